@@ -1,6 +1,6 @@
-"""A long series through a short symmetric kernel, block by block: the sums of `scipy.signal.oaconvolve`, to the bit.
+"""Convolution of a long series with a short symmetric kernel, block by block: `scipy.signal.oaconvolve`, to the bit.
 
-scipy.signal drags in scipy.stats, and takes longer to import than a log to fit.
+Importing scipy.signal also imports scipy.stats, which takes longer than the fit of a log.
 """
 
 from math import ceil, e, log
@@ -59,14 +59,14 @@ def _cheapest_block(overlap: int) -> int:
 
 
 def smooth_length(least: int, primes: tuple[int, ...]) -> int:
-    """Return the least length from there on that is a product of these primes, which are quick to transform.
+    """Return the smallest length, at least that given, whose prime factors are all allowed: it is quick to transform.
 
     Parameters
     ----------
     least : int
         Shortest length that will do [samples].
     primes : tuple of int
-        The factors that are allowed.
+        The allowed factors.
 
     Returns
     -------

@@ -9,11 +9,11 @@ from plant.arrays import Array
 from plant.runs import steps_a_sample
 
 SHORTEST_SAMPLE = 5e-4
-"""Faster logs with pressure are averaged to about this sample time [s]. Ten samples of 0.1 ms in place of five put bulk
-modulus of leaky actuators 0.1 % high, five put it 0.04 % high."""
+"""Logs with pressure at a shorter sample time are averaged to about this one [s]. Means of ten samples of 0.1 ms, in
+place of five, put bulk modulus of leaky actuators 0.1 % high; means of five 0.04 %."""
 
 MOST_LOST = 0.1
-"""Largest share of the samples that are there which may fall into blocks that are not whole [fraction]."""
+"""Largest share of the valid samples that may fall into incomplete blocks [fraction]."""
 
 
 def samples_a_block(sample_time: float, length: float) -> int:
@@ -63,7 +63,7 @@ def odd_block(sample_time: float) -> int:
 
 
 def block_means(values: Array, block: int) -> Array:
-    """Return means over whole blocks; one is missing where any of its samples is.
+    """Return means over whole blocks; missing if any of the block's samples is.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def block_means(values: Array, block: int) -> Array:
     Returns
     -------
     ndarray, shape (n // block, ...)
-        The means; what is left at the end is dropped.
+        The means; the remainder at the end is dropped.
 
     Examples
     --------
@@ -89,9 +89,9 @@ def block_means(values: Array, block: int) -> Array:
 def averaged(log: GreyBoxLog, longest_step: float, block: int | None = None) -> GreyBoxLog:
     """Return a log whose drives and outputs are means over blocks.
 
-    Both sides are filtered alike, which a linear model does not notice. The first sample stays where it is, as a model
-    begins there; its drives are those of a straight line through the first block. A log with gaps in its drives, or one
-    that lacks so many samples that few blocks are whole, is returned as it is.
+    Inputs and outputs are filtered alike, which does not change a linear model. The first sample is not averaged, since
+    a model starts there; its drives are those of a straight line through the first block. The log is returned unchanged
+    if its drives have gaps, or if so many samples are missing that few blocks are whole.
 
     Parameters
     ----------

@@ -1,32 +1,32 @@
 """Limits of residual statistics under white noise alone: wider in a short log than in a long one."""
 
 LARGEST_CHI_SQUARE = 1.2
-"""Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
+"""Mean squared normalised residual above which a model does not explain its log [dimensionless]."""
 
 MORE_THAN_CHANCE = 7.7
-"""Root of the number of samples times how far the mean squared residual is above one by chance in one log of a
-thousand. The variance of white noise over what `measurement_variances` reads off it scatters by 2.45 over that root;
-it is skewed, so that of 400 samples four logs of a thousand are above [dimensionless]."""
+"""Excess of the mean squared residual over one, times the root of the number of samples, that one log in a thousand has
+by chance [dimensionless]. The variance of white noise over what `measurement_variances` finds scatters by 2.45 over
+that root. It is skewed: with 400 samples four logs in a thousand exceed the limit."""
 
 ALIKE_BY_CHANCE = 3.3
-"""The same of the correlation of neighbouring residuals, to either side; that of white noise scatters by one over that
-root (Bartlett 1946) [dimensionless]."""
+"""The same for the correlation of neighbouring residuals, in either direction; that of white noise scatters by one over
+that root (Bartlett 1946) [dimensionless]."""
 
 
 def largest_chi_square(samples: float, least: float = LARGEST_CHI_SQUARE) -> float:
-    """Return the mean squared normalised residual above which a model is said to leave something out.
+    """Return the mean squared normalised residual above which a model does not explain its log.
 
     Parameters
     ----------
     samples : float
-        Residuals that count [count].
+        Number of residuals [count].
     least : float
-        The same of a long log [dimensionless].
+        The limit for a long log [dimensionless].
 
     Returns
     -------
     float
-        The same, or what one log of a thousand exceeds by chance, whichever is more [dimensionless].
+        That limit, or the value that one log in a thousand exceeds by chance, whichever is larger [dimensionless].
 
     Examples
     --------
@@ -42,12 +42,12 @@ def alike_by_chance(samples: float) -> float:
     Parameters
     ----------
     samples : float
-        Residuals that count [count].
+        Number of residuals [count].
 
     Returns
     -------
     float
-        Its size [dimensionless].
+        Its absolute value [dimensionless].
 
     Examples
     --------

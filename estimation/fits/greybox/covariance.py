@@ -10,17 +10,17 @@ from plant.arrays import Array
 from plant.errors import LogWarning
 
 FEW_LAGS = 32
-"""Lags up to which products with an autocovariance are summed lag by lag, and not by a transform [count]."""
+"""Lags up to which products with an autocovariance are summed lag by lag, not by a Fourier transform [count]."""
 
 LARGEST_PART = 100_000
 """Rows of a Jacobian that are factored at a time."""
 
 
 def automatic_lags(residual: Array) -> int:
-    """Return the span of a residual's colour, read off its first-order correlation (Andrews 1991, equation 6.2).
+    """Return the correlation length of residuals, from their first-order correlation (Andrews 1991, equation 6.2).
 
-    A span that is fixed in advance reads slow colour into white residuals, from which the fit has taken what is slow:
-    the deviation then comes out a fifth too small.
+    A fixed length would find slow correlation in white residuals, from which the fit has removed what is slow: the
+    deviation would then be a fifth too small.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ def least_squares_covariance(
     n_used : int
         Samples that are not missing.
     lags : int
-        Span of the autocovariance [samples], 0 for white; see `automatic_lags`.
+        Number of lags of the autocovariance [samples], 0 for white; see `automatic_lags`.
     prior : ndarray, shape (p,)
         Diagonal of P: one over the variance of each parameter before the fit, zero where nothing is known.
     warned : bool
-        Whether the caller is warned where the parameters are not separately determined; else nothing is known there.
+        Whether to warn if the parameters are not separately determined; otherwise they are infinite there.
 
     Returns
     -------
@@ -93,12 +93,12 @@ def least_squares_covariance(
 
 
 def _parts(jacobian: Array) -> list[Array]:
-    """Return a long Jacobian's rows in parts, so that working on one takes little memory."""
+    """Return the rows of a long Jacobian in parts, to save memory."""
     return np.array_split(jacobian, max(1, len(jacobian) // LARGEST_PART))
 
 
 def _autocovariance(residual: Array, n_used: int, lags: int) -> Array:
-    """Return the autocovariance at no lag and up to so many, under a Bartlett window."""
+    """Return the autocovariance from lag zero up to a lag, under a Bartlett window."""
     if lags <= FEW_LAGS:
         shifted = np.array([float(residual[lag:] @ residual[: residual.size - lag]) for lag in range(lags + 1)])
     else:  # a transform that holds the longest shift takes hundreds of lags at the price of a few

@@ -15,38 +15,41 @@ FIRST_RADIUS = 30.0
 """Length of the longest first step, in fitted coordinates: logarithms, or typical sizes [dimensionless]."""
 
 REACH = 30.0
-"""A coordinate by itself steps no farther [dimensionless]: its slope over this is added to its curvature."""
+"""Regularisation: the slope of a coordinate over this is added to its curvature, so it moves no farther alone
+[dimensionless]."""
 
 RIDGE = 1e-6
-"""Added to the curvature: an unknown that is not felt stays where it is [dimensionless]."""
+"""Added to the curvature: an unknown without effect stays where it is [dimensionless]."""
 
 LEAST_GAIN = 1e-3
-"""Half the sum of squares that a further step must promise: less moves no unknown by a twentieth of its deviation."""
+"""Half the sum of squares that a further step must promise: a smaller gain moves no unknown by a twentieth of its
+deviation."""
 
 SHORTEST = 1e-5
-"""A step shorter than this that fails is the last [dimensionless]: the misfit is rougher than its slopes say."""
+"""Length of a failed step after which the search ends [dimensionless]: the cost is rougher than its slopes say."""
 
 SHORTENED = 12
-"""How often at most a step is shortened that promises a loss."""
+"""Most often that a step which promises a loss is shortened."""
 
 POOR, GOOD = 0.25, 0.75
-"""Shares of a step's promise below which the radius shrinks to that part of it, and above which it grows."""
+"""Ratios of actual to promised gain below which the radius shrinks to that part of it, and above which it grows."""
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """The misfit at one point of the search.
+    """Cost and slopes at one point of the search.
 
     Parameters
     ----------
     theta : ndarray, shape (unknowns,)
         Fitted coordinates [dimensionless].
     cost : float
-        Half the sum of squared normalised residuals, outliers counted linearly, and the prior's part [dimensionless].
+        Half the sum of squared normalised residuals, with outliers counted linearly, plus the prior's part
+        [dimensionless].
     gradient : ndarray, shape (unknowns,)
-        Of the cost.
+        Gradient of the cost.
     gram : ndarray, shape (unknowns, unknowns)
-        ``J'J``, each block counted by its weight, and what is known beforehand.
+        ``J'J`` with each block weighted, plus the prior's part.
     """
 
     theta: Array
@@ -65,10 +68,10 @@ def descend(
     wanted: float = np.inf,
     least_share: float = 0.0,
 ) -> Point:
-    """Return the least cost downhill from a start: Gauss-Newton steps within a trust region and bounds.
+    """Return the lowest cost found downhill from a start: Gauss-Newton steps within a trust region and bounds.
 
-    The radius is of the coordinates themselves, mostly logarithms, not of their effects: several unknowns may then move
-    far together where together they change little (Conn, Gould and Toint 2000, Trust-Region Methods, algorithm 6.1.1).
+    The radius limits the coordinates themselves, mostly logarithms, and not their effects: several unknowns may then
+    move far together if their effects cancel (Conn, Gould and Toint 2000, Trust-Region Methods, algorithm 6.1.1).
 
     Parameters
     ----------
@@ -77,7 +80,7 @@ def descend(
     start : ndarray, shape (unknowns,)
         Where to begin [dimensionless].
     evaluations : int
-        How often the cost may be evaluated [evaluations].
+        Most evaluations of the cost [count].
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
     least_gain : float
@@ -85,15 +88,15 @@ def descend(
     radius : float
         Length of the longest first step [dimensionless].
     wanted : float
-        Cost above which the result is of no use [dimensionless]: a search ends where all steps that are left would not
-        bring it down to that, gaining each what the last one did or the next one promises.
+        Cost above which the result is of no use [dimensionless]: a search ends if all remaining steps would not reach
+        it, should each gain what the last one did or the next one promises.
     least_share : float
-        Share of the cost that is left which a further step must promise [fraction].
+        Share of the remaining cost that a further step must promise [fraction].
 
     Returns
     -------
     Point
-        The best point; further steps promise less than the least gain, unless the evaluations were used up.
+        The best point. Further steps promise less than the least gain, unless all evaluations were used.
 
     Examples
     --------
@@ -127,16 +130,16 @@ def descend_together(
     wanted: float = np.inf,
     least_share: float = 0.0,
 ) -> list[Point]:
-    """Return the least cost downhill from each of several starts, all a step at a time; see `descend`.
+    """Return the lowest cost found downhill from each of several starts, with steps in parallel; see `descend`.
 
     Parameters
     ----------
     at_each : callable
-        The cost at each of several coordinates.
+        The costs at several coordinates.
     starts : sequence of ndarray, shape (unknowns,)
         Where to begin [dimensionless].
     evaluations : int
-        How often the cost may be evaluated on the way down from each start [evaluations].
+        Most evaluations of the cost for each start [count].
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
     least_gain : float
@@ -172,7 +175,7 @@ def descend_together(
 
 
 def remembered(at: Callable[[Array], Point]) -> Callable[[Array], Point]:
-    """Return a cost that is worked out once at each point: searches from the same starts begin alike.
+    """Return a cost function that is computed once per point: searches from the same starts share their first points.
 
     Parameters
     ----------
@@ -199,14 +202,14 @@ def search(
     worth: Callable[[Point, float], bool],
     least_share: float,
 ) -> Generator[Array, Point, Point]:
-    """Yield where the cost is to be evaluated, and return the best point; see `descend`.
+    """Yield the coordinates at which the cost is needed, and return the best point; see `descend`.
 
     Parameters
     ----------
     start : ndarray, shape (unknowns,)
         Where to begin [dimensionless].
     evaluations : int
-        How often the cost may be evaluated [evaluations].
+        Most evaluations of the cost [count].
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
     least_gain : float
@@ -214,9 +217,9 @@ def search(
     radius : float
         Length of the longest first step [dimensionless].
     worth : callable
-        ``worth(best, hoped)``: whether to go on, from the cost that all steps that are left may bring the best down to.
+        ``worth(best, hoped)``: whether to go on, given the best point and the cost that the remaining steps may reach.
     least_share : float
-        Share of the cost that is left which a further step must promise [fraction].
+        Share of the remaining cost that a further step must promise [fraction].
 
     Yields
     ------
@@ -252,9 +255,9 @@ def search(
 
 
 def _downhill(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> tuple[Array, float, float]:
-    """Return the best step, by how much it lowers the quadratic model, and the radius that it took.
+    """Return the best step, by how much it lowers the quadratic model, and its radius.
 
-    A bound may bend a long step uphill; a shorter one then goes down.
+    A bound may turn a long step uphill; a shorter one then goes down.
     """
     for _ in range(SHORTENED):
         step = _step(point, curvature, radius, bounds)
@@ -301,5 +304,5 @@ def _shortened(curvature: Array, gradient: Array, radius: float) -> Array:
 
 
 def _length(vector: Array) -> float:
-    """Return a vector's length, to the bit that of `numpy.linalg.norm`, which takes several times as long."""
+    """Return a vector's length, bit for bit as `numpy.linalg.norm`, which takes several times as long."""
     return sqrt(vector.dot(vector))

@@ -14,28 +14,28 @@ from estimation.fits.greybox.sign_constraints import sign_constrained_covariance
 from plant.arrays import Array
 
 NOISE_DOUBT = 0.2
-"""Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
-some percent, and it is white in theory alone [fraction]."""
+"""Relative standard deviation of a driving channel's noise variance that is counted with the slopes [fraction]: the
+variance is known to some percent, and the noise is white in theory only."""
 
 
 @dataclass(frozen=True, eq=False)
 class Information:
     """Information of the slopes at a solution, for the unknowns that have an effect.
 
-    Behind these stand, in the last three, the turns of a slow log's motor that the fit has put to nothing.
+    In the last three arrays these are followed by the turns of a slow log's motor that the fit has reduced to zero.
 
     Parameters
     ----------
     felt : ndarray of int, shape (felt,)
-        Places of the unknowns that are felt.
+        Indices of the unknowns that have an effect.
     errors : ndarray, shape (outputs, blocks)
         Normalised residuals [dimensionless].
     fitted_slopes : ndarray, shape (outputs * blocks, felt)
-        Their derivatives by what is felt [dimensionless].
+        Derivatives of the residuals by these unknowns [dimensionless].
     fitted_bread : ndarray, shape (felt, felt)
-        Inverse of the normal equations of that [dimensionless].
+        Inverse of their normal equations [dimensionless].
     slopes : ndarray, shape (outputs * blocks, felt or more)
-        The derivatives, with those of the turns [dimensionless].
+        Derivatives, followed by those of the turns [dimensionless].
     bread, spread : ndarray, shape (felt or more, felt or more)
         Inverse of the normal equations with the turns, and the covariance by the residuals [dimensionless].
     """
@@ -70,13 +70,13 @@ class Information:
 
 
 def believed(problem: Problem) -> Array:
-    """Return one over the variance of each coordinate that counts in deviations beside what the log tells.
+    """Return one over the prior variance of each coordinate that counts in deviations.
 
     Returns
     -------
     ndarray, shape (unknowns,)
-        What is presumed of an unknown, and how far it may be from where a search ends; zero where nothing is known
-        [dimensionless].
+        Inverse prior variance of each unknown, including how far it may be from where a search ends; zero if nothing is
+        known [dimensionless].
     """
     within = [problem.log.within.get(name, np.inf) ** -2.0 for name in problem.model.unknowns]
     return np.asarray(problem.prior + np.array(within), dtype=np.float64)
@@ -98,9 +98,9 @@ def information(
     slopes : ndarray, shape (outputs * blocks, unknowns)
         Their derivatives [dimensionless].
     felt : ndarray of int, shape (felt,)
-        Places of the unknowns that are felt.
+        Indices of the unknowns that have an effect.
     warned : bool
-        Whether the caller is warned where unknowns are not separately determined.
+        Whether to warn if unknowns are not separately determined.
     """
     fitted = slopes if len(felt) == len(theta) else slopes[:, felt]
     left_over, prior, used = errors.ravel(), believed(problem)[felt], int(np.count_nonzero(errors))
@@ -123,7 +123,7 @@ def covariance_of(
     undisturbed: Array | None,
     moved: Array | None = None,
 ) -> Array:
-    """Return the covariance of the unknowns that have an effect: by noise of the outputs, and of the drives if wanted.
+    """Return the covariance of the unknowns that have an effect: by noise of the outputs, optionally of the drives.
 
     Parameters
     ----------
@@ -132,20 +132,20 @@ def covariance_of(
     point : Point
         Its solution.
     told : Information
-        What the slopes tell there.
+        Information of the slopes there.
     least : ndarray, shape (unknowns,), or None
         Lowest coordinates of its search, see `estimation.fits.greybox.sign_constraints` [dimensionless].
     disturbed : bool
-        Whether the drives' noise counts.
+        Whether drive noise counts.
     undisturbed : ndarray, shape (outputs, blocks), or None
-        Normalised residuals with one model step a sample, where they are known [dimensionless].
+        Normalised residuals with one model step per sample, if known [dimensionless].
     moved : ndarray, shape (outputs * blocks, draws), optional
-        What the drives' noise does to the residuals, see `drive_covariance` [dimensionless].
+        Effect of drive noise on the residuals, see `drive_covariance` [dimensionless].
 
     Returns
     -------
     ndarray, shape (felt, felt)
-        The covariance [dimensionless]; infinite on the diagonal where nothing is known.
+        The covariance [dimensionless]; infinite on the diagonal for undetermined unknowns.
     """
     theta, felt, slopes, bread, spread = point.theta, told.felt, told.slopes, told.bread, told.spread
     tilt = bread[:, : len(felt)] @ problem.untilted(theta, told.errors)[felt]

@@ -1,6 +1,6 @@
 """`drive_covariance(problem, theta, ...)`: the covariance that noise of the driving channels adds to a fit.
 
-It is measured once and acts on all later outputs, so that it is seen by drawing it.
+One noise sample affects all later outputs, so the effect is simulated with random draws.
 """
 
 from functools import lru_cache
@@ -12,10 +12,10 @@ from estimation.fits.greybox.problem import Problem
 from plant.arrays import Array
 
 DRAWS = 16
-"""Realisations of the driving channels' noise; their spread is known to 18 %, of a part that is seldom the larger."""
+"""Realisations of the drive noise. The standard deviation is then known to 18 %; it is seldom the larger part."""
 
 SAMPLES_KEPT = 50_000
-"""Longest log whose draws are kept for the next one [samples]: 13 MB."""
+"""Longest log whose draws are kept for the next log [samples]: 13 MB."""
 
 
 def drive_covariance(
@@ -35,18 +35,18 @@ def drive_covariance(
     theta : ndarray, shape (unknowns,)
         Its solution [dimensionless].
     bread : ndarray, shape (felt, felt)
-        Inverse of ``J'J``, of the unknowns that are felt [dimensionless].
+        Inverse of ``J'J``, for the unknowns that have an effect [dimensionless].
     slopes : ndarray, shape (outputs * blocks, felt)
         ``J``, the derivatives of the normalised residuals [dimensionless].
     undisturbed : ndarray, shape (outputs, blocks), optional
-        The normalised residuals there with one model step a sample; run here if not given [dimensionless].
+        The normalised residuals there with one model step per sample; computed if not given [dimensionless].
     moved : ndarray, shape (outputs * blocks, draws), optional
-        What noise of the drives does to the residuals, see `moved_by_drives`; run here if not given [dimensionless].
+        Effect of drive noise on the residuals, see `moved_by_drives`; computed if not given [dimensionless].
 
     Returns
     -------
     ndarray, shape (felt, felt), or float
-        The covariance [dimensionless]; zero where no driving channel is noisy.
+        The covariance [dimensionless]; zero if no driving channel has noise.
     """
     if not any(spread > 0.0 for spread in problem.log.drive_std):
         return 0.0
@@ -56,9 +56,9 @@ def drive_covariance(
 
 
 def moved_by_drives(problem: Problem, theta: Array, undisturbed: Array | None = None) -> Array:
-    """Return what draws of the driving channels' noise do to the residuals of a log.
+    """Return the effect of random draws of drive noise on the residuals of a log.
 
-    All balances of a log add up what is pumped, so that the draws of one serve the others.
+    All balances of a log integrate the pumped flow, so the draws of one serve for the others.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _noisy_drives(log: GreyBoxLog) -> Array:
 
 @lru_cache(maxsize=1)
 def _kept_draws(samples: int, channels: int) -> Array:
-    """Return draws of white noise, shape (samples, channels, draws), the same for every log: a fit can be repeated.
+    """Return draws of white noise, shape (samples, channels, draws), equal for every log so that fits are repeatable.
 
     They are kept for the other forms of the balance and for the next log of that length.
     """

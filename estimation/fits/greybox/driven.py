@@ -5,8 +5,8 @@ import numpy as np
 from plant.arrays import Array
 
 LEAST_DRIVEN = 0.5
-"""Energy of the drive in a beginning over that of an average part of the log, at least [fraction]; judged. At rest all
-starts leave the same: logs that begin with 8 s of rest led to oil without stiffness, and a search of 20 s."""
+"""Least energy of the drive in the beginning, over that of an average part of the log [fraction]; judged. At rest all
+starts have equal residuals: logs that begin with 8 s of rest led to oil without stiffness, and a search of 20 s."""
 
 
 def driven_samples(drive: Array, samples: int) -> int:
@@ -15,14 +15,14 @@ def driven_samples(drive: Array, samples: int) -> int:
     Parameters
     ----------
     drive : ndarray, shape (n,)
-        What drives the model, such as motor speed; missing samples count for nothing [SI].
+        A drive of the model, such as motor speed; missing samples do not count [SI].
     samples : int
         Least length of the beginning [samples].
 
     Returns
     -------
     int
-        Its length; ``samples`` where that is enough, or the log is no longer.
+        Its length; ``samples`` if that is enough, or the log is no longer.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Output-error fit of a grey-box model: several starts, exact sensitivities, residual tests and covariance.
 
-The variance of an estimate has three parts, told apart: noise of the outputs, noise of the driving channels, and how
-well the rig's own parameters are known. The last two are read off the fit's linear response to them.
+The variance of an estimate has three parts: noise of the outputs, noise of the driving channels, and the uncertainty of
+the rig's own parameters. The last two follow from the fit's linear response to them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,13 +28,14 @@ from plant.arrays import Array
 from plant.spare_processors import each
 
 LEAST_EFFECT = 1.0
-"""An unknown whose unit change moves the prediction by less, in standard deviations of one sample, is not felt."""
+"""Standard deviations of one sample by which a unit change of an unknown must move the prediction; otherwise it has no
+effect."""
 
 SCREENED_SAMPLES = 200_000
-"""A longer log is screened on its beginning."""
+"""Length above which starts are compared on the beginning of a log."""
 
 LENGTHENED = 8
-"""Factor between the beginnings of a long log on which a fit is brought near."""
+"""Ratio of successive beginnings of a long log on which the fit approaches the optimum."""
 
 NEAR_ENOUGH = 0.01
 """Half the sum of squares that a further step must promise while model steps are long [dimensionless]."""
@@ -53,37 +54,37 @@ class GreyBoxFit:
     values : Mapping[str, float]
         The unknowns in SI.
     std : Mapping[str, float]
-        Standard deviation of each from noise alone, in SI; infinite where the log does not determine it.
+        Standard deviation of each due to noise alone, in SI; infinite if the log does not determine it.
     cost : float
         Half the sum of squared normalised residuals, outliers counted linearly [dimensionless].
     chi_square : tuple of float
-        Mean squared normalised residual of each output; 1 where the model explains the log [dimensionless].
+        Mean squared normalised residual of each output; 1 if the model explains the log [dimensionless].
     autocorrelation : tuple of float
-        Of neighbouring normalised residuals; 0 where the model explains the log [dimensionless].
+        Correlation of neighbouring normalised residuals; 0 if the model explains the log [dimensionless].
     rig_slopes : Mapping[str, Mapping[str, float]]
-        By uncertain entry of the rig: by how much each unknown would differ, in SI, per relative change of the entry.
+        By uncertain entry of the rig: change of each unknown, in SI, per relative change of the entry.
     late : Mapping[str, tuple of float]
-        By driving channel whose timing is asked: the time by which it seems to come late [s], and what bringing it
-        forward would gain in log-likelihood, to first order [dimensionless].
+        By driving channel whose timing is tested: its apparent delay [s], and the first-order gain in log-likelihood of
+        removing it [dimensionless].
     play : ShownPlay
-        What the residuals say of a play of the encoder, where a fit was asked.
+        What the residuals show of an encoder's play, if a fit tests for it.
     slopes : ndarray, shape (outputs * blocks, unknowns)
         Derivatives of the normalised residuals there [dimensionless].
     covariance : ndarray, shape (unknowns, unknowns)
-        Of the fitted coordinates from noise alone, with what is presumed; infinite variances where nothing is known
-        [dimensionless].
+        Covariance of the fitted coordinates due to noise alone, with the prior; infinite variances for undetermined
+        unknowns [dimensionless].
     teeth : Mapping[int, ShownRipple]
-        What they say of the pump's teeth, by their count in a turn, where a fit was asked.
+        What the residuals show of the pump's ripple, by tooth count, if a fit tests for it.
     speed_offset : ShownOffset
-        What they say of an offset of the logged speed, the same.
+        What they show of an offset of the logged speed, likewise.
     small_teeth : tuple of Mapping[str, float]
-        By how much teeth that are not taken up move each coordinate, and add to its variance [dimensionless].
+        By how much ripple that is not fitted moves each coordinate, and adds to its variance [dimensionless].
     noise_shift : tuple of Mapping[str, float]
-        The same of noise of motor speed [dimensionless], see `noise_shift`.
+        The same for noise of motor speed [dimensionless], see `noise_shift`.
     seen : float
-        Residuals of the first output that count; without end where they are not counted [count].
+        Number of residuals of the first output; infinite if they are not counted [count].
     steps : ndarray of int, shape (n,), optional
-        Fewer model steps than the log's that are as exact near it, see `sparing_steps` [count].
+        Fewer model steps than the log's that are equally exact near the solution, see `sparing_steps` [count].
     """
 
     model: GreyBoxModel
@@ -113,13 +114,13 @@ class Search:
     Parameters
     ----------
     screened : int
-        A longer log is screened on its beginning [samples].
+        Length above which starts are compared on the beginning of a log [samples].
     screening : int
-        Evaluations of the model that every start is given.
+        Evaluations of the model per start.
     finalists : int
-        Starts that are carried on.
+        Starts that are searched further.
     evaluations : int
-        Evaluations of the model that a finalist may take.
+        Most evaluations of the model per finalist.
     near_enough : float
         Half the sum of squares that a further step must promise [dimensionless].
     """
@@ -132,7 +133,7 @@ class Search:
 
 
 DEFAULT_SEARCH = Search()
-"""Enough where few unknowns act alone."""
+"""Sufficient for a few unknowns whose effects are separate."""
 
 
 def fit_greybox(
@@ -153,7 +154,7 @@ def fit_greybox(
     starts : sequence of Mapping[str, float]
         First guesses of the unknowns in SI.
     search : Search
-        How they are brought to the optimum.
+        Options of the search.
     """
     problem, guesses = Problem(model, log), [model.theta(start) for start in starts]
     bounds = search_bounds(model, guesses, {})
@@ -171,7 +172,7 @@ def roughly(
     hopeful: bool = False,
     screen: Callable[[Array], Point] | None = None,
 ) -> Point:
-    """Return the least cost that is found from several starts, with one model step a sample.
+    """Return the lowest cost from several starts, with one model step per sample.
 
     Parameters
     ----------
@@ -180,15 +181,15 @@ def roughly(
     guesses : sequence of ndarray, shape (unknowns,)
         The starts [dimensionless].
     search : Search
-        How they are brought to the optimum.
+        Options of the search.
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
     wanted : float
         Cost above which the result is of no use [dimensionless], see `estimation.fits.greybox.descent.descend`.
     hopeful : bool
-        Whether several starts are followed only if one explains the beginning; else the cost is infinite.
+        Whether several starts are followed only if one explains the beginning; otherwise the cost is infinite.
     screen : callable, optional
-        The misfit on the beginning of a log that is longer, if another search has asked for some of it.
+        Cost on the beginning of a longer log, if another search has computed part of it.
 
     Returns
     -------
@@ -222,7 +223,7 @@ def roughly(
 
 
 def explained(problem: Problem, point: Point) -> bool:
-    """Return whether a point of the search explains a log so well that no better one is sought.
+    """Return whether a point of the search explains a log so well that no better one is needed.
 
     Parameters
     ----------
@@ -265,15 +266,15 @@ def concluded(
     least : ndarray, shape (unknowns,), optional
         Lowest coordinates of its search, see `estimation.fits.greybox.sign_constraints` [dimensionless].
     disturbed : bool
-        Whether the deviations hold the drives' noise too.
+        Whether the deviations include drive noise.
     asked : bool
-        Whether it is told, of a fit so disturbed, what the rig's doubts would change and which drives come late.
+        Whether such a fit also includes the response to the rig's uncertainties and the timing of drives.
     warned : bool
-        Whether the caller is warned where unknowns are not separately determined; else their deviations are infinite.
+        Whether to warn if unknowns are not separately determined; otherwise their deviations are infinite.
     steps : ndarray of int, shape (n,), optional
-        See `GreyBoxFit`; answers to the rig's doubts are as exact with them.
+        See `GreyBoxFit`; responses to the rig's uncertainties are as exact with them.
     moved_by_noise : ndarray, shape (outputs * blocks, draws), optional
-        What the drives' noise does to the residuals, where another balance has asked for it [dimensionless].
+        Effect of drive noise on the residuals, if computed for another balance [dimensionless].
     """
     model, theta = problem.model, point.theta
     errors, all_slopes = problem.linearised(theta)
@@ -333,7 +334,7 @@ def concluded(
 def _late_and_play(
     problem: Problem, known_of: Information, moved: Sequence[Array], told: NDArray[np.bool_]
 ) -> tuple[dict[str, tuple[float, float]], ShownPlay]:
-    """Return which drives seem to come late, and what the residuals say of a play of the encoder."""
+    """Return the apparent delays of drives, and what the residuals show of an encoder's play."""
     timed, left_over, at_play = problem.log.timed, known_of.left_over, moved[len(problem.log.timed) :]
     left = left_by(known_of.fitted_slopes, known_of.fitted_bread, told)
     names = [problem.model.unknowns[place] for place in known_of.felt]
@@ -342,7 +343,7 @@ def _late_and_play(
 
 
 def _statistics(errors: Array) -> tuple[tuple[float, ...], tuple[float, ...], float]:
-    """Return mean square and autocorrelation of each output's residuals, and how many of the first one count."""
+    """Return mean square and autocorrelation of each output's residuals, and the number of residuals of the first."""
     squares, seen = np.einsum("ij,ij->i", errors, errors), np.maximum(np.count_nonzero(errors, axis=1), 1)
     autocorrelation = np.einsum("ij,ij->i", errors[:, 1:], errors[:, :-1]) / np.maximum(squares, np.finfo(float).tiny)
     return tuple(map(float, squares / seen)), tuple(map(float, autocorrelation)), float(seen[0])

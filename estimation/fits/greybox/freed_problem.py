@@ -1,7 +1,7 @@
-"""The least-squares problem of a model in which any of the parameters may be free: derivatives by finite differences.
+"""The least-squares problem of a model in which any parameter may be free: derivatives by finite differences.
 
-`Problem` has exact sensitivities written into its kernel, which takes a kernel for each set of unknowns. Here one
-kernel without unknowns serves every hypothesis.
+`Problem` has exact sensitivities in its kernel, so each set of unknowns needs its own kernel. Here one kernel without
+unknowns serves every hypothesis.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ from plant.solvers.steps import parameter_names
 from plant.spare_processors import each
 
 MOST_SIDE_BY_SIDE = 200_000
-"""Longest log whose drives are copied once for each run side by side [samples]: some 30 MB."""
+"""Longest log whose drives are copied for each run side by side [samples]: some 30 MB."""
 
 MOST_REMEMBERED = 100_000
 """Blocks of the longest log whose last slopes are kept [count]: some 15 MB."""
@@ -51,7 +51,7 @@ class FreedProblem(Problem):
     """
 
     near = 0.0
-    """How far a run moves all residuals from a known one, up to which they are taken along its slopes [deviations]."""
+    """Change of all residuals from a known point up to which its slopes give them without a run [deviations]."""
 
     def __init__(
         self,
@@ -98,7 +98,7 @@ class FreedProblem(Problem):
         return FreedProblem(self._bare, log, self.model.unknowns, self._sizes, self._ridge)
 
     def at_each(self, thetas: Sequence[Array]) -> list[Point]:
-        """Return the misfit at several points, which is quicker than one after another.
+        """Return the cost and slopes at several points, faster than one after another.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class FreedProblem(Problem):
         return [self._point(at, *weighed(*self._slopes(part, at))) for at, part in zip(thetas, parts, strict=True)]
 
     def at_beside(self, theta: Array, known: Mapping[str, Array]) -> Point:
-        """Return the misfit at a point at which the slopes of some unknowns are known, for a fit has found them.
+        """Return the cost and slopes at a point at which the slopes of some unknowns are known from a fit.
 
         Parameters
         ----------
@@ -155,12 +155,12 @@ class FreedProblem(Problem):
         thetas : sequence of ndarray, shape (unknowns,)
             Fitted coordinates [dimensionless].
         lanes : int
-            Points side by side: `MANY`, or `LANES` where a search has that kernel and few points need no other.
+            Points side by side: `MANY`, or `LANES` if a search already uses that kernel and there are few points.
 
         Returns
         -------
         ndarray, shape (points,)
-            As of `Problem.at` [dimensionless]; noise of driving channels counts as at the first point.
+            As of `Problem.at` [dimensionless]; drive noise is counted as at the first point.
         """
         points = np.array(thetas)
         groups = self._in_groups(self._rows(points, self.log.parameters), None, self._variances(points[0]), lanes)
@@ -261,7 +261,7 @@ class FreedProblem(Problem):
         return weighed(here, columns)
 
     def _remembered(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
-        """Return the residuals and slopes at one of the last two points, or so near to one that slopes lead there."""
+        """Return the residuals and slopes at one of the last two points, or so near to one that its slopes suffice."""
         last = [(theta - one[0], *one[2:]) for one in self._last if np.array_equal(one[1], variance)]
         for away, here, columns in last:
             if not np.any(away):
@@ -275,21 +275,21 @@ class FreedProblem(Problem):
         return None, None
 
     def _nudged(self, theta: Array) -> Array:
-        """Return a point and its neighbours, a row each; one that is on a ridge lies along it."""
+        """Return a point and its neighbours, one row each; those on a ridge lie along it."""
         points = theta + self._nudge * np.eye(len(theta) + 1, len(theta), -1)
         if self._placed is not None:
             self._placed.turn(points, theta, self._nudge)
         return points
 
     def _slopes(self, found: Array, theta: Array) -> tuple[Array, Array]:
-        """Return the residuals at a point and their slopes, of those at `_nudged`."""
+        """Return the residuals at a point and their slopes, from those at `_nudged`."""
         here, slopes = self._differences(found, len(theta))
         if self._placed is not None:
             self._placed.turn_back(slopes, theta)
         return here, slopes
 
     def _differences(self, found: Array, unknowns: int) -> tuple[Array, Array]:
-        """Return the residuals at a point and their slopes, of the residuals there and at its neighbours."""
+        """Return the residuals at a point and their slopes, from the residuals there and at its neighbours."""
         here, slopes = np.empty(found.shape[:2]), np.empty((*found.shape[:2], unknowns))
         fill_differences(found, self._nudge, here, slopes)
         return here, slopes
@@ -339,7 +339,7 @@ class FreedProblem(Problem):
 
 
 def _by_itself(model: GreyBoxModel, *given: Any) -> tuple[float, Array, Array]:
-    """Run a model by itself: most problems run it side by side alone, and need not load this kernel."""
+    """Run a model alone: most problems only run it side by side, and need not load this kernel."""
     return compile_kernel(model)(*given)
 
 

@@ -14,18 +14,19 @@ def gains_beside(free: Array, along: Array, widths: Sequence[int], prices: Seque
     Parameters
     ----------
     free : ndarray, shape (blocks, columns)
-        Changes of the normalised residuals by each column, less what the unknowns take up of them [dimensionless].
+        Changes of the normalised residuals by each column, without the part that the unknowns absorb [dimensionless].
     along : ndarray, shape (columns,)
-        What the residuals ask for of each: minus their scalar product with it [dimensionless].
+        Minus the scalar product of the residuals with each column [dimensionless].
     widths : sequence of int
-        Columns of each explanation, in turn [count]; more are passed over.
+        Columns of each explanation, in turn [count]; further columns are ignored.
     prices : sequence of float
-        What it costs to have searched for each, in log-likelihood [dimensionless].
+        Cost of the search for each, in log-likelihood [dimensionless].
 
     Returns
     -------
     list of float
-        Of each, less its price [dimensionless]: an image of the likeliest gains nothing, and neither does that itself.
+        Gain of each, less its price [dimensionless]: an image of the likeliest gains nothing, nor does the likeliest
+        itself.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """The loop that runs a grey-box model side by side along a log with gaps in its drives, as a plain function.
 
-`estimation.fits.greybox.side_by_side` pastes it into a kernel file, beside `side_by_side_loops`. Each set has a
-covariance of its own of what a gap leaves open, as in `estimation.fits.greybox.loops.run`.
+`estimation.fits.greybox.side_by_side` pastes it into a kernel file, beside `side_by_side_loops`. Each parameter set has
+its own covariance of what a gap leaves unknown, as in `estimation.fits.greybox.loops.run`.
 """
 
 import math
@@ -15,19 +15,19 @@ from plant.solvers.fixed_step_loops import Operation, lay, share
 
 
 class GapKernel(SideBySideKernel, Protocol):
-    """Kernel interface of a model that bears gaps, beyond that of one without.
+    """Kernel interface of a model that allows gaps, beyond that of one without.
 
-    Behind all other numbers stand, `LANES` each, derivatives of the first `JUMPS` states by those that the last step
-    began from, and those of each output by them.
+    The other numbers are followed by derivatives, `LANES` each: those of the first `JUMPS` states by their values
+    before the last step, and those of each output by them.
 
     Attributes
     ----------
     JUMP, JUMPS : tuple of float, int
         `GreyBoxModel.jump`, and its length.
     SLOPES : int
-        Place of the first of these derivatives.
+        Index of the first of these derivatives.
     SETTLED : float
-        Variance that a gap has left open, below which it is closed [fraction of the sensor's].
+        Variance left by a gap below which the gap is closed [fraction of the sensor's].
     open_step_at : callable
         The step with these derivatives.
     """
@@ -61,7 +61,7 @@ def residuals_across_gaps(
     parameters : ndarray, shape (lanes, parameters)
         Parameter rows.
     drives : ndarray, shape (n, drives, one or lanes)
-        Drives at the samples [their SI units], linear between; of all sets alike, or of each.
+        Drives at the samples [their SI units], linear between; common to all sets, or one each.
     measured : ndarray, shape (n, outputs)
         Outputs; NaN is missing.
     sample_time : float
@@ -73,11 +73,11 @@ def residuals_across_gaps(
     variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
         As of `side_by_side_loops.residuals_side_by_side` [SI squared].
     kept : float
-        What is left of a random walk's level after a block [fraction].
+        What remains of a random walk's level after a block [fraction].
     gaps : ndarray, shape (gaps, 3)
-        First and last sample that a gap in the drives acts on, and the variance of `GreyBoxModel.jump` over each.
+        First and last sample that a gap in the drives affects, and the variance of `GreyBoxModel.jump` over each.
     errors : ndarray, shape (outputs, blocks, lanes)
-        Room for the residuals; those of missing blocks are left as they are.
+        Output array for the residuals; those of missing blocks are not changed.
     """
     room = np.zeros(kernel.NUMBERS + 8)  # what is at no time set, the share of a step at its start, is zero
     work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
@@ -136,7 +136,7 @@ def residuals_across_gaps(
 
 
 def carry_each(kernel: GapKernel, work: Array, covariance: Array, reach: Array) -> None:
-    """Take the covariance of what a gap has left open over the last step, of each set: ``P' = F P F'``.
+    """Propagate the covariance that a gap has left over the last step, for each set: ``P' = F P F'``.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def carry_each(kernel: GapKernel, work: Array, covariance: Array, reach: Array) 
     covariance : ndarray, shape (jumps * jumps, lanes)
         The covariances, row by row [1].
     reach : ndarray, shape (jumps * jumps, lanes)
-        Room for ``F P``.
+        Working array for ``F P``.
     """
     size, lanes, slopes = kernel.JUMPS, kernel.LANES, kernel.SLOPES
     for i in range(size):
@@ -169,27 +169,27 @@ def carry_each(kernel: GapKernel, work: Array, covariance: Array, reach: Array) 
 def correct_each(
     kernel: GapKernel, work: Array, output: int, covariance: Array, reach: Array, weight: Array, variance: float
 ) -> bool:
-    """Take a sample into the state of each set that a gap has left open; see `estimation.fits.greybox.loops.correct`.
+    """Correct each set's state, left unknown by a gap, by a sample; see `estimation.fits.greybox.loops.correct`.
 
     Parameters
     ----------
     work : ndarray, shape (numbers,)
-        All numbers; in the output's place stands what is predicted less what is measured [SI].
+        All numbers; the output's place holds prediction minus measurement [SI].
     output : int
-        Place of the output.
+        Index of the output.
     covariance : ndarray, shape (jumps * jumps, lanes)
-        The covariances, row by row; that of a gap which is closed becomes zero [1].
+        The covariances, row by row; that of a closed gap becomes zero [1].
     reach : ndarray, shape (jumps * jumps, lanes)
-        Room for the gains.
+        Working array for the gains.
     weight : ndarray, shape (lanes,)
-        Room for what the sample counts of each set [fraction].
+        Output array for the weight of the sample in each set [fraction].
     variance : float
         Variance of the sensor's noise [SI squared].
 
     Returns
     -------
     bool
-        Whether a gap is open still, in any set.
+        Whether a gap is still open in any set.
     """
     size, lanes, loose = kernel.JUMPS, kernel.LANES, False
     shown = (kernel.WIDTH + 2 * kernel.DRIVES + output) * lanes

@@ -1,10 +1,9 @@
 """Unknown motor speed between the samples of a slow log (intersample behaviour), as noise of the pressure.
 
-A slow log says how fast the motor turns at its samples, not in between. Where speed turns suddenly the oil that is
-pumped by straight lines is off in two ways. A command that came at an unknown time leaves a volume open, which leaks
-off: pressure walks, and comes back as slowly as leakage lets it. And a motor that nears its new speed over a sample or
-two is off by the same course each time, which comes back by itself: the samples beside a turn are off, those after it
-are not.
+A slow log has the motor speed at its samples, but not between them. If speed changes suddenly, the volume pumped by
+straight lines is wrong in two ways. A command at an unknown time leaves a volume error that leaks off: pressure makes a
+random step and returns as slowly as leakage lets it. And a motor that approaches its new speed over a sample or two has
+the same error each time, which cancels by itself: the samples next to a turn are off, those after it are not.
 """
 
 from collections.abc import Iterable
@@ -20,41 +19,40 @@ from estimation.fits.greybox.problem import Problem
 from plant.solvers.steps import parameter_names
 
 SLOW = 1.5e-3
-"""Sample time from which the motor's course between samples counts [s]; judged: to 1 ms its lead takes it up."""
+"""Sample time from which the motor's course between samples matters [s]; judged: up to 1 ms its lead absorbs it."""
 
 OWN_NOISE = 4.0
-"""Deviations of speed's noise beyond which a second difference is a turn of the motor [dimensionless]."""
+"""Deviations of the speed noise beyond which a second difference is a turn of the motor [dimensionless]."""
 
 MAY_VANISH = ("leakage_coefficient", "flow_bias")
-"""Unknowns that a slow log may put to nothing, and so far from what they are that bulk modulus follows."""
+"""Unknowns that the fit of a slow log may reduce to zero, so far from the truth that bulk modulus follows."""
 
 NUDGE = 1e-2
-"""Change by which an answer is read off: of those unknowns as a share of the rig's value, of what is added to motor
-speed as a share of that [fraction]."""
+"""Finite-difference step: for those unknowns as a share of the rig's value, for motor speed as a share of the change
+[fraction]."""
 
 
 IN_VOLUME = 0.5 * np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-"""Oil that the three of `ways` pump in a sample, by the rise in the sample before, after, and two before; the motor's
-lead takes up what goes with the sample's own rise."""
+"""Oil that the three of `ways` pump in a sample, per rise in the sample before, after, and two before; the motor's lead
+absorbs what is proportional to the sample's own rise."""
 
 USUAL = 0.1
-"""Standard deviation of each before the log is seen, over a sample time [fraction]: 0.02 to 0.15 for motors of 2 to 6
-ms at 100 to 500 Hz."""
+"""Prior standard deviation of each, over a sample time [fraction]: 0.02 to 0.15 for motors of 2 to 6 ms at 100 to 500
+Hz."""
 
 
 @dataclass(frozen=True, eq=False)
 class IntersampleDoubt:
-    """Doubt about the motor's speed between samples.
+    """Uncertainty of motor speed between samples.
 
     Parameters
     ----------
     turns : ndarray, shape (n,)
-        What pressure would rise by, did the largest turn of the speed beside it add to the oil pumped up to a sample
-        [Pa].
+        Rise of pressure up to a sample, if the largest change of speed beside it were added to the pumped volume [Pa].
     staying, passing : float
-        Standard deviation of what stays, and of what comes back, over that [fraction].
+        Standard deviation of the lasting part and of the returning part, over that [fraction].
     kept : float
-        What leakage leaves of it by the next sample [fraction].
+        What leakage leaves of the lasting part by the next sample [fraction].
     """
 
     turns: Array
@@ -63,14 +61,14 @@ class IntersampleDoubt:
     kept: float = 1.0
 
     def passes(self, variance: float) -> float:
-        """Return the number of bends of motor speed that noise does not hide.
+        """Return the number of bends of motor speed that exceed the noise.
 
-        Each turn is felt in the time before it and in that after it.
+        Each turn affects the interval before it and the one after it.
 
         Parameters
         ----------
         variance : float
-            Of the pressure's noise, a sample [Pa squared].
+            Variance of the pressure noise per sample [Pa squared].
 
         Returns
         -------
@@ -86,12 +84,12 @@ class IntersampleDoubt:
         Parameters
         ----------
         samples, block : int
-            Samples of the log's beginning that is asked, and of a block [count].
+            Samples of the log's beginning, and of a block [count].
 
         Returns
         -------
         ndarray, shape (blocks - 1,)
-            Of a single block one zero [Pa squared].
+            Zero for a single block [Pa squared].
 
         Examples
         --------
@@ -102,12 +100,12 @@ class IntersampleDoubt:
         return np.add.reduceat((self.staying * self.turns[:samples]) ** 2, begins) if begins.size else np.zeros(1)
 
     def beside(self, samples: int, block: int) -> Array:
-        """Return the variance of each block's mean that comes back.
+        """Return the variance of each block's mean due to the returning part.
 
         Parameters
         ----------
         samples, block : int
-            As of `walk`.
+            As in `walk`.
 
         Returns
         -------
@@ -129,7 +127,7 @@ def _begins(samples: int, block: int) -> IntArray:
 
 
 def turns(log: GreyBoxLog) -> Array:
-    """Return the bend of motor speed at either end of the interval up to each sample, the larger of both.
+    """Return the bend of motor speed at either end of the interval before each sample, the larger of both.
 
     Parameters
     ----------
@@ -139,7 +137,7 @@ def turns(log: GreyBoxLog) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        Second differences that are not steady, less what its noise makes of them [rad/s].
+        Unsteady second differences, less what noise contributes [rad/s].
     """
     speed = log.drives[:, 0]
     bend = np.diff(speed, n=2, prepend=speed[0], append=speed[-1])
@@ -155,14 +153,14 @@ def answered(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:
     problem : Problem
         The problem, motor speed its first drive.
     theta : ndarray, shape (unknowns,)
-        Where it is asked [dimensionless].
+        Where it is computed [dimensionless].
     speeds : iterable of ndarray, each of shape (n,)
-        What is added [rad/s].
+        Changes of speed [rad/s].
 
     Returns
     -------
     ndarray, shape (outputs * blocks, several)
-        Residuals, over what is added [dimensionless].
+        Residuals per unit of the change [dimensionless].
     """
     drives = problem.log.drives
     others = [np.column_stack([NUDGE * one, np.zeros_like(drives[:, 1:])]) for one in speeds]
@@ -171,7 +169,7 @@ def answered(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:
 
 
 def ways(speed: Array) -> Array:
-    """Return the rises of speed near each sample with which the oil pumped up to it may vary.
+    """Return the rises of speed near each sample on which the oil pumped up to it may depend.
 
     Parameters
     ----------
@@ -193,10 +191,10 @@ def ways(speed: Array) -> Array:
 
 
 def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: Array) -> Array:
-    """Return the covariance of unknowns from a motor that bends its course alike at each turn.
+    """Return the covariance of unknowns due to a motor that bends its course alike at each turn.
 
-    It filters the samples, by weights that are not fitted. What the residuals say of them, and what they leave open, is
-    what the unknowns may be off by.
+    Such a motor filters the samples with weights that are not fitted. The residuals determine these weights in part;
+    the result is the effect of what remains.
 
     Parameters
     ----------
@@ -207,7 +205,7 @@ def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: 
     errors : ndarray, shape (outputs, blocks)
         The normalised residuals there [dimensionless].
     bread : ndarray, shape (felt, felt)
-        Inverse of the normal equations of the unknowns that are felt [dimensionless].
+        Inverse of the normal equations of the unknowns that have an effect [dimensionless].
     slopes : ndarray, shape (outputs * blocks, felt)
         Derivatives of the residuals by them [dimensionless].
 
@@ -225,9 +223,9 @@ def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: 
 
 
 def vanished(problem: Problem, theta: Array, errors: Array, felt: NDArray[np.intp]) -> list[Array]:
-    """Return the derivatives by unknowns that a fit has driven to zero, where their logarithms have no effect.
+    """Return the derivatives by unknowns that a fit has reduced to zero, where their logarithms have no effect.
 
-    Where they are left out, bulk modulus seems as sure as if a pump without any loss were known.
+    Without them, bulk modulus would seem as certain as if the pump were known to have no loss.
 
     Parameters
     ----------
@@ -238,12 +236,12 @@ def vanished(problem: Problem, theta: Array, errors: Array, felt: NDArray[np.int
     errors : ndarray, shape (outputs, blocks)
         The normalised residuals there [dimensionless].
     felt : ndarray of int, shape (felt,)
-        Places of the unknowns that are felt.
+        Indices of the unknowns that have an effect.
 
     Returns
     -------
     list of ndarray, each of shape (outputs * blocks,)
-        By the rig's value of each [dimensionless].
+        Per relative change of the rig's value of each [dimensionless].
     """
     rig = dict(zip(parameter_names(problem.model.parameters), problem.log.parameters.tolist(), strict=True))
     found: list[Array] = []

@@ -1,4 +1,4 @@
-"""`likeliest(problem, theta, course)`: how large the intersample doubt of a slow log is."""
+"""`likeliest(problem, theta, course)`: size of the intersample uncertainty of a slow log."""
 
 from dataclasses import replace
 
@@ -9,28 +9,28 @@ from estimation.fits.greybox.intersample_doubt import IntersampleDoubt, answered
 from estimation.fits.greybox.problem import Problem
 
 SHARES = np.array([0.5, 0.7, 1.0, 1.4])
-"""Variances of the pressure's noise that are tried, over what was read off the log [fraction]: in a slow log the latter
-holds some of what the actuator does."""
+"""Variances of the pressure noise that are tried, over that read from the log [fraction]: in a slow log the latter
+includes some of the actuator's motion."""
 
 TRIED = np.array([0.0, *np.geomspace(0.005, 0.28, 7)])
-"""What is tried of what is open of the oil pumped in a sample, over what a turn of the speed could make of it
-[fraction]: a speed that jumps at an unknown time leaves ``12^-1/2`` open."""
+"""Uncertainties of the pumped volume that are tried, over the largest effect of a turn of the speed [fraction]: a speed
+that jumps at an unknown time has ``12^-1/2``."""
 
 LONGEST = 5000
-"""Blocks of a log's beginning that are asked what is open [count]."""
+"""Blocks of a log's beginning on which it is determined [count]."""
 
 AT_ONCE = 64
 """Blocks whose products are summed at a time [count]."""
 
 ALIKE = 1e-9
-"""Power of a combination of columns of length one below which it tells nothing [dimensionless]: rounding is some 1e-15
-of it."""
+"""Squared length of a combination of unit columns below which it has no information [dimensionless]: rounding is about
+1e-15."""
 
 
 def likeliest(problem: Problem, theta: Array, course: IntersampleDoubt) -> tuple[float, float, float]:
-    """Return the most likely lasting and returning parts of the doubt, under any of `SHARES` of the pressure's noise.
+    """Return the likeliest lasting and returning parts of the uncertainty, with any of `SHARES` of the pressure noise.
 
-    In a log that the form does not explain what is off may not leak: whether it does is asked too.
+    In a log that the form does not explain, the error may not leak off: whether it does is tested too.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ def likeliest(problem: Problem, theta: Array, course: IntersampleDoubt) -> tuple
     theta : ndarray, shape (unknowns,)
         Its solution [dimensionless].
     course : IntersampleDoubt
-        Its turns count, and what leakage keeps.
+        Its turns are used, and what leakage keeps.
 
     Returns
     -------
     tuple of float
-        What stays, what comes back, and what is kept, see `IntersampleDoubt` [fraction].
+        Lasting part, returning part, and what is kept, see `IntersampleDoubt` [fraction].
     """
     log, unit = problem.log, replace(course, staying=1.0, passing=1.0)
     (noise,) = log.noise
@@ -63,29 +63,30 @@ def likeliest(problem: Problem, theta: Array, course: IntersampleDoubt) -> tuple
 def restricted(
     left: Array, freed: Array, level: float, walk: Array, beside: Array, kept: float = 1.0
 ) -> tuple[float, float, float]:
-    """Return the likeliest noise of residuals from which a fit has taken what its unknowns could.
+    """Return the likeliest noise of residuals from which a fit has removed what its unknowns could absorb.
 
-    A log under steps has some twenty turns, of which ten unknowns take up half. To the likelihood of what is left those
-    were quiet; the restricted one counts what was taken (Patterson and Thompson 1971, Biometrika 58).
+    A log under steps has some twenty turns, and ten unknowns absorb half of them. The likelihood of the residuals alone
+    would count those as quiet; the restricted likelihood corrects for this (Patterson and Thompson 1971, Biometrika
+    58).
 
     Parameters
     ----------
     left : ndarray, shape (blocks,)
         Residuals, 0 where missing [Pa].
     freed : ndarray, shape (blocks, columns)
-        What was taken out of them: columns of length one at right angles [dimensionless].
+        What was removed from them: orthonormal columns [dimensionless].
     level : float
         Variance of the pressure's noise in a block [Pa squared].
     walk, beside : ndarray, shape (blocks,)
-        Variance that is gained up to each block, and that comes back, where each is open in full [Pa squared].
+        Variance gained up to each block, and variance that returns, each at its full size [Pa squared].
     kept : float
-        What is left by the next block of what stays [fraction].
+        What remains of the lasting part by the next block [fraction].
 
     Returns
     -------
     tuple of float
-        What stays and what comes back, see `IntersampleDoubt` [fraction], and twice the negative log-likelihood, but
-        for a constant.
+        Lasting and returning part, see `IntersampleDoubt` [fraction], and twice the negative log-likelihood, up to a
+        constant.
     """
     share, staying, passing = (one.ravel() for one in np.meshgrid(SHARES, TRIED, TRIED, indexing="ij"))
     white, walks, passes = share * level, staying**2, passing**2
@@ -114,17 +115,17 @@ def restricted(
 
 
 def _squares(whitened: list[Array]) -> Array:
-    """Return sums of products of what was whitened, shape (noises, columns, columns), and forget it."""
+    """Return sums of products of whitened columns, shape (noises, columns, columns), and reset them."""
     parts = np.stack(whitened, axis=1)
     whitened.clear()
     return np.asarray(parts.transpose(0, 2, 1) @ parts, dtype=np.float64)
 
 
 def _without_offset(problem: Problem, theta: Array, most: int) -> tuple[Array, Array]:
-    """Return residuals of the first blocks less what an offset of motor speed and the unknowns make of them.
+    """Return residuals of the first blocks without the effects of an offset of motor speed and of the unknowns.
 
-    An offset leaves pressure off for long. A walk of the pressure would take it up, and none would be found. With them,
-    as columns of length one that are at right angles, is what was taken out.
+    An offset leaves a lasting pressure error. A random walk would absorb it, and no offset would be found. Also
+    returned is what was removed, as orthonormal columns.
     """
     errors, slopes = problem.linearised(theta)
     columns = np.column_stack([answered(problem, theta, [np.ones(len(problem.log.drives))]), slopes])

@@ -1,4 +1,4 @@
-"""`straightened(speed)`: motor speed whose straight lines deliver the volume that the motor does."""
+"""`straightened(speed)`: motor speed whose straight lines deliver the volume that the motor delivers."""
 
 import numpy as np
 
@@ -11,10 +11,10 @@ ALIKE = 0.5
 def straightened(speed: Array, *, slow: bool = False) -> Array:
     """Return motor speed corrected so that straight lines between samples give the right pumped volume.
 
-    A motor that nears its new speed bends its course between samples, and the trapezoidal rule is off by a twelfth of
-    the second difference (Euler and Maclaurin). Where a motor starts, at its largest acceleration, the course has a
-    corner, and no bend that neighbours share: so the median of three second differences counts. It passes a steady bend
-    whole, and a corner at a sample not at all.
+    A motor that approaches its new speed follows a curve between samples, and the error of the trapezoidal rule is a
+    twelfth of the second difference (Euler and Maclaurin). Where a motor starts, at its largest acceleration, the
+    course has a corner, without a bend that neighbours share. So the median of three second differences is used: it
+    keeps a steady bend and ignores a corner at a sample.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def _bends(speed: Array) -> tuple[Array, Array, Array]:
 def steady_bend(speed: Array) -> Array:
     """Return the second differences of speed where three neighbours are alike, zero elsewhere.
 
-    A log slower than its motor has no other bend that is known: a step is over within two samples.
+    In a log slower than its motor no other bend is known: a step is over within two samples.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def compile_kernel(model: GreyBoxModel) -> Kernel:
     Returns
     -------
     callable
-        Takes what `estimation.fits.greybox.loops.run` does, and steps the model by ROS2, a stiff one by SDIRK2: second
+        With the arguments of `estimation.fits.greybox.loops.run`. Its steps are ROS2, for a stiff model SDIRK2: second
         order and L-stable.
     """
     takes = signature_of(run, unknowns=len(model.unknowns), outputs=len(model.outputs), channels=len(model.drives))
@@ -85,7 +85,7 @@ def model_step(
     p: SimpleNamespace,
     drives: Sequence[tuple[Expression, Expression]],
 ) -> list[Expression]:
-    """Return the state after one step of length ``h`` [SI], with the share of it that has passed as the scheme's input.
+    """Return the state after one step of length ``h`` [SI]; the scheme's input is the elapsed share of the step.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether a driving channel comes late, by the residuals of a fit: Rao's score statistic."""
+"""Delay of a driving channel, from the residuals of a fit: Rao's score statistic."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -12,16 +12,16 @@ from estimation.log_checks.channel_names import POSITION
 from plant.arrays import Array
 
 LEAST_LATE = 2e-4
-"""Time below which no channel is said to come late or early [s]."""
+"""Least delay or lead of a channel that is reported [s]."""
 
 LATE_NUDGE = 1e-5
-"""Time by which a driving channel is brought forward to see what its timing does [s]."""
+"""Time by which a driving channel is shifted for the finite difference [s]."""
 
 
 def changes_beside(problem: Problem, theta: Array) -> tuple[Array | None, list[Array]]:
-    """Return the residuals under the log's drives, with one model step a sample, and how others change them.
+    """Return the residuals under the log's drives, with one model step per sample, and their changes by other drives.
 
-    The others are each channel brought forward a little that is asked whether it comes late, and the courses of a play.
+    The other drives are each tested channel, shifted a little, and the courses of an encoder play.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def changes_beside(problem: Problem, theta: Array) -> tuple[Array | None, list[A
     Returns
     -------
     tuple of (ndarray of shape (outputs, blocks) or None, list of ndarray)
-        Normalised residuals, and changes of them, one a channel and then one a course; none where no channel is asked.
+        Normalised residuals and their changes, one per channel and then one per course; empty if no channel is tested.
     """
     log = problem.log
     if not log.timed:
@@ -51,8 +51,8 @@ def changes_beside(problem: Problem, theta: Array) -> tuple[Array | None, list[A
 def left_by(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[Array], Array]:
     """Return the part of a change of residuals that the determined unknowns cannot absorb.
 
-    Only what is known beforehand keeps the others from going far, and as slopes have it a lead of the motor may be less
-    than none: it would take up most of a pressure that is late.
+    Undetermined unknowns are held back by their priors only. In the linear approximation a motor's lead may become
+    negative, and would then absorb most of a late pressure.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def left_by(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[A
     bread : ndarray, shape (unknowns, unknowns)
         Inverse of the normal equations of all of them, with what is known beforehand [dimensionless].
     told : ndarray of bool, shape (unknowns,)
-        Whether the log tells something of each.
+        Whether the log determines each unknown at all.
 
     Returns
     -------
@@ -78,18 +78,18 @@ def left_by(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[A
 def lateness(
     timed: Sequence[str], changes: Sequence[Array], errors: Array, left: Callable[[Array], Array]
 ) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the apparent delay of each driving channel asked for, and its score statistic (Rao).
+    """Yield the apparent delay of each tested driving channel, and its score statistic (Rao).
 
     Parameters
     ----------
     timed : sequence of str
         The channels.
     changes : sequence of ndarray, shape (outputs, blocks)
-        By how much each changes the normalised residuals, see `changes_beside`; more are passed over [dimensionless].
+        Change of the normalised residuals by each, see `changes_beside`; further ones are ignored [dimensionless].
     errors : ndarray, shape (outputs * blocks,)
         The normalised residuals at the solution [dimensionless].
     left : callable
-        What the unknowns do not take up of a change of the residuals.
+        The part of a change of the residuals that the unknowns do not absorb.
 
     Yields
     ------
@@ -110,13 +110,13 @@ def most_late(late: Mapping[str, tuple[float, float]]) -> tuple[str, float, floa
     Parameters
     ----------
     late : Mapping[str, tuple of float]
-        By channel, how late it seems [s], and what that is worth, see `lateness`.
+        By channel, its apparent delay [s] and the gain, see `lateness`.
 
     Returns
     -------
     tuple of (str, float, float)
-        Channel; how late [s], negative where it is early; and the gain in log-likelihood [dimensionless], zero where
-        no channel is asked, or the time is too short or too long to be believed.
+        Channel; delay [s], negative for a lead; and the gain in log-likelihood [dimensionless]. The gain is zero if no
+        channel is tested, or if the delay is too short or too long to be believed.
     """
     channel, (behind, gain) = max(late.items(), key=lambda one: one[1][1], default=("", (0.0, 0.0)))
     return channel, behind, gain if LEAST_LATE < abs(behind) < LATEST else 0.0

@@ -1,4 +1,4 @@
-"""`encoder_noise(position, ...) -> LeakedNoise`: an encoder's noise in means of an output that follows and loses it."""
+"""`encoder_noise(position, ...) -> LeakedNoise`: encoder noise in means of an output that follows it and leaks."""
 
 import math
 from dataclasses import dataclass
@@ -10,51 +10,53 @@ from estimation.fits.convolution import smooth_length
 from estimation.log_checks.bridging import bridged
 
 MOST_LOST = 500.0
-"""Losses beyond which nothing is left from one sample to the next, lest exponentials overflow [dimensionless]."""
+"""Loss above which nothing remains from one sample to the next, so that exponentials do not overflow
+[dimensionless]."""
 
 LEAST_LOST = 1e-6
-"""Losses below which all is kept [dimensionless]."""
+"""Loss below which everything remains [dimensionless]."""
 
 HARMONICS = 6
-"""Harmonics of an encoder's steps whose errors may repeat; those above count as white, a tenth of the variance."""
+"""Harmonics of an encoder's steps whose errors may repeat; higher ones, a tenth of the variance, count as white."""
 
 LAGS = 8
-"""Blocks over which errors of an encoder are looked at for a likeness [count]; what is alike beyond does not change
-within a block, and is lost."""
+"""Blocks over which the autocorrelation of encoder errors is computed [count]. A longer correlation is constant within
+a block, and leaks off."""
 
 UNEVEN = 0.02
-"""Mean distance of readings from multiples of a step from which they are none [steps]; a continuous one's is 0.25."""
+"""Mean distance of readings from multiples of a step above which the encoder has no steps [steps]; that of a continuous
+one is 0.25."""
 
 READ = 3
-"""Blocks over which an encoder's reading is averaged to tell where it is within a step [count]; judged. Over one, what
-a steady piston reads differs by half a step from mean to mean; over more, it may turn round meanwhile."""
+"""Blocks over which an encoder's reading is averaged to find its place within a step [count]; judged. Over one, the
+mean of a steady piston changes by half a step from block to block; over more, the piston may reverse in between."""
 
 FREQUENCIES = 256
-"""Frequencies at which their spectrum is taken [count]."""
+"""Frequencies of their spectrum [count]."""
 
 
 @dataclass(frozen=True, eq=False)
 class LeakedNoise:
-    """What losses leave of a driving channel's noise in means of an output that follows its changes at once.
+    """Encoder noise that remains in means of a leaking output which follows its changes at once.
 
-    The output loses ``1 - a`` of itself from sample to sample; between samples the drive is on a straight line. With
-    white noise, means of ``n`` samples have ``2 (1 - a^n) / (1 - a^2) / n`` times the variance that they have without
-    losses. Errors of a quantised position are not white: at a steady speed each may be like the one before.
+    The output loses ``1 - a`` of itself from sample to sample; between samples the drive is a straight line. With white
+    noise, means of ``n`` samples have ``2 (1 - a^n) / (1 - a^2) / n`` times the variance that they have without losses.
+    Errors of a quantised position are not white: at a steady speed each may be like the one before.
 
     Parameters
     ----------
     cosines : ndarray, shape (frequencies,)
-        Of the frequencies times the sample time [dimensionless].
+        Cosines of the frequencies times the sample time [dimensionless].
     powers : ndarray, shape (frequencies,)
-        What the noise puts into means at each, for an output that forgets all from sample to sample, over the variance
-        of means of white noise [dimensionless].
+        Noise power in means at each frequency, for an output that forgets everything from sample to sample, over the
+        variance of means of white noise [dimensionless].
     """
 
     cosines: Array
     powers: Array
 
     def kept(self, lost: float) -> tuple[float, float]:
-        """Return what losses leave of the noise.
+        """Return the noise that remains after losses.
 
         Parameters
         ----------
@@ -78,19 +80,19 @@ class LeakedNoise:
 
 
 def white_noise(samples: int, every: int = 1) -> LeakedNoise:
-    """Return what losses leave of white noise in means.
+    """Return white noise that remains in means after losses.
 
     Parameters
     ----------
     samples : int
-        Samples a mean [count].
+        Samples per mean [count].
     every : int
-        One in how many of these the output has [count]. Losses even out less of the noise of few.
+        The output has one of so many samples [count]. Losses even out less of the noise if there are few.
 
     Returns
     -------
     LeakedNoise
-        Of a channel whose errors do not repeat.
+        For a channel whose errors do not repeat.
 
     Examples
     --------
@@ -105,32 +107,32 @@ def white_noise(samples: int, every: int = 1) -> LeakedNoise:
 def encoder_noise(
     position: Array, pumped: Array, variance: float, averaged: int, samples: int, every: int = 1
 ) -> LeakedNoise:
-    """Return what losses leave of an encoder's noise in means.
+    """Return encoder noise that remains in means after losses.
 
-    At a position that noise before the encoder blurs by ``s``, the ``k``-th harmonic of the error of a step ``q`` has a
-    variance of ``q^2 / (2 (pi k)^2)``, of which ``exp(-(2 pi k s / q)^2)`` goes with the position (Widrow and Kollar
-    2008, Quantization Noise, chapter 4) and the rest is white. Where the piston is comes from the log itself: what is
-    quick is as the pump moves it, the rest as it is read.
+    Noise ``s`` before the encoder blurs its steps ``q``. The ``k``-th harmonic of the quantisation error has a variance
+    of ``q^2 / (2 (pi k)^2)``, of which ``exp(-(2 pi k s / q)^2)`` depends on position and the rest is white (Widrow and
+    Kollar 2008, Quantization Noise, chapter 4). The position is found from the log itself: fast motion from the pump,
+    slow motion from the readings.
 
     Parameters
     ----------
     position : ndarray, shape (n,)
         As the encoder reads it; NaN is missing [m].
     pumped : ndarray, shape (n,)
-        As the pump would move the piston [m].
+        Piston position according to the pump [m].
     variance : float
-        Of its noise [m^2].
+        Variance of its noise [m^2].
     averaged : int
-        Samples that were averaged to one of the driving channel [count].
+        Samples averaged into one of the driving channel [count].
     samples : int
-        Of these, a mean of the output [count].
+        Of these, samples per mean of the output [count].
     every : int
-        One in how many of these the output has, see `white_noise` [count].
+        The output has one of so many, see `white_noise` [count].
 
     Returns
     -------
     LeakedNoise
-        As the log's own motion makes it.
+        For the motion in this log.
     """
     step, block = _step(position), averaged * samples
     if not step or len(position) <= 2 * READ * block:
@@ -152,7 +154,7 @@ def encoder_noise(
 
 
 def _step(position: Array) -> float:
-    """Return the step of an encoder; 0 where its readings are no multiples of one."""
+    """Return the step of an encoder; 0 if its readings are not multiples of one."""
     moved = np.abs(np.diff(position))
     moved = moved[moved > 0.0]
     if not len(moved):
@@ -163,7 +165,7 @@ def _step(position: Array) -> float:
 
 
 def _course(position: Array, pumped: Array, over: int) -> Array:
-    """Return where a piston is, by the pump and running means of what else moves it over an odd number of samples."""
+    """Return the piston's position: motion by the pump, plus a running mean of the rest over an odd count."""
     over += 1 - over % 2
     beside = position - pumped
     sums = np.cumsum(np.concatenate([[0.0], beside - beside[0]]))
@@ -171,7 +173,7 @@ def _course(position: Array, pumped: Array, over: int) -> Array:
 
 
 def _likeness(turned: Array, lags: int) -> Array:
-    """Return the real autocorrelation of a course of unit vectors [dimensionless]."""
+    """Return the real part of the autocorrelation of a series of unit vectors [dimensionless]."""
     count = len(turned)
     length = smooth_length(count + lags, (2, 3, 5))
     spectrum = np.fft.fft(turned, length)
@@ -179,7 +181,7 @@ def _likeness(turned: Array, lags: int) -> Array:
 
 
 def _leaked(alike: Array, samples: int, every: int) -> LeakedNoise:
-    """Return what losses leave of noise whose autocorrelation is given from lag zero on."""
+    """Return noise that remains after losses, given its autocorrelation from lag zero on."""
     count = max(1, round(samples / every))
     frequency = np.pi * (np.arange(FREQUENCIES) + 0.5) / FREQUENCIES
     spectrum = alike[0] + 2.0 * np.cos(np.outer(frequency, np.arange(1, len(alike)))) @ alike[1:]

@@ -32,20 +32,20 @@ class OutputNoise:
     variance : float
         Of its white noise, a sample [SI squared].
     walk : float
-        Variance that its random walk gathers [SI squared a second]; white noise of a rate, such as measured speed,
+        Variance per time of its random walk [SI squared per second]; white noise of a rate, such as measured speed,
         that the model integrates.
     passed_on : float
-        Standard deviation of what a driving channel's noise adds at once, over `passed_by` [SI].
+        Standard deviation that a driving channel's noise adds at once, over `passed_by` [SI].
     passed_by : str
-        The unknown that the driving channel's noise is multiplied by, one that is fitted as a logarithm.
+        The unknown by which the driving channel's noise is multiplied, fitted as a logarithm.
     passed_over : tuple of str and float
-        The parameter that it is divided by, with the value that `passed_on` holds already [SI].
+        The parameter by which it is divided, with the value that `passed_on` already includes [SI].
     lost_by : tuple of str
-        Parameters by which it is lost again before the next samples.
+        Parameters that make it leak off before the next samples.
     lost : float
-        How much of it a unit of `passed_by` and of these loses from one sample to the next, where that is little [SI].
+        Loss from one sample to the next per unit of `passed_by` and of these, if it is small [SI].
     lost_from : LeakedNoise, optional
-        What losses leave of it in the means by which a fit is judged.
+        The noise that remains after losses in the means by which a fit is judged.
     """
 
     variance: float
@@ -105,45 +105,44 @@ class GreyBoxLog:
     Parameters
     ----------
     drives : ndarray, shape (n, channels)
-        Driving channels in SI, no sample missing.
+        Driving channels in SI, without missing samples.
     measured : ndarray, shape (n, outputs)
         Outputs in SI; NaN is missing.
     parameters : ndarray, shape (parameters,)
-        Row of the actuator's parameters; the unknowns' entries are not used.
+        The actuator's parameters; the entries of unknowns are not used.
     sample_time : float
         Seconds between samples [s].
     steps : ndarray of int, shape (n,)
         Model steps up to each sample.
     noise : tuple of OutputNoise
-        Of each output.
+        Noise of each output.
     drive_std : tuple of float
-        Standard deviation of each driving channel's noise, where the outputs' noise does not hold it already [SI].
+        Standard deviation of each driving channel's noise, unless the outputs' noise already includes it [SI].
     uncertainties : Mapping[str, float]
         Relative standard deviation of the actuator's parameters [fraction]; those of unknowns are not used.
     gaps : ndarray, shape (gaps, 3)
-        First and last sample on which a gap in the drives acts, and the variance that it adds to the state from one
-        sample to the next, in units of `GreyBoxModel.jump`; in order of time, none overlapping.
+        First and last sample that a gap in the drives affects, and the variance that it adds to the state from one
+        sample to the next, in units of `GreyBoxModel.jump`; in order of time, without overlap.
     presumed : Mapping[str, tuple of float]
-        What is known of unknowns before the log is seen: value [SI] and standard deviation of its coordinate.
+        Prior of unknowns: value [SI] and standard deviation of the coordinate.
     within : Mapping[str, float]
-        How far unknowns may be from where a search ends, wherever that is: standard deviation of the coordinate. It
-        counts in deviations alone.
+        Standard deviation of a coordinate about the value at which its search ends. It counts in deviations only.
     block : float
         Length over which residuals are averaged before they are squared [s].
     timed : tuple of str
-        Driving channels of which a fit asks whether they come late.
+        Driving channels whose delay a fit tests.
     counts : tuple of int
-        Counts of a pump's teeth that a fit asks for, see `estimation.fits.greybox.pump_ripple`.
+        Tooth counts of the pump that a fit tests, see `estimation.fits.greybox.pump_ripple`.
     teeth : tuple of Ripple
-        Those whose delivery the drives hold; how large it is stays open.
+        Pump ripple that the drives include; its size remains uncertain.
     speed_offset : float
-        What was subtracted from motor speed [rad/s]; where it is not 0, it stays open too.
+        Offset subtracted from motor speed [rad/s]; if it is not 0, it remains uncertain too.
     course : IntersampleDoubt, optional
-        Doubt about the motor's speed between the samples of a slow log [Pa].
+        Uncertainty of motor speed between the samples of a slow log [Pa].
     stands_for : float
-        How many residuals of a longer log each one stands for, by `FreedProblem` [count].
+        Number of residuals of a longer log that each one represents, in `FreedProblem` [count].
     stiff : bool
-        Whether model steps are implicit, as where a valve opens that fills a chamber in less time than a step takes.
+        Whether model steps are implicit, since an open valve fills a chamber within one step.
     sampled : tuple of (ndarray, shape (samples,), and float), optional
         Motor speed of an averaged log before it was averaged, and its sample time [rad/s, s].
     """
@@ -170,12 +169,12 @@ class GreyBoxLog:
     sampled: tuple[Array, float] | None = None
 
     def beginning(self, samples: int) -> "GreyBoxLog":
-        """Return the log's first part.
+        """Return the first part of the log.
 
         Parameters
         ----------
         samples : int
-            How many samples are kept [samples].
+            Its length [samples].
 
         Returns
         -------
@@ -190,17 +189,17 @@ class GreyBoxLog:
         Parameters
         ----------
         steps : ndarray of int, shape (n,), or None
-            Up to each sample [count]; None for those that it has.
+            Up to each sample [count]; None keeps those of the log.
 
         Returns
         -------
         GreyBoxLog
-            The log; the same one where it has those.
+            The log; the same object if nothing changes.
         """
         return self if steps is None or steps is self.steps else replace(self, steps=steps)
 
     def coarsened(self) -> "GreyBoxLog":
-        """Return the log with one model step a sample: predicted faster and less exactly.
+        """Return the log with one model step per sample: faster and less exact.
 
         Returns
         -------
@@ -211,19 +210,20 @@ class GreyBoxLog:
 
     @property
     def passes_on(self) -> bool:
-        """Whether noise of a driving channel counts with an unknown."""
+        """Whether noise of a driving channel matters, multiplied by an unknown."""
         return any(noise.passed_on > 0.0 for noise in self.noise)
 
     @property
     def measured_rms(self) -> float:
-        """Root mean square of what is measured [output unit]."""
+        """Root mean square of the measured outputs [output unit]."""
         return float(np.sqrt(np.nanmean(self.measured**2)))
 
     @property
     def passes(self) -> float:
         """Number of bends of a slow log's motor speed, at least 1; 1 for any other log [count].
 
-        It passes each turn alike. So what one form gains on another at one turn, it gains at all, which says no more.
+        The motor passes all turns alike. So what one form gains on another at one turn, it gains at all, without more
+        evidence.
         """
         return 1.0 if self.course is None else self.course.passes(self.noise[0].variance)
 
@@ -233,7 +233,7 @@ class GreyBoxLog:
         Parameters
         ----------
         block : int
-            Samples a block [count].
+            Samples per block [count].
 
         Returns
         -------
@@ -252,26 +252,26 @@ class GreyBoxLog:
         return walk + course.walk(samples, block), beside + course.beside(samples, block), course.kept**block
 
     def taken_at(self, value: float) -> "GreyBoxLog":
-        """Return the log with the noise that driving channels pass on as it is where the unknown has a value.
+        """Return the log with the noise passed on by driving channels fixed at a value of the unknown.
 
-        The variance then depends on nothing that is fitted, and a search from afar finds no valley in which it grows
-        without end.
+        The variance then does not depend on any unknown, so a search from far away finds no minimum with infinite
+        noise.
 
         Parameters
         ----------
         value : float
-            Value of what the driving channels' noise is multiplied by [SI].
+            Value of the unknown by which the driving channels' noise is multiplied [SI].
 
         Returns
         -------
         GreyBoxLog
-            The same log under noise of its outputs alone.
+            The same log with noise of its outputs only.
         """
         noise = tuple(OutputNoise(one.variance + (value * one.passed_on) ** 2, one.walk) for one in self.noise)
         return replace(self, noise=noise)
 
     def softened(self, variance: float, walk: float) -> "GreyBoxLog":
-        """Return the log as if its noise were larger, which makes the way to the optimum smoother.
+        """Return the log with larger assumed noise, which smooths the way to the optimum.
 
         Parameters
         ----------
@@ -304,11 +304,11 @@ def greybox_log(
     record : Record
         The log, with the model's drives and outputs.
     parameters : dataclass
-        What is known of the plant, with the fields of the model's parameters.
+        The plant's known values, with the fields of the model's parameters.
     longest_step : float
         Longest step of the model [s].
     variances : Mapping[str, float], optional
-        Of the noise of channels [SI squared]; of outputs read off the log by default, of drives none.
+        Noise variance of channels [SI squared]; by default read from the log for outputs, and zero for drives.
     uncertainties : Mapping[str, float], optional
         Relative standard deviation of the plant's parameters [fraction]; none by default.
 

@@ -1,6 +1,6 @@
 """The loop that predicts a log by a grey-box model and sums up the normal equations of its misfit, in one pass.
 
-Nothing as long as the log is stored unless asked for. `estimation.fits.greybox.kernel` pastes it to a model.
+No array as long as the log is stored unless requested. `estimation.fits.greybox.kernel` pastes the loop to a model.
 """
 
 import math
@@ -12,20 +12,20 @@ import numpy as np
 from estimation.arrays import Array, IntArray
 
 RUNAWAY = 1e6
-"""Largest normalised residual that counts [dimensionless]: a try that runs away keeps a finite cost."""
+"""Largest normalised residual that counts [dimensionless]: a diverging run keeps a finite cost."""
 
 SETTLED = 1e-4
-"""Variance that a gap has left open, below which it is closed [fraction of the sensor's]."""
+"""Variance left by a gap below which the gap is closed [fraction of the sensor's]."""
 
 STRAIGHT = 1e-3
-"""Weight of a block in ``J'J`` that counts linearly [fraction]."""
+"""Weight in ``J'J`` of a block that counts linearly [fraction]."""
 
 
 class MisfitKernel(Protocol):
     """Interface of a model's compiled kernel.
 
-    A point is a tuple with a row for each state: the state, its derivatives by the unknowns, and in a model that bears
-    gaps those by the states that the last step began from. What is observed has such a row for each output.
+    A point is a tuple with a row for each state: the state, its derivatives by the unknowns, and in a model that allows
+    gaps those by the states before the last step. Each output has such a row of its own.
 
     Attributes
     ----------
@@ -34,14 +34,14 @@ class MisfitKernel(Protocol):
     JUMP, JUMPS : tuple of float, int
         `GreyBoxModel.jump`, and its length.
     settle, begin : callable
-        From fitted coordinates and parameters: what is the same at every step, and the point before the first sample.
+        From fitted coordinates and parameters: what is constant over all steps, and the point before the first sample.
     step : callable
-        ``step(point, fixed, before, after, start, end, h)``: the point ``h`` [s] later, while the drives go from one
-        share of the way between samples to another [fraction].
+        ``step(point, fixed, before, after, start, end, h)``: the point ``h`` [s] later, while the drives move between
+        two shares of the way from sample to sample [fraction].
     observe : callable
-        ``observe(point, shown)``: fill in what is observed.
+        ``observe(point, shown)``: fill in the outputs.
     load, store : callable
-        ``load(address)`` and ``store(point, address)``: a point out of memory, and into it.
+        ``load(address)`` and ``store(point, address)``: read a point from memory, and write it.
     """
 
     WIDTH: int
@@ -94,18 +94,18 @@ def run(
     block : int
         Samples a block.
     variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
-        White noise of each output, what its random walk gains after each block, and what else is open of each block's
-        mean; the last number counts for all blocks that follow [SI squared].
+        White noise of each output, random-walk variance after each block, and other variance of each block's mean; the
+        last number holds for all later blocks [SI squared].
     kept : float
-        What is left of a random walk's level after a block [fraction].
+        What remains of a random walk's level after a block [fraction].
     gaps : ndarray, shape (gaps, 3)
-        First and last sample that a gap in the drives acts on, and the variance of `GreyBoxModel.jump` over each.
+        First and last sample that a gap in the drives affects, and the variance of `GreyBoxModel.jump` over each.
     outlier : float
         Residual beyond which a block counts linearly [dimensionless].
     errors : ndarray, shape (errors, blocks)
-        Room for the normalised residuals of each output, or empty.
+        Output array for the normalised residuals of each output, or empty.
     slopes : ndarray, shape (slopes, slope blocks, slope unknowns)
-        Room for their derivatives, or empty.
+        Output array for their derivatives, or empty.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def run(
 
 
 def absorb(row: Array, level: Array, gain: float, scale: float, outlier: float, gradient: Array, gram: Array) -> float:
-    """Take a block's mean misfit and its slopes into the sums, less the random walk's level so far; return its cost."""
+    """Add a block's mean misfit and slopes, less the random walk's level so far, to the sums; return its cost."""
     for j in range(row.size):
         innovation = row[j] - level[j]
         level[j] += gain * innovation
@@ -195,7 +195,7 @@ def absorb(row: Array, level: Array, gain: float, scale: float, outlier: float, 
 
 
 def carry(kernel: MisfitKernel, point: Array, covariance: Array, room: Array) -> None:
-    """Take the covariance of a state that a gap has left open over the last step: ``P' = F P F'``."""
+    """Propagate the covariance of a state that a gap has left unknown over the last step: ``P' = F P F'``."""
     size, first = kernel.JUMPS, 1 + kernel.UNKNOWNS
     for i in range(size):
         for j in range(i, size):
@@ -211,15 +211,16 @@ def carry(kernel: MisfitKernel, point: Array, covariance: Array, room: Array) ->
 def correct(
     kernel: MisfitKernel, point: Array, covariance: Array, reach: Array, shown: Array, excess: float, variance: float
 ) -> float:
-    """Take a sample into a state that a gap has left open, by a Kalman update whose gain is taken as a constant.
+    """Correct a state that a gap has left unknown by a sample: a Kalman update whose gain is treated as constant.
 
-    With any gain that does not depend on the data the innovations are zero on average at the true parameters; with the
-    Kalman gain they are white, and hold all that the log says beside the state in the gap (Kalman 1960, equation 28).
+    With any gain that does not depend on the data the innovations have zero mean at the true parameters. With the
+    Kalman gain they are white, and contain all information of the log except on the state in the gap (Kalman 1960,
+    equation 28).
 
     Returns
     -------
     float
-        Variance of the output that was open [SI squared].
+        Variance of the output before the correction [SI squared].
     """
     size, unknowns, opened = kernel.JUMPS, kernel.UNKNOWNS, 0.0
     for m in range(size):

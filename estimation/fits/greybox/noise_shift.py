@@ -1,8 +1,8 @@
-"""`noise_shift(problem, theta, known_of)`: by how much noise of motor speed moves a fit, and what that leaves open.
+"""`noise_shift(problem, theta, known_of)`: bias of a fit due to motor speed noise, and its variance.
 
-The model pumps what a noisy speed is off by, and keeps it until it has leaked off. That grows with the oil's stiffness,
-so that squares of the residuals are smaller for a softer oil. Where small chambers of stiff oil let the noise be felt,
-bulk modulus came out a deviation too low. See decision 399.
+The model pumps oil according to the noisy speed, and keeps the error until it has leaked off. The error in pressure
+grows with the oil's stiffness, so a sum of squared residuals is smaller for softer oil. With small chambers of stiff
+oil, bulk modulus came out a deviation too low. See decision 399.
 """
 
 from collections.abc import Mapping
@@ -17,22 +17,22 @@ from estimation.log_checks.measurement_noise import struck_variance
 from plant.arrays import Array
 
 MOVING = ("bulk_modulus", "leakage_coefficient", "case_leakage", "flow_bias", "pump_displacement")
-"""Unknowns by which the oil that noise pumps is felt more or less; all are fitted as logarithms."""
+"""Unknowns on which the effect of that noise depends; all are fitted as logarithms."""
 
 NUDGE = 0.02
-"""Change of their logarithms by which that is read off [dimensionless]."""
+"""Change of their logarithms for the finite difference [dimensionless]."""
 
 LONGEST = 30_000
-"""Samples of a log's beginning on which it is read off [count]."""
+"""Samples of a log's beginning that are used [count]."""
 
 
 def noise_shift(
     problem: Problem, theta: Array, known_of: Information
 ) -> tuple[Mapping[str, float], Mapping[str, float]]:
-    """Return the shift of the unknowns that takes back what noise of motor speed moved them by, and its variance.
+    """Return the shift of the unknowns that corrects the bias due to motor speed noise, and its variance.
 
-    Residuals hold the answer ``a`` to the noise. At a minimum of their squares the gradient of ``E |a|^2 / 2`` is made
-    up for by a shift of the unknowns. The gradient is read off drawn noise.
+    The residuals contain the response ``a`` to the noise. The gradient of ``E |a|^2 / 2``, computed with simulated
+    noise, shifts the minimum of their squares.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ def noise_shift(
     theta : ndarray, shape (unknowns,)
         Its solution [dimensionless].
     known_of : Information
-        What the slopes tell there.
+        Information of the slopes there.
 
     Returns
     -------
     tuple of Mapping[str, float]
-        In the fitted coordinates [dimensionless], by unknown that is felt; nothing where noise of speed is not felt.
+        In the fitted coordinates [dimensionless], by unknown; empty if noise of speed does not matter.
     """
     log = problem.log
     if not log.drive_std or not any(noise.walk > 0.0 for noise in log.noise) or log.course is not None:

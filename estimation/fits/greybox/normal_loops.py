@@ -6,18 +6,18 @@ from plant.compiled.native.loops import natively
 
 @natively()
 def fill_differences(found: Array, nudge: float, here: Array, slopes: Array) -> None:
-    """Fill in the residuals at a point and their slopes, of the residuals there and at its neighbours.
+    """Fill in the residuals at a point and their slopes, from the residuals there and at its neighbours.
 
     Parameters
     ----------
     found : ndarray, shape (outputs, blocks, lanes)
-        Residuals at the point, and at its neighbours one after another; what lanes are left count for nothing.
+        Residuals at the point, and at its neighbours one after another; further lanes are ignored.
     nudge : float
-        How far away the neighbours are [dimensionless].
+        Distance of the neighbours [dimensionless].
     here : ndarray, shape (outputs, blocks)
-        Room for the residuals at the point.
+        Output array for the residuals at the point.
     slopes : ndarray, shape (outputs, blocks, unknowns)
-        Room for their slopes.
+        Output array for their slopes.
     """
     for i in range(slopes.shape[0]):
         for k in range(slopes.shape[1]):
@@ -31,7 +31,7 @@ def fill_differences(found: Array, nudge: float, here: Array, slopes: Array) -> 
 def fill_weighed(
     errors: Array, slopes: Array, outlier: float, straight: float, squares: Array, pulling: Array, bent: Array
 ) -> None:
-    """Fill in what cost, gradient and ``J'J`` are sums of; what is grossly off counts linearly (Huber 1964).
+    """Fill in the terms whose sums are cost, gradient and ``J'J``; gross outliers count linearly (Huber 1964).
 
     Parameters
     ----------
@@ -40,15 +40,15 @@ def fill_weighed(
     slopes : ndarray, shape (n, unknowns)
         Their derivatives [dimensionless].
     outlier : float
-        Residual from which on they count linearly [dimensionless].
+        Residual from which outliers count linearly [dimensionless].
     straight : float
-        Weight in ``J'J`` of one that does [dimensionless].
+        Weight in ``J'J`` of an outlier [dimensionless].
     squares : ndarray, shape (n,)
-        Room for each residual's part of the cost.
+        Output array for each residual's part of the cost.
     pulling : ndarray, shape (n,)
-        Room for each residual as it counts in the gradient.
+        Output array for each residual as it counts in the gradient.
     bent : ndarray, shape (n, unknowns)
-        Room for each one's slopes as they count in ``J'J``.
+        Output array for each one's slopes as they count in ``J'J``.
     """
     for k in range(errors.shape[0]):
         value = errors[k]

@@ -1,4 +1,4 @@
-"""`nudge_for(log, model, free)`: step of the finite differences by which a freed problem finds its slopes."""
+"""`nudge_for(log, model, free)`: finite-difference step for the slopes of a freed problem."""
 
 from collections.abc import Collection
 
@@ -8,13 +8,13 @@ from estimation.models.greybox import GreyBoxModel
 from plant.solvers.steps import parameter_names
 
 NUDGE = 1e-4
-"""Step in the fitted coordinates [dimensionless]. Residuals of a piston that sticks and slips have many small corners:
-a step of 1e-7 sees the slope between two of them, and searches stop far from the optimum."""
+"""Step in the fitted coordinates [dimensionless]. Residuals of a piston with stick-slip have many small corners: a step
+of 1e-7 finds the slope between two of them, and searches stop far from the optimum."""
 
 UNEVEN_NUDGE = 1e-3
-"""The same of a single rod [dimensionless]. Its make-up valves open and shut all the time: where the pressures of both
-sides cross, one model step earlier or later is a jump of a third of the noise, which a step of 1e-4 took for slopes ten
-times as steep as they are. Searches stopped above their minimum, and deviations came out up to 100 times too small."""
+"""The same for a single rod [dimensionless]. Its make-up valves open and close all the time. Where the pressures of
+both sides cross, a shift by one model step changes the residual by a third of the noise, which a step of 1e-4 took for
+slopes ten times too steep. Searches stopped above their minimum, and deviations were up to 100 times too small."""
 
 
 def nudge_for(log: GreyBoxLog, model: GreyBoxModel, free: Collection[str]) -> float:

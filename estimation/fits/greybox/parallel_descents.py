@@ -9,8 +9,8 @@ from estimation.fits.greybox.descent import FIRST_RADIUS, LEAST_GAIN, Point, sea
 from plant.arrays import Array
 
 ABREAST = 4
-"""Searches that go down together [count]: with nine to twelve runs each they fill nine tenths of a kernel's lanes, and
-few go on in vain."""
+"""Searches that run in parallel [count]: with nine to twelve runs each they fill nine tenths of a kernel's lanes, and
+few run in vain."""
 
 
 class Way(NamedTuple):
@@ -19,7 +19,7 @@ class Way(NamedTuple):
     Parameters
     ----------
     at_each : callable
-        The cost at each of several coordinates; ways with the same one are evaluated together.
+        The costs at several coordinates; ways with the same function are evaluated together.
     start : ndarray, shape (unknowns,)
         Where to begin [dimensionless].
     bounds : tuple of ndarray, shape (unknowns,)
@@ -42,24 +42,24 @@ def descend_in_turn(
 ) -> list[Point]:
     """Return the results of `descend` for starts in sequence; each result may bound the later ones.
 
-    Some are gone abreast, for one evaluation seldom fills a kernel. A way that has waited for no other went on where it
-    would have ended; it is then cut where the bound of those before it, once these are known, ends it. So each result
-    is the same to the bit as if it had waited.
+    Several run in parallel, since one evaluation seldom fills a kernel. A way that ran ahead is cut back to where the
+    bound from the ways before it would have ended it, once that is known. So each result is the same, to the bit, as in
+    sequence.
 
     Parameters
     ----------
     ways : sequence of Way
         The ways, in their order.
     evaluations : int
-        How often the cost may be evaluated on each [evaluations].
+        Most evaluations of the cost per way [count].
     wanted : float
         See `descend`; of the first way [dimensionless].
     after : callable
-        ``after(i, point)``: what is wanted at most of the ways after way ``i``, given its result; called in order.
+        ``after(i, point)``: bound for the ways after way ``i``, given its result; called in order.
     radius : float
         Length of the longest first step [dimensionless].
     least_share : float
-        Share of the cost that is left which a further step must promise [fraction].
+        Share of the remaining cost that a further step must promise [fraction].
 
     Returns
     -------
@@ -83,7 +83,7 @@ def descend_in_turn(
 
 
 class _Ahead:
-    """A search that goes on as long as no bound on what is wanted, as far as that is known, ends it."""
+    """A search that runs ahead for as long as no known bound ends it."""
 
     def __init__(self, way: Way, evaluations: int, radius: float, least_share: float) -> None:
         self.way = way
@@ -103,7 +103,7 @@ class _Ahead:
         return self.ended is None
 
     def take(self, point: Point) -> None:
-        """Go on from the cost that was asked for."""
+        """Continue with the cost that was requested."""
         try:
             self.asked = self._search.send(point)
         except StopIteration as stop:

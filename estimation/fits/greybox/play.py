@@ -17,13 +17,13 @@ from plant.log.record import Record
 from plant.notes import Note
 
 NUDGE = 1e-6
-"""Play by which the residuals' answer to one is read off [m]."""
+"""Play for the finite difference of the residuals [m]."""
 
 EDGE = 2
-"""How near to a movement the piston may have begun to move, within what the encoder resolves [samples]."""
+"""Samples around a movement in which the piston may have begun to move within the encoder's resolution [samples]."""
 
 FEWEST = 100
-"""Fewest samples in which an encoder stands that are compared with a velocity sensor's; judged [samples]."""
+"""Fewest samples with the encoder at rest that are compared with a velocity sensor; judged [samples]."""
 
 
 class ShownPlay(NamedTuple):
@@ -32,13 +32,13 @@ class ShownPlay(NamedTuple):
     Parameters
     ----------
     size : float
-        By the likeliest course, to first order [m].
+        For the likeliest course, to first order [m].
     gain : float
-        In log-likelihood, Rao's score statistic over two; 0 where all courses ask for less than none [dimensionless].
+        In log-likelihood, Rao's score statistic over two; 0 if all courses show a negative play [dimensionless].
     yields : float
-        How far the piston moves unseen, where that was sensed [m/Pa].
+        Unseen motion of the piston per pressure, if a velocity sensor shows it [m/Pa].
     moved : Mapping[str, float]
-        By how much each unknown's coordinate moves if it is taken up, to first order [dimensionless].
+        Change of each unknown's coordinate if the play is fitted, to first order [dimensionless].
     """
 
     size: float
@@ -51,34 +51,34 @@ NO_PLAY = ShownPlay(0.0, 0.0)
 
 
 PLAY_STRUCTURE = 5e-3
-"""Relative standard deviation of bulk modulus where the encoder has a play, as what the piston does while it crosses
-that is not known; judged [fraction]."""
+"""Relative standard deviation of bulk modulus if the encoder has play, since the piston's motion across it is unknown;
+judged [fraction]."""
 
 PLAY_OPEN = 0.5
-"""Share of what a play puts bulk modulus off by that is left open, as the piston crosses by none of the courses that
-are tried [fraction]: 0.2 covered too few training logs with a play. It puts it off by as much as the fit with a play
-differs from that without, or by what the piston yields unseen beside what the oil does."""
+"""Share of a play's effect on bulk modulus that remains uncertain, as the piston follows none of the modelled courses
+exactly [fraction]: 0.2 covered too few training logs with play. The effect is the difference between fits with and
+without the play, or the unseen compliance over that of the oil."""
 
 PLAY_SHOWN = 4.0
-"""Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three
-courses gains it in one log of 430, so one log in 140 at most is asked in vain. Up to `PLAY_BELIEVED` the interval holds
-what that play would do, if no fit took it up."""
+"""Gain in log-likelihood from which residuals show a play [dimensionless]: by chance each of three courses gains it in
+one log of 430, so at most one log in 140 is tested in vain. Up to `PLAY_BELIEVED` the interval includes the effect of a
+play that no fit includes."""
 
 PLAY_BELIEVED = 7.0
-"""Gain from which a play that residuals show, and no fit took up, shuts the check [dimensionless]: by chance one log in
-3600 at most gains it. It is what one in twenty encoders with a play of up to 100 um, known to some 2 um by such a log,
-makes as likely as none: 3.0 for the one in twenty, 3.0 for the sizes, and 0.7 for courses that are much alike."""
+"""Gain from which a play that no fit includes rejects the log [dimensionless]: by chance at most one log in 3600 gains
+it. Prior odds: one encoder in twenty has a play of up to 100 um, known to some 2 um by such a log. That makes 3.0 for
+the one in twenty, 3.0 for the sizes, and 0.7 for courses that are much alike."""
 
 
 PLAY_SENSED = 2.7
-"""Gain from which a log is asked for a play because a velocity sensor moves beside an encoder that stands, and from
-which its interval holds one that no fit took up: one log in 100 gains it by chance, and fewer seem to move by more than
-the encoder resolves, which is asked too. The check is shut from `PLAY_SHOWN` on, which one log in 400 gains by chance
-[dimensionless]."""
+"""Gain from which a play is tested because a velocity sensor moves while the encoder is at rest, and from which the
+interval includes a play that no fit includes [dimensionless]. One log in 100 gains it by chance, and fewer seem to move
+by more than the encoder's resolution, which is required too. From `PLAY_SHOWN` on, which one log in 400 gains by
+chance, the log is rejected."""
 
 
 def crossed_drives(problem: Problem) -> list[Array]:
-    """Return the drives of a log under a small play, which the piston crosses by one course after another.
+    """Return the drives of a log under a small play, for each course by which the piston may cross it.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def crossed_drives(problem: Problem) -> list[Array]:
     Returns
     -------
     list of ndarray, shape (n, channels)
-        What `shown_play` asks the residuals under [SI].
+        The drives under which `shown_play` needs the residuals [SI].
     """
     log, place = problem.log, problem.model.drives.index(POSITION)
     courses = crossings(log.drives[:, place], log.measured[:, 0], log.sample_time)
@@ -105,19 +105,19 @@ def shown_play(
 ) -> ShownPlay:
     """Return the play that a fit's residuals show.
 
-    A play is positive, so a course counts that asks for one. On a log without, a gain over 4.5 comes by chance in one
-    of 740 for each of three courses that are much alike.
+    A play is positive, so only courses count that show a positive one. In a log without play, a gain over 4.5 comes by
+    chance in one of 740 for each of three similar courses.
 
     Parameters
     ----------
     changes : iterable of ndarray, shape (outputs, blocks)
-        By how much the normalised residuals change under the drives of `crossed_drives` [dimensionless].
+        Change of the normalised residuals under the drives of `crossed_drives` [dimensionless].
     errors : ndarray, shape (blocks,)
         The normalised residuals there [dimensionless].
     left : callable
-        What the unknowns do not take up of a change of the residuals.
+        The part of a change of the residuals that the unknowns do not absorb.
     taken : callable
-        Each unknown by name, and by how much its coordinate rises to take up a change.
+        Each unknown by name, and the change of its coordinate that absorbs the rest.
 
     Returns
     -------
@@ -142,14 +142,14 @@ def play_shows(shown: ShownPlay, sensed: ShownPlay) -> bool:
 
 
 def play_left(shown: ShownPlay, sensed: ShownPlay = NO_PLAY, least: float = 0.0) -> tuple[Note, ...]:
-    """Return the objection to a fit that leaves a play which its residuals or a velocity sensor show.
+    """Return the objection to a fit that omits a play which its residuals or a velocity sensor show.
 
     Parameters
     ----------
     shown, sensed : ShownPlay
-        What either shows.
+        Play from either.
     least : float
-        What residuals must gain by it in any case: those of a fit that leaves much show anything [dimensionless].
+        Least gain that residuals must show: those of a poor fit show anything [dimensionless].
     """
     limits = (shown, max(PLAY_BELIEVED, least)), (sensed, PLAY_SHOWN)
     large = [one.size for one, limit in limits if one.gain > limit and one.size > LEAST_PLAY]
@@ -157,14 +157,14 @@ def play_left(shown: ShownPlay, sensed: ShownPlay = NO_PLAY, least: float = 0.0)
 
 
 def play_structure(moved: float, yields: float) -> float:
-    """Return the relative deviation of bulk modulus that the crossing of a play leaves open.
+    """Return the relative deviation of bulk modulus due to the unknown crossing of a play.
 
     Parameters
     ----------
     moved : float
         Relative difference of bulk modulus from a fit without the play [fraction].
     yields : float
-        What the piston yields unseen, over what the oil does [fraction].
+        Unseen motion of the piston over the compliance of the oil [fraction].
 
     Returns
     -------
@@ -175,7 +175,7 @@ def play_structure(moved: float, yields: float) -> float:
 
 
 def play_untaken(shown: ShownPlay, sensed: ShownPlay, yields: float) -> tuple[float, tuple[Note, ...]]:
-    """Return the doubt due to a play that residuals or a velocity sensor may show and no fit took up.
+    """Return the uncertainty due to a play that residuals or a velocity sensor may show and no fit includes.
 
     Parameters
     ----------
@@ -184,13 +184,13 @@ def play_untaken(shown: ShownPlay, sensed: ShownPlay, yields: float) -> tuple[fl
     sensed : ShownPlay
         What the sensor shows.
     yields : float
-        What the piston yields unseen, over what the oil does [fraction].
+        Unseen motion of the piston over the compliance of the oil [fraction].
 
     Returns
     -------
     tuple of (float, tuple of Note)
-        Relative deviation of bulk modulus, zero for what is as seldom by chance as in one log of 100 [fraction]; and a
-        remark, if the gate is not shut for it.
+        Relative deviation of bulk modulus, zero if one log in 100 shows as much by chance [fraction]; and a note, if
+        the gate does not reject the log for it.
     """
     if not play_shows(shown, sensed):
         return 0.0, ()
@@ -201,10 +201,10 @@ def play_untaken(shown: ShownPlay, sensed: ShownPlay, yields: float) -> tuple[fl
 
 
 def sensed_play(record: Record) -> ShownPlay:
-    """Return the play that a velocity sensor shows: the piston yields to pressure while its encoder stands.
+    """Return the play that a velocity sensor shows: the piston yields to pressure while its encoder is at rest.
 
-    While the encoder stands its seals hold the piston, which moves with pressure. Without a play the encoder moves as
-    far as velocity says; in the play it does not move. A velocity that is made of the encoder's reading shows nothing.
+    While the encoder is at rest, the seals hold the piston, which moves with pressure. Without play the encoder moves
+    as far as velocity says; within the play it does not move. A velocity derived from the encoder shows nothing.
 
     Parameters
     ----------
@@ -214,8 +214,8 @@ def sensed_play(record: Record) -> ShownPlay:
     Returns
     -------
     ShownPlay
-        How far the piston moves unseen, and what that gains in log-likelihood, the size of noise unknown; none where
-        the encoder may see half of it, or the piston moves by less in most of its standings than it resolves.
+        Unseen motion of the piston and its gain in log-likelihood, for unknown noise. Zero if the encoder may see half
+        of the motion, or if the piston mostly moves by less than the resolution.
     """
     if VELOCITY not in record:
         return NO_PLAY
@@ -247,7 +247,7 @@ def sensed_play(record: Record) -> ShownPlay:
 
 
 def _lasting(left: Array, there: BoolArray, samples: int) -> float:
-    """Return the variance of what is left as it counts over so many samples: what was averaged is not white."""
+    """Return the effective variance of residuals over so many samples: averaged noise is not white."""
     parts = len(left) // samples
     left, count = (
         one[: parts * samples].reshape(parts, samples).sum(axis=1) for one in (np.where(there, left, 0.0), there)

@@ -1,8 +1,8 @@
 """Possible courses of the piston within the play of its encoder.
 
-The encoder says at which end of its play it is while it moves. While it stands the piston may be anywhere in between:
-it turns and crosses, or springs back on its seals and comes again. So where it is has a few courses, of which a log
-chooses (`crossings`).
+While the encoder moves, it shows at which end of its play it is. While it is at rest, the piston may be anywhere in
+between: it reverses and crosses, or springs back on its seals and returns. So there are a few courses, and the log
+selects one (`crossings`).
 """
 
 from typing import NamedTuple
@@ -20,18 +20,18 @@ FINEST = 1e-9
 """Their least width [m]."""
 
 SMOOTHED = 2e-2
-"""Length over which pressure is averaged, by a Hann window [s]: its noise then moves no piston, and the quickest of
-crossings takes as long; judged."""
+"""Length over which pressure is averaged, by a Hann window [s]; judged. The fastest crossings take as long, and
+pressure noise moves no piston then."""
 
 STANDS = 0.02
-"""Time for which an encoder stands before the piston is taken to spring back [s]; judged: one may creep in steps."""
+"""Time at rest from which the piston is assumed to spring back [s]; judged: an encoder may creep in steps."""
 
 
 def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     """Return courses of the piston in its encoder's play.
 
-    Between the last movement one way and the first one back the piston turns, and crosses the play with the square of
-    time, as under a constant force. Two steps the same way, from cell to cell, are a movement; one is noise.
+    Between the last movement one way and the first one back the piston reverses, and crosses the play with the square
+    of time, as under a constant force. Two steps the same way, from cell to cell, are a movement; one is noise.
 
     Parameters
     ----------
@@ -45,11 +45,11 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     Returns
     -------
     ndarray, shape (n, 4)
-        In the order of `estimation.models.wide_flow.COURSES`: at which end of its play the encoder is, 1 after it moved
-        up, -1 after it moved down, 0 before anything is known, and from the one to the other while it stands and the
-        piston crosses at last; then what is to be added to that where the piston follows pressure in place of time, as
-        one that is held by the stretch of its seals does; where it crosses at first, and not at last; and where it
-        springs back and comes again, by the share of the pressure that is lost meanwhile [dimensionless].
+        In the order of `estimation.models.wide_flow.COURSES`. First the end of the play at which the encoder is: 1
+        after it moved up, -1 after it moved down, 0 before anything is known, and from one to the other at the end of a
+        rest. Then what to add if the piston follows pressure in place of time, held by the stretch of its seals; if it
+        crosses at the beginning of a rest; and if it springs back and returns, by the share of the pressure that is
+        lost in between [dimensionless].
 
     Examples
     --------
@@ -75,15 +75,15 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
 
 
 class Standings(NamedTuple):
-    """For each sample: the movements before and after, at which sides they left the play, and how far it is there.
+    """For each sample: the movements before and after, the sides on which they left the play, and its place between.
 
     Parameters
     ----------
     first, last : ndarray of int, shape (n,)
         Samples of the movement before and after.
     side, next_side : ndarray, shape (n,)
-        At which end of its play the encoder is from each on: 1 after it moved up, -1 after it moved down, 0 before
-        anything is known.
+        End of the play at which the encoder is from each movement on: 1 after it moved up, -1 after it moved down, 0
+        before anything is known.
     """
 
     first: IntArray
@@ -93,12 +93,12 @@ class Standings(NamedTuple):
 
     @property
     def turns(self) -> BoolArray:
-        """Whether the piston turns meanwhile."""
+        """Whether the piston reverses in between."""
         return self.side != self.next_side
 
     @property
     def length(self) -> IntArray:
-        """Time for which the encoder stands still [samples]."""
+        """Time for which the encoder is at rest [samples]."""
         return self.last - self.first
 
     @property
@@ -115,7 +115,7 @@ class Standings(NamedTuple):
 
 
 def standings(position: Array) -> Standings:
-    """Return between which movements an encoder stands.
+    """Return the movements between which an encoder is at rest.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def smoothed(values: Array, samples: int) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        Its means, in the same unit; beyond either end it is held.
+        Means in the same unit; the ends are extended by their last values.
     """
     if samples < 2:
         return values

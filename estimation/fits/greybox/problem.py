@@ -56,13 +56,12 @@ def search_bounds(
 class Problem:
     """The least-squares problem of one log, on whitened means over the log's blocks.
 
-    Averaging keeps what the log says about unknowns that act more slowly, and makes a 10 kHz log as cheap to judge as a
-    1 kHz one.
+    Averaging keeps the information on unknowns with slower effects, and makes a 10 kHz log as cheap as a 1 kHz one.
 
     Attributes
     ----------
     prior : ndarray, shape (unknowns,)
-        One over the variance of each coordinate before the log is seen; zero where nothing is known [dimensionless].
+        One over the prior variance of each coordinate; zero if nothing is known [dimensionless].
 
     Notes
     -----
@@ -86,7 +85,7 @@ class Problem:
 
     @cached_property
     def blocks(self) -> int:
-        """Number of blocks that hold a sample, over all outputs [count]."""
+        """Number of blocks with at least one sample, over all outputs [count]."""
         begins = np.arange(0, len(self.log.measured), self._block)
         return int(np.count_nonzero(np.logical_or.reduceat(np.isfinite(self.log.measured), begins, axis=0)))
 
@@ -100,7 +99,7 @@ class Problem:
         return type(self)(self.model, log)
 
     def at(self, theta: Array) -> Point:
-        """Return the misfit at a point.
+        """Return cost and slopes at a point.
 
         Parameters
         ----------
@@ -110,7 +109,7 @@ class Problem:
         Returns
         -------
         Point
-            Cost and normal equations; nothing as long as the log is stored.
+            Cost and normal equations; no array as long as the log is stored.
         """
         if not self.log.passes_on:
             return self._point(theta, *self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0))))
@@ -119,7 +118,7 @@ class Problem:
         return self._point(theta, *weighed(errors, self._tilted(theta, errors, slopes)))
 
     def _point(self, theta: Array, cost: float, gradient: Array, gram: Array) -> Point:
-        """Return a point whose misfit is given, with what is known beforehand and a full matrix."""
+        """Return a point whose misfit is given, with the prior added and a full matrix."""
         away = theta - self.presumed
         cost += 0.5 * float(self.prior @ away**2)
         whole = gram + gram.T
@@ -141,7 +140,7 @@ class Problem:
         Returns
         -------
         ndarray, shape (outputs, blocks)
-            White and of unit variance where the model explains the log; zero where a block is missing [dimensionless].
+            White and of unit variance if the model explains the log; zero for a missing block [dimensionless].
         """
         errors = self._room()
         self._run(theta, errors, np.empty((0, 0, 0)), drives, parameters)
@@ -209,7 +208,7 @@ class Problem:
         Returns
         -------
         ndarray, shape (outputs * blocks, unknowns)
-            Zero where a block is missing [dimensionless].
+            Zero for a missing block [dimensionless].
         """
         return self.linearised(theta)[1]
 
@@ -267,7 +266,7 @@ class Problem:
         return self._white + self._passing(theta) if self._passes_on else self._white
 
     def _tilts(self, theta: Array) -> Iterator[tuple[int, int, float]]:
-        """Yield each output whose variance moves with an unknown: its place, the unknown's, the share that moves."""
+        """Yield each output whose variance depends on an unknown: its index, the unknown's, and the dependent share."""
         if self.log.passes_on:
             share, values = self._passing(theta) / self._variances(theta), self.model.values(theta)
             for i, noise in enumerate(self.log.noise):
@@ -275,13 +274,13 @@ class Problem:
                     yield i, self.model.unknowns.index(name), float(share[i]) * slope
 
     def _tilted(self, theta: Array, errors: Array, slopes: Array) -> Array:
-        """Return the derivatives of normalised residuals, those that were taken while the variance was held."""
+        """Return the derivatives of normalised residuals, given those at constant variance."""
         for i, place, share in self._tilts(theta):
             slopes[i, :, place] -= share * errors[i]
         return slopes
 
     def untilted(self, theta: Array, errors: Array) -> Array:
-        """Return the gradient that would be left at an optimum, were noise of driving channels not counted with slopes.
+        """Return the gradient that would remain at an optimum if drive noise were not counted with the slopes.
 
         Parameters
         ----------
@@ -293,7 +292,7 @@ class Problem:
         Returns
         -------
         ndarray, shape (unknowns,)
-            Zero where no channel passes noise on [dimensionless].
+            Zero if no channel passes noise on [dimensionless].
         """
         out = np.zeros(len(theta))
         for i, place, share in self._tilts(theta):
@@ -306,7 +305,7 @@ class Problem:
 
 
 def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
-    """Return cost, gradient and lower triangle of ``J'J`` of normalised residuals; what is grossly off counts linearly.
+    """Return cost, gradient and lower triangle of ``J'J`` of normalised residuals; gross outliers count linearly.
 
     Parameters
     ----------
@@ -318,7 +317,7 @@ def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
     Returns
     -------
     tuple of (float, ndarray of shape (unknowns,), ndarray of shape (unknowns, unknowns))
-        As a kernel gives them.
+        As a kernel returns them.
     """
     columns = slopes.reshape(errors.size, -1)
     squares, pulling, bent = np.empty(errors.shape), np.empty(errors.size), np.empty(columns.shape)

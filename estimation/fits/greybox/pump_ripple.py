@@ -1,7 +1,7 @@
 """Flow ripple of the pump by its gear teeth: test on a fit's residuals, and a log whose speed includes it.
 
-A pump delivers a little more and a little less as each of its teeth passes, by the angle of its shaft. Turned slowly, a
-tooth lasts as long as a stroke's pressure, and is taken for soft oil. The angle is the integral of the logged speed.
+Each tooth that passes makes the delivery pulsate with the angle of the shaft, the integral of the logged speed. At low
+speed a tooth lasts as long as a stroke's pressure pulse, and looks like soft oil.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,33 +17,33 @@ from estimation.fits.greybox.problem import Problem
 from plant.solvers.steps import parameter_names
 
 COUNTS = tuple(range(5, 20))
-"""Teeth a turn that are looked for: gear pumps have 7 to 16, pumps with an odd count of pistons pulse twice for each
-[count]."""
+"""Teeth per revolution that are searched for [count]: gear pumps have 7 to 16; an odd number of pistons pulses twice
+each."""
 
 NUDGE = 1e-2
-"""Amplitude of the teeth, as a share of the flow, by which the residuals' answer to them is read off [fraction]."""
+"""Amplitude of ripple for the finite difference of the residuals, over the flow [fraction]."""
 
 MOST_BETWEEN = 1.0
-"""Half the phase of the teeth from sample to sample up to which they are followed [rad]: three samples a tooth."""
+"""Half the phase of the ripple per sample up to which it is followed [rad]: three samples per tooth."""
 
 LIKELIEST = 3
-"""Counts of which the model is asked [count]: with two waves each and the log itself they run side by side."""
+"""Tooth counts for which the model is run [count]: with two waves each and the log itself they run side by side."""
 
 LEAST_TEETH = 0.03
-"""Amplitude from which teeth are taken up, as a share of the flow [fraction]; judged. Smaller ones are integrated out,
-see `estimation.fits.greybox.small_pump_ripple`."""
+"""Amplitude from which ripple is fitted, over the flow [fraction]; judged. Smaller ripple is integrated out, see
+`estimation.fits.greybox.small_pump_ripple`."""
 
 MOST_OFFSET = 1.0
-"""Largest offset of logged speed that is looked for [rad/s]: 10 revolutions a minute; judged."""
+"""Largest offset of logged speed that is searched for [rad/s]: 10 revolutions per minute; judged."""
 
 LOOKS_A_TURN = 16
-"""Parts of the fastest turn of the teeth's phase, by an offset, over which residuals are summed [count]."""
+"""Parts of a full phase turn, by the fastest offset, over which residuals are summed [count]."""
 
 FINER = 4
-"""Offsets that are tried for each that a log tells apart [count]."""
+"""Offsets that are tried per resolvable one [count]."""
 
 OFFSET_NUDGE = 1e-4
-"""Offset by which the answer to one is read off [rad/s]: it turns the phase by little over the longest log."""
+"""Offset for the finite difference [rad/s]: it changes the phase by little over the longest log."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class Ripple:
     Parameters
     ----------
     count : int
-        How many pass in a turn [count].
+        Teeth per revolution [count].
     cosine, sine : float
-        Their parts that go with the shaft's angle since the first sample, as shares of the flow [fraction].
+        Amplitudes by the shaft's angle since the first sample, over the flow [fraction].
     """
 
     count: int
@@ -69,14 +69,14 @@ class Ripple:
 
 
 class Turning(NamedTuple):
-    """Rotation of a pump beside its logged speed.
+    """Pump ripple and offset of the logged speed.
 
     Parameters
     ----------
     teeth : tuple of Ripple
-        What is in its flow.
+        Ripple of its flow.
     offset : float
-        By how much the logged speed exceeds the shaft's [rad/s].
+        Logged speed minus the shaft's [rad/s].
     """
 
     teeth: tuple[Ripple, ...] = ()
@@ -84,7 +84,7 @@ class Turning(NamedTuple):
 
 
 EVENLY = Turning()
-"""As the log says, without teeth."""
+"""No ripple and no offset."""
 
 
 class ShownRipple(NamedTuple):
@@ -93,23 +93,23 @@ class ShownRipple(NamedTuple):
     Parameters
     ----------
     teeth : Ripple
-        What the log asks for beside what its drives hold, to first order.
+        Ripple beside what the drives already include, to first order.
     gain : float
-        In log-likelihood, Rao's score statistic over two, less what the search for an offset costs [dimensionless].
+        In log-likelihood, Rao's score statistic over two, less the cost of the search for an offset [dimensionless].
     std : float
         Standard deviation of the amplitude [fraction].
     opened : ndarray, shape (unknowns,)
-        Variance of the unknowns' coordinates that is added where these teeth are unknown too [dimensionless].
+        Variance added to the unknowns' coordinates if this ripple is unknown too [dimensionless].
     offset : float
-        By how much the logged speed exceeds the shaft's with these teeth [rad/s].
+        Logged speed minus the shaft's with this ripple [rad/s].
     offset_std : float
-        Standard deviation of that, where the drives hold an offset and these teeth [rad/s].
+        Standard deviation of that, if the drives include an offset and this ripple [rad/s].
     power : ndarray, shape (2, 2)
         Inverse of the covariance of cosine and sine [dimensionless].
     answers : ndarray, shape (unknowns, 2)
-        By how much the unknowns fall as cosine and sine grow [dimensionless].
+        Decrease of the unknowns per cosine and sine [dimensionless].
     beside : float
-        What they gain beside the likeliest count, less that cost [dimensionless].
+        Gain beside the likeliest count, less that cost [dimensionless].
     """
 
     teeth: Ripple
@@ -131,9 +131,9 @@ def with_ripple(log: GreyBoxLog, teeth: Sequence[Ripple], offset: float = 0.0) -
     log : GreyBoxLog
         The log, motor speed its first drive.
     teeth : sequence of Ripple
-        What is in the flow.
+        Ripple of the flow.
     offset : float
-        By how much the logged speed exceeds the shaft's [rad/s].
+        Logged speed minus the shaft's [rad/s].
 
     Examples
     --------
@@ -152,11 +152,11 @@ def delivering(speed: Array, teeth: Sequence[Ripple], offset: float, sample_time
     Parameters
     ----------
     speed : ndarray, shape (n,)
-        As it is logged [rad/s].
+        Logged speed [rad/s].
     teeth : sequence of Ripple
-        What is in the flow.
+        Ripple of the flow.
     offset : float
-        By how much the logged speed exceeds the shaft's [rad/s].
+        Logged speed minus the shaft's [rad/s].
     sample_time : float
         Seconds between samples [s].
 
@@ -176,13 +176,13 @@ class ShownOffset(NamedTuple):
     Parameters
     ----------
     value : float
-        By how much it exceeds the shaft's, to first order [rad/s].
+        Logged speed minus the shaft's, to first order [rad/s].
     gain : float
         In log-likelihood [dimensionless].
     std : float
         Standard deviation of the value [rad/s].
     opened : ndarray, shape (unknowns,)
-        Variance of the unknowns' coordinates that is added where this offset is unknown too [dimensionless].
+        Variance added to the unknowns' coordinates if this offset is unknown too [dimensionless].
     """
 
     value: float
@@ -192,7 +192,7 @@ class ShownOffset(NamedTuple):
 
 
 NO_OFFSET = ShownOffset(0.0, 0.0, np.inf, np.zeros(1))
-"""Where a fit was not asked, or feels none."""
+"""Result of a fit that does not test for an offset, or on which it has no effect."""
 
 
 def shown_ripple(
@@ -200,7 +200,8 @@ def shown_ripple(
 ) -> tuple[Mapping[int, ShownRipple], ShownOffset]:
     """Return the flow ripple that a fit's residuals show, and an offset of speed.
 
-    Without any, each count gains 10 by chance in one log of 22,000, one of `COUNTS` in one log of 1500.
+    In a log without ripple, a given count gains 10 by chance in one log of 22,000, and one of `COUNTS` in one log of
+    1500.
 
     Parameters
     ----------
@@ -215,12 +216,12 @@ def shown_ripple(
     slopes : ndarray, shape (blocks, felt)
         Derivatives of the residuals by them [dimensionless].
     counts : sequence of int
-        Teeth a turn that are looked for [count]; of many the model is asked of the `LIKELIEST`.
+        Teeth per revolution that are searched for [count]; the model is run for the `LIKELIEST` only.
 
     Returns
     -------
     tuple of Mapping[int, ShownRipple] and ShownOffset
-        By their count in a turn, `opened` of the unknowns that are felt; a count that is not felt is left out.
+        By tooth count, `opened` for the unknowns that have an effect; a count without effect is left out.
     """
     log = problem.log
     sought = [_Sought(count) for count in counts]
@@ -264,7 +265,7 @@ def shown_ripple(
 
 @dataclass(frozen=True)
 class _Sought:
-    """A count of teeth, the offset of speed with which it is sought, and what that costs in log-likelihood."""
+    """A tooth count, the offset of speed with which it is searched, and its cost in log-likelihood."""
 
     count: int
     offset: float = 0.0
@@ -272,9 +273,9 @@ class _Sought:
 
 
 def _ways(log: GreyBoxLog, one: _Sought) -> list[tuple[Array, float]]:
-    """Return changes of speed, each for a unit, and how many units of it are tried: two waves, and an offset.
+    """Return unit changes of speed and how many units are tried: two waves, and an offset.
 
-    An offset that the drives hold is sought with the teeth that tell it, once they are held.
+    If the drives include an offset, it is varied together with the ripple that determines it.
     """
     speed, step = log.drives[:, 0], log.sample_time
     turned = _turned(speed - one.offset, step)
@@ -294,17 +295,17 @@ def _turned(speed: Array, step: float) -> tuple[Array, Array]:
 
 
 def _delivered(teeth: Ripple, turned: tuple[Array, Array], sample_time: float) -> Array:
-    """Return the speed that delivers what teeth add [rad/s].
+    """Return the speed that delivers the flow of the ripple [rad/s].
 
-    Straight lines between samples then deliver what teeth do that pass at an even speed. Teeth of which too few samples
-    are taken deliver their mean, which is none.
+    Straight lines between samples then deliver the right volume at constant speed. If there are too few samples per
+    tooth, only the mean is delivered, which is zero.
     """
     cosine, sine = _waves(teeth.count, turned, sample_time)
     return teeth.cosine * cosine + teeth.sine * sine
 
 
 def _waves(count: int, turned: tuple[Array, Array], sample_time: float) -> tuple[Array, Array]:
-    """Return what teeth of unit size deliver as a cosine and as a sine of the shaft's angle [rad/s]."""
+    """Return the speed by unit ripple in cosine and sine of the shaft's angle [rad/s]."""
     between, steps = turned
     phase, half = count * between, 0.5 * count * steps
     seen = half < MOST_BETWEEN
@@ -313,10 +314,10 @@ def _waves(count: int, turned: tuple[Array, Array], sample_time: float) -> tuple
 
 
 def _likeliest(problem: Problem, theta: Array, errors: Array, counts: Sequence[int]) -> Sequence[_Sought]:
-    """Return the counts of teeth that residuals go with most, as pressure answers at an even speed, without the model.
+    """Return the tooth counts that correlate most with residuals, by a linear response at constant speed.
 
-    It then leaks away at one rate, so that it lags behind what teeth deliver by less the faster they pass. An offset of
-    speed turns the phase evenly, so that residuals times waves have a peak at its frequency.
+    Pressure then leaks off at one rate, so its phase lag behind the ripple is smaller the faster teeth pass. An offset
+    of speed changes the phase linearly, so residuals times waves have a peak at its frequency.
     """
     log, rig = problem.log, problem.model.parameters
     value = {

@@ -1,4 +1,4 @@
-"""`Ridge`: two parameters of a fit that nearly cancel, and how a finite difference by one of them is taken."""
+"""`Ridge`: two parameters of a fit that nearly cancel, and how to take a finite difference by one of them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -8,14 +8,15 @@ import numpy as np
 from plant.arrays import Array
 
 STEEPEST = 1e3
-"""Farthest that one logarithm goes along a ridge with the other [dimensionless]: beyond, its parameter has vanished."""
+"""Largest ratio of the steps of the two logarithms along a ridge [dimensionless]: beyond it, one parameter has
+vanished."""
 
 
 class Ridge(NamedTuple):
     """Two parameters, both fitted as logarithms, that nearly cancel when they rise together.
 
-    A difference over a finite step of one alone holds half its curvature, which does not cancel with the slope by the
-    other. Where make-up valves open and close, that was larger than what is left of the two: they seemed known a
+    A finite difference by one of them alone includes half its curvature, which does not cancel with the slope by the
+    other. Where make-up valves open and close, that was larger than the net effect of both, and they seemed known a
     hundred times too well. So the step is taken along the ridge, and the slope by the other is subtracted.
 
     Parameters
@@ -31,7 +32,7 @@ class Ridge(NamedTuple):
     ratio: float
 
     def placed(self, free: Sequence[str]) -> "PlacedRidge | None":
-        """Return the ridge among the unknowns of a fit, None where one of the two is not free."""
+        """Return the ridge among the unknowns of a fit, None if one of the two is not free."""
         if self.nudged not in free or self.along not in free:
             return None
         return PlacedRidge(free.index(self.nudged), free.index(self.along), self.ratio)
@@ -43,7 +44,7 @@ class PlacedRidge(NamedTuple):
     Parameters
     ----------
     nudged, along : int
-        Their places.
+        Their indices.
     ratio : float
         See `Ridge` [unit of the second over that of the first].
     """
@@ -68,7 +69,7 @@ class PlacedRidge(NamedTuple):
         return min(self.ratio * float(np.exp(theta[self.nudged] - theta[self.along])), STEEPEST)
 
     def turn(self, points: Array, theta: Array, nudge: float) -> None:
-        """Turn the neighbour of a point that is nudged by the first parameter onto the ridge, in place.
+        """Move the neighbour of a point that is shifted in the first parameter onto the ridge, in place.
 
         Parameters
         ----------
@@ -82,7 +83,7 @@ class PlacedRidge(NamedTuple):
         points[1 + self.nudged, self.along] += np.log1p(nudge * self.steepness(theta))
 
     def turn_back(self, slopes: Array, theta: Array) -> None:
-        """Turn the slope along the ridge into that by the first parameter alone, in place.
+        """Convert the slope along the ridge into that by the first parameter alone, in place.
 
         Parameters
         ----------

@@ -10,7 +10,7 @@ from plant.arrays import Array
 from plant.solvers.steps import parameter_names
 
 RIG_NUDGE = 1e-3
-"""Relative change of a rig parameter by which the fit's response to it is read off [fraction]."""
+"""Relative change of a rig parameter for the finite difference of the fit's response [fraction]."""
 
 
 def rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:
@@ -23,7 +23,8 @@ def rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array
     theta : ndarray, shape (unknowns,)
         Its solution [dimensionless].
     response : callable
-        From a change of the normalised residuals, shape (outputs, blocks), to how far the felt unknowns go.
+        From a change of the normalised residuals, shape (outputs, blocks), to the shift of the unknowns that have an
+        effect.
 
     Yields
     ------
@@ -54,14 +55,14 @@ def answers_by_rig(problem: Problem, theta: Array, known_of: Information) -> Ite
     theta : ndarray, shape (unknowns,)
         Its solution [dimensionless].
     known_of : Information
-        What the log says there.
+        Information of the slopes there.
 
     Yields
     ------
     name : str
         The parameter.
     slopes : ndarray, shape (unknowns,)
-        Of all unknowns, zero of those that are not felt, in the fitted coordinates [dimensionless].
+        For all unknowns, zero for those without effect, in the fitted coordinates [dimensionless].
     """
     for name, slope in rig_slopes(problem, theta, known_of.response):
         whole = np.zeros(len(theta))

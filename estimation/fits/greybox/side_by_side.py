@@ -1,7 +1,7 @@
 """Kernels that predict a log by a grey-box model under several parameter sets side by side.
 
-A search by finite differences asks for a dozen nearby predictions of one log: as many as fit into the processor's
-vectors take little longer than one.
+A search by finite differences needs a dozen similar predictions of one log. As many as fit into the processor's vector
+registers take little longer than one.
 """
 
 from collections.abc import Callable
@@ -29,8 +29,8 @@ LANES = 8
 """Parameter sets side by side, as many as a vector register of 512 bits holds."""
 
 MANY = 2 * LANES
-"""The same where there are more: two vectors a step, of which one is worked on while the other waits, take from 1.3
-to 1.6 times as long as one."""
+"""The same for more sets: two vectors per step, one computed while the other waits, take 1.3 to 1.6 times as long as
+one."""
 
 ResidualsRun: TypeAlias = Callable[..., None]
 """``run(parameters, drives, measured, sample_time, substeps, block, variance, walk, open_at, kept, errors)`` fills
@@ -38,7 +38,7 @@ errors; of a model that bears gaps, these come before the errors."""
 
 
 def lanes_for(runs: int) -> int:
-    """Return the number of lanes of the kernel that makes so many runs, `MANY` at most [count]."""
+    """Return the number of lanes of the kernel for so many runs, `MANY` at most [count]."""
     return LANES if runs <= LANES else MANY
 
 
@@ -56,8 +56,8 @@ def compile_side_by_side(model: GreyBoxModel, lanes: int) -> ResidualsRun:
     Returns
     -------
     callable
-        Takes what `estimation.fits.greybox.side_by_side_loops.residuals_side_by_side` does, so many parameter rows; of
-        a model that bears gaps, what `estimation.fits.greybox.gap_loops.residuals_across_gaps` does.
+        With the arguments of `estimation.fits.greybox.side_by_side_loops.residuals_side_by_side` and so many parameter
+        rows; for a model that allows gaps, those of `estimation.fits.greybox.gap_loops.residuals_across_gaps`.
     """
     loop = residuals_across_gaps if model.jump else residuals_side_by_side
     takes = signature_of(loop, lanes=lanes, outputs=len(model.outputs), drives=len(model.drives))
@@ -68,7 +68,7 @@ def compile_side_by_side(model: GreyBoxModel, lanes: int) -> ResidualsRun:
 
 @cache
 def _written(model: GreyBoxModel) -> tuple[dict[str, str], list[str], int]:
-    """Return the lines of a model, all that stands in memory, and the count of states; the same for any lanes."""
+    """Return the lines of a model, the names of its numbers in memory, and the count of states; alike for any lanes."""
     names, drives = parameter_names(model.parameters), range(len(model.drives))
     p = parameter_symbols(model.parameters)
     begun = {f"x{i}": as_expression(value) for i, value in enumerate(model.initial(p))}

@@ -1,7 +1,7 @@
 """The loop that runs a grey-box model along a log under several parameter sets side by side, as a plain function.
 
-`estimation.fits.greybox.side_by_side` pastes it into a kernel file. What it finds in such a file is its parameter
-``kernel``.
+`estimation.fits.greybox.side_by_side` pastes it into a kernel file, where its parameter ``kernel`` becomes the names of
+that file.
 """
 
 import math
@@ -16,8 +16,8 @@ from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
 class SideBySideKernel(SideBySide, Protocol):
     """Interface of a model's compiled kernel.
 
-    In memory stand, `LANES` numbers each, states, drives at the last sample, their rises in a step, outputs,
-    the step's length, parameters, and what `settle_at` makes of them.
+    Memory holds, `LANES` numbers each: states, drives at the last sample, their rises in a step, outputs, the step's
+    length, parameters, and what `settle_at` computes from them.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ def residuals_side_by_side(
     parameters : ndarray, shape (lanes, parameters)
         Parameter rows.
     drives : ndarray, shape (n, drives, one or lanes)
-        Drives at the samples [their SI units], linear between; of all sets alike, or of each.
+        Drives at the samples [their SI units], linear between; common to all sets, or one each.
     measured : ndarray, shape (n, outputs)
         Outputs; NaN is missing.
     sample_time : float
@@ -68,12 +68,12 @@ def residuals_side_by_side(
     block : int
         Samples a block.
     variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
-        White noise of each output, what its random walk gains after each block, and what else is open of each block's
-        mean; the last number counts for all blocks that follow [SI squared].
+        White noise of each output, random-walk variance after each block, and other variance of each block's mean; the
+        last number holds for all later blocks [SI squared].
     kept : float
-        What is left of a random walk's level after a block [fraction].
+        What remains of a random walk's level after a block [fraction].
     errors : ndarray, shape (outputs, blocks, lanes)
-        Room for the residuals; those of missing blocks are left as they are.
+        Output array for the residuals; those of missing blocks are not changed.
     """
     room = np.zeros(kernel.NUMBERS + 8)  # what is at no time set, the share of a step at its start, is zero
     work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
@@ -109,7 +109,7 @@ def residuals_side_by_side(
 
 
 def drive(kernel: SideBySideKernel, work: Array, drives: Array, k: int, steps: int) -> None:
-    """Put the drives at the last sample, and their rises in a step up to the sample ``k``, in their places.
+    """Store the drives at the last sample, and their rises per step up to sample ``k``.
 
     Parameters
     ----------
@@ -149,22 +149,22 @@ def close(
     kept: float,
     errors: Array,
 ) -> None:
-    """Fill in the residuals of a block, and take the random walks over to the next one.
+    """Fill in the residuals of a block, and pass the random walks on to the next one.
 
     Parameters
     ----------
     place : int
-        The block's number.
+        Index of the block.
     excess, level : ndarray, shape (outputs, lanes)
-        Sums over the block, predicted less measured, which become zero, and the random walks' levels [SI].
+        Sums over the block of prediction minus measurement, which are reset to zero, and the random walks' levels [SI].
     present, spread : ndarray, shape (outputs,)
-        Samples of the block, which become none, and what the levels are not known by [SI squared].
+        Samples of the block, which are reset to zero, and the variances of the levels [SI squared].
     variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
         As of `residuals_side_by_side` [SI squared].
     kept : float
-        What is left of a random walk's level after a block [fraction].
+        What remains of a random walk's level after a block [fraction].
     errors : ndarray, shape (outputs, blocks, lanes)
-        Room for the residuals; those of missing blocks are left as they are.
+        Output array for the residuals; those of missing blocks are not changed.
     """
     for i in range(kernel.OUTPUTS):
         if present[i] > 0.0:
@@ -192,17 +192,17 @@ def absorb(
     Parameters
     ----------
     excess : ndarray, shape (lanes,)
-        Sums over the block, predicted less measured [SI].
+        Sums over the block of prediction minus measurement [SI].
     level : ndarray, shape (lanes,)
         The random walk's level [SI].
     samples : float
-        How many samples the block has.
+        Samples in the block.
     gain : float
-        Share of an innovation that goes into the level [fraction].
+        Share of an innovation that is added to the level [fraction].
     deviation : float
         Standard deviation of an innovation [SI].
     errors : ndarray, shape (lanes,)
-        Room for the normalised residuals.
+        Output array for the normalised residuals.
     """
     for lane in range(kernel.LANES):
         innovation = excess[lane] / samples - level[lane]

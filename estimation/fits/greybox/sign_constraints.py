@@ -1,8 +1,7 @@
-"""`sign_constrained_covariance(problem, ...)`: covariance of a fit some of whose unknowns cannot be negative.
+"""`sign_constrained_covariance(problem, ...)`: covariance of a fit with unknowns that cannot be negative.
 
-A motor leads and never lags, and an inner circuit does not suck. A search holds such an unknown at nothing where noise
-would carry it beyond, and finds the others as if it stood there. A covariance that lets it go beyond makes their
-intervals too wide.
+A motor leads and never lags, and an inner circuit does not suck. A search holds such an unknown at zero if noise would
+carry it below, and finds the others at that value. A covariance that ignores the bound makes their intervals too wide.
 """
 
 from math import erfc, exp, inf, pi, sqrt
@@ -31,13 +30,13 @@ def sign_constrained_covariance(
     point : Point
         Its solution.
     least : ndarray, shape (unknowns,)
-        Lowest coordinates of its search; others than zero are no law of physics, and bound nothing [dimensionless].
+        Lowest coordinates of its search; only zeros are physical bounds [dimensionless].
     felt : ndarray of int, shape (felt,)
-        Places of the unknowns that are felt.
+        Indices of the unknowns that have an effect.
     bread : ndarray, shape (felt, felt)
         Inverse of the normal equations of those [dimensionless].
     spread : ndarray, shape (felt or more, felt or more)
-        Their covariance without bounds; what stands behind them has none [dimensionless].
+        Their covariance without bounds; what follows them has no bounds [dimensionless].
 
     Returns
     -------
@@ -54,21 +53,21 @@ def sign_constrained_covariance(
 
 
 def not_negative(spread: Array, found: dict[int, tuple[float, float]]) -> Array:
-    """Return the covariance about an estimate of unknowns that are normal, but some of them not negative.
+    """Return the covariance about an estimate of normal unknowns, some of which are not negative.
 
-    Each of those is taken by itself: the others follow it along their regression on it.
+    Each of those is treated separately: the others follow it along their regression on it.
 
     Parameters
     ----------
     spread : ndarray, shape (p, p)
         Covariance without bounds [dimensionless].
     found : dict[int, tuple of float]
-        By the place of an unknown that is not negative: its estimate, and the optimum without bounds [dimensionless].
+        By the index of an unknown that is not negative: its estimate, and the optimum without bounds [dimensionless].
 
     Returns
     -------
     ndarray, shape (p, p)
-        Nowhere more than the covariance without bounds [dimensionless].
+        Never larger than the covariance without bounds [dimensionless].
 
     Examples
     --------
@@ -96,9 +95,9 @@ def square_about(low: float, point: float) -> float:
     Parameters
     ----------
     low : float
-        Above which it lies [dimensionless].
+        Lower limit of the variable [dimensionless].
     point : float
-        About which [dimensionless].
+        Point about which the mean square is taken [dimensionless].
 
     Returns
     -------

@@ -1,7 +1,8 @@
 """Pump ripple too small to fit: integrated out, with the shift and variance that it adds to the unknowns.
 
-Every gear pump has some. Below `LEAST_TEETH` a log seldom tells their count, but where oil is slow beside a tooth they
-put bulk modulus off by more than a deviation. Their answer is linear, so that no fit is made anew.
+Every gear pump has some. Below `LEAST_TEETH` a log seldom determines the tooth count, but if pressure changes slowly
+beside the tooth passing, small ripple moves bulk modulus by more than a deviation. Its effect is linear, so no new fit
+is needed.
 """
 
 import math
@@ -12,21 +13,21 @@ import numpy as np
 from estimation.fits.greybox.pump_ripple import COUNTS, LEAST_TEETH, ShownRipple
 
 ANY_TEETH = 0.5
-"""Probability before a log is seen that teeth are felt at all: a simulator may have none [fraction]."""
+"""Prior probability that ripple has an effect at all: a simulator may have none [fraction]."""
 
 SMALL_STD = LEAST_TEETH / 6.0**0.5
-"""Standard deviation of the cosine and the sine of small teeth, of any size up to `LEAST_TEETH` alike [fraction]."""
+"""Standard deviation of the cosine and the sine of small ripple, uniform up to `LEAST_TEETH` [fraction]."""
 
 
 MOVED = ("bulk_modulus", "leakage_coefficient", "flow_bias")
-"""What is told with small teeth taken into account; all are fitted as logarithms."""
+"""Parameters that are corrected for small ripple; all are fitted as logarithms."""
 
 NOT_MOVED: tuple[Mapping[str, float], Mapping[str, float]] = ({}, {})
-"""What teeth move where a fit was not asked for them, or holds some."""
+"""Correction if a fit does not test for ripple, or includes some."""
 
 
 MOST_MOVED = 1.0
-"""Logarithm of the factor by which small teeth move a parameter at most [dimensionless]; judged."""
+"""Largest shift of a parameter's logarithm by small ripple [dimensionless]; judged."""
 
 
 def small_pump_ripple(
@@ -34,13 +35,13 @@ def small_pump_ripple(
 ) -> tuple[Mapping[str, float], Mapping[str, float]]:
     """Return the shift of the unknowns if a small ripple is unknown too, and the variance that this adds.
 
-    Teeth of each count that was asked are weighed by their evidence beside none (Kass and Raftery 1995, Journal of the
-    American Statistical Association 90, equation 1), cosine and sine being normal before the log is seen.
+    Each tested tooth count is weighted by its evidence against no ripple (Kass and Raftery 1995, Journal of the
+    American Statistical Association 90, equation 1), with a normal prior for cosine and sine.
 
     Parameters
     ----------
     shown : Mapping[int, ShownRipple]
-        What residuals say of each, by their count in a turn.
+        What residuals show of each, by tooth count.
     names : sequence of str
         The unknowns that are felt.
 
@@ -68,7 +69,7 @@ def small_pump_ripple(
 def with_shifts(
     found: Mapping[str, tuple[float, float]], *shifts: tuple[Mapping[str, float], Mapping[str, float]]
 ) -> dict[str, tuple[float, float]]:
-    """Return the result, shifted and widened by what no fit was made for: small teeth, noise of motor speed.
+    """Return the result, shifted and widened by effects that are not fitted: small ripple, noise of motor speed.
 
     Parameters
     ----------

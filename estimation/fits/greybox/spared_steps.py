@@ -1,7 +1,7 @@
 """Short model steps only where they matter, during a search; its end uses all of them.
 
-Between samples pressures are all but straight lines, so that one step is as exact as four. A few samples differ: a
-valve opens or shuts there. Which they are is read off two runs at one point, so that a search has one misfit
+Between samples pressures are nearly straight lines, so that one step is as exact as four. A few samples differ: a valve
+opens or closes there. They are found from two runs at one point, so that a search has the same cost function
 throughout. See decision 294.
 """
 
@@ -16,15 +16,16 @@ from estimation.fits.greybox.side_by_side import LANES
 from plant.arrays import Array
 
 FELT_ERRORS = (1e-4, 3e-4, 1e-3, 3e-3)
-"""A sample has short steps if one long step errs there by more than the first, in standard deviations of its noise, or
-by the next one where too many samples do [dimensionless]. On 20 plain training logs the first moves the optimum by
-0.017 deviations of bulk modulus at most."""
+"""Error of one long step, in standard deviations of the noise, above which a sample has short steps: the first value,
+or the next one if too many samples exceed it [dimensionless]. In 20 plain training logs the first moves the optimum by
+at most 0.017 deviations of bulk modulus."""
 
 AROUND = 3
-"""How many samples before and after it have them, too: a search moves the moment at which a valve opens [samples]."""
+"""Samples before and after it that have short steps, too: a search moves the moment at which a valve opens
+[samples]."""
 
 MOST_SHORT = 0.3
-"""Share of samples with short steps that is too many [fraction]."""
+"""Share of samples with short steps that is too large [fraction]."""
 
 LAST = 4
 """Evaluations with all short steps at the end of a search that had few [count]."""
@@ -43,7 +44,7 @@ def sparing_steps(problem: Problem, theta: Array) -> IntArray:
     Returns
     -------
     ndarray of int, shape (n,)
-        Those of the log where nothing is to be spared, or it has gaps [count].
+        Those of the log if nothing can be saved, or if it has gaps [count].
     """
     log = problem.log
     few = np.ones_like(log.steps)
@@ -65,12 +66,12 @@ def with_steps(problem: Problem, steps: IntArray | None) -> Problem:
     problem : Problem
         The problem.
     steps : ndarray of int, shape (n,), or None
-        Up to each sample [count]; None for those that it has.
+        Up to each sample [count]; None keeps those of the problem.
 
     Returns
     -------
     Problem
-        The problem; the same one where it has those.
+        The problem; the same object if nothing changes.
     """
     log = problem.log.stepped(steps)
     return problem if log is problem.log else problem.on(log)
@@ -89,13 +90,13 @@ def spared(problem: Problem, theta: Array) -> Problem:
     Returns
     -------
     Problem
-        The problem; the same one where nothing is to be spared.
+        The problem; the same object if nothing can be saved.
     """
     return with_steps(problem, sparing_steps(problem, theta))
 
 
 def step_errors(problem: Problem, theta: Array) -> Array:
-    """Return the errors of a log's model steps, as implicit ones show them, near a point.
+    """Return the errors of a log's model steps against implicit ones, near a point.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ def step_errors(problem: Problem, theta: Array) -> Array:
 def _long_step_errors(problem: Problem, theta: Array) -> Array:
     """Return the error of one long step up to each sample, over the noise, shape (n,) [dimensionless].
 
-    What a step errs by stays until the oil has leaked off, so that errors of steps are differences.
+    The error of a step stays until the oil has leaked off, so errors of steps are differences.
     """
     log = problem.log
     white = tuple(one.scaled(1.0, 0.0) for one in log.noise)
@@ -125,7 +126,7 @@ def _long_step_errors(problem: Problem, theta: Array) -> Array:
 
 
 def _apart(problem: Problem, theta: Array, rough: GreyBoxLog, fine: GreyBoxLog) -> Array:
-    """Return what a log's residuals with some model steps have beyond those with others, shape (outputs, blocks)."""
+    """Return a log's residuals with some model steps minus those with others, shape (outputs, blocks)."""
     # side by side, as a search has them: no kernel for these two
     rows = [rough.parameters] * min(1 + len(theta), LANES)
     there, exact = (problem.on(one).residuals_of(theta, rows)[0] for one in (rough, fine))

@@ -1,4 +1,4 @@
-"""`Work(most)`: how much searches may do together, in steps of the model: no result depends on the machine's speed."""
+"""`Work(most)`: limit on the work of all searches, in model steps: results do not depend on the machine's speed."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -8,22 +8,22 @@ from dataclasses import dataclass
 from estimation.fits.greybox.log import GreyBoxLog
 
 MOST_STEPS = 600_000_000
-"""Steps of the model that the searches for what is strange about a log may make, in all runs together [count]; a step
-takes 20 to 50 ns. Of one log of each kind of the open benchmark, 54 take 280 million at most, and one 460 million."""
+"""Most steps of the model in all searches for unusual effects in a log, all runs together [count]; a step takes 20 to
+50 ns. Of one log of each kind of the open benchmark, 54 take at most 280 million, and one 460 million."""
 
 
 class WorkSpentError(Exception):
-    """Searches have done what they may."""
+    """Searches have reached their limit of work."""
 
 
 @dataclass
 class Work:
-    """What searches may do, and what they have done.
+    """Limit of the work of searches, and the work done.
 
     Parameters
     ----------
     most : int
-        Steps of the model in all runs, side by side or not [count].
+        Most steps of the model in all runs, side by side or not [count].
     done : int
         The same so far [count].
 
@@ -41,7 +41,7 @@ class Work:
 
     @contextmanager
     def counted(self) -> Generator[None]:
-        """Count what this thread does within; a `WorkSpentError` ends it before it does more than it may."""
+        """Count this thread's work within the context; a `WorkSpentError` ends it before it exceeds the limit."""
         outer = _counted.set(self)
         try:
             yield
@@ -50,7 +50,7 @@ class Work:
 
 
 def spend(log: GreyBoxLog, runs: int = 1) -> None:
-    """Count runs over a log that are about to be made, if anybody counts.
+    """Count runs over a log that are about to be made, if work is counted.
 
     Parameters
     ----------

@@ -147,8 +147,7 @@ class LossSignals(NamedTuple):
 
 
 def _above(what: Array, course: LossRegressor) -> Array:
-    """Return a power of the excess of a signal over a limit, in the signal's unit; the excess itself for a power of
-    1."""
+    """Return a power of a signal's excess over a limit, in the signal's unit; the excess itself for a power of 1."""
     return course.at * np.maximum(np.abs(what) / course.at - 1.0, 0.0) ** course.width
 
 
