@@ -27,39 +27,38 @@ class Hypothesis:
     free : tuple of str
         Parameters of `WideFlowParameters` that are fitted beside the plain ones.
     starts : tuple of Mapping[str, float]
-        First guesses [SI]; parameters that are not named start where they are absent.
+        First guesses [SI]; other parameters start at "no effect".
     delays : tuple of float
-        Times by which a channel may come late beside its lag, negative where early [s].
+        Possible delays of a channel beside its lag, negative for a lead [s].
     late : str
         That channel.
     shares_of_peak : tuple of float
-        Relief settings that the fit begins with, over the log's highest differential pressure [fraction].
+        First guesses of the relief setting, over the log's highest differential pressure [fraction].
     instead : tuple of str
-        Unknowns of the plain form that are not told apart from it, and are held.
+        Unknowns of the plain form that cannot be distinguished from it, and are held.
     far : bool
-        Whether what it adds is so far from its absence that the slope there says nothing of it.
+        Whether the effect is so far from "no effect" that the slope there does not predict it.
     from_first_sample : bool
-        Whether the search begins with the differential pressure that the log begins with, and a load's with several
-        levels.
+        Whether the search begins with the log's first differential pressure, and that of a load with several levels.
     least : float
-        Size below which what is freed first is not what the hypothesis says [SI].
+        Least size of the first parameter for which the hypothesis keeps its meaning [SI].
     from_mid_travel : bool
         Whether the search also begins with an encoder that reads zero in the middle of the log's travel.
     from_change : bool
-        Whether the search begins where lost flow says that leakage steps.
+        Whether the search begins where the lost flow shows a step of leakage.
     from_entry : bool
-        Whether the search begins where lost flow says that air gets in, and looks for that all over the log.
+        Whether the search begins where the lost flow shows that air enters, and then tries the whole log.
     at_end : tuple of str
-        What is freed only as the search comes to its end.
+        Parameters that are fitted only at the end of the search.
     by_mass : bool
-        Whether the search balances mass whatever the plain form does: bubbles change the volume of what flows.
+        Whether the search balances mass whatever the plain form does: bubbles change the volume of flows.
     beside : tuple of str
-        What is fitted along with it, but is nothing that it promises.
+        Parameters that are fitted along with it, but are not part of its predicted gain.
     lower : bool
-        Whether what is freed first is lower than the rig file has it: else it is not what the hypothesis says.
+        Whether the first parameter must be below the rig file's value for the hypothesis to keep its meaning.
     known : tuple of str
-        What is surely there, in its 95 % interval: a valve that never opens tells no drop, a circuit without air not
-        when it gets in, and air that is in from the beginning gets in at no time.
+        Parameters that the effect always has, so they must be determined: a valve that never opens has no drop, a
+        circuit without air no entry time, and air present from the beginning enters at no time.
     """
 
     name: str
@@ -82,12 +81,12 @@ class Hypothesis:
     known: tuple[str, ...] = ()
 
     def told(self, values: Mapping[str, float], std: Mapping[str, float]) -> bool:
-        """Return whether a log determines what is freed, as far as the hypothesis needs it.
+        """Return whether a log determines the parameters that the hypothesis needs.
 
         Parameters
         ----------
         values, std : Mapping[str, float]
-            What was found, and standard deviations; what has none is known [SI].
+            Parameters found, and standard deviations; those without one are known [SI].
 
         Returns
         -------
@@ -99,22 +98,22 @@ class Hypothesis:
 
 
 DELIVERY = Hypothesis("delivery", ("pump_displacement",))
-"""Asked of every log: a pump that delivers less may pass for leakage, with bulk modulus a fifth too low."""
+"""Tested in every log: a pump that delivers less may look like leakage, with bulk modulus a fifth too low."""
 
 ENCODER_ZERO = Hypothesis(
     "encoder_zero", ("position_zero",), ({"position_zero": -0.06}, {"position_zero": 0.06}), from_mid_travel=True
 )
-"""Asked of every log too: chambers that hold their volumes, or valves that crack, may pass for it."""
+"""Tested in every log too: held chamber volumes, or valves that crack, may look like it."""
 
 VOLUME = Hypothesis("volume", ("chamber_volume",))
 
 START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 
 BEGUN = replace(START_LOAD, from_first_sample=True, by_mass=True, beside=(STIFFNESS,))
-"""The same of a log that begins under load or in motion."""
+"""The same for a log that begins under load or in motion."""
 
 LEAST_PLAY = 5e-6
-"""Least play that is one [m]; judged. With less it is valves and accumulator that explain a log."""
+"""Least play that counts as one [m]; judged. A smaller one stands for details of valves and accumulator."""
 
 PLAY = Hypothesis(
     "position_play",
@@ -123,39 +122,39 @@ PLAY = Hypothesis(
     beside=(*CRACKS, STIFFNESS),
     least=LEAST_PLAY,
 )
-"""What the plain fit found of make-up valves and accumulator has taken the play up, so they are sought again."""
+"""In the plain fit make-up valves and accumulator have absorbed the play, so they are fitted again."""
 
 LEAST_BEND = 1e-6
-"""Least bend of the make-up valves' flow that is one [1/Pa]; judged: at 10 bar they let in half as much a pascal."""
+"""Least bend of the make-up valves' flow that counts [1/Pa]; judged: at 10 bar the flow per pascal is then halved."""
 
 MAKEUP_BENDS = Hypothesis("makeup_bends", (BEND,), ({BEND: 3e-5},), least=LEAST_BEND, beside=CRACKS)
-"""Wide open, a make-up valve is an orifice. Asked where a load pulls the piston faster than the pump feeds it."""
+"""A wide-open make-up valve is an orifice. Tested if a load pulls the piston faster than the pump feeds it."""
 
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 PRESSURE_DRIFT = Hypothesis("pressure_drift", ("pressure_drift",), at_end=(SETTLING,))
-"""A zero that warms up after the sensor is switched on drifts less and less."""
+"""A zero that warms up after the sensor is switched on drifts more and more slowly."""
 
 PRESSURE_SIDES = Hypothesis("pressure_sides", ("pressure_sides",))
-"""Two chamber gauges have a gain each, and one gauge of a difference may have two, one a direction. Asked by itself:
-beside others it takes up part of an offset of speed, and right pairs of them are no longer found."""
+"""Two chamber gauges have one gain each, and a differential gauge may have one per direction. Tested alone: beside
+others it absorbs part of a speed offset, and right pairs of hypotheses are no longer found."""
 
 OFFSET_AT_REST = replace(OFFSET, from_first_sample=True)
-"""The same of a log that begins at rest with a differential pressure: the offset is then that, or there is a load."""
+"""The same for a log that begins at rest with a differential pressure: that is the offset, or there is a load."""
 
 LATE_TRIED = (0.0, 2e-3, 5e-3, 9e-3)
 """Delays with which the search for a late channel begins [s]."""
 
 EARLY_TRIED = (-1e-3, -3e-3, -6e-3, -1e-2)
-"""The same of a speed that comes before the rest: it is delayed by whole milliseconds, and its lag takes back what that
-is too much [s]."""
+"""The same for a speed that leads the rest: it is delayed by whole milliseconds, and its lag corrects the remainder
+[s]."""
 
 LEAST_ROD = 0.02
-"""Least difference of a piston's areas over their sum that is a rod on one side [fraction]; judged. Chambers whose
-volumes alone differ look like an encoder that was homed elsewhere."""
+"""Least difference of the piston areas over their sum for a single rod [fraction]; judged. Chambers that differ only in
+volume look like an encoder with another zero."""
 
 LATEST = 2e-2
-"""Longest delay that is sought, or told of [s]: no sensor, filter or bus is later. In a log of another actuator the
-misfit may fall with every millisecond more, and the search for a delay would have no end."""
+"""Longest delay that is searched for or reported [s]: no sensor, filter or bus is later. In a log of another actuator
+the cost may fall with every millisecond, and the search would have no end."""
 
 PRESSURE_LATE = Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), LATE_TRIED)
 
@@ -165,13 +164,13 @@ PRESSURE_FILTERED = replace(
     starts=({"pressure_lag": 5e-3, FILTER_TIME: 3e-3},),
     delays=(0.0,),
 )
-"""The same behind a filter of second order: to slow signals it is a delay, of no whole samples."""
+"""The same behind a second-order filter: for slow signals it is a delay by no whole number of samples."""
 
 SPEED_LATE = Hypothesis(
     "speed_late", ("speed_lag",), ({"speed_lag": 1e-3},), LATE_TRIED, "motor_speed_rad_s", instead=("speed_lead",)
 )
-"""Asked too where the motor leads the line between samples by as much as it may: a lag of a sample time and a little
-more passes for that, and put bulk modulus four deviations off (1.16 ms at 1 kHz)."""
+"""Also tested if the motor's lead is at its upper limit: a lag of a little more than a sample time looks like that, and
+put bulk modulus four deviations off (1.16 ms at 1 kHz)."""
 
 LEAKAGE_RISE = Hypothesis("leakage_rise", ("leakage_rise",))
 
@@ -182,14 +181,15 @@ LEAKAGE_STEP = Hypothesis(
     from_change=True,
     beside=CRACKS,
 )
-"""A seal gives way within the log. Before it does, drops at which make-up valves open count as in a plain log."""
+"""A seal fails within the log. Before that, the drops at which make-up valves open are priors, as in a plain log."""
 
 LEAKAGE_TURBULENT = Hypothesis("leakage_turbulent", ("leakage_turbulent",))
-"""A worn edge or a scratch leaks as an orifice does. A lag of the pressure took its place, bulk modulus 7 % too low."""
+"""A worn edge or a scratch leaks like an orifice. A lag of the pressure took its place, with bulk modulus 7 % too
+low."""
 
 PUMP_COMPRESSES = Hypothesis("pump_compresses", ("pump_compression",))
-"""A pump draws oil at the low pressure. At 50 bar and 300 MPa it delivers 1.7 % less of it than it draws, at any speed:
-no leakage and no other displacement takes that up, and logs were refused."""
+"""A pump draws oil at low pressure. At 50 bar and 300 MPa it delivers 1.7 % less than it draws, at any speed. Neither
+leakage nor another displacement absorbs that, and logs were refused."""
 
 AIR = Hypothesis(
     "air",
@@ -198,9 +198,9 @@ AIR = Hypothesis(
     at_end=(QUICKNESS,),
     known=("air_softness",),
 )
-"""What oil that is as soft throughout has taken up, slopes do not promise again: beside 1000 for growing leakage they
-promised less than 750 of 3600. Bubbles that are squeezed quickly are stiffer than isothermal ones at low pressure and
-softer at high. Logs under high pressure tell: without an exponent they were refused, at 1.1 to 1.2 times the noise."""
+"""Slopes do not predict what a constantly softer oil has absorbed: beside 1000 for growing leakage they predicted less
+than 750 of 3600. Bubbles under quick compression are stiffer than isothermal ones at low pressure and softer at high
+pressure. Logs at high pressure show it: without an exponent they were refused, at 1.1 to 1.2 times the noise."""
 
 AIR_MIDWAY = Hypothesis(
     "air_midway",
@@ -213,7 +213,7 @@ AIR_MIDWAY = Hypothesis(
     by_mass=True,
     known=("air_softness", "air_onset"),
 )
-"""Where air gets in, lost flow says roughly. How long it takes is sought last: what is short stops a descent."""
+"""The lost flow shows roughly when air enters. The duration is fitted last: a short one stops a descent."""
 
 MAKEUP_BLOCKED = Hypothesis(
     "makeup_blocked",
@@ -227,29 +227,29 @@ PORTS_DRAIN = tuple(
 )
 
 MAKEUP_HIDDEN = replace(MAKEUP_BLOCKED, far=False, beside=CRACKS)
-"""The same beside a plain fit, where the drops at which valves open have taken it up: they are sought again."""
+"""The same beside a plain fit, in which the opening drops of valves have absorbed it: they are fitted again."""
 
 VOLUME_HIDDEN = replace(VOLUME, beside=(*CRACKS, STIFFNESS))
-"""The same beside a plain fit: valves, and an accumulator's level that follows the piston, have taken part of it up."""
+"""The same beside a plain fit: valves, and an accumulator whose level follows the piston, have absorbed part of it."""
 
 MAY_HIDE = (MAKEUP_HIDDEN, *PORTS_DRAIN, LEAKAGE_RISE, OFFSET, PUMP_COMPRESSES, VOLUME_HIDDEN)
-"""What a log that the plain form explains is asked too: drops at which valves open, and leakage, may take it up. With
-`DELIVERY` and `ENCODER_ZERO` they are nine, of which one evaluation is made beside the fit: slopes say what each
-promises, a stuck valve included."""
+"""Also tested if the plain form explains the log: opening drops and leakage may absorb the effect. With `DELIVERY` and
+`ENCODER_ZERO` they are nine, for which one evaluation is made beside the fit: slopes predict the gain of each,
+including a stuck valve."""
 
 CHECKS_CRACK = Hypothesis(
     "checks_crack", ("crack_pressure", "crack_difference"), ({"crack_pressure": 1e4},), known=("crack_pressure",)
 )
 
 CHECKS_HIDDEN = replace(CHECKS_CRACK, beside=CRACKS)
-"""The same beside a plain fit whose drops are far from what is presumed of them: they are sought again."""
+"""The same beside a plain fit whose opening drops are far from their priors: they are fitted again."""
 
 LARGE_CRACK = 3.0 * USUAL_CRACK
-"""Drop from which a plain fit's valve is asked for one that opens late: three deviations of what is presumed [Pa]."""
+"""Opening drop in a plain fit from which a valve that opens late is tested: three prior deviations [Pa]."""
 
 UNLIKE_CRACKS = 3.0 * 2.0**0.5 * USUAL_CRACK
-"""Difference between the drops at which the two make-up valves open from which one may be stuck shut instead: three
-deviations of what is presumed [Pa]. A valve that opens far later than the other may be one that never opens."""
+"""Difference between the opening drops of the two make-up valves from which one may be stuck shut instead: three prior
+deviations [Pa]. A valve that opens far later than the other may never open."""
 
 HYPOTHESES = (
     PRESSURE_LATE,
@@ -291,7 +291,7 @@ HYPOTHESES = (
     CHECKS_CRACK,
     *PORTS_DRAIN,
 )
-"""In no order: the log chooses."""
+"""The order has no meaning: the log decides."""
 
 LIMITS: Mapping[str, tuple[float, float]] = {
     "makeup_opening": (1e2, 1e6),
@@ -328,19 +328,20 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "volume_difference": (-0.6, 0.6),
     "pilot_share": (0.0, 10.0),
 }
-"""Least and largest values where physics gives them [SI]. A make-up valve that opens within a smaller drop has a corner
-that no step of the integrator and no sensor resolves."""
+"""Physical limits of values [SI]. A make-up valve that opens within a smaller drop has a corner that neither the
+integrator nor a sensor resolves."""
 
 PRESUMED = {"chamber_volume": 0.15, "pump_displacement": 0.15}
-"""Standard deviation of the logarithm of what a rig file says, before the log is seen [dimensionless]: dead volume is
-seldom measured; a pump that delivers less than its displacement is worn."""
+"""Prior standard deviation of the logarithm of rig file entries [dimensionless]: dead volume is seldom measured; a pump
+that delivers less than its displacement is worn."""
 
 LEAST_DELIVERY = 1e-2
-"""Relative change of the pump's delivery below which it is not freed: no rig file is surer [fraction]."""
+"""Relative change of the pump's delivery below which it is not fitted: no rig file is more exact [fraction]."""
 
 LEAST_SHARE, MOST_SHARE = 0.6, 1.25
-"""Shares of its displacement in the rig file that a pump may deliver, being worn, or displacement and area rounded
-[fraction]: the usual doubts of the two allow 1.07 (two deviations), and a pump is renewed before it delivers 0.6."""
+"""Range of a pump's delivery over its displacement in the rig file, due to wear or rounded entries [fraction]: the
+usual uncertainty of displacement and area allows 1.07 (two deviations), and a pump is replaced before it delivers
+0.6."""
 
 WORN = 0.9
-"""Delivery over the pump's displacement below which the pump is worn, and the rig file not rounded [dimensionless]."""
+"""Delivery over displacement below which the pump is worn, rather than the rig file rounded [dimensionless]."""

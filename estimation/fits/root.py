@@ -1,6 +1,6 @@
 """A root between two ends, by Brent's method (1973, Algorithms for Minimization without Derivatives, chapter 4).
 
-It takes the steps of `scipy.optimize.brentq`, to the bit. scipy.optimize takes longer to import than a log to fit.
+The steps are those of `scipy.optimize.brentq`, to the bit. Importing scipy.optimize takes longer than the fit of a log.
 """
 
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from math import copysign, inf
 from sys import float_info
 
 MOST_STEPS = 100
-"""Halving alone needs fewer, to any tolerance between ends that are numbers."""
+"""Bisection alone needs fewer steps, for any tolerance and finite ends."""
 
 
 def root_between(function: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
@@ -21,7 +21,7 @@ def root_between(function: Callable[[float], float], low: float, high: float, to
     low, high : float
         The ends [any unit].
     tolerance : float
-        How far off the root may be [unit of the ends].
+        Largest error of the root [unit of the ends].
 
     Returns
     -------
@@ -61,9 +61,9 @@ def root_between(function: Callable[[float], float], low: float, high: float, to
 
 
 def _interpolated(old: tuple[float, float], here: tuple[float, float], across: tuple[float, float]) -> float:
-    """Return the step from here to the root of the line through two points, of the inverse parabola through three.
+    """Return the secant step for two points, or the step by inverse quadratic interpolation for three.
 
-    It is infinite, and so not taken, where values are so small that their products underflow to zero.
+    It is infinite, and so not taken, if values are so small that their products underflow to zero.
     """
     (x, y), (x_old, y_old), (x_across, y_across) = here, old, across
     if x_old == x_across:

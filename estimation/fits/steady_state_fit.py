@@ -1,8 +1,8 @@
 """Leakage, flow bias and friction from the steady parts of logs: equations 5.7, 5.8 and 5.11, with intervals.
 
-Where motor speed, velocity and differential pressure stand still, the flow balance is a line in pressure and the force
-balance a parabola in velocity. Each steady stretch of a log is one point; a fit through many gives the
-coefficients and how sure they are.
+Where motor speed, velocity and differential pressure are constant, the flow balance is a line in pressure and the force
+balance a parabola in velocity. Each steady stretch of a log is one point. A fit through many points gives the
+coefficients and their intervals.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,7 +21,7 @@ Variance: TypeAlias = Callable[[Array], Array]
 """Variance of the points' residuals, given the coefficients."""
 
 ROUNDS = 5
-"""How often a fit is weighted anew by the variances that its answer gives [count]."""
+"""How often a fit is weighted again by the variances that its result gives [count]."""
 
 CONFIDENCE = 0.95
 """Probability with which an interval should hold the true value."""
@@ -30,10 +30,10 @@ _STEADY = 3.0
 """Standard errors by which the halves of a steady stretch may differ."""
 
 _FLAT = 1e-4
-"""Share of a channel's largest magnitude by which they may differ in any case, for logs without noise."""
+"""Least difference that is allowed, over a channel's largest magnitude, for logs without noise."""
 
 _UNKNOWN_COMPLIANCE = 0.5
-"""Share of the flow into compression that counts as error."""
+"""Share of the compression flow that counts as error."""
 
 _MOVING = 10.0
 """Standard errors of velocity above which the piston moves."""
@@ -41,14 +41,14 @@ _MOVING = 10.0
 
 @dataclass(frozen=True)
 class SteadyPoints:
-    """Steady stretches of logs, one entry each, in the sense in which the piston moves; errors are standard errors.
+    """Steady stretches of logs, one entry each, with the direction of motion as positive; errors are standard errors.
 
     Parameters
     ----------
     speed, velocity, pressure : ndarray, shape (n,)
         Motor speed [rad/s], velocity [m/s], differential pressure [Pa], positive in the sense of motion.
     drift : ndarray, shape (n,)
-        What is left of the pressure's rate [Pa/s].
+        Remaining rate of pressure [Pa/s].
     speed_error, velocity_error, pressure_error, drift_error : ndarray, shape (n,)
         Their standard errors, in the same units.
     """
@@ -144,9 +144,9 @@ def steady_points(records: Iterable[Record], window: float = 1.0) -> SteadyPoint
 def fit_leakage(points: SteadyPoints, p: EhaParameters) -> SteadyFit:
     """Fit leakage coefficient and flow bias to steady points, equations 5.7 and 5.8.
 
-    What is left of the pressure's rate takes a little flow: make-up holds the low chamber, so that the high one
-    alone is compressed, with twice the lumped volume (errata E2). That flow is subtracted, and half of it counts as
-    error: bulk modulus is not known here, nor whether make-up is open.
+    The remaining rate of pressure takes a little flow. Make-up flow holds the low chamber, so only the high one is
+    compressed, with twice the lumped volume (errata E2). That flow is subtracted, and half of it counts as error, since
+    neither bulk modulus nor the state of the make-up valve is known here.
 
     Parameters
     ----------

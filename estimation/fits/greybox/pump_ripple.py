@@ -30,8 +30,7 @@ LIKELIEST = 3
 """Tooth counts for which the model is run [count]: with two waves each and the log itself they run side by side."""
 
 LEAST_TEETH = 0.03
-"""Amplitude from which ripple is fitted, over the flow [fraction]; judged. Smaller ripple is integrated out, see
-`estimation.fits.greybox.small_pump_ripple`."""
+"""Amplitude from which ripple is fitted, over the flow [fraction]; judged. Smaller ripple: see `small_pump_ripple`."""
 
 MOST_OFFSET = 1.0
 """Largest offset of logged speed that is searched for [rad/s]: 10 revolutions per minute; judged."""
@@ -43,7 +42,7 @@ FINER = 4
 """Offsets that are tried per resolvable one [count]."""
 
 OFFSET_NUDGE = 1e-4
-"""Offset for the finite difference [rad/s]: it changes the phase by little over the longest log."""
+"""Offset for the finite difference [rad/s]."""
 
 
 @dataclass(frozen=True)

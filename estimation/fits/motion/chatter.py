@@ -1,7 +1,7 @@
 """Bristles too stiff for the steps of the motion form: no search begins with one, and no fit ends with one.
 
-Piston and bristle then chatter, each step on the other side of rest. That is no motion of the model: the misfit has
-pits a few thousandths apart, and in which of them a descent ends hangs on the last digit of the noise.
+Piston and bristle then chatter: each step ends on the other side of rest. That is no real motion. The cost has local
+minima a few thousandths apart, and in which of them a descent ends depends on the last digit of the noise.
 """
 
 from dataclasses import replace
@@ -15,13 +15,14 @@ from plant.arrays import Array
 from plant.solvers.steps import parameter_names
 
 STIFFEST = 4_000.0
-"""Frequency of the mass on its bristle that the model's steps follow [rad/s]: a quarter over the shortest of them."""
+"""Largest natural frequency of the mass on its bristle that the model's steps follow [rad/s]: a quarter over the
+shortest step."""
 
 QUICKEST = 2_000.0
-"""Rate at which the bristle's damping may stop the mass [1/s]: a half over the longest of them."""
+"""Largest rate at which the bristle's damping may stop the mass [1/s]: a half over the longest step."""
 
 MOST_SHORTENED = 4
-"""By how many times steps are shortened at most, where the piston turns [dimensionless]."""
+"""Largest factor by which steps are shortened where the piston reverses [dimensionless]."""
 
 
 def followed(log: GreyBoxLog, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
@@ -44,7 +45,7 @@ def followed(log: GreyBoxLog, names: tuple[str, ...]) -> dict[str, tuple[float, 
 
 
 def without_chatter(problem: FreedProblem, theta: Array) -> FreedProblem:
-    """Return a problem whose steps follow the bristle at a point where the piston turns.
+    """Return a problem with steps short enough for the bristle at a point, where the piston reverses.
 
     Parameters
     ----------
@@ -56,7 +57,7 @@ def without_chatter(problem: FreedProblem, theta: Array) -> FreedProblem:
     Returns
     -------
     FreedProblem
-        The same one where its steps do.
+        The same problem if its steps are short enough.
     """
     log, values = problem.log, problem.model.values(theta)
     followed_at_most = followed(log, parameter_names(problem.model.parameters))["bristle_stiffness"][1]

@@ -60,47 +60,46 @@ FRICTION_TRIED = ((1.0, 1.0, 1.0), (18.0, -3.5, 1.15), (68.0, 8.7, 1.25))
 """Friction coefficients a_1, a_2, a_3 of the starts, as multiples of the healthy paper rig's: the spread of Table 4."""
 
 YIELDED = 2e-5
-"""First guess of the deflection at which seals slide [m]; tens of micrometres in the literature on presliding."""
+"""First guess of the deflection at which seals slide [m]; the literature on presliding has tens of micrometres."""
 
 DAMPING_START = 100.0
 """First guess of the bristle's damping [N s/m]; small beside the oil's."""
 
 FINEST_STEP = 6.25e-5
-"""Longest step while the piston turns, yields or is set off [s]: the bristle's state passes through zero there."""
+"""Longest step while the piston reverses, yields or starts [s]: the bristle's state passes through zero there."""
 
 TURNING = 0.3
-"""Speed under which it counts as turning, over the log's root mean square [fraction]."""
+"""Speed below which the piston counts as reversing, over the log's root mean square [fraction]."""
 
 SET_OFF = 1.0
-"""Change of motor speed between samples from which the pump counts as setting the piston off [rad/s]."""
+"""Change of motor speed between samples from which the pump counts as starting the piston [rad/s]."""
 
 SHORTEST_SAMPLE = 1e-3
-"""Faster logs are averaged to about this sample time [s]: nothing that the model describes is quicker to see."""
+"""Logs at a shorter sample time are averaged to about this one [s]: nothing faster in the model is visible."""
 
 MOST_SAMPLES = 30_000
-"""A longer log is fitted on its beginning: the fit's interval is under a percent long before."""
+"""A longer log is fitted on its beginning, which gives an interval under a percent long before."""
 
 STRUCTURE = 0.005
-"""Relative standard deviation of bulk modulus from friction being of no known law: on the foreign bench, whose
-presliding is of another make, noise alone explains a tenth to a half of the errors. Judged from that one bench
-[fraction]."""
+"""Relative standard deviation of bulk modulus due to the unknown friction law. On the foreign bench, whose presliding
+law is another one, noise alone explains a tenth to a half of the errors. Judged from that one bench [fraction]."""
 
 UNLIKELY = 72.0
-"""Difference of log-likelihood from which a structure counts for nothing beside the other [dimensionless]."""
+"""Difference of log-likelihood from which a structure has no weight beside the other [dimensionless]."""
 
 SPARED_NIS, SPARED_SHARE = 0.5 * MISMATCH_NIS, 0.03
-"""Mean squared normalised residual, and share of the motion, up to which what is left of a log refuses no class
-[dimensionless, fraction]: half of what does."""
+"""Mean squared normalised residual, and share of the motion, up to which the residuals of a log rule out no class
+[dimensionless, fraction]: half of the limit."""
 
 BEGINNING = 0.2
-"""Share of these that counts on a beginning of the log [fraction]: the rest may be followed less well."""
+"""Share of these that holds for the beginning of a log [fraction]: the rest may fit less well."""
 
 NEARLY = 1.1
-"""Misfit of a beginning, over what would explain it, up to which other scales of forces are looked for all the same
-[dimensionless]: the pit of a log that is explained by another one, some percent away in bulk modulus."""
+"""Cost on a beginning over that of an explained one, up to which other scales of forces are still searched
+[dimensionless]: a local minimum near that of an explained log, some percent away in bulk modulus."""
 
 ALIKE = 5.0
-"""Difference of log-likelihood up to which two structures are said to explain a log alike [dimensionless]."""
+"""Difference of log-likelihood up to which two structures explain a log equally well [dimensionless]."""
 
 
 def fit_motion(
@@ -110,7 +109,7 @@ def fit_motion(
     uncertainties: Mapping[str, float] | None = None,
     variances: Mapping[str, float] | None = None,
 ) -> FormFit:
-    """Fit the motion form to a log with either structure of friction, and weigh the two.
+    """Fit the motion form to a log with either structure of friction, and weight the two.
 
     Parameters
     ----------
@@ -123,12 +122,12 @@ def fit_motion(
     uncertainties : Mapping[str, float], optional
         Relative standard deviation of the actuator's parameters [fraction]; none by default.
     variances : Mapping[str, float], optional
-        Measurement variance of motor speed [rad^2/s^2] by its name; read off the log if not given.
+        Measurement variance of motor speed [rad^2/s^2] by its name; determined from the log if not given.
 
     Returns
     -------
     FormFit
-        Value, deviations, and what speaks against them.
+        Value, deviations, and objections.
 
     Raises
     ------
@@ -166,10 +165,10 @@ def _concluded(ended: list[Ended], log: GreyBoxLog, *, sparing: bool) -> tuple[F
 
 
 def share_of_motion(chi_square: float, log: GreyBoxLog) -> float:
-    """Return the size of the residuals over that of the motion, in the time after which drift hides a residual.
+    """Return the size of the residuals over that of the motion, within the time after which drift hides a residual.
 
-    Measured speed has noise, which is a random walk of position: what is older than ``sqrt(variance / walk)`` is
-    forgotten. How many times the encoder's noise a residual is says how fine the encoder is, not how wrong the model.
+    Noise of measured speed is a random walk of position: what is older than ``sqrt(variance / walk)`` is forgotten. The
+    ratio of residuals to encoder noise would measure how fine the encoder is, not how wrong the model.
 
     Parameters
     ----------
@@ -181,7 +180,7 @@ def share_of_motion(chi_square: float, log: GreyBoxLog) -> float:
     Returns
     -------
     float
-        Root mean square over that of the motion [fraction]; infinite where nothing moves.
+        Root mean square over that of the motion [fraction]; infinite if nothing moves.
     """
     (noise,), position = log.noise, log.measured[:, 0]
     kept = np.sqrt(noise.variance / max(noise.walk * log.sample_time, np.finfo(float).tiny))
@@ -230,7 +229,7 @@ def motion_log(
 
 
 def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:
-    """Return the model steps up to each sample: short ones where the piston turns or is set off."""
+    """Return the model steps up to each sample: short ones where the piston reverses or starts."""
     reach = max(1, round(5e-3 / sample_time))
     sums = np.cumsum(np.pad(drives[:, 1] - drives[0, 1], (reach + 1, reach), mode="symmetric"))
     pace = np.gradient(sums[2 * reach + 1 :] - sums[: -2 * reach - 1])  # in proportion to the mean velocity
@@ -265,10 +264,10 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
 
 
 def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxFit], list[float], bool]:
-    """Return the fits of both structures to the whole log, other bulk moduli that explain it, and what was spared.
+    """Return the fits of both structures to the whole log, other bulk moduli that explain it, and what was skipped.
 
-    Other scales are looked for wherever the end explains the log, though no search said so: a gate passes on the end.
-    They may be spared where the log holds bulk modulus far too weakly; what it was on the way is another one then.
+    Other scales are searched if the final fit explains the log, even if no earlier search did. They may be skipped if
+    the log determines bulk modulus far too weakly; that is judged again at the end.
     """
     first, second = sorted(ended, key=lambda one: (not one.explains, one.point.cost))
     search, best, reached, others = first.search, first.point, first.point, list[float]()
@@ -301,10 +300,10 @@ def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxF
 
 
 def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
-    """Return the misfit that a search from a point has to come to, or it need not go on.
+    """Return the cost that a search from a point must reach to be worth while.
 
-    What explains the log, where the point leaves so little that no class is refused for it: how much exactly decides
-    nothing then. Any else, and on a log so short that its searches take little.
+    If the point's residuals are so small that they rule out no class, only an explanation of the log would matter.
+    Otherwise, and in short logs, any improvement counts.
     """
     samples = len(problem.log.measured)
     chi_square = 2.0 * problem.at(begun.theta).cost / samples  # where the search begins: it is not run twice
@@ -313,7 +312,7 @@ def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
 
 
 def _rival(second: Ended, whole: FreedProblem, best: Point, *, told: bool) -> list[GreyBoxFit]:
-    """Return the fit of the other structure of friction to the whole log; none where it cannot matter."""
+    """Return the fit of the other structure of friction to the whole log; None if it cannot matter."""
     own = second.search.whole
     whole = own if whole.log is own.log else own.on(whole.log)  # the same steps, so that misfits compare
     bounds, thetas = second.search.bounds, [best.theta, second.point.theta]

@@ -10,29 +10,29 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from plant.arrays import Array
 
 SCALES = (0.8, 1.25)
-"""Factors on all forces with which an optimum is left and looked for anew. Where no pressure is logged, pressures,
-friction and stiffness may grow together and move little that position shows: a search can end anywhere along such a
-valley, and the curvature where it ends does not say so [dimensionless]."""
+"""Factors on all forces from which the optimum is searched again [dimensionless]. Without pressure, pressures, friction
+and stiffness may grow together with little effect on position: a search can end anywhere along such a valley, and the
+curvature at its end does not show it."""
 
 STIFFENED = (0.93, 1.07)
-"""The same on bulk modulus alone. Where the piston sticks and slips often, the misfit is rough: pits lie a few percent
-apart, and the curvature in one says nothing of the next [dimensionless]."""
+"""The same for bulk modulus alone [dimensionless]. With frequent stick-slip the cost is rough: local minima lie a few
+percent apart, and the curvature in one does not show the next."""
 
 RESCALED = 3
-"""How often at most an optimum is left for a better one that was found so."""
+"""Most often that an optimum is replaced by a better one found in this way."""
 
 BETTER = 5.0
-"""Fall of the cost from which a better optimum is left in its turn [dimensionless]."""
+"""Decrease of the cost from which a better optimum is tested again [dimensionless]."""
 
 ELSEWHERE = 0.005
-"""Relative difference in bulk modulus from which the same [fraction]."""
+"""Relative difference in bulk modulus from which it is tested again [fraction]."""
 
 ALMOST, NEARBY = 1e-3, 0.3
-"""Relative difference in bulk modulus, and the same over its deviation, up to which an optimum that was come near to
-counts as the known one and is not sought more exactly [fraction]."""
+"""Relative difference in bulk modulus, and the same over its deviation, up to which a nearby optimum counts as the
+known one and is not refined [fraction]."""
 
 FAR_AWAY = 0.1
-"""The same from which an optimum is another one, however exactly it is sought [fraction]."""
+"""The same from which an optimum is another one, however exactly it is found [fraction]."""
 
 LARGEST_DISAGREEMENT = 0.05
 """Relative difference in bulk modulus of two optima that explain a log, above which neither is believed [fraction]."""
@@ -45,10 +45,10 @@ GROWING = (
     "bristle_stiffness",
     "bristle_damping",
 )
-"""What grows with the scale of forces."""
+"""Parameters that grow with the scale of forces."""
 
 FALLING = ("leakage_coefficient", "makeup_conductance", "case_leakage")
-"""What falls as forces grow, so that flows stay."""
+"""Parameters that fall as forces grow, so that flows stay the same."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,9 @@ class Way:
     Parameters
     ----------
     near : FreedProblem
-        The problem on which a start is brought near, its noise made larger.
+        The problem with larger noise, for the approach.
     nearing : int
-        Evaluations of the model there.
+        Evaluations of the model on it.
     near_enough : float
         Cost that a further step must promise there [dimensionless].
     finishing : int
@@ -70,7 +70,7 @@ class Way:
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
     explained : float
-        Misfit up to which an optimum explains the log [dimensionless].
+        Cost up to which an optimum explains the log [dimensionless].
     """
 
     near: FreedProblem
@@ -83,16 +83,16 @@ class Way:
 
 
 def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[float]]:
-    """Look for optima with forces or stiffness on another scale, until some disagree.
+    """Search for optima with forces or stiffness on another scale, until some disagree.
 
     Parameters
     ----------
     problem : FreedProblem
         The problem, with the unknowns of the motion form.
     best : Point
-        Its optimum, as far as it is known.
+        Its best known optimum.
     way : Way
-        How a search comes down.
+        Options of the descents.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
 
 
 def disagree(moduli: Sequence[float]) -> bool:
-    """Return whether bulk moduli lie too far apart to be believed.
+    """Return whether bulk moduli are too far apart to be believed.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def disagree(moduli: Sequence[float]) -> bool:
     Returns
     -------
     bool
-        Whether the largest is over the least by more than `LARGEST_DISAGREEMENT`.
+        Whether the largest exceeds the smallest by more than `LARGEST_DISAGREEMENT`.
     """
     return max(moduli) > (1.0 + LARGEST_DISAGREEMENT) * min(moduli)
 
@@ -142,7 +142,7 @@ def deviation(problem: FreedProblem, point: Point) -> float:
 
 
 def _moved(values: Mapping[str, float]) -> Iterator[list[dict[str, float]]]:
-    """Yield where an optimum is left for: all forces on another scale, then another stiffness alone."""
+    """Yield new starts from an optimum: all forces on another scale, then another stiffness alone."""
     scaled: list[dict[str, float]] = []
     for factor in SCALES:
         growing = {name: values[name] * factor for name in GROWING}
@@ -152,7 +152,7 @@ def _moved(values: Mapping[str, float]) -> Iterator[list[dict[str, float]]]:
 
 
 def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, float]], way: Way) -> list[Point]:
-    """Return the optima downhill from another's, some of its values moved; searched side by side."""
+    """Return the optima downhill from changed starts; searched side by side."""
     values = problem.model.values(best.theta)
     starts = [np.clip(problem.model.theta({**values, **some}), *way.bounds) for some in moved]
     near = descend_together(way.near.at_each, starts, way.nearing, way.bounds, way.near_enough)

@@ -1,7 +1,7 @@
 """`annealed(problem, point, ...) -> Point`: escape from a minimum that nearly explains a log, by larger noise.
 
-Where the piston sticks and slips, the misfit has pits a few thousandths apart. In which of them a descent ends hangs on
-rounding: one part in 1e13 of the noise decides. Under larger noise of increments the pits are not there.
+With stick-slip the cost has local minima a few thousandths apart. In which of them a descent ends depends on rounding:
+one part in 1e13 of the noise decides. With a larger random walk they disappear.
 """
 
 from collections.abc import Callable
@@ -11,17 +11,17 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from plant.arrays import Array
 
 LARGER_WALK = 1e3
-"""Factor on the random walk of the residual under which an end is left [dimensionless]: a way on which starts are
-brought near, but with model steps as short as the log's. Longer ones end in chatter that is no motion."""
+"""Factor on the random walk of the residual for the escape [dimensionless]. Model steps stay as short as the log's:
+longer ones end in chatter."""
 
 LEAVING, RETURNING = 12, 100
-"""Evaluations of the model on the way out and back. Descents of 25 were still falling by tenths at their last."""
+"""Evaluations of the model for the escape and the return. Descents of 25 were still falling by tenths at their last."""
 
 LEFT_BY = 0.01
-"""Cost that a further step must promise on the way out [dimensionless]."""
+"""Cost that a further step of the escape must promise [dimensionless]."""
 
 TIMES = 3
-"""How often at most an end is left."""
+"""Most escapes."""
 
 
 def annealed(
@@ -44,13 +44,13 @@ def annealed(
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
     promising : float
-        Cost that a further step must promise on the way back [dimensionless].
+        Cost that a further step of the return must promise [dimensionless].
     deeper : float
-        Fall of the cost from which an end is left in its turn [dimensionless].
+        Decrease of the cost from which another escape is made [dimensionless].
     at : callable, optional
-        Returns a problem's misfit as a function of the coordinates; `FreedProblem.at` by default.
+        A problem's cost as a function of the coordinates; `FreedProblem.at` by default.
     least_share : float
-        Share of the cost that a further step must promise on the way back [fraction].
+        Share of the cost that a further step of the return must promise [fraction].
 
     Returns
     -------

@@ -1,7 +1,8 @@
 """`likeliest(searches) -> list[Ended]`: ends of searches for the motion form's unknowns, on ever longer beginnings.
 
-A start is brought near under larger noise, then searched on the first seconds; what explains those goes on to more of
-the log. Both structures of friction are searched in turn, so that neither is searched in vain where the other explains.
+A start first descends under larger noise, and is then searched on the first seconds; if it explains these, on more of
+the log. Both structures of friction are searched in turn, so that neither is searched in vain if the other explains the
+log.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -28,7 +29,7 @@ SCREENED = 4_000
 """Samples on which starts are compared."""
 
 SEARCHED = 10_000
-"""Samples on which a start that explains those is carried on; a longer log goes on from where it ends."""
+"""Samples on which a start that explains those is searched further; the search of a longer log continues from there."""
 
 UNCHANGED = (1.0, 1.0)
 """Factors that leave the noise as it is [dimensionless]."""
@@ -38,50 +39,50 @@ WAYS: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = (
     (UNCHANGED, UNCHANGED),
     ((1e2, 1e6), (1.0, 1e3)),
 )
-"""Ways down to the optimum: factors on variance and random walk of the residual while starts are screened and while
-they are brought near. With the true, small noise the least misfit of leakage piles up into the position and hides other
-ways down; with a larger walk what counts is increments. Where the piston sticks, straight down is often the shorter."""
+"""Factors on variance and random walk of the residual while starts are screened, and during the approach. With the
+true, small noise the least error of leakage accumulates in position and hides other ways down; with a larger walk
+increments count. If the piston sticks, the direct descent is often shorter."""
 
 SCREENING, NEARING, FINISHING = 10, 12, 25
 """Evaluations of the model in the three stages."""
 
 NEAR_ENOUGH = 0.01
-"""Cost that a further step must promise while a start is only brought near [dimensionless]."""
+"""Cost that a further step of the approach must promise [dimensionless]."""
 
 ENOUGH = 0.1
-"""The same while one is searched on a beginning of the log [dimensionless]."""
+"""The same for the search on a beginning of the log [dimensionless]."""
 
 FINALISTS = 3
-"""Starts that are carried on each way, the likeliest of each way first, until one explains the log."""
+"""Starts that are searched further in each way, the likeliest of each way first, until one explains the log."""
 
 ROUGHLY = 2
-"""By how many times model steps are longer while a start is only brought near."""
+"""Factor on the length of model steps during the approach."""
 
 MOST_WORK = 10_000_000
-"""Steps of eight runs side by side from which on no start is tried but the likeliest one of each structure of friction;
-the structure that is tried first has half of them, unless it explains the beginning. A start that was begun is ended. A
-count, no clock, so that every machine finds the same."""
+"""Steps of eight runs side by side from which only the likeliest start of each structure of friction is tried. The
+structure that is tried first has half of them, unless it explains the beginning. A start that was begun is finished.
+The limit is a count, not a time, so that every machine finds the same."""
 
 EXPLAINED = 1.1
 """Mean squared normalised residual up to which a form explains the log [dimensionless]."""
 
 HOPELESS = 3.0
-"""The same from which no other than the likeliest start of each way is tried [dimensionless]."""
+"""The same from which only the likeliest start of each way is tried [dimensionless]."""
 
 FOREIGN = 10.0
-"""The same, on the first `SEARCHED` samples, from which what nearly explains the first `SCREENED` is not left for a
-deeper minimum [dimensionless]. Judged: such ends had 100 to 600, and the beginning held little that moves."""
+"""The same, on the first `SEARCHED` samples, from which a near explanation of the first `SCREENED` is not left for a
+lower minimum [dimensionless]. Judged: such ends had 100 to 600, and little moved in the beginning."""
 
 SLIGHT = 1e-3
-"""Cost that a further step must promise where nothing explains the log, over what would explain it [fraction]."""
+"""Cost that a further step must promise if nothing explains the log, over that of an explanation [fraction]."""
 
 SLIGHT_SHARE = 0.002
-"""Share of the misfit that a further step must promise where no number will be believed [fraction]: how far the log is
-from explained is then known well enough. At a hundredth, long ways down were given up whose first steps
-promise little."""
+"""Share of the cost that a further step must promise if no number will be believed [fraction]: the distance from an
+explanation is then known well enough. With a hundredth, long descents with slow first steps were given up."""
 
 SAME_COST, SAME_MODULUS = 0.02, 0.01
-"""Relative difference of misfits, and of bulk moduli, up to which two starts came to the same pit [fraction]."""
+"""Relative difference of costs, and of bulk moduli, up to which two starts reached the same local minimum
+[fraction]."""
 
 
 @dataclass(eq=False)
@@ -91,8 +92,8 @@ class Begun:
     Parameters
     ----------
     screened : dict
-        Starts as they were screened, likeliest first, by way. Under larger noise the structures of friction hardly
-        differ: one screening serves both.
+        Screened starts, likeliest first, by way. Under larger noise the structures of friction hardly differ, so both
+        share one screening.
     work : int
         Steps of eight runs side by side that were taken [steps].
     """
@@ -101,7 +102,7 @@ class Begun:
     work: int = 0
 
     def at(self, problem: FreedProblem) -> Callable[[Array], Point]:
-        """Return a problem's misfit as a function of the coordinates, its work counted."""
+        """Return a problem's cost as a function of the coordinates, with its work counted."""
         return partial(self._at, problem)
 
     def at_each(self, problem: FreedProblem) -> Callable[[Sequence[Array]], list[Point]]:
@@ -131,11 +132,11 @@ class MotionSearch:
     part, short : FreedProblem
         The same on its first `SEARCHED` and `SCREENED` samples.
     guesses : list of ndarray, shape (unknowns,)
-        Where it begins [dimensionless].
+        Starts [dimensionless].
     bounds : tuple of ndarray, shape (unknowns,)
-        How far it may go [dimensionless].
+        Bounds of the search [dimensionless].
     near : tuple of ndarray, shape (unknowns,)
-        How far while a start is brought near: as far as model steps follow the bristle [dimensionless].
+        Bounds during the approach: as far as model steps follow the bristle [dimensionless].
     """
 
     whole: FreedProblem
@@ -169,19 +170,19 @@ class MotionSearch:
         return cls(whole, part, short, guesses, bounds, near)
 
     def brought_near(self, rank: int, begun: Begun, worth: Callable[[], bool]) -> Iterator[Array]:
-        """Yield where the starts of a rank lead on the short beginning under larger noise.
+        """Yield the ends of the approach for the starts of a rank, on the short beginning under larger noise.
 
-        One whose misfit is over what explains the log with the larger noise too is left out, and one that comes to
-        where another of its rank did.
+        An end that does not explain the log even with the larger noise is left out, and so is one that equals another
+        of its rank.
 
         Parameters
         ----------
         rank : int
             0 for the likeliest start of each way.
         begun : Begun
-            What was screened so far, and the work; filled in here.
+            What was screened so far, and the work; updated here.
         worth : callable
-            Whether another start than the very first is brought near, asked before each.
+            Whether another start after the very first is approached, called before each.
 
         Yields
         ------
@@ -220,7 +221,7 @@ class Ended:
     search : MotionSearch
         The search.
     point : Point
-        The best point that it found, on the longest beginning that it came to.
+        The best point that it found, on the longest beginning that it reached.
     explains : bool
         Whether it explains the log's first `SEARCHED` samples.
     """
@@ -236,7 +237,7 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
     Parameters
     ----------
     searches : sequence of MotionSearch
-        One a structure of friction.
+        One per structure of friction.
     """
     begun = Begun()
     tries = [_Tries(search, begun) for search in searches]
@@ -278,7 +279,7 @@ class _Tries:
     def carried_on(self, near: Array) -> Point | None:
         """Return the optimum from a start on the first `SEARCHED` samples if it explains them.
 
-        What explains the shorter beginning is followed once a pit, and once in all after `MOST_WORK`.
+        What explains the shorter beginning is searched once per local minimum, and once in all after `MOST_WORK`.
         """
         search, wanted = self.search, explained(self.search.short)
         point, at = Point(near, np.inf, np.zeros(0), np.zeros((0, 0))), self._begun.at(search.short)
@@ -296,7 +297,7 @@ class _Tries:
     def ended(self) -> tuple[Point, bool]:
         """Return the optimum on the shorter beginning if no start explains the log, or a point that explains more.
 
-        What nearly explains the beginning is settled: in which pit a descent ends hangs on rounding.
+        A near explanation of the beginning is annealed: in which local minimum a descent ends depends on rounding.
         """
         search, at = self.search, self._begun.at
         short, bounds, wanted = search.short, search.bounds, explained(search.short)
@@ -332,7 +333,7 @@ def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
 
 
 def explained(problem: FreedProblem) -> float:
-    """Return the misfit up to which a point explains a log [dimensionless].
+    """Return the cost up to which a point explains a log [dimensionless].
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """`share_at(record, parameters, values) -> float`: residual of the motion form at another model's values.
 
 The search for the motion form's unknowns begins at the healthy actuator and a few faulty ones, and may end far from the
-log. Values that another model found say whether it did.
+log. The values of another model show whether it did.
 """
 
 from collections.abc import Mapping
@@ -26,16 +26,16 @@ def share_at(record: Record, parameters: EhaParameters, values: Mapping[str, flo
     parameters : EhaParameters
         Geometry, pump and mass are taken from it.
     values : Mapping[str, float]
-        The unknowns of `estimation.models.motion.UNKNOWNS` [SI]; without ``speed_lead`` and ``bristle_damping`` those
-        with which a search begins.
+        The unknowns of `estimation.models.motion.UNKNOWNS` [SI]; ``speed_lead`` and ``bristle_damping`` default to the
+        first guesses of a search.
     speed_variance : float
         Measurement variance of motor speed [rad^2/s^2].
 
     Returns
     -------
     float
-        See `estimation.fits.motion.fit.share_of_motion`; of the better structure of friction [fraction]. Infinite where
-        the model runs away.
+        See `estimation.fits.motion.fit.share_of_motion`; for the better structure of friction [fraction]. Infinite if
+        the model diverges.
     """
     log = motion_log(record, parameters, {}, speed_variance)
     given = {"speed_lead": LEAD_START, "bristle_damping": DAMPING_START, **values}

@@ -11,21 +11,21 @@ from estimation.fits.motion.force_scale import deviation
 from estimation.fits.motion.search import EXPLAINED
 
 MOST_MOVED = 0.03
-"""Share of bulk modulus by which a misfit that does not show may move it, above which it is not believed [fraction]: as
-much as noise may (`estimation.eha.result.LARGEST_BOUND`)."""
+"""Share of bulk modulus by which an undetected misfit may shift it, above which it is not believed [fraction]: as large
+as the limit for noise (`estimation.eha.result.LARGEST_BOUND`)."""
 
 FAR_TOO_WEAK = 3.0
-"""How many times `MOST_MOVED` it is on the way from which no other scale of forces is looked for [dimensionless]. On
-four logs of random rigs that are not believed, the end of the fit had 0.9 to 1.2 times what the way had; on a fifth,
-which is believed, less than 0.7. If the end is believed after all, the other scales are looked for then."""
+"""The same during a fit, in multiples of `MOST_MOVED`, from which no other scale of forces is searched [dimensionless].
+In four logs of random rigs that are not believed, the end of the fit had 0.9 to 1.2 times the value on the way; in a
+fifth, which is believed, less than 0.7. If the end is believed after all, the other scales are searched then."""
 
 
 def unseen(chi_square: float, samples: int) -> float:
     """Return by how many standard deviations an undetected misfit may shift the result.
 
-    The sum of n squared residuals has a standard deviation of ``sqrt(2 n)``. A misfit of that size does not show, and
-    one that looks like the change of an unknown moves it by the root of that, in deviations. What a log holds firmly
-    is not moved far by so many; what it holds weakly is.
+    The sum of n squared residuals has a standard deviation of ``sqrt(2 n)``. A misfit of that size is not detected. If
+    it has the shape of an unknown's effect, it shifts the unknown by the root of that, in deviations. For a
+    well-determined unknown so many deviations are little; for a weakly determined one they are much.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ def far_too_weak(problem: FreedProblem, best: Point, whole: FreedProblem) -> boo
     problem : FreedProblem
         The problem on a beginning of the log, or on all of it.
     best : Point
-        Its optimum, as far as it is known.
+        Its best known optimum.
     whole : FreedProblem
-        The problem on the whole log, which holds bulk modulus the better, the more samples it has.
+        The problem on the whole log, which determines bulk modulus better the more samples it has.
 
     Returns
     -------
