@@ -14,25 +14,25 @@ from plant.log.record import Record
 from plant.notes import Note
 
 SURE = 0.9
-"""Probability from which one condition is taken to be told [probability]."""
+"""Probability from which a condition counts as determined [probability]."""
 
 LONG_ENOUGH = 10.0
-"""Length of a log from which more of the same is no help [s]."""
+"""Length of a log from which a longer one does not help [s]."""
 
 STRETCH, FEWEST = 0.05, 4
-"""Stretches over which a speed is held or is not [s], and samples in one at least."""
+"""Length of a stretch in which speed may be constant [s], and least number of samples in it."""
 
 LEVEL = 0.05
-"""Speeds closer than this share of the largest are one [fraction]."""
+"""Speeds closer than this share of the largest count as one [fraction]."""
 
 DRIFT = 0.005
-"""A speed is held where its means over the halves of a stretch differ by less, as a share of the largest [fraction]."""
+"""Speed is constant if its means over the halves of a stretch differ by less, as a share of the largest [fraction]."""
 
 WIDE = 0.2
-"""Neighbouring speeds that reach farther than this share of the largest are more than one [fraction]."""
+"""Neighbouring speeds that span more than this share of the largest are more than one [fraction]."""
 
 HELD = 0.02
-"""A speed counts if this share of the log is spent at it [fraction]."""
+"""A speed counts if it lasts for this share of the log [fraction]."""
 
 
 def speeds_held(record: Record) -> int:
@@ -41,8 +41,8 @@ def speeds_held(record: Record) -> int:
     Returns
     -------
     int
-        Speeds, other than rest, at which the motor stays without accelerating, from about 0.1 s on; 0 for a drive that
-        never settles. Speeds that it creeps through are two, however many they are.
+        Speeds other than rest that are constant for about 0.1 s or more; 0 for a drive that never settles. Slowly
+        changing speeds count as two, however many they are.
 
     Examples
     --------
@@ -79,9 +79,9 @@ def advice_for(
     record : Record
         The log.
     probabilities : Mapping[str, float]
-        Of each condition [probability]; empty where there are none.
+        Probability of each condition [probability]; empty if there are none.
     against : iterable of Note
-        What speaks against all of them.
+        Reasons against all of them.
     not_told : iterable of Note
         What the log does not determine.
     channels : iterable of str
@@ -121,21 +121,21 @@ def oil_advice(
 ) -> tuple[Note, ...]:
     """Return advice on oil that is softer than its limit, whatever the condition.
 
-    A log determines bulk modulus over volume alone, so a volume that the rig file gives too small looks alike.
+    A log determines only bulk modulus over volume, so too small a volume in the rig file looks the same.
 
     Parameters
     ----------
     severity : Mapping[str, Quantity]
-        How bad it is, by the names of `faults.diagnosis.severity.UNITS`.
+        Severities, by the names of `faults.diagnosis.severity.UNITS`.
     healthy, limits : Mapping[str, float]
-        The same of the healthy actuator, and where it stops being sound [each in the same unit].
+        The same for the healthy actuator, and their limits [each in the same unit].
     volume : float
         Chamber volume for which bulk modulus was estimated [m^3].
 
     Returns
     -------
     tuple of Note
-        None where the interval given the rig reaches the limit.
+        Empty if the interval given the rig includes the limit.
     """
     modulus, sound = severity["bulk_modulus"], healthy["bulk_modulus"]
     if modulus.value is None or modulus.ci95 is None or modulus.ci95[1] >= limits["bulk_modulus"]:
@@ -145,7 +145,7 @@ def oil_advice(
 
 
 def sensor_advice(left_out: Iterable[Note]) -> tuple[Note, ...]:
-    """Return advice on a velocity sensor that was not used, since all other channels contradict it.
+    """Return advice on a velocity sensor that was left out because all other channels contradict it.
 
     Parameters
     ----------
@@ -157,19 +157,19 @@ def sensor_advice(left_out: Iterable[Note]) -> tuple[Note, ...]:
 
 
 def rig_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaParameters) -> tuple[Note, ...]:
-    """Return advice on the sides of the cylinder or the chamber volume in the rig file, if they contradict the log.
+    """Return advice on the two sides of the cylinder or the chamber volume, if the log contradicts the rig file.
 
     Parameters
     ----------
     strange : iterable of Note
-        What is strange about rig, oil and logger.
+        Unusual effects of rig, oil and logger.
     healthy, written : EhaParameters
-        The healthy actuator, corrected by what explains the log, and as the rig file has it.
+        The healthy actuator, with and without the corrections found from the log.
 
     Returns
     -------
     tuple of Note
-        None where the volume may be right: soft oil has its own advice.
+        Empty if the volume may be right: soft oil has its own advice.
     """
     for note in strange:
         if note.code == RigCode.SINGLE_ROD:
@@ -184,7 +184,7 @@ def rig_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaPara
 
 
 def _mended(doubts: list[Note]) -> tuple[Note, ...]:
-    """Return what to repair before the next log: the suspected sensors, else rig file and units."""
+    """Return what to repair before the next log: the suspected sensors, otherwise rig file and units."""
     if any(note.code == ChannelCode.NOTHING_CHANGES for note in doubts):
         return (AdviceCode.CHECK_LOGGER.note(),)
     if any(isinstance(note.code, ChannelCode) for note in doubts):
@@ -207,7 +207,7 @@ def _mended(doubts: list[Note]) -> tuple[Note, ...]:
 
 
 def _work_on(fault: Note) -> Note | None:
-    """Return the work on an actuator that has a fault which is none of the nine conditions."""
+    """Return the repair of a fault that is none of the nine conditions."""
     match fault.code:
         case RigCode.LEAKAGE_GROWS:
             return AdviceCode.STOP_LEAKAGE.note()

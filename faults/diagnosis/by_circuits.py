@@ -1,4 +1,4 @@
-"""`diagnose_clean(log, actuator) -> Diagnosis`: what circuits say of a log, without its estimate of bulk modulus."""
+"""`diagnose_clean(log, actuator) -> Diagnosis`: diagnosis by circuits, without the estimate of bulk modulus."""
 
 from functools import partial
 
@@ -18,7 +18,7 @@ from faults.diagnosis.severity import healthy_severities, limits_of, severities
 
 
 def diagnose_clean(log: CleanLog, actuator: Actuator, calibration: Calibration | None = None) -> Diagnosis:
-    """Diagnose a log whose sensors have been looked at, by all evidences, without its estimate of bulk modulus.
+    """Diagnose a log whose sensors have been checked, by all evidences, without its estimate of bulk modulus.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def diagnose_clean(log: CleanLog, actuator: Actuator, calibration: Calibration |
     Returns
     -------
     Diagnosis
-        What speaks for each class, and against all.
+        Evidence for each class, and against all.
 
     Raises
     ------

@@ -43,7 +43,7 @@ class Calibration:
         return (self.with_pressure if pressure else self.without_pressure)["weights"]
 
     def widths(self, pressure: bool) -> Mapping[str, float]:
-        """Return by what the severities' intervals are stretched.
+        """Return the factors on the severities' intervals.
 
         Parameters
         ----------

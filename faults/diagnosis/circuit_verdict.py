@@ -19,19 +19,19 @@ class Diagnosis:
     probabilities : Mapping[str, float]
         Of each of the nine conditions, see `estimation.finding.Finding` [probability].
     against : tuple of Note
-        What speaks against all nine.
+        Reasons against all nine.
     severity : Mapping[str, Quantity]
-        How bad, by the names of `faults.diagnosis.severity.UNITS` [each in the unit given there].
+        Severities, by the names of `faults.diagnosis.severity.UNITS` [each in the unit given there].
     healthy : Mapping[str, float]
-        The same of the healthy actuator [each in the same unit].
+        The same for the healthy actuator [each in the same unit].
     limits : Mapping[str, float]
-        Where it stops being sound, from `faults.diagnosis.severity.limits_of` [each in the same unit].
+        Their limits, from `faults.diagnosis.severity.limits_of` [each in the same unit].
     not_told : tuple of Note
         What the log does not determine.
     scoreboard : Scoreboard
         The evidences, and the circuit that was fitted.
     told_by : callable, optional
-        ``told_by(losses, rubbing)``: its severities where leakage and flow bias, or friction, are known otherwise.
+        ``told_by(losses, rubbing)``: its severities if leakage and flow bias, or friction, are known from elsewhere.
     """
 
     probabilities: Mapping[str, float]
@@ -50,10 +50,10 @@ class Diagnosis:
 
     @property
     def followed(self) -> bool:
-        """Whether the circuit follows the log, as far as one must."""
+        """Whether the circuit follows the log closely enough."""
         return all(note.code is not AgainstCode.UNEXPLAINED for note in self.against)
 
     @property
     def unknown(self) -> bool:
-        """Whether something speaks against all nine."""
+        """Whether there is a reason against all nine."""
         return bool(self.against)

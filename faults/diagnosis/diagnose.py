@@ -1,7 +1,7 @@
 """`diagnose_log(record, rig) -> Finding`: which condition, how probable, how bad, or "unknown" and why.
 
-The same pass as `estimation.eha.estimate.estimate_log`, carried on: the log is looked at once, bulk modulus is
-estimated once, and where its gate refuses the fit the class is unknown for the same reasons.
+It continues `estimation.eha.estimate.estimate_log`: the log is checked once and bulk modulus is estimated once. If the
+gate rejects the fit, the class is unknown for the same reasons.
 """
 
 from collections.abc import Callable, Mapping
@@ -66,9 +66,9 @@ class EhaEvidence:
     scores : Scores
         Errors of the nine nominal models.
     diagnosis : Diagnosis or None
-        The fitted circuit and its classes; None where no circuit fits around the rig, or the log is too short.
+        The fitted circuit and its classes; None if no circuit fits around the rig, or the log is too short.
     transfer_functions : Scores or None
-        Errors of nine transfer functions, where they were asked for.
+        Errors of nine transfer functions, if requested.
     """
 
     estimate: BulkModulusEstimate
@@ -83,16 +83,16 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     Parameters
     ----------
     record : Record
-        Motor speed, and position or velocity; differential pressure where it is logged.
+        Motor speed, and position or velocity; differential pressure if it is logged.
     rig : Rig
         The healthy actuator.
     seen : tuple of CleanLog and BulkModulusEstimate, optional
-        What `estimation.eha.estimate.estimated` gave of this log, with all automatic; found here if not given.
+        Result of `estimation.eha.estimate.estimated` for this log with default options; computed if not given.
 
     Returns
     -------
     Finding
-        Its evidence is an `EhaEvidence`. Where the log tells the conditions apart but no circuit fits around the rig,
+        Its evidence is an `EhaEvidence`. If the log distinguishes the conditions but no circuit fits around the rig,
         there is a condition without probabilities.
 
     Raises
@@ -148,11 +148,11 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
 
 
 class _Case(NamedTuple):
-    """A log and its rig, set right by what explains the log.
+    """A log and its rig, corrected for the effects that explain the log.
 
-    Circuits are fitted around ``rig``, which has the oil that was measured where that holds air, or is no kin of the
-    file's. Severities count from ``healthy``. What is ``strange`` is noted of rig, oil and logger. ``written`` is what
-    the rig file says. Nominal models, which know no air, are of the actuator as a whole.
+    Circuits are fitted around ``rig``, which has the measured oil if that contains air or is unlike the file's.
+    Severities are relative to ``healthy``. ``strange`` has the notes on rig, oil and logger. ``written`` is the rig
+    file. Nominal models, which have no air, use the actuator as a whole.
     """
 
     log: CleanLog
@@ -225,9 +225,9 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
 
 
 def _from_the_rigs_oil(diagnosis: Diagnosis, healthy: EhaParameters) -> Diagnosis:
-    """Return a diagnosis whose bulk modulus counts from the rig's oil, also where circuits are fitted around another.
+    """Return a diagnosis whose bulk modulus is compared with the rig's oil, even if circuits are fitted around another.
 
-    Else oil that is half as stiff as the rig's would be compared with itself, and be within its limit.
+    Otherwise oil half as stiff as the rig's would be compared with itself, and be within its limit.
     """
     if diagnosis.healthy["bulk_modulus"] == healthy.bulk_modulus:
         return diagnosis
@@ -238,10 +238,10 @@ def _from_the_rigs_oil(diagnosis: Diagnosis, healthy: EhaParameters) -> Diagnosi
 
 
 class _Plain(NamedTuple):
-    """Diagnosis and nominal models of the log as it came, around the rig as its file says: most logs need no others.
+    """Diagnosis and nominal models of the log as read, around the rig as its file states: most logs need no others.
 
-    They are begun beside the estimate of bulk modulus, which may set log and rig right; then they are not asked for.
-    Where that is known already, there is nothing to begin them beside.
+    They run beside the estimate of bulk modulus, which may correct log and rig; then they are not used. If the
+    corrections are already known, nothing is started.
     """
 
     log: CleanLog
@@ -279,7 +279,7 @@ def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
 
 
 def _judged(log: CleanLog, parameters: EhaParameters, case: _Case, plain: _Plain) -> Loaded:
-    """Return a diagnosis with the pump delivery that the balance of flow gives."""
+    """Return a diagnosis with the pump delivery from the flow balance."""
     around = partial(_diagnosed, log, estimate=case.estimate, plain=plain)
     found = whatever_accumulator(around(parameters), around)
     told = whatever_the_pump_delivers(found.diagnosis, actuator_of(found.parameters), case.estimate, case.strange)
@@ -287,7 +287,7 @@ def _judged(log: CleanLog, parameters: EhaParameters, case: _Case, plain: _Plain
 
 
 def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
-    """Return a diagnosis, under a load where the flow balance holds and the force balance wants one; in stiff oil."""
+    """Return a diagnosis; under a load if the flow balance holds and the force balance shows one; in stiff oil."""
 
     def of(tried: EhaParameters, doubt: float) -> Diagnosis:
         if doubt > 0.0:
@@ -302,9 +302,9 @@ def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEs
 
 
 def _another_oil(value: float | None, estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note | None:
-    """Return a note where the oil, without its air, is no kin of the rig's: the circuit is fitted around what it is.
+    """Return a note if the oil, without its air, is unlike the rig's: the circuit is fitted around the measured oil.
 
-    Stiff oil is no fault, and soft oil is told by its severity, the air that would make it so soft.
+    Stiff oil is no fault. Soft oil shows in its severity, the air that would make it so soft.
     """
     if not estimate.gate.passed or value is None:
         return None
@@ -343,5 +343,5 @@ def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple
 
 
 def _oil_is_the_circuits(estimate: BulkModulusEstimate, *, pressure: bool) -> bool:
-    """Return whether bulk modulus is the circuit's: a filter, or a fit of motion without pressure, was refused."""
+    """Return whether bulk modulus is the circuit's: a filter, or a fit of motion without pressure, was rejected."""
     return not estimate.gate.passed and not (pressure and estimate.form == "flow")

@@ -1,4 +1,4 @@
-"""Entries of a rig file that do not go together."""
+"""Entries of a rig file that contradict each other."""
 
 from faults.diagnosis.circuits.actuator import with_room
 from faults.notes import ClassCode
@@ -6,21 +6,22 @@ from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 PUMP_AND_PISTON, ANOTHER = ("pump_displacement", "piston_area"), 0.1
-"""Entries that make another actuator, by more than this share [fraction]: judged, twice what an area is off at most."""
+"""Entries that define the actuator, and the share by which they must differ for it to be another one [fraction]:
+judged, twice the usual error of an area."""
 
 HEALTHY = ("leakage_coefficient", "flow_bias", "friction_quadratic", "friction_linear", "friction_coulomb")
-"""Entries from which a class and its severities count."""
+"""Entries that a class and its severities are relative to."""
 
 
 def doubtful_entries(p: EhaParameters) -> tuple[Note, ...]:
-    """Return notes on entries of a rig file that do not go together."""
+    """Return notes on entries of a rig file that contradict each other."""
     larger = with_room(p).chamber_volume / p.chamber_volume - 1.0
     tight = (ClassCode.VOLUME_FOR_STROKE.note(percent=100.0 * larger),) if larger > 0.0 else ()
     return (*_healthy_of_the_paper(p), *tight, *_makeup_too_small(p))
 
 
 def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
-    """Return a note where a rig file leaves the healthy values of the paper beside another pump or piston."""
+    """Return a note if a rig file has another pump or piston than the paper's, but the paper's healthy values."""
     of_paper = EhaParameters()
     another = any(abs(getattr(p, name) / getattr(of_paper, name) - 1.0) > ANOTHER for name in PUMP_AND_PISTON)
     left = all(getattr(p, name) == getattr(of_paper, name) for name in HEALTHY)
@@ -28,7 +29,7 @@ def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
 
 
 def _makeup_too_small(p: EhaParameters) -> tuple[Note, ...]:
-    """Return a note where a single rod's own flow through its make-up valves takes more pressure than there is."""
+    """Return a note if a single rod's flow through its make-up valves needs more pressure than there is."""
     share = abs(p.area_difference)
     flow, most = 2.0 * share / (1.0 + share) * p.rated_flow, p.makeup_conductance * p.accumulator_pressure
     if not 0.0 < most < flow:

@@ -25,13 +25,13 @@ EVIDENCES = ("transfer_functions", "models", "innovations", "parameters")
 """The evidences, in the order of the scoreboard's rows."""
 
 FARTHEST = 30.0
-"""Log-odds beyond which an evidence says no more [dimensionless]: no model is sure of more."""
+"""Largest log-odds of an evidence [dimensionless]: no model is more certain than that."""
 
 YIELDS = 1.2
-"""By how much the breakaway force may differ between actuators of one kind [dimensionless]."""
+"""Ratio by which the breakaway force may differ between actuators of one kind [dimensionless]."""
 
 SAMPLES = 20.0
-"""How many independent samples a root-mean-square error counts as [dimensionless]; the weights scale it."""
+"""Number of independent samples that a root-mean-square error stands for [dimensionless]; the weights scale it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,20 +41,20 @@ class Scoreboard:
     Parameters
     ----------
     log_odds : Mapping[str, ndarray of shape (9,)]
-        By evidence, each condition's score below the best [dimensionless], 0 for the best; an evidence that could not
-        be had is absent.
+        By evidence, each condition's score below the best [dimensionless], 0 for the best; unavailable evidence is
+        absent.
     blocks : Blocks
         The log as it was compared.
     fits : ClassFits
         The circuits that were fitted.
     window : Record
-        The stretch of the log that was looked at.
+        The part of the log that was used.
     onset : Change or None
-        When the condition began, which alone is judged; None if it did so before the log.
+        When the condition began; only what follows is judged. None if it began before the log.
     against : tuple of Note
         What changed within the log and is no change of condition.
     drift : Drift or None
-        How its leakage drifts, which these evidences do not know; without pressure.
+        Drift of its leakage, which these evidences ignore; without pressure.
     """
 
     log_odds: Mapping[str, Array]
@@ -141,22 +141,22 @@ def models_scores(fits: ClassFits) -> Array:
 
 
 def within_reach(scores: Array, apart: Array) -> Array:
-    """Return the scores of nominal circuits, as far as the log separates the conditions.
+    """Return the scores of nominal circuits, limited by how far the log separates the conditions.
 
-    They differ from the actuator in all that is fitted besides. What that leaves of a log is taken for friction or
-    leakage, where the log tells nothing of these.
+    Nominal circuits differ from the actuator in all other fitted parameters as well. If the log says nothing about
+    friction or leakage, these differences would be taken for it.
 
     Parameters
     ----------
     scores : ndarray, shape (9,)
         Log-likelihoods of the conditions [dimensionless].
     apart : ndarray, shape (9, 9)
-        How far the log tells one condition from another, see `faults.diagnosis.circuits.region_scores.told_apart`.
+        How far the log separates the conditions, see `faults.diagnosis.circuits.region_scores.told_apart`.
 
     Returns
     -------
     ndarray, shape (9,)
-        None lies farther below another than the two are told apart [dimensionless].
+        None is farther below another than the log separates the two [dimensionless].
 
     Examples
     --------
@@ -193,7 +193,7 @@ def friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Arr
 
 
 def bounded(scores: Array) -> Array:
-    """Return log-odds to the best, bent so that none falls below `FARTHEST` under it.
+    """Return log-odds to the best, compressed so that none falls below ``-FARTHEST``.
 
     Parameters
     ----------

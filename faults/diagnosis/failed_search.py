@@ -1,8 +1,8 @@
 """Objections to a log before circuits are fitted, and whether the fitted circuit removes them.
 
-Without pressure a log is refused if the fit of motion leaves much of the motion. Its search may have failed, though: a
-circuit that follows the log has values for all that the motion form leaves open, and with these it follows the log too.
-Nor does it speak against a piston that hardly moves: how that yields on its seals no model describes to the last digit.
+Without pressure a log is rejected if the fit of motion leaves much of the motion. Its search may have failed, though: a
+circuit that follows the log provides values for the motion form, which then follows the log too. Nor are residuals an
+objection if the piston hardly moves: no model describes exactly how its seals yield.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,8 +22,8 @@ from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 LESS = 0.5
-"""Share of what a search left of the motion up to which the circuit's values show that it failed [fraction]: where it
-did not, they leave 0.9 to 1.1 times as much."""
+"""Residual at the circuit's values over that of the search, up to which the search failed [fraction]; otherwise the
+ratio is 0.9 to 1.1."""
 
 ALIKE = (
     "bulk_modulus",
@@ -37,7 +37,7 @@ ALIKE = (
 """Parameters that a circuit and the motion form share."""
 
 LEAST_DRAIN = 1e-3
-"""Least share of the leakage that drains to the inner circuit [fraction]: no logarithm begins at zero."""
+"""Least share of the leakage that drains to the inner circuit [fraction]: no logarithm starts at zero."""
 
 
 def doubts_after(
@@ -48,9 +48,9 @@ def doubts_after(
     Parameters
     ----------
     doubts : sequence of Note
-        What speaks against it before.
+        Objections before the fit.
     estimate : BulkModulusEstimate
-        Whose gate gave some of them.
+        The estimate whose gate raised some of them.
     log : CleanLog
         The log.
     healthy : EhaParameters
@@ -61,9 +61,9 @@ def doubts_after(
     Returns
     -------
     tuple of Note
-        Those of `faults.diagnosis.circuits.rivals.doubts_left`; none that rest on a fit of motion whose search
-        failed, if the motion form leaves no more at the circuit's values than a circuit may, or of a piston that hardly
-        moves and that the circuit follows to what seals yield.
+        Those of `faults.diagnosis.circuits.rivals.doubts_left`. Objections of a fit of motion are removed if its search
+        failed and the motion form fits as well at the circuit's values, or if the piston hardly moves and the circuit
+        follows it within what seals yield.
     """
     left = doubts_left(doubts, board.blocks, board.fits.best)
     large = next((note for note in left if note.code is EstimateCode.POSITION_RESIDUALS_LARGE), None)
@@ -78,7 +78,7 @@ def doubts_after(
 
 
 def values_of(fit: PointFit, actuator: Actuator) -> Mapping[str, float]:
-    """Return the motion form's unknowns as a fitted circuit has them.
+    """Return the motion form's unknowns with the values of a fitted circuit.
 
     Parameters
     ----------

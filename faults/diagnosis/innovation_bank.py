@@ -15,10 +15,11 @@ from plant.log.record import Record
 from plant.solvers.steps import parameter_row
 
 STEP = 2e-3
-"""Longest step of the filters [s]: their implicit step is stable at any, and what they tell apart is slower."""
+"""Longest step of the filters [s]: their implicit step is always stable, and what distinguishes the conditions is
+slower."""
 
 SPREAD = 0.3
-"""Standard deviation of the first guess of bulk modulus, as a share of it [dimensionless]."""
+"""Relative standard deviation of the first guess of bulk modulus [dimensionless]."""
 
 SIDE_BY_SIDE = 16
 """Filters in a kernel: two vectors of eight hold the nine."""
@@ -27,9 +28,9 @@ SIDE_BY_SIDE = 16
 def innovation_scores(record: Record, rig: EhaParameters) -> Array:
     """Return the log-likelihood of a log's innovations under each condition.
 
-    Each filter is the pressure form with the nominal leakage and friction of a condition; bulk modulus is a state. A
-    condition does not change within a log, so the filters do not mix (an interacting bank would only bound by how much
-    they may differ).
+    Each filter is the pressure form with the nominal leakage and friction of a condition; bulk modulus is a state. The
+    condition is constant within a log, so the filters do not mix (an interacting bank would only limit their
+    differences).
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def innovation_scores(record: Record, rig: EhaParameters) -> Array:
     Returns
     -------
     ndarray, shape (9,)
-        Natural logarithms [dimensionless], in the order of `CONDITIONS`; minus infinity where a filter ran away.
+        Natural logarithms [dimensionless], in the order of `CONDITIONS`; minus infinity if a filter diverged.
     """
     model = replace(PRESSURE_FORM, longest_step=STEP)
     slow = record.slice(0, None, max(1, round(STEP / record.sample_time)))

@@ -1,9 +1,9 @@
-"""`friction_by_forces(record, p, rated)`: friction of a piston that slides, by the balance of forces alone.
+"""`friction_by_forces(record, p, rated)`: friction of a sliding piston, from the force balance alone.
 
-A fitted circuit tells friction with the whole motion, and what its seals do at reversals is judged. While a piston
-slides one way, what pressure pushes it with beyond its inertia is its friction, whatever pump and seals do. The three
-parts of the law are regressed on the velocities at which it slid; a steady force, as of a load or a sensor's zero, has
-another sign than friction by direction and is fitted beside them. See decision 319.
+A fitted circuit determines friction from the whole motion, with an assumed model of the seals at reversals. While a
+piston slides in one direction, the pressure force beyond inertia is its friction, whatever pump and seals do. The three
+parts of the friction law are regressed on the sliding velocities. A constant force, of a load or a sensor's zero, does
+not change sign with direction and is fitted beside them. See decision 319.
 """
 
 import math
@@ -23,37 +23,38 @@ from plant.eha.model import EhaParameters, load_on_rod
 from plant.log.record import Record
 
 WINDOW = 0.02
-"""Time over which forces are averaged [s]: sensors' noise averages, and velocity is nearly the same."""
+"""Time over which forces are averaged [s]: short enough for nearly constant velocity, long enough to average the
+noise."""
 
 RESOLVED = 10
-"""Samples in a window at least: slower logs do not show what pressure and velocity do within one. At 100 Hz, friction
-under binary drives was six deviations off."""
+"""Least number of samples in a window: slower logs do not show how pressure and velocity change within it. At 100 Hz,
+friction under binary drives was six deviations off."""
 
 HALF_STEP = 1e-3
-"""Half of the time over which velocity is read off positions [s]."""
+"""Half of the time over which position is differentiated [s]."""
 
 SLIDES = 25.0
-"""Travel since a reversal from which a piston slides, in the rig's presliding displacements [dimensionless], judged:
-0.5 mm on the paper's actuator. Seals that yield by 0.05 mm one way have then yielded ten times that."""
+"""Travel since a reversal from which a piston slides, over the rig's presliding displacement [dimensionless], judged:
+0.5 mm on the paper's actuator, ten times the yield of seals of 0.05 mm."""
 
 SLOWEST = 1e-3
 """Velocity below which a piston may stick [m/s]."""
 
 FEWEST = 30
-"""Windows from which three parts of friction are told."""
+"""Least number of windows for the three parts of friction."""
 
 LASTS = 5
-"""Windows over which residuals are averaged, to see what lasts of them: a tenth of a second."""
+"""Windows over which residuals are averaged to detect a lasting error: a tenth of a second."""
 
 NOISE_ONLY = 2.0
-"""Residuals over the sensors' noise, by root mean square, above which the law is not that of this piston
-[dimensionless]. It is 1.0 to 1.4 on plain training logs."""
+"""Root mean square residual over the sensors' noise above which the friction law does not fit this piston
+[dimensionless]. It is 1.0 to 1.4 in plain training logs."""
 
 CLIPPED, ROUNDS = 3.0, 6
-"""Deviations from which a residual counts linearly [dimensionless], and rounds of weights."""
+"""Deviations from which a residual counts linearly [dimensionless], and iterations of the weights."""
 
 MOST_ALIKE = 1e12
-"""Largest condition of the normal equations [dimensionless]: beyond, a log does not tell the parts."""
+"""Largest condition number of the normal equations [dimensionless]: above it, a log does not separate the parts."""
 
 
 def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownFriction | None:
@@ -64,16 +65,16 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     record : Record
         Position and differential pressure, at any rate [m, Pa].
     p : EhaParameters
-        The actuator; of it the area, the mass and the load on the rod.
+        The actuator; its area, mass and load on the rod are used.
     rated : float
         Its rated velocity [m/s].
 
     Returns
     -------
     KnownFriction or None
-        None where one of the channels is not logged, or too slowly, where areas differ, so that differential pressure
-        is no force, where pressure has too coarse a converter, where the piston hardly slides, and where more than the
-        sensors' noise is left.
+        None if one of the channels is missing or too slow, if the areas differ (differential pressure is then no
+        force), if the pressure converter is too coarse, if the piston hardly slides, or if residuals exceed the
+        sensors' noise.
     """
     if not {POSITION, PRESSURE} <= set(record.channels) or p.single_rod or rated <= 0.0:
         return None
@@ -108,7 +109,7 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
 
 
 def _windows(position: Array, way: Array, slides: float, length: int) -> IntArray:
-    """Return the first samples of windows in which the piston slides one way and has done so for a while."""
+    """Return the first samples of windows in which the piston slides, and has slid, in one direction."""
     turns = np.concatenate([[0], np.flatnonzero(np.diff(way)) + 1, [len(way)]])
     found = [np.empty(0, dtype=np.int64)]
     for begin, end in pairwise(turns):
@@ -125,7 +126,7 @@ def _mean(values: Array, first: IntArray, length: int) -> Array:
 
 
 def _told(columns: Array, forces: Array, least: float, bends: Array) -> KnownFriction | None:
-    """Return the regression of forces, whose noise has some variance at the least [N^2]; bends are shares of rest."""
+    """Return the regression of forces with a least noise variance [N^2]; bends are shares of friction at rest."""
     count, unknowns = columns.shape
     prior = np.zeros((unknowns, unknowns))
     prior[-1, -1] = SELDOM_KNOWN["moving_mass"] ** -2

@@ -1,9 +1,9 @@
 """`by_the_balance(diagnosis, estimate, record, p)`: severities from the balances of flow and force.
 
-A fitted circuit tells leakage with the whole motion: where its seals yield otherwise than real ones do, it makes up for
-that by leakage. The balance of flows knows pump, piston and pressure, and nothing of friction. Where it explains a log,
-leakage is known some twenty times as well by it, and what hangs on leakage in the steady state is better known too.
-Friction is told by `known_friction` then, which knows nothing of the pump. See decision 304.
+A fitted circuit determines leakage from the whole motion: if real seals yield in another way than its own, leakage
+absorbs the difference. The flow balance uses pump, piston and pressure, and no friction. If it explains a log, it
+determines leakage some twenty times better, and so all that depends on leakage in the steady state. Friction then comes
+from `known_friction`, which does not use the pump. See decision 304.
 """
 
 from collections.abc import Mapping
@@ -33,9 +33,9 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: 
     Parameters
     ----------
     diagnosis : Diagnosis
-        Of a log.
+        Diagnosis of a log.
     estimate : BulkModulusEstimate
-        Of that log.
+        Estimate of that log.
     record : Record
         That log, as it was diagnosed.
     p : EhaParameters
@@ -44,9 +44,9 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: 
     Returns
     -------
     Diagnosis
-        With the leakage and the flow bias of the one, and the friction of the other, each where it is told better than
-        by the circuit; leakage and flow bias only where no further cause is needed. The same one where the balance of
-        flows does not explain the log, or where the circuit is not that of the whole log: its leakage drifts or
+        With leakage and flow bias from the flow balance, and friction from the force balance, each if it is determined
+        better than by the circuit; leakage and flow bias only if no further cause is needed. Unchanged if the flow
+        balance does not explain the log, or if the circuit is not that of the whole log, because its leakage drifts or
         changes.
     """
     blocks, circuits = diagnosis.scoreboard.blocks, diagnosis.severity
@@ -72,29 +72,29 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: 
 
 
 def _told_better(rubbed: Mapping[str, Quantity], severity: Mapping[str, Quantity]) -> bool:
-    """Return whether friction is told better, and all that hangs on it is told: a law may have no steady state."""
+    """Return whether friction, with all that depends on it, is determined better: a law may have no steady state."""
     narrower = (extent(rubbed[name]) < extent(severity[name]) for name in ("added_friction", "pressure_rise"))
     return all(narrower) and all(isfinite(extent(rubbed[name])) for name in OF_FRICTION)
 
 
 def _balances(estimate: BulkModulusEstimate) -> bool:
-    """Return whether the balance of flows explains a log, further causes taken up."""
+    """Return whether the flow balance, further causes included, explains a log."""
     return estimate.form == "flow" and estimate.outcome is Outcome.OK and estimate.gate.passed
 
 
 def _was_late(estimate: BulkModulusEstimate) -> bool:
-    """Return whether pressure or position came late: a lag that is set right as a delay leaves errors at reversals."""
+    """Return whether pressure or position was late: a lag corrected as a delay leaves errors at reversals."""
     found = estimate.explanation
     return found is not None and any(lateness(found, channel) != 0.0 for channel in (PRESSURE, POSITION))
 
 
 def known_losses(estimate: BulkModulusEstimate) -> KnownLosses | None:
-    """Return leakage and flow bias of a log as the balance of flows tells them.
+    """Return leakage and flow bias of a log from the flow balance.
 
     Returns
     -------
     KnownLosses or None
-        None where the balance was not fitted, is refused, or needs a further cause to explain the log.
+        None if the balance was not fitted, is rejected, or needs a further cause to explain the log.
     """
     if not _balances(estimate) or estimate.explanation is not None or not set(LOSSES) <= set(estimate.others):
         return None

@@ -14,7 +14,7 @@ from plant.log.record import Record
 from plant.notes import Note
 
 TOLD_APART = 1.001
-"""Least ratio of the runner-up's score to the best at which a class is named [dimensionless]."""
+"""Least ratio of the runner-up's score to the best for a class to be named [dimensionless]."""
 
 POOR_FIT = 0.5
 """Share of the signal that the best model may leave unexplained [fraction]."""
@@ -26,11 +26,11 @@ class ModelsVerdict(NamedTuple):
     Parameters
     ----------
     outcome : Outcome
-        Not observable where a channel is 0 throughout, or all models move alike.
+        Not observable if a channel is 0 throughout, or all models move alike.
     notes : tuple of Note
-        Why there is no class, where there is none.
+        Why there is no class, if there is none.
     against : tuple of Note
-        What speaks against all nine.
+        Reasons against all nine.
     """
 
     outcome: Outcome
@@ -49,7 +49,7 @@ def ranked(scores: Scores) -> list[tuple[str, float]]:
     Returns
     -------
     list of tuple
-        Condition, and score in its unit; one that ran away comes last.
+        Condition, and score in its unit; one that diverged comes last.
     """
     return sorted(scores.by_condition.items(), key=lambda item: item[1] if math.isfinite(item[1]) else math.inf)
 
@@ -65,7 +65,7 @@ def margin(scores: Scores) -> float:
     Returns
     -------
     float
-        The ratio [dimensionless]; 1 where both are zero, NaN where no model stayed finite.
+        The ratio [dimensionless]; 1 if both are zero, NaN if all models diverged.
     """
     (_, least), (_, next_least) = ranked(scores)[:2]
     if not math.isfinite(least):
@@ -100,7 +100,7 @@ def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
 
 
 def _zero_throughout(channels: Sequence[str], record: Record) -> str:
-    """Return the channels that are 0 in every sample, in words; empty where there is none."""
+    """Return the channels that are 0 in every sample, in words; empty if there are none."""
     values = {name: measured_velocity(record) if name == VELOCITY else record[name] for name in channels}
     silent = [name for name, one in values.items() if not np.any(np.nan_to_num(one))]
     return " and ".join(name if name in record else f"the velocity from {POSITION}" for name in silent)

@@ -1,4 +1,4 @@
-"""Severities that a log does not determine: notes, and which they are."""
+"""Severities that a log does not determine, with notes."""
 
 from collections.abc import Collection, Mapping
 from math import inf, nan
@@ -20,8 +20,8 @@ from plant.log.record import Record
 from plant.notes import Note
 
 HELD, BLOCKED = 95.0, 2.0
-"""Percentile of pressure that a still piston holds [%], and times that at which major friction yields from which the
-piston is blocked [dimensionless]; judged: friction at rest may be half as large again as while it slides."""
+"""Percentile of pressure that a piston at rest withstands [%], and multiple of the breakaway pressure under major
+friction from which it is blocked [dimensionless]; judged: friction at rest may be 1.5 times that of sliding."""
 
 VAGUE = 3.0
 """Ratio of relative widths from which a combination is known and its parts are not [dimensionless]."""
@@ -42,7 +42,7 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
     Returns
     -------
     list[Note]
-        None for a log that tells all.
+        Empty for a log that determines everything.
     """
     blind, said = not_shown(fits), list[Note]()
     unseen = blind >= FRICTION_LAW
@@ -60,10 +60,10 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
 
 
 def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -> tuple[Note, ...]:
-    """Return the reason against all nine conditions of a piston that none of them keeps still, or that may be blocked.
+    """Return the reason against all nine conditions if none of them holds the piston still, or if it may be blocked.
 
-    In the nine, friction yields to the relief pressure, so only leakage keeps the piston still. A blocked rod does so
-    as well. Pressure tells them apart, or friction that shows where a position moves a little.
+    In the nine, friction gives way at relief pressure, so only leakage keeps the piston still. A blocked rod does so as
+    well. Pressure tells the two apart, or friction that shows in small movements.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -
     Returns
     -------
     tuple of Note
-        None where the piston moves, pressure stays where friction may hold it, or friction shows without pressure.
+        Empty if the piston moves, if friction may hold it at that pressure, or if friction shows without pressure.
     """
     gone = travels(record, p)
     if gone is None or not gone.stuck:
@@ -98,12 +98,12 @@ def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -
 
 
 def not_determined(codes: Collection[object]) -> frozenset[str]:
-    """Return the severities that a log does not determine; their values are the prior's.
+    """Return the severities that a log does not determine; their values are those of the prior.
 
     Parameters
     ----------
     codes : collection of Code or str
-        Of what the log does not tell.
+        Codes of what the log does not determine.
 
     Returns
     -------
@@ -123,14 +123,14 @@ def not_determined(codes: Collection[object]) -> frozenset[str]:
 
 
 def without_undetermined(found: Mapping[str, Quantity], codes: Collection[object]) -> Mapping[str, Quantity]:
-    """Return severities, without a number where the log determines none: it would be the prior's.
+    """Return severities, without a number if the log does not determine it: it would be that of the prior.
 
     Parameters
     ----------
     found : Mapping[str, Quantity]
         Severities [each in its unit].
     codes : collection of Code or str
-        Of what the log does not tell.
+        Codes of what the log does not determine.
     """
     unseen = not_determined(codes)
     return {name: Quantity(None, one.unit) if name in unseen else one for name, one in found.items()}

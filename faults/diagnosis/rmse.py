@@ -1,6 +1,6 @@
 """Which condition is a log in? Every condition's model is run on it; the smallest root-mean-square error wins.
 
-Two banks, as in section 6 of the paper: the identified transfer functions, and the mathematical models.
+There are two banks, as in section 6 of the paper: identified transfer functions, and mathematical models.
 """
 
 import math
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 POSITION_WINDOW = 0.01
-"""Window over which position is differentiated where velocity was not logged [s]; two samples of a slower log."""
+"""Window over which position is differentiated if velocity was not logged [s]; two samples of a slower log."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Scores:
     Parameters
     ----------
     by_condition : Mapping[str, float]
-        Score by condition name [m/s, or dimensionless where pressure counts too].
+        Score by condition [m/s, or dimensionless if pressure counts too].
     rmse : Mapping[str, Mapping[str, float]]
         Root-mean-square error [SI] by channel that counts, and by condition name.
     """
@@ -54,7 +54,7 @@ class Scores:
         return min(self.by_condition, key=lambda name: self.by_condition[name])
 
     def of_one(self, channel: str) -> "Scores":
-        """Return the scores as they are when one channel counts alone.
+        """Return the scores of one channel alone.
 
         Parameters
         ----------
@@ -70,7 +70,7 @@ class Scores:
 
     @property
     def table(self) -> "pd.DataFrame":
-        """One row a condition: ``score``, and ``rmse_<channel>`` [SI] for each channel that counts."""
+        """One row per condition: ``score``, and ``rmse_<channel>`` [SI] for each channel that counts."""
         import pandas as pd
 
         errors = {f"rmse_{channel}": found for channel, found in self.rmse.items()}
@@ -80,19 +80,19 @@ class Scores:
 def score_mathematical(record: Record, bank: Mapping[str, EhaParameters], *, pressure: bool = True) -> Scores:
     """Score every condition's lumped model on a log.
 
-    Where one channel counts, the score is its RMSE in SI. Where velocity and differential pressure both count, each
-    RMSE is divided by the channel's own root mean square in the log and the score is the root mean square of the
-    two [dimensionless]: friction shows in pressure, leakage in velocity. A channel that is 0 in every sample has no
-    size, and no part in the score. Position does not count: it drifts with every error in velocity.
+    If one channel counts, the score is its RMSE in SI. If velocity and differential pressure both count, each RMSE is
+    divided by the channel's own root mean square in the log, and the score is the root mean square of the two
+    [dimensionless]: friction shows in pressure, leakage in velocity. A channel that is 0 in every sample has no scale,
+    and does not count. Position does not count: it accumulates every error of velocity.
 
     Parameters
     ----------
     record : Record
-        The log. Without ``differential_pressure_pa`` friction classes are told apart by velocity alone.
+        The log. Without ``differential_pressure_pa`` friction classes are distinguished by velocity alone.
     bank : Mapping[str, EhaParameters]
         Parameters by condition name.
     pressure : bool
-        Whether differential pressure counts where it is logged; Table 5 uses velocity alone.
+        Whether differential pressure counts if it is logged; Table 5 uses velocity alone.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def measured_velocity(record: Record) -> Array:
 
 
 def rmse(measured: Array, predicted: Array) -> float:
-    """Return the root-mean-square difference over the measured samples; infinite where a model ran away.
+    """Return the root-mean-square difference over the measured samples; infinite if a model diverged.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def rmse(measured: Array, predicted: Array) -> float:
 
 
 def _root_mean_square(values: Array) -> float:
-    """Return the root mean square over what is there; where all is, missing samples are not looked for."""
+    """Return the root mean square over valid samples; if all are valid, none are searched for."""
     squares = values**2
     mean = float(np.mean(squares))
     return math.sqrt(float(np.nanmean(squares)) if math.isnan(mean) else mean)

@@ -23,16 +23,17 @@ from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.steady_state import steady_state
 
 DRAWS = 2_000
-"""Circuits drawn from what a fit believes, for the intervals: their ends are right to 3 %."""
+"""Random circuits for the intervals: their ends are right to 3 %."""
 
 OF_KIND = 0.2
-"""How far bulk modulus differs between sound actuators of one kind [dimensionless]: what is less may be air."""
+"""Relative difference of bulk modulus between sound actuators of one kind [dimensionless]: lower values may mean
+air."""
 
 OF_FRICTION = frozenset({"velocity_lost", "added_friction", "pressure_rise"})
-"""Severities that hang on friction."""
+"""Severities that depend on friction."""
 
 OF_OIL = frozenset({"bulk_modulus", "entrained_air"})
-"""Severities that hang on bulk modulus."""
+"""Severities that depend on bulk modulus."""
 
 UNITS: Mapping[str, str] = {
     "leakage_flow": "L/min",
@@ -42,20 +43,20 @@ UNITS: Mapping[str, str] = {
     "bulk_modulus": "Pa",
     "entrained_air": "%",
 }
-"""The severities: leakage flow and bias at rated pressure (the relief setting); velocity lost and pressure rise in the
-steady state at rated speed, relative to the healthy actuator; friction at its rated velocity over the healthy; bulk
-modulus; the air at atmospheric pressure that would make the oil so soft."""
+"""The severities. Leakage flow and bias are at rated pressure (the relief setting). Velocity lost and pressure rise are
+in the steady state at rated speed, relative to the healthy actuator. Friction is at rated velocity, over the healthy
+one. The air is that at atmospheric pressure which would make the oil so soft."""
 
 
 class KnownLosses(NamedTuple):
-    """Leakage and flow bias that are known otherwise than by a fitted circuit.
+    """Leakage and flow bias that are known from another source than a fitted circuit.
 
     Parameters
     ----------
     logarithms : ndarray, shape (2,)
-        Of both, as the first two coordinates of a circuit [dimensionless].
+        Logarithms of both, as the first two coordinates of a circuit [dimensionless].
     covariance : ndarray, shape (2, 2)
-        Of their errors [dimensionless].
+        Covariance of their errors [dimensionless].
     """
 
     logarithms: Array
@@ -63,16 +64,16 @@ class KnownLosses(NamedTuple):
 
 
 class KnownFriction(NamedTuple):
-    """Friction that is known otherwise than by a fitted circuit.
+    """Friction that is known from another source than a fitted circuit.
 
     Parameters
     ----------
     forces : ndarray, shape (3,)
-        At rest, its quadratic part at rated velocity, and all of it there [N].
+        Friction at rest, its quadratic part at rated velocity, and all of it there [N].
     covariance : ndarray, shape (3, 3)
-        Of their errors [N^2].
+        Covariance of their errors [N^2].
     bent : ndarray, shape (3, 3)
-        The same where the law of friction may have another shape [N^2].
+        The same if the friction law may have another shape [N^2].
     """
 
     forces: Array
@@ -147,21 +148,21 @@ def severities(
     actuator : Actuator
         The healthy actuator.
     widths : Mapping[str, float], optional
-        By what each interval is stretched [dimensionless]; 1 if not given.
+        Factor on each interval [dimensionless]; 1 if not given.
     circuits : sequence of OpenCircuit, optional
-        Those that the log leaves open, see `circuits_left_open`; the best alone if not given. Values are those of the
-        likeliest, and intervals hold what all of them may be.
+        Circuits that the log leaves open, see `circuits_left_open`; the best alone if not given. Values are those of
+        the likeliest, and intervals include all of them.
     known : KnownLosses, optional
-        Leakage and flow bias in place of the circuit's. Its friction stays: what a fit made up for by leakage is not
-        what the derivatives say that it is.
+        Leakage and flow bias in place of the circuit's. Its friction stays: what a fit absorbed in leakage does not
+        follow the derivatives.
     rubbing : KnownFriction, optional
         Friction in place of the circuit's.
 
     Returns
     -------
     Mapping[str, Quantity]
-        By the names of `UNITS`. What hangs on friction brings a total interval along: the law may have another shape
-        than the rig's.
+        By the names of `UNITS`. Those that depend on friction have a total interval already, since the law may have
+        another shape than the rig's.
     """
     among = circuits or [OpenCircuit(fits.best.coordinates, 1.0)]
     if known is not None:
@@ -175,7 +176,7 @@ def severities(
 
 
 def _with_losses(spread: Array, known: KnownLosses | None) -> Array:
-    """Return a covariance of coordinates, of which the losses are known otherwise."""
+    """Return a covariance of coordinates in which the losses are known from another source."""
     if known is None:
         return spread
     out = np.array(spread)
@@ -194,7 +195,8 @@ def _under(
 ) -> dict[str, Quantity]:
     """Return the severities of the likeliest circuit, with intervals of all under a covariance of their coordinates.
 
-    ``rubbing`` are forces of friction and their covariance, in place of the circuits'. Only some may be asked for.
+    ``rubbing`` has forces of friction and their covariance, in place of the circuits'. The result may be restricted to
+    some.
     """
     centre = max(among, key=lambda one: one.probability).coordinates
     draws = _normal_draws(len(centre))
@@ -229,14 +231,14 @@ def _under(
 
 @cache
 def _normal_draws(coordinates: int) -> Array:
-    """Return draws of unit white noise, shape (`DRAWS`, coordinates), the same for every log: a fit can be repeated."""
+    """Return draws of white noise, shape (`DRAWS`, coordinates), equal for every log so that fits are repeatable."""
     return np.random.default_rng(0).standard_normal((DRAWS, coordinates))
 
 
 def _unresolved(actuator: Actuator) -> Mapping[str, float]:
-    """Return the friction below the resolution of a fit, by severity: no logarithm begins at zero (`LEAST_FORCE`).
+    """Return the friction below the resolution of a fit, by severity: no logarithm starts at zero (`LEAST_FORCE`).
 
-    It is nothing where the healthy friction has more than that at rest, at rated velocity and in the part between.
+    It is zero if the healthy friction exceeds that at rest, at rated velocity and in the part between.
     """
     p = actuator.circuit
     parts, least = friction_parts(p, actuator.rated)
@@ -248,7 +250,7 @@ def _unresolved(actuator: Actuator) -> Mapping[str, float]:
 
 
 def _centres(circuits: Sequence[OpenCircuit]) -> Array:
-    """Return the circuit about which each draw lies, as often as it is likely, shape (`DRAWS` or 1, 7)."""
+    """Return the circuit about which each draw lies, in proportion to its probability, shape (`DRAWS` or 1, 7)."""
     shares = np.cumsum([one.probability for one in circuits])
     if len(circuits) == 1:
         return circuits[0].coordinates[None]
@@ -281,7 +283,7 @@ def limits_of(actuator: Actuator) -> Mapping[str, float]:
     -------
     Mapping[str, float]
         Half-way from healthy to minor leakage or minor friction; the softest oil of a sound actuator of this kind. In
-        the units of `UNITS`; air has none, since bulk modulus has one.
+        the units of `UNITS`; air has no limit, since bulk modulus has one.
     """
     names, sound = list(CONDITIONS), healthy_severities(actuator)
     leaking, rubbing = (
@@ -296,14 +298,14 @@ def limits_of(actuator: Actuator) -> Mapping[str, float]:
 
 
 def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuator: Actuator) -> Mapping[str, Quantity]:
-    """Return severities with the bulk modulus that was estimated in place of the circuit's, and the air that follows.
+    """Return severities with the estimated bulk modulus in place of the circuit's, and the air that follows.
 
     Parameters
     ----------
     found : Mapping[str, Quantity]
         Severities of a circuit.
     estimated : Quantity
-        Effective bulk modulus [Pa]; without a value where the log does not tell it.
+        Effective bulk modulus [Pa]; without a value if the log does not determine it.
     actuator : Actuator
         The healthy actuator.
 
@@ -323,14 +325,14 @@ def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuat
 
 
 def _air(bulk_modulus: Any, actuator: Actuator) -> Any:
-    """Return the air at atmospheric pressure that would make the oil so soft [%], of one modulus or many."""
+    """Return the air at atmospheric pressure that would make the oil so soft [%], for one modulus or many."""
     healthy = actuator.circuit
     softness = 1.0 / bulk_modulus - 1.0 / healthy.bulk_modulus
     return 100.0 * np.maximum(0.0, softness * healthy.accumulator_pressure**2 / ATMOSPHERE)
 
 
 def _with_air(air: Quantity, modulus: Quantity, actuator: Actuator) -> Quantity:
-    """Return the air with an interval that begins at none where bulk modulus is that of some sound actuator."""
+    """Return the air with an interval that begins at zero if bulk modulus may be that of a sound actuator."""
     unlike = actuator.circuit.bulk_modulus * (1.0 - OF_KIND)
 
     ends, total = (

@@ -1,14 +1,14 @@
 """Total intervals of severities: the effect of the rig file's uncertainty, by steady-state scaling laws.
 
-At rated speed the pumped flow that does not move the piston leaks, so leakage answers an error of displacement or area
-by pumped flow over leakage; the velocity that is lost answers it one to one. Friction is area times pressure, and the
-gain of the sensor is that of the pressure. Without pressure the missing flow is the product of leakage and pressure:
-what a wrong ratio adds goes into either, so each is given it in full, which is too much; the scale itself is held by
-how alike actuators of one kind are, which the interval given the rig holds already.
+At rated speed, pumped flow that does not move the piston leaks. So the response of leakage to a relative error of
+displacement or area is pumped flow over leakage; that of velocity lost is one. Friction is area times pressure, and
+responds to the gain of the pressure sensor. Without pressure the missing flow is the product of leakage and pressure:
+the error of a wrong ratio goes into one or the other, and each gets all of it, which is too much. The scale itself is
+limited by how alike actuators of one kind are, which the interval given the rig includes already.
 
-Leakage is told at rated pressure, which few logs come near. It is carried on in proportion to pressure, as oil flows
-through a narrow gap. Through a scored land or a throttle it rises with the root of pressure (Merritt, Hydraulic Control
-Systems, 1967, chapter 3), and is less there.
+Leakage is reported at rated pressure, which few logs reach. It is extrapolated in proportion to pressure, as oil flows
+through a narrow gap. Through a scored land or a throttle it rises with the square root of pressure (Merritt, Hydraulic
+Control Systems, 1967, chapter 3), and is less there.
 """
 
 from collections.abc import Mapping
@@ -22,12 +22,12 @@ from plant.components.friction import quadratic_friction
 from plant.eha.doubts import PRESSURE_GAIN, Spread
 
 LEAST_LEAKAGE = 1e-2
-"""Least share of the pumped flow that counts as leaking [fraction]."""
+"""Least share of the pumped flow that counts as leakage [fraction]."""
 
 _TURBULENT = "turbulent_share"
 
 TURBULENT = Spread(0.35, 0.0)
-"""Share of a leakage that may rise with the root of pressure [fraction], judged: a standard deviation."""
+"""Share of a leakage that may rise with the square root of pressure [fraction], judged: a standard deviation."""
 
 
 def with_totals(
@@ -38,16 +38,16 @@ def with_totals(
     pressure: bool,
     reached: float = inf,
 ) -> Mapping[str, Quantity]:
-    """Return severities with their total intervals; bulk modulus and the air bring theirs along.
+    """Return severities with their total intervals; bulk modulus and air have theirs already.
 
     Parameters
     ----------
     found : Mapping[str, Quantity]
-        Severities, by the names of `faults.diagnosis.severity.UNITS`; a total that one has already is held too.
+        Severities, by the names of `faults.diagnosis.severity.UNITS`; an existing total interval is included.
     actuator : Actuator
         The healthy actuator.
     spreads : Mapping[str, Spread]
-        How far each entry of the rig may be off.
+        Uncertainty of each entry of the rig.
     pressure : bool
         Whether differential pressure is used.
     reached : float
@@ -56,7 +56,7 @@ def with_totals(
     Returns
     -------
     Mapping[str, Quantity]
-        The same, each with both intervals; without the total where the velocity that is lost is not determined.
+        The same, each with both intervals; without the total if velocity lost is not determined.
     """
     lost = found["velocity_lost"].value
     if lost is None:
@@ -70,7 +70,7 @@ def with_totals(
 
 
 def _holding(ends: tuple[float, float] | None, one: Quantity) -> Quantity:
-    """Return a quantity whose total interval holds another, too."""
+    """Return a quantity whose total interval includes another."""
     if ends is None or one.ci95_total is None:
         return one
     return replace(one, ci95_total=(min(ends[0], one.ci95_total[0]), max(ends[1], one.ci95_total[1])))
@@ -93,7 +93,7 @@ def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Re
 
 
 def _whole(found: Mapping[str, Quantity], actuator: Actuator) -> Mapping[str, float]:
-    """Return the whole that each severity adds to or takes from, in the severity's unit."""
+    """Return the whole from which each severity is a difference, in the severity's unit."""
     p = actuator.circuit
     sound = float(quadratic_friction(actuator.rated, 1.0, p.friction_quadratic, p.friction_linear, p.friction_coulomb))
     value = {name: one.value or 0.0 for name, one in found.items()}

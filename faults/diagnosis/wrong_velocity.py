@@ -12,32 +12,33 @@ from faults.notes import ClassCode
 from plant.notes import Note
 
 BY_GAIN = 0.5
-"""Share of the difference between position and integrated velocity from which it is a wrong gain [fraction]; judged."""
+"""Share of the difference between position and integrated velocity from which it is due to a wrong gain [fraction];
+judged."""
 
 
 def without_wrong_velocity(
     log: CleanLog, against: Sequence[Note], estimate: BulkModulusEstimate, strange: Sequence[Note]
 ) -> CleanLog | None:
-    """Return a log without a velocity that froze or contradicts position, where the balance of flows confirms that.
+    """Return a log without a velocity that froze or contradicts position, if the flow balance confirms that.
 
-    A position that is wrong breaks the balance with motor speed and pressure. Only its gain may hide there, and only
-    where a worn pump may: at one motor speed. Then the log does not say which of the two sensors is wrong.
+    A wrong position breaks the balance with motor speed and pressure. Only its gain may go unnoticed, and only if a
+    worn pump may: at one motor speed. Then the log does not say which of the two sensors is wrong.
 
     Parameters
     ----------
     log : CleanLog
-        The log as it was cleaned.
+        The log after its checks.
     against : sequence of Note
         Reasons against its class.
     estimate : BulkModulusEstimate
         Bulk modulus, and what was found with it.
     strange : sequence of Note
-        What is strange about rig, oil and logger.
+        Notes on rig, oil and logger.
 
     Returns
     -------
     CleanLog or None
-        The log, with notes; None where nothing is wrong with velocity, or position may be wrong.
+        The log, with notes; None if velocity is right, or position may be wrong.
     """
     record, froze = log.record, log.objections_to((VELOCITY,))
     confirmed = estimate.form == "flow" and estimate.gate.passed and estimate.explanation is None

@@ -1,8 +1,8 @@
-"""`whatever_accumulator(found, again)`: a single rod whose inner circuit holds less gas, or more, than is assumed.
+"""`whatever_accumulator(found, again)`: a single rod whose inner circuit has less or more gas than assumed.
 
-Few rig files tell the gas of the inner circuit's accumulator. A single rod takes oil from it at every stroke and gives
-it back, and its pressure, which the low side of the piston has, swings by bars where there is little gas. The balance
-of flows hardly feels that, the force on the piston does: circuits with another accumulator left a fifth to a third of
+Few rig files state the gas of the inner circuit's accumulator. A single rod takes oil from it at every stroke and
+returns it. With little gas its pressure, which acts on the low side of the piston, varies by several bar. The flow
+balance is hardly affected, but the force on the piston is: circuits with another accumulator left a fifth to a third of
 the velocity of such logs.
 """
 
@@ -24,14 +24,14 @@ from plant.eha.circuit_parameters import CircuitParameters, oil_demand
 from plant.eha.model import EhaParameters
 
 TRIED, ROUNDS, PASSES = 8, 2, 3
-"""Accumulators that are run side by side; how often, each time between the neighbours of the best; and how often at
-most a circuit is fitted with the best [count]."""
+"""Accumulators that are run side by side; rounds, each between the neighbours of the best; and most fits of a circuit
+with the best [count]."""
 
 LARGEST = 30.0
-"""Most gas that is tried, over what is assumed [dimensionless]: its pressure then stays as it is."""
+"""Most gas that is tried, over the assumed gas [dimensionless]: its pressure is then constant."""
 
 ABOUT = 2.0
-"""How many times more gas, or less, is tried once a circuit was fitted with some [dimensionless]."""
+"""Factor by which more or less gas is tried once a circuit was fitted with some [dimensionless]."""
 
 
 def whatever_accumulator(found: Loaded, again: Callable[[EhaParameters], Loaded]) -> Loaded:
@@ -47,7 +47,7 @@ def whatever_accumulator(found: Loaded, again: Callable[[EhaParameters], Loaded]
     Returns
     -------
     Loaded
-        The same where a circuit follows the log already, or none does with another accumulator.
+        Unchanged if a circuit follows the log already, or none does with another accumulator.
     """
     if found.diagnosis.followed or not found.parameters.single_rod:
         return found
@@ -60,7 +60,7 @@ def whatever_accumulator(found: Loaded, again: Callable[[EhaParameters], Loaded]
 
 
 def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> CircuitParameters | None:
-    """Return the healthy circuit with an accumulator under which circuits follow a log that they do not follow else.
+    """Return the healthy circuit with an accumulator under which circuits follow the log, if they do not otherwise.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Circui
     Returns
     -------
     CircuitParameters or None
-        None without pressure, where nothing else tells valves from it, and where no accumulator helps.
+        None without pressure, since valves and accumulator then cannot be told apart, and if no accumulator helps.
     """
     if blocks.pressure is None:
         return None
@@ -93,7 +93,7 @@ def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Circui
 
 
 def _likeliest_gas(blocks: Blocks, actuator: Actuator, fit: PointFit, ends: tuple[float, float]) -> tuple[float, float]:
-    """Return the gas between two ends with which a fitted circuit follows a log best [m^3], and what that leaves."""
+    """Return the gas between two ends with which a fitted circuit follows a log best [m^3], and its residual."""
     circuit = actuator.circuit
     rows = np.repeat(parameter_rows(fit.coordinates[None], circuit, actuator.rated), TRIED, axis=0)
     gas, left = 0.0, np.inf

@@ -1,6 +1,6 @@
 """Without pressure, stiff oil is no fault: conditions are compared around the oil of the fitted circuit.
 
-Where pressure is logged, bulk modulus is measured before a circuit is fitted. Soft oil holds air, which is a fault.
+With pressure, bulk modulus is measured before a circuit is fitted. Soft oil contains air, which is a fault.
 """
 
 import math
@@ -18,7 +18,8 @@ from plant.eha.model import EhaParameters
 def whatever_the_oil(diagnosed: Diagnosed, parameters: EhaParameters) -> Loaded:
     """Return a diagnosis around stiffer oil than the rig file's, if stiffness alone contradicts all conditions.
 
-    Oil that the log knows only roughly is not called stiff, but its circuit may lie beside the nine conditions for it.
+    If the log determines the oil only roughly, it is not called stiff, but its circuit may be outside the nine
+    conditions because of it.
 
     Parameters
     ----------
@@ -30,7 +31,7 @@ def whatever_the_oil(diagnosed: Diagnosed, parameters: EhaParameters) -> Loaded:
     Returns
     -------
     Loaded
-        The diagnosis, the actuator around which it is, and a note where its oil is another.
+        The diagnosis, its actuator, and a note if the oil is another.
     """
     found = diagnosed(parameters, 0.0)
     ratio = _stiffness(found, parameters)
@@ -44,7 +45,7 @@ def whatever_the_oil(diagnosed: Diagnosed, parameters: EhaParameters) -> Loaded:
 
 
 def _stiffness(found: Diagnosis, parameters: EhaParameters) -> float | None:
-    """Return the oil's bulk modulus over the rig file's where that may be all that speaks against the conditions."""
+    """Return the oil's bulk modulus over the rig file's, if it may be the only objection to the conditions."""
     if [note.code for note in found.against] == [AgainstCode.OIL_STIFF]:
         return float(found.against[0].data["share"])
     if not found.against or not only_beside(found.against):

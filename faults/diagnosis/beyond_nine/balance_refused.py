@@ -1,9 +1,9 @@
-"""With pressure: a class may stand where the balance of flows does not explain a log to the sensors' noise.
+"""With pressure: a class may stand although the flow balance does not explain a log to the sensors' noise.
 
-The balance predicts each sample, and what it leaves is measured by the sensors' noise: a motor that turns between two
-samples, a search that ends in a wrong valley, spikes, or a valve that chatters refuse bulk modulus, though they hardly
-change the means over 10 ms by which a circuit is compared. What the balance would have told of a worn pump and of
-valves is then asked of circuits with these faults, as without pressure (`other_faults`). See decision 303.
+The balance predicts each sample, and its residuals are compared with the sensors' noise. A motor that reverses between
+two samples, a search that ends in a wrong minimum, spikes, or a valve that chatters reject bulk modulus, though they
+hardly change the 10 ms means with which a circuit is compared. Worn pumps and valves, for which the balance would test,
+are then tested by circuits with these faults, as without pressure (`other_faults`). See decision 303.
 """
 
 import numpy as np
@@ -29,31 +29,32 @@ LEFT_BY_BALANCE = {
     EstimateCode.INNOVATIONS_BESIDE_DRIVE,
     EstimateCode.ESTIMATE_WANDERS,
 }
-"""Reasons that say how much the balance leaves, and none that names what is wrong."""
+"""Reasons that state the size of the balance's residuals, and none that names a cause."""
 
 CLOSELY = (0.03, 0.04)
 """Share of velocity and of pressure, root mean square, up to which a circuit follows a log closely [dimensionless]: a
-quarter and a half of what it may leave of any log. On training logs of the open benchmark with faults outside the nine
-that circuits alone would pass, it leaves 7 % of the velocity and more."""
+quarter and a half of the general limit. In training logs of the open benchmark with faults outside the nine that
+circuits alone would accept, the residual is 7 % of the velocity and more."""
 
 MOST_GAINED = {WORN: NOT_EXCLUDED, STUCK: GAIN, SOUND: -NOT_EXCLUDED}
-"""Log-likelihood up to which another circuit does not speak against the class; 0 of any that is not named here
-[dimensionless]. A worn pump may belong to another class, so it has to be excluded. A valve that never opens leaves no
-trace, so it has to be believed. Each other fault then has a probability of 2 % at most, by what is presumed of it. What
-no rig file knows gained up to 1.2 on sound logs, and up to 73 where a relief valve opens early."""
+"""Log-likelihood up to which another circuit is no objection to the class; 0 for circuits that are not named here
+[dimensionless]. A worn pump may belong to another class, so it must be excluded. A valve that never opens leaves no
+trace, so it must be believed to count. Each other fault then has a probability of 2 % at most, by its prior. Sound
+circuits that differ in what no rig file states gained up to 1.2 on sound logs, and up to 73 if a relief valve opens
+early."""
 
 
 def class_without_balance(
     doubts: tuple[Note, ...], diagnosis: Diagnosis, estimate: BulkModulusEstimate, actuator: Actuator
 ) -> Note | None:
-    """Return a note where a class stands, though the balance of flows is refused.
+    """Return a note if a class stands although the flow balance is rejected.
 
     Parameters
     ----------
     doubts : tuple of Note
-        What speaks against a log because of its estimate.
+        Objections to a log because of its estimate.
     diagnosis : Diagnosis
-        What circuits say of it.
+        Its diagnosis by circuits.
     estimate : BulkModulusEstimate
         Its estimate.
     actuator : Actuator
@@ -62,8 +63,8 @@ def class_without_balance(
     Returns
     -------
     Note or None
-        One where the balance is refused for what it leaves alone, a circuit follows the log `CLOSELY`, and no other
-        circuit, with a fault outside the nine conditions or without, gains more than `MOST_GAINED`; else None.
+        A note if the balance is rejected for its residuals alone, a circuit follows the log `CLOSELY`, and no other
+        circuit, with a fault outside the nine or without, gains more than `MOST_GAINED`; otherwise None.
     """
     board = diagnosis.scoreboard
     blocks, fits = board.blocks, board.fits
@@ -92,6 +93,6 @@ def follows_closely(blocks: Blocks, fit: PointFit) -> bool:
     Returns
     -------
     bool
-        Whether it leaves no more than `CLOSELY`, noise included: within much noise a fault may hide.
+        Whether it leaves no more than `CLOSELY`, noise included: much noise may hide a fault.
     """
     return bool(np.all(fit.scales <= np.array(CLOSELY) * blocks.sizes))

@@ -1,8 +1,8 @@
-"""Classes of a log whose leakage drifts as with warming oil: the reference oil state is integrated out.
+"""Classes of a log whose leakage drifts as with warming oil: the reference temperature is integrated out.
 
-A rig file has the leakage of one oil temperature, which nobody says. Over a log that warms, the condition that holds at
-its end is another than at its beginning: twice a minor leakage is nearly a major one. Conditions are scored with the
-rig file's oil at the end of the log, halfway and at the beginning, and summed.
+A rig file has the leakage at one oil temperature, which it does not state. In a log that warms, the condition at its
+end differs from that at its beginning: twice a minor leakage is nearly a major one. Conditions are scored with the rig
+file's oil at the end of the log, in the middle and at the beginning, and summed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,33 +30,34 @@ from plant.arrays import Array
 from plant.notes import Note
 
 EARLIER = (0.5, 0.0)
-"""Where the rig file's oil may stand besides the end of a log [fraction of it]: over the factor of 2 of a log that
-warms by some 15 K, neighbours are three deviations of actuators of one kind apart, and none is farther than 1.5."""
+"""Other places of the rig file's oil besides the end of a log [fraction of it]: over a factor of 2, as in a log that
+warms by some 15 K, neighbouring places are three deviations of actuators of one kind apart, so none is farther than 1.5
+away."""
 
 PLACED = {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}
-"""What speaks against a log in one oil, and not in another."""
+"""Objections to a log with one oil, and not with another."""
 
 
 def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Sequence[Note]) -> Loaded:
-    """Return a diagnosis whose classes are averaged over the point of the drift at which the rig file's oil lies.
+    """Return a diagnosis whose classes are averaged over the place in the drift of the rig file's oil.
 
-    Each place counts alike before the log is seen, and by how well the nine conditions hold the log there. What speaks
-    against all nine for where the circuit lies does so only where it does at every place.
+    All places have the same prior, and count by how well the nine conditions fit the log there. An objection to the
+    place of the circuit counts only if it holds at every place.
 
     Parameters
     ----------
     diagnosed : callable
         Gives the diagnosis of a log.
     log : CleanLog
-        The log, set right.
+        The corrected log.
     notes : sequence of Note
-        What explains it.
+        Notes on what explains it.
 
     Returns
     -------
     Loaded
-        The diagnosis at the end of the log; with the classes of all places where `LEAKAGE_DRIFTS` is among the notes,
-        or where the diagnosis of a log without pressure found a drift, which then is one of its notes.
+        The diagnosis at the end of the log; with the classes of all places if `LEAKAGE_DRIFTS` is among the notes, or
+        if the diagnosis of a log without pressure found a drift, which is then one of its notes.
     """
     last = diagnosed(log)
     if (drift := last.diagnosis.scoreboard.drift) is not None:
@@ -96,9 +97,9 @@ def _is_placed(one: Diagnosis) -> bool:
 def _followed(
     found: Sequence[Diagnosis], courses: Sequence[float], actuator: Actuator, calibration: Calibration
 ) -> Diagnosis:
-    """Return the diagnosis at the end of a log, its circuit fitted on from another place's where that follows better.
+    """Return the diagnosis at the end of a log, its circuit refitted from another place's if that follows better.
 
-    A doubled leakage lies far from all conditions, and a search from these may end short.
+    A doubled leakage is far from all conditions, and a search from these may end too early.
     """
     misfits = [misfit(one.scoreboard.blocks, one.scoreboard.fits.best.fitted) for one in found]
     best, last = int(np.argmin(misfits)), found[0]
@@ -113,12 +114,12 @@ def _followed(
 
 
 def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str, float]:
-    """Return the probability of each condition over diagnoses of one log, which are alike beforehand.
+    """Return the probability of each condition over diagnoses of one log, with equal priors.
 
     Parameters
     ----------
     found : sequence of Diagnosis
-        They count by their evidences where all compare the same stretch of the log, else alike.
+        Diagnoses; they count by their evidences if all compare the same part of the log, otherwise equally.
     calibration : Calibration
         Weights of the evidences.
 
@@ -145,13 +146,13 @@ def _evidence(board: Scoreboard, calibration: Calibration) -> float:
 
 
 def _with_oil_of(log: CleanLog, leakage: float) -> CleanLog:
-    """Return a log with the rig file's oil where its leakage is so much of what it is at the end."""
+    """Return a log with the rig file's oil where leakage is a given ratio to that at the end."""
     course = log.record[LEAKAGE_COURSE] / leakage
     return replace(log, record=log.record.replace(**{LEAKAGE_COURSE: course}))
 
 
 def _whatever_the_oil(name: str, found: Sequence[Diagnosis]) -> Quantity:
-    """Return a severity as at the end of a log, with a total interval that holds those of all places."""
+    """Return a severity as at the end of a log, with a total interval that includes those of all places."""
     each = [one.severity[name] for one in found]
     ends = [one.ci95 for one in each if one.ci95 is not None]
     if each[0].ci95 is None:

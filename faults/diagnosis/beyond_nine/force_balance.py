@@ -1,8 +1,8 @@
-"""The load on the rod by the force balance of a sliding piston, without a model of how it breaks loose.
+"""The load on the rod from the force balance of a sliding piston, without a model of how it breaks loose.
 
-While the piston slides one way its friction is a smooth function of its speed. So pressure over area is linear in what
-holds the rod back, a constant force, a spring and an inertia, and in the coefficients of friction. If it slides one way
-only, friction at rest is known as far as conditions differ in it, and a constant force no better.
+While the piston slides in one direction, its friction is a smooth function of its speed. So pressure times area is
+linear in a constant force, a spring and an inertia on the rod, and in the coefficients of friction. If it slides in one
+direction only, friction at rest is known as far as conditions differ in it, and a constant force no better.
 """
 
 from dataclasses import dataclass
@@ -19,48 +19,48 @@ from plant.components.oil import ATMOSPHERE
 from plant.eha.model import EhaParameters
 
 BROKEN_LOOSE = 1e-4
-"""Travel after a reversal from which friction is that of sliding [m]: five times what strains the seals; judged."""
+"""Travel after a reversal from which friction is that of sliding [m]: five times the strain of the seals; judged."""
 
 HEARD = 4.0
-"""Noise over which velocity tells a way [dimensionless], in standard deviations."""
+"""Velocity over its noise from which its direction is known [dimensionless], in standard deviations."""
 
 FEWEST = 20
-"""Blocks of a sliding piston below which nothing is said [count]: 0.2 s."""
+"""Least number of blocks with a sliding piston [count]: 0.2 s."""
 
 UNLIKE = 0.3
-"""By how much friction at rest may differ within a condition, in its logarithm [dimensionless], as in `WEAK`."""
+"""Relative difference of friction at rest within a condition [dimensionless], as in `WEAK`."""
 
 FREE = 10.0
-"""How far its other coefficients may lie from none, over the largest that a condition has [dimensionless]."""
+"""Prior size of the other coefficients, over the largest in any condition [dimensionless]."""
 
 SURE = 4.0
-"""Standard deviations from which a load is believed [dimensionless]. On 119 plain training logs none is 1.4."""
+"""Standard deviations from which a load is believed [dimensionless]. In 119 plain training logs none exceeds 1.4."""
 
 LEAST = {"load_force": 0.05, "load_stiffness": 0.01, "moving_mass": 0.01}
-"""Share of the pressure's force, root mean square, from which a load matters [fraction]: a sensor's offset counts from
-0.05 on, and what depends on place or acceleration is none."""
+"""Share of the pressure force, root mean square, from which a load matters [fraction]: a sensor offset can look like a
+constant force, which counts from 0.05 on, and nothing looks like the others."""
 
 LAGGING = 8.0
-"""Standard deviation of an inertia that friction may hide, as it lags speed [kg]: of 60 to 300 kg up to 12 were hidden
-on training logs where the balance alone was sure to 4."""
+"""Standard deviation of an inertia that friction may hide, as it lags behind speed [kg]: of 60 to 300 kg up to 12 were
+hidden in training logs in which the balance alone was certain to 4."""
 
 NAMES = tuple(LEAST)
-"""What holds a rod back, as the actuator has it."""
+"""Loads on a rod, as in the actuator's entries."""
 
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Loads on the rod that the rig file does not have.
+    """Loads on the rod that the rig file does not state.
 
     Parameters
     ----------
     values : ndarray, shape (3,)
-        More constant force against extension [N], more stiffness of a spring that is free where position is zero [N/m],
-        and more mass that moves [kg].
+        Additional constant force against extension [N], stiffness of a spring that is free at position zero [N/m], and
+        moving mass [kg].
     std : ndarray, shape (3,)
         Their standard deviations.
     shares : ndarray, shape (3,)
-        How large a force each is, over that of the pressure, both root mean square [fraction].
+        Size of each force over that of the pressure, both root mean square [fraction].
     """
 
     values: Array
@@ -69,14 +69,14 @@ class Loads:
 
     @property
     def sure(self) -> tuple[str, ...]:
-        """Those of `NAMES` that are more than doubt; springs and masses hold back."""
+        """Those of `NAMES` that are certain; springs and masses are positive."""
         sure = np.abs(self.values) > SURE * self.std
         sure[1:] &= self.values[1:] > 0.0
         return tuple(name for name, one in zip(NAMES, sure, strict=True) if one)
 
     @property
     def believed(self) -> tuple[str, ...]:
-        """Those that are large enough to matter, too."""
+        """Those that are also large enough to matter."""
         large = dict(zip(NAMES, self.shares, strict=True))
         return tuple(name for name in self.sure if large[name] > LEAST[name])
 
@@ -92,9 +92,9 @@ class Balance(NamedTuple):
     Parameters
     ----------
     use : ndarray, shape (n,)
-        Which these are.
+        Which blocks these are.
     columns : ndarray, shape (m, 6)
-        What goes with a force, a spring, an inertia, and friction at rest, linear and quadratic [SI].
+        Regressors of a force, a spring, an inertia, and friction at rest, linear and quadratic [SI].
     push : ndarray, shape (m,)
         Force of the pressure, less inertia and load of the rig file [N].
     pressure : ndarray, shape (m,)
@@ -108,7 +108,7 @@ class Balance(NamedTuple):
 
 
 def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
-    """Return the load on the rod that the force balance shows where the piston slides.
+    """Return the load on the rod from the force balance of the sliding piston.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
     Returns
     -------
     Loads or None
-        The load; None without pressure, and where the piston hardly slides.
+        The load; None without pressure, and if the piston hardly slides.
     """
     balance = sliding_balance(blocks, p)
     if balance is None:
@@ -140,7 +140,7 @@ def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
 
 
 def sliding_balance(blocks: Blocks, p: EhaParameters) -> Balance | None:
-    """Return the force balance of the sliding piston: what pushes it, and what may hold it back.
+    """Return the force balance of the sliding piston: the pressure force, and what may oppose it.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def sliding_balance(blocks: Blocks, p: EhaParameters) -> Balance | None:
     Returns
     -------
     Balance or None
-        None without pressure, and where the piston hardly slides.
+        None without pressure, and if the piston hardly slides.
     """
     if blocks.pressure is None:
         return None
@@ -174,12 +174,12 @@ def sliding_balance(blocks: Blocks, p: EhaParameters) -> Balance | None:
 
 
 def _held(p: EhaParameters) -> float:
-    """Return twice the gauge pressure of the chamber that is at the inner circuit's [Pa]."""
+    """Return twice the gauge pressure of the chamber at the inner circuit's pressure [Pa]."""
     return 2.0 * (p.accumulator_pressure - ATMOSPHERE)
 
 
 def _regressed(columns: Array, push: Array, centre: Array, doubt: Array) -> tuple[Array, Array]:
-    """Return coefficients and their covariance, from what is believed of them and errors that last."""
+    """Return coefficients and their covariance, from their priors and with lasting errors."""
     sizes = np.maximum(np.max(np.abs(columns), axis=0), np.finfo(np.float64).tiny)
     scaled, pull = columns / sizes, 1.0 / (doubt * sizes) ** 2
     begun = centre * sizes
@@ -225,7 +225,7 @@ def friction_believed(p: EhaParameters) -> tuple[Array, Array]:
     Returns
     -------
     tuple of ndarray, each of shape (3,)
-        Friction at rest [N], its linear [N s/m] and its quadratic part [N s^2/m^2], and how far each may be off.
+        Friction at rest [N], its linear [N s/m] and its quadratic part [N s^2/m^2], and their deviations.
     """
     each = [parameters_for(condition, p) for condition in CONDITIONS.values()]
     rest, linear, bent = np.array([[q.friction_coulomb, q.friction_linear, q.friction_quadratic] for q in each]).T

@@ -1,7 +1,7 @@
 """Faults outside the nine conditions that a log without pressure does not exclude: how likely, and what they change.
 
-Some leave no trace in motion: a relief valve that would open at a pressure that the log never reaches, a make-up valve
-that never had to open. They keep what was presumed of them before the log was seen.
+Some leave no trace in motion: a relief valve that would open at a pressure the log never reaches, a make-up valve that
+never had to open. They keep their prior probability.
 """
 
 import math
@@ -19,29 +19,29 @@ from plant.arrays import Array
 from plant.notes import Note
 
 WORTH_SAYING = 0.01
-"""Probability of a fault from which it is said beside its name [probability]."""
+"""Probability of a fault from which it is reported beside its name [probability]."""
 
 LOWEST = 0.1
-"""Setting of a relief valve over the rig file's, to which it may be low [fraction]: no piston slides below."""
+"""Lowest setting of a faulty relief valve over the rig file's [fraction]: no piston slides below."""
 
 DELIVERIES = (0.7, 0.75, 0.8, 0.85, 0.9)
-"""Shares of its displacement that a worn pump delivers [dimensionless]. In a log of 10 s, a pump of 0.85 is likelier
-than a sound one by 50 of log-likelihood; its neighbours at 0.8 and 0.9 are no likelier than a sound one."""
+"""Deliveries of worn pumps over their displacement [dimensionless]. In a log of 10 s, a pump of 0.85 is likelier than a
+sound one by 50 of log-likelihood; its neighbours at 0.8 and 0.9 are no likelier than a sound one."""
 
 SO_WORN = math.log(0.5)
-"""Log-likelihood of one of them before a log is seen, beside what is presumed of wear [dimensionless]: each stands for
-5 % of the displacement, a sound pump for 10 %."""
+"""Prior log-probability of one of them, beside that of wear [dimensionless]: each stands for 5 % of the displacement, a
+sound pump for 10 %."""
 
 WELL_WORN = 0.8
-"""Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
-off by 5 %, and what is presumed of wear has a deviation of 15 %."""
+"""Delivery up to which a pump is worn whatever the accuracy of the rig file's displacement [dimensionless]: an entry
+may be off by 5 %, and the prior of wear has a deviation of 15 %."""
 
 UNSEEN = 1.0 / (1.0 + len(CONDITIONS))
-"""Probability that a make-up valve which a log never opens is stuck shut [probability]: as likely as each of the nine,
-which are alike before a log is seen."""
+"""Probability that a make-up valve which never opens in a log is stuck shut [probability]: as likely as each of the
+nine conditions before a log is seen."""
 
 STAYS = 0.5
-"""Probability of a condition, beside a fault, from which it is the same as without [probability]."""
+"""Probability of a condition, given a fault, from which it is the same as without the fault [probability]."""
 
 
 class OpenFault(NamedTuple):
@@ -50,11 +50,11 @@ class OpenFault(NamedTuple):
     Parameters
     ----------
     name : str
-        What it is called.
+        Its name.
     chance : float
-        How likely it is [probability].
+        Its probability [probability].
     scores : ndarray, shape (9,)
-        How well each condition holds the log beside it: log-likelihoods [dimensionless].
+        How well each condition fits the log given the fault: log-likelihoods [dimensionless].
     """
 
     name: str
@@ -63,19 +63,19 @@ class OpenFault(NamedTuple):
 
 
 def odds_of_hidden_relief(pressure: float, setting: float) -> float:
-    """Return the log-likelihood, before a log is seen, that a low relief valve opens nowhere in it.
+    """Return the prior log-probability that a low relief valve never opens in a log.
 
     Parameters
     ----------
     pressure : float
         Largest pressure in the log [Pa].
     setting : float
-        Of a sound relief valve [Pa].
+        Setting of a sound relief valve [Pa].
 
     Returns
     -------
     float
-        Logarithm of the share of low settings, all alike in their logarithm, that lie above that pressure
+        Logarithm of the share of low settings, uniform in their logarithm, that are above that pressure
         [dimensionless].
 
     Examples
@@ -91,19 +91,19 @@ def odds_of_hidden_relief(pressure: float, setting: float) -> float:
 def odds_of_wear(scores: Sequence[float], sound: float) -> float:
     """Return the odds of a well worn pump against a sound one, with the prior of wear.
 
-    What is presumed of wear before a log is seen is that of `faults.diagnosis.beyond_nine.wear.summed_over_wear`.
+    The prior is that of `faults.diagnosis.beyond_nine.wear.summed_over_wear`.
 
     Parameters
     ----------
     scores : sequence of float
-        How well pumps that deliver each of `DELIVERIES` explain a log [dimensionless].
+        How well pumps with each of `DELIVERIES` explain a log [dimensionless].
     sound : float
-        The same of a sound pump [dimensionless].
+        The same for a sound pump [dimensionless].
 
     Returns
     -------
     float
-        Logarithm of the ratio of pumps that deliver `WELL_WORN` at most to sound ones [dimensionless].
+        Logarithm of the ratio of pumps that deliver at most `WELL_WORN` to sound ones [dimensionless].
 
     Examples
     --------
@@ -115,12 +115,12 @@ def odds_of_wear(scores: Sequence[float], sound: float) -> float:
 
 
 def presumed_of_wear(shares: Sequence[float]) -> Array:
-    """Return the log-likelihoods of what pumps deliver before a log is seen.
+    """Return the prior log-probabilities of pump deliveries.
 
     Parameters
     ----------
     shares : sequence of float
-        What they deliver over their displacement [dimensionless].
+        Deliveries over displacement [dimensionless].
 
     Returns
     -------
@@ -133,17 +133,17 @@ def presumed_of_wear(shares: Sequence[float]) -> Array:
 
 
 def probabilities_of(odds: Mapping[str, float]) -> dict[str, float]:
-    """Return the probability of each of several faults, of which at most one is there.
+    """Return the probability of each of several faults, of which at most one is present.
 
     Parameters
     ----------
     odds : Mapping[str, float]
-        How much likelier each is than none: logarithms of ratios, by name [dimensionless].
+        Log-odds of each against no fault, by name [dimensionless].
 
     Returns
     -------
     dict[str, float]
-        Probability by name [probability]; what is left is that of none.
+        Probability by name [probability]; the remainder is that of no fault.
 
     Examples
     --------
@@ -157,14 +157,14 @@ def probabilities_of(odds: Mapping[str, float]) -> dict[str, float]:
 
 
 def not_excluded(faults: Sequence[OpenFault], sound: Array) -> tuple[Note, ...]:
-    """Return a note that names the faults that a log does not exclude, and what the condition would be beside them.
+    """Return a note that names the faults that a log does not exclude, and the condition given each of them.
 
     Parameters
     ----------
     faults : sequence of OpenFault
-        They.
+        The faults.
     sound : ndarray, shape (9,)
-        How well each condition holds the log without a fault: log-likelihoods [dimensionless].
+        How well each condition fits the log without a fault: log-likelihoods [dimensionless].
 
     Returns
     -------
@@ -185,14 +185,14 @@ def not_excluded(faults: Sequence[OpenFault], sound: Array) -> tuple[Note, ...]:
 def beside_unseen_valve(
     probabilities: Mapping[str, float], not_told: Sequence[Note]
 ) -> tuple[Mapping[str, float], tuple[Note, ...]]:
-    """Return the classes of a log in which a make-up valve never opened: that it is stuck shut is none of the nine.
+    """Return the classes of a log in which a make-up valve never opened: if it is stuck shut, none of the nine holds.
 
-    A stuck valve then has the likelihood of a sound one, and keeps what is presumed of it.
+    A stuck valve then has the likelihood of a sound one, and keeps its prior probability.
 
     Parameters
     ----------
     probabilities : Mapping[str, float]
-        Of each condition with a sound valve [probability].
+        Probability of each condition with a sound valve [probability].
     not_told : sequence of Note
         What the log does not determine.
 
@@ -210,14 +210,14 @@ def beside_unseen_valve(
 
 
 def likelier_fault(probabilities: Mapping[str, float], not_told: Sequence[Note]) -> tuple[Note, ...]:
-    """Return the notes on faults that a log does not exclude, where these are likelier than each of the nine.
+    """Return the notes on faults that a log does not exclude, if these are likelier than each of the nine.
 
-    They speak against all nine then: a verdict would name one of what is less likely.
+    They are then a reason against all nine: a verdict would name something less likely.
 
     Parameters
     ----------
     probabilities : Mapping[str, float]
-        Of each condition; what they lack to 1 is that of such faults [probability].
+        Probability of each condition; the remainder to 1 is that of such faults [probability].
     not_told : sequence of Note
         What the log does not determine.
     """

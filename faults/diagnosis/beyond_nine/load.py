@@ -1,8 +1,8 @@
-"""The load on the rod, where a log shows one: what moves the force balance and leaves the flow balance alone.
+"""The load on the rod, if a log shows one: it changes the force balance and leaves the flow balance alone.
 
-A constant force on the rod shifts differential pressure by as much as a sensor's offset does, yet no oil leaks for an
-offset. So where the flow form explains a log, what shifts its pressures is a load. How large it is the force balance of
-the sliding piston tells, and a circuit fitted under it has to follow the log.
+A constant force on the rod shifts differential pressure just as a sensor's offset does, yet no oil leaks because of an
+offset. So if the flow form explains a log, a shift of its pressures is a load. The force balance of the sliding piston
+determines its size, and a circuit fitted under it must follow the log.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -23,10 +23,10 @@ from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 LOADS_TRIED = 3
-"""Circuits that are fitted under a load at most: what a bias asks for is read off one linear step."""
+"""Most circuits that are fitted under a load: each bias gives a correction by one linear step."""
 
 ASKING = {AgainstCode.PRESSURE_BIAS, AgainstCode.UNEXPLAINED}
-"""What speaks against a circuit that stands under another load than it is told."""
+"""Objections to a circuit under a wrong load."""
 
 
 class Loaded(NamedTuple):
@@ -35,9 +35,9 @@ class Loaded(NamedTuple):
     Parameters
     ----------
     diagnosis : Diagnosis
-        What the circuit under the load says.
+        Diagnosis by the circuit under the load.
     parameters : EhaParameters
-        The actuator with its load; the rig file's where no load explains the log.
+        The actuator with its load; the rig file's if no load explains the log.
     notes : tuple of Note
         The loads by name.
     """
@@ -48,7 +48,7 @@ class Loaded(NamedTuple):
 
 
 Diagnosed: TypeAlias = Callable[[EhaParameters, float], Diagnosis]
-"""What the circuit fitted around an actuator says of a log, where the force on its rod is known so well [N]."""
+"""Diagnosis by a circuit fitted around an actuator, given the standard deviation of the force on its rod [N]."""
 
 
 def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkModulusEstimate) -> Loaded:
@@ -57,18 +57,18 @@ def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkMo
     Parameters
     ----------
     diagnosed : callable
-        ``diagnosed(parameters, std)``: what the circuit fitted around an actuator says of the log, where the constant
-        force on its rod has this standard deviation [N].
+        ``diagnosed(parameters, std)``: diagnosis by a circuit around an actuator, where the constant force on its rod
+        has this standard deviation [N].
     parameters : EhaParameters
         The actuator, as its rig file has it.
     estimate : BulkModulusEstimate
-        What the flow form found.
+        Result of the flow form.
 
     Returns
     -------
     Loaded
-        The diagnosis, and the actuator with its load; those of the rig file where no load explains the log. Where a
-        load that changes does, that speaks against all conditions.
+        The diagnosis, and the actuator with its load; those of the rig file if no load explains the log. A load that
+        changes is a reason against all conditions.
     """
     first = diagnosed(parameters, 0.0)
     blocks = first.scoreboard.blocks
@@ -88,16 +88,16 @@ def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkMo
 
 
 def with_loads(p: EhaParameters, seen: Loads, names: Sequence[str]) -> EhaParameters:
-    """Return an actuator with loads of the force balance.
+    """Return an actuator with loads from the force balance.
 
     Parameters
     ----------
     p : EhaParameters
         The actuator, as its rig file has it.
     seen : Loads
-        What the force balance shows beyond that.
+        Loads that the force balance shows beyond the rig file.
     names : sequence of str
-        Which of its loads.
+        Which of these loads.
     """
     return replace(p, **{name: getattr(p, name) + seen.of(name)[0] for name in names})
 
@@ -105,7 +105,7 @@ def with_loads(p: EhaParameters, seen: Loads, names: Sequence[str]) -> EhaParame
 def first_guesses(
     blocks: Blocks, parameters: EhaParameters, estimate: BulkModulusEstimate, seen: Loads | None
 ) -> Iterator[EhaParameters]:
-    """Yield the actuator under each load that a log may show and that the force balance is not sure of.
+    """Yield the actuator under each load that a log may show and the force balance is not certain of.
 
     Parameters
     ----------
@@ -114,9 +114,9 @@ def first_guesses(
     parameters : EhaParameters
         The actuator, as its rig file has it.
     estimate : BulkModulusEstimate
-        What the flow form found.
+        Result of the flow form.
     seen : Loads or None
-        What the force balance shows.
+        Loads that the force balance shows.
 
     Yields
     ------
@@ -139,7 +139,7 @@ def _followed(
     seen: Loads | None,
     rig: EhaParameters,
 ) -> Loaded | None:
-    """Return the first load under which a circuit follows the log, each corrected by the bias that is left of it."""
+    """Return the first load under which a circuit follows the log, each corrected by the remaining bias."""
     std = _force(seen, rig)[1]
     for guess in guesses:
         loaded = guess
@@ -155,7 +155,7 @@ def _followed(
 
 
 def _told(found: Diagnosis, loaded: EhaParameters, seen: Loads | None, rig: EhaParameters) -> Loaded | None:
-    """Return a diagnosis with its loads by name; None where the force balance has them otherwise."""
+    """Return a diagnosis with its loads by name; None if the force balance contradicts them."""
     more = loaded.load_force - rig.load_force
     force, std = _force(seen, rig)
     if seen is not None and more != 0.0 and abs(more - force) > SURE * std:
@@ -179,7 +179,7 @@ def _asks(found: Diagnosis) -> bool:
 
 
 def _better(found: Diagnosis, first: Diagnosis) -> bool:
-    """Return whether a circuit under a load follows a log better than one without, and no more speaks against it."""
+    """Return whether a circuit under a load follows a log better than one without, without further objections."""
     (under, loaded), (free, without) = ((one.scoreboard.blocks, one.scoreboard.fits) for one in (found, first))
     if len(found.against) > len(first.against):
         return False
@@ -189,7 +189,7 @@ def _better(found: Diagnosis, first: Diagnosis) -> bool:
 
 
 def _open(seen: Loads | None, blocks: Blocks, p: EhaParameters) -> bool:
-    """Return whether the force balance leaves room for a constant force that matters."""
+    """Return whether the force balance allows a constant force that matters."""
     if seen is None or blocks.pressure is None:
         return True
     size = p.piston_area * float(np.sqrt(np.nanmean(blocks.pressure**2)))
@@ -197,7 +197,7 @@ def _open(seen: Loads | None, blocks: Blocks, p: EhaParameters) -> bool:
 
 
 def _force(seen: Loads | None, p: EhaParameters) -> tuple[float, float]:
-    """Return the constant force and its standard deviation [N]; friction holds a piston that sticks either way."""
+    """Return the constant force and its standard deviation [N]; friction holds a sticking piston either way."""
     if seen is not None:
         return seen.of("load_force")
     rest, spread = (one[0] for one in friction_believed(p))

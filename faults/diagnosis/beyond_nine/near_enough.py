@@ -1,8 +1,8 @@
-"""Without pressure: does a circuit lie outside the nine conditions by more than its own model error.
+"""Without pressure: whether a circuit is outside the nine conditions by more than its own model error.
 
-Where pressure is logged, a model error that lasts is counted in how far a circuit may lie beside the nine
-(`class_regions.ClassFits.told`), as a balance of flows looks for other faults. Without, circuits with such faults are
-laid beside the log first (`other_faults`); only where none explains it the error counts.
+With pressure, a lasting model error is part of how far a circuit may be outside the nine
+(`class_regions.ClassFits.told`), since a flow balance tests for other faults. Without it, circuits with such faults are
+compared first (`other_faults`); the error counts only if none of them explains the log.
 """
 
 from collections.abc import Sequence
@@ -16,22 +16,22 @@ from faults.notes import AgainstCode
 from plant.notes import Note
 
 BESIDE = (AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS)
-"""What is said of a circuit beside the nine conditions."""
+"""Objections to a circuit outside the nine conditions."""
 
 
 def only_beside(against: Sequence[Note]) -> bool:
-    """Return whether the only objection to the nine is that the circuit lies outside them.
+    """Return whether the only objection to the nine is that the circuit is outside them.
 
     Returns
     -------
     bool
-        Whether it is so; also where nothing does.
+        Also True if there is no objection.
     """
     return all(note.code in BESIDE for note in against)
 
 
 def lies_beside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> bool:
-    """Return whether circuits lie outside the nine conditions by more than a lasting model error.
+    """Return whether circuits are outside the nine conditions by more than a lasting model error.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def lies_beside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> bool:
     Returns
     -------
     bool
-        Whether the nearest condition's region holds none of them.
+        Whether the nearest condition's region contains none of them.
     """
     lasting = max(fits.lasting, lasting_misfit(fits.best.fitted, blocks))
     return how_near(replace(fits, lasting=lasting), blocks, actuator) < -FARTHEST_OUT

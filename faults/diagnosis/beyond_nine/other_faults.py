@@ -1,10 +1,10 @@
-"""Faults outside the nine conditions, without pressure: does one explain the log better than any of the nine.
+"""Faults outside the nine conditions, without pressure: whether one explains the log better than any of the nine.
 
-Where pressure is logged, the balance of flows looks for a worn pump, for make-up valves that stick or leak and for a
-relief valve that is set low. Without pressure, a circuit with each of these faults is compared with a sound one over
-the regions of all nine conditions (`class_regions`): the difference of their scores is the logarithm of a Bayes factor.
-What no rig file knows of a sound circuit (its case drain, its make-up valves) may explain more than a fault does, so
-the best of several sound circuits is taken.
+With pressure, the flow balance tests for a worn pump, for make-up valves that stick or leak and for a relief valve with
+a low setting. Without pressure, a circuit with each of these faults is compared with a sound one over the regions of
+all nine conditions (`class_regions`): the difference of their scores is the logarithm of a Bayes factor. What no rig
+file states of a sound circuit (its case drain, its make-up valves) may explain more than a fault does, so the best of
+several sound circuits is used.
 """
 
 import math
@@ -39,48 +39,49 @@ from plant.notes import Note
 
 GAIN = 4.0
 """Log-likelihood over all regions that a fault must gain to be believed, in `LASTING` blocks that count as one
-[dimensionless]: a Bayes factor of 55. It is as likely as not then, which is what is presumed of such a fault."""
+[dimensionless]: a Bayes factor of 55. With the prior of such a fault, its probability is then one half."""
 
 NOT_EXCLUDED = -3.0
 """The same, from which a fault is not excluded [dimensionless]: a Bayes factor of a twentieth."""
 
 HOPELESS = 20.0
-"""Log-likelihood below the sound circuit at which a rough search leaves a fault [dimensionless]: a thorough one gained
-up to 26 on it, but few. A search that would not come to it in the steps that are left ends there too."""
+"""Log-likelihood below the sound circuit at which a rough search drops a fault [dimensionless]: few thorough ones
+gained up to 26 on it. A search that cannot reach it in the remaining steps ends there too."""
 
 WORN = "a worn pump"
-"""What that fault is called."""
+"""Name of that fault."""
 
 EARLY = "a relief valve that opens early"
-"""What that one is called."""
+"""Name of that fault."""
 
 STUCK = "a make-up valve that is stuck shut"
-"""What that one is called. One that never has to open leaves no trace, whatever it is."""
+"""Name of that fault. A valve that never has to open leaves no trace."""
 
 LEFT_UNSEEN = math.log(UNSEEN / (1.0 - UNSEEN))
-"""Log-likelihood of one before a log is seen, where the log does not tell it [dimensionless]: as with pressure."""
+"""Prior log-odds of a stuck valve if the log does not show it [dimensionless]: as with pressure."""
 
 SOUND = "a sound circuit"
-"""What one is called that differs from the rig file's in what no rig file knows."""
+"""Name of a circuit that differs from the rig file's in what no rig file states."""
 
 LIKELIER = 10.0
 """How many times likelier than a sound pump a well worn one must be to be believed [dimensionless]: evidence is called
-strong from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 16 sound training logs under major leakage
-and friction none comes to more than 1.4."""
+strong above that (Jeffreys, Theory of Probability, 1961, appendix B). In 16 sound training logs under major leakage and
+friction none exceeds 1.4."""
 
 SHUT = (0.9, 0.97, 0.99, 1.0)
-"""Shares of a make-up valve that are stuck shut [dimensionless]: one that lets a little oil through passes for friction
-beside one that lets none through. A search finds no more than its neighbours."""
+"""Shares of a make-up valve that are blocked [dimensionless]: one that passes a little oil looks like friction beside
+one that passes none. A search finds no more than its neighbours."""
 
 SEATS = (0.4, 1.0)
-"""Leakage past the seat of a make-up valve, over all the leakage of an actuator with major leakage [dimensionless]."""
+"""Leakage past the seat of a make-up valve, over the whole leakage of an actuator with major leakage
+[dimensionless]."""
 
 SETTINGS = (0.75, 0.9)
-"""Settings of a relief valve, over the largest pressure that the sound circuit comes to in the log [dimensionless]."""
+"""Settings of a relief valve, over the largest pressure of the sound circuit in the log [dimensionless]."""
 
 SO_SET = math.log(math.log(SETTINGS[1] / SETTINGS[0]) / math.log(10.0))
-"""Log-likelihood that a low relief valve is set so, before a log is seen [dimensionless]: it may be set to a tenth of
-what it should be, below which no piston slides, and each of `SETTINGS` stands for those about it."""
+"""Prior log-probability of such a setting [dimensionless]: it may be as low as a tenth of the right one, below which no
+piston slides, and each of `SETTINGS` stands for those near it."""
 
 
 class Outside(NamedTuple):
@@ -89,14 +90,14 @@ class Outside(NamedTuple):
     Parameters
     ----------
     against : tuple of Note
-        The fault that a log shows, which speaks against all nine.
+        The fault that a log shows, a reason against all nine.
     open : tuple of Note
-        The faults that it does not tell.
+        The faults that the log leaves open.
     worn : ndarray, shape (1 + pumps, 9), optional
-        How well each condition holds it with a sound pump, then with one that delivers each of `DELIVERIES`:
-        log-likelihoods [dimensionless]; None where a worn pump is excluded.
+        How well each condition fits the log with a sound pump, then with each of `DELIVERIES`: log-likelihoods
+        [dimensionless]; None if a worn pump is excluded.
     faulty : float
-        Probability that one of the faults that the log does not tell is there [probability].
+        Probability that one of the open faults is present [probability].
     """
 
     against: tuple[Note, ...] = ()
@@ -107,10 +108,10 @@ class Outside(NamedTuple):
 
 @dataclass(frozen=True)
 class _Fault:
-    """A fault: what is said where it is there, what it is called where it is not excluded, and a circuit with it.
+    """A fault: its note if found, its name if not excluded, and a circuit with it.
 
-    The search for one that moves the log into another condition begins in that, any other at the sound circuit.
-    What is presumed is the log-likelihood of its size before a log is seen [dimensionless].
+    A search for a fault that moves the log into another condition begins in that, any other at the sound circuit. The
+    prior is the log-probability of its size [dimensionless].
     """
 
     note: Note
@@ -121,7 +122,7 @@ class _Fault:
 
 
 def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outside:
-    """Return the fault outside the nine conditions that a log without pressure shows, and those that it does not tell.
+    """Return the fault outside the nine conditions that a log without pressure shows, and those that it leaves open.
 
     Parameters
     ----------
@@ -135,7 +136,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     Returns
     -------
     Outside
-        What is said of them; nothing with pressure, and where the piston sticks.
+        Empty with pressure, and if the piston sticks.
     """
     if blocks.pressure is not None or is_stuck(blocks, actuator):
         return Outside()
@@ -185,7 +186,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
 def circuits_with_faults(
     blocks: Blocks, fits: ClassFits, actuator: Actuator, gained: float
 ) -> Iterator[tuple[float, ClassFits]]:
-    """Yield circuits with each of the faults that are looked for, fitted to a log without pressure.
+    """Yield circuits with each of the tested faults, fitted to a log without pressure.
 
     Parameters
     ----------
@@ -196,8 +197,8 @@ def circuits_with_faults(
     actuator : Actuator
         The healthy actuator.
     gained : float
-        Log-likelihood that one must gain on these to be of use [dimensionless]: a search that is sure to end `HOPELESS`
-        below that ends early.
+        Log-likelihood that one must gain on these to be of use [dimensionless]: a search that will end `HOPELESS` below
+        that ends early.
 
     Yields
     ------
@@ -225,8 +226,8 @@ def gains_of_others(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Mapp
     Returns
     -------
     Mapping[str, float]
-        By what a fault is called: log-likelihood of the best circuit with it over that of the best sound one, with what
-        is presumed of its size; as `SOUND`, of that one over the rig file's [dimensionless].
+        By name of the fault: log-likelihood of the best circuit with it over that of the best sound one, with the prior
+        of its size; as `SOUND`, of the best sound one over the rig file's [dimensionless].
     """
     runs = nominal_runs(blocks, actuator)
     sound = sound_circuit(blocks, fits, actuator, runs)
@@ -244,7 +245,7 @@ def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELE
 
 
 def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
-    """Return the largest pressure that a fitted circuit comes to in a log without pressure.
+    """Return the largest pressure that a fitted circuit reaches in a log without pressure.
 
     Parameters
     ----------
@@ -266,7 +267,7 @@ def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float
 
 
 def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: float) -> Tried:
-    """Return the circuit with a fault that explains a log best, unless it is so far behind the sound one."""
+    """Return the best circuit with a fault, unless it is too far behind the sound one."""
     faulty = replace(sound.actuator, circuit=fault.circuit)
     wanted = LASTING * (behind - sound.score)  # no region holds a circuit better than its misfit says
     if not fault.elsewhere:
@@ -286,7 +287,7 @@ def _delivering(share: float) -> Note:
 
 
 def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
-    """Yield the faults that are looked for, where the sound circuit comes to a pressure [Pa]."""
+    """Yield the faults that are tested, given the largest pressure of the sound circuit [Pa]."""
     sound = actuator.circuit
     for share in DELIVERIES:
         worn = replace(sound, pump_displacement=share * sound.pump_displacement)

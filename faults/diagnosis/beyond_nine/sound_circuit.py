@@ -1,7 +1,7 @@
-"""Without pressure: the sound circuit that explains a log best, among some that differ in what no rig file knows.
+"""Without pressure: the sound circuit that explains a log best, among some that differ in what no rig file states.
 
-A rig file says little of make-up valves and of the drain from the pump's case. What these explain is no fault, and a
-log that they explain is not unexplained.
+A rig file says little about make-up valves and the drain from the pump's case. What these explain is no fault, and a
+log that they explain is explained.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from faults.diagnosis.circuits.out_of_model import unexplained
 from plant.arrays import Array
 
 WIDER = 5.0
-"""By how much wider make-up valves are tried [dimensionless]: no rig file knows them."""
+"""Factor by which wider make-up valves are tried [dimensionless]: no rig file states them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +36,12 @@ class Tried:
 
     @property
     def score(self) -> float:
-        """Log-likelihood of the condition that holds it best [dimensionless]."""
+        """Log-likelihood of the condition that fits it best [dimensionless]."""
         return float(np.max(self.fits.scores))
 
 
 def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Array) -> Tried:
-    """Return the circuit without a fault that explains a log best, among some that differ in what no rig file knows.
+    """Return the best circuit without a fault, among some that differ in what no rig file states.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Arr
     actuator : Actuator
         The healthy actuator.
     runs : ndarray, shape (9, n, outputs)
-        What its nine nominal circuits do [m/s].
+        Outputs of its nine nominal circuits [m/s].
 
     Returns
     -------
@@ -69,7 +69,7 @@ def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Arr
 
 
 def another_sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Actuator | None:
-    """Return a healthy actuator that follows a log which the rig file's does not, as far as a circuit must.
+    """Return a healthy actuator that follows a log closely enough, if the rig file's does not.
 
     Parameters
     ----------
@@ -83,8 +83,8 @@ def another_sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator) -
     Returns
     -------
     Actuator or None
-        One that differs in what no rig file knows, such as the width of its make-up valves; None where that does not
-        help, and with pressure, where a flow balance is fitted to such things.
+        One that differs in what no rig file states, such as the width of its make-up valves; None if that does not
+        help, and with pressure, since a flow balance fits such parameters.
     """
     if blocks.pressure is not None:
         return None

@@ -1,7 +1,7 @@
-"""`varying_load(blocks, parameters)`: a force on the rod that changes over the log, as a sea or an air stream makes it.
+"""`varying_load(blocks, parameters)`: a force on the rod that changes over the log, as from waves or wind.
 
-No circuit follows such a log, and nothing about its oil is wrong. The force balance of the sliding piston tells the
-force from friction that comes and goes: friction turns round with the piston, a load does not.
+No circuit follows such a log, and nothing is wrong with its oil. The force balance of the sliding piston distinguishes
+the force from varying friction: friction changes sign with direction, a load does not.
 """
 
 import numpy as np
@@ -14,20 +14,21 @@ from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 SPACING = 0.4
-"""Time between the knots of a force's course [s]; judged: it follows swings of up to a hertz."""
+"""Time between the knots of the force [s]; judged: it follows oscillations up to one hertz."""
 
 FEWEST_A_KNOT = 5.0
-"""Blocks of a sliding piston a knot below which nothing is said [count]."""
+"""Least number of blocks with a sliding piston per knot [count]."""
 
 EXPLAINED = 0.7
-"""Share of what friction, inertia, spring and constant load leave that a course must explain [fraction]; judged."""
+"""Share of what friction, inertia, spring and constant load leave that a varying load must explain [fraction];
+judged."""
 
 BETTER = 0.5
-"""What a course of the load must leave, at most, over what one of friction leaves [dimensionless]; judged."""
+"""Largest ratio of the residual with a varying load to that with varying friction [dimensionless]; judged."""
 
 MATTERS = 0.05
-"""Share of the pressure's force from which a varying load matters, both root mean square [fraction], as a constant one
-does."""
+"""Share of the pressure force from which a varying load matters, both root mean square [fraction], as for a constant
+one."""
 
 
 def varying_load(blocks: Blocks, p: EhaParameters) -> Note | None:
@@ -43,7 +44,7 @@ def varying_load(blocks: Blocks, p: EhaParameters) -> Note | None:
     Returns
     -------
     Note or None
-        None without pressure, and where another cause leaves as little of the force balance.
+        None without pressure, and if another cause leaves as little of the force balance.
     """
     balance = sliding_balance(blocks, p)
     if balance is None:
@@ -65,9 +66,9 @@ def varying_load(blocks: Blocks, p: EhaParameters) -> Note | None:
 
 
 def _left(columns: Array, push: Array) -> tuple[float, Array]:
-    """Return the sum of squares that columns leave of a force [N^2], and their coefficients, the shortest that may be.
+    """Return the sum of squares that columns leave of a force [N^2], and their minimum-norm coefficients.
 
-    A course and a constant force tell each other's mean, so the coefficients are not unique.
+    The mean of a varying load and a constant force are the same, so the coefficients are not unique.
     """
     sizes = np.maximum(np.max(np.abs(columns), axis=0), np.finfo(np.float64).tiny)
     found = np.linalg.lstsq(columns / sizes, push)[0]

@@ -1,10 +1,10 @@
-"""Pump delivery from the balance of flow; integrated out if a log does not determine it.
+"""Pump delivery from the flow balance; integrated out if a log does not determine it.
 
-Where pressure is logged, the balance says what the pump delivers, or that the log does not tell
-(`estimation.fits.flow.fit`). It follows the oil to the sensors' noise, and a circuit follows the piston to a few
-percent: what a circuit says of the pump beside a balance that holds is what it leaves of friction. Without pressure,
-circuits with a worn pump are compared (`other_faults`). If a log does not tell, a pump that delivers less leaves less
-leakage to it, and bulk modulus is larger by as much. The probability that the pump is worn is then none of the nine's.
+With pressure, the balance determines the pump's delivery, or that the log leaves it open (`estimation.fits.flow.fit`).
+It follows the oil to the sensors' noise, while a circuit follows the piston to a few percent. So if the balance holds,
+a deviating pump of a circuit is an error of its friction. Without pressure, circuits with a worn pump are compared
+(`other_faults`). If a log leaves the delivery open, a pump that delivers less implies less leakage, and a larger bulk
+modulus. The probability that the pump is worn is then none of the nine's.
 """
 
 import math
@@ -36,47 +36,47 @@ from plant.arrays import Array
 from plant.notes import Note
 
 OFFSETS = {OFFSET.name, "pressure_drift"}
-"""Hypotheses that an offset of the speed may pass for."""
+"""Hypotheses that look like an offset of the speed."""
 
 SUREST = 0.99
-"""Most that slopes make a worn pump likely to which no search led [probability]; judged. They hold to first order, and
-the nine conditions keep their order below it."""
+"""Largest probability of a worn pump from slopes alone, without a search [probability]; judged. Slopes hold to first
+order, and the nine conditions keep their order below it."""
 
 FLOW_SCALE = np.array([{"leakage": 1.0, "bias": 1.0, "bulk_modulus": -1.0}.get(name, 0.0) for name in COORDINATES])
-"""Direction in which all flows of a piston that hardly moves scale with what the pump delivers [dimensionless]: where
-wear is left open, this is why, and pumps that differ explain the log alike along it."""
+"""Direction in which all flows of a nearly resting piston scale with the pump's delivery [dimensionless]: pumps that
+differ explain the log equally well along it, which is why wear is open."""
 
 TRIED = DELIVERIES[::2]
-"""Shares that pumps deliver for which conditions are scored where pressure is logged [dimensionless]."""
+"""Deliveries of pumps for which conditions are scored if pressure is logged [dimensionless]."""
 
 UNLIKELY = math.log(1e-3)
-"""Log-likelihood of a delivery below the likeliest one's that counts for nothing [dimensionless]."""
+"""Log-likelihood of a delivery below the likeliest one's from which it is ignored [dimensionless]."""
 
 FARTHEST, PUMPS = 4.0, 65
-"""How far from the likeliest pump others are looked at, in deviations, and how many [dimensionless, count]."""
+"""Range of pumps about the likeliest, in deviations, and their number [dimensionless, count]."""
 
 
 def whatever_the_pump_delivers(
     diagnosis: Diagnosis, actuator: Actuator, estimate: BulkModulusEstimate, strange: Sequence[Note] = ()
 ) -> Diagnosis:
-    """Return a diagnosis with the pump delivery that the balance of flow gives.
+    """Return a diagnosis with the pump delivery from the flow balance.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        Of a circuit alone.
+        Diagnosis by a circuit alone.
     actuator : Actuator
-        The healthy actuator, with a pump that delivers what the balance found.
+        The healthy actuator, with the delivery from the balance.
     estimate : BulkModulusEstimate
         The balance, and what it leaves open.
     strange : sequence of Note
-        What explains the log.
+        Notes on what explains the log.
 
     Returns
     -------
     Diagnosis
-        Where the balance tells what the pump delivers, without the circuit's doubt of it; where it leaves that open,
-        with classes weighed over it (`probabilities_over_wear`); else, and without pressure, the same. Classes sum to
+        If the balance determines the delivery, without the circuit's objection to it; if it leaves that open, with
+        classes averaged over it (`probabilities_over_wear`); otherwise, and without pressure, unchanged. Classes sum to
         the probability that the pump is not worn (`chance_of_wear`).
     """
     chance = chance_of_wear((*estimate.remarks, *strange))
@@ -96,19 +96,19 @@ def whatever_the_pump_delivers(
 
 
 def chance_of_wear(said: Sequence[Note]) -> float:
-    """Return the probability that a pump delivers less than `WORN`, by the balance of flow.
+    """Return the probability that a pump delivers less than `WORN`, by the flow balance.
 
     Parameters
     ----------
     said : sequence of Note
-        What the balance leaves open, and what explains the log.
+        Notes on what the balance leaves open, and on what explains the log.
 
     Returns
     -------
     float
-        Of a normal distribution, with what is presumed of a pump, of which nothing lies where oil would leak
-        backwards; `SUREST` at most [probability]. Zero where a worn pump was found, which speaks against all nine
-        conditions, and where wear is excluded.
+        From a normal distribution with the prior of a pump, cut off where oil would leak backwards; at most `SUREST`
+        [probability]. Zero if a worn pump was found, which is a reason against all nine conditions, and if wear is
+        excluded.
     """
     if (left := delivery_left_open(said)) is not None:
         return min(_between(left.least, math.log(WORN), left.size, left.deviation), SUREST)
@@ -119,10 +119,10 @@ def chance_of_wear(said: Sequence[Note]) -> float:
 
 
 def chance_by_conditions(board: Scoreboard, actuator: Actuator, left: OpenDelivery, calibration: Calibration) -> float:
-    """Return the probability that a pump delivers less than `WORN`, by the balance of flow and by the conditions.
+    """Return the probability that a pump delivers less than `WORN`, by the flow balance and by the conditions.
 
-    A worn pump looks like one that leaks more than a sound actuator in any condition, in oil that is softer. The
-    conditions weigh this by how well they hold the log with each pump, with the weight that they have in the class.
+    A worn pump looks like a sound one with more leakage than any condition has, in softer oil. The conditions count by
+    how well they fit the log with each pump, with their weight in the class.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def chance_by_conditions(board: Scoreboard, actuator: Actuator, left: OpenDelive
     Returns
     -------
     float
-        `SUREST` at most [probability].
+        At most `SUREST` [probability].
     """
     limit, reach = math.log(WORN), FARTHEST * left.deviation
     least = max(left.size - reach, left.least)
@@ -153,7 +153,7 @@ def chance_by_conditions(board: Scoreboard, actuator: Actuator, left: OpenDelive
 
 
 def _between(least: float, limit: float, mean: float, std: float) -> float:
-    """Return the probability that a normal variable that is not below the least is below a limit."""
+    """Return the probability that a normal variable, cut off below a least value, is below a limit."""
     if limit <= least:
         return 0.0
     above = 1.0 - _below(least, mean, std)
@@ -166,12 +166,12 @@ def _below(limit: float, mean: float, std: float) -> float:
 
 
 def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibration) -> Diagnosis:
-    """Return a diagnosis with what is said of faults outside the nine conditions, without pressure.
+    """Return a diagnosis with faults outside the nine conditions, without pressure.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        Of circuits without such a fault.
+        Diagnosis by circuits without such a fault.
     actuator : Actuator
         The healthy actuator.
     calibration : Calibration
@@ -180,10 +180,9 @@ def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibr
     Returns
     -------
     Diagnosis
-        With the fault that the log shows, those that it does not tell, and classes weighed over a worn pump where that
-        is one of these: they sum to the probability that none of these faults is there, which are none of the nine. The
-        same with pressure, of a piston that sticks, and where more than a place beside the nine (`near_enough`) speaks
-        against them already.
+        With the fault that the log shows, those that it leaves open, and classes averaged over a worn pump if that is
+        one of these: the classes sum to the probability that none of these faults is present. Unchanged with pressure,
+        for a sticking piston, and if there is another objection than a place outside the nine (`near_enough`).
     """
     board = diagnosis.scoreboard
     asked = board.blocks.pressure is None and not is_stuck(board.blocks, actuator)
@@ -205,18 +204,18 @@ def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibr
 
 
 def known_of_flow(estimate: BulkModulusEstimate) -> frozenset[AgainstCode]:
-    """Return the quantities that the balance of flow determines better than a circuit.
+    """Return the quantities that the flow balance determines better than a circuit.
 
     Parameters
     ----------
     estimate : BulkModulusEstimate
-        Of a log.
+        Estimate of a log.
 
     Returns
     -------
     frozenset of AgainstCode
-        What the pump delivers, if this is a balance that holds and does not leave wear open; and whether motor speed is
-        offset, unless an offset of the pressure, which leaks as much, was found in its place. None else.
+        The pump's delivery, if the balance holds and does not leave wear open; and whether motor speed has an offset,
+        unless a pressure offset, which leaks as much, was found in its place. Otherwise none.
     """
     if estimate.form != "flow" or not estimate.gate.passed or wear_left_open(estimate.remarks):
         return frozenset()
@@ -227,11 +226,11 @@ def known_of_flow(estimate: BulkModulusEstimate) -> frozenset[AgainstCode]:
 def probabilities_over_wear(
     board: Scoreboard, actuator: Actuator, remarks: Sequence[Note], calibration: Calibration
 ) -> Mapping[str, float] | None:
-    """Return the probability of each condition, whatever the pump delivers, where a log does not tell.
+    """Return the probability of each condition, averaged over the pump's delivery, if a log leaves it open.
 
-    The conditions are scored again for pumps that deliver `TRIED` of their displacement, as far as the balance of
-    flows leaves them likely; see `summed_over_wear`. Along `FLOW_SCALE` they explain the log alike, for which wear
-    is open, so that no circuit is fitted with them.
+    The conditions are scored again for pumps with `TRIED` deliveries, as far as the flow balance leaves them likely;
+    see `summed_over_wear`. Along `FLOW_SCALE` they explain the log equally well, which is why wear is open, so no
+    circuit is fitted with them.
 
     Parameters
     ----------
@@ -240,7 +239,7 @@ def probabilities_over_wear(
     actuator : Actuator
         The healthy actuator.
     remarks : sequence of Note
-        What the balance of flows leaves open.
+        Notes on what the flow balance leaves open.
     calibration : Calibration
         Weights of the evidences.
 
@@ -262,13 +261,13 @@ def probabilities_over_wear(
 
 
 def _scores_at(board: Scoreboard, along: Array, actuator: Actuator) -> Array:
-    """Return the scores of a circuit that explains a log as well as the best one and lies elsewhere, shape (9,)."""
+    """Return the scores of another circuit that explains a log as well as the best one, shape (9,)."""
     best = board.fits.best
     return _regions_at(board, along, actuator) - misfit(board.blocks, best.fitted, best.scales) / LASTING
 
 
 def _regions_at(board: Scoreboard, along: Array, actuator: Actuator) -> Array:
-    """Return how well each condition's region holds such a circuit, shape (9,)."""
+    """Return how well each condition's region fits such a circuit, shape (9,)."""
     fits = board.fits
     there = replace(fits.best, coordinates=fits.best.coordinates + along)
     if np.any(fits.moved):
@@ -279,20 +278,19 @@ def _regions_at(board: Scoreboard, along: Array, actuator: Actuator) -> Array:
 def summed_over_wear(
     board: Scoreboard, scores: Array, calibration: Calibration, likely: Array | None = None
 ) -> Mapping[str, float]:
-    """Return the probability of each condition, summed over what a pump may deliver.
+    """Return the probability of each condition, summed over possible pump deliveries.
 
     Parameters
     ----------
     board : Scoreboard
         The evidences of a sound pump.
     scores : ndarray, shape (1 + pumps, 9)
-        How well each condition holds the log with a sound pump, then with worn ones: log-likelihoods [dimensionless].
+        How well each condition fits the log with a sound pump, then with worn ones: log-likelihoods [dimensionless].
     calibration : Calibration
         Weights of the evidences.
     likely : ndarray, shape (1 + pumps,), optional
-        Log-likelihoods of these pumps [dimensionless]. Without it, the worn ones deliver `DELIVERIES` and count by what
-        is presumed of a pump before a log is seen: half a normal distribution of the logarithm of what it delivers over
-        its displacement, of deviation `PRESUMED`.
+        Log-likelihoods of these pumps [dimensionless]. By default, the worn ones have `DELIVERIES` and the prior of a
+        pump: half a normal distribution of the logarithm of delivery over displacement, with deviation `PRESUMED`.
 
     Returns
     -------

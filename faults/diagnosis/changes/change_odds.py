@@ -1,8 +1,8 @@
 """Odds of a change of condition: two conditions, one before and one after, against one throughout.
 
 Two circuits always explain more than one: they may differ within a condition, the time of the change is chosen, and so
-are the conditions. All three are priced, and what is left is the logarithm of a Bayes factor, with what is presumed
-(Kass and Raftery 1995, Journal of the American Statistical Association 90, equation 1).
+are the conditions. All three are priced. The remainder is the logarithm of a Bayes factor, with priors (Kass and
+Raftery 1995, Journal of the American Statistical Association 90, equation 1).
 """
 
 import math
@@ -20,13 +20,13 @@ from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.circuits.rivals import behind
 
 CHANGES = 0.05
-"""Share of logs in which the condition changes, presumed [fraction]."""
+"""Prior share of logs in which the condition changes [fraction]."""
 
 
 LIKELIER = 10.0
-"""How many times likelier than none a change must be to be believed [dimensionless]: evidence is called strong from
-there on (Jeffreys, Theory of Probability, 1961, appendix B). Beside one circuit throughout, plain logs without a change
-come to a thirtieth at most, and those with one to 36 at least."""
+"""How many times likelier than none a change must be to be believed [dimensionless]: evidence is called strong above
+that (Jeffreys, Theory of Probability, 1961, appendix B). In plain logs without a change the ratio is at most a
+thirtieth, and in those with one at least 36."""
 
 
 def believed(
@@ -34,14 +34,14 @@ def believed(
 ) -> bool:
     """Return whether a change of condition is so much likelier than none that it is believed.
 
-    A search may end short of the best: one circuit for all is asked again from where those of the parts ended.
+    A search may end too early: one circuit for all is searched again from the ends of the parts.
 
     Parameters
     ----------
     blocks : Blocks
         The log.
     parts : sequence of Blocks
-        What is before the change, and after it.
+        The log before the change, and after it.
     fits : sequence of ClassFits
         Circuits fitted to each.
     whole : ClassFits
@@ -64,14 +64,14 @@ def believed(
 def gain_of(whole: ClassFits, parts: Sequence[Blocks], fits: Sequence[ClassFits]) -> float:
     """Return the gain of two circuits, one for each part, over one circuit for all.
 
-    Each part is compared by itself: noise or a model's error that changes with the motion is no other condition.
+    Each part is compared separately: noise or a model's error that changes with the motion is no other condition.
 
     Parameters
     ----------
     whole : ClassFits
         Circuits fitted to all.
     parts : sequence of Blocks
-        What is before the change, and after it.
+        The log before the change, and after it.
     fits : sequence of ClassFits
         Circuits fitted to each.
 
@@ -88,19 +88,19 @@ def odds_of_change(
 ) -> float:
     """Return the odds of a change of condition against none.
 
-    Without one, one circuit is there from end to end, or it goes elsewhere within its condition: after a change the
-    circuit is in any of the nine conditions alike. Likelihoods count in `LASTING` blocks, as the gain does, and there
-    are as many times at which a log may change. Velocity and pressure are tied by the flow, so that a wrong model errs
-    in both at once: they count as one look. With pressure all three circuits are believed as the least believed one:
-    else a part that is followed to its noise is priced by up to 101 times the information, while its gain counts no
-    more. Which condition a circuit is in is told as a class is.
+    Without a change, one circuit holds throughout, or it moves within its condition; after a change, all nine
+    conditions are equally likely. Likelihoods count in `LASTING` blocks, as the gain does, and there are as many
+    possible times of a change. The flow links velocity and pressure, so a wrong model errs in both at once: they count
+    as one look. With pressure all three circuits have the credibility of the least credible one: otherwise a part that
+    is followed to its noise would be priced by up to 101 times the information, while its gain counts no more. The
+    condition of a circuit is found as a class is.
 
     Parameters
     ----------
     gain : float
-        Log-likelihood that both circuits gain on one [dimensionless].
+        Log-likelihood that both circuits gain over one [dimensionless].
     parts : sequence of ClassFits
-        Circuits fitted to what is before the change, and after it.
+        Circuits fitted to the log before the change, and after it.
     whole : ClassFits
         Circuits fitted to all.
     blocks : Blocks

@@ -1,4 +1,4 @@
-"""Did the piston run into a stop that no rig file names? A circuit with one is laid beside the circuit without."""
+"""Did the piston run into a stop that no rig file states? A circuit with one is compared with the circuit without."""
 
 from dataclasses import replace
 
@@ -11,14 +11,14 @@ from faults.diagnosis.circuits.class_fit import LASTING, misfit
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
 
 RESTS = 0.05
-"""Least time that a piston stands at the farthest place it reached before that may be a stop [s]."""
+"""Least time that a piston rests at its farthest place for that to be a possible stop [s]."""
 
 NEAR = 2e-4
-"""How near to its farthest place a piston is taken to stand there [m]: a stop yields, and an encoder has its steps."""
+"""Distance from its farthest place within which a piston rests there [m]: a stop yields, and an encoder has steps."""
 
 POOR = 0.06
 """Share of velocity or of pressure, root mean square, that a circuit must leave before a stop is looked for [fraction]:
-half of what makes a log unknown."""
+half of the limit for an unknown log."""
 
 GAIN = 10.0
 """Log-likelihood that a stop must gain, in `LASTING` blocks that count as one [dimensionless]."""
@@ -39,9 +39,9 @@ def stopped(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Blocks
     Returns
     -------
     tuple of Blocks and ClassFits
-        As they came where the piston does not stand at its farthest place, where a circuit without a stop follows it,
-        or where a stop there explains no more than friction does. What the log holds while the piston stands at the
-        stop is then missing: how a stop yields would be taken for friction.
+        Unchanged if the piston does not rest at its farthest place, if a circuit without a stop follows it, or if a
+        stop there explains no more than friction does. Otherwise samples at the stop are missing: the compliance of the
+        stop would be taken for friction.
     """
     if np.all(fits.best.scales <= POOR * blocks.sizes) or not _stands(blocks):
         return blocks, fits
@@ -57,12 +57,12 @@ def stopped(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Blocks
 
 
 def _stands(blocks: Blocks) -> bool:
-    """Return whether the piston stands long enough at the farthest place that it reaches."""
+    """Return whether the piston rests long enough at its farthest place."""
     there = _at_farthest(blocks)
     return blocks.reach > 2.0 * NEAR and int(np.sum(there)) * blocks.block * blocks.sample_time > RESTS
 
 
 def _at_farthest(blocks: Blocks) -> NDArray[np.bool_]:
-    """Return in which blocks the piston is at the farthest place that it reaches."""
+    """Return in which blocks the piston is at its farthest place."""
     gone = np.abs(np.cumsum(np.nan_to_num(blocks.velocity))) * blocks.block * blocks.sample_time
     return gone > blocks.reach - NEAR

@@ -1,7 +1,7 @@
-"""Without pressure, one fault outside the nine from end to end may pass for a change of condition within a log.
+"""Without pressure, one fault outside the nine from end to end may look like a change of condition within a log.
 
-A sound circuit leaves a pattern of a worn pump's log, and two sound circuits one after the other leave less of it.
-Where one circuit with the fault explains the log as well as the two, nothing changed within it.
+A sound circuit leaves systematic residuals of a worn pump's log, and two successive sound circuits leave less. If one
+circuit with the fault explains the log as well as the two, nothing changed within it.
 """
 
 import math
@@ -17,7 +17,7 @@ from faults.diagnosis.circuits.class_regions import ClassFits
 def fault_throughout(
     blocks: Blocks, parts: Sequence[Blocks], fits: Sequence[ClassFits], whole: ClassFits, actuator: Actuator
 ) -> bool:
-    """Return whether a fault outside the nine, from end to end, leaves a change of condition unlikely.
+    """Return whether a fault outside the nine, from end to end, makes a change of condition unlikely.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ def fault_throughout(
     Returns
     -------
     bool
-        Whether the change is not `LIKELIER` times as likely as some fault, with what is presumed of both. Never with
-        pressure, where the balance of flows looks for such faults.
+        Whether the change is not `LIKELIER` times as likely as some fault, with the priors of both. Always False with
+        pressure, since the flow balance tests for such faults.
     """
     if blocks.pressure is not None:
         return False

@@ -2,7 +2,7 @@
 
 The derivatives of a fit give, for every time of change at once, what two circuits would explain more than one (the
 generalised likelihood ratio, linearised: Basseville and Nikiforov, Detection of Abrupt Changes, 1993, section 2.4.3).
-Where that is much, both are fitted; it is a change if they are in different conditions.
+If that is much, both are fitted; it is a change if they are in different conditions.
 """
 
 from collections.abc import Iterator
@@ -34,17 +34,18 @@ from plant.notes import Note
 from plant.solvers.adaptive import LANES
 
 SOFTENED = 30.0
-"""Log-likelihood that two circuits must gain before the oil is asked whether it softened [dimensionless]: steady
-training logs of the open benchmark gain up to 27, those into which air gets 95 to 126."""
+"""Log-likelihood that two circuits must gain before softer oil is tested [dimensionless]: steady training logs of the
+open benchmark gain up to 27, those with air entry 95 to 126."""
 
 ONE_SIDED = 1.645
-"""Deviations by which bulk modulus must have fallen then [dimensionless]: one chance in twenty, beside that gain."""
+"""Deviations by which bulk modulus must have fallen then [dimensionless]: a chance of one in twenty, beside that
+gain."""
 
 LATE, EARLY = 0.8, 0.1
-"""How much later, or earlier, than it came a change may be seen [s]."""
+"""How much later, or earlier, than its true time a change may be detected [s]."""
 
 MOST_ALARMS = 3
-"""Alarms of a watch that are looked into, from the last."""
+"""Most alarms of a watch that are examined, from the last."""
 
 LIKELY = 1.92
 """Log-likelihood below the best up to which a time is in the 95 % interval [dimensionless]: half of chi-squared's."""
@@ -52,16 +53,16 @@ LIKELY = 1.92
 
 @dataclass(frozen=True, eq=False)
 class LastPart:
-    """A log, as far as it is in the condition in which it ends.
+    """The part of a log in the condition in which it ends.
 
     Parameters
     ----------
     window : Record
-        The stretch that was looked at.
+        The part that was examined.
     record : Record
-        What of it is in the last condition.
+        The part of it that is in the last condition.
     blocks : Blocks
-        The stretch in blocks; what is in another condition is missing.
+        The window in blocks; those in another condition are missing.
     fits : ClassFits
         Circuits fitted to them.
     onset : Change or None
@@ -69,7 +70,7 @@ class LastPart:
     against : tuple of Note
         What changed within the log and is no change of condition.
     drift : Drift or None
-        How its leakage drifts, which was not taken up; without pressure.
+        Drift of its leakage that the circuits do not include; without pressure.
     """
 
     window: Record
@@ -82,7 +83,7 @@ class LastPart:
 
 
 class Parted(NamedTuple):
-    """A log in two parts, of which each is fitted by itself.
+    """A log in two parts, each fitted separately.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ class Parted(NamedTuple):
     fits : list of ClassFits
         Circuits fitted to each.
     gain : float
-        Log-likelihood that they gain on one circuit for all [dimensionless].
+        Log-likelihood that they gain over one circuit for all [dimensionless].
     whole : ClassFits
         Circuits fitted to all.
     """
@@ -106,7 +107,7 @@ class Parted(NamedTuple):
 
     @property
     def conditions(self) -> tuple[int, int]:
-        """Places of the conditions in which the parts are."""
+        """Indices of the conditions of the two parts."""
         first, last = (int(np.argmax(one.of_one_law)) for one in self.fits)
         return first, last
 
@@ -117,8 +118,8 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
     Parameters
     ----------
     record : Record
-        The log. Of one longer than `LONGEST` the stretch about the last change that `watch_record` finds is looked at,
-        or its beginning if there is none.
+        The log. If it is longer than `LONGEST`, the part about the last change that `watch_record` finds is used, or
+        its beginning if there is none.
     actuator : Actuator
         The healthy actuator.
 
@@ -157,7 +158,7 @@ def _last_of(window: Record, actuator: Actuator) -> LastPart:
 
 
 def _about_alarms(record: Record, actuator: Actuator) -> Iterator[Record]:
-    """Yield stretches about the last alarms of a watch, the last first, of logs too long to be fitted whole."""
+    """Yield parts about the last alarms of a watch, the last first, for logs too long to be fitted whole."""
     if record.duration <= LONGEST + LEAST_LEARNING or record.sample_time > SLOWEST:
         return
     events = watch_record(record, actuator.circuit, learning=LEAST_LEARNING)
@@ -169,7 +170,7 @@ def _about_alarms(record: Record, actuator: Actuator) -> Iterator[Record]:
 
 
 def parted(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Parted | None:
-    """Return a log in two parts, where two circuits one after the other may explain it much better than one.
+    """Return a log in two parts, if two successive circuits may explain it much better than one.
 
     Parameters
     ----------
@@ -183,7 +184,7 @@ def parted(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Parted | None
     Returns
     -------
     Parted or None
-        Both parts; None where one circuit will do, or where both would be in one condition.
+        Both parts; None if one circuit suffices, or both would be in one condition.
     """
     split = likeliest_split(blocks, fits.best)
     if split is None:
@@ -212,10 +213,9 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
     Returns
     -------
     tuple of Change, Blocks and ClassFits, or None
-        The change, the log with all before it taken as missing, and the circuits that fit the rest, which go on from
-        where the circuit before had brought the piston; None for a log in one condition throughout, where no circuit
-        follows what came before or what comes after, and where one with a fault outside the nine explains the log as
-        well.
+        The change, the log with everything before it missing, and the circuits that fit the rest, which continue from
+        the piston's state before the change. None for a log in one condition throughout, if no circuit follows one of
+        the parts, or if one with a fault outside the nine explains the log as well.
     """
     (before, after), (first, last) = two.fits, two.conditions
     if two.gain < GAIN or first == last:
@@ -238,15 +238,15 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
 
 
 def softened(two: Parted) -> tuple[Note, ...]:
-    """Return a note where the oil of a log without pressure softened: air got in, which no condition has.
+    """Return a note if the oil of a log without pressure softened: air entered, which no condition has.
 
-    It is asked whatever conditions the parts are in: air in the oil may pass for friction, and no condition softens
+    It is tested whatever the conditions of the parts: air in the oil may look like friction, and no condition softens
     the oil.
 
     Returns
     -------
     tuple of Note
-        None with pressure, from which the flow balance tells it.
+        Empty with pressure, since the flow balance tests for it.
     """
     if two.parts[0].pressure is not None or two.gain < SOFTENED:
         return ()
@@ -259,14 +259,14 @@ def softened(two: Parted) -> tuple[Note, ...]:
 
 
 def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:
-    """Return a log with all but some of its blocks taken as missing; the drive stays whole.
+    """Return a log with all but some of its blocks missing; the drive stays complete.
 
     Parameters
     ----------
     blocks : Blocks
         The log.
     begin, end : int
-        First block that stays, and the one after the last.
+        First remaining block, and the one after the last.
     """
     there = np.arange(len(blocks.velocity))
     away = (there < begin) | (there >= end)
@@ -275,9 +275,9 @@ def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:
 
 
 def _when(blocks: Blocks, before: Array, after: Array, place: int, actuator: Actuator) -> tuple[int, int, int]:
-    """Return the likeliest block of the change, between the ends of its 95 % interval: both circuits in one run.
+    """Return the likeliest block of the change, and the ends of its 95 % interval, from a run of both circuits.
 
-    A circuit takes its time to show what changed, so most candidates lie before the place at which it was seen.
+    A circuit needs time to show what changed, so most candidates are before the block at which the change was detected.
     """
     step = blocks.block * blocks.sample_time
     first = max(place - round(LATE / step), blocks.first)

@@ -1,6 +1,6 @@
 """Most likely change point between two circuits, from the derivatives of a fit to the whole log.
 
-They give what two circuits would explain more than one for every time of change at once (the generalised likelihood
+They give what two circuits would explain more than one, for every time of change at once (the generalised likelihood
 ratio, linearised: Basseville and Nikiforov, Detection of Abrupt Changes, 1993, section 2.4.3), and to first order the
 circuits themselves.
 """
@@ -17,10 +17,10 @@ from faults.diagnosis.circuits.class_regions import believed_information
 from faults.diagnosis.circuits.region_scores import region_scores
 
 EDGE = 1.0
-"""What a log must hold before a change and after it [s]."""
+"""Least length of a log before a change and after it [s]."""
 
 GAIN = 10.0
-"""Log-likelihood that two circuits must gain on one to be looked into [dimensionless]."""
+"""Log-likelihood that two circuits must gain over one to be examined [dimensionless]."""
 
 
 class Split(NamedTuple):
@@ -31,7 +31,7 @@ class Split(NamedTuple):
     place : int
         First block of the second part.
     before, after : PointFit
-        Coordinates and information; all else is that of one circuit for all.
+        With their own coordinates and information; all else is that of one circuit for all.
     """
 
     place: int
@@ -40,7 +40,7 @@ class Split(NamedTuple):
 
 
 def likeliest_split(blocks: Blocks, fit: PointFit) -> Split | None:
-    """Return the most likely change block between two circuits, if a change explains much more.
+    """Return the most likely block of a change between two circuits, if a change explains much more.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def likeliest_split(blocks: Blocks, fit: PointFit) -> Split | None:
     Returns
     -------
     Split or None
-        Where, and both circuits; None if one circuit will do.
+        The block, and both circuits; None if one circuit suffices.
     """
     first, edge = blocks.first, round(EDGE / (blocks.block * blocks.sample_time))
     left = (blocks.outputs - fit.fitted)[first:] / fit.scales
@@ -90,7 +90,7 @@ def likeliest_split(blocks: Blocks, fit: PointFit) -> Split | None:
 
 
 def in_one_condition(split: Split, blocks: Blocks, actuator: Actuator) -> bool:
-    """Return whether both circuits are, to first order, so clearly in one condition that a fit finds them nowhere else.
+    """Return whether both circuits are, to first order, so clearly in one condition that fits cannot end elsewhere.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Without pressure: does the oil warm or cool within a log? A circuit with drifting leakage against a constant one.
 
-Where pressure is logged, the balance of flows finds a leakage that drifts (`estimation.eha.changing_leakage`). Without,
-the circuit that explains the log best gets an eighth unknown, how far leakage drifts. Viscous friction falls as leakage
-rises. What it promises by its slope tells whether it is worth a search, which for most logs it is not.
+With pressure, the flow balance detects a drifting leakage (`estimation.eha.changing_leakage`). Without it, the best
+circuit gets an eighth unknown, the drift of leakage. Viscous friction falls as leakage rises. The predicted gain from
+its slope decides whether a search is worth while, which for most logs it is not.
 """
 
 from dataclasses import replace
@@ -24,27 +24,27 @@ from plant.arrays import Array
 from plant.notes import Note
 
 LIKELIER = 10.0
-"""How many times likelier a circuit whose leakage drifts must be than one whose leakage stays [dimensionless]: evidence
-is called strong from there on (Jeffreys, Theory of Probability, 1961, appendix B)."""
+"""How many times likelier a circuit with drifting leakage must be than one with constant leakage [dimensionless]:
+evidence is called strong above that (Jeffreys, Theory of Probability, 1961, appendix B)."""
 
 LEAST = 0.2
-"""Least drift, as a logarithm [dimensionless]: less than two deviations of actuators of one kind moves no class."""
+"""Least drift, as a logarithm [dimensionless]: less than two deviations of actuators of one kind changes no class."""
 
 PRESUMED = 1.0
-"""Standard deviation of the drift before a log is seen, as a logarithm [dimensionless]: oil that warms by 25 K."""
+"""Prior standard deviation of the drift, as a logarithm [dimensionless]: oil that warms by 25 K."""
 
 PROMISED = 1.0
-"""Log-likelihood that a drift must promise by its slope to be searched for [dimensionless], in `LASTING` blocks that
-count as one."""
+"""Predicted gain in log-likelihood from which a drift is searched [dimensionless], in `LASTING` blocks that count as
+one."""
 
 FIRST = 0.5 * LEAST
-"""Least first step of a search that may come to `LEAST` [dimensionless]."""
+"""Least first step of a search that may reach `LEAST` [dimensionless]."""
 
 DOUBLED = float(np.log(2.0))
-"""Drift from which a search begins where slopes lead nowhere [dimensionless]."""
+"""Drift at which a search begins if slopes lead nowhere [dimensionless]."""
 
 FARTHEST, NEAR, ROUNDS = 0.7, 0.05, 4
-"""Longest step in the logarithm, the step that ends a search [dimensionless], and how many it takes at most."""
+"""Longest step in the logarithm, the step that ends a search [dimensionless], and the most steps."""
 
 NUDGE = 0.02
 """Step of the finite difference in the logarithm [dimensionless]."""
@@ -58,12 +58,11 @@ class Drift(NamedTuple):
     Parameters
     ----------
     logarithm : float
-        Of leakage at the end over that at the beginning [dimensionless].
+        Logarithm of leakage at the end over that at the beginning [dimensionless].
     fit : PointFit
         The circuit; its leakage is that at the end.
     gain : float
-        Log-likelihood that it gains on a circuit whose leakage stays, in `LASTING` blocks that count as one
-        [dimensionless].
+        Log-likelihood that it gains over constant leakage, in `LASTING` blocks that count as one [dimensionless].
     """
 
     logarithm: float
@@ -84,15 +83,15 @@ def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Drift | Non
     blocks : Blocks
         The log.
     fits : ClassFits
-        The circuits fitted to it whose leakage stays.
+        The circuits with constant leakage that were fitted to it.
     actuator : Actuator
         The healthy actuator.
 
     Returns
     -------
     Drift or None
-        None with pressure, where the log shows none, where no circuit with one follows it, where one without follows a
-        piston that hardly moves to what its seals yield, and of logs that are longer than what is fitted.
+        None with pressure, if the log shows none, if no circuit with one follows it, if one without follows a nearly
+        resting piston within what its seals yield, and for logs longer than what is fitted.
     """
     whole = len(blocks.speed) * blocks.sample_time <= LONGEST
     if blocks.pressure is not None or blocks.course is not None or not whole or is_stuck(blocks, actuator):
@@ -114,14 +113,14 @@ def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Drift | Non
 
 
 def drifting(blocks: Blocks, logarithm: float) -> Blocks:
-    """Return a log over which leakage drifts, its logarithm evenly, to what it is at the end.
+    """Return a log over which leakage drifts, linearly in its logarithm, to its value at the end.
 
     Parameters
     ----------
     blocks : Blocks
         The log.
     logarithm : float
-        Of leakage at the end over that at the beginning [dimensionless].
+        Logarithm of leakage at the end over that at the beginning [dimensionless].
 
     Returns
     -------
@@ -132,12 +131,12 @@ def drifting(blocks: Blocks, logarithm: float) -> Blocks:
 
 
 def course_of(logarithm: float, samples: int) -> Array:
-    """Return leakage over what it is at the end.
+    """Return leakage over its value at the end.
 
     Parameters
     ----------
     logarithm : float
-        Of leakage at the end over that at the beginning [dimensionless].
+        Logarithm of leakage at the end over that at the beginning [dimensionless].
     samples : int
         How many [samples].
 
@@ -155,7 +154,7 @@ def course_of(logarithm: float, samples: int) -> Array:
 
 
 def with_course(log: CleanLog, found: Drift) -> tuple[CleanLog, Note]:
-    """Return a log with the drift that it shows, and what that is called.
+    """Return a log with the drift that it shows, and a note.
 
     Returns
     -------
@@ -184,9 +183,9 @@ def _searched(blocks: Blocks, none: Drift, moved: float, step: Array, condition:
 
 
 def _step(blocks: Blocks, found: Drift, actuator: Actuator) -> tuple[float, float, Array]:
-    """Return the predicted gain of the next step of a drift, the step, and that of the coordinates.
+    """Return the predicted gain of the next step of a drift, that step, and that of the coordinates.
 
-    All are moved at once (Gauss and Newton's step); the promise is that of the drift alone.
+    All move at once (Gauss-Newton); the gain is that of the drift alone.
     """
     drift, fit, _ = found
     rows = parameter_rows((fit.coordinates + 0.5 * NUDGE * _LEAKS_MORE)[None], actuator.circuit, actuator.rated)

@@ -1,1 +1,1 @@
-"""Circuits fitted to a log, and what they say of the nine conditions."""
+"""Circuits fitted to a log, and their evidence on the nine conditions."""

@@ -1,4 +1,4 @@
-"""A healthy actuator and the points at which its nine conditions lie, among circuits that are fitted to logs."""
+"""A healthy actuator and its nine conditions, as points in the coordinates of fitted circuits."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -13,7 +13,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
 
 MOST_VOLUME = 2.0
-"""Times a rig file's volume that its stroke may ask for [dimensionless]: as far as a volume is sought in a log; beyond,
+"""Ratio to a rig file's volume that its stroke may require [dimensionless]: as far as volumes are searched. Beyond it,
 stroke or unit is wrong, and no circuit fits."""
 
 
@@ -30,7 +30,8 @@ class Actuator:
     conditions : ndarray, shape (9, 7)
         Coordinates of the nine nominal circuits, in the order of `CONDITIONS`.
     load_doubt : float
-        Standard deviation of the constant force on its rod, where a log had to tell that [N]; 0 as the rig file has it.
+        Standard deviation of the constant force on its rod, if it was found from a log [N]; 0 if the rig file states
+        it.
     """
 
     circuit: CircuitParameters
@@ -41,7 +42,7 @@ class Actuator:
 
 @lru_cache(maxsize=8)
 def actuator_of(parameters: EhaParameters) -> Actuator:
-    """Return the actuator of a rig with its nine conditions, kept for the next log.
+    """Return the actuator of a rig with its nine conditions; cached for the next log.
 
     Parameters
     ----------
@@ -73,7 +74,8 @@ def with_room(p: EhaParameters) -> EhaParameters:
     Returns
     -------
     EhaParameters
-        With the least volume that its stroke leaves, if it says less; the same one if that is no error of a volume.
+        With the least volume that its stroke requires, if the file states less; unchanged if no error of a volume can
+        explain it.
     """
     wanted = (p.stroke or 0.0) / float(longest_stroke(p))
     return replace(p, chamber_volume=wanted * p.chamber_volume) if 1.0 < wanted < MOST_VOLUME else p

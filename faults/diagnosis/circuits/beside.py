@@ -1,4 +1,4 @@
-"""Where a circuit lies that is in none of the nine conditions, nor between them: its levels, and what is odd."""
+"""Levels of a circuit that is in none of the nine conditions, nor between them, and its most unusual part."""
 
 from collections.abc import Mapping
 
@@ -25,16 +25,17 @@ PARTS: Mapping[str, str] = {
 """Coordinates of a circuit in words."""
 
 LEVELS = np.linspace(0.0, 2.0, 41)
-"""Levels that are tried, a fifth of the quarter that is told apart [dimensionless]: 1 is minor, 2 is major."""
+"""Levels that are tried [dimensionless]: 1 is minor, 2 is major. A log separates a quarter; these are a fifth of
+that."""
 
 
 def beside_note(fits: ClassFits, actuator: Actuator) -> Note:
-    """Return the levels of a circuit's leakage and friction, each by itself, and what goes least with them.
+    """Return the levels of a circuit's leakage and friction, each alone, and the part that fits them least.
 
     Parameters
     ----------
     fits : ClassFits
-        Whose best circuit is asked for.
+        The fits; the best circuit is used.
     actuator : Actuator
         The healthy actuator.
     """

@@ -1,9 +1,9 @@
-"""`with_lead(blocks, actuator)`: a slow log with what its motor does between samples, as a circuit tells it.
+"""`with_lead(blocks, actuator)`: a slow log with its motor's course between samples, as a circuit determines it.
 
-A slow log says how fast its motor turns at the samples. Where commands come at samples, as in a controller whose clock
-the logger shares, a motor that nears its new speed within a sample or two is ahead of the straight line at every turn.
-The oil that this pumps moves the piston at once; a circuit that is driven by straight lines makes up for it by friction
-and leakage. The flow form has a lead for that (`estimation.models.flow.delivered_flow`); here circuits have it too.
+A slow log has the motor speed at its samples only. If commands come at samples, as with a controller that shares the
+logger's clock, a motor that settles within a sample or two leads the straight line at every turn. The oil pumped in
+this way moves the piston at once; a circuit driven by straight lines absorbs it in friction and leakage. The flow form
+has a lead for that (`estimation.models.flow.delivered_flow`), and so have circuits here.
 """
 
 from dataclasses import replace
@@ -22,21 +22,21 @@ from faults.diagnosis.circuits.model_doubt import doubt_of, left_of, seldom_know
 from plant.arrays import Array
 
 ROUNDS = 3
-"""Linear steps to a lead at most [count]."""
+"""Most linear steps to a lead [count]."""
 
 ROUGHLY = 10.0
 """Gain in log-likelihood below which the search before each ends [dimensionless]."""
 
 SETTLED = 0.005
-"""Step over the sample time at which a lead is near enough [dimensionless]: it moves severities by some hundredths of
-their deviations."""
+"""Last step over the sample time at which the lead has converged [dimensionless]: it moves severities by some
+hundredths of their deviations."""
 
 NUDGE = 0.02
-"""Step of the finite difference by a lead, over the sample time [dimensionless]."""
+"""Finite-difference step of a lead, over the sample time [dimensionless]."""
 
 
 def with_lead(blocks: Blocks, actuator: Actuator) -> Blocks:
-    """Return a slow log with the lead of its motor that a circuit tells; any other as it is.
+    """Return a slow log with the lead of its motor that a circuit determines; any other log unchanged.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def with_lead(blocks: Blocks, actuator: Actuator) -> Blocks:
     Returns
     -------
     Blocks
-        The log, with a speed half-way between each two samples. One without pressure is left as it is.
+        The log, with a speed half-way between each two samples. A log without pressure is unchanged.
     """
     if blocks.pressure is None or blocks.averaged or blocks.sample_time < SLOW:
         return blocks
@@ -66,20 +66,20 @@ def with_lead(blocks: Blocks, actuator: Actuator) -> Blocks:
 
 
 def led(blocks: Blocks, lead: float) -> Blocks:
-    """Return a log whose motor is ahead of the straight lines between its samples.
+    """Return a log whose motor leads the straight lines between its samples.
 
     Parameters
     ----------
     blocks : Blocks
         The log, with or without speeds between its samples.
     lead : float
-        By so much of each rise of the speed more is turned until it is over [s].
+        The motor turns further by this time, multiplied by each rise of the speed [s].
 
     Returns
     -------
     Blocks
-        The log, with speeds half-way, between which it is linear: on average that is a curve's mean where speed bends
-        steadily, and the straight line's with the lead elsewhere.
+        The log, with speeds half-way and straight lines between them: their mean is that of the curve if the bend is
+        steady, and otherwise that of the straight line with the lead.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def open_beside(fit: PointFit, blocks: Blocks, actuator: Actuator) -> tuple[Arra
     Returns
     -------
     tuple of ndarray, shapes (m, n, outputs) and (m,)
-        How the outputs answer each, and how far off it may be, see `seldom_known_slopes` and `spreads_of`.
+        Response of the outputs to each, and its standard deviation, see `seldom_known_slopes` and `spreads_of`.
     """
     slopes, spreads = seldom_known_slopes(fit, blocks, actuator), spreads_of(actuator)
     if blocks.between == 1:
@@ -134,7 +134,7 @@ def open_beside(fit: PointFit, blocks: Blocks, actuator: Actuator) -> tuple[Arra
 def spread_with_pressure(
     fit: PointFit, blocks: Blocks, actuator: Actuator, scores: Array, seen: Array, among: Array
 ) -> Array:
-    """Return the covariance of the coordinates of a circuit that was fitted to a log with pressure, for intervals.
+    """Return the covariance of the coordinates of a circuit fitted to a log with pressure, for intervals.
 
     Parameters
     ----------
@@ -149,12 +149,12 @@ def spread_with_pressure(
     seen : ndarray, shape (7,)
         See `doubt_of`.
     among : ndarray, shape (7, 7)
-        What lies between this and other circuits that fit as well [dimensionless].
+        Covariance between this and other circuits that fit as well [dimensionless].
 
     Returns
     -------
     ndarray, shape (7, 7)
-        With what is unknown beside the coordinates [dimensionless].
+        With the effect of the nuisance unknowns [dimensionless].
     """
     slopes, spreads = open_beside(fit, blocks, actuator)
     return doubt_of(fit, slopes, blocks, actuator.conditions, scores, seen, spreads) + among

@@ -1,7 +1,7 @@
 """`blocks_of(record) -> Blocks`: a log as it is compared with circuits: mean velocity and pressure over blocks.
 
-What is compared is coarse on purpose: the mean velocity and the mean pressure over blocks of 10 ms, whatever the log's
-sample rate, so that encoder, differentiation and pressure noise hardly count and the log's length alone sets the cost.
+The comparison is coarse on purpose: means over blocks of 10 ms, whatever the log's sample rate. So encoder steps,
+differentiation and pressure noise hardly count, and the cost depends on the log's length only.
 """
 
 from collections.abc import Mapping
@@ -26,31 +26,31 @@ BLOCK = 0.01
 """Time over which velocity and pressure are averaged [s]."""
 
 SETTLING = 0.1
-"""Time at the start that does not count [s]: the circuit starts at rest, a log need not."""
+"""Time at the start that does not count [s]: the circuit starts at rest, a log may not."""
 
 FORGOTTEN = 1.0
-"""The same where a log begins in motion and no pressure says with what [s]: what a stuck piston holds leaks away in
+"""The same for a log that begins in motion without a pressure [s]: pressure that a stuck piston holds leaks off in
 about that time, ``V / (beta L)`` of the healthy actuator."""
 
 STIRRED = 0.05
-"""Share of a log's motor speed, root mean square, from which its first one is that of a machine that runs [fraction]: a
-motor passes through zero, and noise of logs that begin at rest is some 0.001."""
+"""First motor speed over the log's root mean square from which the log begins in motion [fraction]: a motor also passes
+through zero, and the noise of logs that begin at rest is some 0.001."""
 
 FEWEST = 8
-"""Blocks of a log, at least [count]."""
+"""Least number of blocks in a log [count]."""
 
 LONGEST = 30.0
-"""Longest stretch of a log that is simulated [s]."""
+"""Longest part of a log that is simulated [s]."""
 
 RATE = 1e-3
-"""Sample time to which faster logs are averaged [s]; half of it where that blurs the speed."""
+"""Sample time to which faster logs are averaged [s]; half of it if that would blur the speed."""
 
 MOST_BLURRED = 0.01
-"""Share of the speed, root mean square, that averaging may lose at edges [fraction]. Behind a motor that lags sines
-lose 0.2 %, steps up to 0.6 %, and binary signals 1.3 %, with which leakage came out 0.3 to 1.3 % low."""
+"""Share of the speed, root mean square, that averaging may remove at edges [fraction]. With a motor that lags, sines
+lose 0.2 %, steps up to 0.6 %, and binary signals 1.3 %, which put leakage 0.3 to 1.3 % low."""
 
 LEAST_BEGUN = 0.1
-"""Share of a log's pressure, root mean square, from which what it begins with is more than noise [fraction]."""
+"""First pressure over the log's root mean square from which it is more than noise [fraction]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,30 +68,31 @@ class Blocks:
     velocity : ndarray, shape (n,)
         Mean velocity over each block [m/s]; NaN where unknown.
     pressure : ndarray, shape (n,), or None
-        Mean differential pressure over each block [Pa], None where it is not logged.
+        Mean differential pressure over each block [Pa], None if it is not logged.
     noise : ndarray, shape (outputs,)
-        Standard deviation of what the sensors add to velocity [m/s] and pressure [Pa].
+        Standard deviation of sensor noise in velocity [m/s] and pressure [Pa].
     earlier : tuple of int or ndarray, shape (circuits,), and ndarray, shape (parameters,), or None
-        Another circuit that ran up to a sample, or up to one before each circuit, as a row of parameters; None if one
+        Another circuit that ran up to a sample, or up to one sample per circuit, as a row of parameters; None if one
         ran throughout.
     course : ndarray, shape (samples,), or None
-        Leakage over what it is when the log ends [dimensionless]; None where it does not change.
+        Leakage over its value at the end of the log [dimensionless]; None if it does not change.
     stop : float or None
-        How far from where the log begins the piston ran into a stop [m]; None where only the rig knows of stops.
+        Distance from the beginning of the log at which the piston ran into a stop [m]; None if only the rig file has
+        stops.
     begun : tuple of float, or None
-        Differential pressure [Pa] and velocity [m/s] with which the log begins; None at rest, and where it is not told.
+        Differential pressure [Pa] and velocity [m/s] at the beginning of the log; None at rest, or if unknown.
     opening : tuple of float, or None
-        The same [Pa, m/s], if it is no more than noise too: under a load a piston without pressure is not at rest.
+        The same [Pa, m/s] even if it is within noise: under a load a piston without pressure is not at rest.
     place : float
-        Position that the log begins with [m]; 0 where none is logged.
+        Position at the beginning of the log [m]; 0 if none is logged.
     settling : float
         Time at the start that does not count [s].
     averaged : bool
         Whether each sample of motor speed is the mean of several logged ones.
     differenced : bool
-        Whether velocity is how far a logged position went: what its error adds to a block, it takes from the next.
+        Whether velocity is a difference of positions: an error added to one block is subtracted from the next.
     lead : float
-        By how much the motor is ahead of straight lines between logged samples [s], see
+        Time by which the motor leads straight lines between logged samples [s], see
         `faults.diagnosis.circuits.between_samples`.
     between : int
         Samples of the motor speed from one logged sample to the next.
@@ -122,12 +123,12 @@ class Blocks:
 
     @cached_property
     def outputs(self) -> Array:
-        """What is measured, shape (n, outputs): velocity [m/s], and pressure [Pa] if there is one."""
+        """Measured outputs, shape (n, outputs): velocity [m/s], and pressure [Pa] if there is one."""
         return np.column_stack([self.velocity] if self.pressure is None else [self.velocity, self.pressure])
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
-        """Which of the outputs are there, of the blocks that count, shape (n - first, outputs)."""
+        """Which outputs are valid in the blocks that count, shape (n - first, outputs)."""
         return np.isfinite(self.outputs[self.first :])
 
     @cached_property
@@ -142,7 +143,7 @@ class Blocks:
 
     @property
     def travel(self) -> float:
-        """Total travel of the piston to and fro [m]."""
+        """Total travel of the piston in both directions [m]."""
         return float(np.ptp(self._gone))
 
     @cached_property
@@ -152,7 +153,7 @@ class Blocks:
 
     @cached_property
     def _gone(self) -> Array:
-        """Distance of the piston up to each block [m], gaps bridged at the neighbouring speed."""
+        """Travel of the piston up to each block [m], with gaps bridged at the neighbouring velocity."""
         known = bridged(self.velocity) if np.any(np.isfinite(self.velocity)) else np.zeros(len(self.velocity))
         return np.cumsum(known) * self.block * self.sample_time
 
@@ -163,7 +164,7 @@ class Blocks:
 
 
 def root_mean_square(values: Array) -> Array:
-    """Return the root mean square of each column over the samples that are there.
+    """Return the root mean square of each column over its valid samples.
 
     Parameters
     ----------
@@ -173,7 +174,7 @@ def root_mean_square(values: Array) -> Array:
     Returns
     -------
     ndarray, shape (columns,)
-        In the same units; NaN where nothing is there.
+        In the same units; NaN if no sample is valid.
     """
     squares = values**2
     mean = np.mean(squares, axis=0)
@@ -255,7 +256,7 @@ def _samples_in_one(record: Record) -> int:
 
 
 def _velocity(whole: Mapping[str, Array], block: int, sample_time: float) -> Array | None:
-    """Return the mean velocity over each block [m/s], None where no motion is logged; position goes first."""
+    """Return the mean velocity over each block [m/s], None if no motion is logged; position is preferred."""
     if _position_goes(whole):
         return np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
     if "velocity_m_s" in whole and np.any(np.isfinite(whole["velocity_m_s"])):
@@ -264,12 +265,12 @@ def _velocity(whole: Mapping[str, Array], block: int, sample_time: float) -> Arr
 
 
 def _position_goes(whole: Mapping[str, Array]) -> bool:
-    """Return whether a position is logged, which then says how fast the piston is."""
+    """Return whether velocity is taken from a logged position."""
     return "position_m" in whole and bool(np.any(np.isfinite(whole["position_m"])))
 
 
 def _pressure(whole: Mapping[str, Array], block: int, sample_time: float) -> Array | None:
-    """Return the mean pressure over each block [Pa], None where none is logged or its sensor was out throughout."""
+    """Return the mean pressure over each block [Pa], None if none is logged or its sensor failed throughout."""
     if PRESSURE not in whole:
         return None
     pressure = _mean(whole[PRESSURE], block)
@@ -277,7 +278,7 @@ def _pressure(whole: Mapping[str, Array], block: int, sample_time: float) -> Arr
 
 
 def _with_gaps(values: Array | None, block: int, behind: int = 0) -> NDArray[np.bool_]:
-    """Return the blocks with a long gap of a channel, or with one up to so many samples ago: the circuit ran blind."""
+    """Return the blocks that contain, or closely follow, a long gap of a channel: the circuit ran without data."""
     if values is None or not np.any(gone := long_gaps(values)):
         return np.zeros(1, dtype=np.bool_)
     sums = np.cumsum(np.concatenate([np.zeros(behind + 1, dtype=np.intp), gone]))
@@ -305,13 +306,13 @@ def _pressed(first: float, pressure: Array) -> bool:
 
 
 def _place(whole: Mapping[str, Array]) -> float:
-    """Return the position with which a log begins, 0 where none is logged [m]."""
+    """Return the first position of a log, 0 if none is logged [m]."""
     position = whole.get("position_m")
     return 0.0 if position is None or not np.any(np.isfinite(position)) else float(bridged(position)[0])
 
 
 def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
-    """Return the white noise of the channels as it is left in the blocks."""
+    """Return the white noise of the channels that remains in block means."""
     record, velocity = Record(sample_time, whole), "velocity_m_s"
     if "position_m" in whole:
         noise = [(2.0 * position_variance(whole["position_m"])) ** 0.5 / (block * sample_time)]
@@ -330,9 +331,9 @@ def _pooled(values: Array, pooled: int) -> Array:
 
 
 def _mean(values: Array, block: int, spare: int = 1) -> Array:
-    """Return the means of blocks over the samples that are there; NaN where more than half are missing.
+    """Return block means over valid samples; NaN if more than half are missing.
 
-    What a clipped sensor left out is not like what it kept: the mean of a small rest would lie off.
+    Samples that a clipped sensor lost are unlike those it kept, so the mean of a small rest would be biased.
     """
     count = (len(values) - spare) // block
     parts = values[: count * block].reshape(count, block)

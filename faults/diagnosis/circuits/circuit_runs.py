@@ -1,6 +1,6 @@
-"""Circuits run under a log's motor speed, and what is compared with the log: mean velocity and pressure over blocks.
+"""Circuits run under a log's motor speed, and their outputs for the comparison: mean velocity and pressure over blocks.
 
-Eight circuits run side by side in one kernel, so a Gauss-Newton step with all its derivatives costs one of them.
+Eight circuits run side by side in one kernel, so a Gauss-Newton step with all its derivatives costs as much as one run.
 """
 
 from dataclasses import fields, replace
@@ -23,31 +23,32 @@ from plant.solvers.block_means import block_means
 from plant.solvers.steps import parameter_row
 
 COORDINATES = ("leakage", "bias", "friction_rest", "friction_quadratic", "friction_rated", "bulk_modulus", "presliding")
-"""What is fitted, as logarithms of: leakage coefficient, flow bias, friction force at rest, its quadratic part at rated
-velocity, all of it at rated velocity, bulk modulus, and presliding displacement over the rig's. The last is judged and
-differs from seal to seal; held where it is wrong, it bends friction and leakage."""
+"""Fitted coordinates, as logarithms: leakage coefficient, flow bias, friction force at rest, its quadratic part at
+rated velocity, all of it at rated velocity, bulk modulus, and presliding displacement over the rig's. The last is
+judged in a rig file and differs from seal to seal; held at a wrong value it would bias friction and leakage."""
 
 PRESLIDING_REACH = 3.0
-"""Farthest that presliding displacement is taken from the rig's, as a logarithm [dimensionless]: 20 times."""
+"""Farthest presliding displacement from the rig's, as a logarithm [dimensionless]: 20 times."""
 
 AT_STOP = 0.02
-"""A log shows a stop if its piston turned this near to one, as a share of half the stroke [fraction]."""
+"""A log shows a stop if its piston reversed this near to one, as a share of half the stroke [fraction]."""
 
 ALLOWED = {"tolerance": 1e-4, "drive_tolerance": 2e-3}
-"""Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_groups`: far below what counts."""
+"""Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_groups`: far below what
+matters."""
 
 LEAST_FLOW = 1e-3
 """Least leakage at the relief setting, and least flow bias, over the rated pump flow [fraction]: a rig file may have
-none, and no logarithm begins at zero. Judged: no log tells so little from nothing."""
+none, and no logarithm starts at zero. Judged: no log can distinguish so little from zero."""
 
 LEAST_FORCE = 1e-3
-"""Least friction at rest, of its quadratic part and of the whole at rated velocity, over the force of the relief
-setting on the piston [fraction]: a rig file may have none, and no logarithm begins at zero. Judged: 5 N on the paper's
-actuator, of whose friction these are 436, 122 and 651 N."""
+"""Least friction at rest, quadratic part and whole at rated velocity, over the piston force at the relief setting
+[fraction]: a rig file may have none, and no logarithm starts at zero. Judged: 5 N on the paper's actuator, which has
+436, 122 and 651 N."""
 
 DRIFT_STEPS = 50
-"""Steps in which leakage drifts over a log without pressure: over a factor of two 1.4 % each, a tenth of how actuators
-of one kind differ."""
+"""Steps in which leakage drifts over a log without pressure: for a factor of two 1.4 % each, a tenth of the difference
+between actuators of one kind."""
 
 COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
 
@@ -191,9 +192,9 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
 
 @lru_cache(maxsize=2)
 def _brought(blocks: Blocks, width: int) -> tuple[Array, Array]:
-    """Return outputs up to a change and the states at it, each of one circuit.
+    """Return outputs up to a change and the states at it, each for one circuit.
 
-    All that are tried after it begin there, so it is run once.
+    All circuits after the change begin there, so it is run once.
     """
     until, before = blocks.earlier or (0, np.empty(0))
     rows = as_wide(_as_logged(blocks, before[None])[0], width)[None, None]
@@ -214,7 +215,7 @@ def _run(blocks: Blocks, starts: Array, rows: Array, since: int = 0) -> Array:
 
 
 def _allowed(blocks: Blocks) -> dict[str, float]:
-    """Return the errors allowed in runs, and what the motor's speed does between its samples: it has inertia."""
+    """Return the errors allowed in runs, and how motor speed changes between its samples: it has inertia."""
     if blocks.between > 1:  # its lines have a curve's means
         return {**ALLOWED, "bulge": STRAIGHT}
     return {**ALLOWED, "bulge": MEANS if blocks.averaged else SAMPLES}
@@ -250,9 +251,9 @@ def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> A
 
 
 def _starts(blocks: Blocks, rows: Array) -> Array:
-    """Return the states in which circuits begin, shape (m, states): at rest, or as the log does.
+    """Return the initial states of circuits, shape (m, states): at rest, or as the log begins.
 
-    Under a load rest is at the pressure that holds it: a log that begins at another is in motion, and says which.
+    Under a load, rest is at the pressure that holds it: a log that begins at another pressure begins in motion.
     """
     p = circuit_values(rows)
     begun = blocks.opening if blocks.begun is None and np.any(p.load_force) else blocks.begun
@@ -275,17 +276,16 @@ _LEAKAGES = ("leakage_coefficient", "pump_crossport_leakage", "pump_case_leakage
 
 
 def _as_logged(blocks: Blocks, rows: Array) -> Array:
-    """Return circuits as a log has them: positions are counted from where it begins, a spring is strained there."""
+    """Return circuits in a log's coordinates: position is relative to its beginning, where a spring may be strained."""
     rows = _between_stops(blocks, rows)
     rows[:, COLUMN["load_force"]] += rows[:, COLUMN["load_stiffness"]] * blocks.place
     return rows
 
 
 def _between_stops(blocks: Blocks, rows: Array) -> Array:
-    """Return circuits with the stops of the rig's stroke where the log may show one, without stops elsewhere.
+    """Return circuits with the stops of the rig's stroke if the log may show one, otherwise without stops.
 
-    A piston that turned back before it came to a stop, or that went past it, shows none. A stop that the log itself
-    has shown goes before the rig's.
+    A piston that reversed before a stop, or passed its place, shows none. A stop found in the log replaces the rig's.
     """
     rows = rows.copy()
     if blocks.stop is not None:
@@ -298,7 +298,7 @@ def _between_stops(blocks: Blocks, rows: Array) -> Array:
 
 
 def _outputs(blocks: Blocks, states: Array, rows: Array) -> Array:
-    """Return what is compared, of states, shape (samples, states, m), and rows, shape (1 or samples, m, parameters)."""
+    """Return the compared outputs, from states, shape (samples, states, m), and rows, (1 or samples, m, parameters)."""
     velocity = np.diff(states[:: blocks.block, 2], axis=0) / (blocks.block * blocks.sample_time)
     if blocks.pressure is None:
         return np.ascontiguousarray(velocity.T)[..., None]

@@ -13,15 +13,15 @@ from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, 
 from plant.arrays import Array
 
 STEP = 0.005
-"""Step of the finite differences in the logarithms [dimensionless]. The parts of friction pull against each other, so
-that 95 % of their slopes cancel: a step of 0.02 errs by 4 %, which turned the sign of what was left. Where a piston
-sticks and slips the run jumps, and a step of 0.002 makes slopes of that."""
+"""Finite-difference step in the logarithms [dimensionless]. The parts of friction oppose each other, so that 95 % of
+their slopes cancel: a step of 0.02 has an error of 4 %, which reversed the sign of the remainder. With stick-slip the
+run has jumps, and a step of 0.002 takes these for slopes."""
 
 ROUNDS = 12
-"""Gauss-Newton steps at most."""
+"""Most Gauss-Newton steps."""
 
 STARTS = 3
-"""Conditions from which a fit begins at most: the nearest, and those that are nearly as near."""
+"""Most conditions from which a fit begins: the nearest, and those that are nearly as near."""
 
 FARTHEST = 0.7
 """Longest step in a logarithm [dimensionless]."""
@@ -30,24 +30,24 @@ GAINED = 0.5
 """Gain in log-likelihood below which the search ends [dimensionless]."""
 
 PROMISING = 2e-3
-"""Gain that a step must promise to be tried [dimensionless]: less moves nothing by a fifteenth of its deviation."""
+"""Gain that a step must promise to be tried [dimensionless]: a smaller one moves nothing by a fifteenth of its
+deviation."""
 
 SHORTEST = 0.07
-"""Share of a step below which a trial that gains nothing is the last [fraction]: a whole step, 0.3,
-0.09 and 0.027 of it are tried."""
+"""Share of a step below which a trial without gain is the last [fraction]: 1, 0.3, 0.09 and 0.027 of it are tried."""
 
 LEAST_SCALE = 1e-3
-"""Share of an output's root mean square that a residual counts as in any case [dimensionless]: no model is exact."""
+"""Least residual that is counted, over an output's root mean square [dimensionless]: no model is exact."""
 
 LASTING = 30.0
-"""Blocks over which a model's error lasts [dimensionless]: 0.3 s, a few reversals."""
+"""Blocks over which a model's error persists [dimensionless]: 0.3 s, a few reversals."""
 
 SEALS = 1.0
 """Standard deviation of the logarithm of presliding displacement [dimensionless]: 7 to 50 um about 20 um."""
 
 
 def _prior(each: Sequence[float], rubbing_alike: float) -> Array:
-    """Return a covariance in the coordinates; the quadratic part of friction and the whole rise together too."""
+    """Return a prior covariance in the coordinates; the quadratic part of friction and the whole are correlated."""
     covariance = np.diag(np.square(each))
     rubbing = [COORDINATES.index(name) for name in ("friction_quadratic", "friction_rated")]
     covariance[np.ix_(rubbing, rubbing)] += rubbing_alike**2
@@ -55,10 +55,10 @@ def _prior(each: Sequence[float], rubbing_alike: float) -> Array:
 
 
 WITHIN = _prior((0.12, 0.12, 0.12, 0.10, 0.08, 0.2, SEALS), 0.08)
-"""How actuators in one condition differ: covariance of the logarithms, shape (7, 7) [dimensionless]."""
+"""Differences of actuators in one condition: covariance of the logarithms, shape (7, 7) [dimensionless]."""
 
 WEAK = _prior((0.5, 0.5, 0.3, 0.3, 0.2, 0.3, SEALS), 0.5)
-"""What is believed of an actuator in no known condition, about the nearest one: covariance, shape (7, 7)."""
+"""Prior of an actuator in no known condition, about the nearest one: covariance, shape (7, 7)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,15 +68,15 @@ class PointFit:
     Parameters
     ----------
     coordinates : ndarray, shape (7,)
-        Where, in `COORDINATES`.
+        Where it is, in `COORDINATES`.
     cost : float
         Minus its log-posterior [dimensionless], up to a constant of the log.
     information : ndarray, shape (7, 7)
-        What the log says about the coordinates: the inverse of their covariance without a prior.
+        Information of the log on the coordinates: inverse covariance without a prior.
     scales : ndarray, shape (outputs,)
-        Root mean square of the residuals [m/s, Pa], the least that counts.
+        Root mean square of the residuals [m/s, Pa], at least the smallest that is counted.
     fitted : ndarray, shape (n, outputs)
-        What the circuit does [m/s, Pa].
+        Outputs of the circuit [m/s, Pa].
     slopes : ndarray, shape (7, n, outputs)
         Its derivatives with respect to the coordinates.
     """
@@ -91,7 +91,7 @@ class PointFit:
 
 @lru_cache(maxsize=2)
 def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
-    """Return the runs of the nine nominal circuits under a log's motor speed, cached for the log.
+    """Return the runs of the nine nominal circuits under a log's motor speed; cached for the log.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
     Returns
     -------
     ndarray, shape (9, n, outputs)
-        Velocity [m/s] and pressure [Pa]; it cannot be written to, since whoever asks again gets the same.
+        Velocity [m/s] and pressure [Pa]; read-only, since the cached array is returned.
     """
     runs = predicted(blocks, parameter_rows(actuator.conditions, actuator.circuit, actuator.rated))
     runs.flags.writeable = False
@@ -111,7 +111,7 @@ def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
 
 
 def scales_of(blocks: Blocks, fitted: Array) -> Array:
-    """Return the root mean square of what a model leaves of a log.
+    """Return the root mean square of a model's residuals.
 
     Parameters
     ----------
@@ -123,25 +123,25 @@ def scales_of(blocks: Blocks, fitted: Array) -> Array:
     Returns
     -------
     ndarray, shape (outputs,)
-        Residuals [m/s, Pa], not below the sensors' noise and `LEAST_SCALE`.
+        Residuals [m/s, Pa], at least the sensors' noise and `LEAST_SCALE`.
     """
     left = blocks.outputs[blocks.first :] - fitted[blocks.first :]
     return np.maximum(root_mean_square(left), least_scales(blocks))
 
 
 def least_scales(blocks: Blocks) -> Array:
-    """Return the least residuals of any model of a log.
+    """Return the smallest residuals that a model of a log can have.
 
     Returns
     -------
     ndarray, shape (outputs,)
-        The sensors' noise, and not below `LEAST_SCALE` of the signal [m/s, Pa].
+        The sensors' noise, and at least `LEAST_SCALE` of the signal [m/s, Pa].
     """
     return np.maximum(blocks.noise, LEAST_SCALE * blocks.sizes)
 
 
 def least_misfit(blocks: Blocks) -> float:
-    """Return the least value of `misfit`: of a model that leaves only the sensors' noise.
+    """Return the least value of `misfit`: that of a model whose residuals are the sensors' noise alone.
 
     Parameters
     ----------
@@ -166,12 +166,12 @@ def misfit(blocks: Blocks, fitted: Array, scales: Array | None = None) -> float:
     fitted : ndarray, shape (n, outputs)
         The model.
     scales : ndarray, shape (outputs,), optional
-        What `scales_of` returns of it, if that is known [m/s, Pa].
+        Result of `scales_of` for it, if known [m/s, Pa].
 
     Returns
     -------
     float
-        Up to a constant of the log [dimensionless]; infinite where the model ran away.
+        Up to a constant of the log [dimensionless]; infinite if the model diverged.
     """
     if not np.all(np.isfinite(fitted)):
         return float("inf")
@@ -187,7 +187,7 @@ def fit_freely(
     wanted: float = float("inf"),
     promising: float = PROMISING,
 ) -> PointFit:
-    """Fit the circuit to a log with next to no prior.
+    """Fit the circuit to a log with a very weak prior.
 
     Parameters
     ----------
@@ -198,13 +198,13 @@ def fit_freely(
     condition : str
         The nearest condition, about which the weak prior lies.
     start : ndarray of shape (7,), or PointFit, optional
-        Coordinates where the search begins [dimensionless], or a fit about another condition from which it goes on;
-        those of the condition if not given.
+        Where the search begins: coordinates [dimensionless], or a fit about another condition to continue; the
+        condition's if not given.
     gained : float
         Gain in log-likelihood below which the search ends [dimensionless].
     wanted : float
-        Cost above which the circuit is of no use [dimensionless]: the search ends where all steps that are left would
-        not bring it down to that, gaining each what the last one did or the next one promises.
+        Cost above which the circuit is of no use [dimensionless]: the search ends if all remaining steps would not
+        reach it, should each gain what the last one did or the next one promises.
     promising : float
         Gain in log-likelihood that a step must promise to be tried [dimensionless].
 
@@ -248,14 +248,14 @@ def fit_freely(
 def _most_gained(promised: float, reach: float, gain: float) -> float:
     """Return the gain of a step at its best length, on the parabola through a trial.
 
-    It begins with a slope of twice what the whole step promises, and has gained so much at a share ``reach`` of it.
+    Its initial slope is twice what the whole step promises, and the trial at a share ``reach`` gave the gain.
     """
     curvature = (2.0 * promised * reach - gain) / reach**2
     return promised**2 / curvature
 
 
 def about(blocks: Blocks, actuator: Actuator, condition: str, fit: PointFit) -> PointFit:
-    """Return a fit as it counts about another condition.
+    """Return a fit with its cost about another condition.
 
     Parameters
     ----------
@@ -295,7 +295,7 @@ def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: A
 
 @lru_cache(maxsize=ROUNDS + 1)
 def _around(blocks: Blocks, actuator: Actuator, place: bytes) -> Array:
-    """Return the runs of a circuit and of its neighbours: a rough and a thorough search from one start begin alike."""
+    """Return the runs of a circuit and its neighbours; cached, as rough and thorough searches share first points."""
     point = np.frombuffer(place)
     around = np.vstack([point, point + STEP * np.eye(len(point))])
     runs = predicted(blocks, parameter_rows(around, actuator.circuit, actuator.rated))

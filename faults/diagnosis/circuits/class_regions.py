@@ -1,9 +1,9 @@
 """Score of each condition: fitted circuits compared with the conditions' regions.
 
-In a condition leakage, flow bias, friction and bulk modulus differ from the nominal ones as actuators of one kind do, a
-Gaussian region; integrating the likelihood over it in closed form (Laplace's method: MacKay, Information Theory, 2003,
-chapter 27) scores the condition. What a log says nothing of, as friction beyond what a stuck piston is pushed with,
-counts for none.
+Actuators in one condition differ from the nominal one in leakage, flow bias, friction and bulk modulus: a Gaussian
+region. The integral of the likelihood over it (Laplace's method: MacKay, Information Theory, 2003, chapter 27) is the
+score of the condition. What a log does not determine, such as friction beyond the force on a stuck piston, favours
+none.
 """
 
 from collections.abc import Callable
@@ -44,19 +44,19 @@ from faults.diagnosis.circuits.rivals import behind, between_fits, creeps, expla
 from plant.arrays import Array
 
 ROUGHLY_GAINED = 10.0
-"""Gain in log-likelihood below which a search from near by ends [dimensionless]: a third of what counts as one."""
+"""Gain in log-likelihood below which a search from near by ends [dimensionless]: a third of a real difference."""
 
 YIELDING = 5.0
 """Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""
 
 ALIKE, ALIKE_COUNT = 0.25, 1.0
-"""Squared deviation of actuators of one kind, in units of `WITHIN`, before a log is seen, and how many deviations that
-belief counts as [dimensionless]: 0.25 are some 10 % in leakage and friction."""
+"""Prior squared difference of actuators of one kind, in units of `WITHIN`: 0.25 is some 10 % in leakage and friction.
+And the weight of that prior in deviations [dimensionless]."""
 
 _NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
 
 PRESSURE_SCALE = np.array([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Direction in which all pressures scale and no motion changes [dimensionless]."""
+"""Direction in which all pressures scale without a change of motion [dimensionless]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,22 +68,22 @@ class ClassFits:
     best : PointFit
         The circuit that fits best.
     information : ndarray, shape (7, 7)
-        What is believed to be known of its coordinates: inverse covariance without a prior.
+        Credible information on its coordinates: inverse covariance without a prior.
     nominal : ndarray, shape (9,)
         Misfit of each condition's nominal circuit [dimensionless].
     nominal_scales : ndarray, shape (9, outputs)
-        Root mean square of what it leaves [m/s, Pa].
+        Root mean square of its residuals [m/s, Pa].
     scores : ndarray, shape (9,)
-        How well each condition's region holds the fitted circuits: log-likelihoods [dimensionless].
+        How well the fitted circuits fit each condition's region: log-likelihoods [dimensionless].
     spreading : callable
-        Works out `spread`, for which circuits are run: of most fits scores alone are read.
+        Computes `spread`, which needs runs of circuits: most fits are used for their scores only.
     lasting : float
-        By what a model error that lasts divides the information [dimensionless], see `lasting_misfit`; 1 at the least,
-        and without pressure.
+        Divisor of the information for a lasting model error [dimensionless], see `lasting_misfit`; at least 1, and 1
+        without pressure.
     moved : ndarray, shape (7, m)
-        What bends of the law of friction move the coordinates by [dimensionless], see `bent_by`.
+        Shift of the coordinates by bends of the friction law [dimensionless], see `bent_by`.
     unbent : ndarray, shape (9,), optional
-        The scores if the law is not bent; `scores` if not given.
+        The scores without such bends; `scores` if not given.
     """
 
     best: PointFit
@@ -106,22 +106,22 @@ class ClassFits:
 
     @property
     def of_one_law(self) -> Array:
-        """Scores of parts of a log, or of circuits, that have one law of friction in common, shape (9,)."""
+        """Scores of parts of a log, or of circuits, that share one friction law, shape (9,)."""
         return self.scores if self.unbent is None else self.unbent
 
     @property
     def told(self) -> Array:
         """Information on the coordinates, lasting model error included, shape (7, 7) [dimensionless].
 
-        By it a circuit is judged to lie between the conditions. Intervals have `spread`, which is narrower where a
-        model error lasts: with it more such circuits are seen on the lumped plant, but one more plain log in 150 is
+        It decides whether a circuit is between the conditions. Intervals use `spread`, which is narrower if a model
+        error persists: with that, more such circuits are found on the lumped plant, but one more plain log in 150 is
         falsely unknown.
         """
         return told_of_bent(self.information / self.lasting, self.moved)
 
     @property
     def bent_spread(self) -> Array:
-        """Covariance of the coordinates for intervals, where the law of friction may be bent, shape (7, 7)."""
+        """Covariance of the coordinates for intervals if the friction law may be bent, shape (7, 7)."""
         return self.spread + doubt_of_bends(self.information, self.moved)
 
     def apart(self, actuator: Actuator) -> Array:
@@ -135,7 +135,7 @@ class ClassFits:
         Returns
         -------
         ndarray, shape (9, 9)
-            Expected log-likelihood ratios [dimensionless], where the law of friction may be bent.
+            Expected log-likelihood ratios [dimensionless] if the friction law may be bent.
         """
         if not np.any(self.moved):
             return told_apart(self.spread, actuator)
@@ -155,7 +155,7 @@ def fit_classes(
     start: Array | None = None,
     wanted: float = np.inf,
 ) -> ClassFits:
-    """Fit circuits to a log from the nearest conditions and weigh all nine.
+    """Fit circuits to a log from the nearest conditions, and score all nine.
 
     Parameters
     ----------
@@ -164,10 +164,10 @@ def fit_classes(
     actuator : Actuator
         The healthy actuator.
     runs : ndarray, shape (9, n, outputs), optional
-        What the nine nominal circuits do [m/s, Pa]; run here if not given.
+        Outputs of the nine nominal circuits [m/s, Pa]; computed if not given.
     start : ndarray, shape (7,), optional
-        Coordinates of a circuit near by [dimensionless]: one search begins there, in place of one from each condition
-        that is near, and ends where it gains or promises little.
+        Coordinates of a nearby circuit [dimensionless]: a single search begins there, in place of one from each near
+        condition, and ends if it gains or promises little.
     wanted : float
         Cost above which a circuit is of no use, see `fit_freely` [dimensionless].
 
@@ -217,30 +217,30 @@ def fit_classes(
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:
-    """Return a fit without pressure at the scale that is the most likely within a condition."""
+    """Return a fit without pressure at the scale that is most likely within a condition."""
     pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
     shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
     return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE)
 
 
 def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) -> Array:
-    """Return the covariance of a fit's coordinates without pressure, for intervals that know how well the model holds.
+    """Return the covariance of a fit's coordinates without pressure, for intervals, including the model's error.
 
-    What is left of a log that the model describes is the sensors' noise, which averages away; the error of a wrong
-    model lasts. So variances grow with what is left after averaging over a tenth of a second, over what white noise
-    would leave. The common scale of pressure is known only as far as actuators of one kind are alike, and an
-    actuator that differs much from its kind in what its log tells is taken to do so in what it does not tell.
+    If the model is right, its residuals are the sensors' noise, which averages away; the error of a wrong model
+    persists. So variances grow with what remains after averaging over a tenth of a second, beyond white noise. The
+    common scale of pressure is known only as far as actuators of one kind are alike; one that differs much in what its
+    log determines is assumed to do so in the rest.
 
     Parameters
     ----------
     fit : PointFit
         The fit.
     information : ndarray, shape (7, 7)
-        What is believed of it, see `believed_information`.
+        Credible information, see `believed_information`.
     blocks : Blocks
         Its log, without pressure.
     centre : ndarray, shape (7,)
-        Coordinates of the condition that it is in.
+        Coordinates of its condition.
 
     Returns
     -------
@@ -262,14 +262,14 @@ def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
     Parameters
     ----------
     fitted : ndarray, shape (n, outputs)
-        What the model does [m/s, Pa].
+        Outputs of the model [m/s, Pa].
     blocks : Blocks
         Its log.
 
     Returns
     -------
     float
-        Ratio of root mean squares, the larger of the outputs' [dimensionless]: 1 or less where noise alone is left.
+        Ratio of root mean squares, the largest of the outputs [dimensionless]: 1 or less for noise alone.
     """
     power = lasting_power((blocks.outputs - fitted)[blocks.first :])
     return float(np.max(np.sqrt(power) / least_scales(blocks)))
@@ -288,7 +288,7 @@ def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:
     Returns
     -------
     bool
-        Whether it moves no more than a few presliding displacements.
+        Whether it moves by no more than a few presliding displacements.
     """
     return blocks.travel < YIELDING * actuator.circuit.presliding_displacement
 
@@ -296,8 +296,8 @@ def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:
 def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) -> Array:
     """Return the credible information of a fit: residuals beyond the sensors' noise count as lasting model error.
 
-    Without pressure nothing is believed of `PRESSURE_SCALE`: motion is the same at twice the pressure, with half the
-    leakage and twice the friction and bulk modulus, but for the inertia, which is less than a model's error.
+    Without pressure there is none on `PRESSURE_SCALE`: motion is the same at twice the pressure, with half the leakage
+    and twice the friction and bulk modulus, except for inertia, whose effect is below a model's error.
 
     Parameters
     ----------
@@ -306,7 +306,8 @@ def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) 
     blocks : Blocks
         Its log.
     stuck : bool
-        Whether the piston sticks: then nothing is believed of friction, as what moves is the seals' unknown stiffness.
+        Whether the piston sticks. There is then no information on friction, since the seals' unknown stiffness moves
+        it.
 
     Returns
     -------
@@ -326,8 +327,8 @@ def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) 
 def how_near(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
     """Return the score of the condition nearest to a log.
 
-    Without pressure searches from several conditions end at circuits that follow a log nearly alike, some within a
-    condition and some far from all. A log is outside only where each is, or explains so much less.
+    Without pressure, searches from several conditions end at circuits that follow a log about equally well, some within
+    a condition and some far from all. A log is outside only if all are, or if those inside explain much less.
 
     Parameters
     ----------
@@ -341,8 +342,8 @@ def how_near(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
     Returns
     -------
     float
-        Log-likelihood of the region that holds the best circuit [dimensionless], 0 at its middle; without pressure of
-        any circuit, less what the best explains more.
+        Log-likelihood of the region with the best circuit [dimensionless], 0 at its centre; without pressure the best
+        over all circuits, each less its distance from the best fit.
     """
     best = float(np.max(region_scores(fits.best, fits.told, actuator)))
     if blocks.pressure is not None:

@@ -1,10 +1,10 @@
-"""Friction varies with speed differently from seal to seal: the doubt about friction at rated speed in a slow log.
+"""The friction law differs from seal to seal: uncertainty of friction at rated speed in a slow log.
 
-A circuit's friction has three parts (at rest, quadratic, whole at rated velocity). That of real seals falls from rest
-on as oil is drawn under them (Stribeck), and rises by another power than one or two. Friction at rated velocity is read
-off where the piston comes near it; where it does not, it is carried on by the three parts. So the law may depart from
-them by bends that fade within some velocity, with a judged spread. What bends would move the three parts by is left
-open in classes and intervals.
+A circuit's friction has three parts (at rest, quadratic, whole at rated velocity). Friction of real seals first falls
+with speed as oil is drawn under them (Stribeck), and then rises with another power than one or two. Friction at rated
+velocity is measured if the piston comes near that; otherwise it is extrapolated by the three parts. So the law may
+deviate from them by bends that fade within some velocity, with a judged size. Their effect on the three parts widens
+classes and intervals.
 
 Source: law and size of the fall, Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, European Journal of Control 4
 (1998), sections 2 and 3; an error of a model as an unknown with a prior, Kennedy and O'Hagan, Journal of the Royal
@@ -21,17 +21,17 @@ from plant.arrays import Array
 
 FADES = (0.03, 0.1, 0.3)
 """Velocities within which a bend fades, over the rated one [fraction]: 1 to 13 mm/s on the paper's actuator. Seals of
-cylinders have Stribeck velocities of one to some tens of millimetres a second."""
+cylinders have Stribeck velocities of one to some tens of millimetres per second."""
 
 BEND = 0.1
 """Standard deviation of each bend over friction at rest [dimensionless], judged: all three together are 17 % at rest.
-Seals break loose at 1.05 to 1.5 times the force at which they slide."""
+Breakaway friction of seals is 1.05 to 1.5 times that of sliding."""
 
 SLIDES = 0.005
-"""Velocity above which a piston shows what friction is when it slides, over the rated one [fraction]."""
+"""Velocity over the rated one above which a piston slides [fraction]."""
 
 RIDGE = 1e-7
-"""Ridge of the regression [dimensionless]: one speed alone does not tell three parts."""
+"""Ridge of the regression [dimensionless]: one speed alone does not determine three parts."""
 
 FORCES = [at for at, name in enumerate(COORDINATES) if name.startswith("friction")]
 """Coordinates that are forces."""
@@ -40,9 +40,9 @@ FORCES = [at for at, name in enumerate(COORDINATES) if name.startswith("friction
 def bent_by(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
     """Return the response of a fit to unknown bends of the friction law.
 
-    A search lays the three parts through what friction was at the velocities reached. What a bend adds there moves them
-    as it moves a regression. Nothing is concluded of the bend from what is left of the log: a piston that turns leaves
-    errors of the seals' elasticity that look like one.
+    A search fits the three parts to friction at the velocities that were reached. A bend shifts them as it would shift
+    a regression. The residuals of the log are not used: a piston that reverses leaves errors of the seals' elasticity
+    that look like a bend.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def bent_by(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
     Returns
     -------
     ndarray, shape (7, 3)
-        What each of `FADES`, as large as its standard deviation, moves the coordinates by [dimensionless].
+        Shift of the coordinates by each of `FADES` at one standard deviation [dimensionless].
     """
     speed = np.abs(fit.fitted[blocks.first :, 0][blocks.seen[:, 0]]) / actuator.rated
     speed = np.append(speed[speed > SLIDES], 0.0)  # what breaks loose shows friction at rest
@@ -75,14 +75,14 @@ def told_of_bent(information: Array, moved: Array) -> Array:
     Parameters
     ----------
     information : ndarray, shape (7, 7)
-        What it would tell if the law had the circuit's shape.
+        Its information if the law had the circuit's shape.
     moved : ndarray, shape (7, m)
-        What bends move the coordinates by, see `bent_by`.
+        Shift of the coordinates by bends, see `bent_by`.
 
     Returns
     -------
     ndarray, shape (7, 7)
-        Inverse of the covariance with the bends' in it, for information that has no inverse too.
+        Inverse of the covariance including bends; also defined for singular information.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def doubt_of_bends(information: Array, moved: Array) -> Array:
     Returns
     -------
     ndarray, shape (7, 7)
-        Covariance [dimensionless]; no more than the weak prior leaves.
+        Covariance [dimensionless]; no more than the weak prior allows.
     """
     weak = np.linalg.inv(WEAK)
     bent, straight = (np.linalg.inv(one + weak) for one in (told_of_bent(information, moved), information))

@@ -1,7 +1,7 @@
-"""Without pressure: a load on the rod that the rig file does not have, beside an offset of motor speed.
+"""Without pressure: a load on the rod that the rig file does not state, as an alternative to an offset of motor speed.
 
-Both move a piston that leaks further one way than the other. Where an offset explains a log better than none, circuits
-with a constant force and with a spring on the rod are fitted beside it. Other logs pay nothing for that.
+Both make a leaking piston move further in one direction. If an offset explains a log better than none, circuits with a
+constant force and with a spring on the rod are fitted as well. Other logs need no extra time.
 """
 
 import math
@@ -21,18 +21,18 @@ from plant.notes import Note
 
 APART = math.log(10.0)
 """Log-likelihood by which one of two explanations must be better to be named alone [dimensionless], in `LASTING` blocks
-that count as one: evidence is called strong from there on (Jeffreys, Theory of Probability, 1961, appendix B)."""
+that count as one: evidence is called strong above that (Jeffreys, Theory of Probability, 1961, appendix B)."""
 
 ROUNDS = 2
-"""Linear steps towards a load at most: a second one gained up to a tenth more."""
+"""Most linear steps towards a load: a second one gained up to a tenth more."""
 
 NUDGE = 0.02
-"""Step of the finite difference, over what is presumed of a load [dimensionless]."""
+"""Finite-difference step, over the prior standard deviation of a load [dimensionless]."""
 
 
 @dataclass(frozen=True)
 class _Load:
-    """A load by its entry in a rig file: what it is called, its unit, and what is presumed of its size [same unit]."""
+    """A load by its entry in a rig file: its name, its unit, and its prior standard deviation [same unit]."""
 
     entry: str
     name: str
@@ -56,15 +56,15 @@ def load_for_offset(
     without : PointFit
         The circuit that was fitted freely without an offset.
     offset : float
-        What motor speed would have to read less [rad/s].
+        Correction of the logged motor speed [rad/s].
     gain : float
-        Log-likelihood that it gains [dimensionless].
+        Its gain in log-likelihood [dimensionless].
 
     Returns
     -------
     Note or None
-        A load alone where it is ten times likelier; both where neither is; None where the offset is, and where no
-        circuit under a load follows the log.
+        A load alone if it is ten times likelier; both if neither is; None if the offset is, or if no circuit under a
+        load follows the log.
     """
     force = actuator.circuit.piston_area * actuator.circuit.relief_pressure
     loads = (
@@ -106,7 +106,7 @@ def _fitted(
 def _step(
     moved: Callable[[float], CircuitParameters], presumed: float, blocks: Blocks, actuator: Actuator, fit: PointFit
 ) -> float:
-    """Return the linear step of a load from a circuit, all else that is fitted moving with it [unit of the load]."""
+    """Return the linear step of a load from a circuit, with all other coordinates free [unit of the load]."""
     first, nudge = blocks.first, NUDGE * presumed
     rows = parameter_rows(fit.coordinates[None], moved(nudge), actuator.rated)
     columns = np.concatenate([fit.slopes, (predicted(blocks, rows) - fit.fitted) / NUDGE])[:, first:] / fit.scales

@@ -1,13 +1,13 @@
-"""Model error of a fitted circuit: the doubt of severities when pressure is logged.
+"""Model error of a fitted circuit: the uncertainty of severities when pressure is logged.
 
-A circuit that is fitted to a log has the rig's seals, make-up valves, mass and accumulator, and a judged share of its
-leakage in the pump. Where those are others, what is fitted gives way. So they are unknowns beside the fitted ones for
-one linear step, each with the spread that is judged of it: what the log leaves open of them widens the intervals, and
-so does what it says of them, because the fit did not go that way (consider covariance: Tapley, Schutz and Born,
-Statistical Orbit Determination, 2004, chapter 6). The file may also be right about all of them: both count, as likely
-as they make the log. What is left of a log that no sensor makes is a wrong model's error, which a longer log does not
-average away; that is counted here, once, and where it is. Where noise alone is left, that of a position does not last.
-An encoder's steps are no wrong model either: what they add to one block they take from the next. See decision 251.
+A circuit fitted to a log has the seals, make-up valves, mass and accumulator of the rig file, and a judged share of its
+leakage in the pump. If the real ones differ, the fitted parameters absorb the difference. So they are nuisance unknowns
+for one linear step, each with a judged spread. What the log leaves open of them widens the intervals, and so does what
+it says of them, because the fit did not go that way (consider covariance: Tapley, Schutz and Born, Statistical Orbit
+Determination, 2004, chapter 6). The file may also be right about all of them: both cases count, in proportion to their
+likelihood. Residuals beyond sensor noise are the error of a wrong model, which a longer log does not average away; that
+is counted here, once, and where it occurs. Noise of a position does not persist. An encoder's steps are no model error
+either: what they add to one block they subtract from the next. See decision 251.
 """
 
 from collections.abc import Mapping
@@ -23,8 +23,8 @@ from faults.diagnosis.circuits.class_fit import WEAK, PointFit
 from plant.arrays import Array
 
 _CASE = "pump_case_leakage"
-"""What draws oil from both sides, so that make-up valves open the more: it acts otherwise where it grows than where it
-falls, and is nudged both ways."""
+"""The case drain draws oil from both sides, so that make-up valves open more. Its effect is not symmetric, so finite
+differences are taken in both directions."""
 
 SELDOM_KNOWN: Mapping[str, float] = MappingProxyType(
     {
@@ -36,10 +36,10 @@ SELDOM_KNOWN: Mapping[str, float] = MappingProxyType(
         "pump_crossport_leakage": 0.26,
     }
 )
-"""Standard deviations, judged: of logarithms, and of the pump's two leakages as shares of the whole [dimensionless]."""
+"""Judged standard deviations: of logarithms, and of the pump's two leakages as shares of the whole [dimensionless]."""
 
 NUDGE = 0.05
-"""Step of the finite differences in logarithms and shares [dimensionless]."""
+"""Finite-difference step in logarithms and shares [dimensionless]."""
 
 _STEPS: Mapping[str, float] = MappingProxyType({"pump_crossport_leakage": -NUDGE, _CASE: SELDOM_KNOWN[_CASE]})
 """Steps of shares: the cylinder leaks the rest."""
@@ -48,23 +48,23 @@ RIGHT = 0.25
 """Share of the rig files that are right about all of `SELDOM_KNOWN` [fraction], judged."""
 
 NOISE_ALONE = 1.1
-"""Residuals over the sensors' noise, root mean square, up to which nothing else is left [dimensionless]: the noise is
-known to a twentieth, and a log of 1000 blocks tells the size of what is left no better."""
+"""Root mean square residual over the sensors' noise up to which residuals are noise alone [dimensionless]: the noise is
+known to a twentieth, and a log of 1000 blocks determines the size of residuals no better."""
 
 STRUCTURAL = 100.0
-"""By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
-not what the derivatives say that it is."""
+"""Factor on the variance for residuals beyond sensor noise [dimensionless]: they persist, and do not follow the
+derivatives."""
 
 LOOKS = 10.0
-"""Independent looks that a log gives at a wrong model's error, however long it is [dimensionless]."""
+"""Number of independent looks that a log gives at a wrong model's error, however long it is [dimensionless]."""
 
 AVERAGED = 10
-"""Blocks over which residuals are averaged to see what lasts of them, and to either side of one over which a wrong
-model's error is as large as there [dimensionless]: a tenth of a second."""
+"""Blocks over which residuals are averaged to find a lasting error, and on either side of a block within which a wrong
+model's error has the same size [dimensionless]: a tenth of a second."""
 
 
 def distrust(fit: PointFit, blocks: Blocks) -> float:
-    """Return by what a fit's information is divided for what no sensor makes of its residuals.
+    """Return the divisor of a fit's information for residuals beyond sensor noise.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def distrust(fit: PointFit, blocks: Blocks) -> float:
     Returns
     -------
     float
-        Factor [dimensionless], 1 where noise alone is left.
+        Factor [dimensionless], 1 for noise alone.
     """
     unexplained = float(np.max(1.0 - (blocks.noise / fit.scales) ** 2))
     return 1.0 + STRUCTURAL * max(unexplained, 0.0)
@@ -93,7 +93,7 @@ def spreads_of(actuator: Actuator) -> Array:
     Returns
     -------
     ndarray, shape (m,)
-        Standard deviations of `SELDOM_KNOWN`, and of the force on its rod over itself where a log had to tell that.
+        Standard deviations of `SELDOM_KNOWN`, and of the relative force on its rod if it was found from a log.
     """
     spreads = list(SELDOM_KNOWN.values())
     if actuator.load_doubt > 0.0:
@@ -154,7 +154,7 @@ def lasting_power(left: Array) -> Array:
     Returns
     -------
     ndarray, shape (outputs,)
-        Mean square of white noise, and `AVERAGED` times that of an error that lasts [m^2/s^2, Pa^2].
+        For white noise its mean square, for a lasting error `AVERAGED` times that [m^2/s^2, Pa^2].
     """
     size = min(AVERAGED, len(left))
     parts = left[: len(left) // size * size].reshape(-1, size, left.shape[1])
@@ -168,10 +168,10 @@ def left_of(fit: PointFit, blocks: Blocks) -> Array:
 
 
 def power_left(left: Array, blocks: Blocks) -> Array:
-    """Return the mean square of what a fit leaves of a log.
+    """Return the mean square of a fit's residuals.
 
-    A search counts no residual as less than `class_fit.LEAST_SCALE` of the signal. Here that would be a wrong model's
-    error, of which a log may show that there is none: 10 kHz average the sensors' noise to a third of it.
+    A search counts no residual below `class_fit.LEAST_SCALE` of the signal. Here that would be a model error, of which
+    a log may show that there is none: 10 kHz average the sensors' noise to a third of it.
 
     Parameters
     ----------
@@ -183,22 +183,22 @@ def power_left(left: Array, blocks: Blocks) -> Array:
     Returns
     -------
     ndarray, shape (outputs,)
-        Not below the noise, nor the error that runs of a circuit are allowed [m^2/s^2, Pa^2].
+        At least the noise, and the error allowed in runs of a circuit [m^2/s^2, Pa^2].
     """
     return np.maximum(root_mean_square(left), np.maximum(blocks.noise, ALLOWED["tolerance"] * blocks.sizes)) ** 2
 
 
 def noise_shown(left: Array, blocks: Blocks) -> Array:
-    """Return the power of the sensors' noise, a position's at least as large as residuals show it.
+    """Return the power of the sensors' noise; that of a position is at least as large as residuals show it.
 
-    The steps of an encoder are known as the noise that they are while a piston moves over many of them from sample to
-    sample. Where it is slow, they do not average. Both give neighbouring blocks opposite errors, which a wrong model
-    does not: of differences of white noise the covariance of neighbours is minus half of the variance.
+    Encoder steps act as known noise while a piston crosses many of them from sample to sample. At low speed they do not
+    average. Both give neighbouring blocks opposite errors, which a wrong model does not: for differences of white noise
+    the covariance of neighbours is minus half of the variance.
 
     Parameters
     ----------
     left : ndarray, shape (n, outputs)
-        Likewise.
+        Residuals, as from `left_of`.
     blocks : Blocks
         The log.
 
@@ -215,22 +215,22 @@ def noise_shown(left: Array, blocks: Blocks) -> Array:
 
 
 def model_error(left: Array, blocks: Blocks) -> Array:
-    """Return the variance of what a fit leaves of a log that its sensors do not make.
+    """Return the variance of a fit's residuals beyond sensor noise.
 
-    It is what is left beyond the noise as far as that is known, in the blocks or in their averages: an error that
-    lasts shows in these where noise hides it in a block.
+    It is the excess over the noise, within the accuracy of that, in the blocks or in their averages: a lasting error
+    shows in the averages if noise hides it in a block.
 
     Parameters
     ----------
     left : ndarray, shape (n, outputs)
-        As `left_of` returns it.
+        Residuals, as from `left_of`.
     blocks : Blocks
         The log.
 
     Returns
     -------
     ndarray, shape (outputs,)
-        Nothing where noise alone is left [m^2/s^2, Pa^2].
+        Zero for noise alone [m^2/s^2, Pa^2].
     """
     power = power_left(left, blocks)
     beyond = power - NOISE_ALONE**2 * noise_shown(left, blocks)
@@ -251,7 +251,7 @@ def near_by(left: Array, seen: NDArray[np.bool_]) -> Array:
     Returns
     -------
     ndarray, shape (n, outputs)
-        Mean squares over `AVERAGED` blocks to either side, over that of all [dimensionless]; 1 where nothing is left.
+        Mean squares over `AVERAGED` blocks on either side, over that of all [dimensionless]; 1 for zero residuals.
     """
     sums = np.concatenate([np.zeros((1, 2 * left.shape[1])), np.cumsum(np.hstack([left**2, seen]), axis=0)])
     at = np.arange(len(left))
@@ -265,20 +265,20 @@ def near_by(left: Array, seen: NDArray[np.bool_]) -> Array:
 def taken_back(slopes: Array, seen: NDArray[np.bool_]) -> Array:
     """Return the reduction of a position's noise in a fit against white noise of its velocity.
 
-    Mean velocity over a block is a difference of two positions. The error of the one between two blocks counts in both,
-    with opposite signs: neighbours have a correlation of -1/2, and nothing of it lasts.
+    Mean velocity over a block is a difference of two positions. The error of the position between two blocks counts in
+    both, with opposite signs: neighbours have a correlation of -1/2, and nothing persists.
 
     Parameters
     ----------
     slopes : ndarray, shape (m, n)
-        How velocity answers what is fitted and what is seldom known, over its deviation [dimensionless].
+        Response of velocity to fitted and nuisance unknowns, over its deviation [dimensionless].
     seen : ndarray, shape (n,)
         Which blocks are known.
 
     Returns
     -------
     ndarray, shape (m, m)
-        To be taken from the second moment of the pulls [dimensionless].
+        To be subtracted from the second moment of the pulls [dimensionless].
     """
     beside = (slopes[:, 1:] * (seen[1:] & seen[:-1])) @ slopes[:, :-1].T
     return np.asarray(0.5 * (beside + beside.T), dtype=np.float64)
@@ -300,22 +300,22 @@ def doubt_of(
     fit : PointFit
         The fit.
     seldom : ndarray, shape (m, n, outputs)
-        How the outputs answer what is seldom known, see `seldom_known_slopes`.
+        Response of the outputs to the nuisance unknowns, see `seldom_known_slopes`.
     blocks : Blocks
         Its log, with pressure.
     centres : ndarray, shape (conditions, 7)
-        Coordinates of the conditions about which the weak prior may lie.
+        Coordinates of the conditions about which the weak prior may be centred.
     odds : ndarray, shape (conditions,)
         Log-likelihoods of the conditions [dimensionless], up to a constant.
     seen : ndarray, shape (7,)
-        1 for what the log can tell, 0 for what it cannot, as friction of a piston that sticks.
+        1 for what the log can determine, 0 for what it cannot, such as friction of a piston that sticks.
     spreads : ndarray, shape (m,)
-        Standard deviations of what is seldom known, see `spreads_of`.
+        Standard deviations of the nuisance unknowns, see `spreads_of`.
 
     Returns
     -------
     ndarray, shape (7, 7)
-        Covariance, and the squares of the steps that prior and log ask for [dimensionless].
+        Covariance, plus the squares of the steps that prior and log suggest [dimensionless].
     """
     known, left = len(fit.coordinates), left_of(fit, blocks)
     there = np.where(blocks.seen, left, 0.0)

@@ -1,4 +1,4 @@
-"""Parts of a circuit that a log does not determine; their values are the prior's.
+"""Parts of a circuit that a log does not determine; their values are those of the prior.
 
 See decision 302.
 """
@@ -10,10 +10,10 @@ from faults.diagnosis.circuits.class_fit import WEAK
 from faults.diagnosis.circuits.class_regions import ClassFits
 
 BLIND = 0.9
-"""A log that narrows a coefficient to no less than this share of the prior says nothing of it [dimensionless]."""
+"""Ratio of posterior to prior deviation from which a log says nothing about a coefficient [dimensionless]."""
 
 FRICTION_LAW = frozenset({"friction_rated", "friction_rest"})
-"""Coordinates of a circuit that tell its friction."""
+"""Coordinates of a circuit that determine its friction."""
 
 
 def not_shown(fits: ClassFits) -> frozenset[str]:

@@ -1,8 +1,8 @@
 """If a log leaves two classes open, its severities cover the circuits of both.
 
-A log whose piston moves at a fifth of its rated velocity may be followed nearly as well by friction that rises with the
-velocity's square as by friction that does not. The fit that explains it best then says little of friction at rated
-velocity, though its covariance, which knows one valley alone, is narrow.
+If a piston moves at a fifth of its rated velocity, friction that rises with the square of velocity may fit nearly as
+well as friction that does not. The best fit then says little about friction at rated velocity, though its covariance,
+which knows only one minimum, is narrow.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from faults.diagnosis.circuits.class_regions import ClassFits, is_stuck
 from plant.arrays import Array
 
 OPEN = 0.025
-"""Least probability of a class whose circuit counts [probability]: an interval leaves out as much at either end."""
+"""Least probability of a class whose circuit counts [probability]: what an interval leaves out at either end."""
 
 
 class OpenCircuit(NamedTuple):
@@ -29,7 +29,7 @@ class OpenCircuit(NamedTuple):
     coordinates : ndarray, shape (7,)
         In the order of `faults.diagnosis.circuits.circuit_runs.COORDINATES`.
     probability : float
-        Of its class [probability].
+        Probability of its class [probability].
     """
 
     coordinates: Array
@@ -39,7 +39,7 @@ class OpenCircuit(NamedTuple):
 def circuits_left_open(
     blocks: Blocks, fits: ClassFits, actuator: Actuator, probabilities: Mapping[str, float]
 ) -> list[OpenCircuit]:
-    """Return the circuit that follows a log best about each class that the log leaves open.
+    """Return the best circuit about each class that the log leaves open.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ def circuits_left_open(
     actuator : Actuator
         The healthy actuator.
     probabilities : Mapping[str, float]
-        Of the conditions [probability].
+        Probability of each condition [probability].
 
     Returns
     -------
     list of OpenCircuit
-        The best one of all first, whatever the probability of its class. It is alone where the log tells the class;
-        where pressure is not logged, and leakage and friction have one scale in common; and where the piston sticks, so
-        that friction is open in any case.
+        The best one of all first, whatever the probability of its class. It is alone if the log determines the class,
+        if pressure is not logged (leakage and friction then share one scale), or if the piston sticks, since friction
+        is then open in any case.
     """
     nearest = list(CONDITIONS)[int(np.argmax(fits.scores))]
     found = [OpenCircuit(fits.best.coordinates, max(OPEN, probabilities[nearest]))]

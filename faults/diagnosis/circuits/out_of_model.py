@@ -1,8 +1,7 @@
-"""Is the log one that the nine conditions can explain? Else the verdict is "unknown", with what speaks against.
+"""Can the nine conditions explain a log? Otherwise the verdict is "unknown", with the reasons.
 
-A log is looked at from three sides: does any circuit follow it, does the circuit that does lie in or between the
-conditions' regions, and would a sensor's bias or another pump explain it better. The limits leave room for rigs that no
-circuit describes to the last digit.
+There are three tests: does any circuit follow the log, is that circuit in or between the conditions' regions, and would
+a sensor's bias or another pump explain the log better. The limits allow for rigs that no circuit describes exactly.
 """
 
 import math
@@ -28,28 +27,29 @@ from faults.notes import AgainstCode
 from plant.notes import Note
 
 EARLIER = 0.1
-"""Time over which velocity is averaged once more where pressure is logged [s]: a piston that hardly moves breaks loose
-some blocks sooner or later than the circuit's, and goes as far."""
+"""Time over which velocity is averaged again if pressure is logged [s]: a piston that hardly moves breaks loose some
+blocks sooner or later than the circuit's, and moves as far."""
 
 UNEXPLAINED_LONGER = 0.06
-"""Share of velocity that means over `EARLIER` may leave [dimensionless]: half of what blocks may."""
+"""Share of velocity that means over `EARLIER` may leave unexplained [dimensionless]: half of the limit for blocks."""
 
 STICKS = math.exp(SEALS)
-"""How far seals may yield, over the rig's presliding displacement [dimensionless]: a standard deviation more, 54 um."""
+"""How far seals may yield, over the rig's presliding displacement [dimensionless]: one standard deviation more, 54
+um."""
 
 FARTHEST_OUT = 7.0
-"""Least log-likelihood of the nearest condition's region, below its centre's [dimensionless]."""
+"""Least log-likelihood of the nearest condition's region, relative to its centre [dimensionless]."""
 
 FARTHEST_BESIDE = 10.4
-"""The same of the circuit that is the best of all severities, where pressure is logged [dimensionless]: two severities
-reach 7.0 by chance in one case of 1100, and five other coordinates in as many reach this. Without pressure nothing else
-tells some faults."""
+"""The same for the best circuit of all severities, if pressure is logged [dimensionless]: two severities reach 7.0 by
+chance in one case of 1100, and five other coordinates reach this as seldom. Without pressure it is the only sign of
+some faults."""
 
 STANDARD_ERRORS = 2.0
-"""Standard errors from zero at which a bias is believed [dimensionless]; they hold the model's error already."""
+"""Standard errors from zero at which a bias is believed [dimensionless]; they include the model's error."""
 
 LEAST_BIAS = {"pump": 0.08, "differential_pressure_pa": 0.05, "motor_speed_rad_s": 0.03}
-"""Biases that matter: of the pump's flow a radian, of pressure and of motor speed over their root mean square."""
+"""Biases that matter: of the pump's flow per radian, of pressure and of motor speed over their root mean square."""
 
 GRID = 9
 """Severities of leakage, and of friction, between none and major that are tried."""
@@ -62,14 +62,14 @@ SMALLEST_PUMP = 0.3
 
 PUMP_GAIN, PUMP_GAIN_WITHOUT = 20.0, 3.0
 """Log-posterior that another pump must gain, with pressure and without, in `LASTING` blocks that count as one
-[dimensionless]. On logs of other physics a pump 10 % off gained up to 15 without being there; on nine steps one 15 %
-off gains 44 to 154, and 9 to 18 where leakage and friction are major. With pressure the balance of flows looks for a
+[dimensionless]. In logs of other physics a pump 10 % off gained up to 15 without being there. On nine steps, one that
+is 15 % off gains 44 to 154, and 9 to 18 under major leakage and friction. With pressure the flow balance tests for a
 worn pump too; without, nothing else does."""
 
 BIAS_GAIN = 4.0
-"""The same that an offset of motor speed must gain without pressure [dimensionless]: as much as any other fault. Of a
-piston that creeps one step promises offsets that are not there; plain training log 9749 gains 2.7, unlike chambers and
-loads on the rod 13 to 57."""
+"""The same for an offset of motor speed without pressure [dimensionless]: as for any other fault. For a creeping piston
+one linear step promises false offsets; plain training log 9749 gains 2.7, unlike chambers and loads on the rod 13 to
+57."""
 
 
 def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator) -> list[Note]:
@@ -89,14 +89,14 @@ def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Ac
     Returns
     -------
     list[Note]
-        None for a log that fits.
+        Empty for a log that fits.
     """
     left = [] if sticks_and_slips(blocks, fits.best, actuator) else unexplained(blocks, fits, actuator)
     return [*left, *_biases(blocks, fits, actuator), *_outside(blocks, fits, region, actuator)]
 
 
 def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
-    """Return a note for each output of which the best circuit leaves more than it may.
+    """Return a note for each output of which the best circuit leaves too much.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Not
     Returns
     -------
     list[Note]
-        None where a circuit follows the log.
+        Empty if a circuit follows the log.
     """
     scales, sizes = fits.best.scales, blocks.sizes
     shares = np.divide(scales, sizes, out=np.full(len(scales), np.inf), where=sizes > 0.0)  # a dead sensor reads 0
@@ -127,26 +127,26 @@ def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Not
 
 
 def sticks_and_slips(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
-    """Return whether a circuit misses only when the piston breaks loose and jumps, and not how far it goes.
+    """Return whether a circuit misses only the times at which the piston breaks loose, and not how far it moves.
 
-    Minor friction falls with speed, so that a piston pushed slowly sticks and slips: some twenty jumps a second, each
-    of a tenth of a millimetre. When one begins rests on seals that no circuit describes to the last digit, and the next
-    follows from it; how far the piston goes follows from pressure and flow. So where pressure is followed, and motion
-    over `EARLIER` to what seals may yield, jumps that come at other times speak against no condition.
+    Minor friction falls with speed, so that a slowly pushed piston sticks and slips: some twenty jumps a second of a
+    tenth of a millimetre each. The start of a jump depends on seals that no circuit describes exactly, and the next
+    jump follows from it. How far the piston moves follows from pressure and flow. So if the circuit follows pressure,
+    and motion over `EARLIER` within what seals may yield, jumps at other times are no objection.
 
     Parameters
     ----------
     blocks : Blocks
         The log in blocks.
     fit : PointFit
-        The circuit that explains it best.
+        The best circuit.
     actuator : Actuator
         The healthy actuator.
 
     Returns
     -------
     bool
-        Whether it is so; never without pressure, of which nothing then tells that the piston sticks.
+        Always False without pressure, since nothing then shows that the piston sticks.
     """
     if blocks.pressure is None or fit.scales[1] > max(UNEXPLAINED[1] * blocks.sizes[1], 2.0 * blocks.noise[1]):
         return False
@@ -165,11 +165,11 @@ def _left_longer(blocks: Blocks, fit: PointFit) -> float:
 
 
 def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
-    """Return a note for each sensor that is biased, and for a pump that is another than the rig's.
+    """Return a note for each biased sensor, and for a pump other than the rig's.
 
-    Both are looked for in one linear step from the best circuit. A pump that is off bends the other coordinates, so it
-    is put into the circuit and the step taken again; it counts if the circuit then explains the log better. So does an
-    offset of motor speed without pressure, unless a load on the rod explains the log as well.
+    Both are found by one linear step from the best circuit. Another pump changes the other coordinates, so it is put
+    into the circuit and the step is repeated; it counts if the circuit then explains the log better. So does an offset
+    of motor speed without pressure, unless a load on the rod explains the log as well.
     """
     size = float(np.sqrt(np.mean(blocks.speed**2)))
     if size == 0.0:
@@ -213,7 +213,7 @@ def _least(name: str, error: float, sizes: Mapping[str, float]) -> float:
 def _one_step(
     blocks: Blocks, fit: PointFit, trust: float, actuator: Actuator, sizes: Mapping[str, float]
 ) -> Mapping[str, tuple[float, float]]:
-    """Return the pump's share and each sensor's bias with its standard error, by one linear step from a fit."""
+    """Return the pump's relative delivery and each sensor's bias, with errors, by one linear step from a fit."""
     first = blocks.first
     rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
     nudge = 0.01 * sizes["motor_speed_rad_s"]
@@ -260,7 +260,7 @@ def _outside(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator)
 
 
 def _nearest_severity(fits: ClassFits, actuator: Actuator) -> tuple[float, float, float]:
-    """Return severities of leakage and friction whose region holds the circuit best, and how well."""
+    """Return the severities of leakage and friction whose region fits the circuit best, and how well."""
     levels = np.linspace(0.0, 2.0, GRID)
     each = [(float(leakage), float(friction)) for leakage in levels for friction in levels]
     points = [coordinates_of(severity(*pair, actuator.circuit), actuator.rated) for pair in each]

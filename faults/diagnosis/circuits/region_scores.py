@@ -1,7 +1,7 @@
 """Scores of the nine conditions' regions for a fitted circuit, and how far a log separates them.
 
-A region is Gaussian in the logarithms of what is fitted, as actuators of one kind differ in them. So is a log's
-likelihood where it is narrow. Where it is wide, the forces of friction count: pressure is linear in them.
+A region is Gaussian in the logarithms of the fitted parameters, as actuators of one kind differ in them. So is the
+likelihood if it is narrow. If it is wide, friction is treated as forces, since pressure is linear in them.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Arra
     fit : PointFit
         The circuit.
     information : ndarray, shape (7, 7)
-        Inverse covariance of its coordinates; directions of which a log says nothing do not count.
+        Inverse covariance of its coordinates; directions without information do not count.
     actuator : Actuator
         The healthy actuator.
 
@@ -37,15 +37,15 @@ def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Arra
 def scores_in_forces(fit: PointFit, told: Array, actuator: Actuator) -> Array:
     """Return the score of each condition's region for a fitted circuit, with friction as forces.
 
-    Pressure is linear in the forces of friction and not in their logarithms: a quadratic part that a slow log tells to
-    900 N more or less may be 100 N or 1900 N, and both lie one deviation off.
+    Pressure is linear in the forces of friction and not in their logarithms: a quadratic part known to ± 900 N may be
+    100 N or 1900 N, and both are one deviation off.
 
     Parameters
     ----------
     fit : PointFit
         The circuit.
     told : ndarray, shape (7, 7)
-        What is believed of it: inverse covariance of its coordinates.
+        Credible inverse covariance of its coordinates.
     actuator : Actuator
         The healthy actuator.
 
@@ -73,7 +73,7 @@ def told_apart(spread: Array, actuator: Actuator) -> Array:
     Returns
     -------
     ndarray, shape (9, 9)
-        Half the squared distance of their regions, each blurred by the log, in deviations [dimensionless].
+        Half the squared distance between their regions, in deviations that include the log's [dimensionless].
     """
     between = actuator.conditions[:, None] - actuator.conditions
     return 0.5 * np.einsum("abi,ij,abj->ab", between, np.linalg.inv(WITHIN + spread), between)
@@ -87,14 +87,14 @@ def apart_in_forces(fit: PointFit, spread: Array, actuator: Actuator) -> Array:
     fit : PointFit
         The circuit.
     spread : ndarray, shape (7, 7)
-        Covariance of its coordinates, with what bends move them by.
+        Covariance of its coordinates, with the effect of bends.
     actuator : Actuator
         The healthy actuator.
 
     Returns
     -------
     ndarray, shape (9, 9)
-        Half the squared distance of their regions, each blurred by the log, in deviations [dimensionless].
+        Half the squared distance between their regions, in deviations that include the log's [dimensionless].
     """
     off, sizes = _in_forces(fit, actuator)
     within = _within(sizes)

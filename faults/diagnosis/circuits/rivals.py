@@ -1,9 +1,9 @@
 """Rival circuits of one log, one per level of friction, compared as far as the log can separate them.
 
-A piston that creeps on its seals, sticks and slips is followed by no circuit to the sensors' noise: when it breaks
-loose rests on the seals' law, which is known roughly. The misfit has many minima then, and a search that begins at
-one level of friction ends there. What one end explains more than another counts no more often than a wrong model's
-error gives independent looks, much as in the intervals (`faults.diagnosis.circuits.model_doubt`).
+No circuit follows a piston that creeps, sticks and slips to the sensors' noise: when it breaks loose depends on the
+seals' law, which is known roughly. The cost then has many minima, and a search that begins at one level of friction
+ends there. The advantage of one over another counts only as often as a wrong model's error gives independent looks,
+much as in the intervals (`faults.diagnosis.circuits.model_doubt`).
 """
 
 from collections.abc import Sequence
@@ -21,19 +21,19 @@ from plant.arrays import Array
 from plant.notes import Note
 
 LOOKS = 5.0
-"""Independent looks at a wrong model's error by which one of two circuits that follow a log roughly is preferred
-[dimensionless]: half of those that an interval counts, as both circuits err where the piston sticks and slips."""
+"""Independent looks at a wrong model's error for the choice between two circuits that follow a log roughly
+[dimensionless]: half of those for an interval, since both circuits err where the piston sticks and slips."""
 
 ROUGHLY = 0.06
-"""Share of velocity, root mean square, that is left where a circuit follows a piston roughly [dimensionless]: half of
-what may be left unexplained. Of 36 plain training logs of the open benchmark all but one of those that travel further
-than 4 mm leave less (0.062); creeping ones that were called wrongly over 90 % leave 0.12 and more."""
+"""Share of velocity, root mean square, that a circuit leaves if it follows a piston roughly [dimensionless]: half of
+the limit. Of 36 plain training logs of the open benchmark with travel over 4 mm, all but one leave less (0.062);
+creeping ones with a wrong class over 90 % leave 0.12 and more."""
 
 _SLIDING = [COORDINATES.index(name) for name in ("friction_quadratic", "friction_rated")]
 
 
 def explains(blocks: Blocks, fit: PointFit) -> bool:
-    """Return whether a circuit leaves the sensors' noise alone of a log.
+    """Return whether a circuit's residuals are the sensors' noise alone.
 
     Parameters
     ----------
@@ -51,42 +51,44 @@ def explains(blocks: Blocks, fit: PointFit) -> bool:
 
 
 def creeps(blocks: Blocks, fit: PointFit) -> bool:
-    """Return whether a piston moves so little, or so roughly, that a search may have ended beside its friction.
+    """Return whether a piston moves so little, or so roughly, that a search may have ended at a wrong friction level.
 
     Parameters
     ----------
     blocks : Blocks
         The log, with pressure.
     fit : PointFit
-        The circuit that explains it best.
+        The best circuit.
 
     Returns
     -------
     bool
-        Whether more than noise, and more than `ROUGHLY` of the velocity, is left.
+        Whether residuals exceed the noise, and `ROUGHLY` of the velocity.
     """
     left, size = float(fit.scales[0]), float(blocks.sizes[0])
     return left > max(NOISE_ALONE * float(least_scales(blocks)[0]), ROUGHLY * size)
 
 
 def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[Note, ...]:
-    """Return the objections left beside a circuit; a failed motion fit is none if its form lacks what the log shows.
+    """Return the remaining objections given a circuit; a failed fit of motion is none if its form lacks what a log has.
 
-    The motion form knows none of these. A circuit, whose beginning does not count, says how the piston moves.
+    The motion form knows neither drift nor stops nor a start in motion. A circuit, whose beginning does not count,
+    follows such logs.
 
     Parameters
     ----------
     doubts : sequence of Note
-        What speaks against the log before a circuit was fitted.
+        Objections before a circuit was fitted.
     blocks : Blocks
         The log.
     fit : PointFit
-        The circuit that explains it best.
+        The best circuit.
 
     Returns
     -------
     tuple of Note
-        All of them where leakage stays and the log begins at rest and shows no stop, or no circuit follows the piston.
+        All of them if leakage is constant and the log begins at rest and shows no stop, or if no circuit follows the
+        piston.
     """
     unknown_to_motion = blocks.settling != SETTLING or blocks.stop is not None
     if blocks.course is None and (creeps(blocks, fit) or not unknown_to_motion):
@@ -95,7 +97,7 @@ def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[
 
 
 def other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition: str) -> list[PointFit]:
-    """Return the ends of searches that begin with the friction of another level, and with all else as in a fit.
+    """Return the ends of searches that begin with another level of friction, and otherwise at a fit.
 
     Parameters
     ----------
@@ -104,14 +106,14 @@ def other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition
     actuator : Actuator
         The healthy actuator.
     best : PointFit
-        The circuit that explains the log best so far.
+        The best circuit so far.
     condition : str
-        The condition in which it is: its leakage stays.
+        Its condition: the leakage stays.
 
     Returns
     -------
     list of PointFit
-        A fit for each other level. The force at rest stays too, since a piston that breaks loose shows it.
+        One fit per other level. The force at rest stays too, since a piston that breaks loose shows it.
     """
     found: list[PointFit] = []
     for at, (name, other) in enumerate(CONDITIONS.items()):
@@ -123,25 +125,25 @@ def other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition
 
 
 def behind(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
-    """Return the log-likelihood ratio of each fit to the best, scaled by how well any circuit follows the log.
+    """Return the log-likelihood of each fit relative to the best, scaled by how well any circuit follows the log.
 
-    Where the better of two follows the piston, the log is looked at once in `LASTING` blocks. Where it follows it
-    roughly, a wrong model's error decides between the two, and of that a log gives `LOOKS` looks; an output that it
-    follows to the sensors' noise is not in doubt.
+    If the better of two follows the piston, the log counts once per `LASTING` blocks. If it follows roughly, a wrong
+    model's error decides between the two, and a log gives `LOOKS` looks at that. An output that is followed to the
+    sensors' noise counts fully.
 
     Parameters
     ----------
     fits : sequence of PointFit
         The fits.
     best : PointFit
-        The one that they are compared with.
+        The fit with which they are compared.
     blocks : Blocks
-        The log. Without pressure a look lasts `LASTING` blocks in any case.
+        The log. Without pressure a look always lasts `LASTING` blocks.
 
     Returns
     -------
     ndarray, shape (fits,)
-        Log-likelihoods [dimensionless], 0 for the best; infinite where a circuit ran away.
+        Log-likelihoods [dimensionless], 0 for the best; infinite if a circuit diverged.
     """
     scales, noise = scales_of(blocks, best.fitted), NOISE_ALONE * least_scales(blocks)
     found = np.full(len(fits), np.inf)
@@ -155,9 +157,9 @@ def behind(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
 
 
 def _roughness(blocks: Blocks, scales: Array, noise: Array) -> Array:
-    """Return which share of each output's residuals is a wrong model's error, where the piston is followed roughly.
+    """Return the share of each output's residuals that is a wrong model's error, if the piston is followed roughly.
 
-    All of what is no noise from twice `ROUGHLY` on, nothing up to it [dimensionless].
+    All beyond noise from twice `ROUGHLY` on, nothing up to it [dimensionless].
     """
     if blocks.pressure is None:
         return np.zeros(len(scales))
@@ -167,21 +169,21 @@ def _roughness(blocks: Blocks, scales: Array, noise: Array) -> Array:
 
 
 def between_fits(fits: Sequence[PointFit], best: PointFit, worse: Array) -> Array:
-    """Return the covariance that near-equal other ends of a search add to the best.
+    """Return the covariance that other, nearly equal ends of a search add to the best.
 
     Parameters
     ----------
     fits : sequence of PointFit
         The ends of the search.
     best : PointFit
-        The one that is told.
+        The fit that is reported.
     worse : ndarray, shape (fits,)
-        How far each is behind that one, by `behind` [dimensionless].
+        Log-likelihood by which each is behind it, from `behind` [dimensionless].
 
     Returns
     -------
     ndarray, shape (7, 7)
-        Second moment about the best [dimensionless]; none where the others explain much less.
+        Second moment about the best [dimensionless]; zero if the others explain much less.
     """
     shares = np.exp(np.min(worse) - worse)
     off = np.array([fit.coordinates - best.coordinates for fit in fits])

@@ -1,4 +1,4 @@
-"""Do a velocity sensor and the encoder tell one motion? Where they do not, one of the two is wrong."""
+"""Do a velocity sensor and the encoder show the same motion? If not, one of the two is wrong."""
 
 import numpy as np
 
@@ -12,11 +12,11 @@ AGREEMENT = 0.05
 """Share by which velocity and the slope of position may differ, root mean square [dimensionless]."""
 
 BREAK = 3.0
-"""Standard deviations of its noise by which velocity may differ from the slope of position in any case."""
+"""Difference between velocity and the slope of position that is always allowed, in standard deviations of its noise."""
 
 ALIKE = 1.5
-"""Times the noise of filtered channels by which the two may differ [dimensionless]: between blocks two apart such noise
-leaves nearly all of itself, a sensor that is wrong for longer leaves less."""
+"""Allowed difference over the noise of filtered channels [dimensionless]: between blocks two apart such noise is almost
+uncorrelated, while a lasting sensor error is not."""
 
 
 def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
@@ -32,7 +32,7 @@ def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        One where they differ by more than their noise and `AGREEMENT`.
+        One note if they differ by more than their noise and `AGREEMENT`.
     """
     if "velocity_m_s" not in record or "position_m" not in record:
         return ()
@@ -49,9 +49,9 @@ def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
 
 
 def _filtered_noise(apart: Array, velocity: Array) -> float:
-    """Return the noise of two sensors of one motion in what they differ by, however it was filtered [m/s].
+    """Return the noise of the difference between two sensors of one motion, however it was filtered [m/s].
 
-    What goes with velocity or its change, as a wrong gain or a lag does, is no noise.
+    What is proportional to velocity or its change, as with a wrong gain or a lag, is no noise.
     """
     if len(apart) < FEWEST:
         return 0.0
@@ -61,9 +61,9 @@ def _filtered_noise(apart: Array, velocity: Array) -> float:
 
 
 def _by_trapezia(record: Record, blocks: Blocks) -> Array:
-    """Return the mean velocity over each block by the trapezoidal rule [m/s], as the slope of position has it.
+    """Return the mean velocity over each block by the trapezoidal rule [m/s], comparable to the slope of position.
 
-    Means of samples are half a sample early: 5 % of velocity where that doubles within a block.
+    Means of samples are half a sample early: an error of 5 % if velocity doubles within a block.
     """
     pooled = round(blocks.sample_time / record.sample_time) * blocks.block
     rows = record["velocity_m_s"][: len(blocks.velocity) * pooled + 1 : pooled]
@@ -74,8 +74,8 @@ def _by_trapezia(record: Record, blocks: Blocks) -> Array:
 def _between_samples(record: Record, blocks: Blocks) -> float:
     """Return the sampling error of block means of velocity, root mean square [m/s].
 
-    Between two samples velocity changes at a moment that no sample tells, so that a sample stands for too much or too
-    little of it: by a share of the change that is even between 0 and 1. Changes that are noise count there already.
+    Velocity changes at an unknown moment between two samples, so a sample represents too much or too little of it: by a
+    share of the change that is uniform between 0 and 1. Changes due to noise are counted already.
     """
     rows = round(blocks.block * blocks.sample_time / record.sample_time)
     steps = np.diff(record["velocity_m_s"])

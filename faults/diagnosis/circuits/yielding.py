@@ -9,19 +9,19 @@ from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.class_fit import PointFit
 
 UNEXPLAINED = (0.12, 0.08)
-"""Share of velocity and of pressure, root mean square, that the best circuit may leave [dimensionless]."""
+"""Share of velocity and of pressure, root mean square, that the best circuit may leave unexplained [dimensionless]."""
 
 YIELDING = 0.015
-"""Share of the velocity at which the pump's whole flow would move the piston, root mean square, that may be left in any
-case [dimensionless]: a piston that hardly moves yields on its seals, which no circuit describes to the last digit."""
+"""Residual velocity that is always allowed, over that at which the pump's whole flow would move the piston, root mean
+square [dimensionless]: a piston that hardly moves yields on its seals, which no circuit describes exactly."""
 
 HALF_POWER = math.sqrt(0.5)
-"""Share of velocity, root mean square, beyond which a circuit explains less than half of its power [dimensionless]:
-where pressure is not followed either, it says nothing of the log."""
+"""Share of velocity, root mean square, beyond which a circuit explains less than half of its power [dimensionless]: if
+it does not follow pressure either, it says nothing about the log."""
 
 
 def yielding_velocity(blocks: Blocks, actuator: Actuator) -> float:
-    """Return the velocity that a piston which yields on its seals may have beside a circuit's.
+    """Return the allowed residual velocity of a piston that yields on its seals.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def yielding_velocity(blocks: Blocks, actuator: Actuator) -> float:
     -------
     float
         `YIELDING` of the velocity at which the pump's whole flow would move the piston, root mean square [m/s]; without
-        pressure no more than `HALF_POWER` of the piston's own.
+        pressure at most `HALF_POWER` of the piston's own.
     """
     pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area
     yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
@@ -42,7 +42,7 @@ def yielding_velocity(blocks: Blocks, actuator: Actuator) -> float:
 
 
 def yields_on_seals(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
-    """Return whether a piston hardly moves, and a circuit follows it to what seals yield.
+    """Return whether a piston hardly moves, and a circuit follows it within what seals yield.
 
     Parameters
     ----------
@@ -56,14 +56,14 @@ def yields_on_seals(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
     Returns
     -------
     bool
-        Whether what the circuit leaves of velocity is no more than seals may yield, and `UNEXPLAINED` of velocity too.
+        Whether the residual velocity is within what seals may yield, and within `UNEXPLAINED` of velocity too.
     """
     yielding = yielding_velocity(blocks, actuator)
     return float(fit.scales[0]) <= yielding and UNEXPLAINED[0] * float(blocks.sizes[0]) <= yielding
 
 
 def follows(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
-    """Return whether a circuit follows the velocity of a log as far as a circuit must.
+    """Return whether a circuit follows the velocity of a log closely enough.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def follows(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
     Returns
     -------
     bool
-        Whether it leaves no more than `UNEXPLAINED` of it, twice its noise, or what seals yield.
+        Whether its residual is at most `UNEXPLAINED` of velocity, twice the noise, or what seals yield.
     """
     least = max(2.0 * float(blocks.noise[0]), yielding_velocity(blocks, actuator))
     return float(fit.scales[0]) <= max(UNEXPLAINED[0] * float(blocks.sizes[0]), least)
