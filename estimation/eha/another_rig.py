@@ -1,6 +1,6 @@
 """`unless_another_rig(...)`: a log that nothing explains may be that of another actuator than the rig file's.
 
-The piston then does not go where the file's pump would send it.
+The piston then does not move as the file's pump would drive it.
 """
 
 from dataclasses import replace
@@ -19,16 +19,16 @@ from plant.log.record import Record
 from plant.notes import Note
 
 OFF = 0.3
-"""Logarithm of displacement over area, over that of the rig file, from which it is another actuator's [dimensionless].
-It is a judgement: the usual doubts of both make 0.07 in two deviations, and balances of logs with their own rig file
-are up to 0.28 off."""
+"""Difference of the logarithm of displacement over area from that of the rig file, from which the actuator is another
+one [dimensionless]. A judgement: the usual uncertainty of both is 0.07 in two deviations, and logs with their own rig
+file are up to 0.28 off."""
 
 
 def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
-    """Return the objection to a rig file whose pump would send the piston elsewhere than it went.
+    """Return the objection to a rig file whose pump would drive the piston otherwise than it moved.
 
-    Leakage, flow bias and compression are whatever the log says they are, so only displacement over area counts. Where
-    most of the flow is lost, motion takes up what a balance leaves out; other blocks then tell another ratio.
+    Leakage, flow bias and compression are free, so only displacement over area counts. If most of the flow is lost,
+    motion absorbs what a balance omits, and different blocks show different ratios.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        Empty where the log does not tell the ratio, where it is that of the rig file, and without pressure.
+        Empty if the log does not determine the ratio, if it is that of the rig file, and without pressure.
     """
     balance = flow_balance(record, p, MIDDLE)
     if balance is None or balance.contradicts_rig < REFUTED:
@@ -53,14 +53,14 @@ def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
 
 
 def unless_rig_contradicted(slips: tuple[Note, ...], record: Record, p: EhaParameters) -> tuple[Note, ...]:
-    """Return wrong signs and units that a fit names; the objection to the rig file where pressure alone is to be wrong.
+    """Return wrong signs and units that a fit names; the objection to the rig file if only pressure would be wrong.
 
-    The unit of pressure changes nothing about how far the pump sends the piston.
+    The unit of pressure does not change how far the pump moves the piston.
 
     Parameters
     ----------
     slips : tuple of Note
-        What the fit names.
+        The slips that the fit names.
     record : Record
         The log.
     p : EhaParameters
@@ -71,14 +71,14 @@ def unless_rig_contradicted(slips: tuple[Note, ...], record: Record, p: EhaParam
 
 
 def unless_another_rig(found: BulkModulusEstimate, log: CleanLog, p: EhaParameters) -> BulkModulusEstimate:
-    """Return an estimate; a mismatch without a number if it was refused and the log contradicts the rig file.
+    """Return an estimate; a mismatch without a number if it was rejected and the log contradicts the rig file.
 
     Parameters
     ----------
     found : BulkModulusEstimate
-        The estimate. One that passes its check, or was found to contradict the rig file already, stays as it is.
+        The estimate. It is unchanged if it passes its check, or already contradicts the rig file.
     log : CleanLog
-        Its log. Where a sensor is accused, nothing is asked of the rig file.
+        Its log. If a sensor is suspected, the rig file is not tested.
     p : EhaParameters
         The healthy actuator.
 

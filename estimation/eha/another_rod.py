@@ -11,14 +11,15 @@ from plant.notes import Note
 
 VAGUE_AREAS = 0.5 * max(DOUBTS["piston_area"].usual)
 """Relative standard deviation of the ratio of a piston's areas from which an explanation by it is doubted [fraction]:
-half that of an area in a rig file. Right ones are known to 0.7 % at most; one that was wrong, with bulk modulus 14 to
-22 % too high, to 2 to 3 %."""
+half that of an area in a rig file. Right ratios are known to 0.7 % at most; a wrong one, with bulk modulus 14 to 22 %
+too high, to 2 to 3 %."""
 
 THROUGH = 0.001
 """Difference of the logarithm of a piston's two areas up to which its rod is a through rod [dimensionless]."""
 
 OTHER_ROD = 2.0 * 2.0**0.5 * max(DOUBTS["piston_area"].usual)
-"""The same between fit and rig file from which the areas are not the file's [dimensionless]: two deviations."""
+"""Difference of that logarithm between fit and rig file from which the areas are not the file's [dimensionless]: two
+deviations."""
 
 
 def vague_areas(found: Explanation | None) -> tuple[Note, ...]:
@@ -27,12 +28,12 @@ def vague_areas(found: Explanation | None) -> tuple[Note, ...]:
     Parameters
     ----------
     found : Explanation or None
-        What explains a log, if anything does.
+        The explanation of a log, if there is one.
 
     Returns
     -------
     tuple of Note
-        Nothing where areas are no part of it, or their ratio is known.
+        Empty if areas are not part of it, or their ratio is known.
     """
     if found is None or "area_difference" not in found.values:
         return ()
@@ -44,10 +45,10 @@ def vague_areas(found: Explanation | None) -> tuple[Note, ...]:
 
 
 def of_another_rod(note: Note) -> bool:
-    """Return whether a note tells areas that are not those of a rig file which says a single rod.
+    """Return whether a note reports areas that contradict a rig file with a single rod.
 
-    What is wrong with such a rig is taken up by its areas at times, a displacement that is 6 % off by 10 % of one. Its
-    bulk modulus may be right then, but its force balance is not.
+    An error of such a rig file may be absorbed by the areas, such as a displacement 6 % off by 10 % of an area. Bulk
+    modulus may then be right, but the force balance is not.
     """
     if note.code is not RigCode.SINGLE_ROD:
         return False
@@ -56,12 +57,12 @@ def of_another_rod(note: Note) -> bool:
 
 
 def b_over_a(difference: float) -> float:
-    """Return the ratio of two sides.
+    """Return side B over side A.
 
     Parameters
     ----------
     difference : float
-        Of sides A and B over their sum [dimensionless].
+        Difference of sides A and B over their sum [dimensionless].
 
     Returns
     -------

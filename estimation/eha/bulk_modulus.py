@@ -53,18 +53,18 @@ class EstimateOptions:
     ----------
     form : str
         ``"flow"``, ``"motion"``, ``"pressure"``, ``"acceleration"`` (the published one, valid between reversals only,
-        errata E9), or ``"auto"``: flow or motion where their channels are logged, else pressure.
+        errata E9), or ``"auto"``: flow or motion if their channels are logged, otherwise pressure.
     method : str
         ``"least-squares"`` for the forms that can be fitted, flow and motion; a filter of
         `estimation.filters.methods.METHODS`; a method of `estimation.eha.named_methods.NAMED`, with a form of its own;
-        or ``"auto"``: least squares where the form allows, the log begins at rest, and nothing is asked for that only a
-        filter does, else what `estimation.eha.by_filter.chosen_method` says.
+        or ``"auto"``: least squares if the form allows it, the log begins at rest, and no option needs a filter,
+        otherwise that of `estimation.eha.by_filter.chosen_method`.
     start : float, optional
         First guess [Pa]; the actuator's own if not given.
     start_std : float
         Its standard deviation, for the forms that are filtered [Pa].
     states : tuple of str
-        What a filter estimates beside bulk modulus: ``leakage``, ``friction``, ``air``, or a parameter's name.
+        States that a filter estimates beside bulk modulus: ``leakage``, ``friction``, ``air``, or a parameter's name.
     tuned : bool
         Whether the filter's noise levels are tuned to the log by likelihood.
     robust : str
@@ -86,7 +86,7 @@ class EstimateOptions:
 
 
 DEFAULT_OPTIONS = EstimateOptions()
-"""All automatic."""
+"""Everything automatic."""
 
 
 def estimate_bulk_modulus(
@@ -98,19 +98,18 @@ def estimate_bulk_modulus(
 ) -> BulkModulusEstimate:
     """Estimate effective bulk modulus from a log.
 
-    With position and ``differential_pressure_pa`` logged, the flow form fits it with leakage and flow bias, and
-    friction plays no part (`estimation.models.flow`). Without pressure, the motion form fits leakage and friction along
-    with it (`estimation.models.motion`), and the estimate rests on how the piston starts, stops and rings; where it
-    sticks there is nothing to rest on, and the outcome says so instead of giving a number (errata E13). A filter
-    takes leakage and friction as known.
+    With position and ``differential_pressure_pa``, the flow form fits it with leakage and flow bias, without friction
+    (`estimation.models.flow`). Without pressure, the motion form fits leakage and friction along with it
+    (`estimation.models.motion`). The estimate then depends on how the piston starts, stops and rings; if it sticks, the
+    outcome says so in place of a number (errata E13). A filter takes leakage and friction as known.
 
-    Bulk modulus enters as ``chamber_volume / bulk_modulus`` alone, so what is not known of the volume, and of the pump
-    and the piston, is not known of bulk modulus either; `uncertainties` carry it into the total interval.
+    Bulk modulus appears only as ``chamber_volume / bulk_modulus``. So the uncertainty of the volume, and of pump and
+    piston, is part of that of bulk modulus; `uncertainties` carry it into the total interval.
 
     Parameters
     ----------
     parameters : EhaParameters
-        The actuator; its bulk modulus is where the bound is taken, and the default first guess.
+        The actuator; its bulk modulus is the default first guess, and the value at which the bound is computed.
     uncertainties : Mapping[str, float or Spread], optional
         Relative standard deviation of the actuator's parameters, as a rig file has them [fraction], or that of their
         logarithms down and up; none by default.
@@ -120,8 +119,8 @@ def estimate_bulk_modulus(
     Returns
     -------
     BulkModulusEstimate
-        Value, interval, bound and verdict; a filter's value is its mean over the last 20 % of the log, or that after
-        the last sample where its noise levels are tuned.
+        Value, interval, bound and verdict. A filter's value is its mean over the last 20 % of the log, or that after
+        the last sample if its noise levels are tuned.
 
     Raises
     ------
@@ -148,7 +147,7 @@ def left_out(log: CleanLog, found: BulkModulusEstimate) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        One a channel at most.
+        At most one per channel.
     """
     used = {*found.channels, SPEED, *(PRESSURES if PRESSURE in found.channels else ())}
     return tuple(note for note in log.left_out if note.data["channel"] in used)
@@ -160,14 +159,14 @@ def estimate_clean(
     options: EstimateOptions = DEFAULT_OPTIONS,
     uncertainties: Mapping[str, float | Spread] | None = None,
 ) -> BulkModulusEstimate:
-    """Estimate effective bulk modulus from a log whose sensors have been looked at; see `estimate_bulk_modulus`.
+    """Estimate effective bulk modulus from a log whose sensors have been checked; see `estimate_bulk_modulus`.
 
     Parameters
     ----------
     options : EstimateOptions
-        How.
+        Options of the estimate.
     uncertainties : Mapping[str, float or Spread], optional
-        How far the actuator's parameters may be off [fraction]; it decides no outcome and no gate.
+        Uncertainty of the actuator's parameters [fraction]; it changes neither outcome nor gate.
 
     Returns
     -------
@@ -213,9 +212,9 @@ def estimate_clean(
 def _fit(
     log: CleanLog, parameters: EhaParameters, form: str, guess: float, spreads: Mapping[str, Spread], *, chosen: bool
 ) -> FormFit | None:
-    """Return the fit of a form; none where it has none, or the log begins under a load that the form does not explain.
+    """Return the fit of a form; None if it has none, or if the log begins under a load that the form does not explain.
 
-    Whoever has chosen least squares gets it, whatever the log begins with.
+    If the user chose least squares, it is used whatever the log begins with.
     """
     if form != "flow":
         return FITTED[form][0](log.record, parameters, guess, {}, log.variances) if form in FITTED else None
@@ -232,7 +231,7 @@ def _fit(
 def _filtered(
     log: CleanLog, parameters: EhaParameters, form: str, guess: float, options: EstimateOptions
 ) -> BulkModulusEstimate:
-    """Return the estimate of a filter; a log that is fitted imports none."""
+    """Return the estimate of a filter; imported only here, so that a fitted log does not load it."""
     from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
 
     method = "auto" if options.method == LEAST_SQUARES else options.method
@@ -247,12 +246,12 @@ def _filtered(
 
 
 def _wrong_sensors(log: CleanLog, form: str) -> tuple[Note, ...]:
-    """Return the objections to the sensors that a fit would use: it would explain them by faults that are not there."""
+    """Return the objections to the sensors that a fit would use: it would explain their errors by false faults."""
     return log.objections_to((*FITTED[form][1], SPEED)) if form in FITTED else ()
 
 
 def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:
-    """Return the estimate with the gate shut where a sensor that was used has stopped telling the truth."""
+    """Return the estimate with the gate shut if a sensor that was used has failed."""
     said = log.objections_to((*found.channels, SPEED))
     if not said:
         return found
@@ -260,7 +259,7 @@ def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusE
 
 
 def _form(options: EstimateOptions, record: Record) -> str:
-    """Return the form to fit: that of a named method, the one asked for, or the one that the log allows."""
+    """Return the form to fit: that of a named method, the chosen one, or the one that the log allows."""
     if options.method in NAMED:
         own = NAMED[options.method].form
         if options.form not in ("auto", own):
@@ -278,14 +277,14 @@ def _automatic(record: Record) -> str:
 
 
 def rigid_bound(log: CleanLog, parameters: EhaParameters) -> float:
-    """Return the bound of the pressure form, which knows leakage and friction: no form that must find them does better.
+    """Return the bound of the pressure form, which knows leakage and friction: forms that must find them do no better.
 
-    It takes one pass over the log, and tells a piston that sticks throughout before a fit is tried (errata E13).
+    It takes one pass over the log, and detects a piston that sticks throughout before a fit is tried (errata E13).
 
     Parameters
     ----------
     log : CleanLog
-        The log; its drive and sensors count, not what they show.
+        The log; only its drive and noise levels are used.
 
     Returns
     -------
@@ -301,7 +300,7 @@ def rigid_bound(log: CleanLog, parameters: EhaParameters) -> float:
 
 
 def _channel_slips(fit: FormFit, parameters: EhaParameters) -> tuple[Note, ...]:
-    """Return the wrong signs and units that a fit names; no pump delivers several times what it displaces."""
+    """Return the wrong signs and units that a fit names; no pump delivers several times its displacement."""
     share = None if fit.explanation is None else delivered(fit.explanation, parameters)
     if share is None or share <= FARTHEST:
         return tuple(note for note in fit.reasons if isinstance(note.code, ChannelCode))
@@ -309,7 +308,7 @@ def _channel_slips(fit: FormFit, parameters: EhaParameters) -> tuple[Note, ...]:
 
 
 def _misread(log: CleanLog, form: str) -> BulkModulusEstimate:
-    """Return no number, since the log's channels are not what their names say."""
+    """Return an outcome without a number, since the log's channels are not what their names say."""
     used = tuple(name for name in FLOW_CHANNELS if name in log.record)
     return without_number(Outcome.MISMATCH, log.mistakes, form, used)
 
@@ -317,7 +316,7 @@ def _misread(log: CleanLog, form: str) -> BulkModulusEstimate:
 def _with_rig(
     found: BulkModulusEstimate, parameters: EhaParameters, spreads: Mapping[str, Spread]
 ) -> BulkModulusEstimate:
-    """Return an estimate with what is not known of the rig, by the laws of dimension where the fit did not say."""
+    """Return an estimate with the rig's uncertainty, by the laws of dimension if the fit has no responses."""
     found = replace(found, spreads=with_wear(spreads, found.remarks))
     if found.value is None or found.responses:
         return found

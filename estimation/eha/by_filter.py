@@ -33,19 +33,19 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "friction": ("friction_quadratic", "friction_linear", "friction_coulomb"),
     "air": ("air_fraction",),
 }
-"""Short names for states that belong together."""
+"""Short names for groups of states."""
 
 WALK = 0.05
-"""Random walk of a further state that lets it follow a change: of its logarithm, in a second [1/s^(1/2)]."""
+"""Random walk of a further state, so that it can follow a change: of its logarithm, per second [1/s^(1/2)]."""
 
 
 STEPS_A_SAMPLE = 8
-"""Model steps a sample, at least, where noise levels are tuned: the interval is then so narrow that errors of the steps
-count. On our lumped plant at 5 kHz four steps a sample were 0.0007 % off, eight 0.0002 %."""
+"""Least model steps per sample if noise levels are tuned: the interval is then so narrow that errors of the steps
+matter. On our lumped plant at 5 kHz four steps per sample had an error of 0.0007 %, eight 0.0002 %."""
 
 SHORTEST_STEP = 2.5e-5
-"""Step that is never shortened for it, which is that of the lumped plant [s]: at 10 kHz one step of 0.1 ms a sample was
-0.01 % off, two 0.003 %, four less than 0.0005 %."""
+"""Step that is not shortened further for it, that of the lumped plant [s]: at 10 kHz one step of 0.1 ms per sample had
+an error of 0.01 %, two 0.003 %, four less than 0.0005 %."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class FilterOptions:
         A filter of `estimation.filters.methods.METHODS`, a method of `estimation.eha.named_methods.NAMED`, or
         ``"auto"``: see `chosen_method`.
     states : tuple of str
-        What is estimated beside bulk modulus: of `AUGMENTABLE`, or of `GROUPS`.
+        States estimated beside bulk modulus: of `AUGMENTABLE`, or of `GROUPS`.
     tuned : bool
         Whether the noise levels are tuned to the log by likelihood.
     robust : str
@@ -72,7 +72,7 @@ class FilterOptions:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The further states, groups spelt out."""
+        """The further states, with groups spelt out."""
         for name in self.states:
             require_known("a further state", name, (*GROUPS, *AUGMENTABLE))
         return tuple(dict.fromkeys(one for name in self.states for one in GROUPS.get(name, (name,))))
@@ -86,22 +86,22 @@ def estimate_by_filter(
     start_std: float,
     options: FilterOptions,
 ) -> BulkModulusEstimate:
-    """Estimate bulk modulus, and whatever else is wanted, with one filter on one process model.
+    """Estimate bulk modulus, and further states if wanted, with one filter on one process model.
 
     Parameters
     ----------
     parameters : EhaParameters
-        The actuator; first guesses of what is estimated.
+        The actuator, with first guesses of the estimated parameters.
     guess, start_std : float
         First guess of bulk modulus and its standard deviation [Pa].
     options : FilterOptions
-        How.
+        Options of the filter.
 
     Returns
     -------
     BulkModulusEstimate
-        Value, interval, bound and verdict; the value is the mean over the last 20 % of the log, or, where noise levels
-        are tuned, that after the last sample.
+        Value, interval, bound and verdict. The value is the mean over the last 20 % of the log, or, if noise levels are
+        tuned, that after the last sample.
 
     Raises
     ------
@@ -155,19 +155,19 @@ def estimate_by_filter(
 
 
 def chosen_method(record: Record, model: ProcessModel, tuned: bool) -> str:
-    """Return the filter that serves a log best.
+    """Return the filter that suits a log best.
 
     Parameters
     ----------
     tuned : bool
-        Whether its noise levels are those of the log.
+        Whether its noise levels are tuned to the log.
 
     Returns
     -------
     str
-        ``iterated-smoother`` where pressure is a state that is not logged, for a filter may then lose its way while the
-        piston sticks and never know; it presumes the right noise levels, so ``ekf`` where they are not tuned, and for
-        logs that are too long to be held.
+        ``iterated-smoother`` if pressure is a state that is not logged: a filter may then diverge unnoticed while the
+        piston sticks. It presumes the right noise levels, so ``ekf`` if they are not tuned, and for logs too long to be
+        held in memory.
     """
     unseen = PRESSURE in [state.name for state in model.states] and PRESSURE not in record
     return "iterated-smoother" if tuned and unseen and len(record) <= LONGEST else "ekf"
@@ -185,7 +185,7 @@ def estimate_by_flow_filter(
     parameters : EhaParameters
         Geometry and pump, and the size of the first guesses.
     options : FilterOptions
-        The method must be ``chamber-ekf``, ``ekf`` or ``auto``; nothing else can be chosen.
+        The method must be ``chamber-ekf``, ``ekf`` or ``auto``; there are no other options.
     guess : float, optional
         First guess of bulk modulus [Pa]; the actuator's if not given.
 
@@ -228,20 +228,20 @@ def conclude(
     fraction: float = 0.2,
     judged: Estimate | None = None,
 ) -> BulkModulusEstimate:
-    """Judge a filtered log and put the result in words and numbers.
+    """Judge a filtered log and return the result.
 
     Parameters
     ----------
     bound : float
         Relative Cramér-Rao bound of bulk modulus [fraction].
     form : str
-        What was believed of the actuator.
+        The process model.
     names : tuple of str
         Further states that are reported.
     fraction : float
         Share of the log, at its end, over which values are averaged [fraction].
     judged : Estimate, optional
-        The reading of the log that passes the gate; the same if not given.
+        The reading of the log that must pass the gate; the same if not given.
     """
     value, std = estimate.settled(BULK_MODULUS, fraction)
     finite = bool(np.isfinite(value) and np.isfinite(std))
@@ -272,11 +272,11 @@ def _verdict(estimate: Estimate, record: Record, finite: bool, bound: float) -> 
 
 
 def _settled(filtered: Callable[[float], Estimate], guess: float) -> tuple[Estimate, Estimate]:
-    """Filter from the first guess; where it was far too low or the gate objects, again from where that ended.
+    """Filter from the first guess; if that was far too low or the gate objects, again from where the filter ended.
 
-    A first guess far below the truth predicts no motion at all, and the filter may then spend its prior on the wrong
-    side, unnoticed by the gate. The second pass begins near the answer with the same wide prior; the likelier is
-    returned, and with it the first pass.
+    A first guess far below the truth predicts no motion at all, and the filter may then use up its prior on the wrong
+    side, unnoticed by the gate. The second pass begins near the answer with the same wide prior. The likelier pass is
+    returned with the first one.
     """
     first = filtered(guess)
     value, _ = first.settled(BULK_MODULUS)

@@ -1,8 +1,8 @@
-"""A bank of chamber filters as one estimate: which filters count, replay of the log, and their mean.
+"""A bank of chamber filters as one estimate: selection of filters, replay of the log, and their mean.
 
-At every sample the mixture rests on what came before it alone (Alspach and Sorenson 1972, equations 26 to 33): a weight
-is that of its block's beginning. What is hopeless is dropped block by block; from `FIRST_LOOK` on the survivors read
-again what they have read (`estimation.filters.relinearised`).
+At every sample the mixture depends on earlier samples only (Alspach and Sorenson 1972, equations 26 to 33): a weight is
+that at the beginning of its block. Hopeless filters are dropped block by block; from `FIRST_LOOK` on the remaining ones
+process all earlier samples again (`estimation.filters.relinearised`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,25 +18,25 @@ from estimation.filters.batch import filter_batch
 from estimation.filters.relinearised import relinearised
 
 BLOCKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-"""Ends of the first blocks [s]; later ones are each `GROWTH` times as late."""
+"""Ends of the first blocks [s]; each later end is `GROWTH` times the one before."""
 
 GROWTH = 3.0
 """Ratio of later blocks' ends [dimensionless]."""
 
 FIRST_LOOK = 2.0
-"""From when on the log so far is read again [s]: by then it tells a wrong valley from a right one."""
+"""Time from which the log so far is processed again [s]: by then it tells a wrong minimum from a right one."""
 
 HEARD = {0.0: 1000, 0.5: 64, 1.0: 16}
-"""How many filters of a model go on after a block that ends then or later [s]."""
+"""Filters of a model that continue after a block that ends at this time or later [s]."""
 
 READ_AGAIN, KEPT = 4, 2
-"""How many filters of a model read the log again, and how many of them go on."""
+"""Filters of a model that process the log again, and how many of them continue."""
 
 NEAR = 1.0
-"""Deviations of bulk modulus and leakage within which two filters are one [dimensionless]."""
+"""Deviations of bulk modulus and leakage within which two filters count as one [dimensionless]."""
 
 LONGEST_READ_AGAIN = 300_000
-"""The log so far is read again while it is no longer [samples]."""
+"""Longest log so far that is processed again [samples]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Member:
     problem : FilterProblem
         The whole log with the filter's prior.
     mean, covariance : ndarray, shapes (n,) and (n, n)
-        What it believes, scaled.
+        Its belief, scaled.
     score : float
         Log of its prior weight and likelihood [dimensionless].
     """
@@ -84,9 +84,9 @@ def run_bank(members: Sequence[Member], near: tuple[int, ...]) -> Reading:
     Parameters
     ----------
     members : sequence of Member
-        Of one log, those of a model side by side; all models have the same states.
+        Filters of one log; those of a model run side by side. All models have the same states.
     near : tuple of int
-        Places of the states in which filters are told apart.
+        Indices of the states by which filters are told apart.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def _ends(samples: int, every: int, sample_time: float) -> list[int]:
 
 
 def _part(problem: FilterProblem, begin: int, end: int) -> FilterProblem:
-    """Return the task of a block, from the sample that the one before ended with, which is not measured twice."""
+    """Return the task of a block, from the last sample of the one before, which is not used twice."""
     measured = problem.measured[begin:end]
     if begin > 0:
         measured = measured.copy()
@@ -158,7 +158,7 @@ def _weights(heard: Sequence[Member]) -> Array:
 
 
 def _mixed(weights: Array, means: Array, variances: Array) -> tuple[Array, Array]:
-    """Return the moments of a mixture; one that diverged or counts for nothing is left out."""
+    """Return the moments of a mixture; diverged filters and those without weight are left out."""
     sound = (weights > 1e-12) & np.all(np.isfinite(means), axis=(1, 2)) & np.all(np.isfinite(variances), axis=(1, 2))
     if not np.any(sound):
         return np.full_like(means[0], np.nan), np.full_like(means[0], np.nan)
@@ -168,7 +168,7 @@ def _mixed(weights: Array, means: Array, variances: Array) -> tuple[Array, Array
 
 
 def _survivors(heard: list[Member], near: tuple[int, ...], end: int, samples: int) -> list[Member]:
-    """Return who goes on, model by model, having read the log so far again where it is time to."""
+    """Return the filters that continue, model by model, after processing the log so far again if it is time."""
     time = end * heard[0].problem.sample_time
     again = (time >= FIRST_LOOK or end == samples) and end <= LONGEST_READ_AGAIN
     most = [count for since, count in HEARD.items() if time >= since][-1]
@@ -189,7 +189,7 @@ def _read_again(member: Member, end: int) -> Member:
 
 
 def _apart(members: Sequence[Member], near: tuple[int, ...]) -> list[Member]:
-    """Return the likelier of any two that are one."""
+    """Return the likelier of any two filters that count as one."""
     kept: list[Member] = []
     for member in members:
         if not any(_same(member, other, near) for other in kept):

@@ -10,11 +10,11 @@ from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 WARMED = 3.0
-"""Factor up to which leakage follows the oil's viscosity and is no fault [dimensionless]: mineral oil thins to a third
-as it warms by some 25 K (ISO 3448 VG 46 between 40 and 65 degrees Celsius, about)."""
+"""Factor up to which leakage follows the oil's viscosity and is no fault [dimensionless]: the viscosity of mineral oil
+falls to a third as it warms by some 25 K (ISO 3448 VG 46 between 40 and 65 degrees Celsius, about)."""
 
 LEAST_GROWN = 1e-3
-"""Least leakage over its value halfway [dimensionless]: a parabola may cross zero beyond what it was fitted to."""
+"""Least leakage over its value halfway [dimensionless]: a parabola may cross zero outside the fitted range."""
 
 
 def growth_note(found: Explanation, _: EhaParameters) -> Note:
@@ -23,7 +23,7 @@ def growth_note(found: Explanation, _: EhaParameters) -> Note:
     Parameters
     ----------
     found : Explanation
-        What explains the log.
+        The explanation of the log.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def changed_note(factor: float, last: float) -> Note:
     factor : float
         Leakage at the end over that at the beginning [dimensionless].
     last : float
-        That at the end [m^3/(s Pa)].
+        Leakage at the end [m^3/(s Pa)].
 
     Returns
     -------
@@ -59,7 +59,7 @@ def step_note(found: Explanation, _: EhaParameters) -> Note:
     Parameters
     ----------
     found : Explanation
-        What explains the log.
+        The explanation of the log.
 
     Returns
     -------
@@ -76,12 +76,12 @@ def step_note(found: Explanation, _: EhaParameters) -> Note:
 
 
 def leakage_over(found: Explanation, elapsed: Array) -> Array:
-    """Return leakage that changes all along, over its value halfway.
+    """Return a leakage that changes throughout a log, over its value halfway.
 
     Parameters
     ----------
     found : Explanation
-        What explains the log.
+        The explanation of the log.
     elapsed : ndarray, shape (n,)
         Shares of the log [fraction].
 

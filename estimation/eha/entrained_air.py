@@ -24,7 +24,7 @@ class EntrainedAir(NamedTuple):
     share, std : float
         Its volume at atmospheric pressure over that of the oil, and standard deviation [fraction].
     quickness : float
-        1 - 1/n of the exponent n by which it is squeezed [dimensionless].
+        1 - 1/n of its polytropic exponent n [dimensionless].
     compliance : float
         Inverse of the oil's bulk modulus at the stated pressure, air included [1/Pa].
     stated : float
@@ -38,7 +38,7 @@ class EntrainedAir(NamedTuple):
     stated: float
 
     def compliance_at(self, pressure: float) -> float:
-        """Return what the air alone adds to the compliance of oil.
+        """Return the compliance that the air alone adds to oil.
 
         Parameters
         ----------
@@ -48,19 +48,19 @@ class EntrainedAir(NamedTuple):
         Returns
         -------
         float
-            Of a unit of oil [1/Pa].
+            Per unit of oil [1/Pa].
         """
         bubbles = self.share * (ATMOSPHERE / pressure) ** (1.0 - self.quickness)
         return bubbles * (1.0 - self.quickness) / pressure
 
     @property
     def liquid(self) -> float:
-        """Bulk modulus of the oil without it [Pa]; not positive where air alone is as soft as the whole."""
+        """Bulk modulus of the oil without it [Pa]; not positive if the air alone is as soft as the whole."""
         left = self.compliance - self.compliance_at(self.stated)
         return 1.0 / left if left else 0.0
 
     def isothermal(self, pressure: float) -> "EntrainedAir":
-        """Return isothermal air that yields as much at a pressure, in oil that is as stiff as a whole.
+        """Return isothermal air with the same compliance at a pressure, in oil of the same total stiffness.
 
         Parameters
         ----------
@@ -77,12 +77,12 @@ def entrained_air(found: Explanation | None) -> EntrainedAir | None:
     Parameters
     ----------
     found : Explanation or None
-        What explains the log.
+        The explanation of the log.
 
     Returns
     -------
     EntrainedAir or None
-        None where no air does, or where it gets in later.
+        None if there is none, or if it enters later.
     """
     if found is None or "air_softness" not in found.values or "air_onset" in found.values:
         return None
@@ -92,21 +92,21 @@ def entrained_air(found: Explanation | None) -> EntrainedAir | None:
 
 
 def with_air(parameters: EhaParameters, found: Explanation | None) -> EhaParameters:
-    """Return an actuator with the oil and the air that a log shows, for a circuit, whose bubbles are isothermal.
+    """Return an actuator with the oil and air that a log shows, for a circuit, whose bubbles are isothermal.
 
-    They yield as the log's do where they matter most: at the inner circuit's pressure.
+    Their compliance equals the log's where it matters most: at the inner circuit's pressure.
 
     Parameters
     ----------
     parameters : EhaParameters
         The actuator.
     found : Explanation or None
-        What explains the log.
+        The explanation of the log.
 
     Returns
     -------
     EhaParameters
-        The same one where no air does, or more than oil with bubbles can hold.
+        Unchanged if there is no air, or more than oil with bubbles can hold.
     """
     if (air := entrained_air(found)) is None:
         return parameters
@@ -123,16 +123,16 @@ def amount_of_air(
     Parameters
     ----------
     found : Explanation or None
-        What explains the log.
+        The explanation of the log.
     responses : Responses or None
-        Of bulk modulus to the rig file's entries [dimensionless]: what makes it larger makes the air less.
+        Response of bulk modulus to the rig file's entries [dimensionless]: a larger bulk modulus means less air.
     spreads : Mapping[str, Spread]
-        How far each entry may be off.
+        Uncertainty of each entry.
 
     Returns
     -------
     Quantity or None
-        Share of the oil at atmospheric pressure [%]; None where no air explains the log.
+        Share of the oil at atmospheric pressure [%]; None if no air explains the log.
     """
     if (air := entrained_air(found)) is None:
         return None
@@ -146,7 +146,7 @@ def air_note(found: Explanation, _: EhaParameters) -> Note:
     Parameters
     ----------
     found : Explanation
-        With that air.
+        The explanation with that air.
     """
     softness, std = found.values["air_softness"]
     said = {"percent": 100.0 * softness / ATMOSPHERE, "half_width": 100.0 * NORMAL_95 * std / ATMOSPHERE}

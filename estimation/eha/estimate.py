@@ -15,7 +15,7 @@ from plant.notes import Note
 from plant.units import notes as parameter_notes
 
 KIND = "eha"
-"""What the registry calls the gear-pump actuator."""
+"""Name of the gear-pump actuator in the registry."""
 
 NOT_THE_LOGS = {
     EstimateCode.BOUND_TOO_WIDE,
@@ -26,19 +26,19 @@ NOT_THE_LOGS = {
     EstimateCode.WEAKLY_HELD,
     EstimateCode.NOT_HELD,
 }
-"""Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, its oil is too stiff for the
-noise of position, or it depends on how the piston starts and stops, which decides no condition."""
+"""Reasons of a gate against bulk modulus alone: the log has too little information on it, its oil is too stiff for the
+position noise, or it depends on how the piston starts and stops. They are no reasons against a condition."""
 
 LARGEST_SHARE = 0.06
-"""Share of the motion that a fit without pressure may leave where anything is concluded from the log [fraction]: as
-much as means over 0.1 s may differ from a circuit's (`faults.diagnosis.circuits.out_of_model`)."""
+"""Largest share of the motion that a fit without pressure may leave before nothing is concluded from the log
+[fraction]: as much as means over 0.1 s may differ from a circuit's (`faults.diagnosis.circuits.out_of_model`)."""
 
 NOT_TOLD = frozenset({RigCode.MAKEUP_UNSEEN})
-"""Remarks of a fit that say what a log does not tell, and nothing of the numbers that it does."""
+"""Remarks of a fit on what a log does not determine, which say nothing about its numbers."""
 
 
 def estimate_log(record: Record, rig: Rig, options: EstimateOptions = DEFAULT_OPTIONS) -> Finding:
-    """Estimate effective bulk modulus, and what is found along with it, from a log.
+    """Estimate effective bulk modulus, and further parameters, from a log.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def estimate_log(record: Record, rig: Rig, options: EstimateOptions = DEFAULT_OP
     rig : Rig
         The actuator: parameters, and how well they are known.
     options : EstimateOptions
-        How; all automatic if not given.
+        Options of the estimate; all automatic if not given.
 
     Returns
     -------
@@ -65,12 +65,12 @@ def estimate_log(record: Record, rig: Rig, options: EstimateOptions = DEFAULT_OP
 
 
 def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanLog, BulkModulusEstimate]:
-    """Return a log with its estimate.
+    """Return a log, after its checks, with its estimate.
 
     Parameters
     ----------
     options : EstimateOptions
-        How.
+        Options of the estimate.
 
     Returns
     -------
@@ -132,14 +132,14 @@ def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[No
     Returns
     -------
     tuple of Note
-        None for a plain log.
+        Empty for a plain log.
     """
     strange = () if found.explanation is None else notes_of(found.explanation, parameters)
     return (*strange, *(note for note in found.remarks if note.code not in NOT_TOLD))
 
 
 def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:
-    """Return the note on what is lost without differential pressure; nothing if it is used.
+    """Return the note on what is lost without differential pressure; empty if it is used.
 
     Returns
     -------
@@ -154,16 +154,16 @@ def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:
 
 
 def refused(found: BulkModulusEstimate) -> tuple[Note, ...]:
-    """Return why the fit of a log is refused, so that nothing can be concluded from it.
+    """Return why the fit of a log is rejected, so that nothing can be concluded from it.
 
-    A form that is told leakage and friction may be refused because the actuator is not the one that it was told of;
-    that is no objection to the log.
+    A form with given leakage and friction may be rejected because the actuator has others; that is no objection to the
+    log.
 
     Returns
     -------
     tuple of Note
-        Reasons of its gate; none where it passed, or where they speak against bulk modulus alone. A log of which the
-        model leaves much of the motion, however fine the encoder, is refused for all of them.
+        Reasons of its gate; empty if it passed, or if they concern bulk modulus alone. If the model leaves much of the
+        motion, all reasons count, however fine the encoder.
     """
     if found.form not in FITTED:
         return ()
@@ -172,7 +172,7 @@ def refused(found: BulkModulusEstimate) -> tuple[Note, ...]:
 
 
 def _moves_otherwise(found: BulkModulusEstimate) -> bool:
-    """Return whether the piston moves unlike the model, by a large share of its motion, not only of the noise."""
+    """Return whether the residual is a large share of the piston's motion, and not only large beside the noise."""
     large = [note for note in found.gate.reasons if note.code == EstimateCode.POSITION_RESIDUALS_LARGE]
     share = max((float(note.data["motion_percent"]) for note in large), default=float("inf"))
     return found.outcome is Outcome.MISMATCH and share > 100.0 * LARGEST_SHARE

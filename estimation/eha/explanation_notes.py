@@ -28,10 +28,10 @@ from plant.log.record import Record
 from plant.notes import Note
 
 LAGS: Mapping[str, str] = {PRESSURE: "pressure_lag", SPEED: "speed_lag", POSITION: "position_lag"}
-"""The lag of each channel that may come late, beside its delay."""
+"""The lag of each channel that may be late, beside its delay."""
 
 LEAKAGE_COURSE = "leakage_course"
-"""Channel of a log that was set right: leakage over what it is when the log ends [dimensionless]."""
+"""Channel of a corrected log: leakage over its value at the end of the log [dimensionless]."""
 
 RIG_ENTRIES = ("pump_displacement", "chamber_volume", "area_difference", "volume_difference", "pilot_share")
 """Entries of a rig file that a log may correct."""
@@ -63,7 +63,7 @@ def notes_of(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        One a hypothesis, and one where others explain the log about as well.
+        One per hypothesis, and one if others explain the log about as well.
     """
     notes = [_NOTES[name](found, parameters) for name in found.names]
     if found.rivals:
@@ -96,19 +96,19 @@ def _speed_early(found: Explanation, p: EhaParameters) -> Note:
 
 
 def lateness(found: Explanation, channel: str) -> float:
-    """Return the total delay of a channel, lag and delay together.
+    """Return the total delay of a channel: lag plus delay.
 
     Parameters
     ----------
     found : Explanation
-        What explains the log.
+        The explanation of the log.
     channel : str
         One of `LAGS`.
 
     Returns
     -------
     float
-        Time [s], negative where it comes early.
+        Time [s], negative for a lead.
     """
     return found.delays.get(channel, 0.0) + found.values.get(LAGS[channel], (0.0, 0.0))[0]
 
@@ -132,7 +132,7 @@ def _sides(found: Explanation, _: EhaParameters) -> Note:
 
 
 def _zero(found: Explanation, p: EhaParameters) -> Note:
-    """Chambers of unlike volume look as those of an encoder that reads zero elsewhere."""
+    """Return the note on chambers of unequal volume, which look like those of an encoder with another zero."""
     value, half_width = found.values["position_zero"][0], 1e3 * _half_width(found, "position_zero")
     more = 2.0 * p.piston_area * abs(value)
     side = "A" if value < 0.0 else "B"
@@ -244,17 +244,17 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
 
 
 def at_pump_speed(log: CleanLog, turning: Turning) -> CleanLog:
-    """Return a log at whose speed a pump without ripple delivers the same flow.
+    """Return a log with the speed at which a pump without ripple delivers the same flow.
 
     Parameters
     ----------
     turning : Turning
-        Teeth of the pump, and offset of the logged speed.
+        Pump ripple, and offset of the logged speed.
 
     Returns
     -------
     CleanLog
-        The log itself where nothing was taken up.
+        Unchanged if there is neither.
     """
     if turning == EVENLY:
         return log
@@ -264,13 +264,13 @@ def at_pump_speed(log: CleanLog, turning: Turning) -> CleanLog:
 
 
 def set_right(log: CleanLog, found: Explanation) -> CleanLog:
-    """Return a log as its channels would be without the sensors' offsets and delays that explain it.
+    """Return a log without the sensors' offsets and delays that explain it.
 
     Returns
     -------
     CleanLog
-        The log, with a `LEAKAGE_COURSE` where leakage drifts over it; pressures at its end that are not known any
-        more are missing.
+        The log, with a `LEAKAGE_COURSE` if leakage drifts over it; pressures at its end that are no longer known are
+        missing.
     """
     value = {name: pair[0] for name, pair in found.values.items()}
     record, changed = log.record, dict[str, Array]()
@@ -296,7 +296,7 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
 
 
 def _with_position(record: Record, moved: Array, behind: float) -> Mapping[str, Array]:
-    """Return the velocity brought forward with the position, where both come from one late encoder; else nothing."""
+    """Return the velocity shifted along with the position, if both come from one late encoder; otherwise nothing."""
     if VELOCITY not in record:
         return {}
     slope, forward = np.gradient(moved) / record.sample_time, _brought_forward(record, VELOCITY, behind)
@@ -305,7 +305,7 @@ def _with_position(record: Record, moved: Array, behind: float) -> Mapping[str, 
 
 
 def _brought_forward(record: Record, channel: str, late: float) -> Array:
-    """Return a channel as if it came on time; where it is sampled in some rows alone, each goes to its nearest row."""
+    """Return a channel without its delay; if it is sampled in some rows only, each sample goes to its nearest row."""
     values, rows = record[channel], np.arange(len(record))
     there = np.flatnonzero(np.isfinite(values))
     if len(there) in (0, 1, len(record)):
@@ -324,9 +324,9 @@ def rig_set_right(parameters: EhaParameters, found: Explanation) -> EhaParameter
     Parameters
     ----------
     parameters : EhaParameters
-        What the rig file says.
+        The rig file's actuator.
     found : Explanation
-        What explains the log.
+        The explanation of the log.
     """
     names = [name for name in RIG_ENTRIES if name in found.values]
     return replace(parameters, **{name: found.values[name][0] for name in names})

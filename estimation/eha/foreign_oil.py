@@ -1,7 +1,7 @@
-"""`unless_foreign(...)`: a bulk modulus that no oil has, or that a piston which stands still leaves open.
+"""`unless_foreign(...)`: a bulk modulus that no oil has, or that a piston at rest leaves undetermined.
 
-A motion confirms the units of speed and pressure: the piston goes as far as it is pumped, and slides from the pressure
-on that friction takes. Oil that is compressed behind a piston that stands still is known on their scale alone.
+Motion confirms the units of speed and pressure: the piston moves as far as it is pumped, and slides at the pressure
+that friction takes. Compression of oil behind a piston at rest confirms no scale.
 """
 
 from dataclasses import replace
@@ -22,27 +22,27 @@ from plant.log.record import Record
 from plant.notes import Note
 
 STIFFEST = 2.5e9
-"""Bulk modulus over which no oil is [Pa]: mineral oils have 1.4 to 2 GPa (Merritt, Hydraulic Control Systems, 1967,
-chapter 2), and a chamber of 15 % more than its rig file says reads as much more."""
+"""Largest bulk modulus of any oil [Pa]: mineral oils have 1.4 to 2 GPa (Merritt, Hydraulic Control Systems, 1967,
+chapter 2), and if a chamber is 15 % larger than its rig file says, the estimate is as much larger."""
 
 SOFTEST = 3e7
-"""Bulk modulus below which no oil is that holds no bubbles [Pa]; judged. The softest oil of the open benchmark has
-40 MPa, and the paper's in psi read as bar 14 MPa."""
+"""Least bulk modulus of any oil without bubbles [Pa]; judged. The softest oil of the open benchmark has 40 MPa, and the
+paper's in psi read as bar 14 MPa."""
 
 UNLIKE = 0.2
-"""Logarithm of bulk modulus over the rig file's from which the units are doubted that no motion confirms
+"""Logarithm of bulk modulus over the rig file's from which units are doubted if no motion confirms them
 [dimensionless]; judged."""
 
 VAGUE_STILL = 0.1
-"""Relative deviation of bulk modulus from which one behind a still piston is none [fraction]; judged. Two slips of
-scale that cancel had 13 to 30 %, logs without a slip 1 to 3 %."""
+"""Relative deviation of bulk modulus behind a piston at rest, above which it is not reported [fraction]; judged. Two
+slips of scale that cancel had 13 to 30 %, logs without a slip 1 to 3 %."""
 
 
 def shows_no_motion(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     """Return the objection to a log in which neither pump nor piston moves, or no sensor of the piston ever changes.
 
-    A piston that stands still yields on its seals, which makes 2 % of bulk modulus; a sensor that shows no such thing
-    is dead or too coarse.
+    A piston at rest yields on its seals, which is 2 % of bulk modulus; a sensor that does not show it is dead or too
+    coarse.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def shows_no_motion(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        Empty where one of them moves.
+        Empty if one of them moves.
     """
     gone = travels(record, p)
     if gone is not None and gone.at_rest:
@@ -66,12 +66,12 @@ def shows_no_motion(record: Record, p: EhaParameters) -> tuple[Note, ...]:
 
 
 def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters) -> BulkModulusEstimate:
-    """Return an estimate, without a number where its oil is none.
+    """Return an estimate, without a number if no oil is like that.
 
     Parameters
     ----------
     found : BulkModulusEstimate
-        The estimate. One without a value stays as it is.
+        The estimate; unchanged if it has no value.
     record : Record
         Its log.
     p : EhaParameters
@@ -80,9 +80,9 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     Returns
     -------
     BulkModulusEstimate
-        Without a number where no oil is like that, or, of a piston that stands still, where it is vague or no kin of
-        the rig's; no kin is what is unlike it at all where something strange explains the log. That no motion confirms
-        the units is said where the pump turns, and of oil unlike the rig's.
+        Without a number if no oil is like that. For a piston at rest, also if it is vague or unlike the rig's oil, and
+        more strictly so if an unusual effect explains the log. A note says that no motion confirms the units if the
+        pump turns, and if the oil is unlike the rig's.
     """
     if found.value is None:
         return found
@@ -102,7 +102,7 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
 
 
 def _is_none(found: BulkModulusEstimate, ratio: float) -> bool:
-    """Return whether an oil without bubbles, told by pressure, is softer or stiffer than any.
+    """Return whether oil without bubbles, measured with pressure, is softer or stiffer than any.
 
     Pressure in another unit scales bulk modulus and leakage, and the flow balance explains that as well.
     """

@@ -14,8 +14,8 @@ PUBLISHED_TIME = 1e-4
 """Sample time of section 7, for which equation 7.6 is printed [s]."""
 
 PRINTED_Q = (1e-12, 1e-8, 1e-6, 1e-12)
-"""Equation 7.6: what a step adds to the variance of position [m^2], velocity [m^2/s^2], acceleration [m^2/s^4] and bulk
-modulus [Pa^2]."""
+"""Equation 7.6: variance added per step to position [m^2], velocity [m^2/s^2], acceleration [m^2/s^4] and bulk modulus
+[Pa^2]."""
 
 PRINTED_R: Mapping[str, float] = MappingProxyType({"position_m": 1e-12, "velocity_m_s": 1e-4})
 """Equation 7.7: measurement variances [m^2, m^2/s^2]."""
@@ -33,14 +33,14 @@ class NamedMethod:
     Parameters
     ----------
     form : str
-        What is believed of the actuator.
+        The process model.
     method : str
         A filter of `estimation.filters.methods.METHODS`.
     noise : Mapping[str, float]
         Process-noise densities by state, in place of the form's [SI squared a second].
     variances : Mapping[str, float]
-        Measurement variances of the channels that are used, in place of the log's [SI squared]; all that the form
-        predicts where there are none.
+        Measurement variances of the channels that are used, in place of the log's [SI squared]; if empty, all channels
+        that the form predicts.
     """
 
     form: str

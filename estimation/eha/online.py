@@ -1,7 +1,7 @@
 """A filter on a stream of an electro-hydrostatic actuator: its task and its state file.
 
-Samples of a stream become drives and measurements as those of a log do. A state holds task and memory, so that a filter
-continues after a restart to the last bit, and refuses a stream that is not the one it was made for.
+Samples of a stream become drives and measurements as those of a log do. A state file holds task and memory. So a filter
+continues after a restart, to the last bit, and refuses a stream for which it was not made.
 """
 
 from collections.abc import Mapping
@@ -38,9 +38,9 @@ class StreamFilterOptions:
     form, method : str
         One of `EXPORTED_FORMS`, and of `estimation.filters.online.RULES`.
     states : tuple of str
-        What is estimated beside bulk modulus.
+        States estimated beside bulk modulus.
     tuned : bool
-        Whether the noise levels are those of greatest likelihood on the log that they are read off.
+        Whether the noise levels are those of greatest likelihood on the reference log.
     """
 
     parameters: EhaParameters
@@ -56,7 +56,7 @@ def begin_filter(asked: StreamFilterOptions, first: Record, like: Record | None 
     Parameters
     ----------
     first : Record
-        What the stream begins with: first belief, channels, and sensor noise where there is no other log.
+        Beginning of the stream: first belief, channels, and sensor noise if there is no other log.
     like : Record, optional
         A log of the same bench, from which the noise levels are read.
 
@@ -86,7 +86,7 @@ def _with_pressure(record: Record) -> Record:
 
 
 def _whole(record: Record) -> NDArray[np.bool_]:
-    """Return which samples have every channel; noise is read off these."""
+    """Return which samples have every channel; noise is determined from these."""
     return np.all([np.isfinite(record[name]) for name in record], axis=0)
 
 
@@ -119,12 +119,12 @@ def samples_of(filtered: OnlineFilter, channels: Mapping[str, Array]) -> tuple[A
 
 
 def save_filter(path: Path, asked: StreamFilterOptions, filtered: OnlineFilter, last: float) -> None:
-    """Write task and memory of a filter, whole or not at all.
+    """Write task and memory of a filter, completely or not at all.
 
     Parameters
     ----------
     path : Path
-        Where to.
+        File to write.
     last : float
         Time of the last sample [s].
 

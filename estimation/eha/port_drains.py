@@ -13,9 +13,9 @@ from plant.notes import Note
 
 
 def most_drained(p: EhaParameters) -> float:
-    """Return the largest case drain of a sound pump per port, before a log is seen.
+    """Return the prior upper limit of a sound pump's case drain per port.
 
-    It is presumed a twentieth of the healthy leakage, and known to a factor of e: 97.5 % drain less than a third of it.
+    The prior is a twentieth of the healthy leakage, known to a factor of e: 97.5 % drain less than a third of it.
 
     Returns
     -------
@@ -33,13 +33,13 @@ def most_drained(p: EhaParameters) -> float:
 def drain_note(side: str) -> Callable[[Explanation, EhaParameters], Note]:
     """Return a function that writes the note on ports that drain differently.
 
-    The port that drains more is the one of a make-up valve that leaks, whichever drain was freed; and where it drains
-    no more than the case of a sound pump does, no valve leaks.
+    The port that drains more has the make-up valve that leaks, whichever drain was fitted. If it drains no more than
+    the case of a sound pump does, no valve leaks.
 
     Parameters
     ----------
     side : str
-        The port whose drain was freed, a or b.
+        The port whose drain was fitted, a or b.
 
     Returns
     -------

@@ -21,8 +21,8 @@ LARGEST_BOUND = 0.03
 """Relative Cramér-Rao bound above which bulk modulus is called not observable (errata E13) [fraction]."""
 
 VAGUE = 0.5
-"""Relative standard deviation above which a number is none, whatever its bound [fraction]; judged. Where a model
-chatters the bound may vanish: a log of chambers that leak empty within a sample had 147 % beside one of 1e-9."""
+"""Relative standard deviation above which a value is not reported, whatever its bound [fraction]; judged. If a model
+chatters, the bound may vanish: a log of chambers that leak empty within a sample had 147 % beside a bound of 1e-9."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,40 +36,40 @@ class BulkModulusEstimate:
     value : float or None
         Effective bulk modulus, convention of equation 5.8 (errata E2) [Pa]; None unless the outcome is ok.
     std : float or None
-        Its standard deviation from the log's noise, as if the rig file were right [Pa].
+        Its standard deviation due to the log's noise, if the rig file is right [Pa].
     bound : float
         Relative Cramér-Rao bound [fraction].
     gate : Gate
         Whether value and interval can be believed.
     form : str
-        What was believed of the actuator: ``flow``, ``motion``, ``pressure`` or ``acceleration``.
+        The process model: ``flow``, ``motion``, ``pressure`` or ``acceleration``.
     channels : tuple of str
         Channels that were used beside motor speed.
     nis : Mapping[str, float]
-        Mean squared normalised residual of each predicted channel; 1 where the model explains the log [dimensionless].
+        Mean squared normalised residual of each predicted channel; 1 if the model explains the log [dimensionless].
     others : Mapping[str, tuple of float]
-        What was estimated along with it: value and standard deviation in SI, by parameter name.
+        Further estimates: value and standard deviation in SI, by parameter name.
     estimate : Estimate or None
-        The filtered log, where a filter was used.
+        The filtered log, if a filter was used.
     first_pass : Estimate or None
-        The pass that began at the first guess; the same one unless a second, begun where it ended, was likelier.
+        The pass that began at the first guess; the same one unless a second was likelier.
     responses : Mapping[str, Responses]
-        How bulk modulus and the others would differ if the rig did, by quantity [dimensionless].
+        Response of bulk modulus and the others to the rig's entries, by quantity [dimensionless].
     spreads : Mapping[str, Spread]
-        How far each entry of the rig may be off.
+        Uncertainty of each entry of the rig.
     tuning : Tuning or None
-        Noise levels, where they were tuned to the log.
+        Noise levels, if they were tuned to the log.
     explanation : Explanation or None
-        What is strange about rig, oil or logger, where that explains the log.
+        The effects of rig, oil or logger that explain the log, if any were needed.
     remarks : tuple of Note
-        What the log leaves open, and is nothing against the estimate.
+        What the log leaves undecided, which is no objection to the estimate.
     method : str
         How it was estimated: ``least-squares``, a filter of `estimation.filters.methods.METHODS`, or a method of
         `estimation.eha.named_methods.NAMED`.
     turning : Turning
-        Teeth of the pump and offset of the speed that were taken up.
+        Pump ripple and offset of the speed that were corrected.
     correlation : float
-        Of the errors of leakage coefficient and flow bias, where a fit balances flows [dimensionless].
+        Correlation of the errors of leakage coefficient and flow bias, if a fit balances flows [dimensionless].
     """
 
     outcome: Outcome
@@ -103,41 +103,41 @@ class BulkModulusEstimate:
         return rig_notes("bulk_modulus", self.quantity, self.responses.get("bulk_modulus", {}), self.spreads)
 
     def with_total(self, name: str, one: Quantity) -> Quantity:
-        """Return one of the quantities with the interval that holds what is not known of the rig.
+        """Return a quantity with its total interval, which includes the rig's uncertainty.
 
         Parameters
         ----------
         name : str
-            What it is.
+            Its name.
         one : Quantity
-            With the interval that holds if the rig file is right [in its unit].
+            The quantity with the interval given the rig [in its unit].
 
         Returns
         -------
         Quantity
-            With both.
+            With both intervals.
         """
         return with_total(one, self.responses.get(name), self.spreads)
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """The 95 % interval if the rig file is right [Pa], or None where there is no value."""
+        """The 95 % interval if the rig file is right [Pa], or None if there is no value."""
         if self.value is None or self.std is None:
             return None
         return positive_interval_95(self.value, self.std)
 
 
 def is_vague(value: float, std: float | None, share: float = VAGUE) -> bool:
-    """Return whether a value is known so poorly that it is none.
+    """Return whether a value is too uncertain to be reported.
 
     Parameters
     ----------
     value : float
         The value [in its unit].
     std : float or None
-        Its standard deviation [in its unit]; None where nothing is known of it.
+        Its standard deviation [in its unit]; None if unknown.
     share : float
-        Relative standard deviation above which it is none [fraction].
+        Limit of the relative standard deviation [fraction].
 
     Examples
     --------
@@ -148,7 +148,7 @@ def is_vague(value: float, std: float | None, share: float = VAGUE) -> bool:
 
 
 def too_wide(bound: float) -> Note:
-    """Return the note for a bound that is over the largest.
+    """Return the note for a bound above the limit.
 
     Parameters
     ----------
@@ -161,20 +161,20 @@ def too_wide(bound: float) -> Note:
 def without_number(
     outcome: Outcome, reasons: tuple[Note, ...], form: str, channels: tuple[str, ...], bound: float = float("nan")
 ) -> BulkModulusEstimate:
-    """Return an estimate that gives no number.
+    """Return an estimate without a number.
 
     Parameters
     ----------
     outcome : Outcome
-        How it went.
+        Its outcome.
     reasons : tuple of Note
-        Why.
+        The reasons.
     form : str
-        What would have been believed of the actuator.
+        The process model.
     channels : tuple of str
-        Channels that were looked at beside motor speed.
+        Channels that were examined beside motor speed.
     bound : float
-        Relative Cramér-Rao bound [fraction]; NaN where it was not asked for.
+        Relative Cramér-Rao bound [fraction]; NaN if it was not computed.
 
     Returns
     -------

@@ -1,15 +1,16 @@
 """Sensitivity of a result to the rig file's entries, and the total interval that includes their uncertainty.
 
-A response is the relative change of a quantity per relative change of a rig entry. The flow form's fit gives its own;
-everything else takes the laws of dimension below. They are exact in what they say of scale:
+A response is the relative change of a quantity per relative change of a rig entry. The flow form's fit provides its
+own; everything else uses the laws of dimension below, which are exact for common scales:
 
-- volume over bulk modulus is all that any balance holds, so bulk modulus goes with the volume;
-- with pressure logged, all flows may grow together: leakage grows, compliance V/beta too, so bulk modulus falls as the
-  displacement grows; a sensor that reads high makes bulk modulus too large and leakage too small;
-- without it mass, friction, pressures and bulk modulus may grow together, and leakage fall: the mass holds the scale.
+- any balance contains only volume over bulk modulus, so bulk modulus is proportional to the volume;
+- with pressure, all flows may be scaled together: leakage grows, and so does compliance V/beta, so bulk modulus falls
+  as the displacement grows; a pressure sensor that reads high makes bulk modulus too large and leakage too small;
+- without pressure, mass, friction, pressures and bulk modulus may grow together while leakage falls: the mass fixes
+  the scale.
 
 Leakage is a small difference of two flows: an error of the pump's or the piston's counts by pumped flow over leakage.
-How the ratio of the two flows acts on bulk modulus depends on the drive; the laws let the displacement carry it.
+How the ratio of the two flows affects bulk modulus depends on the drive; the laws assign it to the displacement.
 """
 
 import math
@@ -34,23 +35,24 @@ GAIN: Mapping[str, float] = MappingProxyType({"bulk_modulus": -1.0, "leakage_coe
 """Responses to the gain of the pressure sensor."""
 
 DELIVERY_ENTRY = "pump_displacement"
-"""The entry of a rig that a worn pump falls short of."""
+"""The entry of a rig file that a worn pump does not reach."""
 
 SOFT = 0.55
-"""Share of the rig's bulk modulus below which the oil holds air [dimensionless]; it is too stiff above the inverse."""
+"""Share of the rig's bulk modulus below which the oil contains air [dimensionless]; above the inverse it is too
+stiff."""
 
 MOSTLY_RIG = 2.0
-"""Ratio of the total interval to the one given the rig above which a note names the entry [dimensionless]."""
+"""Ratio of the total interval to the one given the rig, above which a note names the entry [dimensionless]."""
 
 
 def fitted_responses(fit: FormFit) -> Mapping[str, Responses]:
-    """Return responses of what the flow form found, from the fit's own linear response.
+    """Return the responses of the flow form's results, from the fit's own linear response.
 
     Returns
     -------
     Mapping[str, Responses]
-        By quantity. Where the log tells the volume, bulk modulus hangs on the gain of the pressure alone: all flows may
-        grow with the chambers, and their ratio is in the interval given the rig (`ratio_doubt`).
+        By quantity. If the log determines the volume, bulk modulus depends on the gain of the pressure only: all flows
+        may scale with the chambers, and their ratio is in the interval given the rig (`ratio_doubt`).
     """
     told = {
         name: {entry: slopes[name] / value for entry, slopes in fit.rig_slopes.items() if value}
@@ -68,14 +70,14 @@ def scaled_responses(
     Parameters
     ----------
     found : Mapping[str, float]
-        What was found of it, by parameter [SI].
+        Estimated parameters [SI].
     pressure : bool
         Whether differential pressure was used.
 
     Returns
     -------
     Mapping[str, Responses]
-        By quantity; none of what no law is known of.
+        By quantity; only those for which there is a law.
     """
     p = replace(parameters, **{name: value for name, value in found.items() if hasattr(parameters, name)})
     velocity, settled = steady_state(p.rated_speed, p)
@@ -94,7 +96,7 @@ def scaled_responses(
 
 
 def _reaches(responses: Responses, spreads: Mapping[str, Spread]) -> dict[str, tuple[float, float]]:
-    """Return the shift of a quantity down and up by each entry within its own 95 % [fraction of the quantity]."""
+    """Return the shift of a quantity, down and up, by each entry within the entry's 95 % [fraction of the quantity]."""
     found: dict[str, tuple[float, float]] = {}
     for entry, power in responses.items():
         down, up = spreads.get(entry, (0.0, 0.0))
@@ -108,25 +110,25 @@ def with_total(
 ) -> Quantity:
     """Return a quantity with its total interval: noise and every entry of the rig, taken as independent.
 
-    An entry's logarithm is normal, so its ends are ``value * exp(-1.96 s)`` and ``value * exp(1.96 s)``; distances of
-    the ends from the value add in squares. If the interval is one of the logarithm, distances of logarithms do.
+    An entry's logarithm is normal, so its limits are ``value * exp(-1.96 s)`` and ``value * exp(1.96 s)``; distances of
+    the limits from the value add in squares. If the interval is one of the logarithm, distances of logarithms do.
 
     Parameters
     ----------
     one : Quantity
-        With the interval that holds if the rig file is right.
+        The quantity with the interval given the rig.
     responses : Responses or None
-        Of the quantity [dimensionless]; None where they are not known.
+        Responses of the quantity [dimensionless]; None if unknown.
     spreads : Mapping[str, Spread]
-        How far each entry may be off.
+        Uncertainty of each entry.
     size : float, optional
-        What the responses are relative to, for a quantity that counts from a healthy actuator's [in its unit]; the
-        value itself if not given, which then stays positive.
+        Value to which the responses are relative, for a difference from a healthy actuator [in its unit]; by default
+        the value itself, which then stays positive.
 
     Returns
     -------
     Quantity
-        With ``ci95_total``; without it where there is no interval, or its responses are not known.
+        With ``ci95_total``; without it if there is no interval, or its responses are unknown.
     """
     if one.value is None or one.ci95 is None or responses is None:
         return one
@@ -148,7 +150,7 @@ def _of_logarithm(value: float, ends: tuple[float, float]) -> bool:
 
 
 def _log_ratio(value: float, more: float) -> float:
-    """Return the logarithm of a value with something more over it, where that leaves at least a hundredth of it."""
+    """Return the logarithm of a value plus a shift, over the value; at least a hundredth of the value must remain."""
     return math.log1p(max(more / value, -0.99))
 
 
@@ -158,12 +160,12 @@ def wear_left_open(remarks: Sequence[Note]) -> float:
     Parameters
     ----------
     remarks : sequence of Note
-        What a fit leaves open.
+        Notes on what a fit leaves open.
 
     Returns
     -------
     float
-        Standard deviation of the logarithm [dimensionless]; zero where the log tells, or a worn pump was found.
+        Standard deviation of the logarithm [dimensionless]; zero if the log determines it, or a worn pump was found.
     """
     said = _said_of_wear(remarks)
     return 0.005 * float(said["percent"]) if said else 0.0
@@ -175,10 +177,10 @@ class OpenDelivery(NamedTuple):
     Parameters
     ----------
     size, deviation : float
-        Logarithm of the delivery over the displacement, and its standard deviation, with what is presumed of a pump
+        Logarithm of the delivery over the displacement, and its standard deviation, with the prior of a pump
         [dimensionless].
     least : float
-        Below which nothing would leak, but the other way [dimensionless].
+        The value below which leakage would be negative [dimensionless].
     """
 
     size: float
@@ -192,12 +194,12 @@ def delivery_left_open(remarks: Sequence[Note]) -> OpenDelivery | None:
     Parameters
     ----------
     remarks : sequence of Note
-        What a fit leaves open.
+        Notes on what a fit leaves open.
 
     Returns
     -------
     OpenDelivery or None
-        The delivery; None where the log tells, or a worn pump was found.
+        The delivery; None if the log determines it, or a worn pump was found.
     """
     said = _said_of_wear(remarks)
     if said is None:
@@ -209,19 +211,19 @@ def delivery_left_open(remarks: Sequence[Note]) -> OpenDelivery | None:
 
 
 def _said_of_wear(remarks: Sequence[Note]) -> Mapping[str, Any] | None:
-    """Return the figures of the note that wear is not excluded, None where there is none."""
+    """Return the figures of the note that wear is not excluded, None if there is none."""
     return next((note.data for note in remarks if note.code is RigCode.WEAR_NOT_EXCLUDED), None)
 
 
 def with_wear(spreads: Mapping[str, Spread], remarks: Sequence[Note]) -> Mapping[str, Spread]:
-    """Return the uncertainties of rig entries, displacement's lower one widened by undetermined pump wear.
+    """Return the uncertainties of rig entries, with displacement's lower one widened by undetermined pump wear.
 
     Parameters
     ----------
     spreads : Mapping[str, Spread]
-        How far, as the rig file has it.
+        Uncertainty of each entry, from the rig file.
     remarks : sequence of Note
-        What a fit leaves open.
+        Notes on what a fit leaves open.
 
     Returns
     -------
@@ -234,18 +236,18 @@ def with_wear(spreads: Mapping[str, Spread], remarks: Sequence[Note]) -> Mapping
 
 
 def rig_notes(name: str, one: Quantity, responses: Responses, spreads: Mapping[str, Spread]) -> tuple[Note, ...]:
-    """Return a note where a quantity is known only as well as the rig.
+    """Return a note if a quantity is known only as well as the rig.
 
     Parameters
     ----------
     name : str
-        The quantity.
+        Its name.
     one : Quantity
-        With both intervals.
+        The quantity with both intervals.
     responses : Responses
-        Of the quantity [dimensionless].
+        Its responses [dimensionless].
     spreads : Mapping[str, Spread]
-        How far each entry may be off.
+        Uncertainty of each entry.
 
     Returns
     -------
@@ -264,7 +266,7 @@ def rig_notes(name: str, one: Quantity, responses: Responses, spreads: Mapping[s
 
 
 def another_oil(value: float | None, rig: EhaParameters) -> tuple[Note, ...]:
-    """Return a note where a bulk modulus that is believed is not that of the rig's oil.
+    """Return a note if a believed bulk modulus is not that of the rig's oil.
 
     Parameters
     ----------
@@ -276,7 +278,7 @@ def another_oil(value: float | None, rig: EhaParameters) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        One at most: what it may be instead, and the chamber volume that would explain it.
+        One at most: the possible causes, and the chamber volume that would explain it.
     """
     ratio = 1.0 if value is None else value / rig.bulk_modulus
     if SOFT <= ratio <= 1.0 / SOFT:

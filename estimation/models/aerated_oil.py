@@ -1,4 +1,4 @@
-"""Oil that holds air: its tangent bulk modulus, and by what share it swells from one pressure to another."""
+"""Oil that contains air: its tangent bulk modulus, and how much it expands from one pressure to another."""
 
 from types import SimpleNamespace
 
@@ -6,10 +6,10 @@ from plant.compiled.functions import Scalar, exp, log, maximum, minimum, where
 from plant.components.oil import ATMOSPHERE
 
 VAPOUR = 2e4
-"""Absolute pressure about which a chamber that is short of oil becomes soft [Pa]; pressures stay positive."""
+"""Absolute pressure around which a chamber short of oil becomes soft [Pa]; pressures stay positive."""
 
 STIFFEST = 0.01
-"""Least compliance of a chamber over that at the stated pressure: a search may try more air than there can be there."""
+"""Least compliance of a chamber over that at the stated pressure: a search may try more air than is possible."""
 
 
 def present_air(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
@@ -37,28 +37,28 @@ def _bubbles(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) 
 
 
 def _before(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
-    """Return the volume of the air that the stated bulk modulus holds, over that of its oil [dimensionless]."""
+    """Return the volume of the air that the stated bulk modulus includes, over that of its oil [dimensionless]."""
     return where(p.air_onset < 0.0, _bubbles(p.stated_pressure, air, p, quick=quick), 0.0)
 
 
 def _liquid(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
-    """Return the share of the stated oil's compliance that is the liquid's, and not its air's [fraction]."""
+    """Return the share of the stated oil's compliance that is due to the liquid, and not to air [fraction]."""
     slope = 1.0 - p.air_quickness if quick else 1.0
     return 1.0 - p.bulk_modulus * slope * _before(air, p, quick=quick) / p.stated_pressure
 
 
 def _room(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
-    """Return bulk modulus times the volume of oil and bubbles over that when stated, which is 1 by volume [Pa]."""
+    """Return bulk modulus times the volume of oil and bubbles over that at the stated pressure, 1 by volume [Pa]."""
     grown = p.by_mass * (_bubbles(pressure, air, p, quick=quick) - _before(air, p, quick=quick))
     squeezed = pressure - (p.stated_pressure if quick else ATMOSPHERE)
     return p.bulk_modulus * (1.0 + grown) - p.by_mass * squeezed * _liquid(air, p, quick=quick)
 
 
 def tangent_stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool = False) -> Scalar:
-    """Return the tangent bulk modulus of a chamber: liquid, air that softens as 1/p^2 or so, and vapour.
+    """Return the tangent bulk modulus of a chamber: liquid, air that softens about as 1/p^2, and vapour.
 
-    `bulk_modulus` is that at `stated_pressure`, air included; the liquid's where air gets in midway. By mass it is of
-    the room that the oil fills, bubbles included.
+    `bulk_modulus` is that at `stated_pressure`, air included; that of the liquid if air enters within the log. By mass
+    it refers to the volume that the oil fills, bubbles included.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def tangent_stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quic
     Returns
     -------
     float
-        Rise of pressure over the share by which the volume falls [Pa].
+        Rise of pressure over the relative decrease of volume [Pa].
     """
     above = maximum(pressure, 0.05 * VAPOUR)
     ratio, bubbles = VAPOUR / above, _bubbles(pressure, air, p, quick=quick)
@@ -85,7 +85,7 @@ def tangent_stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quic
 
 
 def swellings(p1: Scalar, p2: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool = False) -> tuple[Scalar, Scalar]:
-    """Return by what share oil swells that flows from the first pressure to the second, of the room in either.
+    """Return the relative expansion of oil that flows from the first pressure to the second, in the volume of either.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def swellings(p1: Scalar, p2: Scalar, air: Scalar, p: SimpleNamespace, *, quick:
     Returns
     -------
     tuple of float
-        Shares, both zero where volumes are balanced [fraction].
+        Both zero if volumes are balanced [fraction].
     """
     freed = _bubbles(p2, air, p, quick=quick) - _bubbles(p1, air, p, quick=quick)
     swells = (p1 - p2) * _liquid(air, p, quick=quick) + p.bulk_modulus * freed

@@ -1,7 +1,7 @@
 """Parameters as states: a process model that also estimates leakage, flow bias, friction or entrained air.
 
-What cannot be negative is estimated as a logarithm, so it stays positive, and a first guess that is wrong by a factor
-is as near as one that is wrong by its inverse. The linear friction coefficient may be negative (errata E12).
+Positive parameters are estimated as logarithms, so they stay positive, and a first guess that is wrong by a factor is
+as near as one that is wrong by its inverse. The linear friction coefficient may be negative (errata E12).
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,7 +40,7 @@ MOST = 1e3
 """Largest value of a parameter, over that of the healthy actuator [dimensionless]."""
 
 AIR = StateVariable(AIR_FRACTION, "1", 1e-2, 0.0, 1e-6, 0.2, logarithmic=True)
-"""Begins at one percent; at most a foam's."""
+"""Begins at one percent; the upper limit is that of foam."""
 
 
 def augmented(model: ProcessModel, names: Sequence[str], drift: Mapping[str, float] | None = None) -> ProcessModel:

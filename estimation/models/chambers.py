@@ -1,8 +1,8 @@
 """The flow form as process models for a filter: two chambers, make-up valves, the pump's drain, the relief valve.
 
-Motor speed and position are measured, so both flows of equation 5.8 are known and friction plays no part. What the
-pressure form lacks stands here: chambers whose volume the piston changes, a low side that the inner circuit feeds, a
-drain, and flows that are balanced by mass where pressure is not small beside bulk modulus.
+Motor speed and position are measured, so both flows of equation 5.8 are known, and friction does not appear. Beyond the
+pressure form it has: chambers whose volume the piston changes, a low side fed by the inner circuit, a drain, and flows
+that are balanced by mass if pressure is not small beside bulk modulus.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,8 +23,8 @@ from plant.eha.model import EhaParameters
 from plant.solvers.steps import solve_linear
 
 FLOOR_NOISE = 2e4
-"""Process-noise density of a chamber's pressure, for what straight lines between samples leave out [Pa^2/s]; the noise
-of measured speed comes on top (`estimation.eha.by_flow_filter.drive_noise`)."""
+"""Process-noise density of a chamber's pressure, for the error of straight lines between samples [Pa^2/s]; the noise of
+measured speed is added (`estimation.eha.by_flow_filter.drive_noise`)."""
 
 
 def logarithm_of(name: str, unit: str, scale: float, lower: float = 1e-6, upper: float = 1e6) -> StateVariable:
@@ -55,8 +55,8 @@ STATES = (
     logarithm_of("relief_pressure", "Pa", 1e6),
     logarithm_of("relief_conductance", "m^3/(s Pa)", 1e-8),
 )
-"""Chamber pressures and constants. A constant that is positive and may be far from its first guess is a logarithm; one
-that may be zero stands as it is."""
+"""Chamber pressures and constants. A positive constant that may be far from its first guess is a logarithm; one that
+may be zero is not."""
 
 STDS: Mapping[str, float] = {
     BULK_MODULUS: 0.3,
@@ -69,7 +69,7 @@ STDS: Mapping[str, float] = {
     "relief_pressure": 0.02,
     "relief_conductance": 0.7,
 }
-"""Relative standard deviation of each guess [fraction]; of bulk modulus, leakage and bias about half the distance to
+"""Relative standard deviation of each guess [fraction]; for bulk modulus, leakage and bias about half the distance to
 the next."""
 
 PRESSURE_STD = 1e4
@@ -77,14 +77,14 @@ PRESSURE_STD = 1e4
 
 LOAD_STD = 0.3
 """Standard deviation of the chamber pressures before the first sample of a log that begins under load, where the lower
-one need not be that of the inner circuit [fraction of the load]."""
+one may differ from the inner circuit's [fraction of the load]."""
 
 MAKEUP, OPENING, DRAIN, LEAD = 1e-9, 1e3, 2.4e-13, 1e-5
 """First guesses of the make-up conductance [m^3/(s Pa)], of the drop at which a make-up valve is half open [Pa], of the
 drain a port [m^3/(s Pa)], and of the motor's lead on the straight line between samples [s]."""
 
 LEAST = 1e-3
-"""A guess that is zero begins at this share of the default actuator's value [fraction]."""
+"""Share of the default actuator's value at which a guess of zero begins [fraction]."""
 
 CONSTANTS = ("bulk_modulus", *(state.name for state in STATES[3:]))
 """The constants, as `estimation.models.flow.chamber_rates` calls them."""

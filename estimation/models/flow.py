@@ -41,10 +41,10 @@ class Delivery(NamedTuple):
 
 
 def delivered_flow(speeds: tuple[Scalar, Scalar], p: SimpleNamespace, step: Scalar, share: Scalar) -> Scalar:
-    """Return the pump's flow within a step (errata E8), the motor being ahead of the straight line between samples.
+    """Return the pump's flow within a step (errata E8); the motor leads the straight line between samples.
 
-    The log's speed is linear between samples, the motor's is not: towards its new speed a lagging motor is always
-    ahead of the straight line, by ``T^2 / (12 lag)`` for sample time T, which `speed_lead` takes up.
+    The log's speed is linear between samples, the motor's is not: a motor with a lag that approaches its new speed
+    always leads the straight line, by ``T^2 / (12 lag)`` for sample time T, which is `speed_lead`.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def leaked_flow(dp: Scalar, leakage: Scalar, p: SimpleNamespace) -> Scalar:
 
 
 def port_flows(pumped: Scalar, leaked: Scalar, dp: Scalar, swelling: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-    """Return the flow into chamber 1 and that out of chamber 2, each as the volume that it has there.
+    """Return the flow into chamber 1 and that out of chamber 2, each as its volume there.
 
     A flow is counted at its outlet for the pump, at its inlet for a leak: the denser side is chamber 1 if ``dp > 0``.
 
@@ -294,7 +294,7 @@ FLOW_FORM = GreyBoxModel(
 """The flow form with its unknowns, balanced by volume; friction is none of them."""
 
 STIFFNESS = "accumulator_stiffness"
-"""Rise of the inner circuit's pressure per volume of oil that the chambers push back into it [Pa/m^3]. Without it, bulk
+"""Rise of the inner circuit's pressure per volume of oil that the chambers return to it [Pa/m^3]. Without it, bulk
 modulus of a circuit with 1 L of gas comes out up to 0.8 % wrong."""
 
 MASS_FLOW_FORM = replace(
@@ -313,7 +313,7 @@ HELD_FLOW_FORM = replace(FLOW_FORM, name="flow_held", rates=_held)
 volume is far larger than what the piston sweeps, and of the lumped plant."""
 
 NEAR_RELIEF = 0.97
-"""Share of the relief setting above which the valve is taken to open [fraction]."""
+"""Share of the relief setting above which the valve is assumed to open [fraction]."""
 
 
 def reaches_relief(pressure: Array, setting: float) -> bool:

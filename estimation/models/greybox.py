@@ -20,7 +20,7 @@ class GreyBoxModel:
     """A model whose unknown parameters are fitted to a log.
 
     Unknowns are fitted as logarithms: they stay positive, and a start that is wrong by a factor is as near as one that
-    is wrong by its inverse. One that may be negative is fitted as it is, in units of a typical size.
+    is wrong by its inverse. One that may be negative is fitted in units of a typical size.
 
     Parameters
     ----------
@@ -29,8 +29,8 @@ class GreyBoxModel:
     initial : callable
         ``initial(parameters)``: the state before the first sample, in SI.
     rates : callable
-        ``rates(state, drives, parameters, share)`` in SI a second, where drives holds each channel's value at start and
-        end of a step, then the step's length [s], and share is how far into the step [fraction].
+        ``rates(state, drives, parameters, share)`` in SI per second. Drives has each channel's value at start and end
+        of a step, then the step's length [s]; share is the elapsed part of the step [fraction].
     observe : callable
         ``observe(state)``: the predicted outputs in SI.
     parameters : type
@@ -38,10 +38,10 @@ class GreyBoxModel:
     linear : tuple of (str, float)
         The unknowns that may be negative, each with a typical size in SI.
     jump : tuple of float
-        Change of the state in SI that stands for a unit of what a gap in the drives leaves open; none where the model
-        bears no gaps.
+        Change of the state in SI per unit of what a gap in the drives leaves unknown; empty if the model allows no
+        gaps.
     stiff : bool
-        Whether steps are implicit, since rates turn stiff within one, as where a valve of a small chamber opens.
+        Whether steps are implicit, since rates become stiff within one, as when a valve of a small chamber opens.
     """
 
     name: str

@@ -6,7 +6,8 @@ from plant.compiled.functions import Scalar, absolute, sqrt, where
 from plant.components.check_valve import make_up_flow
 
 BEND, USUAL_BEND = "makeup_bend", 1e-4
-"""Inverse of the drop from which the flow of a make-up valve goes with its root, and its typical size [1/Pa]."""
+"""Inverse of the drop above which the flow of a make-up valve is proportional to its square root, and its typical size
+[1/Pa]."""
 
 
 def inner_flows(
@@ -45,13 +46,13 @@ def inner_flows(
 def accumulator_rate(taken: Scalar, supply: Scalar, p: SimpleNamespace) -> Scalar:
     """Return the rate of the inner circuit's pressure: a single rod's gas is stiffer the smaller it is.
 
-    Such a rod takes a third of it and gives it back at every stroke. A through rod hardly moves it, and a search that
-    could stiffen it by far ended in another valley.
+    Such a rod takes a third of the gas volume at every stroke and returns it. A through rod hardly changes it, and with
+    a variable stiffness its search ended in another minimum.
 
     Parameters
     ----------
     taken : float or Expression
-        Oil that flows from it into the chambers [m^3/s].
+        Flow from it into the chambers [m^3/s].
     supply : float or Expression
         Its pressure, absolute [Pa].
     p : namespace
@@ -67,16 +68,16 @@ def accumulator_rate(taken: Scalar, supply: Scalar, p: SimpleNamespace) -> Scala
 
 
 def narrowed(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
-    """Return the conductance of a make-up valve, which falls with the root of a large drop either way, as an orifice's.
+    """Return the conductance of a make-up valve, which falls with the root of a large drop, as an orifice's does.
 
     Parameters
     ----------
     drop : float or Expression
         Pressure of the inner circuit less that of the chamber [Pa].
     conductance : float or Expression
-        The same at a small drop [m^3/(s Pa)].
+        Conductance at a small drop [m^3/(s Pa)].
     bend : float or Expression
-        Inverse of the drop from which it falls; 0 where it does not [1/Pa].
+        Inverse of the drop from which it falls; 0 for a constant conductance [1/Pa].
 
     Returns
     -------

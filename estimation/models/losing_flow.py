@@ -1,6 +1,6 @@
-"""The flow form with one more loss, whose course is known from what is measured and whose size is not.
+"""The flow form with one more loss, whose shape is known from measured signals and whose size is not.
 
-A leak that goes with position, with the shaft's angle or with pressure, and a pump that fills badly, take oil from the
+A leak that depends on position, on the shaft's angle or on pressure, and a pump that fills badly, take oil from the
 loaded chamber as leakage does: each is one column beside the drives. See decision 288.
 """
 
@@ -18,7 +18,7 @@ from plant.eha.circuit import chamber_volumes
 from plant.units import si
 
 LOSS, LOSS_SIZE = "extra_loss", "loss_size"
-"""Drive: flow from chamber 1 to chamber 2 for a unit of it [m^3/s]; unknown: how many units are lost."""
+"""Drive: flow from chamber 1 to chamber 2 per unit of the loss [m^3/s]; unknown: its size in these units."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""`ProcessModel`: what a filter believes about how the state moves and what the sensors see.
+"""`ProcessModel`: how the state evolves and what the sensors measure, as a filter assumes it.
 
 To add a model, write its step as plain arithmetic on a tuple of scalars and name its states; kernels, Jacobians and
 every filter follow from that (`estimation.models.eha_forms` has two examples).
@@ -20,16 +20,16 @@ from plant.runs import steps_a_sample
 from plant.solvers.steps import Parameters
 
 OPENING = "opening_"
-"""Begins the name of a drive that holds extra variance of a state, which a sample adds beside the process noise, in the
-filter's units [dimensionless]; the state's name follows. See `estimation.log_checks.bridging`."""
+"""Prefix of a drive that holds extra variance of a state, added per sample to the process noise, in the filter's units
+[dimensionless]; the state's name follows. See `estimation.log_checks.bridging`."""
 
 MOST_SUBSTEPS = 1000
-"""Steps of a model that a sample may need: a filter of slower samples would take forever, and its model has settled."""
+"""Most model steps per sample: beyond that a filter would take forever, and the model has settled within a sample."""
 
 Opening: TypeAlias = Callable[[Any, Mapping[str, Array], float], tuple[Array, Mapping[str, float]]]
-"""``opening(parameters, unknown, sample time [s])``: with the variance of what each drive did within gaps (of position,
-where it was; of any other, its integral), the variance that each sample adds to some quantity, and how far the states
-move with a unit of it."""
+"""``opening(parameters, unknown, sample time [s])``: from the variance of each drive within gaps (for position itself,
+for others their integral), the variance that each sample adds to some quantity, and the change of the states per unit
+of it."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class StateVariable:
     noise_density : float
         Random-walk intensity of the process noise [state's unit squared a second].
     lower, upper : float
-        Physical bounds that the estimate is held to [in the state's unit].
+        Physical bounds of the estimate [in the state's unit].
     logarithmic : bool
         Whether the filter works on the logarithm of the state over its scale: the state then stays positive, a factor
         is as near as its inverse, and the noise density is that of the logarithm [1/s].
@@ -82,13 +82,13 @@ class ProcessModel:
     observe : callable
         ``observe(state, parameters)``, which returns the predicted value [SI] of each channel that it can predict.
     longest_step : float
-        Longest step that the model takes well; slower logs are sub-stepped [s].
+        Longest step for which the model is accurate; slower logs have several steps per sample [s].
     drives : tuple of str
         Channels that drive the model; linear between samples.
     parameters : type
         Frozen dataclass of floats that `step` and `observe` read.
     opening : callable, optional
-        What gaps in the drives leave open; if not given, straight lines across them are believed.
+        Effect of gaps in the drives; without it, straight lines across gaps are assumed exact.
     """
 
     name: str
@@ -152,7 +152,7 @@ class ProcessModel:
         return Gaussian(mean, belief.covariance / np.outer(slope, slope))
 
     def to_si(self, mean: Array) -> tuple[Array, Array]:
-        """Return states in SI, and by how much each moves with the filter's number.
+        """Return states in SI, and their change per unit of the filter's number.
 
         Parameters
         ----------

@@ -1,8 +1,8 @@
 """The motion form: bulk modulus from motor speed and position alone, where no pressure is logged.
 
-The chambers are those of the flow form, but their pressures are not seen: they push the piston, and what the log shows
-is how it starts, stops and rings. So friction is part of the model, and a bristle that yields before it slides, since
-its stiffness acts beside the oil's. What holds the scale of the pressures is little: the moving mass, and the inner
+The chambers are those of the flow form, but their pressures are not measured: they push the piston, and the log shows
+how it starts, stops and rings. So friction is part of the model, with a bristle that yields before it slides, since its
+stiffness acts beside the oil's. The scale of the pressures is weakly determined: by the moving mass, and by the inner
 circuit's pressure, at which make-up begins.
 """
 
@@ -49,7 +49,7 @@ UNKNOWNS = (
 """What is fitted; stiffness in N/m and damping in N s/m, the rest as named in the nomenclature."""
 
 SEATED = 1.0
-"""Drop at which a make-up valve is half open here, where nothing shows it [Pa]: it opens at once."""
+"""Drop at which a make-up valve is half open here, as the log does not show it [Pa]: it opens at once."""
 
 LINEAR = {"friction_linear": 2e3}
 """Size in which the linear friction a_2 is fitted, which may be negative (errata E12) [N s/m]."""

@@ -1,7 +1,7 @@
-"""The wide flow form: the pressure balance with all that a strange rig, oil or logger may add to it.
+"""The wide flow form: the pressure balance with all effects that a strange rig, oil or logger may add to it.
 
-Every addition has a value at which it is absent, so that one kernel serves every hypothesis: what is not asked about is
-held there.
+Every effect has a value at which it is absent, so that one kernel serves every hypothesis: effects that are not tested
+are held there.
 """
 
 from dataclasses import dataclass, replace
@@ -22,10 +22,10 @@ from plant.eha.model import piston_areas
 from plant.units import si
 
 TURBULENT_AT = 5e5
-"""Differential pressure at which a turbulent share of the leakage is stated, and leakage with it [Pa]."""
+"""Differential pressure at which a turbulent share of the leakage, and the leakage itself, are stated [Pa]."""
 
 LAMINAR_BELOW = 1e4
-"""Differential pressure below which every leak is laminar [Pa]; judged: it moves 0.1 bar at most."""
+"""Differential pressure below which every leak is laminar [Pa]; judged: it changes pressure by 0.1 bar at most."""
 
 SHORTEST_LAG = 1e-6
 """Lag of a pressure sensor that has none [s]."""
@@ -34,10 +34,10 @@ COURSES = ("side_of_play", "play_by_pressure", "play_at_once", "play_sprung")
 """Courses of the piston in its encoder's play, see `estimation.fits.greybox.play.crossings`."""
 
 CROSSED = COURSES[1:]
-"""Parameters that say how far each of the others is followed in place of the first."""
+"""Parameters that state how far each of the others replaces the first."""
 
 QUICKNESS, QUICKEST = "air_quickness", 2.0 / 7.0
-"""1 - 1/n of the bubbles' exponent n: 0 is isothermal; and the most of it, n = 1.4 [dimensionless]."""
+"""1 - 1/n of the bubbles' exponent n (0 is isothermal), and its largest value, n = 1.4 [dimensionless]."""
 
 GROWTH = ("leakage_growth", "leakage_bend", "leakage_rise")
 """Parameters of a leakage that changes over the log, in the order of `grown_leakage`."""
@@ -161,22 +161,23 @@ def _sides(courses: Any, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
 
 
 def _ahead(p: SimpleNamespace) -> SimpleNamespace:
-    """Return the parameters with the speed's lag in its lead: what a lag hides is its length times the slope."""
+    """Return the parameters with the speed's lag added to its lead: a lag acts by its length times the slope."""
     return SimpleNamespace(**{**vars(p), "speed_lead": p.speed_lead + p.speed_lag})
 
 
 def grown_leakage(elapsed: Scalar, growth: Scalar, bend: Scalar, rise: Scalar) -> Scalar:
-    """Return leakage over its value halfway through the log, which a fit tells best.
+    """Return leakage over its value halfway through the log, which a fit determines best.
 
-    Wear may add evenly, and viscosity falls by a share in each minute: there is a parabola and an exponential, which is
-    taken as the eighth power of ``(1 + x/16) / (1 - x/16)``, within 0.3 % of it for a leakage that grows tenfold.
+    Wear may add linearly, and viscosity falls by a share in each minute. So there is a parabola and an exponential,
+    approximated by the eighth power of ``(1 + x/16) / (1 - x/16)``, within 0.3 % of it for a leakage that grows
+    tenfold.
 
     Parameters
     ----------
     elapsed : float, ndarray or Expression
         Share of the log [fraction].
     growth, bend : float or Expression
-        What goes with that share and with its square [dimensionless].
+        Coefficients of that share and of its square [dimensionless].
     rise : float or Expression
         Rise of the logarithm over the log [dimensionless].
 
@@ -202,7 +203,7 @@ def stepped_leakage(elapsed: Scalar, before: Scalar, at: Scalar, width: Scalar) 
     before : float or Expression
         Leakage before the step over that after, less one [dimensionless].
     at, width : float or Expression
-        Middle of the step, and how long it takes [fraction of the log].
+        Middle of the step, and its duration [fraction of the log].
 
     Returns
     -------
@@ -213,9 +214,9 @@ def stepped_leakage(elapsed: Scalar, before: Scalar, at: Scalar, width: Scalar) 
 
 
 def turbulent_leakage(dp: Scalar, share: Scalar) -> Scalar:
-    """Return leakage over what it would be in proportion to pressure, of which a share goes with the root of pressure.
+    """Return leakage over laminar leakage, if a share of it is proportional to the square root of pressure.
 
-    Long narrow gaps leak in proportion; a worn edge or a scratch leaks as an orifice does (Merritt, Hydraulic Control
+    Long narrow gaps have laminar leakage; a worn edge or a scratch leaks as an orifice does (Merritt, Hydraulic Control
     Systems, 1967, section 3-3).
 
     Parameters
@@ -223,7 +224,7 @@ def turbulent_leakage(dp: Scalar, share: Scalar) -> Scalar:
     dp : float or Expression
         Differential pressure [Pa].
     share : float or Expression
-        What that share is at `TURBULENT_AT` [fraction].
+        The turbulent share at `TURBULENT_AT` [fraction].
 
     Returns
     -------
@@ -295,8 +296,8 @@ def _turbulent_quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace,
 TURBULENT_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_turbulent", rates=_turbulent)
 QUICK_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_quick", rates=_quick)
 TURBULENT_QUICK_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_turbulent_quick", rates=_turbulent_quick)
-"""The same with a share of the leakage turbulent, with `QUICKNESS` of bubbles, and with both. Plain logs, which the
-wide form is asked of too, pay for no roots and no powers."""
+"""The same with a share of the leakage turbulent, with `QUICKNESS` of bubbles, and with both. They are separate forms,
+so that plain logs, for which the wide form is used too, need not compute roots and powers."""
 
 LINEAR = {
     "speed_lead": 1e-5,

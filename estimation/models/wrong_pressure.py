@@ -1,4 +1,4 @@
-"""`misread(pressures, elapsed, p)`: what a pressure sensor reads too much, once it has settled."""
+"""`misread(pressures, elapsed, p)`: error of a pressure sensor, apart from its lag."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -6,14 +6,14 @@ from typing import Any
 from plant.compiled.functions import Scalar
 
 SETTLING = "drift_settling"
-"""Parameter that says how far an offset that drifts settles within the log."""
+"""Parameter that states how far a drifting offset settles within the log."""
 
 MOST_SETTLING = 12.0
-"""Most time constants within a log with which an offset is sought to settle [1]: `drifted` is within 0.002 there."""
+"""Most time constants of a settling offset within a log [1]: `drifted` has an error of 0.002 there."""
 
 
 def misread(pressures: tuple[Scalar, Scalar], elapsed: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return what the pressure sensor reads too much, once it has settled [Pa].
+    """Return the error of the pressure sensor, apart from its lag [Pa].
 
     Parameters
     ----------
@@ -34,11 +34,11 @@ def misread(pressures: tuple[Scalar, Scalar], elapsed: Scalar, p: SimpleNamespac
 
 
 def drifted(elapsed: Any, settling: Any) -> Any:
-    """Return how far an offset has drifted, over what it would over the log at its first rate.
+    """Return how far an offset has drifted, over the drift of the whole log at its initial rate.
 
-    A sensor that warms up after it is switched on settles by ``(1 - exp(-k x)) / k``; of 0 the drift is even. The
-    exponential is taken as the eighth power of ``u = (1 - k x / 16) / (1 + k x / 16)``, and ``1 - u^8`` is written as
-    a product, which has no gap at 0.
+    A sensor that warms up after it is switched on settles by ``(1 - exp(-k x)) / k``; with k = 0 the drift is linear.
+    The exponential is approximated by the eighth power of ``u = (1 - k x / 16) / (1 + k x / 16)``, and ``1 - u^8`` is
+    written as a product, which is defined at 0.
 
     Parameters
     ----------

@@ -50,8 +50,8 @@ YIELDING = 5.0
 """Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""
 
 ALIKE, ALIKE_COUNT = 0.25, 1.0
-"""Prior squared difference of actuators of one kind, in units of `WITHIN`: 0.25 is some 10 % in leakage and friction.
-And the weight of that prior in deviations [dimensionless]."""
+"""Prior squared difference of actuators of one kind, in units of `WITHIN` (0.25 is some 10 % in leakage and friction),
+and the weight of that prior in deviations [dimensionless]."""
 
 _NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
 
@@ -114,7 +114,7 @@ class ClassFits:
         """Information on the coordinates, lasting model error included, shape (7, 7) [dimensionless].
 
         It decides whether a circuit is between the conditions. Intervals use `spread`, which is narrower if a model
-        error persists: with that, more such circuits are found on the lumped plant, but one more plain log in 150 is
+        error persists: it would find more such circuits on the lumped plant, but one more plain log in 150 would be
         falsely unknown.
         """
         return told_of_bent(self.information / self.lasting, self.moved)
@@ -166,8 +166,8 @@ def fit_classes(
     runs : ndarray, shape (9, n, outputs), optional
         Outputs of the nine nominal circuits [m/s, Pa]; computed if not given.
     start : ndarray, shape (7,), optional
-        Coordinates of a nearby circuit [dimensionless]: a single search begins there, in place of one from each near
-        condition, and ends if it gains or promises little.
+        Coordinates of a nearby circuit [dimensionless]: one search begins there, in place of one per near condition,
+        and ends if it gains or promises little.
     wanted : float
         Cost above which a circuit is of no use, see `fit_freely` [dimensionless].
 
@@ -306,8 +306,7 @@ def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) 
     blocks : Blocks
         Its log.
     stuck : bool
-        Whether the piston sticks. There is then no information on friction, since the seals' unknown stiffness moves
-        it.
+        Whether the piston sticks: there is then no information on friction, since the seals' stiffness moves it.
 
     Returns
     -------
