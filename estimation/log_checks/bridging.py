@@ -1,9 +1,9 @@
-"""Gaps in the drives of a filter: bridged by straight lines that the filter does not trust.
+"""Gaps in the drives of a filter: bridged by straight lines with the uncertainty that these leave.
 
-Motor speed drives every process model, so where it was not logged it is not known what the pump delivered. Whatever
-volume a straight line leaves open enters the belief as process noise of the states that it moves, sample by sample, and
-what is measured next decides. The same holds for position, where it drives a model: the swept volume is right again
-after a gap, but not what leaked meanwhile, and pressures measured within the gap say nothing.
+Motor speed drives every process model, so the pumped volume is unknown while it was not logged. The volume error of a
+straight line is added, sample by sample, to the process noise of the states that it moves, and the next measurement
+corrects it. The same holds for position, if it drives a model: the swept volume is right again after a gap, but not
+what leaked in between, and pressures measured within the gap are of no use.
 """
 
 from dataclasses import replace
@@ -23,7 +23,7 @@ from plant.log.record import Record
 from plant.solvers.steps import Parameters
 
 WIDE = 1.5
-"""Samples farther apart than this many times what is usual for the channel leave a gap [dimensionless]."""
+"""Distance of samples, over the channel's usual one, from which it is a gap [dimensionless]."""
 
 
 def bridged(x: Array) -> Array:
@@ -37,7 +37,7 @@ def bridged(x: Array) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        No NaN.
+        Without NaN.
 
     Raises
     ------
@@ -54,17 +54,17 @@ def bridged(x: Array) -> Array:
 
 
 def gaps(values: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the gaps of a channel; one that is logged every so many samples throughout is slow, and has none.
+    """Return the gaps of a channel; one with a sample every so many rows throughout is slow, and has none.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        A channel with a sample at least [any unit]; NaN where missing.
+        A channel with at least one sample [any unit]; NaN where missing.
 
     Returns
     -------
     tuple of ndarray, shape (present - 1,)
-        Sample times from each sample that is there to the next, and whether a gap lies between them.
+        Sample times from each valid sample to the next, and whether that is a gap.
 
     Examples
     --------
@@ -84,12 +84,12 @@ def within_gaps(values: Array) -> NDArray[np.bool_]:
     Parameters
     ----------
     values : ndarray, shape (n,)
-        A channel with a sample at least [any unit]; NaN where missing.
+        A channel with at least one sample [any unit]; NaN where missing.
 
     Returns
     -------
     ndarray of bool, shape (n,)
-        Whether a sample lies in one; none does between the samples of a slow channel.
+        Whether a sample is in one; never between the samples of a slow channel.
     """
     present = np.flatnonzero(np.isfinite(values))
     apart, wide = gaps(values)
@@ -99,7 +99,7 @@ def within_gaps(values: Array) -> NDArray[np.bool_]:
 
 
 def filled(values: Array) -> tuple[Array, int]:
-    """Return a slow channel with straight lines between its samples, and every how many rows it has one.
+    """Return a slow channel with straight lines between its samples, and its spacing in rows.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def filled(values: Array) -> tuple[Array, int]:
     Returns
     -------
     tuple of (ndarray, shape (n,), and int)
-        The channel, its gaps and ends still NaN; as it is where it has a sample in most rows.
+        The channel, with NaN in its gaps and at its ends; unchanged if it has a sample in most rows.
 
     Examples
     --------
@@ -124,20 +124,20 @@ def filled(values: Array) -> tuple[Array, int]:
 
 
 def _per_sample(values: Array, each: Array, before: float, after: float) -> Array:
-    """Return a value for each sample time, from one for each step between samples that are there, and for the ends."""
+    """Return a value for each sample time, from one for each interval between valid samples, and for the ends."""
     present = np.flatnonzero(np.isfinite(values))
     ends = np.full(present[0], before), np.full(len(values) - 1 - present[-1], after)
     return np.concatenate([np.zeros(1), ends[0], np.repeat(each, np.diff(present)), ends[1]])
 
 
 def unknown_angle(speed: Array, sample_time: float) -> Array:
-    """Return the variance of what the pump turned while its speed was not logged.
+    """Return the variance of the pump's angle while its speed was not logged.
 
-    A straight line across n sample times is wrong by when a step d from one end's speed to the other's came, which
-    leaves ``d^2 (n^2 - 1) / 12`` of its integral open, in squared sample times. Across a gap the speed may have gone
-    elsewhere meanwhile: the bridge of increments of variance ``s^2`` a sample time leaves ``s^2 n (n^2 - 1) / 12``.
-    The larger one counts. Across a gap at an end of the log the speed is held, which leaves ``s^2 n^3 / 3``. All is
-    spread evenly. A speed that is logged every so many samples throughout has steps, but no gaps.
+    A straight line across n sample times is wrong by the unknown time of a step d between the speeds at its ends. The
+    variance of its integral is ``d^2 (n^2 - 1) / 12``, in squared sample times. In a gap the speed may also have
+    changed and returned: with increments of variance ``s^2`` per sample time, the variance is ``s^2 n (n^2 - 1) / 12``.
+    The larger one is used. In a gap at an end of the log the speed is held constant, with a variance of ``s^2 n^3 /
+    3``. All are spread evenly. A speed with a sample every so many rows throughout has steps, but no gaps.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def unknown_angle(speed: Array, sample_time: float) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        Variance that the sample time up to each sample adds [rad^2].
+        Variance added by the sample time before each sample [rad^2].
 
     Examples
     --------
@@ -169,10 +169,10 @@ def unknown_angle(speed: Array, sample_time: float) -> Array:
 
 
 def unknown_path(position: Array, sample_time: float) -> Array:
-    """Return the variance of where the piston went while its position was not logged.
+    """Return the variance of the piston's position while it was not logged.
 
-    Across a gap of n sample times the velocity may have changed by increments of variance ``s^2`` a sample time, which
-    takes the piston off the straight line by a variance of ``s^2 n^3 / 48`` in the middle, in squared sample times.
+    In a gap of n sample times the velocity may have changed by increments of variance ``s^2`` per sample time. The
+    variance of the deviation from a straight line is then ``s^2 n^3 / 48`` in the middle, in squared sample times.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def unknown_path(position: Array, sample_time: float) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        Variance that the sample time up to each sample adds [m^2].
+        Variance added by the sample time before each sample [m^2].
     """
     present = np.flatnonzero(np.isfinite(position))
     n, gap = gaps(position)
@@ -199,7 +199,7 @@ def unknown_path(position: Array, sample_time: float) -> Array:
 def with_gaps_open(
     model: ProcessModel, record: Record, parameters: Parameters
 ) -> tuple[ProcessModel, Array, NDArray[np.bool_]]:
-    """Return a model and its drives, such that nothing is believed of what straight lines bridge.
+    """Return a model and its drives, with the uncertainty of straight lines across gaps.
 
     Parameters
     ----------
@@ -213,9 +213,9 @@ def with_gaps_open(
     Returns
     -------
     tuple of (ProcessModel, ndarray of shape (samples, drives), ndarray of bool of shape (samples,))
-        The model, driven also by the variance that each sample opens in its states, where any is; its drives [SI, and
-        the filter's units squared], no sample missing; and at which samples what is measured can be compared with the
-        model.
+        The model, driven also by the variance that each sample adds to its states, if there is any; its drives without
+        missing samples [SI, and the filter's units squared]; and the samples at which measurements can be compared with
+        the model.
     """
     drives = [bridged(record[drive]) for drive in model.drives]
     comparable = np.ones(len(record), dtype=np.bool_)
@@ -237,7 +237,7 @@ def with_gaps_open(
 
 @cache
 def _opened(model: ProcessModel, names: tuple[str, ...]) -> ProcessModel:
-    """Return the model with a drive more for each state that gaps open; its step does not use them."""
+    """Return the model with one more drive for each state affected by gaps; its step does not use them."""
     count = len(model.drives)
 
     def step(state: tuple[Scalar, ...], drives: Any, p: Any, h: Scalar) -> tuple[Scalar, ...]:

@@ -1,4 +1,4 @@
-"""Channels averaged over blocks, and how two of them move together: what physics of the channels is judged by."""
+"""Channels averaged over blocks, and correlations between them, for checks of the channels by physics."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
 FEWEST_SAMPLES, FEWEST_BLOCKS = 5, 20
-"""Samples in a block, and blocks of which something is concluded, at least [count]."""
+"""Least samples per block, and least blocks for a conclusion [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class ChannelBlocks:
     length : float
         Length of a block [s].
     pumped : ndarray, shape (n,), or None
-        What the pump displaces [m^3/s].
+        Flow displaced by the pump [m^3/s].
     slope : ndarray, shape (n,), or None
         Slope of position [m/s].
     position : ndarray, shape (n,), or None
@@ -46,12 +46,12 @@ class ChannelBlocks:
 
     @property
     def piston(self) -> Array | None:
-        """Velocity of the piston [m/s], of position where that is logged."""
+        """Velocity of the piston [m/s], from position if that is logged."""
         return self.velocity if self.slope is None else self.slope
 
 
 def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBlocks:
-    """Return a log in blocks of a length, or of a few samples where those are longer.
+    """Return a log in blocks of a given length, or of a few samples if that is longer.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBl
 
 
 def whole(record: Record, name: str) -> Array | None:
-    """Return a channel with its gaps bridged, None where it is not logged [its unit]."""
+    """Return a channel with its gaps bridged, None if it is not logged [its unit]."""
     if name not in record or not np.any(np.isfinite(record[name])):
         return None
     return bridged(record[name])
@@ -109,7 +109,7 @@ def alike(y: Array | None, x: Array | None) -> tuple[float, float]:
     Returns
     -------
     tuple of float
-        Correlation [dimensionless] and size of y over that of x [their units]; zeros where one is absent or still.
+        Correlation [dimensionless] and size of y over that of x [their units]; zeros if one is absent or constant.
     """
     if y is None or x is None or len(y) < FEWEST_BLOCKS:
         return 0.0, 0.0
@@ -124,7 +124,7 @@ def alike(y: Array | None, x: Array | None) -> tuple[float, float]:
 def power_of(pressure: Array | None, flow: Array | None, piston: Array | None) -> float:
     """Return the correlation of pressure with pumped flow, without the effect of a constant load and a spring.
 
-    What slides and leaks takes power, whatever the load; a load gives back what it took.
+    Sliding and leakage take power, whatever the load; a load returns what it took.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def power_of(pressure: Array | None, flow: Array | None, piston: Array | None) -
     Returns
     -------
     float
-        Correlation [dimensionless]; 0 where one is absent.
+        Correlation [dimensionless]; 0 if one is absent.
     """
     if pressure is None or piston is None:
         return 0.0

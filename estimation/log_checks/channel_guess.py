@@ -1,7 +1,8 @@
-"""Which column of a strange log is which channel, guessed by name, by unit, and by what only that channel does.
+"""Which column of an unknown log is which channel: guessed by name, by unit, and by what only that channel does.
 
-Time increases. The slope of position is velocity, and follows the pump. Differential pressure is one port's less the
-other's, and has the sign of the motion, since friction has. A unit that no file gives is guessed by the usual size.
+Time increases. The slope of position is velocity, which follows the pump. Differential pressure is one port's pressure
+less the other's, and has the sign of the motion, since friction has. A unit that the file does not state is guessed
+from the usual size.
 """
 
 from collections import Counter
@@ -29,12 +30,12 @@ BLOCKS = 300
 """Blocks that a log is averaged over [count]."""
 
 SURE, FOLLOWS, WEAKLY, ALIKE = 0.95, 0.7, 0.3, 0.999
-"""Correlations of a slope with what it is, of what follows, of a pressure with the motion, and of two columns that are
-one."""
+"""Correlations: of a slope with the channel it belongs to, of what follows it, of a pressure with the motion, and of
+two columns that are the same."""
 
 CLOCK, STILL, SLOPE, RUNNER_UP, DIFFERENCE, TREND = 4.0, -3.0, 4.0, 2.5, 5.0, 1.5
-"""What is said by: a clock, a column that stays the same, a slope, what follows it less well, a difference of two
-columns, and a pressure that goes with the motion [log-odds]; judged."""
+"""Evidence of: a clock, a constant column, a slope, a worse slope, a difference of two columns, and a pressure that
+follows the motion [log-odds]; judged."""
 
 CANDIDATES: Mapping[str, Sequence[str]] = {
     TIME: ("s", "ms", "us"),
@@ -44,16 +45,16 @@ CANDIDATES: Mapping[str, Sequence[str]] = {
     **dict.fromkeys((PRESSURE, *PORTS), ("Pa", "bar", "kPa", "psi", "MPa")),
     VOLTAGE: ("V", "mV"),
 }
-"""Units that are tried where a file gives none, the usual ones first."""
+"""Units that are tried if a file states none, the usual ones first."""
 
 MOST_PRESSURES = 100
-"""Columns that are tried in threes for a difference, those that are likest a pressure first [count]; judged."""
+"""Columns among which differences are searched, those most like a pressure first [count]; judged."""
 
 LEAST_SHARE = 0.1
-"""How much each of two columns must move for a third to be their difference [fraction of what that moves]; judged."""
+"""Least variation of each of two columns for a third to be their difference [fraction of the third's]; judged."""
 
 UNIT_DOUBT = 0.7
-"""What a guess is worth whose unit was guessed too [fraction]; judged."""
+"""Factor on the probability of a guess whose unit was guessed too [fraction]; judged."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class ChannelGuess:
     guess : Guess
         Column, unit and probability.
     why : tuple of Note
-        What speaks for it.
+        The evidence.
     """
 
     guess: Guess
@@ -78,23 +79,23 @@ def guess_channels(
     p: EhaParameters,
     channels: Collection[str] = (TIME, *CHANNELS),
 ) -> tuple[ChannelGuess, ...]:
-    """Return which column each channel may be, and how sure that is.
+    """Return which column each channel may be, with its probability.
 
     Parameters
     ----------
     headings : sequence of Heading
-        What the columns are called.
+        Headings of the columns.
     columns : Mapping[int, ndarray of shape (n,)]
-        Values as logged of those that hold numbers or dates, by their place.
+        Values as logged of the columns with numbers or dates, by index.
     p : EhaParameters
-        The actuator, for how far its piston goes a turn of its pump.
+        The actuator, for the travel of its piston per turn of its pump.
     channels : collection of str
-        Channels that are looked for.
+        Channels to look for.
 
     Returns
     -------
     tuple of ChannelGuess
-        Each channel and each column once.
+        Each channel and each column at most once.
     """
     points: dict[str, dict[int, float]] = {}
     for channel in channels:
@@ -113,7 +114,7 @@ def guess_channels(
 
 
 def _add(points: dict[str, dict[int, float]], channel: str, place: int, worth: float) -> bool:
-    """Add to what speaks for a column, where its unit allows it."""
+    """Add evidence for a column, if its unit allows it."""
     if place not in points.get(channel, {}):
         return False
     points[channel][place] += worth
@@ -121,7 +122,7 @@ def _add(points: dict[str, dict[int, float]], channel: str, place: int, worth: f
 
 
 def _by_other_names(points: dict[str, dict[int, float]]) -> None:
-    """Let a name that says one channel speak against those of which it says nothing: a pressure may move as a slope."""
+    """Count a name that states one channel as evidence against the others: a pressure may move like a slope."""
     said: dict[int, float] = {}
     for worth in points.values():
         for place, one in worth.items():
@@ -143,7 +144,7 @@ def _by_clock(points: dict[str, dict[int, float]], columns: Mapping[int, Any], w
 
 
 def _of_one_length(columns: Mapping[int, Any], time: int | None) -> dict[int, Any]:
-    """Return the columns of numbers as long as the time, or as most are: only rows of one moment are compared."""
+    """Return the columns of numbers as long as the time, or as most are: only rows of the same time are compared."""
     lengths = Counter(map(len, columns.values()))
     wanted = max(lengths, key=lambda one: lengths[one], default=0) if time is None else len(columns[time])
     chosen = ((place, one) for place, one in columns.items() if place != time and one.dtype.kind != "M")
@@ -151,7 +152,7 @@ def _of_one_length(columns: Mapping[int, Any], time: int | None) -> dict[int, An
 
 
 def _means(columns: Mapping[int, Any]) -> dict[int, Array]:
-    """Return columns averaged over blocks and scaled to one; those that stay the same are left out."""
+    """Return columns averaged over blocks and scaled to one, without constant ones."""
     out: dict[int, Array] = {}
     for place, values in columns.items():
         there = np.isfinite(values)
@@ -177,7 +178,7 @@ def _alike(one: Array, other: Array) -> float:
 
 
 def _by_motion(points: dict[str, dict[int, float]], means: Mapping[int, Array], why: dict[Any, list[Note]]) -> None:
-    """Find the column whose slope others are: position, of which velocity is the slope and the pump's speed follows."""
+    """Find the column whose slope others are: position, with velocity as its slope, which the pump's speed follows."""
     followers: dict[int, list[tuple[float, int]]] = {}
     places = np.array(list(means), dtype=np.int64)
     halves = [0.5 * (one[1:] + one[:-1]) for one in means.values()]
@@ -204,7 +205,7 @@ def _by_motion(points: dict[str, dict[int, float]], means: Mapping[int, Array], 
 
 
 def _by_pressure(points: dict[str, dict[int, float]], means: Mapping[int, Array], why: dict[Any, list[Note]]) -> None:
-    """Find pressures: one that is the difference of two others, or goes with the pump."""
+    """Find pressures: one that is the difference of two others, or that follows the pump."""
     pressed = [place for place in points.get(PRESSURE, {}) if place in means]
     pump = max(points.get(SPEED, {}), key=lambda place: points[SPEED][place], default=None)
     likest = sorted(sorted(pressed, key=lambda place: -points[PRESSURE][place])[:MOST_PRESSURES])
@@ -224,13 +225,13 @@ def _by_pressure(points: dict[str, dict[int, float]], means: Mapping[int, Array]
 
 
 def _with_motion(place: int, correlation: float) -> Note:
-    """Return that a column goes with the motion in that place, or against it, as one with the wrong sign does."""
+    """Return that a column follows the motion, with the same or the opposite sign."""
     code = GuessCode.FOLLOWS if correlation > 0.0 else GuessCode.OPPOSES
     return code.note(column=place + 1, correlation=correlation)
 
 
 def _differences(means: Array) -> list[tuple[int, int, int]]:
-    """Return the rows that are the difference of two others, each at a scale of its own, as (row, one, other).
+    """Return the rows that are the difference of two others, each with its own scale, as (row, one, other).
 
     The least-squares fit of every row by every two others follows from all covariances.
     """
@@ -259,7 +260,7 @@ def _differences(means: Array) -> list[tuple[int, int, int]]:
 
 
 def _unit_rows(rows: Array) -> Array:
-    """Return rows without their means, at a size of one; those that stay the same are zero."""
+    """Return rows without their means, scaled to one; constant ones are zero."""
     centred = rows - rows.mean(axis=1, keepdims=True)
     size = np.linalg.norm(centred, axis=1, keepdims=True)
     return np.divide(centred, size, out=np.zeros_like(centred), where=size > 0.0)

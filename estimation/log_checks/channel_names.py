@@ -1,4 +1,4 @@
-"""Channels of a log of the electro-hydrostatic actuator that the checks ask."""
+"""Channels of a log of the electro-hydrostatic actuator that the checks use."""
 
 from plant.log.chamber_pressures import CHAMBERS as CHAMBERS
 from plant.log.chamber_pressures import PRESSURE as PRESSURE
@@ -9,4 +9,4 @@ PRESSURES = (PRESSURE, *CHAMBERS)
 """Channels of pressure: the difference, and the two chambers'."""
 
 MEASURED = (SPEED, POSITION, VELOCITY, *PRESSURES)
-"""All channels that the checks ask."""
+"""All channels that the checks use."""

@@ -1,8 +1,8 @@
 """Channels with a wrong sign, unit or name, found by physics before anything is fitted.
 
-Velocity is the slope of position. The piston goes where the pump sends it, and not farther than the pumped oil takes
-it, while leakage and friction may take any share. What is pumped moves the piston once, and compresses oil as pressure
-rises. A factor counts only near one that a slip of units makes, and far from what a wrong rig file does.
+Velocity is the slope of position. The piston moves with the pump, and no farther than the pumped oil moves it, while
+leakage and friction may take any share. Pumped oil moves the piston, and compresses oil as pressure rises. A factor
+counts only if it is near that of a slip of units, and far from what a wrong rig file can explain.
 """
 
 from collections.abc import Mapping
@@ -28,61 +28,61 @@ from plant.log.record import Record
 from plant.notes import Note
 
 MEASURED = (SPEED, POSITION, VELOCITY, PRESSURE)
-"""Channels of which at least one changes in a log that shows anything."""
+"""Channels of which at least one must change in a log with any information."""
 
 SHORT, MIDDLE, LONG = 0.01, 0.02, 0.05
 """Blocks over which velocity is compared with position, flows are balanced, and the piston follows the pump [s]."""
 
 NEAR = 1.15
-"""Factor by which a ratio of two sensors of one motion may miss that of a slip of units [dimensionless]."""
+"""Factor within which a ratio of two sensors of one motion agrees with a slip of units [dimensionless]."""
 
 LEAST, MOST, LOST = 0.6, 1.3, 0.5
-"""What a balance may make of a slip's factor, and what a piston that loses flow leaves of it [fraction]."""
+"""Range of a balance's factor over that of a slip, and what a piston with large losses leaves of it [fraction]."""
 
 APART = 5.0
-"""Times that two sensors of one motion differ from which one is in a unit that nobody thought of; judged: gains are off
-by less [dimensionless]."""
+"""Ratio of two sensors of one motion from which one has an unknown unit; judged: errors of gain are smaller
+[dimensionless]."""
 
 TINY = 1e-3
-"""Factor of a length from which a piston seems to stand, which without pressure no leakage is taken for."""
+"""Factor of a length below which a piston seems to stand still, which cannot be leakage without pressure."""
 
 SURE, FOLLOWS, OPPOSED = 0.9, 0.6, -0.3
-"""Correlations of one motion measured twice, of a piston with its pump, and with one that counts the other way: what
-yields and slides never goes against its drive, neither in the long run nor from block to block."""
+"""Correlations of one motion measured twice, of a piston with its pump, and with one of opposite sign: compliance and
+friction never oppose their drive, neither in the long run nor from block to block."""
 
 BOTH_WAYS = 0.6
-"""Least ratio of what a piston does in its two directions where speed is found to lack its sign: of its ways, its mean
-velocities, and what is pumped meanwhile [fraction]; judged."""
+"""Least ratio between a piston's two directions from which speed lacks its sign: of its travel, its mean velocities,
+and the pumped volume meanwhile [fraction]; judged."""
 
 MOVES_ON = 0.5
-"""Correlation of a moving piston's speed from block to block, at the least [dimensionless]: it is 0.81 to 0.99 in the
-nine conditions under steps and binary signals. An encoder's noise has -0.5, a velocity sensor's 0."""
+"""Least correlation of a moving piston's speed from block to block [dimensionless]: it is 0.81 to 0.99 in the nine
+conditions under steps and binary signals. An encoder's noise has -0.5, a velocity sensor's 0."""
 
 UNKNOWN_UNIT, UNKNOWN_RIG = "another unit", "another unit, or a rig file of another actuator"
 LOSSY = "another unit, such as mm read as m where much of the flow is lost, or a rig file of another actuator"
-"""What is said of a factor that no known slip makes, or that one makes of a piston that loses most of the flow."""
+"""Words for a factor that no known slip makes, or that one makes if most of the flow is lost."""
 
 EXPLAINED, KNOWN, TOLD = 0.9, 0.1, 4.0
-"""Share of the flow that a balance must explain, relative deviation at which its factor counts, and deviations from
-zero at which a sign does."""
+"""Share of the flow that a balance must explain, relative deviation up to which its factor counts, and deviations from
+zero from which a sign does."""
 
 FAST, SIX = 2.0, 6.0
-"""Times the motor's limit that no speed in revolutions a minute is, judged; and deg/s in one such [dimensionless]. Half
-way between the two the piston goes the root of that as far as deg/s say."""
+"""Factor above the motor's limit that a speed in revolutions per minute cannot reach, judged; and that of deg/s read as
+rpm [dimensionless]. Between the two the travel decides."""
 
 REFUTED = 2.0
-"""Times what a balance leaves unexplained by which the piston's flow must differ from the rig's before a slip of units
-is seen in it [dimensionless]."""
+"""Difference of the piston's flow from the rig's, over what a balance leaves unexplained, from which a slip of units is
+seen in it [dimensionless]."""
 
 HELD = 0.7
-"""Share of the rig's Coulomb friction up to which pressure moves no piston [fraction]; judged. The oil that a stuck one
-takes with its seals was a tenth of what a sliding one takes, and told as rpm read as rad/s."""
+"""Share of the rig's Coulomb friction up to which pressure moves no piston [fraction]; judged. With its seals a stuck
+piston takes a tenth of the oil of a sliding one, which was reported as rpm read as rad/s."""
 
 RESOLVED = 1e3
-"""Deviations of its noise that a position in a wrong unit spans; a stuck piston spans fewer [dimensionless]."""
+"""Travel of a position in a wrong unit, over its noise; a stuck piston has less [dimensionless]."""
 
 PRESSURE_OFF = 50.0
-"""Times the rig's compressibility, or its inverse, that comes of a unit of pressure and of no oil [dimensionless]."""
+"""Ratio to the rig's compressibility, or its inverse, that means a unit of pressure and no oil [dimensionless]."""
 
 
 def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
@@ -149,7 +149,7 @@ def _swapped(short: ChannelBlocks) -> tuple[Note, ...]:
 
 
 def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameters) -> tuple[Note, ...]:
-    """Compare the slope of position with velocity, and both with the pump to say which is wrong."""
+    """Compare the slope of position with velocity, and both with the pump to find which is wrong."""
     same, ratio = alike(short.slope, short.velocity)
     if abs(same) < SURE:
         return ()
@@ -190,11 +190,11 @@ def _moved(record: Record) -> str:
 def _reversed(
     record: Record, middle: ChannelBlocks, long: ChannelBlocks, balance: FlowBalance | None
 ) -> tuple[Note, ...]:
-    """Say which of pump, piston and pressure counts the other way: two of the three go together.
+    """Return which of pump, piston and pressure has the wrong sign: two of the three agree.
 
-    Oil yields to pressure, and what slides and leaks takes power: where neither is so, pump and pressure are opposed.
-    Of a sine whose half period is a long block, such blocks tell the phase at which they begin: a piston that lags a
-    little may then seem opposed. In shorter blocks it is not.
+    Oil yields to pressure, and sliding and leakage take power: if neither holds, pump and pressure have opposite signs.
+    If half the period of a sine equals a long block, the result depends on the phase of the blocks: a piston with a
+    small lag may then seem opposed. In shorter blocks it does not.
     """
     together, _ = gone_together(long.piston, long.pumped)
     apart = all(alike(one.piston, one.pumped)[0] < OPPOSED for one in (middle, long)) and together < OPPOSED
@@ -221,10 +221,10 @@ def _reversed(
 
 
 def _unsigned(record: Record, middle: ChannelBlocks, balance: FlowBalance | None) -> tuple[Note, ...]:
-    """Return a note where a piston goes both ways, as fast and for as much oil, while speed is never negative.
+    """Return a note if a piston moves both ways, as fast and for as much oil, while speed is never negative.
 
-    A load or a spring drives it back too, but against a pump that turns slowly, or so that leakage explains the flow. A
-    stuck piston's noise goes both ways as well, and changes its sign from block to block.
+    A load or a spring moves it back too, but against a pump that turns slowly, or so that leakage explains the flow.
+    Noise of a stuck piston goes both ways as well, and changes its sign from block to block.
     """
     piston, pumped = middle.piston, middle.pumped
     if piston is None or pumped is None or balance is not None or np.nanmin(record[SPEED]) < 0.0:
@@ -242,9 +242,9 @@ def _unsigned(record: Record, middle: ChannelBlocks, balance: FlowBalance | None
 
 
 def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:
-    """Compare how far the piston goes with what is pumped, leakage and compression counted where pressure is logged.
+    """Compare the piston's travel with the pumped volume, less leakage and compression if pressure is logged.
 
-    Where areas differ it goes farthest by the smaller one, which ``least`` counts.
+    If the areas differ it moves farthest by the smaller one, which ``least`` uses.
     """
     together, ratio = gone_together(long.piston, long.pumped)
     gone, least = p.piston_area * ratio, min(piston_areas(p)) * ratio
@@ -293,7 +293,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
 
 
 def _swept_more(long: ChannelBlocks, p: EhaParameters) -> bool:
-    """Return whether a piston swept more than was pumped in all; at one speed nothing else tells how far it went."""
+    """Return whether a piston swept more than was pumped in all; at one speed nothing else shows how far it moved."""
     if long.piston is None or long.pumped is None:
         return False
     return bool(p.piston_area * np.abs(long.piston).sum() > np.abs(long.pumped).sum())
@@ -314,7 +314,7 @@ def _resolved(record: Record, long: ChannelBlocks) -> bool:
 
 
 def _pressure_units(middle: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:
-    """Judge the unit of pressure by how much oil it seems to compress, and by what sliding takes."""
+    """Judge the unit of pressure by the oil that it seems to compress, and by the pressure of sliding."""
     if middle.pressure is None or balance is None or balance.compressed < TOLD * balance.compressed_std:
         return ()
     sliding = max(p.friction_coulomb / p.piston_area, 0.05 * p.relief_pressure)

@@ -1,4 +1,4 @@
-"""`clean_log(record, parameters)`: a log looked at once, before anything is fitted to it."""
+"""`clean_log(record, parameters)`: the checks of a log before anything is fitted to it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -40,14 +40,14 @@ class CleanLog:
     ----------
     record : Record
         The log, without repeated samples and rows, dropouts, gross outliers, clipped pressures and positions, steps of
-        a zero, hum, a late velocity or an offset of it, and samples of like noise; its longest part where rows were
-        lost. Steps of a channel with few significant digits are of one size.
+        a zero, hum, a late velocity or an offset of it, and samples of correlated noise; its longest part if rows were
+        lost. Steps of a channel with few significant digits have one size.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note
-        What was left out of it.
+        Notes on what was left out.
     objections : tuple of Note
-        Sensors that have stopped telling the truth; each note names its ``channel``.
+        Sensors that have failed; each note names its ``channel``.
     mistakes : tuple of Note
         Channels with a wrong sign, unit or name. With one, nothing is concluded from the log.
     """
@@ -65,7 +65,7 @@ class CleanLog:
 
     @property
     def speed_held(self) -> bool:
-        """Whether motor speed came slower than the rest, so that the log was taken at its samples."""
+        """Whether motor speed was logged at a lower rate than the rest, so that the log was reduced to its samples."""
         return any(note.code == SensorCode.SPEED_HELD for note in self.left_out)
 
     def objections_to(self, channels: tuple[str, ...]) -> tuple[Note, ...]:
@@ -74,30 +74,30 @@ class CleanLog:
         Parameters
         ----------
         channels : tuple of str
-            The channels that are used.
+            The channels.
 
         Returns
         -------
         tuple of Note
-            None for sound sensors.
+            Empty for sound sensors.
         """
         return tuple(note for note in self.objections if note.data["channel"] in channels)
 
 
 def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
-    """Look at a log's sensors once: noise, outliers, clipping, frozen or dead channels.
+    """Check a log's sensors once: noise, outliers, clipping, frozen or dead channels.
 
     Parameters
     ----------
     record : Record
         The log.
     parameters : EhaParameters
-        The actuator, for its relief valve and for what the pump must have moved.
+        The actuator, for its relief valve and for the motion due to its pump.
 
     Returns
     -------
     CleanLog
-        The log to fit, and what was found.
+        The log to fit, and the findings.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
 
 
 def _thinned_variances(record: Record, filtered: tuple[Note, ...], every: Record) -> Mapping[str, float]:
-    """Return the variances of channels of which one sample in several was kept; rounding shows where all are there."""
+    """Return the variances of channels of which one sample in several was kept; rounding is determined from all."""
     found = {name: independent_variance(record[name]) for name in (str(note.data["channel"]) for note in filtered)}
     rounded = {name: rounded_variance(every[name]) for name in found}
     least = SMALLEST_VARIANCE[PRESSURE]

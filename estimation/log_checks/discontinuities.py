@@ -1,9 +1,9 @@
-"""Rows at which a log breaks off: a sensor's zero that was set anew, and rows that were lost without a mark.
+"""Breaks in a log: a sensor's zero that was set anew, and rows that were lost without a mark.
 
-Position goes on by what velocity says. Pressure changes by what pump and piston compress, and by what leaks. A row at
-which one of them steps several times farther from that than it ever does elsewhere is no motion. Where it steps alone,
-its zero was set anew: a step of position is subtracted. That of a pressure is not known as well as a fit asks for, and
-where several channels jump at once rows were lost, nobody knows how many: the longest part without a step is kept.
+Position continues by velocity. Pressure changes by compression and leakage. A row at which one of them steps several
+times farther from that than it does anywhere else is no motion. If it steps alone, its zero was set anew: a step of
+position is subtracted. A step of pressure is not known as well as a fit requires, and if several channels jump at once,
+an unknown number of rows was lost: the longest part without a step is kept.
 """
 
 from itertools import pairwise
@@ -18,46 +18,46 @@ from plant.log.record import Record
 from plant.notes import Note
 
 FEWEST_ROWS, MOST_PLACES = 500, 10
-"""Rows of a log that show what is usual, at least, and places that are looked for, at most [count]."""
+"""Least rows of a log that show the usual changes, and most places that are looked for [count]."""
 
 SLOWEST, SLOWEST_PRESSURE = 5.5e-3, 2.5e-3
-"""Sample times beyond which pace, and pressure, change within a row by as much as they ever do [s]."""
+"""Sample times above which velocity, and pressure, change within a row as much as they ever do [s]."""
 
 APART = 10
-"""Rows about a place that are left out of what is usual elsewhere, and over which a step must last [samples]."""
+"""Rows about a place that are excluded from the usual changes, and over which a step must last [samples]."""
 
 STEP, STEP_ALONE, STEP_OF_PRESSURE = 3.0, 4.0, 2.2
-"""How many times the largest one elsewhere a step must be [dimensionless]: of a position; of one without a velocity
-that says how far the piston went; of a pressure. 640 logs reach 1.9, 2.0 and 1.5 (training, shared), 2.5 just after
-a start under load, and 9 where friction grips."""
+"""Ratio of a step to the largest one elsewhere [dimensionless]: of a position; of one without a velocity; of a
+pressure. 640 logs reach 1.9, 2.0 and 1.5 (training, shared), 2.5 just after a start under load, and 9 where friction
+grips."""
 
 NEAR = 4
-"""Rows on either side over whose mean a step is taken [samples]."""
+"""Rows on either side over whose mean a step is computed [samples]."""
 
 LASTS = 0.5
-"""Share of a step that must be left some rows on; of an outlier nothing is [fraction]."""
+"""Share of a step that must remain some rows later; of an outlier nothing remains [fraction]."""
 
 BROKEN = 8.0
 """Deviations of noise by which another channel jumps in the same row if rows were lost [dimensionless]."""
 
 STOPS = 0.1
-"""Share of its way up to a stop that a piston goes on behind it, or stays short of it [fraction]; judged."""
+"""Share of its travel before a stop by which a piston moves on after it, or stays short of it [fraction]; judged."""
 
 SOFT_STOP = 1e-3
 """Share of a log's travel by which a stop yields [fraction]; judged."""
 
 YIELDS = 1e-3
-"""Sample time at which a stop has yielded after `NEAR` rows, and `APART` more tell that it holds [s]; judged. Faster
-logs take more rows: a stop yields over milliseconds, and in one it yields a large part of what a piston goes."""
+"""Sample time at which a stop has yielded after `NEAR` rows, and `APART` more show that it holds [s]; judged. Faster
+logs need more rows: a stop yields over milliseconds, and that may be a large part of the travel."""
 
 SETS_OFF = 0.02, 0.5
-"""Shares of the log's highest speed between which a motor sets off from rest [fraction]; judged."""
+"""Shares of the log's highest speed between which a motor starts from rest [fraction]; judged."""
 
 SETTING_OFF = 0.1
-"""Longest time for which a motor sets off [s]: one that turns slowly at first may have its pressure zeroed then."""
+"""Longest time of a motor's start [s]: if it turns slowly at first, its pressure may be zeroed then."""
 
 REST = 10
-"""Rows that position repeats before it jumps if it was held by its logger [samples]."""
+"""Rows of constant position before a jump that mean that its logger held it [samples]."""
 
 
 class _Step(NamedTuple):
@@ -74,12 +74,12 @@ def without_discontinuities(record: Record) -> tuple[Record, tuple[Note, ...]]:
     Parameters
     ----------
     record : Record
-        The log, without outliers; position is needed, and a channel that goes with it.
+        The log, without outliers; position is needed, and another channel that belongs to it.
 
     Returns
     -------
     tuple of (Record, tuple of Note)
-        The log, steps of a zero subtracted, or its longest part; and what was done.
+        The log, with steps of a zero subtracted, or its longest part; and notes.
     """
     if POSITION not in record or len(record) < FEWEST_ROWS or record.sample_time > SLOWEST:
         return record, ()
@@ -112,7 +112,7 @@ def without_discontinuities(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
 
 def _by_row(record: Record, steps: list[_Step]) -> dict[int, set[str]]:
-    """Return the channels that jump at each place; steps in neighbouring rows are one place."""
+    """Return the channels that jump at each place; steps in neighbouring rows count as one place."""
     out: dict[int, set[str]] = {}
     for step in sorted(steps, key=lambda one: one.row):
         row = next((one for one in out if step.row - one <= APART), step.row)
@@ -138,9 +138,9 @@ def _longest(record: Record, steps: list[_Step]) -> tuple[Record, tuple[Note, ..
 
 
 def _steps_of_position(record: Record) -> list[_Step]:
-    """Return the steps of position that velocity does not explain, larger than its moves between rows elsewhere.
+    """Return the steps of position that velocity does not explain and that exceed its moves between rows elsewhere.
 
-    Seals that grip stop a piston within a row; it strays by less than it goes.
+    Seals that grip stop a piston within a row; it then deviates by less than its own step.
     """
     gone, sure = np.diff(record[POSITION]), VELOCITY in record
     pace = record.sample_time * record[VELOCITY] if sure else np.zeros(len(record))
@@ -162,10 +162,10 @@ def _steps_of_pressure(record: Record) -> list[_Step]:
 
 
 def _setting_off(speed: Array, sample_time: float) -> slice:
-    """Return the rows in which a motor sets off from rest; none where it turns as the log begins.
+    """Return the rows in which a motor starts from rest; none if it turns when the log begins.
 
-    Both chambers are at the accumulator's pressure then. Until one of them draws make-up, pressure rises twice as fast
-    as it ever does again.
+    Both chambers are at the accumulator's pressure then. Until one of them draws make-up flow, pressure rises twice as
+    fast as it ever does again.
     """
     size = np.nan_to_num(np.abs(speed))
     turns, away = (int(np.argmax(size > share * np.max(size))) for share in SETS_OFF)
@@ -183,9 +183,9 @@ def _driven(record: Record, row: int) -> bool:
 
 
 def _meets_stop(record: Record, row: int) -> bool:
-    """Return whether the piston meets an end stop near a row: it stops for good, as far out as it ever goes.
+    """Return whether the piston meets an end stop near a row: it stops for good, at its farthest place.
 
-    What the pump delivers, or a load pulls, then goes into pressure at once.
+    The pump's delivery, or the pull of a load, then raises pressure at once.
     """
     position = record[POSITION]
     near, apart = (max(rows, round(rows * YIELDS / record.sample_time)) for rows in (NEAR, APART))
@@ -209,20 +209,19 @@ def _without(values: Array, rows: list[int]) -> Array:
 def pressure_strays(record: Record, *, noisy: bool = False) -> Array:
     """Return the changes of pressure from row to row that pump, piston and leakage do not explain.
 
-    Valves and seals bend this line, so rows that stray far from it are left out before it is drawn again.
+    Valves and seals bend this line, so rows far from it are left out before it is fitted again.
 
     Parameters
     ----------
     record : Record
         A log with motor speed, position and differential pressure.
     noisy : bool
-        Whether the change before counts among what explains: a noisy row is followed by a change the other way, a step
-        is not.
+        Whether the previous change is a regressor: a noisy row is followed by a change the other way, a step is not.
 
     Returns
     -------
     ndarray, shape (n - 1,)
-        The rest [Pa]; NaN where a sample that it needs is missing.
+        The remainder [Pa]; NaN if a sample that it needs is missing.
     """
     pressure, speed, T = record[PRESSURE], record[SPEED], record.sample_time
     rise, swept, turned = np.diff(pressure), np.diff(record[POSITION]), 0.5 * T * (speed[1:] + speed[:-1])
@@ -253,7 +252,7 @@ def pressure_strays(record: Record, *, noisy: bool = False) -> Array:
 
 
 def _places(strayed: Array, least: float) -> list[int]:
-    """Return rows behind which a channel steps farther than anywhere else, and stays; nothing where none does."""
+    """Return rows after which a channel steps farther than anywhere else, and stays; empty if there are none."""
     sizes = np.nan_to_num(np.abs(strayed))
     sizes[:APART] = sizes[-APART:] = 0.0  # a log may begin within a jerk
     found: list[tuple[int, float]] = []
@@ -268,13 +267,13 @@ def _places(strayed: Array, least: float) -> list[int]:
 
 
 def _size(strayed: Array, k: int) -> float:
-    """Return the size of a step at a row, by the means of some rows on either side."""
+    """Return the size of a step at a row, from the means of some rows on either side."""
     course = np.cumsum(np.nan_to_num(strayed[k - NEAR : k + NEAR + 1]))
     return float(np.mean(course[NEAR:]) - np.mean(course[:NEAR]))
 
 
 def _held_before(record: Record, step: _Step) -> int:
-    """Return the number of rows for which a position rests before it jumps; 0 for no rest, or another channel."""
+    """Return the number of rows of constant position before its jump; 0 for no rest, or another channel."""
     if step.channel != POSITION:
         return 0
     before = record[POSITION][: step.row + 1]

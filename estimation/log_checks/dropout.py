@@ -1,7 +1,7 @@
-"""Dropouts: rows that a logger filled with its last ones, and gaps of one channel that the balance of flows feels.
+"""Dropouts: rows that a logger filled with its last ones, and gaps of one channel that matter to the flow balance.
 
-A logger that misses a while may write its last row again and again. Nothing tells that from rest but its end: then
-piston or pressure are somewhere else at once, farther than they ever go from one row to the next.
+A logger that misses data may write its last row again and again. Only the end distinguishes that from rest: piston or
+pressure then jump farther than they ever move from one row to the next.
 """
 
 import numpy as np
@@ -17,25 +17,25 @@ from plant.log.record import Record
 from plant.notes import Note
 
 ASKED = (SPEED, POSITION, VELOCITY, *PRESSURES)
-"""Channels that a row must repeat, all that are logged."""
+"""Channels that a row must repeat, if they are logged."""
 
 FEWEST_CHANNELS, FEWEST_ROWS = 3, 10
-"""Channels that must be logged, and rows that must repeat the one before, to speak of a dropout [count]."""
+"""Least logged channels, and least repeated rows, for a dropout [count]."""
 
 JUMP = 2.0
-"""How many times the largest step elsewhere a channel goes at once when a dropout ends [dimensionless]."""
+"""Ratio of the jump at the end of a dropout to the largest step elsewhere [dimensionless]."""
 
 LONG_GAP = 5
-"""Missing samples in a row from which a line between a gap's ends says nothing of what lies between [samples]."""
+"""Missing samples in a row from which a straight line across the gap is of no use [samples]."""
 
 
 def without_dropouts(record: Record) -> tuple[Record, tuple[Note, ...]]:
-    """Return a log without the rows that its logger only wrote again while it had none.
+    """Return a log without the rows that its logger only repeated.
 
     Returns
     -------
     tuple of (Record, tuple of Note)
-        The log, those rows missing in all channels, and a note for each channel if there are any.
+        The log, with those rows missing in all channels, and a note for each channel if there are any.
     """
     asked = [name for name in ASKED if name in record]
     if len(asked) < FEWEST_CHANNELS:
@@ -71,10 +71,10 @@ def _jumps(values: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def without_pauses(record: Record) -> Record:
-    """Return a log for the balance of flows, in which a long gap of motor speed or position is one of all it balances.
+    """Return a log for the flow balance, in which a long gap of motor speed or position is a gap of all channels.
 
-    Without either, pressure within the gap says nothing, and what the pump delivered or the piston swept meanwhile is
-    known from the other only where nothing leaks, opens or runs empty.
+    Without either, pressure within the gap is of no use, and the missing pumped or swept volume follows from the other
+    only if nothing leaks, opens or runs empty.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def without_pauses(record: Record) -> Record:
     Returns
     -------
     Record
-        The same one where no such gap is.
+        Unchanged if there is no such gap.
     """
     gone = long_gaps(record[SPEED]) | long_gaps(record[POSITION])
     if not np.any(gone):
@@ -93,7 +93,7 @@ def without_pauses(record: Record) -> Record:
 
 
 def long_gaps(values: Array) -> NDArray[np.bool_]:
-    """Return the samples in gaps of `LONG_GAP` samples or more; none is between those of a slow channel.
+    """Return the samples in gaps of `LONG_GAP` samples or more; never between those of a slow channel.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def long_gaps(values: Array) -> NDArray[np.bool_]:
     Returns
     -------
     ndarray of bool, shape (n,)
-        Whether a sample lies in one; nowhere in a channel of which nothing is there.
+        Whether a sample is in one; nowhere in an empty channel.
 
     Examples
     --------

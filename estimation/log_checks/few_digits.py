@@ -1,8 +1,8 @@
 """`with_even_steps(record)`: channels written with few significant digits, whose steps grow with their size.
 
 A logger that prints ``%.4g`` writes 9.999 mm and 41.76 mm: near mid-stroke its steps are a thousand times smaller than
-at the end of the travel. Noise read off the smallest steps is then far too low for the rest of the log, and the fit
-finds causes for what is rounding. Rounded to the largest step, such a channel is one of a coarse converter.
+at the end of the travel. Noise determined from the smallest steps is then far too low for the rest of the log, and the
+fit finds causes for rounding. Rounded to its largest step, such a channel equals that of a coarse converter.
 """
 
 import numpy as np
@@ -14,17 +14,17 @@ from plant.log.record import Record
 from plant.notes import Note
 
 MOST_DIGITS = 5
-"""Significant digits up to which a channel is looked at [count]; with six, steps are finer than any encoder's."""
+"""Significant digits up to which a channel is checked [count]; with six, steps are finer than any encoder's."""
 
 LOOKED_AT = 200
-"""Samples that are looked at first, spread over the log [count]."""
+"""Samples that are checked first, spread over the log [count]."""
 
 EXACT = 1e-9
 """Share of a value up to which it equals its rounding [fraction]: a change of unit costs 1e-16."""
 
 FEWEST, USED = 50, 0.5
-"""Samples of a power of ten that tell how many digits it has [count], and the share of them whose last digit is not 0:
-written digits have 0.9, steps that are the same at any size 0 in the lower one of two powers."""
+"""Samples of a power of ten that show the number of digits [count], and the share of them whose last digit is not 0:
+written digits have 0.9; steps of one size have 0 in the lower one of two powers."""
 
 
 def with_even_steps(record: Record) -> tuple[Record, tuple[Note, ...]]:
@@ -38,7 +38,7 @@ def with_even_steps(record: Record) -> tuple[Record, tuple[Note, ...]]:
     Returns
     -------
     tuple of Record and tuple of Note
-        The log, and none for a log with more digits.
+        The log, and no notes if it has more digits.
     """
     rounded: dict[str, Array] = {}
     notes: list[Note] = []
@@ -51,7 +51,7 @@ def with_even_steps(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
 
 def written_digits(values: Array) -> int:
-    """Return with how many significant digits a channel was written; 0 where steps of one size, or many digits, were.
+    """Return the number of significant digits of a channel; 0 if its steps have one size, or it has many digits.
 
     Parameters
     ----------
@@ -83,12 +83,12 @@ def written_digits(values: Array) -> int:
 
 
 def _largest_power(values: Array) -> float:
-    """Return the largest power of ten that enough samples have: a spike must not coarsen the whole log."""
+    """Return the largest power of ten with enough samples: a spike must not coarsen the whole log."""
     return float(_common(_power(_sizes(values)))[-1])
 
 
 def _common(powers: Array) -> Array:
-    """Return the powers that enough samples have, in order."""
+    """Return the powers with enough samples, in order."""
     found, counts = np.unique(powers, return_counts=True)  # without counts NumPy imports its masked arrays
     return found[counts >= FEWEST]
 
@@ -104,5 +104,5 @@ def _has_digits(sizes: Array, powers: Array, digits: int) -> bool:
 
 
 def _power(sizes: Array) -> Array:
-    """Return the power of ten of positive values; one that rounding has left just below a power is taken for it."""
+    """Return the power of ten of positive values; one that rounding has left just below a power counts as it."""
     return np.floor(np.log10(sizes * (1.0 + EXACT)))

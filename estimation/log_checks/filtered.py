@@ -1,6 +1,6 @@
-"""Filtered pressure: noise that a filter or an averaging logger has made alike from sample to sample.
+"""Filtered pressure: noise that a filter or an averaging logger has correlated from sample to sample.
 
-A fit takes each sample's noise for its own. Where it is not, as many samples are left out as make it so: a fit then
+A fit assumes independent noise in each sample. If it is correlated, only every so many samples are kept: a fit then
 sees a slow sensor, and finds the filter's lag as any other.
 """
 
@@ -19,34 +19,34 @@ WINDOW = 64
 _TAPER = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(WINDOW) / WINDOW)
 
 FEWEST_WINDOWS = 8
-"""Windows without a missing sample below which a spectrum is not judged [count]."""
+"""Least number of windows without a missing sample for a spectrum [count]."""
 
 BANDS = (0.2, 0.3, 0.4, 0.5)
 """Edges of the bands that are compared [cycles/sample]: in a log that is fast enough, the actuator is slower."""
 
 FASTEST_RING = 0.1
-"""Natural frequency up to which the bands hold noise alone [cycles/sample]: half of where they begin, for what rings
-does so with a width, and a rig file is up to a third off."""
+"""Natural frequency up to which the bands contain noise alone [cycles/sample]: half of their lower edge, as a resonance
+has a width, and a rig file may be wrong by a third."""
 
 CHANCE, FLATTEST = 3.2, 0.9
-"""Noise is white if the least power of a band over the largest exceeds 1 less the first over the root of the count of
-windows, or the second where they are many [dimensionless]. White noise of 1 to 20 s at 1 kHz fails in 1 log of 1000; a
+"""Noise is white if the least power of a band over the largest exceeds 1 less the first over the root of the number of
+windows, or the second if there are many [dimensionless]. White noise of 1 to 20 s at 1 kHz fails in 1 log of 1000; a
 correlation of 0.15 between neighbours shows in 20 s."""
 
 SLOWEST = 150.0
-"""Rate below which no sensor is made slower [Hz]."""
+"""Rate below which no sensor is thinned out further [Hz]."""
 
 QUIET = 0.25
-"""Share of the windows that count as quiet, those of least power in the bands [fraction]: a drive of steps turns a
-third as fast in as many as at most, so 15 teeth at 1500 rpm pass 125 times a second."""
+"""Share of the windows that count as quiet, those of least power in the bands [fraction]. Under steps, a third of the
+top speed is not exceeded in so many, so 15 teeth at 1500 rpm pass 125 times a second there."""
 
 NEARER = 0.5
-"""How far from white noise is in quiet windows at most, over how far it is in all [dimensionless]; judged. To pick by
-power favours what is white: of 60 logs with averages of 2 or 4 rows at most one passes so, of 60 with a correlation of
-0.15 or a filter at 0.3 cycles/sample, 10 at most."""
+"""Largest distance from white noise in quiet windows, over that in all [dimensionless]; judged. Selection by power
+favours white noise: of 60 logs with averages of 2 or 4 rows at most one passes, of 60 with a correlation of 0.15 or a
+filter at 0.3 cycles/sample at most 10."""
 
 MOST_ROWS = 40
-"""Rows over which noise may be alike [count]."""
+"""Rows over which noise may be correlated [count]."""
 
 
 def without_correlated_noise(record: Record, rings_at: float = 0.0) -> tuple[Record, tuple[Note, ...]]:
@@ -57,7 +57,7 @@ def without_correlated_noise(record: Record, rings_at: float = 0.0) -> tuple[Rec
     record : Record
         The log.
     rings_at : float
-        Natural frequency of the piston on its oil [Hz]. A log in which that is near the bands is left as it is.
+        Natural frequency of the piston on its oil [Hz]. A log in which it is near the bands is unchanged.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def without_correlated_noise(record: Record, rings_at: float = 0.0) -> tuple[Rec
 
 
 def independent_rows(values: Array, sample_time: float) -> int:
-    """Return every how many rows the noise of a channel is independent.
+    """Return the spacing in rows at which the noise of a channel is independent.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def independent_rows(values: Array, sample_time: float) -> int:
     Returns
     -------
     int
-        1 where it is in every row, or where no number of rows makes it so: then it is no noise that is alike.
+        1 if it is independent in every row, or at no spacing: then it is not correlated noise.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def independent_rows(values: Array, sample_time: float) -> int:
 
 
 def is_white(values: Array) -> bool:
-    """Return whether the noise of a channel is white as far as its samples tell.
+    """Return whether the noise of a channel is white, as far as its samples show.
 
     Parameters
     ----------
@@ -125,9 +125,9 @@ def is_white(values: Array) -> bool:
 def is_white_when_quiet(values: Array) -> bool:
     """Return whether the noise of a channel is white where it is quietest, but not over the whole log.
 
-    A filter or an average is there at any time. What the actuator does is not: the teeth of a pump are slower than the
-    bands while it turns slowly, a loop rests between moves, a chirp is slow for a while.
-    A few windows show a filter less surely than all do, so they must also be nearer to white by `NEARER`.
+    A filter or an average acts at all times. The actuator does not: the teeth of a pump are below the bands while it
+    turns slowly, a loop rests between moves, a chirp is slow for a while. A few windows show a filter less surely than
+    all do, so they must also be nearer to white by `NEARER`.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def _cut(values: Array) -> Array:
 
 
 def _windows(values: Array) -> Array:
-    """Return windows that miss no sample, shape (windows, `WINDOW`)."""
+    """Return windows without missing samples, shape (windows, `WINDOW`)."""
     windows = _cut(values)
     return windows[np.isfinite(windows).all(axis=1)]
 
@@ -164,26 +164,26 @@ def _windows(values: Array) -> Array:
 def flatness(windows: Array) -> float:
     """Return the least power of a band of high frequency over the largest.
 
-    The power at a frequency is the usual one of all windows, so that none counts in which the actuator is struck.
+    The power at a frequency is the median over windows, so that single windows with an impact do not count.
 
     Parameters
     ----------
     windows : ndarray, shape (windows, `WINDOW`)
-        Stretches of a channel [any unit].
+        Parts of a channel [any unit].
 
     Returns
     -------
     float
-        The ratio [dimensionless], 1 where there is no power.
+        The ratio [dimensionless], 1 if there is no power.
     """
     bands = _powers(windows)
     return min(bands) / max(bands) if max(bands) > 0.0 else 1.0
 
 
 def independent_variance(values: Array) -> float | None:
-    """Return the variance of a channel's independent noise by its highest band, None where too few samples are there.
+    """Return the variance of a channel's independent noise from its highest band, None if it has too few samples.
 
-    Second differences of samples that are far apart hold what the actuator does.
+    Second differences of samples that are far apart would include the actuator's motion.
 
     Parameters
     ----------

@@ -12,17 +12,17 @@ from estimation.models.model import ProcessModel
 from plant.log.record import Record
 
 PRESSURE_NOISE_LOGGED = 3e8
-"""Process-noise density of differential pressure where it is logged [Pa^2/s]. It stands for the flows that a lumped
-model leaves out (make-up, changing volumes); without the sensor the model's own, small one holds the pressure."""
+"""Process-noise density of differential pressure if it is logged [Pa^2/s]. It stands for the flows that a lumped model
+omits (make-up, changing volumes); without the sensor, the model's own small density is used."""
 
 START_STD = 3e8
-"""Standard deviation of the first guess [Pa]: convergence is driven by it (errata E10)."""
+"""Standard deviation of the first guess [Pa]: it drives convergence (errata E10)."""
 
 TURNING = 0.2
-"""Share of a log's motor speed, root mean square, from which the motor turns [fraction]."""
+"""Share of a log's motor speed, root mean square, above which the motor turns [fraction]."""
 
 AT_REST = 3e4
-"""Differential pressure of an actuator that is taken to be at rest, at most, beside five deviations of noise [Pa]."""
+"""Largest differential pressure of an actuator at rest, beside five deviations of noise [Pa]."""
 
 
 def first_belief(model: ProcessModel, record: Record, start: float, start_std: float) -> Gaussian:
@@ -58,7 +58,7 @@ def first_belief(model: ProcessModel, record: Record, start: float, start_std: f
 
 
 def first_load(record: Record, variances: Mapping[str, float] | None = None) -> float:
-    """Return the differential pressure that a log begins with, zero where that is little enough for rest.
+    """Return the differential pressure at the beginning of a log, zero if it is small enough for rest.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def begins_in_motion(record: Record, share: float = TURNING) -> bool:
     Returns
     -------
     bool
-        Whether the first motor speed is more.
+        Whether the first motor speed exceeds that.
     """
     speed = record[SPEED]
     first = abs(_first(record, SPEED))

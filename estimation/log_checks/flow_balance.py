@@ -13,20 +13,21 @@ from plant.eha.model import EhaParameters, piston_areas
 from plant.log.record import Record
 
 FEWEST_SAMPLES = 8
-"""Samples in a block at least, since those at its ends count little [count]."""
+"""Least samples in a block, since those at its ends count little [count]."""
 
 MOST_LOST = 0.25
-"""Share of the flow at rated speed that is the largest flow bias [fraction]; judged: the leakiest actuator of the paper
-loses a fifth."""
+"""Largest flow bias, over the flow at rated speed [fraction]; judged: the leakiest actuator of the paper loses a
+fifth."""
 
 BIASES = 401
-"""Flow biases over which a balance is averaged [count]: a step moves the piston's factor by less than 0.1 %."""
+"""Flow biases over which a balance is averaged [count]: one more or less changes the piston's factor by less than 0.1
+%."""
 
 HELD_BEYOND = 3.0
-"""Deviations of its noise from which one sample of pressure tells a single rod's side that holds it [dimensionless]."""
+"""Deviations of its noise from which one sample of pressure shows the loaded side of a single rod [dimensionless]."""
 
 LEAST_SHARE = 1e-12
-"""Share of the flow that counts as left where nothing is, as of a log without noise [fraction]."""
+"""Share of the flow that counts as left in any case, as in a log without noise [fraction]."""
 
 
 class FlowBalance(NamedTuple):
@@ -35,11 +36,11 @@ class FlowBalance(NamedTuple):
     Parameters
     ----------
     swept : float
-        Times the piston's own flow that are pumped to move it; 1 for a sound log [dimensionless].
+        Pumped flow for the motion over the piston's own flow; 1 for a sound log [dimensionless].
     swept_std : float
         Its standard deviation [dimensionless].
     compressed : float
-        Times the rig's compressibility [dimensionless].
+        Factor on the rig's compressibility [dimensionless].
     compressed_std : float
         Its standard deviation [dimensionless].
     explained : float
@@ -59,13 +60,13 @@ class FlowBalance(NamedTuple):
     def contradicts_rig(self) -> float:
         """Error of the piston's flow by the balance, over what the balance leaves unexplained [dimensionless].
 
-        A piston that hardly moves under a pump that leaks it all lets motion stand for whatever the balance leaves out.
+        If the piston hardly moves and nearly all flow leaks, the motion absorbs whatever the balance omits.
         """
         return abs(self.swept - 1.0) * self.moving / max(1.0 - self.explained, 1e-12) ** 0.5
 
 
 def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance | None:
-    """Return the balance of the pumped flow; None if pump, piston or pressure is not logged, or the pump rests.
+    """Return the balance of the pumped flow; None if pump, piston or pressure is not logged, or the pump is at rest.
 
     Parameters
     ----------
@@ -102,11 +103,11 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
 
 
 def _pumped_areas(pressure: Array, least: float, size: int, p: EhaParameters) -> Array:
-    """Return the area whose flow the pump's is, shape (n,) [m^2].
+    """Return the area that the pump's flow moves, shape (n,) [m^2].
 
-    What a single rod's low side takes or gives beside goes through its make-up valve, which the high side holds open.
-    With plain valves that shut, both sides may be high, and the mean counts. Below ``least`` a pressure may be noise
-    [Pa], and the mean over ``size`` samples tells the side.
+    The difference of a single rod's low side passes its make-up valve, which the high side holds open. With plain
+    valves that shut, both sides may be high, and the mean area is used. Below ``least`` a pressure may be noise [Pa];
+    the mean over ``size`` samples shows the side.
     """
     if not (p.single_rod and p.pilot_share > 0.0):
         return np.full(len(pressure), p.piston_area)
@@ -124,8 +125,8 @@ def _noise(values: Array) -> float:
 class _Window:
     """Means and slopes of a signal over blocks, weighted by a parabola that is zero at both ends of a block.
 
-    The slope of a signal, weighted so, is the signal itself weighted by the parabola's slope: all samples of a block
-    share in it (Shinbrot, On the analysis of linear and nonlinear systems, 1957). The variances of a mean and of a
+    The slope of a signal, weighted in this way, is the signal itself weighted by the parabola's slope: all samples of a
+    block contribute (Shinbrot, On the analysis of linear and nonlinear systems, 1957). The variances of a mean and of a
     slope are those of a sample's noise times `of_mean` [dimensionless] and `of_slope` [1/s^2].
     """
 
@@ -155,16 +156,16 @@ class _Window:
 def _whatever_the_bias(
     flow: Array, sign: Array, parts: Sequence[Array], noises: Array, most: float
 ) -> FlowBalance | None:
-    """Return the balance of a flow by its parts, over the flow biases that it leaves open.
+    """Return the balance of a flow by its parts, averaged over the flow biases that it leaves open.
 
-    A pump that turns at one speed pumps what its sign says. Least squares then let a bias take up all flow, for the
-    less there is to explain, the less is left. So each bias counts by the share of the other flow that is left.
-    A bias is none of a pump's below zero and above `most` [m^3/s]; of a speed in another unit all flows are as many
-    times too large as the piston's.
+    The flow of a pump at constant speed is proportional to the sign of speed. Least squares then let a bias absorb all
+    flow, since the less there is to explain, the less is left. So each bias counts by the share of the remaining flow
+    that is left. A bias is neither below zero nor above `most` [m^3/s]; if speed has another unit, all flows are larger
+    by the same factor as the piston's.
 
-    Noise in a part draws its factor towards zero, and those of parts that move like it elsewhere: by the inverse of the
-    normal equations times the variance of noise, times the factor, once, squared and so on. Two orders are corrected,
-    and deviations hold the second, so that where the series does not converge nothing is known.
+    Noise in a part biases its factor towards zero, and shifts those of correlated parts: by the inverse of the normal
+    equations times the variance of noise, times the factor, once, squared and so on. Two orders are corrected, and
+    deviations include the second, so that nothing is known if the series does not converge.
     """
     if np.ptp(flow) == 0.0:
         return None
@@ -200,10 +201,11 @@ def _whatever_the_bias(
 
 
 def _blocks_that_repeat(rest: Array) -> float:
-    """Return of how many blocks each holds what the others do not [dimensionless, 1 or more].
+    """Return how many blocks are worth one independent block [dimensionless, 1 or more].
 
-    Neighbours of a slow remainder repeat each other, and so do the periods of a sine: what a model leaves of each is
-    the same. Blocks are then worth as many as their spectrum has lines (Welch's equivalent degrees of freedom, 1947).
+    Neighbours of a slow remainder repeat each other, and so do the periods of a sine, with the same model error in
+    each. The number of independent blocks is then that of the lines of their spectrum (Welch's equivalent degrees of
+    freedom, 1947).
     """
     lasting = float(np.clip(alike(rest[1:], rest[:-1])[0], 0.0, 0.99))
     power = np.abs(np.fft.rfft(rest - rest.mean())[1:]) ** 2

@@ -1,4 +1,4 @@
-"""Does a still encoder miss a motion, or that seals yield? Leakage is the log's own, not a healthy actuator's."""
+"""Whether a constant encoder reading misses a motion, or the yield of seals. Leakage is the log's own."""
 
 import numpy as np
 
@@ -9,26 +9,26 @@ from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
 BLOCK, FEWEST = 0.02, 25
-"""Length of the blocks over which flows are balanced [s], and blocks outside of the hold that are needed [count]."""
+"""Length of the blocks over which flows are balanced [s], and least blocks outside of the hold [count]."""
 
 WINDOW = 0.5
-"""Stretches of a hold that are judged, each by itself [s]: over more of it losses would be uncertain by as much."""
+"""Parts of a hold that are judged separately [s]: over longer ones losses would be too uncertain."""
 
 LOSSES_KNOWN, FLOW_KNOWN, DEVIATIONS = 0.25, 0.05, 3.0
-"""Share by which losses may differ within the hold, share by which pump and piston may be off, and deviations of the
-losses, that are allowed for."""
+"""Allowances: share by which losses may differ within the hold, share by which pump and piston may be wrong, and
+deviations of the losses."""
 
 SHORTEST_TRAVEL = 5e-4
-"""Missed travel below which nothing is concluded: the seals give way by less [m]."""
+"""Missed travel below which nothing is concluded: seals yield by less [m]."""
 
 AT_RELIEF = 0.9
-"""Share of the relief setting from which the valve may take all that is pumped [fraction]."""
+"""Share of the relief setting from which the valve may take all pumped flow [fraction]."""
 
 SEALS_YIELD, RESOLVED = 2e-5, 10.0
-"""How far seals yield before they slide [m] (judged), and quanta of an encoder by which it must show that [count]."""
+"""Yield of seals before they slide [m] (judged), and quanta of an encoder that must show it [count]."""
 
 FAR_LONGER, SWINGS = 10.0, 0.5
-"""Times the longest other hold, and share of the range of pressure elsewhere, from which a hold is looked at
+"""Length of a hold over the longest other one, and its range of pressure over that elsewhere, from which it is checked
 [dimensionless]; judged."""
 
 JUMP, BEYOND_PUMP = 10.0, 5.0
@@ -43,14 +43,14 @@ def jumped(record: Record, hold: slice, p: EhaParameters) -> bool:
     record : Record
         The log, with position.
     hold : slice
-        Samples over which it is still.
+        Samples with a constant reading.
     p : EhaParameters
         The actuator, for what its pump moves.
 
     Returns
     -------
     bool
-        False too where the log ends with the hold.
+        Also False if the log ends with the hold.
     """
     present = np.flatnonzero(np.isfinite(record[POSITION]))
     rate = np.abs(np.diff(record[POSITION][present])) / (np.diff(present) * record.sample_time)
@@ -63,16 +63,16 @@ def jumped(record: Record, hold: slice, p: EhaParameters) -> bool:
 
 
 def misses_seals(record: Record, hold: slice, p: EhaParameters) -> bool:
-    """Return whether a fine encoder of a piston that only yields on its seals repeats one value for long.
+    """Return whether a fine encoder repeats one value for long while the piston yields on its seals.
 
-    Pressure swings on meanwhile, and the encoder repeats itself for far longer than anywhere else.
+    Pressure varies meanwhile, and the encoder repeats itself for far longer than anywhere else.
 
     Parameters
     ----------
     record : Record
         The log, with position.
     hold : slice
-        Samples over which it is still.
+        Samples with a constant reading.
     p : EhaParameters
         The actuator, for its friction.
     """
@@ -92,7 +92,7 @@ def misses_seals(record: Record, hold: slice, p: EhaParameters) -> bool:
 
 
 def _range(values: Array) -> float:
-    """Return the range of a channel without its highest and lowest hundredth; NaN where hardly anything is there."""
+    """Return the range of a channel without its highest and lowest hundredth; NaN if it has hardly any samples."""
     there = values[np.isfinite(values)]
     return float(np.subtract(*np.percentile(there, (99.0, 1.0)))) if len(there) > FEWEST else np.nan
 
@@ -100,7 +100,7 @@ def _range(values: Array) -> float:
 def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     """Return whether pump delivery within a hold exceeds leakage, compression and relief flow.
 
-    Leakage, flow bias and compressibility come from the rest of the log, in which the encoder tells where the oil goes.
+    Leakage, flow bias and compressibility come from the rest of the log, in which the encoder shows where the oil goes.
     Without pressure, or with too little of a rest, leakage may have taken all.
 
     Parameters
@@ -108,7 +108,7 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     record : Record
         The log, with position.
     hold : slice
-        Samples over which position is still.
+        Samples with a constant reading.
     p : EhaParameters
         The actuator.
 
@@ -152,9 +152,9 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
 
 
 def _biased(pumped: Array, bias: float) -> Array:
-    """Return the share of a flow bias that is lost: no more than is pumped.
+    """Return the flow lost by a flow bias: no more than is pumped.
 
-    At rest only noise is pumped, and its sign would hide the bias of a log that dwells.
+    At rest only noise is pumped, and its sign would hide the bias of a log with long rests.
     """
     return np.clip(pumped / bias, -1.0, 1.0) if bias > 0.0 else np.sign(pumped)
 
@@ -164,7 +164,7 @@ def _means(values: Array, size: int, count: int) -> Array:
 
 
 def _fitted(columns: Array, found: Array) -> tuple[Array, Array]:
-    """Return coefficients that are not negative, with their deviations."""
+    """Return non-negative coefficients, with their deviations."""
     sizes = np.linalg.norm(columns, axis=0)
     sizes[sizes == 0.0] = 1.0
     inverse = np.linalg.pinv((columns / sizes).T @ (columns / sizes))

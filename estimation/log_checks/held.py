@@ -1,8 +1,8 @@
 """Held samples: a slow channel that its logger repeats until the next sample comes, or bridges by straight lines.
 
-Neither is a measurement. It is left out, so that a fit sees a slow sensor and no late or noiseless one. Where all
-channels do so in the same rows, motor speed among them, a slow log was written in the rows of a faster clock. Where the
-speed alone does, or in rows of its own, what the pump delivered is known at its samples: the log is taken there.
+Neither is a measurement. These rows are left out, so that a fit sees a slow sensor, and not a late or noiseless one. If
+all channels do so in the same rows, with motor speed among them, a slow log was written in the rows of a faster clock.
+If speed alone does, or in rows of its own, the pumped volume is known at its samples: the log is reduced to these.
 """
 
 from collections.abc import Iterator, Mapping
@@ -19,21 +19,21 @@ from plant.log.record import Record
 from plant.notes import Note
 
 HELD = (POSITION, VELOCITY, *PRESSURES)
-"""Channels that are asked: none can jump. A motor speed that is held may be how the motor was driven (`slow_speed`)."""
+"""Channels that are checked: none can jump. A motor speed that is held may be the motor's own (`slow_speed`)."""
 
 LEAST_STEPS = 100
-"""Steps over its resolution that a channel must make to be judged [count]."""
+"""Least steps above its resolution for a channel to be judged [count]."""
 
 RESOLVED = 2.5
-"""Steps larger than this many of the smallest are no single ones of a converter [dimensionless]."""
+"""Size of a step, over the smallest, above which it is no single step of a converter [dimensionless]."""
 
 RUN_ON, ON_TIME = 0.01, 0.9
-"""Share of those steps that may follow another one row before, and share of them after which the next comes in the
-usual time, a row more or less [fraction]. A channel that is sampled in every row steps in most while it moves."""
+"""Largest share of those steps that may follow another one row later, and least share after which the next comes in the
+usual time, give or take a row [fraction]. A channel that is sampled in every row steps in most rows while it moves."""
 
 STRAIGHT, MOSTLY = 1e-3, 0.45
-"""A row bends by less than this share of what rows bend by (root mean square) where it lies on a line between its
-neighbours; and the least share of rows that do so in a channel that was bridged, every second one being sampled."""
+"""Bend over the root mean square bend below which a row is on the line between its neighbours; and the least share of
+such rows in a bridged channel, in which at most every second row is sampled."""
 
 
 class _Slow(NamedTuple):
@@ -45,13 +45,13 @@ class _Slow(NamedTuple):
 
 
 def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
-    """Return a log without the values that its logger only repeated, or put on lines between samples.
+    """Return a log without the values that its logger only repeated, or interpolated between samples.
 
     Returns
     -------
     tuple of (Record, tuple of Note)
-        The log, and a note for each channel that was held or bridged. A log all of whose channels were, in the same
-        rows, has the clock of its samples, and so has one whose motor speed was repeated.
+        The log, and a note for each channel that was held or bridged. If all channels were, in the same rows, the log
+        gets the clock of its samples, and so does one whose motor speed was repeated.
     """
     slow = {name: one for name in HELD if name in record and (one := _slow(record[name])) is not None}
     turning = _slow_speed(record)
@@ -110,7 +110,7 @@ def _slow(values: Array) -> _Slow | None:
 
 
 def _straight(values: Array) -> NDArray[np.bool_]:
-    """Return which rows but the ends lie on the line between their neighbours; none where a sample is missing."""
+    """Return which inner rows are on the line between their neighbours; none if a sample is missing."""
     bends = np.diff(values, 2)
     return np.abs(bends) < STRAIGHT * np.sqrt(np.mean(bends**2))
 
@@ -130,7 +130,7 @@ def _only_at(values: Array, one: _Slow) -> bool:
 
 
 def held_rows(values: Array) -> int:
-    """Return the rows over which a channel repeats each sample; 1 where it is sampled in every row.
+    """Return the number of rows over which a channel repeats each sample; 1 if it is sampled in every row.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def held_rows(values: Array) -> int:
     Returns
     -------
     int
-        Usual count of rows from sample to sample.
+        Usual number of rows from sample to sample.
 
     Examples
     --------

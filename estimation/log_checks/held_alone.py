@@ -1,7 +1,7 @@
-"""A channel that stood still alone: its logger had no new sample of it for a while.
+"""A single channel that was constant for a while: its logger had no new sample.
 
-Where a channel is noisy on either side, it cannot repeat one value for long. That is left out as missing. A sensor that
-never comes back, or stands still for long, is accused instead (`sensor_check`).
+If a channel is noisy on either side, it cannot repeat one value for long. Those samples are left out as missing. A
+sensor that never comes back, or is constant for long, is reported instead (`sensor_check`).
 """
 
 import numpy as np
@@ -15,21 +15,22 @@ from plant.log.record import Record
 from plant.notes import Note
 
 ASKED = (SPEED, VELOCITY, *PRESSURES)
-"""Channels that are asked. A piston that rests repeats its position too; that shows by a jump (`discontinuities`)."""
+"""Channels that are checked. A piston at rest repeats its position too; a jump shows the difference
+(`discontinuities`)."""
 
 FEWEST_ROWS, BESIDE = 20, 50
-"""Rows that a channel repeats, and rows on either side that show its noise, at least [count]."""
+"""Least rows that a channel repeats, and rows on either side that show its noise [count]."""
 
 REPEATS, LONGER = 0.1, 4.0
-"""Share of those rows that repeat the one before, at most [fraction]; and how many times longer than any other of its
-repetitions a hold is [dimensionless]: rest, a clipped pressure and a coarse sensor come again."""
+"""Largest share of those rows that repeat the one before [fraction]; and length of a hold over any other
+[dimensionless]: rest, a clipped pressure and a coarse sensor recur."""
 
 NOISY, LEAST_NOISE = 1.0, 1e-5
-"""Fourth differences of noise are larger than its third ones, by 1.9 on average, those of a motion far smaller
-[dimensionless]; and the least share of a channel's range that is noise, and no rounding of the file [fraction]."""
+"""Least ratio of fourth to third differences for noise, 1.9 on average and far smaller for motion [dimensionless]; and
+the least share of a channel's range that is noise, and not rounding of the file [fraction]."""
 
 MOST = 0.2
-"""Share of a log that a channel may be held [fraction]."""
+"""Largest share of a log for which a channel may be held [fraction]."""
 
 
 def without_held_alone(record: Record) -> tuple[Record, tuple[Note, ...]]:
@@ -38,7 +39,7 @@ def without_held_alone(record: Record) -> tuple[Record, tuple[Note, ...]]:
     Parameters
     ----------
     record : Record
-        The log; rows that repeat all channels are missing.
+        The log; rows that repeat all channels are already missing.
     """
     changed: dict[str, Array] = {}
     notes: list[Note] = []
@@ -55,7 +56,7 @@ def without_held_alone(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
 
 def _held(values: Array) -> BoolArray:
-    """Return which samples only repeat the one before, where the channel does not by itself."""
+    """Return which samples repeat the one before, where the channel itself would not."""
     out = np.zeros(len(values), dtype=np.bool_)
     first, behind = stretches(np.append(False, np.diff(values) == 0.0))
     lengths = behind - first
@@ -77,14 +78,14 @@ def _held(values: Array) -> BoolArray:
 
 
 def is_noisy(values: Array, least: float) -> bool:
-    """Return whether nearly every row of a stretch shows noise.
+    """Return whether nearly every row of a part shows noise.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        The stretch [any unit].
+        The part [any unit].
     least : float
-        Third differences that are more than a file's rounding [unit of the channel].
+        Size of third differences above a file's rounding [unit of the channel].
 
     Examples
     --------

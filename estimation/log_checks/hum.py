@@ -1,7 +1,7 @@
-"""Hum: tones of the mains that a cable picks up into a pressure channel, taken off before anything is fitted.
+"""Hum: mains tones that a cable picks up in a pressure channel, removed before anything is fitted.
 
-A tone is told by its line in the spectrum. One that motor speed or position has as well is motion, and stays; so does
-one that is gone while the motor turns at other speeds: teeth of the pump, where a drive stays at its limit of speed.
+A tone is a line in the spectrum. If motor speed or position has the line too, it is motion, and stays. It also stays if
+it vanishes while the motor turns at other speeds: teeth of the pump, in a drive that stays at its speed limit.
 """
 
 from functools import lru_cache
@@ -22,50 +22,52 @@ MOVING = (SPEED, POSITION)
 """Channels whose lines are motion."""
 
 LOWEST = 40.0
-"""Frequency under which no hum is looked for [Hz]: the mains have 50 or 60 Hz, and what the piston does is slower."""
+"""Frequency below which no hum is looked for [Hz]: mains have 50 or 60 Hz, and the piston is slower."""
 
 HIGHEST = 0.4
-"""Frequency times sample time over which none is looked for [dimensionless]: corners of a drive alternate there."""
+"""Frequency times sample time above which none is looked for [dimensionless]: corners of a drive alternate there."""
 
 STANDS_OUT, SHARED = 200.0, 0.1
-"""Power of a hum's line over the usual one near it, and the share of that ratio which a line of motion at the same
-frequency may have [dimensionless]. Noise reaches 27 on 204 logs of all kinds, a hum of 0.1 bar 5,000; one of 600 that
-stays makes the balance's residuals 1.3 times the noise."""
+"""Power of a hum's line over the usual one near it, and the largest share of that ratio in a line of motion at the same
+frequency [dimensionless]. Noise reaches 27 in 204 logs of all kinds, a hum of 0.1 bar 5,000; an uncorrected one of 600
+raises the balance's residuals to 1.3 times the noise."""
 
 REPEATS = 1e3
-"""The same of the line of a drive that repeats itself [dimensionless]."""
+"""The same for the line of a periodic drive [dimensionless]."""
 
 ALONE, AROUND, WIDTH = 0.05, 30.0, 1.0
-"""Share of a hum's line that others may have [dimensionless], within this distance of it and beyond its own width
-[Hz]: a drive that repeats itself has a row of lines, of which none is hum."""
+"""Largest share of a hum's line in others [dimensionless], within this distance of it and outside its own width [Hz]: a
+periodic drive has a row of lines, none of which is hum."""
 
 NEARBY = 100
-"""Lines of which the usual power is taken [count]."""
+"""Lines from which the usual power is computed [count]."""
 
 MOST_TONES = 8
-"""Tones that are taken off at most: the mains and its harmonics."""
+"""Most tones that are removed: the mains and its harmonics."""
 
 TEETH = range(5, 31)
-"""Tones in a turn of the motor that a pump may have [count]: pistons of an axial pump to two a tooth of a gear pump."""
+"""Possible pump tones per turn of the motor [count]: from the pistons of an axial pump to two per tooth of a gear
+pump."""
 
 AT_TEETH = 0.02
-"""Distance of a tone from a number of tones a turn within which the motor may make it [fraction]; judged."""
+"""Distance of a tone from a whole number of tones per turn within which the motor may cause it [fraction]; judged."""
 
 UNSEEN, GONE = 10.0, 0.1
-"""Power of a line over the usual one that is none, and the most that it may be of what a hum would have left
-[dimensionless]: of teeth at a limit of speed up to 3 was left while the motor turned otherwise, of hums 15 and more."""
+"""Power over the usual one up to which there is no line, and the largest share of what a hum would have left
+[dimensionless]: of teeth at a speed limit up to 3 was left while the motor turned otherwise, of hums 15 and more."""
 
 STRETCH = 25.0
-"""Periods over which a tone keeps amplitude and phase [periods]: the mains wander by some hundredths of a hertz."""
+"""Periods over which a tone keeps amplitude and phase [periods]: mains frequency varies by some hundredths of a
+hertz."""
 
 
 def without_hum(record: Record) -> tuple[Record, tuple[Note, ...]]:
-    """Return a log whose differential pressure holds no hum.
+    """Return a log whose differential pressure has no hum.
 
     Returns
     -------
     tuple of (Record, tuple of Note)
-        The log, and a note for each tone that was taken off.
+        The log, and a note for each tone that was removed.
     """
     if PRESSURE not in record or not np.any(np.isfinite(record[PRESSURE])):
         return record, ()
@@ -94,9 +96,10 @@ def without_hum(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
 
 def _is_of_teeth(record: Record, pressure: Array, frequency: float, lines: Array, place: int) -> bool:
-    """Return whether a line is gone from the rows in which the motor does not turn at its frequency over that of teeth.
+    """Return whether a line vanishes in the rows in which the motor does not turn at the line's tooth frequency.
 
-    Hum goes on whatever the motor does. Where it does hardly anything else, nothing tells them apart, and it is hum.
+    Hum does not depend on the motor. If the motor hardly ever turns otherwise, the two cannot be told apart, and the
+    line is hum.
     """
     if SPEED not in record or not np.any(np.isfinite(record[SPEED])):
         return False
@@ -107,7 +110,7 @@ def _is_of_teeth(record: Record, pressure: Array, frequency: float, lines: Array
 
 
 def _lines(values: Array, rows: NDArray[np.bool_] | None = None) -> Array:
-    """Return the power of each line of a channel's second differences over what is usual near it, of all or some rows.
+    """Return the power of each line of a channel's second differences over the usual power near it, by rows.
 
     Parameters
     ----------
@@ -128,7 +131,7 @@ def _lines(values: Array, rows: NDArray[np.bool_] | None = None) -> Array:
 
 @lru_cache(maxsize=1)
 def _window(length: int) -> Array:
-    """Return a Hann window, kept for the next log of that length."""
+    """Return a Hann window, cached for the next log of that length."""
     return np.hanning(length)
 
 
@@ -136,7 +139,7 @@ def _alone(frequencies: Array, lines: Array, place: int) -> bool:
     """Return whether a spectral line has no others near it, and is no harmonic of a periodic drive.
 
     Harmonics come in rows, every one or every other: a line of a slow drive has others of its row near it. Only those
-    of a fast one stand as far apart as tones of the mains.
+    of a fast drive are as far apart as tones of the mains.
     """
     apart = np.abs(frequencies - frequencies[place])
     others = lines[(apart > WIDTH) & (apart < AROUND)]
@@ -150,7 +153,7 @@ def _alone(frequencies: Array, lines: Array, place: int) -> bool:
 
 
 def _between(frequencies: Array, lines: Array, place: int) -> float:
-    """Return the frequency of a line that stands between two of the spectrum [Hz], by a parabola through logarithms."""
+    """Return the frequency of a line between two of the spectrum [Hz], by a parabola through logarithms."""
     if not 0 < place < len(lines) - 1:
         return float(frequencies[place])
     before, here, after = np.log(np.maximum(lines[place - 1 : place + 2], np.finfo(float).tiny))
@@ -160,7 +163,7 @@ def _between(frequencies: Array, lines: Array, place: int) -> float:
 
 
 def _tone(values: Array, per_sample: float) -> Array:
-    """Return the tone of a frequency [1/samples] in a channel, fitted in stretches of their own."""
+    """Return the tone of a frequency [1/samples] in a channel, fitted in separate parts."""
     phase = 2.0 * np.pi * per_sample * np.arange(len(values))
     waves: Array = np.column_stack([np.cos(phase), np.sin(phase)]).astype(np.float64)
     parts = np.array_split(np.arange(len(values)), max(1, round(len(values) * per_sample / STRETCH)))

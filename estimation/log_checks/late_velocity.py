@@ -1,8 +1,7 @@
-"""`without_late_velocity(record)`: a velocity that was filtered, or derived from position with a delay, is left out.
+"""`without_late_velocity(record)`: a velocity that was filtered, or differentiated with a delay, is left out.
 
-A velocity that comes late by T is behind what position gained: over any stretch, position gains ``int v dt + T dv``,
-to first order, whether a filter or a delay makes it late. Play of the encoder and a late position have the other sign.
-See decision 288.
+A velocity that is late by T lags behind the gain of position: over any part, position gains ``int v dt + T dv`` to
+first order, for a filter as for a delay. Encoder play and a late position have the opposite sign. See decision 288.
 """
 
 import numpy as np
@@ -14,31 +13,31 @@ from plant.log.record import Record
 from plant.notes import Note
 
 STRETCH = 0.05
-"""Stretch over which the two are compared [s]: several times the longest lag of a usual filter; noise of velocity adds
-up to little over it."""
+"""Length of the parts over which the two are compared [s]: several times the longest lag of a usual filter, and short
+enough for little accumulated noise."""
 
 LEAST_LATE = 1e-3
-"""Least lateness of which a log is asked [s]; judged."""
+"""Least delay that is reported [s]; judged."""
 
 EXPLAINED = 0.5
-"""Share of how far the two are apart that one lateness must explain [fraction]; judged: the rest may be noise that a
-filter has made alike. What goes with velocity itself, as a wrong gain, explains none."""
+"""Share of the difference that one delay must explain [fraction]; judged: the rest may be noise correlated by a filter.
+A wrong gain, proportional to velocity, explains none."""
 
 MATTERS, BLOCK = 0.04, 0.01
-"""Share of the velocity's root mean square that lateness must make of a difference, to matter [fraction], and means
-over how long differ so [s]: noise adds to it, and from 0.05 on the diagnosis says that two sensors disagree."""
+"""Share of the velocity's root mean square from which the difference due to the delay matters [fraction], and the
+length of its means [s]: noise adds to it, and from 0.05 on the diagnosis reports that two sensors disagree."""
 
 LEAST_STRETCHES = 20
-"""Stretches that must hold both channels [count]."""
+"""Least parts with both channels [count]."""
 
 
 def without_late_velocity(record: Record) -> tuple[Record, tuple[Note, ...]]:
-    """Return a log without a velocity that comes late; position tells the same, on time.
+    """Return a log without a velocity that is late; position has the same information, on time.
 
     Returns
     -------
     tuple of (Record, tuple of Note)
-        The log, and by how much its velocity was late; the same log and none where a channel is missing or on time.
+        The log, and the delay of its velocity; unchanged if a channel is missing or on time.
     """
     if POSITION not in record or VELOCITY not in record:
         return record, ()
@@ -57,7 +56,7 @@ def without_late_velocity(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
 
 def velocity_lateness(record: Record) -> float:
-    """Return by how much velocity comes after what position gains.
+    """Return the delay of velocity behind position.
 
     Parameters
     ----------
@@ -67,13 +66,13 @@ def velocity_lateness(record: Record) -> float:
     Returns
     -------
     float
-        Lateness [s]; 0 where too little of both is there.
+        Delay [s]; 0 if there are too few samples of both.
     """
     return _lateness(*_compared(record[POSITION], record[VELOCITY], record.sample_time))
 
 
 def velocity_apart(record: Record) -> float:
-    """Return the difference between velocity and the slope of position over stretches of `STRETCH`.
+    """Return the difference between velocity and the slope of position over parts of `STRETCH`.
 
     Parameters
     ----------
@@ -83,7 +82,7 @@ def velocity_apart(record: Record) -> float:
     Returns
     -------
     float
-        Root mean square [m/s]; 0 where too little of both is there.
+        Root mean square [m/s]; 0 if there are too few samples of both.
     """
     apart, _ = _compared(record[POSITION], record[VELOCITY], record.sample_time)
     return float(np.sqrt(np.mean(apart**2))) / STRETCH if len(apart) else 0.0
@@ -100,7 +99,7 @@ def wrong_gain_explains(record: Record) -> float:
     Returns
     -------
     float
-        Share of the squared difference over stretches of `STRETCH` [fraction]; 1 where they do not differ.
+        Share of the squared difference over parts of `STRETCH` [fraction]; 1 if they do not differ.
     """
     gained, swept, _ = _stretches(record[POSITION], record[VELOCITY], record.sample_time)
     apart = gained - swept
@@ -117,20 +116,20 @@ def _lateness(apart: Array, change: Array) -> float:
 
 
 def _fastest(velocity: Array, sample_time: float) -> float:
-    """Return the rate at which velocity changes over `BLOCK`, root mean square [m/s^2]."""
+    """Return the rate of change of velocity over `BLOCK`, root mean square [m/s^2]."""
     rows = max(1, round(BLOCK / sample_time))
     change = velocity[rows:] - velocity[:-rows]
     return float(np.sqrt(np.nanmean(change**2))) / (rows * sample_time)
 
 
 def _compared(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
-    """Return the excess of position's gain over integrated velocity, and velocity's change, for each stretch."""
+    """Return position's gain minus integrated velocity, and velocity's change, for each part."""
     gained, swept, change = _stretches(position, velocity, sample_time)
     return gained - swept, change
 
 
 def _stretches(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array, Array]:
-    """Return position's gain, integrated velocity, and velocity's change, for each stretch."""
+    """Return position's gain, integrated velocity, and velocity's change, for each part."""
     rows = max(1, round(STRETCH / sample_time))
     gone = 0.5 * sample_time * (velocity[1:] + velocity[:-1])
     unknown = np.concatenate([[0], np.cumsum(np.isnan(gone))])

@@ -1,9 +1,9 @@
 """`logged_on_change(record)`: channels of which only changes above a threshold were logged (dead band, compression).
 
-A historian or a bus that reports by exception repeats the last value until the quantity has moved by a threshold. What
-it repeats is wrong by up to that, and always late: bulk modulus was up to 5 % off behind an open gate. The smallest
-steps of such a channel are alike, as those of a coarse converter are, but its values lie on no grid. Steps of a ramp
-are alike too, but follow each other in every row.
+A historian or a bus that reports by exception repeats the last value until the quantity has moved by a threshold.
+Repeated values are wrong by up to that, and always late: bulk modulus was up to 5 % off and passed the gate. The
+smallest steps of such a channel are alike, as those of a coarse converter are, but its values are on no grid. Steps of
+a ramp are alike too, but follow each other in every row.
 """
 
 import numpy as np
@@ -15,26 +15,26 @@ from plant.log.record import Record
 from plant.notes import Note
 
 REPEATED = 0.3
-"""Share of rows that must repeat the last value for a channel to be asked [fraction]."""
+"""Least share of rows that repeat the last value for a channel to be checked [fraction]."""
 
 FEWEST_STEPS = 50
-"""Steps that a channel must make to be judged [count]."""
+"""Least steps of a channel for a judgement [count]."""
 
 ALIKE, EDGE = 0.25, 2.0
-"""Share of steps that lie between the smallest and so many times that [fraction, dimensionless]. Of a channel that is
-logged in every row a few in a hundred do."""
+"""Least share of steps between the smallest and this multiple of it [fraction, dimensionless]. In a channel that is
+logged in every row it is a few percent."""
 
 AFTER_REPEAT = 0.1
-"""Share of those steps that follow a row which repeats the last value [fraction]; judged. Of logs on change it is 0.2
-to 1; of ramps between levels, a pump that starts and stops, or a clipped pressure, 0.02 at most."""
+"""Least share of those steps that follow a row which repeats the last value [fraction]; judged. In logs on change it is
+0.2 to 1; for ramps between levels, a pump that starts and stops, or a clipped pressure at most 0.02."""
 
 OFF_GRID = 0.15
-"""Distance of values from a grid of the smallest step, root mean square, above which no converter made them [steps];
-values anywhere have 0.29."""
+"""Root mean square distance of values from a grid of the smallest step, above which they are not a converter's [steps];
+random values have 0.29."""
 
 NEARBY, LIKE, GRIDS = 100.0, 0.03, 121
-"""Steps from the first value within which values are looked at [steps], share by which the grid's step may differ from
-the smallest one, where it was rounded once more [fraction], and how many such grids are tried [count]."""
+"""Steps from the first value within which values are checked [steps], share by which the grid's step may differ from
+the smallest one, if that was rounded again [fraction], and the number of grids that are tried [count]."""
 
 MATTERS = 0.01
 """Threshold over the channel's standard deviation from which it matters [fraction]; judged. At 0.05 bulk modulus is up
@@ -52,7 +52,7 @@ def logged_on_change(record: Record) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        None for a log that has a measurement in every row.
+        Empty for a log with a measurement in every row.
     """
     found = []
     for channel in (SPEED, POSITION, PRESSURE):
@@ -74,7 +74,7 @@ def dead_band(values: Array) -> float:
     Returns
     -------
     float
-        Its threshold, in its unit; 0 where every row is a measurement.
+        Its threshold, in its unit; 0 if every row is a measurement.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def dead_band(values: Array) -> float:
 
 
 def _on_grid(values: Array, step: float) -> bool:
-    """Return whether values lie on a grid of about this step, as a converter's do, rounded once more or not."""
+    """Return whether values are on a grid of about this step, as a converter's are, whether rounded again or not."""
     places = (np.unique(values) - values[0]) / step
     places = places[np.abs(places) < NEARBY] * np.linspace(1.0 - LIKE, 1.0 + LIKE, GRIDS)[:, None]
     return float(np.min(np.mean((places - np.rint(places)) ** 2, axis=1))) < OFF_GRID**2

@@ -1,4 +1,4 @@
-"""Refuse a sensor that holds one value for long, where nothing else in a log tells whether it froze."""
+"""Refuse a sensor that is constant for long, if nothing else in a log shows whether it froze."""
 
 from collections.abc import Iterable
 
@@ -8,12 +8,12 @@ from plant.errors import LogError
 from plant.log.record import Record
 
 LONGEST_HOLD = 0.05
-"""Share of a log for which a live sensor holds one value at most [fraction] (judged): it has noise, and follows a drive
-of some ten cycles or more."""
+"""Largest share of a log for which a live sensor is constant [fraction] (judged): it has noise, and follows a drive of
+some ten cycles or more."""
 
 
 def require_live(record: Record, names: Iterable[str]) -> None:
-    """Refuse a log in which one of these channels holds one value for long.
+    """Refuse a log in which one of these channels is constant for long.
 
     Parameters
     ----------

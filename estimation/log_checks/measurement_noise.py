@@ -1,4 +1,4 @@
-"""Measurement noise read off the log itself, not taken as published (errata E11)."""
+"""Measurement noise determined from the log itself, not taken as published (errata E11)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha1
@@ -23,20 +23,20 @@ NORMAL_MAD = 1.482602218505602
 """Standard deviation of a normal variable over its median absolute deviation."""
 
 MOST_REMEMBERED = 32
-"""Variances that are remembered by what they are of [count]."""
+"""Variances that are cached, by content [count]."""
 
 ROUNDING = 1e-12
-"""Share of a channel's largest value up to which a step is that of floating-point numbers [fraction]."""
+"""Share of a channel's largest value up to which a step is due to floating-point rounding [fraction]."""
 
 
 def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[str, float]:
     """Estimate each channel's measurement variance from its second differences.
 
-    A second difference removes everything smooth and holds six times the variance of white noise; its median absolute
-    deviation ignores the moments at which the piston really jumps. Differences of what a converter rounded are whole
-    steps, and so would be their median; it is taken within its step. A channel that mostly repeats its last value is
-    taken for quantised: it has the mean square of its small differences, or one twelfth of the squared quantum, at
-    least.
+    A second difference removes everything smooth and has six times the variance of white noise; its median absolute
+    deviation ignores the moments at which the piston really jumps. Differences of rounded values are whole steps, and
+    so would be their median; it is interpolated within its step. A channel that mostly repeats its last value counts as
+    quantised: its variance is the mean square of its small differences, and at least one twelfth of the squared
+    quantum.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[st
 
 
 def _once(variance: Callable[..., float], values: Array, *more: str) -> float:
-    """Return a variance of a channel, which checks and fits ask one after another: once for all of them."""
+    """Return a variance of a channel, computed once for all checks and fits that need it."""
     content = np.ascontiguousarray(values, dtype=np.float64)
     key = (variance.__name__, sha1(content.data, usedforsecurity=False).digest(), len(content), *more)
     found = _remembered.get(key)
@@ -87,13 +87,13 @@ def _variance(values: Array, channel: str) -> float:
 
 
 COARSE, NEAR = 1.5, 4.0
-"""Step of a converter over the noise from which noise differs with where between two steps a signal lies, and
-deviations within which the mean square of differences counts then [dimensionless]. At two deviations the median is 7 %
+"""Step of a converter over the noise from which the noise depends on the signal's place between two steps, and
+deviations within which the mean square of differences is used then [dimensionless]. At two deviations the median is 7 %
 off, the mean square 2 %."""
 
 
 def _squared(bends: Array, step: float, gain: int) -> float:
-    """Return the variance of white noise whose differences, which have ``gain`` times as much, are given."""
+    """Return the variance of white noise from that of its differences, which is ``gain`` times as large."""
     deviation = NORMAL_MAD * _grouped_median(np.abs(bends), step) / gain**0.5
     if step > COARSE * deviation > 0.0:
         near = bends[np.abs(bends) <= NEAR * gain**0.5 * deviation]
@@ -102,9 +102,9 @@ def _squared(bends: Array, step: float, gain: int) -> float:
 
 
 def _grouped_median(sizes: Array, step: float) -> float:
-    """Return the median of sizes that were rounded to steps, each as likely anywhere within half a step of its value.
+    """Return the median of sizes that were rounded to steps, each uniform within half a step of its value.
 
-    Sizes of which more than half are none have a median of none: what they differ by is less than a step tells.
+    If more than half are zero, the median is zero: the differences are smaller than a step shows.
     """
     middle = median(sizes)
     same = np.count_nonzero(np.abs(sizes - middle) < 0.25 * step)
@@ -116,7 +116,7 @@ def _grouped_median(sizes: Array, step: float) -> float:
 
 
 def _step(values: Array) -> float:
-    """Return the smallest step of a channel that is more than rounding of its floating-point values."""
+    """Return the smallest step of a channel above floating-point rounding."""
     steps = np.abs(np.diff(values))
     return float(np.min(steps[steps > ROUNDING * np.max(np.abs(values), initial=0.0)], initial=np.inf))
 
@@ -124,19 +124,19 @@ def _step(values: Array) -> float:
 def is_coarse(values: Array, variance: float) -> bool:
     """Return whether a channel's quantisation is too coarse for its noise to average out.
 
-    What a signal that rests between two steps reads is then off by the same share of a step in each sample.
+    The reading of a constant signal between two steps is then wrong by the same share of a step in each sample.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
         The channel, in any unit; NaN where missing.
     variance : float
-        Of its noise, rounding included [unit of the channel squared].
+        Variance of its noise, rounding included [unit of the channel squared].
 
     Returns
     -------
     bool
-        Whether they are; see `COARSE`.
+        Whether it is; see `COARSE`.
 
     Examples
     --------
@@ -148,7 +148,7 @@ def is_coarse(values: Array, variance: float) -> bool:
 
 
 def _quantum(values: Array) -> float:
-    """Return the smallest step of a channel that mostly does not move; 0 for any other."""
+    """Return the smallest step of a channel that is mostly constant; 0 for any other."""
     steps = np.abs(np.diff(values))
     moved = steps[steps > 0.0]
     held = np.count_nonzero(steps == 0.0)
@@ -161,10 +161,10 @@ between two levels has differences of one and of two."""
 
 
 def rounded_variance(values: Array) -> float:
-    """Return the variance of a channel that mostly does not move, by what it flickers between its levels; 0 for others.
+    """Return the variance of a mostly constant channel, from its flicker between levels; 0 for others.
 
-    Noise of a third of a quantum moves a converter seldom, so that the median of its differences is none, while the
-    noise of what it reads is a fifth more than rounding alone.
+    Noise of a third of a quantum rarely changes the reading, so the median of its differences is zero, while the noise
+    of the reading is a fifth larger than rounding alone.
 
     Parameters
     ----------
@@ -190,17 +190,18 @@ def rounded_variance(values: Array) -> float:
 
 
 SMOOTH = 6
-"""Order of the differences that leave nothing of a motion: at 1 kHz a ringing of 50 Hz is passed on with 0.1 %, a
-second difference passes 10 % of it and takes that for noise."""
+"""Order of the differences that remove a motion: at 1 kHz a ringing of 50 Hz is reduced to 0.1 %, while a second
+difference keeps 10 % of it and takes that for noise."""
 
 WINDOW = 200
-"""Samples whose noise is averaged; of such windows the usual one counts, and none in which the piston is struck."""
+"""Samples over which noise is averaged; the median of such windows is used, so that those with an impact on the piston
+do not count."""
 
 
 def position_variance(position: Array) -> float:
-    """Return a position sensor's own variance, without the floor that a filter is given.
+    """Return a position sensor's own variance, without the floor for filters.
 
-    Motion that is slow beside the samples is no part of it; one twelfth of an encoder's squared quantum is the least.
+    Slow motion does not count; the least value is one twelfth of an encoder's squared quantum.
 
     Parameters
     ----------
@@ -228,10 +229,10 @@ def position_variance(position: Array) -> float:
 
 
 def struck_variance(values: Array) -> float:
-    """Return the variance of a channel's noise where a drive strikes it every few samples.
+    """Return the variance of a channel's noise if a drive excites it every few samples.
 
-    The ringing of stiff oil bends so sharply that second differences hold as much of it as of the noise; sixth ones,
-    of which the median counts, hold a tenth of that or less.
+    The ringing of stiff oil is so fast that second differences contain as much of it as of the noise; the median of
+    sixth differences contains a tenth of that or less.
 
     Parameters
     ----------
@@ -241,7 +242,7 @@ def struck_variance(values: Array) -> float:
     Returns
     -------
     float
-        Variance [unit of the channel squared]; infinite where more than half of the differences are none.
+        Variance [unit of the channel squared]; infinite if more than half of the differences are zero.
 
     Examples
     --------

@@ -1,10 +1,10 @@
-"""Notes of a look at the columns of an unknown log, and at how its logger wrote them."""
+"""Notes on the columns of an unknown log, and on how its logger wrote them."""
 
 from plant.notes import Code
 
 
 class GuessCode(Code):
-    """Why a column of a strange log may be a channel; columns count from 1."""
+    """Evidence that a column of an unknown log is a channel; columns count from 1."""
 
     CALLED_SO = "its name says so"
     DATES = "it holds dates or times of the day"
@@ -22,7 +22,7 @@ class GuessCode(Code):
 
 
 class LoggerCode(Code):
-    """What a logger's way to write a channel has cost."""
+    """Effects of how a logger writes a channel."""
 
     LOGGED_ON_CHANGE = (
         "{channel} was logged only when it had changed by {percent:.2g} % of its standard deviation, and repeated in "

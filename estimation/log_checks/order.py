@@ -14,7 +14,7 @@ def median(values: Array) -> float:
     Parameters
     ----------
     values : ndarray, shape (n,)
-        Any unit; one sample at least, none missing.
+        Any unit; at least one sample, none missing.
 
     Returns
     -------
@@ -56,14 +56,14 @@ def medians(rows: Array) -> Array:
 
 
 def percentile(values: Array, percent: float) -> float:
-    """Return a percentile, on the straight line between neighbours.
+    """Return a percentile, linearly interpolated between neighbours.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        Any unit; one sample at least, none missing.
+        Any unit; at least one sample, none missing.
     percent : float
-        Share of the samples that lie below [percent].
+        Share of the samples below it [percent].
 
     Returns
     -------
@@ -79,14 +79,14 @@ def percentile(values: Array, percent: float) -> float:
 
 
 def percentiles(values: Array, percents: Sequence[float]) -> list[float]:
-    """Return several percentiles of the same samples, which are ordered once; see `percentile`.
+    """Return several percentiles of the same samples, sorted once; see `percentile`.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        Any unit; one sample at least, none missing.
+        Any unit; at least one sample, none missing.
     percents : sequence of float
-        Shares of the samples that lie below [percent].
+        Shares of the samples below them [percent].
 
     Returns
     -------
@@ -110,14 +110,14 @@ def percentiles(values: Array, percents: Sequence[float]) -> list[float]:
 
 
 def stacked(values: Array, count: int) -> tuple[Array, Array]:
-    """Return parts of a channel as rows, cut as `numpy.array_split` cuts them: some parts hold one sample more.
+    """Return parts of a channel as rows, cut as `numpy.array_split` cuts them: some parts have one sample more.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
         Any unit.
     count : int
-        How many parts, at most n.
+        Number of parts, at most n.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Gross outliers: samples that no motion explains, taken out before anything is fitted or filtered."""
+"""Gross outliers: samples that no motion explains, removed before anything is fitted or filtered."""
 
 import math
 from collections.abc import Sequence
@@ -17,28 +17,29 @@ from plant.notes import Note
 from plant.sensors.sensors import differentiated
 
 WINDOWS = ((7, 1), (11, 2))
-"""Samples of the running medians that an outlier stands out from, and how many ranks beside the median show how the
-signal bends. A signal that only rises or only falls is its own median, so a step of the drive is no outlier; three
-outliers within seven samples look like a step, and not within eleven."""
+"""Lengths of the running medians from which an outlier is measured, and how many ranks beside the median show how the
+signal bends [samples, count]. A monotonic signal is its own median, so a step of the drive is no outlier. Three
+outliers within seven samples look like a step, but not within eleven."""
 
 GROSS = 10.0
-"""How far beyond the channel's usual distance from its running median a gross outlier is [dimensionless]."""
+"""Distance of a gross outlier from its running median, over the channel's usual one [dimensionless]."""
 
 BENDS = 3.0
-"""By how many spreads of the window's middle samples it is farther away still: a peak is none [dimensionless]."""
+"""Spreads of the window's middle samples by which it must be farther away still: a peak is no outlier
+[dimensionless]."""
 
 USUAL = 95.0
-"""Share of the samples that are taken to be no outliers [percent]."""
+"""Share of the samples that are assumed to be no outliers [percent]."""
 
 ENDS = 3
-"""Samples at either end of a log that have no other side: there only what leaves the channel's range stands out."""
+"""Samples at either end of a log that have no other side: only what exceeds the channel's range is an outlier there."""
 
 PART = 4096
-"""Windows that are sorted at a time [samples]: they stay in a processor's own cache; of 1024 to 16,384 the quickest."""
+"""Windows that are sorted at a time [samples]: they fit into a processor's cache; the fastest of 1024 to 16,384."""
 
 REACH, BESIDE = 10, 3.0
-"""Samples beside a gross outlier in which the burst that it belongs to may still ring, and what counts there as
-standing out, in the measure of `GROSS` [count, dimensionless]; judged."""
+"""Samples beside a gross outlier in which the burst that it belongs to may still ring, and the limit for outliers
+there, in the measure of `GROSS` [count, dimensionless]; judged."""
 
 FEWEST_ALIKE, MOST_ALIKE = 3, 0.8
 """Gross outliers of one value from which a logger writes it in place of a lost sample, and their share of all gross
@@ -61,7 +62,7 @@ def without_outliers(values: Array, noise: float = 0.0) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        The channel, NaN where it stood out.
+        The channel, with NaN for outliers.
 
     Examples
     --------
@@ -87,7 +88,7 @@ def without_outliers(values: Array, noise: float = 0.0) -> Array:
 
 
 def without_bursts(values: Array, sound: Array, noise: float) -> Array:
-    """Return a channel without what rings on beside its gross outliers, as what a cable picks up does.
+    """Return a channel without the ringing beside its gross outliers, as a cable picks it up.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ def without_bursts(values: Array, sound: Array, noise: float) -> Array:
 def without_written_for_lost(values: Array, sound: Array, noise: float) -> Array:
     """Return a channel without the value that its logger writes in place of a lost sample, such as zero.
 
-    Such a sample is a gross outlier only where the channel is far from that value. Nearer to it, it stands out too.
+    Such a sample is a gross outlier only if the channel is far from that value. Nearer to it, it is recognised too.
 
     Parameters
     ----------
@@ -159,7 +160,7 @@ def without_written_for_lost(values: Array, sound: Array, noise: float) -> Array
 
 
 def _running_ranks(values: Array, window: int, ranks: Sequence[int]) -> Array:
-    """Return order statistics of the window around each sample, a row each; beyond either end its sample is held."""
+    """Return order statistics of the window around each sample, one row each; the ends are extended."""
     around, out = np.pad(values, window // 2, mode="edge"), np.empty((len(ranks), len(values)))
     for begin in range(0, len(values), PART):
         part = around[begin : begin + PART + window - 1]
@@ -175,20 +176,19 @@ def _running_ranks(values: Array, window: int, ranks: Sequence[int]) -> Array:
 
 @cache
 def exchanges(count: int) -> tuple[tuple[int, int], ...]:
-    """Return which of some numbers to compare, and to exchange if need be, to sort them (Batcher's odd-even merges).
+    """Return the pairs to compare, and to exchange if necessary, that sort some numbers (Batcher's odd-even merges).
 
-    All windows of a log are sorted so at a time, a tenth of the time that sorting one after another takes.
+    All windows of a log are sorted together in this way, in a tenth of the time of sorting one after another.
 
     Parameters
     ----------
     count : int
-        How many numbers there are.
+        Number of values.
 
     Returns
     -------
     tuple of pairs of int
-        The lower number's place and the higher one's, in order (Knuth 1998, The Art of Computer Programming 3,
-        algorithm 5.2.2M).
+        The lower index and the higher one, in order (Knuth 1998, The Art of Computer Programming 3, algorithm 5.2.2M).
 
     Examples
     --------
@@ -210,9 +210,9 @@ def exchanges(count: int) -> tuple[tuple[int, int], ...]:
 
 
 def _within_range(seen: Array, noise: float) -> Array:
-    """Return a channel without those of its first and last samples that lie a range beyond all that others show.
+    """Return a channel without those of its first and last samples that are a full range beyond all others.
 
-    One that its neighbours lead to is none: a log may begin at rest, and show the speed that the motor comes to.
+    One that its neighbours lead to is none: a log may begin at rest, and show how the motor speeds up.
     """
     inner = seen[ENDS:-ENDS]
     low, high = float(np.nanmin(inner)), float(np.nanmax(inner))
@@ -230,15 +230,15 @@ def _within_range(seen: Array, noise: float) -> Array:
 def without_gross_outliers(record: Record, channels: Sequence[str]) -> tuple[Record, tuple[Note, ...]]:
     """Return a log without the gross outliers of its channels.
 
-    A piston that slips shows a velocity for a few samples alone; it is an outlier only where the encoder does not
-    confirm it.
+    A piston that slips shows a velocity for a few samples only; it is an outlier only if the encoder does not confirm
+    it.
 
     Parameters
     ----------
     record : Record
         The log.
     channels : sequence of str
-        Channels to look at; those that the log lacks are passed over.
+        Channels to check; those that the log lacks are ignored.
 
     Returns
     -------

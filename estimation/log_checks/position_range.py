@@ -1,7 +1,7 @@
-"""Position at the end of its sensor's range: it stays at one extreme value while velocity shows that the piston moves.
+"""Position at the end of its sensor's range: it stays at an extreme value while velocity shows that the piston moves.
 
-A piston that rests or stands at a stop repeats its position too, but no velocity. A frozen encoder jumps when it comes
-back to life; one at the end of its range goes on from there.
+A piston at rest or at a stop repeats its position too, but has no velocity. A frozen encoder jumps when it recovers;
+one at the end of its range continues from there.
 """
 
 import numpy as np
@@ -13,10 +13,10 @@ from plant.log.record import Record
 from plant.notes import Note
 
 FARTHEST = 1.5
-"""How many times its largest step elsewhere a position may go as it leaves its range or comes back [dimensionless]."""
+"""Step of a position as it leaves its range or comes back, over its largest step elsewhere [dimensionless]."""
 
 ASKED = 5
-"""Longest stays at a level that are asked for motion [count]."""
+"""Number of longest stays at a level that are tested for motion [count]."""
 
 
 def without_position_beyond_range(record: Record) -> tuple[Record, tuple[Note, ...]]:
@@ -25,12 +25,12 @@ def without_position_beyond_range(record: Record) -> tuple[Record, tuple[Note, .
     Parameters
     ----------
     record : Record
-        The log; without a velocity of its own nothing is found.
+        The log; it needs a velocity sensor.
 
     Returns
     -------
     tuple of (Record, tuple of Note)
-        The log, position missing at those samples, and a note if there are any.
+        The log, with position missing at those samples, and a note if there are any.
     """
     if POSITION not in record or VELOCITY not in record:
         return record, ()

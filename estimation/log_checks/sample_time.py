@@ -7,7 +7,7 @@ SLOWEST = 0.1
 its motion within tenths of a second."""
 
 ROUNDING = 1e-6
-"""By how much a sample time may be longer than a limit [dimensionless]: stamps are rounded."""
+"""Relative tolerance of a limit on the sample time [dimensionless]: stamps are rounded."""
 
 
 def too_far_apart(sample_time: float, slowest: float) -> str:
@@ -16,7 +16,7 @@ def too_far_apart(sample_time: float, slowest: float) -> str:
     Parameters
     ----------
     sample_time, slowest : float
-        Seconds between samples, and the most that is of use [s].
+        Seconds between samples, and the limit [s].
     """
     return (
         f"samples are {sample_time:.3g} s apart, but must be at most {slowest:.3g} s: slower ones do not show how the "

@@ -1,8 +1,8 @@
 """Sensors that cannot be trusted: frozen, dead, or at the end of their range.
 
-A filter believes a frozen encoder like any other, and an innocent chi-square follows: constant samples agree with each
-other. So a log is looked at before it is believed. What is at a stop of the sensor's range is censored, not measured,
-and is taken out (`without_saturated`).
+A filter believes a frozen encoder like any other, with an innocent chi-square: constant samples agree with each other.
+So a log is checked before it is used. Values at the end of a sensor's range are censored, not measured, and are removed
+(`without_saturated`).
 """
 
 import numpy as np
@@ -22,46 +22,47 @@ from plant.log.record import Record
 from plant.notes import Note
 
 LONGEST_HOLD = 0.05
-"""A live sensor does not repeat one value for longer while the quantity moves [s]."""
+"""Longest time for which a live sensor repeats one value while the quantity changes [s]."""
 
 FEWEST_HELD = 20
-"""Repeated samples below which nothing is concluded from a hold, whatever its length."""
+"""Repeated samples below which a hold means nothing, whatever its length."""
 
 USUAL_REPEATS = 0.5
-"""A channel that repeats its last sample more often is coarse: that it holds a value is no sign there [fraction]."""
+"""Share of repeated samples above which a channel is coarse: a constant value then means nothing [fraction]."""
 
 BY_CHANCE = 1e-9
-"""Probability of as many repetitions of the extreme value, for a sensor that repeats itself as often as this one does
+"""Probability of so many repetitions of the extreme value, for a sensor that repeats itself as often as this one does
 elsewhere, below which it is at the end of its range [probability]."""
 
 LEAST_RUN = 3
 """Samples at the largest value that count as one stay there."""
 
 ARRIVING, LEAST_ARRIVAL = 2.0, 0.1
-"""A channel comes to a stay on the move if just before it was farther away than so many of its quanta, or of
-this share of its usual step [dimensionless]."""
+"""A channel arrives at a stay in motion if just before it was farther away than so many of its quanta, or than this
+share of its usual step [dimensionless]."""
 
 AROUND, BAND = 0.01, 4.0
-"""Of a pressure that hovers at the end of the range only the lower half of its noise is seen, so samples so near a
-clipped one [s] and so near its level [standard deviations] are left out with it."""
+"""For a pressure near the end of the range only the lower half of its noise is seen, so samples near a clipped one in
+time [s] and in level [standard deviations] are left out with it."""
 
 HEAPED = 2.0
-"""A sensor at the end of its range heaps so many times more samples there than close by [dimensionless]."""
+"""Ratio of samples at the end of a sensor's range to those close by [dimensionless]."""
 
 NOISY = 0.3
-"""Noise makes a channel's steps differ from one to the next by more than this share of them [fraction]."""
+"""Relative difference of successive steps that noise causes [fraction]."""
 
 COARSE = 0.2
-"""A channel that repeats its last sample more often shows no noise, and a relief valve's plateau is flat [fraction]."""
+"""Share of repeated samples above which a channel shows no noise, and a relief valve's plateau is flat [fraction]."""
 
 FEWEST_DEAD = 100
-"""Samples below which a pressure sensor is not called dead: of 20, many a live one looks like noise."""
+"""Samples below which a pressure sensor is not called dead: with 20, many a live one looks like noise."""
 
 NOISE_SHARE = 0.9
-"""A channel whose white noise is more than this share of all that it shows, shows nothing [fraction]."""
+"""Share of white noise in a channel above which it shows nothing [fraction]."""
 
 CLIPPED = 0.98
-"""A pressure held above this share of its largest is at the end of its range or at the relief valve [fraction]."""
+"""Share of its largest value above which a constant pressure is at the end of its range or at the relief valve
+[fraction]."""
 
 UNDELIVERED = 5.0
 """Quanta of the encoder by which a velocity sensor must show motion [dimensionless]."""
@@ -75,12 +76,12 @@ def sensor_objections(record: Record, parameters: EhaParameters) -> tuple[Note, 
     record : Record
         The log.
     parameters : EhaParameters
-        The actuator, to tell what the pump must have moved.
+        The actuator, for the motion due to its pump.
 
     Returns
     -------
     tuple of Note
-        None for a sound log.
+        Empty for a sound log.
     """
     accused = {
         PRESSURE: _frozen_pressure(record, parameters) or _dead_pressure(record),
@@ -115,7 +116,7 @@ def holds(values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _longest_hold(values: Array, sample_time: float) -> slice | None:
-    """Return the longest hold, if it is long enough to mean something; samples missing in it do not count."""
+    """Return the longest hold, if it is long enough to mean something; missing samples in it do not count."""
     present = np.flatnonzero(np.isfinite(values))
     if not len(present):
         return None
@@ -127,7 +128,7 @@ def _longest_hold(values: Array, sample_time: float) -> slice | None:
 
 
 def _hold_of(record: Record, channel: str) -> slice | None:
-    """Return the longest stretch over which a channel repeats itself although it usually does not."""
+    """Return the longest part over which a channel repeats itself although it usually does not."""
     if channel not in record:
         return None
     hold = _longest_hold(record[channel], record.sample_time)
@@ -140,7 +141,7 @@ def _hold_of(record: Record, channel: str) -> slice | None:
 
 
 def _frozen_velocity(record: Record) -> Note | None:
-    """Compare a still velocity sensor with the encoder; a stuck piston's velocity is zero, and its encoder still."""
+    """Compare a constant velocity with the encoder; a stuck piston's velocity is zero, and its encoder constant."""
     stretch = _hold_of(record, VELOCITY)
     if stretch is None or POSITION not in record:
         return None
@@ -156,7 +157,7 @@ def _frozen_velocity(record: Record) -> Note | None:
 
 
 def _frozen_pressure(record: Record, p: EhaParameters) -> Note | None:
-    """Compare a still pressure with the pump: while that delivers unevenly, pressure is never the same for long."""
+    """Compare a constant pressure with the pump: while that delivers unevenly, pressure is never constant for long."""
     stretch = _hold_of(record, PRESSURE)
     if stretch is None or SPEED not in record:
         return None

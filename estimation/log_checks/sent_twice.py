@@ -1,7 +1,7 @@
-"""Rows that a logger wrote twice: a packet that came again was filed under other times.
+"""Rows that a logger wrote twice: a repeated packet was stored under other times.
 
 Noise never repeats a row of several channels digit by digit, and rest repeats one row more than a few times. So a
-stretch of rows that each stand in few places, at one distance in time, was sent again.
+sequence of rows that each occur in few places, at one distance in time, was sent again.
 """
 
 from collections.abc import Sequence
@@ -20,37 +20,37 @@ from plant.log.record import Record
 from plant.notes import Note
 
 FEWEST_CHANNELS, FEWEST_ROWS = 3, 5
-"""Channels that must be logged, and rows in a stretch that is sent again, at least [count]."""
+"""Least logged channels, and least rows in a repeated sequence [count]."""
 
 MOST_PLACES = 4
-"""Places of a log in which such a row may stand: more is a rest, or a drive that repeats without noise [count]."""
+"""Most places of a log in which such a row may occur: more means rest, or a periodic drive without noise [count]."""
 
 FARTHEST = 0.2
 """Share of the log by which a copy may follow: a run without noise repeats after a period of its drive [fraction]."""
 
 JUMP = 3.0
-"""How many usual steps of a channel a copy goes back at its beginning, where no noise shows that it is one: where a
-drive repeats, none does."""
+"""Usual steps of a channel by which a copy jumps back at its beginning, if no noise proves that it is one: a periodic
+drive has no jump."""
 
 
 FEWEST_ANY, DISTINCT = 10, 0.8
-"""Rows of a copy at least where nobody knows what the columns are [count], and the share of them that differ in a noisy
-one [fraction]: two coarse columns repeat a few rows by chance, and a plant at rest repeats its level."""
+"""Least rows of a copy of unknown columns [count], and the share of them that differ in a noisy column [fraction]: two
+coarse columns repeat a few rows by chance, and a plant at rest repeats its level."""
 
 
 def without_rows_sent_twice(record: Record, columns: Sequence[str] | None = None) -> tuple[Record, tuple[Note, ...]]:
-    """Return a log without rows that its logger wrote again behind others.
+    """Return a log without rows that its logger wrote again.
 
-    Where a channel goes on behind the copy as if no time had passed, the copy is cut out and the clock closed up.
-    Otherwise the copy stands in place of rows that were lost, and these are missing.
+    If a channel continues after the copy as if no time had passed, the copy is cut out and the clock closed up.
+    Otherwise the copy replaced rows that were lost, and these are missing.
 
     Parameters
     ----------
     record : Record
         The log.
     columns : sequence of str, optional
-        Two columns or more of which nothing is known; one of them must be noisy where rows come again. The channels of
-        an actuator unless told.
+        Two columns or more of unknown meaning; one of them must be noisy where rows are repeated. By default the
+        channels of an actuator.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def without_rows_sent_twice(record: Record, columns: Sequence[str] | None = None
 
 
 def _copies(rows: Array, *, known: bool) -> tuple[IntArray, IntArray]:
-    """Return the first row of each copy, and the one behind its last; rows of shape (channels, n), of known meaning."""
+    """Return the first row of each copy, and the one after its last; rows have shape (channels, n)."""
     bits = np.ascontiguousarray(rows).view(np.uint64)
     keys = np.zeros(rows.shape[1], dtype=np.uint64)
     for one in bits:
@@ -127,7 +127,7 @@ def _one_lag(again: BoolArray, lag: IntArray) -> list[tuple[int, int]]:
 
 
 def _widened(keys: NDArray[np.uint64], first: int, behind: int, lag: int) -> tuple[int, int]:
-    """Return a copy with the rows at either end that stand in more places, as those of a rest do."""
+    """Return a copy with the rows at either end that occur in more places, as those of a rest do."""
     while first - 1 >= lag and behind - first < lag and keys[first - 1] == keys[first - 1 - lag]:
         first -= 1
     while behind < len(keys) and behind - first < lag and keys[behind] == keys[behind - lag]:
@@ -171,5 +171,5 @@ def _time_passed(values: Array, first: IntArray, behind: IntArray) -> float:
 
 
 def _unlikely(squared: float, variance: float) -> float:
-    """Return minus the log-likelihood of a step by Student's law with three degrees: some steps are far larger."""
+    """Return minus the log-likelihood of a step by Student's law with three degrees of freedom: it has long tails."""
     return 0.5 * np.log(variance) + 2.0 * np.log1p(squared / (3.0 * variance))

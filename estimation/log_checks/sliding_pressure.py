@@ -1,7 +1,8 @@
 """`sliding_pressure(record, p)`: pressure under which a piston slides, over what the rig's friction takes.
 
-A balance of flows holds pressure over stiffness, so it cannot tell a unit of pressure from oil as many times as stiff.
-Friction can: no piston slides at a pressure that its friction does not let it, and few at one many times as high.
+A flow balance contains only pressure over stiffness, so it cannot distinguish a unit of pressure from oil that is
+stiffer by the same factor. Friction can: no piston slides below the pressure of its friction, and few at many times
+that.
 """
 
 from math import log as ln
@@ -19,8 +20,8 @@ SLIDING = 0.1
 """Share of the highest velocity from which a piston slides [fraction]."""
 
 LEAST, MOST = 0.8, 6.0
-"""Times the pressure that the rig's friction takes at which its pistons slide [dimensionless]; judged: faults raise
-friction, and a rig file may have a fifth too much of it. Loads may need more."""
+"""Range of the sliding pressure over what the rig's friction takes [dimensionless]; judged: faults raise friction, and
+a rig file may have a fifth too much of it. Loads may need more."""
 
 
 def sliding_pressure(record: Record, p: EhaParameters) -> float:
@@ -36,7 +37,7 @@ def sliding_pressure(record: Record, p: EhaParameters) -> float:
     Returns
     -------
     float
-        Their ratio; 1 where position or pressure is not logged, or never changes, and where the rig has no friction
+        Their ratio; 1 if position or pressure is not logged, or never changes, and if the rig has no friction
         [dimensionless].
     """
     blocks = channel_blocks(record, p, MIDDLE)
@@ -60,7 +61,7 @@ def beyond_sliding(ratio: float) -> float:
     Returns
     -------
     float
-        Logarithm of how many times; 0 where pistons slide at it [dimensionless].
+        Logarithm of the factor; 0 within the range [dimensionless].
 
     Examples
     --------

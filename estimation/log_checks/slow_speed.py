@@ -1,7 +1,7 @@
-"""A motor speed that its logger repeated between slow samples, told from a motor that was driven in steps.
+"""A motor speed that its logger repeated between slow samples, distinguished from a motor that was driven in steps.
 
-Both look alike. What the oil was compressed by from sample to sample says which it was: pump and piston explain it
-better with speed as it is logged, or on a straight line from one sample to the next.
+Both look alike. The compression of the oil from sample to sample shows the difference: pump and piston explain it
+better with the speed as logged, or with straight lines between samples.
 """
 
 import numpy as np
@@ -11,8 +11,8 @@ from plant.arrays import Array
 from plant.log.record import Record
 
 SURE = 10.0
-"""Gain in log-likelihood by which straight lines must explain the pressure better [dimensionless]: odds of 20,000. Of a
-logger that repeats other channels too it need be more than as much worse."""
+"""Gain in log-likelihood by which straight lines must explain the pressure better [dimensionless]: odds of 20,000. If
+the logger repeats other channels too, a loss of up to as much is accepted."""
 
 
 def was_repeated(record: Record, *, others: bool) -> bool:
@@ -21,14 +21,14 @@ def was_repeated(record: Record, *, others: bool) -> bool:
     Parameters
     ----------
     record : Record
-        The log, its motor speed held; values that other channels only repeat are missing.
+        The log, with its motor speed held; values that other channels only repeat are missing.
     others : bool
         Whether there are such channels.
 
     Returns
     -------
     bool
-        Where no pressure and position say otherwise, the motor is believed.
+        False unless pressure and position show it.
     """
     if PRESSURE not in record or POSITION not in record:
         return False

@@ -1,4 +1,4 @@
-"""`travels(record, p)`: how far a piston went, and how far its pump would have moved it."""
+"""`travels(record, p)`: travel of a piston, and the travel due to its pump."""
 
 from typing import NamedTuple
 
@@ -13,19 +13,19 @@ from plant.log.plausibility import LIMITS
 from plant.log.record import Record
 
 RESTING, TURNED = 0.2, 10.0
-"""Times the least travel up to which a pump that delivers it rests, and from which on a still piston is stuck
+"""Factors on the least travel: up to the first the pump is at rest, and from the second on a still piston is stuck
 [dimensionless]; judged. Noise of a resolver at rest makes a hundredth."""
 
 
 class Travels(NamedTuple):
-    """How far piston and pump went in a log, from the lowest to the highest point.
+    """Range of piston and pump in a log, from the lowest to the highest point.
 
     Parameters
     ----------
     piston : float
         Travel of the piston [m].
     pump : float
-        Travel of a piston that takes all that is pumped, without an offset of the speed [m].
+        Travel of a piston that takes all pumped flow, without an offset of the speed [m].
     """
 
     piston: float
@@ -33,12 +33,12 @@ class Travels(NamedTuple):
 
     @property
     def still(self) -> bool:
-        """Whether the piston stands still: seals give way by as much."""
+        """Whether the piston stands still: seals yield by as much."""
         return self.piston < SHORTEST_TRAVEL
 
     @property
     def at_rest(self) -> bool:
-        """Whether the pump rests as well: no known volume then compresses the oil."""
+        """Whether the pump is at rest as well: the compressed volume is then unknown."""
         return self.still and self.pump < RESTING * SHORTEST_TRAVEL
 
     @property
@@ -48,9 +48,9 @@ class Travels(NamedTuple):
 
 
 def travels(record: Record, p: EhaParameters) -> Travels | None:
-    """Return how far piston and pump went, noise averaged out over blocks; None where one is not logged.
+    """Return the travel of piston and pump, with noise averaged out over blocks; None if one is not logged.
 
-    Without position, velocity tells, less an offset that is worth no more flow than one of motor speed may be.
+    Without position, velocity is used, less an offset of no more flow than one of motor speed may have.
 
     Parameters
     ----------
@@ -71,5 +71,5 @@ def travels(record: Record, p: EhaParameters) -> Travels | None:
 
 
 def _swept(rate: Array, offset: float) -> Array:
-    """Return the sums of a rate, whose mean is taken off as far as it may be an offset."""
+    """Return the integral of a rate, without its mean as far as that may be an offset."""
     return np.cumsum(rate - np.clip(np.mean(rate), -offset, offset))

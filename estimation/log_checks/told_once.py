@@ -1,8 +1,8 @@
-"""`told_once(record) -> Record`: a reading that an encoder repeats counts where it changes, and once at rest.
+"""`told_once(record) -> Record`: a repeated encoder reading is used where it changes, and once at rest.
 
 An encoder rounds. Where its reading changes, the piston is halfway between the two readings, and their errors cancel.
-Between changes all rows are off alike: a filter that takes them for samples of their own believes their mean. While the
-piston slows down before a rest or a reversal, that mean lies behind it, and more so the faster the samples.
+Between changes all rows have the same error: a filter that takes them for independent samples believes their mean.
+While the piston slows down before a rest or a reversal, that mean lags behind, the more so the faster the samples.
 """
 
 import numpy as np
@@ -14,25 +14,26 @@ from plant.arrays import Array
 from plant.log.record import Record
 
 ROUNDED = 2.0
-"""Noise over that of rounding alone below which equal readings are one, and no chance [dimensionless]."""
+"""Noise over that of rounding alone below which equal readings are no chance [dimensionless]."""
 
 REST = 10
-"""Rows of one reading that are a rest [samples], of which the middle counts. Of two rows neither is the middle: with
+"""Rows of one reading that are a rest [samples], of which the middle is used. Of two rows neither is the middle: with
 the first of them alone bulk modulus was 15 deviations off at 10 kHz."""
 
 SLOW = 2
-"""Rows of a reading from which its changes are slow [samples]: the piston then moves half a step a row at most, and the
-rows beside a change are off by half a step, one up and one down. After a faster change it may rest at once, as far off
-as in the middle of the rest, and would count twice: at 1 kHz bulk modulus was half a deviation high."""
+"""Rows of a reading from which its changes are slow [samples]: the piston then moves at most half a step per row, and
+the rows beside a change are wrong by half a step in opposite directions. After a faster change it may rest at once,
+with the same error as in the middle of the rest, which would count twice: at 1 kHz bulk modulus was half a deviation
+high."""
 
 
 def told_once(record: Record) -> Record:
-    """Return a log in which a repeated position is told once, if it is rounded more than it is noisy.
+    """Return a log in which a repeated position is used once, if its rounding exceeds its noise.
 
     Returns
     -------
     Record
-        The log itself where position is missing, never moves, or has noise of its own.
+        The log itself if position is missing, never moves, or has noise of its own.
 
     Examples
     --------
@@ -48,10 +49,10 @@ def told_once(record: Record) -> Record:
 
 
 def changes_and_rests(values: Array) -> Array:
-    """Return values without the rows in which they repeat themselves, but for the middle of each rest.
+    """Return values without the rows in which they repeat themselves, except for the middle of each rest.
 
-    The rows before and after a change stay, unless a rest lies beside a fast motion. A rest counts in its middle, where
-    a slow motion is nearest to the reading. The first row stays: there a filter begins.
+    The rows before and after a change are kept, unless a rest follows a fast motion. A rest is represented by its
+    middle, where a slow motion is nearest to the reading. The first row is kept: a filter begins there.
 
     Parameters
     ----------

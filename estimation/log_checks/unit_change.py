@@ -1,4 +1,4 @@
-"""A channel whose unit changed within the log: its noise and what it shows are so many times as large from there on."""
+"""A channel whose unit changed within the log: its noise and its signal are larger by one factor from there on."""
 
 import numpy as np
 
@@ -9,18 +9,18 @@ from plant.log.record import Record
 from plant.notes import Note
 
 BLOCKS, FEWEST, LEAST_ROWS = 60, 5, 100
-"""Blocks that a log is divided into, blocks on either side of a change, and rows in a block, at least [count]."""
+"""Blocks of a log, least blocks on either side of a change, and least rows in a block [count]."""
 
 LEAST = 5.0
-"""Factor from which noise is looked at: no unit is nearer to another, but that of pressure in psi [dimensionless]."""
+"""Factor from which noise is checked: no unit is nearer to another, except psi [dimensionless]."""
 
 ALIKE, LARGE, ALIKE_IF_LARGE, OTHERS = 0.1, 50.0, 0.4, 3.0
-"""Share by which the noise may miss a slip's factor, the factor from which noise by itself never grows and that may be
-more (an encoder has few steps), and factor by which the noise of other channels may change."""
+"""Share by which the noise may miss a slip's factor, the factor above which noise never grows by itself and the wider
+share allowed there (an encoder has few steps), and factor by which the noise of other channels may change."""
 
 LOW, ROUNDED = 0.3, 1e-12
-"""Quantile of a channel's fourth differences that noise makes, whatever moves in other rows; and the share of the
-largest value that is but the arithmetic's rounding [fraction]."""
+"""Quantile of a channel's fourth differences that is noise, whatever moves in other rows; and the share of the largest
+value that is rounding [fraction]."""
 
 SLIPS = (10.0, 100.0, 1e3, 1e5, 1e6, 60.0 / (2.0 * np.pi), 6894.76, 14.5038)
 """Factors between units of one quantity: mm, cm and m; bar, kPa, MPa, psi and Pa; rpm and rad/s [dimensionless]."""
@@ -32,7 +32,7 @@ def unit_changes(record: Record) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        None for a log that is written in one unit throughout.
+        Empty for a log that is written in one unit throughout.
     """
     asked = [name for name in MEASURED if name in record]
     size = max(LEAST_ROWS, len(record) // BLOCKS)
@@ -59,7 +59,7 @@ def unit_changes(record: Record) -> tuple[Note, ...]:
 
 
 def _noise(values: Array, size: int, count: int) -> Array:
-    """Return the size of a channel's noise in each block, by fourth differences [its unit]; NaN where there is none."""
+    """Return the size of a channel's noise in each block, from fourth differences [its unit]; NaN if there is none."""
     bends = np.abs(np.diff(values[: size * count], 4, append=4 * [np.nan])).reshape(count, size)
     bends[bends <= ROUNDED * np.nanmax(np.abs(values), initial=0.0)] = np.nan
     there = np.count_nonzero(np.isfinite(bends), axis=1)
@@ -74,7 +74,7 @@ def _ratio(noise: Array, k: int) -> float:
 
 
 def _split(noise: Array) -> tuple[int, float] | None:
-    """Return the block from which noise is another one, and by how many times, where no block lies between."""
+    """Return the block from which noise is different, and its factor, if no block is in between."""
     known = np.flatnonzero(np.isfinite(noise))
     if len(known) < 2 * FEWEST:
         return None
@@ -92,7 +92,7 @@ def _split(noise: Array) -> tuple[int, float] | None:
 
 
 def _exactly(values: Array, near: int, size: int, factor: float) -> int:
-    """Return the row from which a channel is so many times as large, within two blocks."""
+    """Return the row from which a channel is larger by a factor, within two blocks."""
     first = max(1, near - size)
     steps = np.abs(np.diff(values[first - 1 : near + size]))
     large = np.nanmax(steps)

@@ -1,11 +1,11 @@
-"""Slips of the units of speed and length, by the factors that they make."""
+"""Slips of the units of speed and length, by their factors."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
 FARTHEST = 3.0
-"""Times the pumped flow that no piston moves, whatever is wrong in the rig file [dimensionless]."""
+"""Ratio to the pumped flow that no piston can reach, whatever is wrong in the rig file [dimensionless]."""
 
 RPM = 60.0 / (2.0 * np.pi)
 TURN = 2.0 * np.pi
@@ -14,7 +14,7 @@ TURNS: Mapping[float, str] = {
     RPM: "rad/s read as rpm",
     TURN: "rev/s read as rad/s",
 }
-"""Slips of the speed's unit, by how many times too far the piston then seems to go."""
+"""Slips of the speed's unit, by the factor by which the piston then seems to move too far."""
 
 DEGREES = 180.0 / np.pi
 """Degrees in a radian [dimensionless]."""
@@ -32,4 +32,4 @@ LENGTHS: Mapping[float, str] = {
     1e-3: "m read as mm",
     1e-6: "m read as um",
 }
-"""Slips of a length's unit, by the factor that they make."""
+"""Slips of a length's unit, by their factors."""

@@ -1,4 +1,4 @@
-"""`without_velocity_offset(record)`: a velocity sensor that does not read zero at rest, by how far the piston went."""
+"""`without_velocity_offset(record)`: the offset of a velocity sensor, from the piston's travel."""
 
 import numpy as np
 
@@ -9,33 +9,33 @@ from plant.log.record import Record
 from plant.notes import Note
 
 PARTS = 16
-"""Parts of a log over which mean velocity is compared with what position gained [count]."""
+"""Parts of a log over which mean velocity is compared with the gain of position [count]."""
 
 LEAST_PARTS = 8
-"""Parts that must hold both channels [count]."""
+"""Least parts with both channels [count]."""
 
 CERTAIN = 6.0
 """Standard errors from which an offset is believed [dimensionless]: with 14 degrees of freedom, one log in 30,000."""
 
 MATTERS = 0.01
 """Share of the velocity's root mean square from which an offset is subtracted [fraction]; judged: class and severities
-are not that exact."""
+are less exact than that."""
 
 MOST_SAMPLES_OFF = 0.2
 """Share of a part's samples that may be missing [fraction]."""
 
 
 def without_velocity_offset(record: Record) -> tuple[Record, tuple[Note, ...]]:
-    """Return a log without the offset of its velocity sensor, where position tells one.
+    """Return a log without the offset of its velocity sensor, if position shows one.
 
-    Over each part of the log the mean velocity is ``offset + gain * (what position gained) / (its time)``. A wrong gain
-    is thus no offset, and nothing is done about it.
+    Over each part of the log the mean velocity is ``offset + gain * (gain of position) / (its time)``. A wrong gain is
+    thus no offset, and is not corrected.
 
     Returns
     -------
     tuple of (Record, tuple of Note)
-        The log, and what was subtracted; the same log and none where a channel is missing, or where the offset is too
-        small to matter or not certain.
+        The log, and what was subtracted; unchanged if a channel is missing, or if the offset is too small to matter or
+        not certain.
     """
     if POSITION not in record or VELOCITY not in record:
         return record, ()

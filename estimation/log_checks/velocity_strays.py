@@ -1,7 +1,7 @@
-"""How far velocity, summed up, usually strays from position: its sensor filters, averages and has a gain of its own.
+"""Usual deviation of integrated velocity from position: a velocity sensor filters, averages and has a gain of its own.
 
-A filter makes the noise alike from sample to sample, so its sum wanders further than that of white noise, and lets
-velocity run on after the piston has stopped. Neither is motion that position missed.
+A filter correlates the noise, so its integral wanders further than that of white noise, and velocity continues after
+the piston has stopped. Neither is motion that position missed.
 """
 
 import numpy as np
@@ -12,30 +12,30 @@ from estimation.log_checks.late_velocity import velocity_lateness
 from plant.log.record import Record
 
 USUAL = 5.0
-"""Times the lower quartile that velocity must stray from a position that stays, for velocity to be believed
-[dimensionless]. The quartile is a sound stretch's also where position stays often; of 36 plain training logs under
-eight filters of 20 to 150 Hz none gets there."""
+"""Ratio to the lower quartile by which velocity must deviate from a constant position to be believed [dimensionless].
+The quartile is that of a sound part even if position is often constant; in 36 plain training logs under eight filters
+of 20 to 150 Hz the ratio is never reached."""
 
 LONGEST = 0.5
-"""Window over which they are compared at most [s]: there are some elsewhere in a log that freezes for good."""
+"""Longest window of the comparison [s]: a log that freezes for good must have some elsewhere."""
 
 
 def strays_unusually(record: Record, stretch: slice, resolved: float) -> bool:
-    """Return whether velocity leaves position further behind over a stretch than it does over as long a one elsewhere.
+    """Return whether velocity deviates from position over a part by more than it does over equally long ones elsewhere.
 
     Parameters
     ----------
     record : Record
         The log, with position and velocity.
     stretch : slice
-        Samples over which position stays.
+        Samples with a constant position.
     resolved : float
-        How far position must go to tell where it moves [m]; where it does not, it may be as frozen.
+        Least travel of position that shows motion [m]; parts with less may be frozen too.
 
     Returns
     -------
     bool
-        True too where position moves nowhere else.
+        Also True if position moves nowhere else.
     """
     position, velocity = bridged(record[POSITION]), bridged(record[VELOCITY])
     went = np.cumsum(velocity) * record.sample_time + velocity_lateness(record) * velocity
