@@ -14,10 +14,10 @@ from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import Problem
 
 PASSES = 10
-"""Times that signs are told from a run, and initial states are fitted to signed outputs, at most."""
+"""Most iterations of signs from a run and initial states fitted to signed outputs."""
 
 BEGINNINGS = (0.02, 0.1)
-"""Shares of a log over which its output is tried with one sign first."""
+"""Shares of a log over which the output is first assumed to have one sign."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +29,9 @@ class AbsoluteDynamics(OutputErrorDynamics):
     zero : float
         The sensor's zero, over the output's deviation from its mean [dimensionless].
     lag : float
-        Pole of the lag; zero where there is none [dimensionless].
+        Pole of the lag; zero if there is none [dimensionless].
     linear : LinearDynamics
-        What comes before the absolute value; its output is counted from the sensor's zero.
+        What precedes the absolute value; its output is relative to the sensor's zero.
     """
 
     zero: float
@@ -45,11 +45,11 @@ class AbsoluteDynamics(OutputErrorDynamics):
         return self.linear.n_values + (self.lag > 0.0)
 
     def unanswered(self, length: int) -> int:
-        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
+        """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
         return self.linear.form.unanswered(length)
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its initial state by least squares of the outputs that are there."""
+        """Return the free run, with its initial state by least squares of the available outputs."""
         form, size = self.linear.form, y - self.zero
         columns = Problem(form, Channels((), "", 1.0, (u,), (y,))).linear_columns(self.linear.f)
         driven = columns[:, : form.n_b + 1] @ np.concatenate([self.linear.theta[: form.n_b], self.linear.theta[-1:]])
@@ -85,7 +85,7 @@ class AbsoluteDynamics(OutputErrorDynamics):
         Returns
         -------
         dict
-            ``lag_s``, without an interval; zero where there is none [s].
+            ``lag_s``, without an interval; zero if there is none [s].
         """
         lag = -sample_time / float(np.log(self.lag)) if self.lag > 0.0 else 0.0
         return {"kind": "absolute-value", "lag_s": {"value": lag, "std": None, "ci95": None}}

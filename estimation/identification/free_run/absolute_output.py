@@ -1,7 +1,7 @@
 """Output error of a linear model whose output is measured without its sign: the absolute value, smoothed by one lag.
 
-A pulse counter gives the speed of a shaft and not its direction. With the sign known, the model behind it is linear, so
-searches begin at signs: the square of the output is a quadratic form of filtered inputs, whose least-squares estimate
+A pulse counter gives the speed of a shaft and not its direction. With the sign known, the model is linear, so searches
+begin with guessed signs: the square of the output is a quadratic form of filtered inputs, whose least-squares estimate
 has the linear model as its largest eigenvector (the lifting of phase retrieval: Candes, Strohmer and Voroninski 2013).
 See decision 307.
 """
@@ -21,34 +21,34 @@ from estimation.identification.free_run.linear_problem import Form, LinearFit, P
 from estimation.identification.search.levenberg import levenberg
 
 TOLERANCE, MOST_STEPS = 1e-9, 60
-"""Share of the cost that a further step may promise at the end, and evaluations at most."""
+"""Relative gain of the cost below which a descent ends, and most evaluations."""
 
 POLES = (0.3, 0.6, 0.8, 0.9)
-"""Poles of the filtered inputs at which signs are first told."""
+"""Poles of the filtered inputs from which signs are first guessed."""
 
 FILTERED = 8
 """Filtered inputs, all inputs together."""
 
 PASSES = 8
-"""Times that signs are told from a linear fit, and a linear model is fitted to signed outputs, at most."""
+"""Most iterations of signs from a linear fit and a linear model fitted to signed outputs."""
 
 LAG = 0.2
-"""Pole of the lag at which descents begin beside none."""
+"""Pole of the lag at which descents begin, beside zero."""
 
 REFINED, ROUGH = 3, 1e-3
-"""Starts that are carried on, and share of the cost that two steps in a row must gain each before they are compared."""
+"""Starts that are refined, and relative gain of two successive steps below which the first descents end."""
 
 
 @dataclass(frozen=True, eq=False)
 class AbsoluteFit:
-    """Result of a fit, in the data's scale, with the output counted from the sensor's zero.
+    """Result of a fit, in the data's scale, with the output relative to the sensor's zero.
 
     Parameters
     ----------
     lag : float
-        Pole of the lag behind the absolute value; zero where there is none [dimensionless].
+        Pole of the lag behind the absolute value; zero if there is none [dimensionless].
     linear : LinearFit
-        What comes before the absolute value.
+        What precedes the absolute value.
     """
 
     lag: float
@@ -101,14 +101,14 @@ class AbsoluteProblem:
         return output, jacobian
 
     def descend(self, theta: Array, *, lag: bool, least_gain: float = 0.0) -> AbsoluteFit:
-        """Return the minimum that one start leads to.
+        """Return the minimum from one start.
 
         Parameters
         ----------
         theta : ndarray, shape (p,)
             Lag, then the linear model's values.
         lag : bool
-            Whether the lag is fitted; it stays as it is otherwise.
+            Whether the lag is fitted; otherwise it is constant.
         least_gain : float
             As `levenberg` takes it [dimensionless].
         """
@@ -131,7 +131,7 @@ class AbsoluteProblem:
 
 
 def lagged(rows: Array, lag: float) -> Array:
-    """Return series behind a lag of gain one, each having stood at its first value before.
+    """Return series behind a lag of gain one, each constant at its first value before.
 
     Parameters
     ----------
@@ -162,9 +162,9 @@ def fit_absolute(form: Form, data: Channels, signs: Sequence[Array]) -> Absolute
     Parameters
     ----------
     data : Channels
-        Scaled, the output counted from the sensor's zero.
+        Scaled, with the output relative to the sensor's zero.
     signs : sequence of ndarray, shape (n,)
-        Signs of the output to begin at, one sequence at least.
+        Guessed signs of the output, at least one sequence.
     """
     problem = AbsoluteProblem(form, data)
     starts = [np.concatenate([[0.0], _followed(form, data, sign).theta]) for sign in signs]
@@ -179,12 +179,12 @@ def fit_absolute(form: Form, data: Channels, signs: Sequence[Array]) -> Absolute
 
 
 def refitted_absolute(fit: AbsoluteFit, data: Channels, least_gain: float = 0.0) -> AbsoluteFit:
-    """Return the fit taken on, on the same data or a part of them.
+    """Return the fit continued on the same data or a part of them.
 
     Parameters
     ----------
     data : Channels
-        Scaled, the output counted from the sensor's zero.
+        Scaled, with the output relative to the sensor's zero.
     least_gain : float
         As `levenberg` takes it [dimensionless].
     """
@@ -192,7 +192,7 @@ def refitted_absolute(fit: AbsoluteFit, data: Channels, least_gain: float = 0.0)
 
 
 def signs_of(fit: AbsoluteFit, data: Channels) -> Array:
-    """Return the signs of the output that the sensor does not tell.
+    """Return the signs of the output that the sensor does not measure.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def signs_of(fit: AbsoluteFit, data: Channels) -> Array:
 
 
 def signs_at_first(data: Channels) -> list[Array]:
-    """Return signs that the output may have had: those of quadratic forms of filtered inputs, and one sign throughout.
+    """Return possible signs of the output: from quadratic forms of filtered inputs, and one sign throughout.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def _filtered(data: Channels, pole: float) -> Array:
 
 
 def _followed(form: Form, data: Channels, sign: Array) -> LinearFit:
-    """Return the linear fit to outputs with signs that are told by the fit before, until none changes."""
+    """Return the linear fit to outputs with signs from the fit before, until no sign changes."""
     ends = np.cumsum([y.size for y in data.y])[:-1]
     fit = _signed_fit(form, data, sign, ends, ())
     for _ in range(PASSES - 1):
@@ -268,6 +268,6 @@ def _followed(form: Form, data: Channels, sign: Array) -> LinearFit:
 
 
 def _signed_fit(form: Form, data: Channels, sign: Array, ends: IntArray, starts: Sequence[Array]) -> LinearFit:
-    """Return the linear fit to outputs with signs, from given denominators or from the data's own."""
+    """Return the linear fit to signed outputs, from given denominators or from the data's own."""
     signed = replace(data, y=tuple(part * y for part, y in zip(np.split(sign, ends), data.y, strict=True)))
     return fit_linear(form, signed, starts or steiglitz_mcbride(Problem(form, signed)), least_gain=ROUGH)

@@ -1,4 +1,4 @@
-"""Which linear model may be believed: one that integrates, one that is slow, or a quicker or simpler one instead."""
+"""Which linear model may be believed: one that integrates, a slow one, or a faster or simpler one instead."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,21 +14,21 @@ from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 
 NEARLY_AS_GOOD = 0.02
-"""Share of held-back error that is given up for a model without cancelling or undetermined parts."""
+"""Relative increase of the held-back error that is accepted for a model without cancelling or undetermined parts."""
 
 BELIEVED = 0.5
-"""Likewise, of the output's deviation, where no other model may be taken."""
+"""The same, over the output's deviation, if no other model is possible."""
 
 
 def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
-    """Return the candidate that may be believed, and notes on those that were passed over for it.
+    """Return the candidate that may be believed, and notes on those that were rejected for it.
 
     Parameters
     ----------
     candidates : sequence of Candidate
-        One at least.
+        At least one.
     data, by : Channels, Scaling
-        Scaled, and how.
+        Scaled, and the scaling.
     """
     best, notes = _prompt_or_late(candidates, data, by)
     end = band_end(data)
@@ -43,7 +43,7 @@ def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> 
 
 
 def _prompt_or_late(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
-    """Return the same where what rings above the band of the inputs is taken like any other model."""
+    """Return the same; a model that rings above the band of the inputs is treated like any other."""
     best, notes = _believed(candidates, data, by)
     prompt = [one for one in candidates if max(one.form.delays) <= 1]
     if max(best.form.delays) > 1 and prompt:
@@ -56,7 +56,7 @@ def _prompt_or_late(candidates: Sequence[Candidate], data: Channels, by: Scaling
 
 
 def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
-    """Return the same where a dead time is taken like any other size."""
+    """Return the same; a dead time is treated like any other size."""
     notes: list[Note] = []
     best = chosen(candidates)
     # a time constant held at the record's length does nearly what an integrator does, and is no other explanation
@@ -103,9 +103,9 @@ def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> t
 
 
 def _needless(integrating: Candidate, settled: Sequence[Candidate]) -> bool:
-    """Return whether a model that settles, of no more values, explains the whole record better than one that does not.
+    """Return whether a stable model with no more values explains the whole record better than an integrating one.
 
-    A block that holds the only step of the inputs takes from its fit all that tells how the output settles.
+    If a block contains the only step of the inputs, the fit to the others does not show how the output settles.
     """
     smaller = [one for one in settled if one.form.n_values <= integrating.form.n_values]
     return any(one.bic < integrating.bic for one in smaller)
@@ -128,12 +128,12 @@ def _slow_note(taken: Candidate, data: Channels) -> Note:
 
 
 def _carries_on(slow: Candidate, quick: Candidate, data: Channels) -> bool:
-    """Return whether a slow model has no larger error on blocks and halves than a quick one."""
+    """Return whether a slow model has no larger error on blocks and halves than a fast one."""
     errors = [np.hypot(one.held_back, halves_error(one.fit, data)) for one in (slow, quick)]
     return not errors[0] > errors[1]
 
 
 def _undetermined(one: Candidate, data: Channels, by: Scaling) -> bool:
-    """Return whether a pole and a zero cancel, or the steady gain is less than its standard deviation."""
+    """Return whether a pole and a zero cancel, or the steady gain is smaller than its standard deviation."""
     model = linear_model(one.fit, data, by)
     return bool(model.cancellations) or not model.dc_gain_std < abs(model.dc_gain)

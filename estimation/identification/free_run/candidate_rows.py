@@ -18,15 +18,15 @@ def form_row(structure: str, one: Compared, form: Form, doubt: str = "", **besid
     Parameters
     ----------
     structure : str
-        What the command line calls it.
+        Name in the command line.
     one : Compared
         The candidate.
     form : Form
         Of its linear part.
     doubt : str
-        Why it may not be taken; empty where it may.
+        Why it may not be chosen; empty if it may.
     **beside : object
-        What else is told of it.
+        Further entries.
     """
     return {
         "structure": structure,

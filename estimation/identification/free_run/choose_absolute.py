@@ -1,4 +1,4 @@
-"""Whether an output is measured without its sign, and the model before it: by the free run on blocks held back."""
+"""Whether an output is measured without its sign, and the model before it: by the free run on held-back blocks."""
 
 from dataclasses import dataclass, replace
 
@@ -25,8 +25,8 @@ ORDERS = range(1, 6)
 """Orders of the linear part."""
 
 BELOW, NEAR_ZERO = 0.05, 0.25
-"""How far the lowest hundredth of an output without a sign may lie below zero, and its lowest twentieth above it, both
-in its deviation: noise, and what a lag leaves of a change of sign [dimensionless]."""
+"""How far the lowest hundredth of an output without a sign may be below zero, and its lowest twentieth above it, over
+its deviation: allowances for noise, and for a lag at a change of sign [dimensionless]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ def may_lack_sign(data: Channels, by: Scaling) -> bool:
     Parameters
     ----------
     data, by : Channels, Scaling
-        Scaled, and how.
+        Scaled, and the scaling.
     """
     output = np.concatenate(data.y)
     low, near = np.nanquantile(output, [0.01, 0.05]) - _zero(by)
@@ -57,14 +57,14 @@ def may_lack_sign(data: Channels, by: Scaling) -> bool:
 
 
 def absolute_candidates(data: Channels, by: Scaling, asked: Asked) -> list[AbsoluteCandidate]:
-    """Return models of several orders, each judged on blocks held back; none with a pole slower than a block.
+    """Return models of several orders, each judged on held-back blocks; none with a pole slower than a block.
 
     Parameters
     ----------
     data, by : Channels, Scaling
-        Scaled, and how.
+        Scaled, and the scaling.
     asked : Asked
-        Sizes that the data do not choose.
+        Sizes that the user gives.
     """
     counted, m = from_zero(data, by), len(data.inputs)
     forms = [
@@ -85,12 +85,12 @@ def absolute_candidates(data: Channels, by: Scaling, asked: Asked) -> list[Absol
 
 
 def chosen_absolute(candidates: list[AbsoluteCandidate]) -> AbsoluteCandidate:
-    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC."""
+    """Return the model of least BIC among those nearly as good on held-back blocks as the best."""
     return smallest(candidates, min(one.held_back for one in candidates))
 
 
 def from_zero(data: Channels, by: Scaling) -> Channels:
-    """Return the same data with the output counted from the sensor's zero.
+    """Return the same data with the output relative to the sensor's zero.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _told(fit: AbsoluteFit) -> AbsoluteFit:
 
 
 def _judged(fit: AbsoluteFit, data: Channels, zero: float) -> AbsoluteCandidate:
-    """Return a fit with its errors on blocks held back, each by a fit to the others."""
+    """Return a fit with its errors on held-back blocks, each by a fit to the others."""
     target, errors = np.concatenate(data.y), list[float]()
     problem = AbsoluteProblem(fit.linear.form, data)
     for masks in blocks(data, BLOCKS):

@@ -1,4 +1,4 @@
-"""Which nonlinearity at the input, and which order behind it: by the free run on blocks held back."""
+"""Which nonlinearity at the input, and which order behind it: by the free run on held-back blocks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,10 +21,10 @@ from estimation.identification.free_run.transfer_function import linear_model
 from estimation.progress import tell
 
 ORDERS = 4
-"""Order of the linear part at most."""
+"""Highest order of the linear part."""
 
 BENT_MARGIN = 0.02
-"""Share by which a nonlinearity at the input must do better than none on what was held back."""
+"""Share by which a nonlinearity at the input must reduce the held-back error."""
 
 UNSCALED = Scaling(np.zeros(1), np.ones(1), 0.0, 1.0)
 """Poles and zeros are the same in every scale."""
@@ -37,7 +37,8 @@ class HammersteinCandidate(Compared):
     Parameters
     ----------
     doubt : str
-        ``cancelling`` where a pole of the linear part, slower than a block, is not told from a zero; empty otherwise.
+        ``cancelling`` if a pole of the linear part, slower than a block, cannot be distinguished from a zero; otherwise
+        empty.
     """
 
     fit: HammersteinFit
@@ -45,14 +46,14 @@ class HammersteinCandidate(Compared):
 
 
 def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[HammersteinCandidate]:
-    """Return models of each kind before linear ones of several orders, the best of each judged on blocks held back.
+    """Return models of each kind before linear ones of several orders, the best of each judged on held-back blocks.
 
-    Those that leave too much of the data of their own fit to be worthwhile are not judged.
+    Models that leave too much of their own data are not judged.
 
     Parameters
     ----------
     linear : sequence of Candidate
-        Linear models of the same data, from which forms and denominators are taken.
+        Linear models of the same data, which provide forms and denominators.
     data : Channels
         Scaled, one input.
     """
@@ -80,15 +81,15 @@ def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[
 
 
 def chosen_hammerstein(candidates: Sequence[HammersteinCandidate]) -> HammersteinCandidate:
-    """Return the smallest candidate that does nearly as well on held-back blocks as the best.
+    """Return the smallest candidate that is nearly as good on held-back blocks as the best.
 
-    A slow pole that a zero nearly cancels follows the drift of one record: a block held back lies between outputs that
-    pin it, and another record does not.
+    A slow pole that a zero nearly cancels follows the drift of one record. Outputs on both sides determine a held-back
+    block, but not another record.
 
     Parameters
     ----------
     candidates : sequence of HammersteinCandidate
-        One at least; where all are doubtful, one of them is returned.
+        At least one; if all are doubtful, one of them is returned.
     """
     sound = [one for one in candidates if not one.doubt] or list(candidates)
     return smallest(sound, min(one.held_back for one in sound))
@@ -97,7 +98,7 @@ def chosen_hammerstein(candidates: Sequence[HammersteinCandidate]) -> Hammerstei
 def worthwhile(
     candidates: Sequence[HammersteinCandidate], linear: Sequence[Candidate], best: Candidate, *, surely: bool
 ) -> HammersteinCandidate | None:
-    """Return the candidate to take, if it is better than every linear model.
+    """Return the candidate, if it is better than every linear model.
 
     Parameters
     ----------
@@ -106,14 +107,14 @@ def worthwhile(
     linear : sequence of Candidate
         Models without a nonlinearity.
     best : Candidate
-        Of them, the one that is taken otherwise.
+        The one that is chosen otherwise.
     surely : bool
-        Whether it must be told apart from that one: nobody has asked for a nonlinearity.
+        Whether it must be better by more than chance, since the user did not ask for a nonlinearity.
 
     Returns
     -------
     HammersteinCandidate or None
-        None where the linear model is kept.
+        None if the linear model is kept.
     """
     if not candidates:
         return None
@@ -147,7 +148,7 @@ def _doubt(fit: HammersteinFit, data: Channels) -> str:
 
 
 def _held_back(fit: HammersteinFit, data: Channels) -> tuple[float, ...]:
-    """Return the free-run error of each block held back, simulated by a fit to the others."""
+    """Return the free-run error of each held-back block, simulated by a fit to the others."""
     target, errors = np.concatenate(data.y), list[float]()
     for masks in blocks(data, BLOCKS):
         tell("nonlinear inputs")

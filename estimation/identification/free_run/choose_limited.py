@@ -1,4 +1,4 @@
-"""Whether an output has limits, and the linear model between them: by the free run on blocks held back."""
+"""Whether an output has limits, and the linear model between them: by the free run on held-back blocks."""
 
 from dataclasses import dataclass, replace
 
@@ -19,20 +19,20 @@ from estimation.progress import tell
 from estimation.stretches import stretches
 
 ORDERS = 3
-"""Order of the linear model at most."""
+"""Highest order of the linear model."""
 
 MARGIN, CUT_OFF = 0.02, 0.7
-"""Share by which stops must do better than none on what was held back, as a nonlinearity at the input must; and share
-of the error without a limit that a model which is cut off may leave, as a pole at 1 may."""
+"""Share by which stops must reduce the held-back error, as a nonlinearity at the input must; and largest ratio of the
+error with saturation to that without, as for a pole at 1."""
 
 SETTLED = 0.2
-"""Share of the error without stops that a model between stops may leave where the output may have settled at both
-[fraction]; judged: of pistons driven to and fro between stops 0.06 to 0.13 is left, of an output that rises faster than
-it falls, told as stops, 0.26."""
+"""Largest ratio of the error between stops to that without, if the output may have settled at both [fraction]; judged:
+0.06 to 0.13 for pistons driven between stops, 0.26 for an output that rises faster than it falls, reported as stops."""
 
 ONE_LEVEL, NEARLY = 0.05, 0.9
-"""How far an input may be from its median, over its deviation in the whole log, to have one value, and share of the
-samples that must have it [fraction]; judged. A sample or two behind each change of the input have the other one."""
+"""Distance of an input from its median, over its deviation in the whole log, within which it has one value, and share
+of the samples that must have it [fraction]; judged. One or two samples after each change of the input have another
+value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +54,10 @@ class LimitedCandidate(Compared):
 
 
 def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
-    """Return the best model between limits, where it is better than the linear one; None where there is none.
+    """Return the best model between limits, if it is better than the linear one; otherwise None.
 
-    Where it explains more of the log and is not surely better, the comparison's notes say where the output stands, but
-    for the ends of a staircase.
+    If it explains more of the log and is not surely better, the comparison's notes say where the output is constant,
+    except for the ends of a staircase.
 
     Parameters
     ----------
@@ -100,9 +100,9 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
 
 
 def _levels_at_ends(data: Channels, limits: Limits) -> tuple[bool, float]:
-    """Return whether inputs have one value nearly wherever the output stands at an end, and how often another one.
+    """Return whether inputs have one value nearly whenever the output is at an end, and how often another one.
 
-    Where they have, the output may have settled there. The share is of the samples whose input has the value of no end.
+    If so, the output may have settled there. The share is that of samples whose input has the value of no end.
     """
     u, y = np.concatenate(data.u), np.concatenate(data.y)
     at, middle = at_limits(y, limits), 0.5 * (limits.low + limits.high)  # infinite where one end alone is finite
@@ -114,12 +114,12 @@ def _levels_at_ends(data: Channels, limits: Limits) -> tuple[bool, float]:
 
 
 def told_limits(data: Channels, by: Scaling, limits: Limits) -> tuple[str, float]:
-    """Return limits as words, and the share of samples that stand there.
+    """Return limits in words, and the share of samples at them.
 
     Parameters
     ----------
     data, by : Channels, Scaling
-        Scaled, and how.
+        Scaled, and the scaling.
     limits : Limits
         Of the output.
 
@@ -134,7 +134,7 @@ def told_limits(data: Channels, by: Scaling, limits: Limits) -> tuple[str, float
 
 
 def refitted_limited(taken: LimitedCandidate, data: Channels) -> LinearFit:
-    """Return the fit of a candidate taken on, on the same data or more of them.
+    """Return the fit of a candidate, continued on the same data or more of them.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def refitted_limited(taken: LimitedCandidate, data: Channels) -> LinearFit:
 
 
 def _forms(order: int, delays: tuple[int, ...], sizes: int | None) -> list[Form]:
-    """Return forms of one order, with and without an answer within one sample."""
+    """Return forms of one order, with and without a response within one sample."""
     if sizes is not None:
         return [Form(order, (sizes,) * len(delays), delays)]
     late = tuple(max(delay, 1) for delay in delays)
@@ -157,7 +157,7 @@ def _forms(order: int, delays: tuple[int, ...], sizes: int | None) -> list[Form]
 
 
 def _fitted(form: Form, data: Channels, limits: Limits, one: LinearComparison) -> LinearFit:
-    """Return the best fit of one form: begun at what outputs between limits tell, and at models without limits."""
+    """Return the best fit of one form: started from outputs between limits, and from models without limits."""
     tell("outputs with limits")
     problem = LimitedProblem(form, data, limits)
     free = _free(data, limits)
@@ -171,18 +171,18 @@ def _fitted(form: Form, data: Channels, limits: Limits, one: LinearComparison) -
 
 
 def _begun(f: Array, free: Channels, problem: LimitedProblem) -> Array:
-    """Return values of a denominator, from outputs between limits."""
+    """Return a start for a denominator, from outputs between limits."""
     values = Problem(problem.form, free).profiled(f)[1][: problem.form.n_values]
     return problem.begun(values)
 
 
 def _free(data: Channels, limits: Limits) -> Channels:
-    """Return what lies between limits: of stops as logs of their own."""
+    """Return the data between limits: with stops as separate logs."""
     return _pieces(data, limits) if limits.stops else between(data, limits)
 
 
 def _pieces(data: Channels, limits: Limits) -> Channels:
-    """Return what lies between stays at a limit as logs of their own."""
+    """Return the data between stays at a limit as separate logs."""
     u, y = list[Array](), list[Array]()
     for inputs, output in zip(data.u, data.y, strict=True):
         for first, last in zip(*stretches(~at_limits(output, limits)), strict=True):
@@ -193,7 +193,7 @@ def _pieces(data: Channels, limits: Limits) -> Channels:
 
 
 def _judged(fit: LinearFit, data: Channels, limits: Limits) -> LimitedCandidate:
-    """Return a fit with its errors on blocks held back, each by a fit to the others."""
+    """Return a fit with its errors on held-back blocks, each by a fit to the others."""
     target, errors, whole = np.concatenate(data.y), list[float](), LimitedProblem(fit.form, data, limits)
     for masks in blocks(data, BLOCKS):
         tell("outputs with limits")

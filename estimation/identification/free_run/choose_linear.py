@@ -1,4 +1,4 @@
-"""Order and dead time of a linear model by its free run on blocks held back, information criteria beside."""
+"""Order and dead time of a linear model by its free run on held-back blocks, with information criteria as well."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from estimation.identification.free_run.linear_fit import extended, fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit
 
 CLEARLY = 0.01
-"""Share by which a larger model must do better on what was held back."""
+"""Share by which a larger model must reduce the held-back error."""
 
 DEAD_TIME = 0.03
-"""Share by which a dead time of more than one sample must do better."""
+"""Share by which a dead time of more than one sample must reduce it."""
 
 INTEGRATING = 0.7
-"""A pole at one is believed where it leaves less than this share of the best other model's held-back error."""
+"""Largest ratio of the held-back error with a pole at one to that of the best other model."""
 
 PATIENCE = 2
 """Orders without gain after which no higher one is tried."""
@@ -29,14 +29,14 @@ PATIENCE = 2
 
 @dataclass(frozen=True, eq=False)
 class Candidate(Compared):
-    """A form with what speaks for it.
+    """A form with its evidence.
 
     Parameters
     ----------
     aic : float
         Information criterion of the free run [dimensionless].
     doubt : str
-        Why it may not be taken; empty where it may.
+        Why it may not be chosen; empty if it may.
     """
 
     fit: LinearFit
@@ -45,7 +45,7 @@ class Candidate(Compared):
 
     @property
     def price(self) -> float:
-        """Held-back error by which candidates are compared [dimensionless]: a dead time has its price."""
+        """Held-back error for comparisons, increased for a dead time [dimensionless]."""
         return self.held_back * (1.0 + DEAD_TIME * (max(self.form.delays) > 1))
 
     @property
@@ -56,13 +56,13 @@ class Candidate(Compared):
     def outlasts_block(self, data: Channels) -> bool:
         """Return whether a time constant is longer than a held-back block.
 
-        What such a pole does in a block is pinned by the outputs on both sides, so blocks do not miss it where it
+        Outputs on both sides of a block determine the effect of such a pole there, so blocks do not reveal that it
         follows the drift of one record.
 
         Parameters
         ----------
         data : Channels
-            That it was judged on.
+            The data on which it was judged.
         """
         return slowest_pole(self.fit.f) > np.exp(-(BLOCKS + 1.0) / data.told)
 
@@ -78,13 +78,13 @@ def slowest_pole(f: Array) -> float:
     Returns
     -------
     float
-        Distance from the origin; zero where there is no root [dimensionless].
+        Distance from the origin; zero if there is no root [dimensionless].
     """
     return float(np.abs(np.roots(f)).max()) if f.size > 1 else 0.0
 
 
 def candidate(fit: LinearFit, data: Channels) -> Candidate:
-    """Return a fit with its held-back error, criteria, and what is doubtful in it."""
+    """Return a fit with its held-back error, criteria, and doubts."""
     # a dead time that was searched is one more value
     values = fit.theta.size + sum(delay > 1 for delay in fit.form.delays) - fit.integrates
     bic, aic = criteria(fit.cost, values, data.n_samples)
@@ -99,7 +99,7 @@ def criteria(cost: float, values: int, samples: int) -> tuple[float, float]:
     cost : float
         Sum of squared errors [squared unit of the output].
     values, samples : int
-        How many values were fitted, to how many samples [count].
+        Number of fitted values and of samples [count].
 
     Returns
     -------
@@ -111,7 +111,7 @@ def criteria(cost: float, values: int, samples: int) -> tuple[float, float]:
 
 
 def doubt_of(fit: LinearFit, data: Channels) -> str:
-    """Return why a linear model may not be taken: ``time_constant``, ``no_fit``, or nothing."""
+    """Return why a linear model may not be chosen: ``time_constant``, ``no_fit``, or nothing."""
     output, n = np.concatenate(data.y), data.n_samples
     spread = float(np.nansum((output - np.nanmean(output)) ** 2))
     if spread == 0.0:  # beside one huge value all others are rounded to one number
@@ -128,18 +128,18 @@ def doubt_of(fit: LinearFit, data: Channels) -> str:
 def linear_candidates(
     data: Channels, orders: Sequence[int], delays: tuple[int, ...] | None, sizes: int | None = None
 ) -> list[Candidate]:
-    """Return linear models over orders and dead times, each judged on blocks held back.
+    """Return linear models over orders and dead times, each judged on held-back blocks.
 
     Parameters
     ----------
     data : Channels
         Scaled.
     orders : sequence of int
-        Orders tried, rising; ended early where two in a row bring nothing.
+        Orders that are tried, rising; the search ends after two without gain.
     delays : tuple of int or None
-        Dead time of each input [samples]; None estimates it, and tries none and one sample beside.
+        Dead time of each input [samples]; None estimates it, and tries zero and one sample as well.
     sizes : int, optional
-        Numerator coefficients of each input; as many as the order, or one more, unless told.
+        Numerator coefficients of each input; by default as many as the order, or one more.
     """
     m = len(data.inputs)
     late = delays or estimate_delays(data)
@@ -164,7 +164,7 @@ def linear_candidates(
 
 
 def _least(candidates: Sequence[Candidate]) -> float:
-    """Return the least held-back error of models that may be taken: of those with a pole at 1, if one is believed."""
+    """Return the least held-back error of acceptable models: of those with a pole at 1, if one is believed."""
     sound = min((one.held_back for one in candidates if not one.doubt), default=np.inf)
     integrating = min((one.held_back for one in candidates if one.fit.integrates), default=np.inf)
     return integrating if integrating < INTEGRATING * sound else sound
@@ -178,18 +178,18 @@ def _best_start(form: Form, data: Channels, previous: Sequence[Array]) -> Linear
 
 
 def _within_record(one: Candidate, data: Channels) -> Candidate:
-    """Return the best model of the same form whose time constants the record can hold."""
+    """Return the best model of the same form whose time constants are shorter than the record."""
     return candidate(fit_linear(one.form, data, [one.fit.f], bounded=True), data)
 
 
 def _integrating(one: Candidate, data: Channels) -> list[Candidate]:
-    """Return the best model of the same form with a pole at 1; none where it cannot be written."""
+    """Return the best model of the same form with a pole at 1; None if it cannot be written."""
     fit = fit_integrating(one.form, data, [one.fit.f], search=True, least_gain=NEAR)
     return [candidate(fit, data)] if np.isfinite(fit.cost) else []
 
 
 def _forms(order: int, late: tuple[int, ...], m: int, sizes: int | None) -> list[Form]:
-    """Return forms of one order: behind the estimated dead time, and behind none or one sample."""
+    """Return forms of one order: with the estimated dead time, and with zero or one sample."""
     if sizes is not None:
         return [Form(order, (sizes,) * m, late)]
     forms = [
@@ -202,15 +202,15 @@ def _forms(order: int, late: tuple[int, ...], m: int, sizes: int | None) -> list
 
 
 def chosen(candidates: Sequence[Candidate]) -> Candidate:
-    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC.
+    """Return the model of least BIC among those nearly as good on held-back blocks as the best.
 
-    A dead time of more than one sample was searched among many and looks better than it is: it counts as a value in
-    BIC, and its price is what others are measured by.
+    A dead time of more than one sample is the best of many and looks better than it is: it counts as a value in BIC,
+    and models are compared by their price.
 
     Parameters
     ----------
     candidates : sequence of Candidate
-        One at least; where all are doubtful, the best of them is returned.
+        At least one; if all are doubtful, the best of them is returned.
     """
     sound = [one for one in candidates if not one.doubt] or list(candidates)
     return smallest(sound, min(one.price for one in sound))
@@ -220,12 +220,12 @@ Some = TypeVar("Some", bound=Compared)
 
 
 def smallest(candidates: Sequence[Some], least: float) -> Some:
-    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC.
+    """Return the model of least BIC among those nearly as good on held-back blocks as the best.
 
     Parameters
     ----------
     candidates : sequence of Compared
-        One at least that does.
+        At least one that is.
     least : float
         Held-back error of the best one [dimensionless].
     """

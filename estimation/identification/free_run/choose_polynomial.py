@@ -1,7 +1,7 @@
-"""Which polynomial model is offered: products grown one by one, or all of a few lags kept small by a penalty.
+"""Which polynomial model is offered: products added one by one, or all products of a few lags with a penalty.
 
-How many products are grown is told by blocks that are held back: each has a growth of its own, which never saw it. What
-is offered must run well there, and its fits to different blocks must agree where the same inputs come in another order.
+The number of products is chosen on held-back blocks, each of which has a selection of its own that never used it. A
+model is offered if it runs well there, and if fits to different blocks agree for the same inputs in another order.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,27 +27,27 @@ MOST_TERMS = 20
 """Products beside the linear terms."""
 
 PATIENCE = 4
-"""Products without gain on what was held back after which no more are added."""
+"""Products without gain on held-back data after which no more are added."""
 
 CLEARLY = 0.01
-"""Share by which further products must do better on what was held back."""
+"""Share by which further products must reduce the held-back error."""
 
 HIGHEST_BASE = 4
-"""Order of the linear model that products are added to."""
+"""Highest order of the linear model to which products are added."""
 
 HIGHEST_RUBBING, RUBBING_BASES, RUBS = 3, 2, 0.1
-"""Order of a linear model whose output may rub, models of each order, and share of the squared error that friction must
-explain."""
+"""Highest order of a linear model with output friction, models of each order, and share of the squared error that
+friction must explain."""
 
 BASES, SCREENED, KEPT = 6, 3, 2
-"""Linear models that products are added to, how many products they are given first, and how many models go on."""
+"""Linear models to which products are added, how many products each gets at first, and how many models continue."""
 
 COMPARED, LARGER = 16, 6
-"""Models of every product, best on what was held back, that are fitted to all data and tried in other orders: of the
-sizes that are tried first, and of larger ones, so that neither leave out the other."""
+"""Models with every product, the best on held-back data, that are fitted to all data and tried in other orders: of the
+sizes tried first, and of larger ones, so that neither excludes the other."""
 
 SELECTIONS = 5
-"""Models of few products, likewise."""
+"""Models with few products, likewise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +57,11 @@ class PolynomialCandidate(Compared):
     Parameters
     ----------
     fit : PolynomialFit
-        Of all data that structures are compared on.
+        Fit to all data on which structures are compared.
     refit : callable
-        Fits the same to other data of as many logs; None where that runs away.
+        Fits the same to other data with as many logs; None if that diverges.
     spread : float
-        How far fits without one block each run from it on inputs in other orders [dimensionless].
+        Deviation of fits without one block each, on inputs in other orders [dimensionless].
     parts : tuple of PolynomialFit
         Fits that left out one block each.
     """
@@ -73,17 +73,17 @@ class PolynomialCandidate(Compared):
 
     @property
     def price(self) -> float:
-        """Criterion for comparing models: error on held-back data, and doubt elsewhere [dimensionless]."""
+        """Criterion for comparisons: error on held-back data, plus the uncertainty elsewhere [dimensionless]."""
         return float(np.hypot(self.held_back, self.spread))
 
 
 def polynomial_candidates(
     linear: Sequence[Candidate], data: Channels, asked: Asked | None = None, bar: float = float("inf")
 ) -> list[PolynomialCandidate]:
-    """Return polynomial models: grown from linear ones, of every product, and of the few that explain most.
+    """Return polynomial models: grown from linear ones, with every product, and with the few that explain most.
 
-    The latter two are fitted to all data only while they can still be the best one: a price is not less than the
-    held-back error that it begins with.
+    The latter two are fitted to all data only while they can still be the best: a price is at least the held-back
+    error.
 
     Parameters
     ----------
@@ -92,9 +92,9 @@ def polynomial_candidates(
     data : Channels
         Scaled.
     asked : Asked, optional
-        Sizes that the data do not choose.
+        Sizes that the user gives.
     bar : float
-        Price from which on nobody takes a model [dimensionless].
+        Price from which no model is used [dimensionless].
     """
     delays, wanted = min(linear, key=lambda one: one.held_back).form.delays, asked or Asked()
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
@@ -126,7 +126,7 @@ def _from_linear(base: LinearFit) -> Callable[[Channels], PolynomialFit | None]:
 
 
 def _with_friction(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
-    """Return growths from models whose output rubs, if friction explains much that linear models leave."""
+    """Return growths from models with output friction, if friction explains much that linear models leave."""
     fits: list[PolynomialFit] = []
     for order in range(1, HIGHEST_RUBBING + 1):
         # what rubs may integrate: a time constant beyond the record is no doubt here
@@ -143,7 +143,7 @@ def _with_friction(linear: Sequence[Candidate], data: Channels) -> list["_Growth
 def _dense(
     data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
 ) -> list[PolynomialCandidate]:
-    """Return the models of every product that do best on what was held back, but for those that leave their range."""
+    """Return the models with every product that are best on held-back data, except those that leave their range."""
     forms = forms_tried(delays, asked)
     judged = sorted(judged_recipes(data, parts, forms, asked), key=lambda one: one.held_back)
     first = [one for one in judged if one.recipe.form in forms][:COMPARED]
@@ -153,7 +153,7 @@ def _dense(
 def _selected(
     data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
 ) -> list[PolynomialCandidate]:
-    """Return the models of few products that do best on what was held back, but for those that leave their range."""
+    """Return the models with few products that are best on held-back data, except those that leave their range."""
     judged = judged_selections(data, parts, forms_selected(delays, asked))
     return _kept(sorted(judged, key=lambda one: one.held_back)[:SELECTIONS], data, bar)
 
@@ -161,9 +161,9 @@ def _selected(
 def _kept(
     judged: Sequence[JudgedRecipe[Recipe]] | Sequence[JudgedRecipe[Selection]], data: Channels, bar: float
 ) -> list[PolynomialCandidate]:
-    """Return models of all data that were judged without a block each, but for those that leave their range.
+    """Return models of all data that were judged without a block each, except those that leave their range.
 
-    Passed over are those that leave more of what was held back than the price of the best one, or than the bar.
+    Models are skipped if their held-back error exceeds the price of the best one, or the bar.
     """
     found: list[PolynomialCandidate] = []
     known: dict[Recipe, PolynomialFit | None] = {}
@@ -180,7 +180,7 @@ def _kept(
 
 
 def _fitted(recipe: Recipe, data: Channels, known: dict[Recipe, PolynomialFit | None]) -> PolynomialFit | None:
-    """Return the fit of a recipe, begun at what is known of the same one with fewer penalties, and remember it."""
+    """Return the fit of a recipe, started from the same one with fewer penalties; it is cached."""
     if recipe not in known:
         begun = None
         if recipe.free_run:
@@ -232,7 +232,7 @@ class _Growth:
         return [pooled(one) for one in self.block_errors]
 
     def advance(self, most: int) -> bool:
-        """Add products until there are as many as wanted, or more bring nothing; return whether it runs free at all."""
+        """Add products until there are as many as wanted, or more bring no gain; return whether it runs free at all."""
         if not np.isfinite(self.errors[0]):
             return False
         pool = candidate_terms(self.path[0].variables)
@@ -252,7 +252,7 @@ class _Growth:
         return True
 
     def finished(self) -> PolynomialCandidate:
-        """Return the model of all data with as many products as held-back blocks ask for, pruned."""
+        """Return the model of all data with the number of products chosen on held-back blocks, pruned."""
         errors = self.errors
         least = min(errors)
         count = next(k for k, error in enumerate(errors) if error <= (1.0 + CLEARLY) * least)
@@ -274,7 +274,7 @@ class _Growth:
 
 
 def _pruned(fit: PolynomialFit, data: Channels) -> PolynomialFit:
-    """Return a fit without the products that the free run's information criterion does not miss."""
+    """Return a fit without the products that the free run's information criterion does not need."""
     price = float(np.log(data.n_samples)) / data.n_samples
     index = fit.terms.shape[0] - 1
     while index >= 0:

@@ -1,4 +1,4 @@
-"""Inputs and outputs of one or more logs as free-run fits take them: scaled, with blocks that may be held back."""
+"""Inputs and outputs of one or more logs for free-run fits: scaled, with blocks that may be held back."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,13 +12,13 @@ from estimation.identification.signals.period import common_period
 from plant.errors import HydrostateError
 
 FEWEST = 20
-"""Samples of an output that a fit needs at least."""
+"""Least number of output samples for a fit."""
 
 SHORTEST = 20
-"""Samples of a block that is held back in every period at least; a shorter period has too little in it."""
+"""Least number of samples of a held-back block in every period; a shorter period has too little information."""
 
 MOST_ORDER = 20
-"""Order at most that may be asked for: time grows with its square [count]."""
+"""Highest order that may be requested: time grows with its square [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Channels:
     sample_time : float
         Seconds between samples [s].
     u : tuple of ndarray, shape (n, m)
-        Inputs of each log, no gaps.
+        Inputs of each log, without gaps.
     y : tuple of ndarray, shape (n,)
         Output of each log; NaN where missing.
     own_offsets : bool
@@ -48,7 +48,7 @@ class Channels:
 
     @property
     def n_samples(self) -> int:
-        """Outputs that are there."""
+        """Number of valid outputs."""
         return sum(int(np.isfinite(y).sum()) for y in self.y)
 
     @property
@@ -58,12 +58,12 @@ class Channels:
 
     @cached_property
     def periods(self) -> tuple[int | None, ...]:
-        """After how many samples the inputs of each log repeat themselves; None where they do not."""
+        """Period of each log's inputs in samples; None if they are not periodic."""
         return tuple(common_period(u) for u in self.u)
 
     @property
     def told(self) -> int:
-        """Samples of the longest log that its inputs tell something new in: a period, where they repeat themselves."""
+        """Samples of the longest log with new information: one period, if its inputs are periodic."""
         return max(lengths_told(self))
 
     @property
@@ -85,7 +85,7 @@ class Channels:
 def channels_from(
     u: Sequence[Array], y: Sequence[Array], sample_time: float, inputs: Sequence[str], output: str
 ) -> Channels:
-    """Return channels after checking them.
+    """Return channels after checks.
 
     Parameters
     ----------
@@ -138,12 +138,12 @@ def _require_variation(values: Array, name: str) -> None:
 
 
 def require_size(order: int | None, delay: int | None, n_numerator: int | None) -> None:
-    """Refuse a size that no model has, or that would keep the search busy for minutes.
+    """Refuse a size that no model has, or whose search would take minutes.
 
     Parameters
     ----------
     order, delay, n_numerator : int, optional
-        Of every input.
+        For every input.
 
     Raises
     ------
@@ -161,12 +161,12 @@ def require_size(order: int | None, delay: int | None, n_numerator: int | None) 
 
 
 def require_room(data: Channels, order: int | None, delay: int | None, n_numerator: int | None) -> None:
-    """Refuse a size of a model for which the logs are too short.
+    """Refuse a model size for which the logs are too short.
 
     Parameters
     ----------
     order, delay, n_numerator : int, optional
-        Of every input.
+        For every input.
 
     Raises
     ------
@@ -202,14 +202,14 @@ class Scaling:
 
 
 def scaled(data: Channels) -> tuple[Channels, Scaling]:
-    """Return channels of zero mean and unit deviation, and what was taken off."""
+    """Return channels with zero mean and unit deviation, and the scaling."""
     together, outputs = np.concatenate(data.u), np.concatenate(data.y)
     by = Scaling(together.mean(axis=0), together.std(axis=0), float(np.nanmean(outputs)), float(np.nanstd(outputs)))
     return in_scale(data, by), by
 
 
 def in_scale(data: Channels, by: Scaling) -> Channels:
-    """Return channels brought to a scaling that is already known."""
+    """Return channels in a given scaling."""
     return replace(
         data,
         u=tuple((one - by.u_mean) / by.u_std for one in data.u),
@@ -218,12 +218,12 @@ def in_scale(data: Channels, by: Scaling) -> Channels:
 
 
 def lengths_told(data: Channels, shortest: int = SHORTEST) -> list[int]:
-    """Return after how many samples the inputs of each log repeat themselves, or how many it has where they do not.
+    """Return the period of each log's inputs, or its length if they are not periodic.
 
     Parameters
     ----------
     shortest : int
-        Shorter periods are not counted: they have too little in them [samples].
+        Shorter periods do not count: they have too little information [samples].
     """
     return [
         period if period is not None and period >= shortest else len(u)
@@ -232,20 +232,20 @@ def lengths_told(data: Channels, shortest: int = SHORTEST) -> list[int]:
 
 
 def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
-    """Return masks that hold back one block of every log after the other, but for the first.
+    """Return masks that hold back one block of every log after the other, except the first.
 
-    The first block is never held back: nothing else tells the initial state. Where the inputs repeat themselves, a
-    block is the same part of every period: a block of the log would hold back nothing that other periods do not tell.
+    The first block is never held back: it determines the initial state. If the inputs are periodic, a block is the same
+    part of every period: otherwise the other periods would contain what is held back.
 
     Parameters
     ----------
     count : int
-        Blocks that are held back.
+        Number of blocks that are held back.
 
     Returns
     -------
     list of list of ndarray of bool, shape (n,)
-        One mask a log, for each block.
+        One mask per log, for each block.
     """
     places: list[IntArray] = []
     for told, y in zip(lengths_told(data, SHORTEST * (count + 1)), data.y, strict=True):
@@ -255,12 +255,12 @@ def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
 
 
 def halves(data: Channels) -> tuple[Channels, Channels]:
-    """Return the first half of every log, and the second one; of inputs that repeat themselves, of the last period.
+    """Return the first and the second half of every log; for periodic inputs, of the last period.
 
     Returns
     -------
     tuple of Channels
-        As many logs each.
+        With the same number of logs each.
     """
     begins = [y.size - told for told, y in zip(lengths_told(data), data.y, strict=True)]
     cuts = [(begin + y.size) // 2 for begin, y in zip(begins, data.y, strict=True)]
@@ -277,7 +277,7 @@ def halves(data: Channels) -> tuple[Channels, Channels]:
 
 
 def section(data: Channels, most: int) -> Channels:
-    """Return of each log the part in which the first input varies most, so that there are no more samples than wanted.
+    """Return the part of each log in which the first input varies most, with a limited number of samples.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Dead times of the inputs of a linear model: short ones tried one by one, long ones where a screen shows them."""
+"""Dead times of the inputs of a linear model: short ones tried one by one, long ones if a screening shows them."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations_with_replacement
@@ -16,48 +16,47 @@ from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 
 LONGEST_SHARE = 5
-"""A dead time lasts at most one of so many parts of the record: the first block, which is never held back. Up to a
-third of it, a drift was taken for a dead time on one of 91 logs."""
+"""Inverse of the longest dead time over the record: the length of the first block, which is never held back. With a
+limit of a third, a drift was taken for a dead time in one of 91 logs."""
 
 CLEARLY = 0.9
-"""A long dead time is taken if it leaves less than this share of what shorter ones leave [fraction]: among hundreds of
-dead times, the best is a few per cent better than the others by chance."""
+"""Largest ratio of the error with a long dead time to that with shorter ones [fraction]: the best of hundreds of dead
+times is a few per cent better than the others by chance."""
 
 APART = 3.0
-"""Ratio of the time constants that the screen puts side by side, from one sample to a fifth of the record: between two
-neighbours, the dead time that it shows moves by less than the time constant, and it is refined after."""
+"""Ratio of the time constants of the screening, from one sample to a fifth of the record: between two neighbours, the
+dead time moves by less than the time constant, and it is refined afterwards."""
 
 ORDER, NEAR = 3, 1e-4
-"""Order of the fits that refine a long dead time, and their least gain as `levenberg` takes it: with fewer poles, the
-rise of a third one is taken for dead time."""
+"""Order of the fits that refine a long dead time, and their least gain for `levenberg`: with fewer poles, the rise of a
+third one would be taken for dead time."""
 
 NEARLY = 1.005
-"""What a dead time may leave, over what the best one leaves, to be taken if it is shorter [dimensionless]."""
+"""Error with a shorter dead time over that with the best one, up to which the shorter is chosen [dimensionless]."""
 
 
 UNEXPLAINED = 0.5
-"""Share of the output's deviation that a model leaves from which a dead time beyond those looked for may be the cause,
-and share of that error that a model behind it may leave to be named: of 55 logs without one, none below 0.6, and of
-five with one all below 0.1."""
+"""Residual of a model over the output's deviation, from which a longer dead time may be the cause, and ratio of errors
+up to which such a dead time is named: in 55 logs without one it is at least 0.6, in five with one at most 0.1."""
 
 
 def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ...]:
     """Return the dead time of each input with which models of low order fit best, one input after the other.
 
-    Dead times up to `long_dead_time` are each tried with models of second order. Those beyond are looked for by
-    correlation of the output with the filtered input, and refined by fits.
+    Dead times up to `long_dead_time` are each tried with second-order models. Longer ones are found by correlation of
+    the output with the filtered input, and refined by fits.
 
     Parameters
     ----------
     data : Channels
         Scaled.
     longest : int, optional
-        Dead time at most; a fifth of the record unless told [samples].
+        Longest dead time; by default a fifth of the record [samples].
 
     Returns
     -------
     tuple of int
-        One an input [samples].
+        One per input [samples].
     """
     m = len(data.inputs)
     longest = data.told // LONGEST_SHARE if longest is None else min(longest, data.told // LONGEST_SHARE)
@@ -75,16 +74,16 @@ def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ..
 
 
 def late_answers(data: Channels, rmse: float) -> list[Note]:
-    """Return a note on each input that the output seems to answer later than dead times are looked for.
+    """Return a note on each input with a response later than the dead times that are searched.
 
-    Held-back blocks cannot judge such a model: what tells of it is a fit behind a dead time of up to half of the log.
+    Held-back blocks cannot judge such a model: a fit with a dead time of up to half of the log is used.
 
     Parameters
     ----------
     data : Channels
         Scaled.
     rmse : float
-        Root-mean-square error of the model that was chosen [dimensionless].
+        Root-mean-square error of the chosen model [dimensionless].
     """
     if rmse < UNEXPLAINED:
         return []
@@ -102,7 +101,7 @@ def late_answers(data: Channels, rmse: float) -> list[Note]:
 
 
 def _longer(data: Channels, index: int, delays: Sequence[int], tried: int, most: int) -> int:
-    """Return the dead time of one input beyond those tried if it leaves clearly less, else the given one."""
+    """Return a longer dead time of one input if its error is clearly smaller, otherwise the given one."""
     if most <= tried:
         return delays[index]
     left = _unexplained(data, index, delays, most)
@@ -136,10 +135,10 @@ def _longer(data: Channels, index: int, delays: Sequence[int], tried: int, most:
 
 
 def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -> Array:
-    """Return the squared error that one input leaves behind each dead time, shape (most + 1,).
+    """Return the squared error that one input leaves for each dead time, shape (most + 1,).
 
-    The input goes through two poles of every pair, and has two coefficients behind the dead time. What the other inputs
-    and the initial state explain through the same poles is taken off the output before.
+    The input passes through two poles of every pair, and has two coefficients after the dead time. What the other
+    inputs and the initial state explain through the same poles is first subtracted from the output.
     """
     least = np.full(most + 1, np.inf)
     others = [k for k in range(len(delays)) if k != index]
@@ -172,19 +171,19 @@ def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -
 
 
 def _met(later: Array, series: Array, size: int) -> Array:
-    """Return the sum of products of one series with another one so many samples before it, by FFT of a size."""
+    """Return the sums of products of one series with a shifted other one, by FFT."""
     return np.fft.irfft(np.fft.rfft(later, size) * np.fft.rfft(series, size).conj(), size)
 
 
 def _gained(crossed: Array, power: Array, beside: Array) -> Array:
-    """Return what two coefficients explain behind each dead time, shape (most + 1,).
+    """Return what two coefficients explain for each dead time, shape (most + 1,).
 
     Parameters
     ----------
     crossed, power : ndarray, shape (most + 2,)
-        Products of the output with the input so many samples before, and the input's own squares, summed.
+        Sums of products of the output with the shifted input, and of the input's own squares.
     beside : ndarray, shape (most + 1,)
-        Products of two neighbouring samples of the input, likewise.
+        Sums of products of two neighbouring samples of the input.
     """
     (now, later), (one, other) = ((x[:-1], x[1:]) for x in (crossed, power))
     alone = now**2 / np.maximum(one, 1e-300)

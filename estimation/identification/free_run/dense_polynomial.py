@@ -1,7 +1,7 @@
-"""Polynomial models of every product of a few lags, kept small by a penalty instead of a choice of products.
+"""Polynomial models with every product of a few lags, with a penalty in place of a selection of products.
 
-Nothing is chosen but the size and the penalty: one least squares of the one-step error, then, of the sizes that do
-best, a descent of the free run.
+Only size and penalty are chosen: by one least-squares fit of the one-step error, and then, for the best sizes, by a
+descent of the free run.
 """
 
 from collections.abc import Sequence
@@ -26,27 +26,27 @@ SIZES = ((1, 2), (2, 2), (3, 2), (3, 3))
 """Lags of the output and of each input that are tried first."""
 
 MOST_TERMS = 120
-"""Of a model; larger sizes are left out."""
+"""Most terms of a model; larger sizes are left out."""
 
 ONE_STEP = (1e-3, 1e-4, 1e-5, 1e-8)
 """Penalties of the one-step least squares, on terms of unit deviation [dimensionless]."""
 
 BEGUN = 1e-4
-"""Of them, the one that the free run begins at."""
+"""The penalty from which the free run starts."""
 
 FREE_RUN = (1e-1, 1e-2, 1e-3)
-"""Penalties of the free run; each descent begins where that before it has ended [dimensionless]."""
+"""Penalties of the free run; each descent begins where the one before ended [dimensionless]."""
 
 STEPS = 15
-"""Evaluations of each descent: what takes more is not well determined."""
+"""Evaluations of each descent: a model that needs more is poorly determined."""
 
 DESCENDED = 4
-"""Sizes of which the free run is descended."""
+"""Sizes whose free run is descended."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """Sizes that are given and not chosen by the data; None where they are.
+    """Sizes given by the user; None if the data choose.
 
     Parameters
     ----------
@@ -70,11 +70,11 @@ class Recipe:
     form : Form
         Lags.
     degree : int
-        Of the products at most.
+        Largest degree of the products.
     one_step : float
         Penalty of the one-step least squares [dimensionless].
     free_run : tuple of float
-        Those of the free run, one descent each; none where it is not descended [dimensionless].
+        Penalties of the free run, one descent each; empty without a descent [dimensionless].
     """
 
     form: Form
@@ -85,16 +85,16 @@ class Recipe:
     def fit(
         self, data: Channels, begun: PolynomialFit | None = None, known: "Moments | None" = None
     ) -> PolynomialFit | None:
-        """Return the model of given data; None where it runs away or there are too few samples.
+        """Return the model of given data; None if it diverges or there are too few samples.
 
         Parameters
         ----------
         data : Channels
             Scaled; outputs held back are NaN.
         begun : PolynomialFit, optional
-            What the same recipe without its last penalty gives on these data, if that is known.
+            Result of the same recipe without its last penalty, if known.
         known : tuple, optional
-            Moments of these data for this size, as `moments` returns them, if they are known.
+            Moments of these data for this size, from `moments`, if known.
         """
         if begun is not None:
             return self._descended(begun, data, self.free_run[-1])
@@ -128,9 +128,9 @@ class JudgedRecipe(Judged, Generic[Kind]):
     Parameters
     ----------
     recipe : object
-        Whose ``fit`` takes data.
+        Has a ``fit`` that takes data.
     fits : tuple of PolynomialFit
-        One a block.
+        One per block.
     """
 
     recipe: Kind
@@ -150,7 +150,7 @@ def every_term(n_variables: int, degree: int) -> IntArray:
     Returns
     -------
     ndarray of int, shape (k, 3)
-        Variables that each term multiplies; -1 stands for 1.
+        Variables in each term; -1 stands for 1.
 
     Examples
     --------
@@ -166,14 +166,14 @@ def every_term(n_variables: int, degree: int) -> IntArray:
 
 
 def forms_tried(delays: tuple[int, ...], asked: Asked) -> list[Form]:
-    """Return sizes of models of every product.
+    """Return sizes of models with every product.
 
     Parameters
     ----------
     delays : tuple of int
-        Dead time of each input that is tried beside none and one sample [samples].
+        Dead time of each input that is tried beside zero and one sample [samples].
     asked : Asked
-        What is given and not chosen.
+        What the user gives.
 
     Examples
     --------
@@ -187,14 +187,14 @@ def forms_tried(delays: tuple[int, ...], asked: Asked) -> list[Form]:
 
 
 def late_by(delays: tuple[int, ...], asked: Asked) -> list[tuple[int, ...]]:
-    """Return the dead times of the inputs that are tried: none, one sample and those given, or what is asked.
+    """Return the dead times of the inputs that are tried: zero, one sample and those given, or the user's.
 
     Parameters
     ----------
     delays : tuple of int
         Dead time of each input [samples].
     asked : Asked
-        What is given and not chosen.
+        What the user gives.
     """
     m = len(delays)
     return [(0,) * m, (1,) * m, delays] if asked.delay is None else [(asked.delay,) * m]
@@ -203,10 +203,10 @@ def late_by(delays: tuple[int, ...], asked: Asked) -> list[tuple[int, ...]]:
 def judged_recipes(
     data: Channels, parts: Sequence[Channels], forms: Sequence[Form], asked: Asked | None = None
 ) -> list[JudgedRecipe[Recipe]]:
-    """Return models of every product, each judged on blocks that its fits left out.
+    """Return models with every product, each judged on blocks that its fits left out.
 
-    The free run is descended for the sizes that do best by one least squares, and for larger ones beside the best of
-    them as long as a further lag does clearly better.
+    The free run is descended for the sizes that are best by one least-squares fit, and for larger ones next to the best
+    as long as a further lag is clearly better.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def judged_recipes(
     Returns
     -------
     list of JudgedRecipe
-        Only those that run; none where every size has too many terms.
+        Those that run; empty if every size has too many terms.
     """
     found: list[JudgedRecipe[Recipe]] = []
     best: dict[tuple[Form, int], float] = {}
@@ -247,7 +247,7 @@ def judged_recipes(
 
 
 def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels]) -> list[JudgedRecipe[Recipe]]:
-    """Return models of one size whose free run is descended under one penalty after the other."""
+    """Return models of one size whose free run is descended with one penalty after the other."""
     found: list[JudgedRecipe[Recipe]] = []
     for k in range(len(FREE_RUN)):
         one = _judged(Recipe(form, degree, BEGUN, FREE_RUN[: k + 1]), data, parts, found[-1] if found else None)
@@ -260,7 +260,7 @@ def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels
 def _climbed(
     found: Sequence[JudgedRecipe[Recipe]], data: Channels, parts: Sequence[Channels], asked: Asked
 ) -> list[JudgedRecipe[Recipe]]:
-    """Return models of a lag more than the best, and of more lags as long as each does clearly better."""
+    """Return models with one lag more than the best, and with more lags as long as each is clearly better."""
     more: list[JudgedRecipe[Recipe]] = []
     best = min(found, key=lambda one: one.held_back, default=None)
     while best is not None:
@@ -278,12 +278,12 @@ def _climbed(
 
 
 def larger(form: Form, asked: Asked) -> list[Form]:
-    """Return sizes of one lag more, of the output or of every input, but for what is asked for.
+    """Return sizes with one lag more, of the output or of every input, except what the user gives.
 
     Parameters
     ----------
     asked : Asked
-        What is given and not chosen.
+        What the user gives.
 
     Examples
     --------
@@ -301,7 +301,7 @@ def _judged(
     before: JudgedRecipe[Recipe] | None = None,
     known: Sequence[Moments] | None = None,
 ) -> JudgedRecipe[Recipe] | None:
-    """Return a recipe's fits to all blocks but one, begun at those before; None where one of them runs away."""
+    """Return a recipe's fits to all blocks but one, started from those before; None if one of them diverges."""
     fits = list[PolynomialFit | None]()
     for index, part in enumerate(parts):
         tell("polynomial models")
@@ -315,14 +315,14 @@ def _judged(
 def judged_fits(
     recipe: Kind, fits: Sequence[PolynomialFit | None], data: Channels, parts: Sequence[Channels]
 ) -> JudgedRecipe[Kind] | None:
-    """Return fits to all blocks but one with their errors there; None where one of them runs away.
+    """Return fits to all blocks but one with their errors there; None if one of them diverges.
 
     Parameters
     ----------
     recipe : object
-        What was fitted.
+        The recipe.
     fits : sequence of PolynomialFit or None
-        One a block.
+        One per block.
     data : Channels
         Scaled.
     parts : sequence of Channels

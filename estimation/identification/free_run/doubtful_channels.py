@@ -1,4 +1,4 @@
-"""What is doubtful in channels themselves: inputs that are alike, and outputs that stand out from their neighbours."""
+"""Doubts about the channels themselves: dependent inputs, and outputs that stand out from their neighbours."""
 
 import numpy as np
 
@@ -19,23 +19,23 @@ from estimation.log_checks.outliers import without_outliers
 from plant.notes import Note
 
 ALIKE = 1e-10
-"""Share of an input's variance that other inputs may leave of it for it to be their linear function: far above what
-rounding leaves, and far below the noise of any sensor or converter [fraction]."""
+"""Largest unexplained share of an input's variance for it to be a linear function of other inputs: far above rounding,
+and far below the noise of any sensor or converter [fraction]."""
 
 MUCH, NOISY = 0.1, 0.5
-"""Share of the output's deviation from which what a linear model leaves is worth a word, and share of what is left, by
-deviation, that changes from sample to sample explain as white noise where it is nothing else [dimensionless]."""
+"""Residual of a linear model over the output's deviation from which it is reported, and share of the residual, by
+deviation, that changes from sample to sample explain for pure white noise [dimensionless]."""
 
 LATE, OTHERS, SAMPLES_EACH = (0, 2, 6, 18), 39, 4
-"""By how many samples functions of inputs are late in what they may explain of what is left, at how many other times
-they are tried (one told beforehand beats them all by chance in 2.5 %), and samples a column at least [count]."""
+"""Lags in samples of functions of inputs that may explain the residual, number of other shifts that are tried (one
+given in advance beats them all by chance in 2.5 %), and least samples per column [count]."""
 
 MOST_OF_IT = 0.5
-"""Share of a model's squared error above which a few outputs decide what is fitted, and not the others [fraction]."""
+"""Share of a model's squared error above which a few outputs decide the fit [fraction]."""
 
 
 def doubtful_channels(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return notes on inputs that are alike, and on outputs that stand out.
+    """Return notes on dependent inputs, and on outputs that stand out.
 
     Parameters
     ----------
@@ -70,10 +70,10 @@ def inputs_alike(data: Channels) -> list[Note]:
 
 
 def outputs_that_stand_out(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return a note if a few outputs that stand out from their neighbours decide what is fitted.
+    """Return a note if a few outputs that stand out from their neighbours decide the fit.
 
-    They hold most of the model's error, or have taken it farther from the others than their mean is. Outputs that stand
-    out because the inputs drive them are followed by the model, and take it from no others.
+    They account for most of the model's error, or have moved it farther from the others than their mean is. If inputs
+    cause such outputs, the model follows them without a loss elsewhere.
     """
     y, sound = np.concatenate(data.y), np.concatenate([without_outliers(one) for one in data.y])
     outside = np.isfinite(y) & np.isnan(sound)
@@ -89,15 +89,14 @@ def outputs_that_stand_out(model: FreeRunModel, data: Channels) -> list[Note]:
 
 
 def _runs(model: FreeRunModel, data: Channels) -> list[Array]:
-    """Return the free run of each log, begun as its outputs say."""
+    """Return the free run of each log, with initial states from its outputs."""
     return [model.simulate(u, y) for u, y in zip(data.u, data.y, strict=True)]
 
 
 def more_than_noise(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return a note if a model leaves much of the output, more than noise from sample to sample, and of its inputs.
+    """Return a note if the residual is large, more than noise from sample to sample, and depends on the inputs.
 
-    Sensor noise that is filtered or held is no noise from sample to sample either, so what is left must follow the
-    inputs too.
+    Filtered or held sensor noise is correlated from sample to sample too, so the residual must also follow the inputs.
     """
     runs = _runs(model, data)
     begins = [model.dynamics.unanswered(y.size) for y in data.y]
@@ -119,9 +118,10 @@ def more_than_noise(model: FreeRunModel, data: Channels) -> list[Note]:
 
 
 def still_wanders(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return a note where what a nonlinear model leaves of an output wanders.
+    """Return a note if the residual of a nonlinear model wanders.
 
-    What a bend leaves behind a linear model may look like a walk or hide one; nothing of it is left here.
+    The residual of a linear model may wander because of a nonlinearity, or the nonlinearity may hide it; here the
+    nonlinearity is removed.
 
     Parameters
     ----------
@@ -139,9 +139,9 @@ def still_wanders(model: FreeRunModel, data: Channels) -> list[Note]:
 
 
 def follows(left: Array, drives: Array) -> bool:
-    """Return whether what is left of an output follows functions of signals, more than of the same at other times.
+    """Return whether a residual follows functions of signals more than it follows the same functions at other times.
 
-    Both may last over many samples, so that a level of significance for white noise would not hold.
+    Both may be correlated over many samples, so a significance level for white noise would not hold.
 
     Parameters
     ----------

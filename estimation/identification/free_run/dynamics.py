@@ -1,4 +1,4 @@
-"""Dynamics of a model in the data's scale: what each kind must offer, and what those of output error share."""
+"""Dynamics of a model in the data's scale: the interface of every kind, and what output-error models share."""
 
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar, Protocol
@@ -17,7 +17,7 @@ class Dynamics(Protocol):
         ...
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, shape (n,), from the state that suits the outputs that are there best."""
+        """Return the free run, shape (n,), from the initial state that fits the available outputs best."""
         ...
 
     def one_step(self, u: Array, y: Array) -> Array:
@@ -25,7 +25,7 @@ class Dynamics(Protocol):
         ...
 
     def unanswered(self, length: int) -> int:
-        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
+        """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
         ...
 
     def to_dict(self) -> dict[str, Any]:
@@ -34,19 +34,19 @@ class Dynamics(Protocol):
 
 
 class OutputErrorDynamics(ABC):
-    """Dynamics whose noise is the output sensor's: what was measured before says nothing of the next sample."""
+    """Dynamics with noise of the output sensor only: past measurements do not improve the next prediction."""
 
     def unanswered(self, length: int) -> int:
-        """Return how many first outputs of a log of some length [samples] respond to inputs from before it.
+        """Return how many first outputs of a log of a given length [samples] depend on inputs from before it.
 
-        None do, unless a class says otherwise.
+        None, unless a class overrides it.
         """
         del length
         return 0
 
     @abstractmethod
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its initial state by least squares of the outputs that are there.
+        """Return the free run, with its initial state by least squares of the available outputs.
 
         Parameters
         ----------

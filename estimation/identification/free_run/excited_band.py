@@ -1,7 +1,7 @@
-"""Whether a model rings where its inputs hardly move: above the band that they excite.
+"""Whether a model rings above the band that its inputs excite.
 
-What a plant does there is not in the log, so a slow pole there is fitted to noise and distortion alone. It costs
-nothing on held-back blocks, whose inputs lie in the same band, and everything on an input that goes beyond.
+The log does not show the plant's behaviour there, so a slow pole there is fitted to noise and distortion only. It costs
+nothing on held-back blocks, whose inputs are in the same band, and everything for an input that goes beyond.
 """
 
 import numpy as np
@@ -11,11 +11,11 @@ from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.held_back import BLOCKS
 
 SHOWN = 1e-3
-"""Share of an input's largest spectral density from which on it shows what a plant does: 30 dB less is lost in noise of
-3 % of the output."""
+"""Share of an input's largest spectral density from which it shows the plant's behaviour: 30 dB less is lost in noise
+of 3 % of the output."""
 
 SMOOTHED = 64
-"""Parts of half the sampling rate over which a spectral density is a mean; lines of a multisine lie closer."""
+"""Bands of half the sampling rate over which a spectral density is averaged; lines of a multisine are closer."""
 
 
 def band_end(data: Channels) -> float:
@@ -55,9 +55,9 @@ def rings_beyond(one: Candidate, data: Channels, end: float) -> bool:
     Parameters
     ----------
     data : Channels
-        That it was judged on.
+        The data on which it was judged.
     end : float
-        As `band_end` returns it [rad].
+        Result of `band_end` [rad].
     """
     poles = np.roots(one.fit.f)
     return bool(np.any((np.abs(np.angle(poles)) > end) & (np.abs(poles) > np.exp(-(BLOCKS + 1.0) / data.told))))

@@ -13,12 +13,12 @@ def rubbed(total: float, before: float, rub: Array) -> tuple[float, float]:
     Parameters
     ----------
     total : float
-        What the terms give [dimensionless].
+        Sum of the terms [dimensionless].
     before : float
-        The output a sample before [dimensionless].
+        The previous output [dimensionless].
     rub : ndarray, shape (f,)
-        What friction takes off the output below and above where it rests: at the third value, or of two where it was a
-        sample before; there it stays unless more than that moves it.
+        What friction subtracts below and above the resting place, which is the third value, or of two values the
+        previous output; the output stays there unless more than that moves it.
 
     Returns
     -------
@@ -47,27 +47,27 @@ def run_factored(
     rub: Array,
     out: Array,
 ) -> int:
-    """Write the output from a sample on; return where it ran away, else -1.
+    """Write the output from a sample on; return where it diverged, otherwise -1.
 
     Parameters
     ----------
     share : ndarray, shape (n, m)
-        What each monomial of past outputs is multiplied by; the first monomial is 1.
+        Factors of each monomial of past outputs; the first monomial is 1.
     parent, factor : ndarray of int, shape (m,)
-        A monomial is an earlier one times a past output: the first values of the latter are as they are, the others
-        are held at their ends.
+        A monomial is an earlier one times a past output: the first values of the latter are used as they are, the
+        others are clipped at their ends.
     lag : ndarray of int, shape (l,)
         Of the past outputs [samples].
     limits : ndarray, shape (l, 2)
-        Ends at which they are held in products.
+        Ends at which they are clipped in products.
     ends : ndarray, shape (2,)
-        Between which the output is held.
+        Ends at which the output is clipped.
     begin : int
-        First sample that is written; not less than the longest lag.
+        First sample that is written; at least the longest lag.
     rub : ndarray, shape (f,)
-        As `rubbed` takes it; none where nothing rubs.
+        For `rubbed`; empty without friction.
     out : ndarray, shape (n,)
-        Holds outputs before that sample; the others are written.
+        Contains outputs before that sample; the others are written.
     """
     own = lag.size
     past, made = np.zeros(2 * own), np.zeros(parent.size)
@@ -102,12 +102,12 @@ def slopes_of(
     monomials: Array,
     slope: Array,
 ) -> None:
-    """Write monomials of past outputs, and how each output depends on those before it.
+    """Write monomials of past outputs, and the dependence of each output on those before it.
 
     Parameters
     ----------
     share : ndarray, shape (n, m)
-        As `run_factored` takes it, like all before ``out``.
+        As in `run_factored`, like all before ``out``.
     parent, factor : ndarray of int, shape (m,)
         Likewise.
     lag : ndarray of int, shape (l,)
@@ -121,12 +121,12 @@ def slopes_of(
     rub : ndarray, shape (f,)
         Likewise.
     out : ndarray, shape (n,)
-        What `run_factored` has written.
+        Result of `run_factored`.
     monomials : ndarray, shape (n, m)
         Written.
     slope : ndarray, shape (n, k)
-        Written: derivative of each output by the k before it; where the output rubs, by k - 1, and the last column is
-        the direction in which it moves, as `rubbed` returns it.
+        Written: derivative of each output by the k before it; with friction by k - 1, and the last column is the
+        direction of motion from `rubbed`.
     """
     own, count = lag.size, parent.size
     past, adjoint, effect = np.zeros(2 * own), np.zeros(count), np.zeros(2 * own)
@@ -167,18 +167,18 @@ def slopes_of(
 def write_own(
     monomials: Array, inputs: Array, place: IntArray, column: IntArray, slope: Array, n_rub: int, rows: Array
 ) -> None:
-    """Write the derivatives of some samples by coefficients and friction, as if the past did not depend on them.
+    """Write the derivatives of some samples by coefficients and friction, for constant past outputs.
 
     Parameters
     ----------
     monomials : ndarray, shape (r, m)
-        As `slopes_of` writes them.
+        From `slopes_of`.
     inputs : ndarray, shape (r, i)
         Monomials of inputs.
     place, column : ndarray of int, shape (terms,)
-        Monomial of past outputs and monomial of inputs that each term is the product of.
+        Monomial of past outputs and monomial of inputs of each term.
     slope : ndarray, shape (r, k)
-        As `slopes_of` writes it.
+        From `slopes_of`.
     n_rub : int
         Number of the friction's values, which take the last columns.
     rows : ndarray, shape (r, p)
@@ -203,14 +203,14 @@ def write_own(
 
 @compiled
 def pass_on(slope: Array, depth: int, rows: Array) -> None:
-    """Add what the outputs before pass on to the derivatives of each output.
+    """Add the effect of earlier outputs to the derivatives of each output.
 
     Parameters
     ----------
     slope : ndarray, shape (r, k)
-        As `slopes_of` writes it.
+        From `slopes_of`.
     depth : int
-        How many outputs before it each one depends on.
+        Number of earlier outputs on which each one depends.
     rows : ndarray, shape (depth + r, p)
         Derivatives of the outputs before the first sample; below them those of `write_own`, which are added to.
     """

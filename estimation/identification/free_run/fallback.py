@@ -1,12 +1,12 @@
-"""The linear model that stands in for a nonlinear one on inputs that do not determine the latter.
+"""The linear model that replaces a nonlinear one on inputs for which the latter is not determined.
 
-Products are fitted where the training inputs were, and a run on others may lead anywhere. How far a run is determined
-is told without an output: fits that left out one block of the training data each are run on the same inputs. Their
-squared deviations from the model, times as many as there are blocks, are its variance (the jackknife of groups:
-Quenouille 1956, Tukey 1958). Where that is more than the linear model's squared error, the linear one is run.
+Products are fitted within the range of the training inputs, and a run on others may lead anywhere. How well a run is
+determined is found without an output: fits that left out one block of the training data each are run on the same
+inputs. The mean square of their deviations from the model, times the number of blocks, is its variance (the jackknife
+of groups: Quenouille 1956, Tukey 1958). If that exceeds the linear model's squared error, the linear one is run.
 
-A nonlinearity at the input has few values, which fits without a block agree on more. What it leaves of held-back blocks
-is counted beside, as for the linear model. Of polynomials it is not: see decision 353.
+A nonlinearity at the input has few values, on which fits without a block agree more. So its error on held-back blocks
+is added, as for the linear model. For polynomials it is not: see decision 353.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -27,17 +27,16 @@ class Fallback:
     Parameters
     ----------
     linear : LinearDynamics
-        Of the same data.
+        Linear model of the same data.
     linear_parts, parts : tuple of LinearDynamics and of Dynamics
         Fits of the linear model and of the nonlinear one that left out one block each.
     error : float
-        Of the linear model on blocks held back, over the output's deviation [dimensionless].
+        Error of the linear model on held-back blocks, over the output's deviation [dimensionless].
     share : float
-        Samples that fits without a block come from, over those that both models were fitted to: of a long log,
-        structures are compared on a section, and what is taken is fitted to all. A variance falls with their number
-        [dimensionless].
+        Samples of the fits without a block over those of both models: for a long log, structures are compared on a
+        section, and the chosen one is fitted to all. A variance falls with their number [dimensionless].
     own_error : float
-        Of the nonlinear model on blocks held back, likewise; zero where it is not counted [dimensionless].
+        Error of the nonlinear model on held-back blocks, likewise; zero if it is not counted [dimensionless].
     """
 
     linear: LinearDynamics
@@ -48,45 +47,45 @@ class Fallback:
     own_error: float = 0.0
 
     def errors(self, u: Array, y: Array, own: Array) -> tuple[float, float]:
-        """Return the errors to be expected of the nonlinear run and of the linear one.
+        """Return the expected errors of the nonlinear run and of the linear one.
 
         Parameters
         ----------
         u : ndarray, shape (n, m)
             Inputs, scaled.
         y : ndarray, shape (n,)
-            Output, scaled; NaN where missing. Only initial states are taken from it.
+            Output, scaled; NaN where missing. Only initial states are estimated from it.
         own : ndarray, shape (n,)
             Free run of the nonlinear model, scaled.
 
         Returns
         -------
         tuple of float
-            What the nonlinear run is not determined to, infinite where a run has no end; and the linear model's error
-            on held-back blocks together with what its run is not determined to, over the output's deviation in the
-            fitted data [dimensionless].
+            Uncertainty of the nonlinear run, infinite if a run diverges; and the linear model's error on held-back
+            blocks together with the uncertainty of its run, over the output's deviation in the fitted data
+            [dimensionless].
         """
         return self.judged(u, y, own)[1]
 
     def judged(self, u: Array, y: Array, own: Array, ends: Array | None = None) -> tuple[Array, tuple[float, float]]:
-        """Return the nonlinear run, or the linear one where that errs less, and the errors of both.
+        """Return the nonlinear run, or the linear one if its error is smaller, and the errors of both.
 
-        An output that integrates over the run has no range. What the linear run goes beyond the ends at which a
-        nonlinear run is held is an error of the latter that its fits agree on.
+        An output that integrates has no range. If the linear run goes beyond the ends at which a nonlinear run is
+        clipped, the difference is an error that all nonlinear fits share.
 
         Parameters
         ----------
         u : ndarray, shape (n, m)
             Inputs, scaled.
         y, own : ndarray, shape (n,)
-            As `errors` takes them.
+            As in `errors`.
         ends : ndarray, shape (2,), optional
             Least and greatest output that a nonlinear run can have, scaled.
 
         Returns
         -------
         tuple of ndarray, shape (n,), and tuple of float
-            Output, scaled, and what `errors` returns.
+            Output, scaled, and the result of `errors`.
         """
         linear = self.linear.run(u, y)
         known = float(np.sqrt(self.share))
@@ -125,7 +124,7 @@ class Fallback:
 
 
 def jackknife(whole: Array, parts: Sequence[Array]) -> float:
-    """Return the standard deviation of a run by those of fits that left out a group of data each.
+    """Return the standard deviation of a run, from fits that left out a group of data each.
 
     The first group of a record is never left out, so there is one group more than runs.
 
@@ -139,7 +138,7 @@ def jackknife(whole: Array, parts: Sequence[Array]) -> float:
     Returns
     -------
     float
-        Root mean square over the run; infinite where one of them is not finite.
+        Root mean square over the run; infinite if one of them is not finite.
 
     Examples
     --------
@@ -152,6 +151,6 @@ def jackknife(whole: Array, parts: Sequence[Array]) -> float:
 
 
 def _integrates(f: Array, rows: int) -> bool:
-    """Return whether a denominator has a pole that neither settles nor swings within so many rows."""
+    """Return whether a denominator has a pole that neither settles nor oscillates within a number of rows."""
     roots = np.roots(f)
     return bool(np.any((np.abs(roots) > np.exp(-1.0 / rows)) & (np.abs(np.angle(roots)) < 1.0 / rows)))

@@ -1,4 +1,4 @@
-"""Linear models judged anew on fewer samples, where nonlinear ones are compared with them."""
+"""Linear models judged again on fewer samples, for the comparison with nonlinear ones."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,22 +12,22 @@ from estimation.identification.free_run.linear_fit import COARSE
 def on_fewer(
     linear: Sequence[Candidate], best: Candidate, part: Channels, fewer: Channels
 ) -> tuple[Channels, list[Candidate], Candidate]:
-    """Return the data that nonlinear models are compared on, and linear ones judged there, the best one apart.
+    """Return the data on which nonlinear models are compared, and linear ones judged there, the best one separately.
 
     Parameters
     ----------
     linear : sequence of Candidate
         Judged on the part.
     best : Candidate
-        The one that was chosen of them.
+        The chosen one.
     part, fewer : Channels
-        Scaled: what linear models were judged on, and a section of no more samples.
+        Scaled: the data on which linear models were judged, and a section with a limited number of samples.
 
     Returns
     -------
     tuple of Channels, list of Candidate and Candidate
-        As they were where the section is the part. Doubts stay: whether a time constant is too long for the record is
-        told by the longer one.
+        Unchanged if the section is the part. Doubts stay: whether a time constant is too long is judged by the longer
+        one.
     """
     if fewer.n_samples == part.n_samples:
         return part, list(linear), best

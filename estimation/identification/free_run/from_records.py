@@ -17,19 +17,19 @@ from plant.errors import HydrostateError, LogWarning
 from plant.log.record import Record
 
 SAME_CLOCK = 1e-3
-"""Share by which sample times may differ and still be one."""
+"""Relative difference up to which sample times count as equal."""
 
 SPOILT = 0.05
-"""Squared errors of a line over a gap, summed, over the input's variance, from which a log is split there [samples]."""
+"""Sum of squared errors of a line over a gap, over the input's variance, from which a log is split there [samples]."""
 
 MOST_GAPS = 30
-"""Gaps of one input at which a log is split at most, the worst ones: each part has a beginning that is estimated."""
+"""Most gaps of one input at which a log is split, the worst ones: each part has an initial state to estimate."""
 
 LONGEST_ANSWER = 20
-"""Outputs that are left out after a gap of an input, at most: dead times are about as long [samples]."""
+"""Most outputs that are left out after a gap of an input: about the length of dead times [samples]."""
 
 TRIED = 400
-"""Stretches of an input that are bridged for comparison, at most."""
+"""Most parts of an input that are bridged for comparison."""
 
 
 def channels_of(
@@ -49,10 +49,10 @@ def channels_of(
     inputs, output : sequence of str, str
         Channels.
     sample_time : float, optional
-        Wanted [s]; the longest of the logs' unless told.
+        Requested sample time [s]; by default the longest of the logs'.
     split : bool
-        Whether a log is split where an input is not known, see `pieces`. A model that is fitted or judged across such
-        a gap answers for what was never put in.
+        Whether a log is split where an input is unknown, see `pieces`. Otherwise a model is fitted and judged on inputs
+        that never were.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def channels_of(
 
 
 def channels_to_run(record: Record, inputs: Sequence[str], output: str, sample_time: float | None = None) -> Channels:
-    """Return the channels that a model is run on: its inputs, and its output as far as the log has one.
+    """Return the channels on which a model is run: its inputs, and its output as far as the log has one.
 
     Parameters
     ----------
@@ -102,12 +102,12 @@ def channels_to_run(record: Record, inputs: Sequence[str], output: str, sample_t
     inputs, output : sequence of str, str
         Channels; the output may be missing.
     sample_time : float, optional
-        Wanted [s]; the log's unless told.
+        Requested sample time [s]; by default the log's.
 
     Returns
     -------
     Channels
-        An output that is missing is NaN throughout.
+        A missing output is NaN throughout.
 
     Raises
     ------
@@ -131,12 +131,12 @@ def channels_to_run(record: Record, inputs: Sequence[str], output: str, sample_t
 
 
 def sent_once(record: Record, names: Sequence[str]) -> Record:
-    """Return a log without rows that its logger wrote a second time, whatever its columns are.
+    """Return a log without rows that its logger wrote twice, whatever its columns are.
 
     Returns
     -------
     Record
-        The log itself where there are none.
+        The log itself if there are none.
 
     Warns
     -----
@@ -152,12 +152,13 @@ def sent_once(record: Record, names: Sequence[str]) -> Record:
 def pieces(record: Record, inputs: Sequence[str]) -> list[Record]:
     """Split a log where an input misses samples that a straight line would get wrong.
 
-    How wrong is read off the input itself: where it is whole, stretches as long as the gap are bridged and compared.
+    The error of a line is found from the input itself: complete parts as long as the gap are bridged and compared.
 
     Returns
     -------
     list of Record
-        The log itself where nothing spoils it; else its parts of at least `FEWEST` samples and a two-hundredth of it.
+        The log itself if nothing is wrong; otherwise its parts with at least `FEWEST` samples and a two-hundredth of
+        it.
 
     Warns
     -----
@@ -196,7 +197,7 @@ def _unknown(values: Array) -> BoolArray:
 
 
 def _spoilt(values: Array, length: int) -> float:
-    """Return the squared errors of a line over a gap, summed, over the input's variance [samples]."""
+    """Return the sum of squared errors of a line over a gap, over the input's variance [samples]."""
     # at random, for evenly spaced stretches may keep step with the input's own clock
     starts = np.random.default_rng(0).integers(0, max(values.size - length - 1, 1), TRIED)
     stretches = values[np.minimum(starts[:, None] + np.arange(length + 2), values.size - 1)]
@@ -216,7 +217,7 @@ def _on_clock(values: Array, sample_time: float, wanted: float) -> Array:
 
 
 def without_gaps(values: Array, name: str) -> Array:
-    """Return an input with its gaps bridged by straight lines, and warn of them.
+    """Return an input with its gaps bridged by straight lines, with a warning.
 
     Parameters
     ----------
@@ -239,7 +240,7 @@ def without_gaps(values: Array, name: str) -> Array:
 
 
 def _tell_bridged(parts: Sequence[Array], name: str, *, stacklevel: int) -> bool:
-    """Warn of the samples that parts of an input lack; return whether any does."""
+    """Warn of missing samples of an input in parts; return whether there are any."""
     lacking = sum(int(np.count_nonzero(np.isnan(one))) for one in parts)
     if lacking:
         said = IdentificationCode.INPUT_BRIDGED.note(channel=name, count=lacking, total=sum(map(len, parts)))

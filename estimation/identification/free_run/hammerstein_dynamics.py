@@ -15,7 +15,7 @@ from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 
 PLACES = 5
-"""Places of a play at the first sample that are tried."""
+"""Initial states of a play that are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,11 +27,11 @@ class HammersteinDynamics(OutputErrorDynamics):
     at_input : str
         One of `NONLINEARITIES`.
     values, std : ndarray, shape (k,)
-        What it was fitted to be, and standard deviations, scaled.
+        Fitted values and standard deviations, scaled.
     linear : LinearDynamics
-        What follows.
+        What follows the nonlinearity.
     fallback : Fallback, optional
-        What is run on inputs that do not determine this model.
+        The model that is run on inputs for which this one is not determined.
     """
 
     at_input: str
@@ -47,15 +47,15 @@ class HammersteinDynamics(OutputErrorDynamics):
         return self.values.size + self.linear.n_values
 
     def unanswered(self, length: int) -> int:
-        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
+        """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
         return self.linear.form.unanswered(length)
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, or that of the linear model where it stands in."""
+        """Return the free run, or that of the linear model if that replaces it."""
         return self.judged_run(u, y)[0]
 
     def judged_run(self, u: Array, y: Array) -> tuple[Array, tuple[float, float] | None]:
-        """Return the same with the errors to be expected of both models.
+        """Return the same with the expected errors of both models.
 
         Parameters
         ----------
@@ -67,13 +67,13 @@ class HammersteinDynamics(OutputErrorDynamics):
         Returns
         -------
         tuple of ndarray, shape (n,), and tuple of float or None
-            Output, scaled, and what `Fallback.errors` returns; None where no linear model may stand in.
+            Output, scaled, and the result of `Fallback.errors`; None without a linear model.
         """
         own = self._own_run(u, y)
         return (own, None) if self.fallback is None else self.fallback.judged(u, y, own)
 
     def _own_run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its initial state by least squares of the outputs that are there."""
+        """Return the free run, with its initial state by least squares of the available outputs."""
         kind, known = NONLINEARITIES[self.at_input], np.isfinite(y)
         begun = u[0, 0] + self.values[0] * np.linspace(-1.0, 1.0, PLACES) if kind.remembers else np.zeros(1)
         if not known.any():

@@ -15,13 +15,13 @@ from estimation.identification.free_run.linear_problem import Form, LinearFit, P
 from estimation.identification.search.levenberg import levenberg
 
 TOLERANCE, MOST_STEPS = 1e-9, 60
-"""Share of the cost that a further step may promise at the end, and evaluations at most."""
+"""Relative gain of the cost below which a descent ends, and most evaluations."""
 
 REFINED = 3
-"""Starts that are carried on."""
+"""Starts that are refined."""
 
 NEAR = 1e-3
-"""As `COARSE`, of the linear model before the nonlinearity's values move."""
+"""As `COARSE`, for the linear model before the nonlinearity's values are varied."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +33,11 @@ class HammersteinFit:
     kind : str
         One of `NONLINEARITIES`.
     values : ndarray, shape (k,)
-        Of the nonlinearity.
+        Values of the nonlinearity.
     starts : ndarray, shape (logs,)
-        Of a nonlinearity that remembers, one a log; empty otherwise.
+        Initial states of a nonlinearity with memory, one per log; otherwise empty.
     linear : LinearFit
-        What follows it.
+        What follows the nonlinearity.
     """
 
     kind: str
@@ -75,14 +75,14 @@ class HammersteinProblem:
         Parameters
         ----------
         values : ndarray, shape (k,)
-            Of the nonlinearity.
+            Values of the nonlinearity.
         starts : ndarray, shape (logs,)
-            One a log, where it remembers.
+            One per log, if it has memory.
 
         Returns
         -------
         tuple of Channels and list of ndarray, shape (n, columns)
-            Columns are values, then the log's own start where there is one.
+            Columns are values, then the log's own initial state if there is one.
         """
         found = [
             self.kind.apply(u[:, 0], values, float(starts[index]) if self.n_starts else 0.0)
@@ -121,12 +121,12 @@ class HammersteinProblem:
         return output, jacobian
 
     def descend(self, values: Array, starts: Array, linear: Array, least_gain: float = 0.0) -> HammersteinFit:
-        """Return the minimum that one start leads to.
+        """Return the minimum from one start.
 
         Parameters
         ----------
         values, starts, linear : ndarray, shapes (k,), (logs,) and (p,)
-            Where to begin.
+            The start.
         least_gain : float
             As `levenberg` takes it [dimensionless].
         """
@@ -151,7 +151,7 @@ class HammersteinProblem:
 
 
 def _answers(inputs: Array, b: Array, f: Array, delay: int) -> Array:
-    """Return the response of the linear model to each column, held at its first value before."""
+    """Return the response of the linear model to each column, constant at its first value before."""
     rows = np.empty((inputs.shape[1], inputs.shape[0]))
     padded = np.concatenate([np.repeat(inputs[:1], delay + b.size, axis=0), inputs])
     for row, column in zip(rows, padded.T, strict=True):
@@ -161,7 +161,7 @@ def _answers(inputs: Array, b: Array, f: Array, delay: int) -> Array:
 
 
 def fit_hammerstein(kind: str, form: Form, data: Channels, denominators: Sequence[Array]) -> HammersteinFit | None:
-    """Return the best model of one kind and form; None where the input's samples do not reach it.
+    """Return the best model of one kind and form; None if the input's samples do not reach the nonlinearity.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def fit_hammerstein(kind: str, form: Form, data: Channels, denominators: Sequenc
     data : Channels
         Scaled, one input.
     denominators : sequence of ndarray, shape (order + 1,)
-        Where the linear part may begin.
+        Starts of the linear part.
     """
     problem = HammersteinProblem(kind, form, data)
     tried: list[tuple[float, Array, Array]] = []
@@ -204,7 +204,7 @@ def _apart(ranked: Sequence[tuple[float, Array, Array]]) -> list[tuple[float, Ar
 
 
 def finished(fit: HammersteinFit, data: Channels) -> HammersteinFit:
-    """Return the fit taken on to its minimum, on its own data.
+    """Return the fit continued to its minimum, on its own data.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def finished(fit: HammersteinFit, data: Channels) -> HammersteinFit:
 
 
 def refitted(fit: HammersteinFit, data: Channels, least_gain: float = 0.0) -> HammersteinFit:
-    """Return the fit taken on, on other data of as many logs.
+    """Return the fit continued on other data with as many logs.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def refitted(fit: HammersteinFit, data: Channels, least_gain: float = 0.0) -> Ha
 
 
 def deviations(fit: HammersteinFit, data: Channels) -> Array:
-    """Return the standard deviations of the nonlinearity's values, coloured residuals allowed for.
+    """Return the standard deviations of the nonlinearity's values, for coloured residuals.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def deviations(fit: HammersteinFit, data: Channels) -> Array:
     Returns
     -------
     ndarray, shape (k,)
-        In the data's scale; infinite where no sample tells a value [dimensionless].
+        In the data's scale; infinite for a value without information [dimensionless].
     """
     problem = HammersteinProblem(fit.kind, fit.linear.form, data)
     output, jacobian = problem.jacobian(fit.theta)

@@ -1,4 +1,4 @@
-"""Errors of free runs on what was held back: blocks between outputs that are fitted, and halves."""
+"""Errors of free runs on held-back data: blocks between fitted outputs, and halves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,25 +16,25 @@ BLOCKS = 4
 """Blocks of every log, each held back once."""
 
 STUDENT_95 = (6.314, 2.920, 2.353)
-"""What a mean of two, three and four is below by chance in 95 %, over its standard error (Student's distribution)."""
+"""95 % quantile of a mean of two, three and four over its standard error (Student's distribution)."""
 
 TINY = 1e-300
-"""Error of a block for which none is taken: its logarithm is finite [dimensionless]."""
+"""Replaces a zero error of a block, so that its logarithm is finite [dimensionless]."""
 
 NEAR = 1e-6
-"""Share of the cost that two steps of a descent in a row must gain each while forms are compared: the chosen one is
-fitted on."""
+"""Relative gain of two successive steps below which a descent ends while forms are compared: the chosen one is fitted
+further."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Judged:
-    """A model that was judged on blocks held back.
+    """A model that was judged on held-back blocks.
 
     Parameters
     ----------
     block_errors : tuple of float
         Root-mean-square free-run error of each block, simulated by a fit to the others, over the output's deviation;
-        NaN where one holds nothing [dimensionless].
+        NaN for an empty block [dimensionless].
     """
 
     block_errors: tuple[float, ...]
@@ -47,7 +47,7 @@ class Judged:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Compared(Judged):
-    """The same, with what speaks for a smaller model.
+    """The same, with a criterion that favours smaller models.
 
     Parameters
     ----------
@@ -59,19 +59,19 @@ class Compared(Judged):
 
 
 def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
-    """Return the root-mean-square free-run error of each block held back, simulated by a fit to the others.
+    """Return the root-mean-square free-run error of each held-back block, simulated by a fit to the others.
 
     Parameters
     ----------
     fit : LinearFit
-        Of all data; each fit begins at it.
+        Fit to all data, at which each other fit begins.
     data : Channels
         Scaled.
 
     Returns
     -------
     tuple of float
-        Over the output's deviation, one a block.
+        Over the output's deviation, one per block.
     """
     problem, errors = Problem(fit.form, data), list[float]()
     tell("linear models")
@@ -82,14 +82,14 @@ def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
 
 
 def block_error(error: Array, mask: BoolArray) -> float:
-    """Return the root mean square of an error where a block was held back; NaN where the block holds nothing.
+    """Return the root mean square of an error in a held-back block; NaN for an empty block.
 
     Parameters
     ----------
     error : ndarray, shape (n,)
         Simulated less measured.
     mask : ndarray of bool, shape (n,)
-        Where it was held back.
+        The held-back block.
 
     Returns
     -------
@@ -100,12 +100,12 @@ def block_error(error: Array, mask: BoolArray) -> float:
 
 
 def pooled(errors: Sequence[float]) -> float:
-    """Return the root mean square over blocks; infinite where there are none.
+    """Return the root mean square over blocks; infinite if there are none.
 
     Parameters
     ----------
     errors : sequence of float
-        One a block [dimensionless].
+        One per block [dimensionless].
 
     Returns
     -------
@@ -127,12 +127,12 @@ def surely_better(errors: Sequence[float], others: Sequence[float]) -> bool:
     Parameters
     ----------
     errors, others : sequence of float
-        Root-mean-square errors of the model and of the other, one a block; NaN where one holds nothing [dimensionless].
+        Root-mean-square errors of the model and of the other, one per block; NaN for an empty block [dimensionless].
 
     Returns
     -------
     bool
-        Of one block alone, whether it is better there.
+        With a single block, whether it is better there.
 
     Examples
     --------
@@ -148,18 +148,18 @@ def surely_better(errors: Sequence[float], others: Sequence[float]) -> bool:
 def told_apart(errors: Sequence[float], others: Sequence[float]) -> bool:
     """Return whether a model beats another on the same blocks by more than chance, by the ratio of their errors.
 
-    Ratios count each block alike, however large the output is there. Their logarithms are asked as Student (1908) does,
-    at 5 %.
+    Ratios weight all blocks equally, however large the output is there. Their logarithms are tested as in Student
+    (1908), at 5 %.
 
     Parameters
     ----------
     errors, others : sequence of float
-        Root-mean-square errors of the model and of the other, one a block; NaN where one holds nothing [dimensionless].
+        Root-mean-square errors of the model and of the other, one per block; NaN for an empty block [dimensionless].
 
     Returns
     -------
     bool
-        Of one block alone, whether it is better there.
+        With a single block, whether it is better there.
 
     Examples
     --------
@@ -179,19 +179,19 @@ def told_apart(errors: Sequence[float], others: Sequence[float]) -> bool:
 def halves_error(fit: LinearFit, data: Channels) -> float:
     """Return the error of a free run over each half of every log by a fit to the other halves, root mean square.
 
-    A block lies between outputs that are fitted, and they pin a slow pole there; a half has only an initial state.
+    Fitted outputs on both sides of a block hide the error of a slow pole; a half has only an initial state.
 
     Parameters
     ----------
     fit : LinearFit
-        Of all data; each fit begins at it.
+        Fit to all data, at which each other fit begins.
     data : Channels
         Scaled.
 
     Returns
     -------
     float
-        Over the output's deviation; NaN where a half has too few outputs.
+        Over the output's deviation; NaN if a half has too few outputs.
     """
     first, second = halves(data)
     if min(first.n_samples, second.n_samples) < 2 * fit.theta.size:

@@ -1,4 +1,4 @@
-"""From channels to the model that generalises: candidates judged by free runs on blocks held back."""
+"""From channels to the model that generalises: candidates judged by free runs on held-back blocks."""
 
 import warnings
 from collections.abc import Sequence
@@ -54,17 +54,17 @@ FREE_STRUCTURES = ("output-error", "narx", "hammerstein", "wiener", "auto", *ADO
 """Structures between any channels; auto chooses between the first four."""
 
 HIGHEST = 6
-"""Order of a linear model at most, where the data choose."""
+"""Highest order of a linear model if the data choose."""
 
 MOST_CHOSEN, MOST_COMPARED, MOST_FITTED = 10_000, 5_000, 100_000
 """Samples on which linear models are compared, on which nonlinear ones are compared with them, and on which a nonlinear
-model is fitted at the end."""
+model is finally fitted."""
 
 ROUNDING = 1e-9
-"""Held-back error of a linear model below which nothing is left but rounding: no bend is looked for [dimensionless]."""
+"""Held-back error of a linear model below which only rounding is left: no nonlinearity is tried [dimensionless]."""
 
 CLEAR_MARGIN = 0.15
-"""Share by which a nonlinear model must do better than the linear one on what was held back."""
+"""Share by which a nonlinear model must reduce the held-back error of the linear one."""
 
 
 def identify_channels(
@@ -75,22 +75,22 @@ def identify_channels(
     delay: int | None = None,
     n_numerator: int | None = None,
 ) -> Identified:
-    """Identify the relation from inputs to one output, with offset, initial states and what the data say of both.
+    """Identify the relation from inputs to one output, with offset, initial states and their uncertainty.
 
     Parameters
     ----------
     data : Channels
         One log or several.
     structure : str
-        ``"output-error"``: linear; ``"narx"``: polynomial, its terms chosen by the free run; ``"auto"``: linear,
-        unless the polynomial one is clearly better on blocks held back, or of one input the next. Of one input also
-        ``"hammerstein"``: a dead zone, saturation or backlash in front of a linear model, where one of them is better
-        there than none; and the keys of `other_structures.ADOPTED`, at the order that output error is given.
-        ``"wiener"``: linear, its output measured without a sign. ``"output-error"`` and ``"auto"`` take it where the
-        output seems to lack its sign, give a model limits where the output stands at them, and fit it to changes from
-        sample to sample where the output wanders by itself (`random_walk`).
+        ``"output-error"``: linear. ``"narx"``: polynomial, with terms chosen by the free run. ``"hammerstein"``, for
+        one input: a dead zone, saturation or backlash before a linear model, if one of them is better than none.
+        ``"wiener"``: linear, with its output measured without a sign. ``"auto"``: linear, unless one of the others is
+        clearly better on held-back blocks. Further the keys of `other_structures.ADOPTED`, at the order of the
+        output-error model. ``"output-error"`` and ``"auto"`` also recognise an output without its sign, limits at which
+        the output stays, and an output with a random walk, which is fitted to changes from sample to sample
+        (`random_walk`).
     order, delay, n_numerator : int, optional
-        Of every input; chosen by the free run on blocks held back where not given.
+        For every input; if not given, chosen by the free run on held-back blocks.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def identify_channels(
 
 
 def _with_doubts(found: Identified, data: Channels, structure: str, *, looked_for: bool) -> Identified:
-    """Return what was found with notes on a walk that it follows, and on dead times that were not looked for."""
+    """Return the result with notes on a random walk that it follows, and on dead times that were not searched."""
     whole, by = scaled(data)
     part, notes = section(whole, MOST_CHOSEN), list[Note]()
     if structure in ("narx", "hammerstein", "wiener"):
@@ -138,7 +138,7 @@ def _with_doubts(found: Identified, data: Channels, structure: str, *, looked_fo
 def _identified(
     data: Channels, structure: str, order: int | None, delay: int | None, n_numerator: int | None
 ) -> Identified:
-    """Return the model: of changes where the output wanders, else linear, or of the structure that is asked for."""
+    """Return the model: of changes if the output has a random walk, otherwise linear, or of the requested structure."""
     whole, by = scaled(data)
     orders = list(range(1, HIGHEST + 1)) if order is None else [order]
     delays = None if delay is None else (delay,) * len(data.inputs)
@@ -172,7 +172,7 @@ def _identified(
 
 
 def _of_changes(task: Task) -> Identified | None:
-    """Return the linear model of an output that wanders; None where it does not."""
+    """Return the linear model of an output with a random walk; None if it has none."""
     walk = wandering(task.whole, task.part, task.orders, task.delays, task.asked.n_numerator)
     found = None if walk is None else from_changes(walk, task.data, task.by)
     # a controller that answers the output's noise bends a fit of changes more than one of levels
@@ -180,9 +180,9 @@ def _of_changes(task: Task) -> Identified | None:
 
 
 def _of_other_levels(task: Task, linear: LinearComparison) -> tuple[Identified, float] | None:
-    """Return the linear model of logs that were brought to one offset, or without their trend; None where none is.
+    """Return the linear model of logs brought to one offset, or without their trend; None if there is none.
 
-    With it, the deviation of that output [its unit].
+    Also the deviation of that output [its unit].
     """
     data, orders, delays = task.data, task.orders, task.delays
     apart = levelled(data, orders, delays)
@@ -199,9 +199,9 @@ def _of_other_levels(task: Task, linear: LinearComparison) -> tuple[Identified, 
 
 
 def _or_nonlinear(found: Identified, linear: LinearComparison, structure: str, std: float | None = None) -> Identified:
-    """Return what was found, or of ``auto`` a nonlinear model that leaves clearly less held back of the data.
+    """Return the result, or for ``auto`` a nonlinear model with a clearly smaller held-back error.
 
-    Errors are over the deviation of the output that each was judged on, which is ``std`` of the one that was found.
+    Errors are over the deviation of the output on which each was judged, which is ``std`` for the result.
     """
     if structure != "auto":
         return found
@@ -212,7 +212,7 @@ def _or_nonlinear(found: Identified, linear: LinearComparison, structure: str, s
 
 
 def _nonlinear_or_linear(structure: str, linear: LinearComparison) -> Identified:
-    """Return a nonlinear model, or the linear one where no nonlinear one is asked for and none is better."""
+    """Return a nonlinear model, or the linear one if none was requested and none is better."""
     task = linear.task
     # a whole period, where there is one: a shorter section would say nothing of what is slower than itself
     most = max(MOST_COMPARED, task.part.told) if task.part.told < task.part.longest else MOST_COMPARED
@@ -246,7 +246,7 @@ def _taken_polynomial(
     own: Candidate,
     bend: HammersteinCandidate | None,
 ) -> PolynomialCandidate | None:
-    """Return the best polynomial model, or None where ``auto`` has a linear one that is nearly as good."""
+    """Return the best polynomial model, or None if ``auto`` has a linear one that is nearly as good."""
     straight = min([own, *(one for one in judged if not one.doubt)], key=lambda one: one.held_back)
     bar = (1.0 - CLEAR_MARGIN) * straight.held_back if structure == "auto" and linear.sound else float("inf")
     bar = bar if bend is None else min(bar, bend.held_back)
@@ -277,7 +277,7 @@ def _polynomial(
 def _worthwhile_nonlinearity(
     linear: Sequence[Candidate], best: Candidate, data: Channels, rows: list[dict[str, Any]], *, surely: bool
 ) -> HammersteinCandidate | None:
-    """Return the best model with a nonlinearity at its input, or None where none is better than every linear one."""
+    """Return the best model with a nonlinearity at its input, or None if none is better than every linear one."""
     if len(data.inputs) > 1:
         raise HydrostateError(f"structure hammerstein takes one input, got {', '.join(data.inputs)}: use narx")
     found = hammerstein_candidates(linear, data)
@@ -316,7 +316,7 @@ def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics
 def _fallback(
     taken: PolynomialCandidate | HammersteinCandidate, linear: Candidate, part: Channels, whole: Channels
 ) -> Fallback:
-    """Return the fallback for inputs that do not determine a nonlinear model."""
+    """Return the fallback for inputs on which a nonlinear model is not determined."""
     masks = blocks(part, BLOCKS)
     others = tuple(LinearDynamics.of(refitted_linear(linear.fit, part.without(mask))) for mask in masks)
     share = part.n_samples / max(part.n_samples, section(whole, MOST_FITTED).n_samples)

@@ -14,7 +14,7 @@ SHARES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4)
 
 @compiled
 def play(u: Array, width: float, start: float, out: Array, slopes: Array) -> None:
-    """Fill in the output of a play: it follows the input at half its width, and stands still in between.
+    """Fill in the output of a play: it follows the input at half its width, and is constant in between.
 
     Parameters
     ----------
@@ -25,9 +25,9 @@ def play(u: Array, width: float, start: float, out: Array, slopes: Array) -> Non
     start : float
         Output before the first sample [unit of the input].
     out : ndarray, shape (n,)
-        Room for the output.
+        Output array.
     slopes : ndarray, shape (n, 2)
-        Room for its derivatives by half the width and by the start.
+        Output array for the derivatives by half the width and by the start.
     """
     at, by_width, by_start = start, 0.0, 1.0
     for k in range(u.size):
@@ -41,8 +41,8 @@ def play(u: Array, width: float, start: float, out: Array, slopes: Array) -> Non
 
 
 Applied = Callable[[Array, Array, float], tuple[Array, Array]]
-"""``apply(u, values, start)``: what the linear model sees of the input, shape (n,), and its derivatives by the values,
-and by the start where there is one, shape (n, values)."""
+"""``apply(u, values, start)``: input of the linear model, shape (n,), and its derivatives by the values, and by the
+start if there is one, shape (n, values)."""
 
 
 def _dead_zone(u: Array, values: Array, start: float) -> tuple[Array, Array]:  # noqa: ARG001 -- all take a start
@@ -69,7 +69,7 @@ def _inner(u: Array) -> list[Array]:
 
 
 def _outer(u: Array) -> list[Array]:
-    """Return levels that leave as many samples above as below, and on one side alone."""
+    """Return levels with equally many samples above and below, and on one side alone."""
     least, most = float(u.min()), float(u.max())
     both = [np.quantile(u, [share, 1.0 - share]) for share in SHARES]
     high = [np.array([least, np.quantile(u, 1.0 - share)]) for share in SHARES[1::2]]
@@ -82,7 +82,7 @@ def _widths(u: Array) -> list[Array]:
 
 
 def _acts(u: Array, values: Array) -> bool:
-    """Return whether a band has ordered ends, neither of them beyond the range of the samples."""
+    """Return whether a band has ordered ends, both within the range of the samples."""
     low, high = values
     return bool(low <= high and low >= u.min() and high <= u.max())
 
@@ -94,17 +94,17 @@ class Nonlinearity:
     Parameters
     ----------
     names : tuple of str
-        What is fitted: levels of the input, or half a width, which is none.
+        Fitted values: levels of the input, or half a width.
     level : bool
         Whether they are levels.
     remembers : bool
-        Whether it has a start of its own in every log.
+        Whether it has an initial state in every log.
     apply : callable
         See `Applied`.
     starts : callable
-        From the input of all logs to values at which searches begin.
+        From the input of all logs to first guesses.
     may : callable
-        Whether values may be evaluated on that input.
+        Whether values are valid for that input.
     """
 
     names: tuple[str, ...]

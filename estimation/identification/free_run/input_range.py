@@ -1,4 +1,4 @@
-"""Whether a polynomial model is asked about inputs that it never saw, and whether a linear one stands in there."""
+"""Whether a polynomial model is run on inputs outside its training range, and whether a linear one replaces it."""
 
 from collections.abc import Sequence
 from itertools import count
@@ -27,7 +27,7 @@ def inputs_beyond(model: FreeRunModel, data: Channels) -> list[Note]:
     Returns
     -------
     list of Note
-        One an input that leaves its range by a tenth of it or more, with how far and how often.
+        One per input that leaves its range by a tenth of it or more, with how far and how often.
     """
     if not isinstance(model.dynamics, PolynomialDynamics):
         return []
@@ -59,7 +59,7 @@ def inputs_beyond(model: FreeRunModel, data: Channels) -> list[Note]:
 def linear_instead(
     model: FreeRunModel, data: Channels, judged: Sequence[tuple[float, float]] | None = None
 ) -> list[Note]:
-    """Return a note if a linear model stands in for a nonlinear one that these inputs do not determine.
+    """Return a note if a linear model replaces a nonlinear one that these inputs do not determine.
 
     Parameters
     ----------
@@ -68,12 +68,12 @@ def linear_instead(
     data : Channels
         In units of the channels; inputs in the model's order.
     judged : sequence of tuple of float, optional
-        What `FreeRunModel.judged_run` has told of each log, where it was run [dimensionless].
+        Result of `FreeRunModel.judged_run` for each log, if it was run [dimensionless].
 
     Returns
     -------
     list of Note
-        One at most, of the log on which the nonlinear model is determined least.
+        One at most, for the log on which the nonlinear model is determined least.
     """
     dynamics = model.dynamics
     if not isinstance(dynamics, PolynomialDynamics | HammersteinDynamics) or dynamics.fallback is None:
@@ -107,14 +107,15 @@ def doubts_about_inputs(
     data : Channels
         In units of the channels; inputs in the model's order.
     judged : sequence of tuple of float, optional
-        As `linear_instead` takes it [dimensionless].
+        As in `linear_instead` [dimensionless].
     named : str
-        What the reader calls the logs.
+        Name of the logs for the reader.
 
     Returns
     -------
     list of Note
-        That no log is longer than the dead time, or a linear model stands in; else one on each input beyond its range.
+        That no log is longer than the dead time, or that a linear model replaces the nonlinear one; otherwise one on
+        each input beyond its range.
     """
     if all(model.dynamics.unanswered(y.size) == y.size for y in data.y):
         dead_time = next(n for n in count(data.longest) if model.dynamics.unanswered(n + 1) == n)

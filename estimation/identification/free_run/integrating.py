@@ -1,8 +1,8 @@
-"""Linear models that integrate: one pole is at 1, and what is fitted is the rest of the model on summed inputs.
+"""Linear models that integrate: one pole is at 1, and the rest of the model is fitted to summed inputs.
 
-A pole that is estimated near 1 decays over a few records, so that a run over new data drifts off; and its descent goes
-along a curved valley, where offset, initial state and pole give one ramp together. With the pole given, the inputs are
-summed, the ramp is a column, and the other poles are as easy to fit as those of a plant that settles. See decision 295.
+A pole estimated near 1 decays over a few records, so that a run over new data drifts off. Its descent follows a curved
+valley, in which offset, initial state and pole together make one ramp. With the pole given, the inputs are summed, the
+ramp is a column, and the other poles are as easy to fit as those of a stable plant. See decision 295.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,13 @@ from estimation.identification.free_run.linear_kernel import settles
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 
 RECORDS = 1e3
-"""Time constant of the pole that is written for 1 [records]: a run begins at rest, which a pole at 1 does not have."""
+"""Time constant of the pole that is written in place of 1 [records]: a run begins at rest, which a pole at 1 does not
+have."""
 
 
 LOST, ROUNDED = 0.01, 1e-12
-"""Share of the cost by which what is written may differ from what was fitted, and share of a denominator's coefficients
-that their sum must be: beside other poles close to 1 it is rounding, and a run begins at the first input over it."""
+"""Relative change of the cost by writing it in this way that is accepted, and least ratio of a denominator's sum to its
+coefficients: beside other poles close to 1 the sum is rounding, and a run begins at the first input divided by it."""
 
 
 def fit_integrating(
@@ -33,20 +34,20 @@ def fit_integrating(
     Parameters
     ----------
     form : Form
-        Of order one or more, the pole at 1 among them.
+        Of order one or more, including the pole at 1.
     data : Channels
         Scaled.
     starts : sequence of ndarray, shape (n + 1,)
-        Denominators to begin at; the pole nearest to 1 is taken out of each.
+        Denominators at which to begin; the pole nearest to 1 is removed from each.
     search : bool
-        Whether others are tried beside them.
+        Whether others are tried as well.
     least_gain : float
         As `levenberg` takes it [dimensionless].
 
     Returns
     -------
     LinearFit
-        Its pole has a time constant of `RECORDS` records. The cost is infinite where such a model cannot be written.
+        Its pole has a time constant of `RECORDS` records. The cost is infinite if such a model cannot be written.
     """
     summed, scales = _summed(data)
     inner = Form(
@@ -63,7 +64,7 @@ def fit_integrating(
 
 
 def refitted_linear(fit: LinearFit, data: Channels, *, least_gain: float = 0.0) -> LinearFit:
-    """Return a fit of the same kind to other data, begun where it has ended.
+    """Return a fit of the same kind to other data, started at its end.
 
     Parameters
     ----------
@@ -82,9 +83,9 @@ def _no_delays(data: Channels) -> list[int]:
 
 
 def _summed(data: Channels) -> tuple[Channels, Array]:
-    """Return summed inputs with a ramp in every log, and a level in every log but the first; and how inputs are scaled.
+    """Return summed inputs with a ramp in every log, and a level in every log but the first; and their scaling.
 
-    What an input stood at before a log goes into the ramp, so that sums are at rest before it.
+    The level of an input before a log is part of the ramp, so that sums are at rest before it.
     """
     sums = [np.cumsum(u - u[0], axis=0) for u in data.u]
     scales = np.maximum(np.sqrt(np.mean(np.concatenate(sums) ** 2, axis=0)), 1e-300)
@@ -101,7 +102,7 @@ def _summed(data: Channels) -> tuple[Channels, Array]:
 
 
 def _without_slowest(f: Array) -> Array:
-    """Return a denominator without its root nearest to 1; what would be left complex of a pair becomes real."""
+    """Return a denominator without its root nearest to 1; the rest of a complex pair becomes real."""
     roots = np.roots(f)
     kept = np.delete(roots, int(np.argmin(np.abs(roots - 1.0))))
     left = np.poly(kept)
@@ -109,7 +110,7 @@ def _without_slowest(f: Array) -> Array:
 
 
 def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> LinearFit:
-    """Return a fit to summed inputs as one of the inputs themselves, its initial states by least squares."""
+    """Return a fit to summed inputs as one of the inputs themselves, with initial states by least squares."""
     b = [numerator / scale for numerator, scale in zip(found.numerators, scales, strict=False)]
     pole = float(np.exp(-1.0 / (RECORDS * data.longest)))
     f, settled = np.convolve(found.f, [1.0, -pole]), float(found.f.sum())

@@ -11,16 +11,16 @@ if TYPE_CHECKING:
 
 
 def lay_shifted(column: Array, series: Array, lag: int, before: float) -> None:
-    """Put a series into a column some samples later, a level in front of it.
+    """Write a shifted series into a column, with a constant level before it.
 
     Parameters
     ----------
     column : ndarray, shape (n,)
-        Receives it.
+        Output.
     series : ndarray, shape (n,)
         Any.
     lag : int
-        By how many samples.
+        Shift in samples.
     before : float
         The level [any unit].
     """
@@ -29,7 +29,7 @@ def lay_shifted(column: Array, series: Array, lag: int, before: float) -> None:
 
 
 def columns_of(form: "Form", u: Array) -> Array:
-    """Return the lagged inputs of one log; before it every input stood at its first value.
+    """Return the lagged inputs of one log; before it every input had its first value.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def columns_of(form: "Form", u: Array) -> Array:
     Returns
     -------
     ndarray, shape (n, n_b)
-        One column a numerator coefficient.
+        One column per numerator coefficient.
     """
     columns, place = np.empty((u.shape[0], form.n_b), order="F"), 0
     for one, size, delay in zip(u.T, form.sizes, form.delays, strict=True):

@@ -1,4 +1,4 @@
-"""Least squares by scaled normal equations, of the samples that count."""
+"""Least squares by scaled normal equations, over the samples that count."""
 
 from collections.abc import Sequence
 
@@ -7,16 +7,16 @@ import numpy as np
 from estimation.arrays import Array, BoolArray
 
 MOST_PIECES = 32
-"""Stretches without a gap that are summed one by one; of more, the samples that count are copied."""
+"""Parts without a gap that are summed one by one; if there are more, the samples that count are copied."""
 
 
 class Counted:
-    """Which samples count, as stretches without a gap: blocks that are held back leave few, and none is copied.
+    """Which samples count, as parts without a gap: held-back blocks leave few, and nothing is copied.
 
     Parameters
     ----------
     used : ndarray of bool, shape (n,)
-        Where a sample counts.
+        Mask of the samples that count.
     """
 
     def __init__(self, used: BoolArray) -> None:
@@ -34,7 +34,7 @@ class Counted:
         columns : ndarray, shape (n, p)
             Regressors.
         target : ndarray, shape (n,)
-            What they should give; not read where a sample does not count.
+            Target; not read where a sample does not count.
 
         Returns
         -------
@@ -72,9 +72,9 @@ def least_squares(columns: Array, target: Array, counted: Counted | None = None)
     columns : ndarray, shape (n, p)
         Regressors.
     target : ndarray, shape (n,)
-        What they should give.
+        Target.
     counted : Counted, optional
-        Which samples count; all unless told.
+        Which samples count; all by default.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A linear model whose output is cut off or held by stops, in the data's scale: its free run and its JSON form."""
+"""A linear model whose output saturates or is held by stops, in the data's scale: its free run and its JSON form."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ class LimitedDynamics(LinearDynamics):
 
     @property
     def n_values(self) -> int:
-        """Fitted coefficients, limits among them."""
+        """Fitted coefficients, including limits."""
         return self.theta.size + self.limits.count
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its initial state by least squares of the outputs that are there."""
+        """Return the free run, with its initial state by least squares of the available outputs."""
         problem = LimitedProblem(self.form, Channels((), "", 1.0, (u,), (y,)), self.limits)
         if np.count_nonzero(np.isfinite(y)) > self.form.order:
             return problem.jacobian(problem.begun(self.theta))[0]

@@ -1,8 +1,8 @@
-"""Output error of a linear model whose output has limits: a sensor or converter that is cut off, or a stop.
+"""Output error of a linear model whose output has limits: saturation of a sensor or converter, or a stop.
 
-What is cut off goes on behind its limit. What leans on a stop does not: it leaves as soon as it is driven away, so its
-output is the sum of what the linear model's changes, held between the limits. Both have exact derivatives: none by what
-came before the last time that a stop was left, and none at a limit.
+Behind saturation the signal goes on. At a stop it does not: the output leaves the stop as soon as it is driven away, so
+it is the sum of the linear model's changes, held between the limits. Both have exact derivatives: zero by everything
+before the last time at a stop, and zero at a limit.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,27 +19,27 @@ from estimation.identification.search.jit import compiled
 from estimation.identification.search.levenberg import levenberg
 
 TOLERANCE, MOST_STEPS = 1e-9, 60
-"""Share of the cost that a further step may promise at the end, and evaluations at most."""
+"""Relative gain of the cost below which a descent ends, and most evaluations."""
 
 STATE_STEPS = 12
-"""Evaluations of a run whose initial state alone is fitted, at most."""
+"""Most evaluations of a run whose initial state alone is fitted."""
 
 BEGINNINGS, MOST_STARTS = (0.02, 0.1), 4
-"""Shares of a log whose outputs tell its initial state at first, and starts of it at most."""
+"""Shares of a log whose outputs give its first initial state, and most starts of it."""
 
 NOISE_BAND = 6.0
-"""Deviations of the noise over which outputs at a limit spread, three to each side [dimensionless]."""
+"""Deviations of the noise over which outputs at a limit spread, three on each side [dimensionless]."""
 
 ROUNDING = 1e-9
 """Share of the output's range over which outputs at a limit without noise spread [dimensionless]."""
 
 LEAST_SHARE, LONGEST, PILED = 0.005, 4, 2.0
-"""Share of all samples that stand at a limit, samples of the longest stay, and how many times as many there are as in
-the next band of the same width, at least. They only ask for a comparison, which decides [dimensionless]."""
+"""Least share of all samples at a limit, least length of the longest stay, and least ratio to the number in the next
+band of the same width. They only start a comparison, which decides [dimensionless]."""
 
 SPARSE_SHARES = (1.0, 0.5, 0.25, 0.125)
-"""Shares of that band that are tried where most rows are empty: what moves from one sample to the next is not noise
-alone there [fraction]."""
+"""Shares of that band that are tried if most rows are empty: changes from one sample to the next are then not noise
+alone [fraction]."""
 
 SMOOTH = np.sqrt(6.0) * 0.6745
 """Median of the magnitude of second differences of white noise, over its deviation [dimensionless]."""
@@ -47,16 +47,16 @@ SMOOTH = np.sqrt(6.0) * 0.6745
 
 @dataclass(frozen=True)
 class Limits:
-    """Where an output ends.
+    """Limits of an output.
 
     Parameters
     ----------
     low, high : float
-        Infinite where there is no limit; scaled [dimensionless].
+        Infinite if there is no limit; scaled [dimensionless].
     near : float
-        How far outputs at a limit are from it at most; scaled [dimensionless].
+        Largest distance of outputs at a limit from it; scaled [dimensionless].
     stops : bool
-        Whether the plant itself stops there; else only what is measured is cut off.
+        Whether the plant itself stops there; otherwise only the measurement saturates.
     """
 
     low: float
@@ -66,7 +66,7 @@ class Limits:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of limits."""
         return int(np.isfinite(self.low)) + int(np.isfinite(self.high))
 
     def nonlinearity(self, by: Scaling) -> dict[str, Any]:
@@ -96,7 +96,7 @@ class Limits:
 
 
 def limits_of(data: Channels) -> Limits | None:
-    """Return the ends at which an output stands for a while, or None where it does not.
+    """Return the ends at which an output stays for a while, or None if there are none.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def limits_of(data: Channels) -> Limits | None:
 
 
 def _end(logs: Sequence[Array], band: float) -> float:
-    """Return the upper end at which known outputs stand, infinite where they do not."""
+    """Return the upper end at which valid outputs stay, infinite if there is none."""
     y = np.concatenate(logs)
     top = float(y.max())
     there, below = y >= top - band, (y < top - band) & (y >= top - 2.0 * band)
@@ -137,7 +137,7 @@ def _longest(mask: BoolArray) -> int:
 
 
 def at_limits(y: Array, limits: Limits) -> BoolArray:
-    """Return where an output stands at a limit; nowhere where it is missing.
+    """Return where an output is at a limit; False where it is missing.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ class LimitedProblem:
         return output, slopes
 
     def descend(self, theta: Array, *, least_gain: float = 0.0) -> LinearFit:
-        """Return the minimum that one start leads to.
+        """Return the minimum from one start.
 
         Parameters
         ----------
@@ -214,12 +214,12 @@ class LimitedProblem:
         return LinearFit(self.form, best, self.inner.share * cost)
 
     def begun(self, values: Array) -> Array:
-        """Return values with the initial states that suit the outputs best, begun at what several parts of them tell.
+        """Return values with the initial states that fit the outputs best, from several parts of them.
 
         Parameters
         ----------
         values : ndarray, shape (p,)
-            As the model has them, without initial states.
+            Values of the model, without initial states.
 
         Returns
         -------
@@ -245,7 +245,7 @@ class LimitedProblem:
         return np.concatenate([theta[:free], min(ended, key=lambda one: one[0])[1]])
 
     def _beginnings(self) -> list[BoolArray]:
-        """Return masks of outputs that tell the initial states, of each log alike."""
+        """Return masks of outputs that determine the initial states, the same for each log."""
         known, free = self.inner.used, self.inner.used & ~at_limits(self.inner.y, self.limits)
         if not self.limits.stops:
             return [free]
@@ -267,7 +267,7 @@ class LimitedProblem:
 
 @compiled
 def stopped(free: Array, low: float, high: float, output: Array, left: IntArray) -> None:
-    """Hold a series between stops: it moves as a free one does, but for what would lead beyond them.
+    """Hold a series between stops: it moves as a free one does, except beyond them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Linear models of one output, compared on blocks held back, and the one of them that may be believed."""
+"""Linear models of one output, compared on held-back blocks, and the one that may be believed."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -25,9 +25,9 @@ from estimation.log_checks.bridging import bridged
 from plant.notes import Note
 
 BACKWARDS, REVERSED, FOLLOWED = (1, 2), 0.5, 0.2
-"""Orders of models from output to input, and what they may leave where columns are swapped, over the model's error and
-over the deviation: in the right direction noise is left, against it all that is not seen in advance, and of what a
-controller does its set-point."""
+"""Orders of models from output to input, and their largest errors for swapped columns, over the model's error and over
+the deviation. In the right direction noise is left; against it, everything that cannot be predicted, and of a
+controller's action its set-point."""
 
 LEADS = (1, 2, 3, 4, 5)
 """Samples by which an input may be logged late [count]."""
@@ -35,22 +35,22 @@ LEADS = (1, 2, 3, 4, 5)
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is to be identified.
+    """An identification task.
 
     Parameters
     ----------
     data : Channels
         In units of the channels.
     whole, by : Channels, Scaling
-        The same scaled, and how.
+        The same scaled, and the scaling.
     part : Channels
-        The section of it on which linear models are compared.
+        The section on which linear models are compared.
     asked : Asked
-        Sizes that are given.
+        Sizes that the user gives.
     orders : list of int
         Orders of linear models that are compared.
     delays : tuple of int or None
-        Dead time of each input [samples]; None where the data choose it.
+        Dead time of each input [samples]; None if the data choose it.
     """
 
     data: Channels
@@ -69,7 +69,7 @@ class LinearComparison:
     Parameters
     ----------
     task : Task
-        What they are models of.
+        The task.
     candidates : list of Candidate
         All of them.
     best : Candidate
@@ -77,9 +77,9 @@ class LinearComparison:
     related : bool
         Whether the inputs explain the output better than in another order.
     notes : list of Note
-        What was passed over, or is doubtful.
+        Rejected models, and doubts.
     rows : list of dict
-        What was compared, as `Identified.candidates` has it; other structures are added.
+        Compared models, as in `Identified.candidates`; other structures are added.
     """
 
     task: Task
@@ -119,7 +119,7 @@ class LinearComparison:
 
 
 def linear_comparison(task: Task) -> LinearComparison:
-    """Compare linear models of all orders that are asked for."""
+    """Compare linear models of all requested orders."""
     candidates = linear_candidates(task.part, task.orders, task.delays, task.asked.n_numerator)
     best, notes = believable(candidates, task.part, task.by)
     related = not best.outlasts_block(task.part) or linear_explains(best.fit, task.part)
@@ -128,7 +128,7 @@ def linear_comparison(task: Task) -> LinearComparison:
 
 
 def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> list[Note]:
-    """Return a note where the input of a linear model follows the output's noise, by the longest log.
+    """Return a note if the input of a linear model follows the output's noise, in the longest log.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> l
     data : Channels
         Levels, in units of the channels.
     changes : bool
-        Whether changes from sample to sample are asked, of an output whose noise is a random walk.
+        Whether changes from sample to sample are tested, for an output whose noise is a random walk.
     """
     if len(data.inputs) != 1:
         return []
@@ -153,15 +153,15 @@ def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> l
 
 
 def swapped(left: Array, data: Channels, log: int) -> Note | None:
-    """Return a note where the input answers the output rather than the other way round, or is logged late; else None.
+    """Return a note if the input responds to the output instead of the other way round, or is logged late.
 
-    A model of the other direction looks ahead, and so does one of an input that is logged late: the one that leaves
-    less is told. An input that is late is told too where the other direction leaves much, as behind noise.
+    A model of the wrong direction looks ahead, and so does one with a late input: the one with the smaller error is
+    reported. A late input is also reported if the other direction has a large error, as behind noise.
 
     Parameters
     ----------
     left : ndarray, shape (n,)
-        What the model leaves of the output of one log [output unit].
+        Residual of the model for the output of one log [output unit].
     data : Channels
         In units of the channels.
     log : int
@@ -180,7 +180,7 @@ def swapped(left: Array, data: Channels, log: int) -> Note | None:
 
 
 def _left(data: Channels) -> float:
-    """Return what a small linear model without dead time leaves, over the output's deviation [dimensionless]."""
+    """Return the error of a small linear model without dead time, over the output's deviation [dimensionless]."""
     whole, _ = scaled(data)
     fits = (fit_linear(Form(order, (order + 1,), (0,)), whole, least_gain=COARSE) for order in BACKWARDS)
     return float(np.sqrt(min(fit.cost for fit in fits) / whole.n_samples))

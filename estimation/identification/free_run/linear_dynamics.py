@@ -19,7 +19,7 @@ class LinearDynamics(OutputErrorDynamics):
     Parameters
     ----------
     theta : ndarray, shape (p,)
-        Numerators, denominator behind its 1, offset.
+        Numerators, denominator without its leading 1, offset.
     """
 
     form: Form
@@ -39,7 +39,7 @@ class LinearDynamics(OutputErrorDynamics):
 
     @property
     def level(self) -> float:
-        """Output where inputs stand at zero [scaled]."""
+        """Output at zero inputs [scaled]."""
         return float(self.theta[-1])
 
     def transfer_functions(self) -> list[tuple[Array, Array]]:
@@ -50,14 +50,14 @@ class LinearDynamics(OutputErrorDynamics):
         ]
 
     def unanswered(self, length: int) -> int:
-        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
+        """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
         return self.form.unanswered(length)
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its initial state by least squares of the outputs that are there.
+        """Return the free run, with its initial state by least squares of the available outputs.
 
-        Behind a long dead time it begins with the first output that answers the log's inputs; that one stands for those
-        before it too.
+        With a long dead time it begins with the first output that responds to the log's inputs; outputs before it have
+        the same value.
         """
         form, n_b = self.form, self.form.n_b
         columns = Problem(form, Channels((), "", 1.0, (u,), (y,))).linear_columns(self.f)

@@ -19,31 +19,32 @@ FIRST_STEPS = 20
 """Evaluations of each of several starts."""
 
 MOST_SEARCHED = 100_000
-"""Samples of which the global minimum is searched; more begin at other starts alone."""
+"""Most samples for a global search; longer records begin at other starts only."""
 
 COARSE = 1e-5
-"""Share of the cost that two steps in a row must gain each while models are compared: what is taken is fitted on."""
+"""Relative gain of two successive steps below which a descent ends while models are compared: the chosen one is fitted
+further."""
 
 PASSES = 12
-"""Of the iteration of Steiglitz and McBride."""
+"""Iterations of Steiglitz and McBride."""
 
 SLOWER = (0.5, 0.9, 0.98)
-"""Poles that are added, each with its zeros, to the minimum of one order less."""
+"""Poles that are added, each with its zeros, to the minimum of the next lower order."""
 
 
 def fit_linear(
     form: Form, data: Channels, starts: Sequence[Array] = (), *, bounded: bool = False, least_gain: float = 0.0
 ) -> LinearFit:
-    """Return the best linear model of one form: of the three best starts, what leads after a few steps goes on alone.
+    """Return the best linear model of one form: the leader of the three best starts after a few steps is refined.
 
     Parameters
     ----------
     data : Channels
         Scaled.
     starts : sequence of ndarray, shape (n + 1,)
-        Denominators to begin at beside those that are searched; where some are given, only they are.
+        Denominators at which to begin; if none are given, they are searched.
     bounded : bool
-        Whether every time constant must stay within the record.
+        Whether every time constant must be shorter than the record.
     least_gain : float
         As `levenberg` takes it [dimensionless].
     """
@@ -63,12 +64,12 @@ def fit_linear(
 
 
 def extended(fit: LinearFit) -> list[Array]:
-    """Return denominators of one order more that hold a minimum: a real pole is added, which zeros can cancel."""
+    """Return denominators with one order more at the same minimum: a real pole is added, which zeros can cancel."""
     return [np.convolve(fit.f, [1.0, -pole]) for pole in SLOWER]
 
 
 def steiglitz_mcbride(problem: Problem) -> list[Array]:
-    """Return denominators of the iteration of Steiglitz and McBride (1965), begun at ARX; gaps end a run of rows.
+    """Return denominators of the iteration of Steiglitz and McBride (1965), started from ARX; gaps end a run of rows.
 
     Parameters
     ----------
@@ -132,6 +133,6 @@ def _searched(problem: Problem) -> list[Array]:
 
 
 def quick_fit(form: Form, data: Channels) -> float:
-    """Return the cost of the best denominator that the iteration of Steiglitz and McBride passes, undescended."""
+    """Return the cost of the best denominator in the iteration of Steiglitz and McBride, without a descent."""
     problem = Problem(form, data)
     return min(problem.profiled(f)[0] for f in steiglitz_mcbride(problem))

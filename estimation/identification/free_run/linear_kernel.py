@@ -1,4 +1,4 @@
-"""Series through one denominator side by side, each from the state that its level before the log has brought about."""
+"""Series through one denominator side by side, each from the steady state of its level before the log."""
 
 import numpy as np
 
@@ -9,19 +9,19 @@ from estimation.identification.search.jit import compiled
 
 @compiled
 def decay_rows(f: Array, rows: Array, levels: Array) -> None:
-    """Put every row through ``1/F``, in place.
+    """Filter every row by ``1/F``, in place.
 
-    A sample waits for the one before it, so two rows go side by side, and of the sum only the product with the latest
-    output comes last.
+    A sample waits for the one before it, so two rows are computed side by side, and the product with the latest output
+    is added last.
 
     Parameters
     ----------
     f : ndarray, shape (k,)
         Denominator, monic.
     rows : ndarray, shape (r, n)
-        One series a row.
+        One series per row.
     levels : ndarray, shape (r,)
-        What each stood at before its first sample.
+        Level of each before its first sample.
     """
     order = f.size - 1
     count, n = rows.shape
@@ -65,12 +65,12 @@ def decay_rows(f: Array, rows: Array, levels: Array) -> None:
 def settles(coefficients: Array) -> bool:
     """Return whether a denominator has all its roots inside the unit circle, and a positive sum.
 
-    A run begins at rest: its level is divided by that sum, of which rounding may leave nothing beside roots near one.
+    A run begins at rest: its level is divided by that sum, which rounding may reduce to zero for roots near one.
 
     Parameters
     ----------
     coefficients : ndarray, shape (n,)
-        Behind the leading 1.
+        Without the leading 1.
 
     Examples
     --------

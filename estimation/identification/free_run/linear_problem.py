@@ -14,12 +14,12 @@ from estimation.identification.search.levenberg import levenberg
 from estimation.identification.search.reflections import stable_step
 
 TOLERANCE, MOST_STEPS = 1e-9, 80
-"""Share of the cost that a further step may promise at the end, and evaluations at most."""
+"""Relative gain of the cost below which a descent ends, and most evaluations."""
 
 LONG_DEAD_TIME, LONG_SHARE = 20, 20
-"""Dead time beyond which the outputs before the first answer are left out of a fit, and the part of a log beyond which
-they are too if that is less: of a shorter one the free initial state and the input's first value tell nearly all of
-them [samples, one of so many parts]."""
+"""Dead time above which the outputs before the first response are left out of a fit, and inverse share of a log above
+which they are as well, if that is less. For shorter ones the free initial state and the input's first value determine
+nearly all of them [samples, dimensionless]."""
 
 
 def long_dead_time(length: int) -> int:
@@ -34,7 +34,7 @@ def long_dead_time(length: int) -> int:
 
 
 def unanswered(dead_time: int, length: int) -> int:
-    """Return how many first outputs of a log are left out, because they respond to inputs from before it.
+    """Return how many first outputs of a log are left out, because they depend on inputs from before it.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def unanswered(dead_time: int, length: int) -> int:
     Returns
     -------
     int
-        The dead time, if it is a long one; of a shorter log all of it [samples].
+        The dead time, if it is a long one; for a shorter log all of it [samples].
 
     Examples
     --------
@@ -61,9 +61,9 @@ class Form:
     Parameters
     ----------
     order : int
-        Coefficients of the denominator behind its 1.
+        Denominator coefficients without the leading 1.
     sizes, delays : tuple of int
-        Coefficients of each input's numerator, and the samples before them.
+        Numerator coefficients of each input, and its dead time in samples.
     """
 
     order: int
@@ -81,7 +81,7 @@ class Form:
         return self.n_b + self.order + 1
 
     def unanswered(self, length: int) -> int:
-        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
+        """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
         return unanswered(max(self.delays), length)
 
 
@@ -92,14 +92,14 @@ class LinearFit:
     Parameters
     ----------
     theta : ndarray, shape (p,)
-        Numerators, denominator behind its 1, offset, and the initial state of each log; then how much higher each log's
-        offset is, but the first one's, where logs have their own.
+        Numerators, denominator without its leading 1, offset, and the initial state of each log; then the difference of
+        each log's offset from the first one's, if logs have their own.
     cost : float
-        Sum of squared residuals; where outputs are left out, as if they had left as much [dimensionless].
+        Sum of squared residuals; outputs that are left out count as the average [dimensionless].
     bounded : bool
-        Whether time constants were held within the record.
+        Whether time constants were limited to the record.
     integrates : bool
-        Whether a pole was given at 1.
+        Whether a pole at 1 was given.
     """
 
     form: Form
@@ -155,9 +155,9 @@ class Problem:
         return out
 
     def _lay_linear(self, f: Array, out: Array, offset: int) -> None:
-        """Put the linear columns where they belong: numerators first, the offset and initial states from a column on.
+        """Write the linear columns to their places: numerators first, the offset and initial states from a column on.
 
-        Where initial states have no part is left as it is: zero.
+        Rows without an effect of initial states are not written: they are zero.
         """
         form, n = self.form, self.form.order
         out[:, offset] = 1.0
@@ -179,11 +179,11 @@ class Problem:
                 out[first:last, index - 1 - self.n_own] = 1.0
 
     def first_columns(self, index: int) -> Array:
-        """Return the lagged inputs before a log: every lag stands at the first value."""
+        """Return the lagged inputs before a log: every lag has the first value."""
         return np.repeat(self.data.u[index][0], self.form.sizes)
 
     def profiled(self, f: Array) -> tuple[float, Array]:
-        """Return the least cost that a denominator allows, and all values.
+        """Return the least cost for a denominator, and all values.
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class Problem:
         return self._lay(theta, jacobian), jacobian
 
     def _lay(self, theta: Array, jacobian: Array) -> Array:
-        """Return the output; its derivatives go into an array that was zero, or has been laid out by this before."""
+        """Return the output; its derivatives are written into an array that was zero, or was filled here before."""
         n_b, n = self.form.n_b, self.form.order
         f = np.concatenate([[1.0], theta[n_b : n_b + n]])
         self._lay_linear(f, jacobian, n_b + n)
@@ -235,18 +235,18 @@ class Problem:
     def descend(
         self, theta: Array, *, bounded: bool = False, least_gain: float = 0.0, most_steps: int = MOST_STEPS
     ) -> LinearFit:
-        """Return the minimum that one start leads to.
+        """Return the minimum from one start.
 
         Parameters
         ----------
         theta : ndarray, shape (p,)
             All values.
         bounded : bool
-            Whether every time constant must stay within the record.
+            Whether every time constant must be shorter than the record.
         least_gain : float
             As `levenberg` takes it [dimensionless].
         most_steps : int
-            Evaluations at most.
+            Most evaluations.
         """
         n_b, n = self.form.n_b, self.form.order
         jacobian = np.zeros((self.y.size, theta.size), order="F")

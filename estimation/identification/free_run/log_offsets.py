@@ -1,9 +1,9 @@
-"""Logs of one plant whose offsets differ: sensors that were set to zero anew in between.
+"""Logs of one plant with different offsets: sensors that were zeroed in between.
 
-With one offset, a fit follows the steps between logs with slow poles, whose initial states do what an offset would,
-and its gain is anything. So linear models are compared with an offset of each log too, where these explain more than
-chance. They are taken where they leave clearly less on held-back blocks, or as little with poles that settle within a
-block. Each log is brought to the mean offset before, and keeps an offset among its values for its covariance.
+With one offset, a fit follows the steps between logs with slow poles, whose initial states replace an offset, and its
+gain is arbitrary. So linear models are also compared with an offset for each log, if these explain more than chance.
+They are used if they leave clearly less on held-back blocks, or as little with poles that settle within a block. Each
+log is brought to the mean offset before, and keeps an offset among its values for its covariance.
 """
 
 from collections.abc import Sequence
@@ -23,20 +23,20 @@ from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 
 CLEARLY, NEARLY = 0.85, 1.02
-"""Share of the held-back error that offsets of logs must come below to be believed, as a nonlinear structure must; and
-what they may leave where a model with one offset has a pole that outlasts a block, as for a simpler model."""
+"""Largest ratio of held-back errors with and without offsets of logs, as for a nonlinear structure; and the same if the
+model with one offset has a pole slower than a block, as for a simpler model."""
 
 
 @dataclass(frozen=True, eq=False)
 class LevelledLogs:
-    """Logs that were brought to one offset.
+    """Logs brought to one offset.
 
     Parameters
     ----------
     data : Channels
-        The logs, each less how much its offset is above the mean.
+        The logs, each less its offset relative to the mean.
     above : ndarray, shape (logs,)
-        How much [output unit].
+        These offsets [output unit].
     """
 
     data: Channels
@@ -50,16 +50,16 @@ class LevelledLogs:
 
 
 def levelled(data: Channels, orders: Sequence[int], delays: tuple[int, ...] | None = None) -> LevelledLogs | None:
-    """Return logs brought to one offset; None of one log alone, or where their offsets differ by chance.
+    """Return logs brought to one offset; None for a single log, or if their offsets differ by chance.
 
     Parameters
     ----------
     data : Channels
         In units of the channels.
     orders : sequence of int
-        Of models that are compared; the first few tell offsets.
+        Orders of the models that are compared; the first few determine offsets.
     delays : tuple of int, optional
-        Dead time of each input; estimated unless told [samples].
+        Dead time of each input; estimated by default [samples].
     """
     if len(data.y) < 2 or not all(np.isfinite(y).any() for y in data.y):
         return None
@@ -91,7 +91,7 @@ def believed(own: LinearComparison, one: LinearComparison) -> bool:
     Parameters
     ----------
     own, one : LinearComparison
-        Models with an offset of each log, and with one.
+        Models with an offset for each log, and with one.
     """
     lasting = [lasts(each.best, each) for each in (own, one)]
     spread = own.task.by.y_std / one.task.by.y_std

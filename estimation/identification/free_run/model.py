@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from estimation.identification.model.linear_model import LinearModel
 
 FORMAT = "hydrostate-model"
-"""What a saved model calls itself."""
+"""Name of the format in a saved model."""
 
 VERSION = 1
 
@@ -40,7 +40,7 @@ KINDS: Mapping[str, Any] = {
         StateSpaceDynamics,
     )
 }
-"""Dynamics by what a saved model calls them."""
+"""Dynamics by their names in a saved model."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,9 @@ class FreeRunModel:
     structure : str
         How it was fitted: ``"output-error"``, ``"narx"``, ...
     scaling, dynamics : Scaling, Dynamics
-        Of the fitted data, and what runs between its scaled channels.
+        Scaling of the fitted data, and the dynamics between its scaled channels.
     linear : LinearModel, optional
-        The transfer function with its covariance, where there is one input and the model is linear.
+        The transfer function with its covariance, for one input and a linear model.
     """
 
     inputs: tuple[str, ...]
@@ -111,32 +111,32 @@ class FreeRunModel:
         Parameters
         ----------
         u : array_like, shape (n, m) or (n,)
-            Inputs in the model's order, no gaps.
+            Inputs in the model's order, without gaps.
         y : array_like, shape (n,), optional
-            Measured output, NaN where missing: only the initial state is taken from it. Without it the run begins
-            where the first input would have brought a linear model, and a polynomial one at its mean.
+            Measured output, NaN where missing: only the initial state is estimated from it. Without it the run begins
+            in the steady state of the first input for a linear model, and at the mean for a polynomial one.
 
         Returns
         -------
         ndarray, shape (n,)
-            Output; NaN from where a polynomial model runs away.
+            Output; NaN from where a polynomial model diverges.
         """
         return self.judged_run(u, y)[0]
 
     def judged_run(self, u: ArrayLike, y: ArrayLike | None = None) -> tuple[Array, tuple[float, float] | None]:
-        """Return the free run, and what tells whether a linear model stands in, worked out once for both.
+        """Return the free run, and the errors that decide whether a linear model replaces it, computed once for both.
 
         Parameters
         ----------
         u : array_like, shape (n, m) or (n,)
-            Inputs in the model's order, no gaps.
+            Inputs in the model's order, without gaps.
         y : array_like, shape (n,), optional
-            As `simulate` takes it.
+            As in `simulate`.
 
         Returns
         -------
         tuple of ndarray, shape (n,), and tuple of float or None
-            Output, and what `Fallback.errors` returns; None of models that have no other to stand in.
+            Output, and the result of `Fallback.errors`; None for models without a fallback.
         """
         inputs, outputs = self._scaled(u, y)
         errors: tuple[float, float] | None = None
@@ -181,7 +181,7 @@ class FreeRunModel:
     def judged_quality(
         self, u: Sequence[Array], y: Sequence[Array]
     ) -> tuple[FreeRunQuality, list[tuple[float, float]]]:
-        """Return the quality on logs, and the errors that decide whether a linear model stands in, from the same runs.
+        """Return the quality on logs, and the errors that decide on the linear fallback, from the same runs.
 
         Parameters
         ----------
@@ -193,7 +193,7 @@ class FreeRunModel:
         Returns
         -------
         tuple of FreeRunQuality and list of tuple of float
-            How well, and what `judged_run` tells of each log; empty for models that have no other to stand in.
+            The quality, and the result of `judged_run` for each log; empty for models without a fallback.
         """
         measured = np.concatenate([self._answered(one) for one in y])
         runs = [self.judged_run(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)]
@@ -203,7 +203,7 @@ class FreeRunModel:
         return quality, [errors for _, errors in runs if errors is not None]
 
     def _answered(self, y: Array) -> Array:
-        """Return an output without those at its start that a long dead time leaves to inputs from before the log."""
+        """Return an output without its first samples that depend, by a long dead time, on earlier inputs."""
         return np.where(np.arange(y.size) < self.dynamics.unanswered(y.size), np.nan, y)
 
     def _scaled(self, u: ArrayLike, y: ArrayLike | None) -> tuple[Array, Array]:
@@ -251,7 +251,7 @@ class FreeRunModel:
 
     @property
     def level(self) -> float:
-        """Output of a linear model whose inputs have long stood at the data's means [output unit]; NaN for others."""
+        """Output of a linear model at rest with inputs at the data's means [output unit]; NaN for others."""
         if not isinstance(self.dynamics, LinearDynamics | StateSpaceDynamics):
             return float("nan")
         return self.scaling.y_mean + self.scaling.y_std * self.dynamics.level
@@ -265,14 +265,14 @@ class FreeRunModel:
         return self.level - float(np.dot(gains, self.scaling.u_mean))
 
     def padded_transfer_functions(self) -> tuple[list[Array], list[Array]]:
-        """Return numerators and denominators of a linear model, one an input, zeros behind all that are shorter."""
+        """Return numerators and denominators of a linear model, one per input, padded with zeros."""
         both = self.transfer_functions()
         length = max(max(b.size, f.size) for b, f in both)
         numerators, denominators = ([np.pad(x, (0, length - x.size)) for x in one] for one in zip(*both, strict=True))
         return numerators, denominators
 
     def to_control(self) -> "control.TransferFunction":
-        """Return a linear model as a python-control object, one column an input, without offset and limits."""
+        """Return a linear model as a python-control object, one column per input, without offset and limits."""
         import control
 
         numerators, denominators = self.padded_transfer_functions()
@@ -325,7 +325,7 @@ class FreeRunModel:
 
 
 def _fit(measured: Array, found: Array, *, running: bool) -> tuple[float, float]:
-    """Return fit [%] and root-mean-square error; NaN of no samples, and a free run that ran away has none."""
+    """Return fit [%] and root-mean-square error; NaN without samples, or if the free run diverged."""
     known = np.isfinite(measured) & (np.isfinite(found) | running)
     left = (measured - found)[known]
     if left.size == 0:

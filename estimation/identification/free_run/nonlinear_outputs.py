@@ -1,4 +1,4 @@
-"""Outputs that are a nonlinear function of what a linear model gives: without its sign, cut off, or held by stops."""
+"""Outputs that are a nonlinear function of a linear model's output: without its sign, saturated, or held by stops."""
 
 from dataclasses import replace
 
@@ -28,11 +28,11 @@ from plant.errors import HydrostateError
 from plant.notes import Note
 
 SIGNLESS = 0.5
-"""Share of the linear model's held-back error that a model without a sign may leave: signs that are told are many."""
+"""Largest ratio of the held-back error without a sign to that of the linear model: many signs are fitted."""
 
 
 def without_sign(linear: LinearComparison, most: int, *, surely: bool) -> AbsoluteCandidate | None:
-    """Return the best model of an output without its sign; None where there is none, or a linear one will do.
+    """Return the best model of an output without its sign; None if there is none, or a linear one is good enough.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def without_sign(linear: LinearComparison, most: int, *, surely: bool) -> Absolu
     most : int
         Samples on which nonlinear models are compared.
     surely : bool
-        Whether it must be clearly better: nobody has asked for it.
+        Whether it must be clearly better, since the user did not ask for it.
 
     Raises
     ------
@@ -69,13 +69,13 @@ def absolute(taken: AbsoluteCandidate, linear: LinearComparison, most: int, *, a
     Parameters
     ----------
     taken : AbsoluteCandidate
-        What was chosen.
+        The chosen model.
     linear : LinearComparison
         Models of the output as it is.
     most : int
-        Samples that are fitted at most.
+        Most samples that are fitted.
     asked : bool
-        Whether it was asked for; else a note says that it was taken.
+        Whether the user asked for it; otherwise a note says that it was chosen.
     """
     data, by = linear.task.data, linear.task.by
     fit = refitted_absolute(taken.fit, from_zero(section(linear.task.whole, most), by))
@@ -113,16 +113,16 @@ def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
 
 
 def told(model: FreeRunModel, linear: LinearComparison, held_back: float) -> Identified:
-    """Return a nonlinear model with its quality, not to be believed where it has none.
+    """Return a nonlinear model with its quality; it is not believed without one.
 
     Parameters
     ----------
     model : FreeRunModel
         Fitted to all data.
     linear : LinearComparison
-        Linear models that it was compared with.
+        Linear models with which it was compared.
     held_back : float
-        Its error on blocks held back, over the output's deviation [dimensionless].
+        Its error on held-back blocks, over the output's deviation [dimensionless].
     """
     data = linear.task.data
     quality = model.quality(data.u, data.y)

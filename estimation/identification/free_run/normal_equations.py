@@ -1,7 +1,7 @@
-"""Normal equations of a polynomial model's free run, summed over short stretches that stay in the processor's cache.
+"""Normal equations of a polynomial model's free run, summed over short parts that stay in the processor's cache.
 
-Terms are factored: a term is a monomial of past outputs times one of inputs. What the inputs give does not change in a
-descent and is worked out once; a sample's run then takes the monomials of outputs alone, of which there are few.
+A term is a monomial of past outputs times one of inputs. Those of inputs do not change in a descent and are computed
+once; the run of a sample only needs the monomials of outputs, of which there are few.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from estimation.identification.free_run.polynomial_fit import Runs
 
 STRETCH = 100_000
-"""Derivatives that are held at once [count]: 800 kB."""
+"""Derivatives that are held at a time [count]: 800 kB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +31,12 @@ class Factors:
     place, column : ndarray of int, shape (k,)
         Of each term: its monomial of past outputs, and that of inputs.
     parent, factor : ndarray of int, shape (m,)
-        A monomial of outputs is an earlier one times a past output, counted among those as they are, then among those
-        that are held at their ends; the first is 1.
+        A monomial of outputs is an earlier one times a past output, counted first among those as they are, then among
+        those that are clipped at their ends; the first is 1.
     own : ndarray of int, shape (l,)
         Which variables are past outputs.
     inputs : tuple of (tuple of int, bool)
-        Which variables each monomial of inputs multiplies, and whether they are held at their ends.
+        Variables of each monomial of inputs, and whether they are clipped at their ends.
     """
 
     place: IntArray
@@ -52,12 +52,12 @@ class Factors:
         Parameters
         ----------
         single, held : ndarray, shape (n, v)
-            Variables as they are, and held at their ends.
+            Variables as they are, and clipped at their ends.
 
         Returns
         -------
         ndarray, shape (n, i)
-            One column a monomial.
+            One column per monomial.
         """
         rows = np.ones((len(self.inputs), single.shape[0]))
         for row, (variables, is_held) in zip(rows, self.inputs, strict=True):
@@ -72,9 +72,9 @@ def factored(source: Sequence[int], terms: IntArray) -> Factors:
     Parameters
     ----------
     source : sequence of int
-        Of each variable: 0 for the output, else the input's number from 1.
+        Of each variable: 0 for the output, otherwise the input's number from 1.
     terms : ndarray of int, shape (k, 3)
-        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
+        Variables of each term, followed by -1 if there are fewer than three; -1 stands for 1.
 
     Examples
     --------
@@ -119,7 +119,7 @@ class NormalEquations:
     runs : Runs
         Terms and data.
     ends : ndarray, shape (2,)
-        Between which the output is held.
+        Ends at which the output is clipped.
     """
 
     def __init__(self, runs: "Runs", ends: Array) -> None:
@@ -133,7 +133,7 @@ class NormalEquations:
         self._rub = np.empty(0)
 
     def outputs(self, theta: Array) -> Array | None:
-        """Return the outputs of all logs, one after the other; None where one runs away.
+        """Return the outputs of all logs, one after the other; None if one diverges.
 
         Parameters
         ----------
@@ -159,7 +159,7 @@ class NormalEquations:
         return np.concatenate(self._outputs)
 
     def sums(self, left: Array) -> tuple[Array, Array]:
-        """Return the sums of products of the last run's derivatives with each other, and with what it leaves.
+        """Return the sums of products of the last run's derivatives with each other, and with the residuals.
 
         Parameters
         ----------
@@ -179,12 +179,12 @@ class NormalEquations:
         return gram, right
 
     def sums_beside(self, left: Array, others: slice) -> tuple[Array, Array, Array]:
-        """Return the same where some values are only compared: their products with each other are not summed.
+        """Return the same if some values are only compared: their products with each other are not summed.
 
         Parameters
         ----------
         left : ndarray, shape (n,)
-            As `sums` takes it.
+            As in `sums`.
         others : slice
             The values that are compared.
 
@@ -223,7 +223,7 @@ class NormalEquations:
         return runs.terms.shape[0] + runs.variables.n_start * len(self.inputs) + runs.variables.n_friction
 
     def _slopes(self, index: int) -> tuple[Array, Array]:
-        """Return monomials of past outputs, and how each output of a log depends on those before it."""
+        """Return monomials of past outputs, and the dependence of each output of a log on those before it."""
         share, one, variables = self._shares[index], self.factors, self.runs.variables
         monomials = np.zeros(share.shape)
         slope = np.zeros((share.shape[0], variables.n_start + bool(variables.friction)))

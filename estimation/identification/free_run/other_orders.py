@@ -10,21 +10,21 @@ from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit, Runs
 
 WILD = 0.003
-"""Share of samples that a model may be held there where its inputs come in another order; beyond, it is wild."""
+"""Share of samples at which a model may be clipped if its inputs come in another order; above it, the model is wild."""
 
 REORDERED, PIECES = 10, (8, 25)
-"""Other orders of the inputs that a model is tried on, and pieces that they are cut into, by turns."""
+"""Number of other orders of the inputs on which a model is tried, and alternating numbers of pieces."""
 
 
 def reordered(data: Channels, count: int = REORDERED) -> Iterator[Channels]:
-    """Yield the same channels with pieces of the inputs in other orders, some of them backwards.
+    """Yield the same channels with pieces of the inputs in other orders, some of them reversed.
 
     Parameters
     ----------
     data : Channels
         Scaled.
     count : int
-        Other orders.
+        Number of other orders.
 
     Yields
     ------
@@ -62,22 +62,22 @@ def is_wild(fit: PolynomialFit, data: Channels) -> bool:
 def disagreement(fits: Sequence[PolynomialFit], whole: PolynomialFit, data: Channels) -> float:
     """Return the deviation of fits that left out one block each from that of all data, under reordered inputs.
 
-    No output is measured there, so it tells nothing of what all of them miss alike; but what a block more or less
-    changes on new inputs is not known.
+    No output is measured there, so errors common to all fits do not show; but what changes with a block more or less is
+    not determined.
 
     Parameters
     ----------
     fits : sequence of PolynomialFit
-        One a block.
+        One per block.
     whole : PolynomialFit
-        Of all data.
+        Fit to all data.
     data : Channels
         Scaled.
 
     Returns
     -------
     float
-        Root mean square, over the output's deviation; infinite where one runs away [dimensionless].
+        Root mean square, over the output's deviation; infinite if one diverges [dimensionless].
     """
     squares = list[float]()
     for other in reordered(data):

@@ -1,4 +1,4 @@
-"""Structures that are fitted otherwise than by their free run, adopted: with an offset, and judged by the free run."""
+"""Structures that are not fitted by their free run: they get an offset, and are judged by the free run."""
 
 from dataclasses import replace
 
@@ -15,10 +15,10 @@ from estimation.identification.structure_names import STRUCTURE_NAMES
 from plant.errors import HydrostateError
 
 ADOPTED = {name: structure for name, structure in STRUCTURE_NAMES.items() if name != "output-error"}
-"""Structures that are not fitted by their free run, by what the command line calls them."""
+"""Structures that are not fitted by their free run, by their names in the command line."""
 
 HELD_BACK = 1.0 / 3.0
-"""Last share of every log that is not fitted, to judge the structure by."""
+"""Last share of every log that is held back to judge the structure."""
 
 
 def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearDynamics, LinearModel, float]:
@@ -36,7 +36,7 @@ def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearDyn
     Returns
     -------
     tuple of LinearDynamics, LinearModel and float
-        What runs free, the fit with its offset, and the held-back error over the output's deviation.
+        The dynamics, the fit with its offset, and the held-back error over the output's deviation.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def _fitted(name: str, form: Form, data: Channels, by: Scaling) -> LinearModel:
 
 
 def _dynamics(model: LinearModel, data: Channels, by: Scaling) -> tuple[LinearDynamics, float]:
-    """Return the free-run dynamics of a fit, with the offset that suits the data best."""
+    """Return the free-run dynamics of a fit, with the offset that fits the data best."""
     if not model.is_stable:
         raise HydrostateError(
             f"the {model.structure} model of {data.output!r} is unstable and does not run free: use output-error"

@@ -1,8 +1,8 @@
-"""Start of a polynomial model of an output with friction: a linear model whose output dry friction holds.
+"""Start of a polynomial model of an output with friction: a linear model whose output is held by dry friction.
 
-A body that dry friction holds does not move until more than the friction pulls, and is then pulled by the difference.
-Of a velocity the implicit step of Euler is exact: what the other terms would give is brought nearer to rest by a level,
-and stands at rest within it. A position does the same from where it was a sample before.
+A body held by dry friction does not move until the pull exceeds the friction, and is then accelerated by the
+difference. For a velocity the implicit Euler step is exact: the sum of the other terms is moved towards rest by a
+constant, and is at rest within it. A position does the same relative to its previous value.
 """
 
 from dataclasses import replace
@@ -15,16 +15,16 @@ from estimation.identification.free_run.linear_problem import LinearFit, Problem
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs, variables_of
 
 LEVELS = (0.02, 0.1, 0.3, 0.6)
-"""Friction that searches begin at, over what the inputs put in at one deviation [dimensionless]."""
+"""Friction at which searches begin, over the effect of the inputs at one deviation [dimensionless]."""
 
 
 def fit_with_friction(linear: LinearFit, friction: str, data: Channels) -> PolynomialFit | None:
-    """Return a linear model whose output rubs, fitted to its free run; None where it runs away.
+    """Return a linear model with output friction, fitted to its free run; None if it diverges.
 
     Parameters
     ----------
     friction : str
-        ``"velocity"`` or ``"position"``: what the output is.
+        ``"velocity"`` or ``"position"``: the kind of output.
     data : Channels
         Scaled; outputs held back are NaN.
     """
@@ -42,7 +42,7 @@ def fit_with_friction(linear: LinearFit, friction: str, data: Channels) -> Polyn
 
 
 def _first_outputs(linear: LinearFit, runs: Runs, data: Channels) -> Array:
-    """Return the outputs of the linear model that each log's run begins with: noise sends what integrates astray."""
+    """Return the outputs of the linear model with which each log's run begins: noise misleads integrating ones."""
     problem, n = Problem(linear.form, data), runs.variables.n_start
     output = problem.jacobian(linear.theta)[0]
     places = zip(problem.bounds[:-1], runs.begins, strict=True)
@@ -50,6 +50,6 @@ def _first_outputs(linear: LinearFit, runs: Runs, data: Channels) -> Array:
 
 
 def continued(fit: PolynomialFit, data: Channels) -> PolynomialFit | None:
-    """Return a fit carried on with other data of as many logs; None where it runs away."""
+    """Return a fit continued on other data with as many logs; None if it diverges."""
     runs = Runs(fit.variables, fit.terms, data)
     return runs.fit(np.concatenate([fit.coefficients, runs.start_values(), fit.friction]), FINAL_STEPS)

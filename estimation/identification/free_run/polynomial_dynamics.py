@@ -18,11 +18,11 @@ START_STEPS = 12
 """Refinements of the first outputs of a polynomial run."""
 
 AGREED = 0.6
-"""Share of what a run is not determined to, where its products are held, that it may be where they go on: of four fits
-each, less is chance in one case of six (Fisher's ratio of variances) [fraction]."""
+"""Uncertainty of a run with released products over that with clipped ones, up to which products are released: with four
+fits each, a smaller ratio occurs by chance in one case of six (Fisher's ratio of variances) [fraction]."""
 
 SMOOTHED = (8, 24)
-"""Samples through which a level and a straight line give first outputs without their noise."""
+"""Samples through which a constant and a straight line give first outputs without their noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +32,13 @@ class PolynomialDynamics:
     Parameters
     ----------
     terms : ndarray of int, shape (k, d)
-        Variables that each term multiplies; -1 stands for 1.
+        Variables of each term; -1 stands for 1.
     coefficients : ndarray, shape (k,)
-        One a term.
+        One per term.
     friction : ndarray, shape (f,)
-        Values of the friction; empty where the output does not rub.
+        Values of the friction; empty without friction.
     fallback : Fallback, optional
-        What is run on inputs that do not determine this model.
+        The model that is run on inputs for which this one is not determined.
     """
 
     variables: Variables
@@ -54,11 +54,11 @@ class PolynomialDynamics:
         return self.coefficients.size + self.friction.size
 
     def unanswered(self, length: int) -> int:
-        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
+        """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
         return unanswered(int(self.variables.lag.max(initial=0)), length)
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, or that of the linear model where it stands in.
+        """Return the free run, or that of the linear model if that replaces it.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class PolynomialDynamics:
         return self.judged_run(u, y)[0]
 
     def judged_run(self, u: Array, y: Array) -> tuple[Array, tuple[float, float] | None]:
-        """Return the same with the errors to be expected of both models.
+        """Return the same with the expected errors of both models.
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class PolynomialDynamics:
         Returns
         -------
         tuple of ndarray, shape (n,), and tuple of float or None
-            Output, scaled, and what `Fallback.errors` returns; None where no linear model may stand in.
+            Output, scaled, and the result of `Fallback.errors`; None without a linear model.
         """
         own = self.own_run(u, y)
         if self.fallback is None:
@@ -103,11 +103,11 @@ class PolynomialDynamics:
         return freed if freed[1][0] < AGREED * told[1][0] else told
 
     def _released(self) -> "PolynomialDynamics":
-        """Return the same products, held farther out."""
+        """Return the same products, clipped farther out."""
         return replace(self, variables=self.variables.released(), fallback=None)
 
     def own_run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its first outputs fitted to those that are there; NaN from where it runs away.
+        """Return the free run, with its first outputs fitted to the available ones; NaN from where it diverges.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class PolynomialDynamics:
         return np.concatenate([first[:begin], self._begun(runs, y)[begin:]])
 
     def _begun(self, runs: Runs, y: Array) -> Array:
-        """Return the run whose first outputs suit those that are there best; NaN from where it runs away."""
+        """Return the run whose first outputs fit the available ones best; NaN from where it diverges."""
         measured = runs.start_values()
         if np.count_nonzero(runs.used) <= 4 * measured.size:
             return self._refined(runs, y, measured, 1)[0]
@@ -145,7 +145,7 @@ class PolynomialDynamics:
         return best
 
     def _refined(self, runs: Runs, y: Array, start: Array, steps: int) -> tuple[Array, float]:
-        """Return the best run that refinements of first outputs lead to, and its squared error; infinite if none."""
+        """Return the best run after refinement of first outputs, and its squared error; infinite if there is none."""
         known, equations = runs.used, NormalEquations(runs, runs.ends)
         best, cost = np.full(y.size, np.nan), np.inf
         for step in range(steps):
@@ -166,7 +166,7 @@ class PolynomialDynamics:
         return best, cost
 
     def one_step(self, u: Array, y: Array) -> Array:
-        """Return the one-step prediction from the measured past; NaN where some of it is missing.
+        """Return the one-step prediction from measured past outputs; NaN if some are missing.
 
         Parameters
         ----------
@@ -189,7 +189,7 @@ class PolynomialDynamics:
         return out
 
     def nonlinearity(self, by: Scaling, sample_time: float) -> dict[str, Any] | None:
-        """Return the friction of an output that rubs: how fast it brakes what moves down and up, and where that rests.
+        """Return the friction of an output: its deceleration of downward and upward motion, and the resting place.
 
         Parameters
         ----------
@@ -201,7 +201,8 @@ class PolynomialDynamics:
         Returns
         -------
         dict or None
-            Of a velocity ``below`` and ``above`` in its unit a second, of a position in its unit a second squared.
+            For a velocity ``below`` and ``above`` in its unit per second, for a position in its unit per second
+            squared.
         """
         if not self.friction.size:
             return None
@@ -248,7 +249,7 @@ class PolynomialDynamics:
 
 
 def smoothed_starts(y: Array, first: int, count: int) -> list[Array]:
-    """Return first outputs on levels and straight lines through what follows them.
+    """Return first outputs on constants and straight lines through the samples after them.
 
     Parameters
     ----------
@@ -257,12 +258,12 @@ def smoothed_starts(y: Array, first: int, count: int) -> list[Array]:
     first : int
         Sample of the first of them.
     count : int
-        How many are wanted.
+        Number of outputs.
 
     Returns
     -------
     list of ndarray, shape (count,)
-        None of them where too few outputs are there.
+        Empty if there are too few outputs.
 
     Examples
     --------

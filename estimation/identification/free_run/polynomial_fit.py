@@ -12,13 +12,13 @@ from estimation.identification.free_run.polynomial_variables import BEYOND, Vari
 from estimation.identification.search.levenberg import levenberg
 
 FARTHEST = 0.2
-"""Share of its range by which the output itself may leave it, where there are products [dimensionless]."""
+"""Share of its range by which the output itself may leave it, with products [dimensionless]."""
 
 STEPS, FINAL_STEPS = 8, 40
 """Evaluations after each added term, and at the end."""
 
 TOLERANCE = 1e-8
-"""Share of the cost that a further step may promise at the end."""
+"""Relative gain of the cost below which a descent ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class PolynomialFit:
     Parameters
     ----------
     terms : ndarray of int, shape (k, 3)
-        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
+        Variables of each term, followed by -1 if there are fewer than three; -1 stands for 1.
     theta : ndarray, shape (k + n_start * logs + n_friction,)
         Coefficients, the first outputs of each log, and the values of the friction.
     cost : float
@@ -42,12 +42,12 @@ class PolynomialFit:
 
     @property
     def coefficients(self) -> Array:
-        """One a term."""
+        """One per term."""
         return self.theta[: self.terms.shape[0]]
 
     @property
     def friction(self) -> Array:
-        """Values of the friction; empty where there is none."""
+        """Values of the friction; empty if there is none."""
         return self.theta[self.theta.size - self.variables.n_friction :]
 
 
@@ -85,12 +85,12 @@ def variables_of(linear: LinearFit, data: Channels) -> tuple[Variables, IntArray
 
 
 def ends_of(variables: Variables, terms: IntArray) -> Array:
-    """Return the ends at which a run's output is held: none where there are no products.
+    """Return the ends at which a run's output is clipped: infinite without products.
 
     Parameters
     ----------
     terms : ndarray of int, shape (k, 3)
-        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
+        Variables of each term, followed by -1 if there are fewer than three; -1 stands for 1.
 
     Returns
     -------
@@ -107,12 +107,12 @@ class Runs:
     Parameters
     ----------
     terms : ndarray of int, shape (k, 3)
-        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
+        Variables of each term, followed by -1 if there are fewer than three; -1 stands for 1.
     data : Channels
         Scaled.
     early : bool
-        Whether runs begin as early as the output's lags allow, with inputs that stood at their first values before the
-        log; unless told, they begin where no input counts that came before it, and what is earlier is as measured.
+        Whether runs begin as early as the output's lags allow, with inputs at their first values before the log. By
+        default they begin where no earlier input counts, and earlier outputs are as measured.
     """
 
     def __init__(self, variables: Variables, terms: IntArray, data: Channels, *, early: bool = False) -> None:
@@ -124,13 +124,13 @@ class Runs:
         self.used: BoolArray = np.isfinite(self.target) & ~np.concatenate(given)
 
     def start_values(self) -> Array:
-        """Return the measured outputs that each log's run begins with, gaps filled by the first that is there."""
+        """Return the measured outputs with which each log's run begins; gaps are filled by the first valid one."""
         n = self.variables.n_start
         ends = zip(self.data.y, self.begins, strict=True)
         return np.concatenate([first_values(y, begin)[begin - n :] for y, begin in ends]) if n else np.zeros(0)
 
     def outputs(self, theta: Array) -> Array | None:
-        """Return the outputs; None where one runs away.
+        """Return the outputs; None if one diverges.
 
         Parameters
         ----------
@@ -146,18 +146,18 @@ class Runs:
 
     @property
     def ends(self) -> Array:
-        """Ends at which the output is held: none where there are no products, shape (2,)."""
+        """Ends at which the output is clipped: infinite without products, shape (2,)."""
         return ends_of(self.variables, self.terms)
 
     def begun(self, theta: Array, index: int) -> Array:
-        """Return the outputs of a log before its run, and zeros behind them.
+        """Return the outputs of a log before its run, followed by zeros.
 
         Parameters
         ----------
         theta : ndarray, shape (p,)
             All values.
         index : int
-            Of the log.
+            Index of the log.
 
         Returns
         -------
@@ -171,7 +171,7 @@ class Runs:
         return out
 
     def fit(self, theta: Array, steps: int, penalty: float = 0.0, least_gain: float = 0.0) -> PolynomialFit | None:
-        """Return the minimum of the squared free-run error that is reached from given values, if they run at all.
+        """Return the minimum of the squared free-run error from given values, if they run at all.
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class Runs:
 
 
 def first_values(y: Array, count: int) -> Array:
-    """Return the first outputs of a log, gaps filled by the first that is there.
+    """Return the first outputs of a log; gaps are filled by the first valid one.
 
     Parameters
     ----------

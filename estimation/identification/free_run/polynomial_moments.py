@@ -7,7 +7,7 @@ from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.polynomial_variables import Variables, products
 
 Moments = tuple[Array, Array, int]
-"""Sums of products of terms with each other and with the output, and of how many samples."""
+"""Sums of products of terms with each other and with the output, and the number of samples."""
 
 
 def moments(variables: Variables, terms: IntArray, data: Channels) -> Moments:
@@ -16,14 +16,14 @@ def moments(variables: Variables, terms: IntArray, data: Channels) -> Moments:
     Parameters
     ----------
     terms : ndarray of int, shape (k, 3)
-        Variables that each term multiplies; -1 stands for 1.
+        Variables of each term; -1 stands for 1.
     data : Channels
         Scaled; outputs held back are NaN.
 
     Returns
     -------
     tuple of ndarray (k, k), ndarray (k,) and int
-        The sums, and how many samples they are of.
+        The sums, and the number of samples.
     """
     count = terms.shape[0]
     gram, right, n = np.zeros((count, count)), np.zeros(count), 0
@@ -39,21 +39,21 @@ def moments(variables: Variables, terms: IntArray, data: Channels) -> Moments:
 
 
 def one_step_values(terms: IntArray, known: Moments, penalty: float) -> Array | None:
-    """Return coefficients of the least squares of the one-step error; None where there are too few samples.
+    """Return coefficients of the least squares of the one-step error; None if there are too few samples.
 
     Parameters
     ----------
     terms : ndarray of int, shape (k, 3)
-        Variables that each term multiplies; -1 stands for 1.
+        Variables of each term; -1 stands for 1.
     known : tuple
-        As `moments` returns them.
+        From `moments`.
     penalty : float
         On products of unit deviation [dimensionless].
 
     Returns
     -------
     ndarray, shape (k,), or None
-        One a term.
+        One per term.
     """
     gram, right, n = known
     if n < terms.shape[0]:

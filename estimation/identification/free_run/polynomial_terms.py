@@ -1,8 +1,8 @@
-"""Which products a polynomial model is given: orthogonal least squares on the sensitivities of its free run.
+"""Which products a polynomial model gets: orthogonal least squares on the sensitivities of its free run.
 
-Of all products of two and three lagged signals, the one is added whose effect on the free run explains most of its
-residual, beside all that the model can do already (orthogonal least squares, Chen, Billings and Luo 1989, on the
-sensitivities of the free run instead of regressors of the one-step error). After each, all values are fitted anew.
+Of all products of two and three lagged signals, the one is added whose effect on the free run explains most of the
+residual, beyond what the model can already do (orthogonal least squares, Chen, Billings and Luo 1989, on the
+sensitivities of the free run instead of regressors of the one-step error). After each, all values are fitted again.
 """
 
 from itertools import combinations_with_replacement
@@ -20,10 +20,10 @@ MOST_CANDIDATES = 250
 """Products that are compared."""
 
 TRIED = 4
-"""Of the best products, how many are tried until one lowers the error."""
+"""Number of best products that are tried until one reduces the error."""
 
 DEPENDENT = 1e-12
-"""Share of the squared sensitivities that a direction must have to be told from rounding."""
+"""Share of the squared sensitivities below which a direction is rounding."""
 
 LEAST_GAIN = 1e-4
 """Share of the squared error that a term must explain to be added."""
@@ -40,7 +40,7 @@ def candidate_terms(variables: Variables) -> IntArray:
 
 
 def begun(linear: LinearFit, data: Channels) -> PolynomialFit | None:
-    """Return a linear model as a polynomial one, fitted to its free run; None where it runs away.
+    """Return a linear model as a polynomial one, fitted to its free run; None if it diverges.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def begun(linear: LinearFit, data: Channels) -> PolynomialFit | None:
 
 
 def one_more(fit: PolynomialFit, pool: IntArray, data: Channels) -> PolynomialFit | None:
-    """Return the fit with the product that explains most beside those that are there; None where none does.
+    """Return the fit with the product that explains most in addition; None if none does.
 
     Parameters
     ----------
@@ -78,13 +78,13 @@ def one_more(fit: PolynomialFit, pool: IntArray, data: Channels) -> PolynomialFi
 
 
 def without_term(fit: PolynomialFit, index: int, data: Channels) -> PolynomialFit | None:
-    """Return the fit without one of its terms, the others fitted anew."""
+    """Return the fit without one of its terms, with the others fitted again."""
     terms = np.delete(fit.terms, index, axis=0)
     return Runs(fit.variables, terms, data).fit(np.delete(fit.theta, index), STEPS)
 
 
 def _gains_of(fit: PolynomialFit, pool: IntArray, data: Channels) -> Array | None:
-    """Return the part of the squared residual that each product explains; None if the fit runs away."""
+    """Return the part of the squared residual that each product explains; None if the fit diverges."""
     count = fit.terms.shape[0]
     every = Runs(fit.variables, np.concatenate([fit.terms, pool]), data)
     equations = NormalEquations(every, Runs(fit.variables, fit.terms, data).ends)
@@ -98,9 +98,9 @@ def _gains_of(fit: PolynomialFit, pool: IntArray, data: Channels) -> Array | Non
 
 
 def _gains(own: Array, shared: Array, square: Array, right: Array, explained: Array) -> Array:
-    """Return the part of the squared residual that each candidate explains beside present terms, linearised.
+    """Return the part of the squared residual that each candidate explains in addition to present terms, linearised.
 
-    Given are products of sensitivities: of the values that are there with each other and with the candidates, of the
+    The arguments are products of sensitivities: of the present values with each other and with the candidates, of the
     candidates with themselves, and of both with the residual.
     """
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""The lagged signals that terms of a polynomial model multiply, and each term's product."""
+"""The lagged signals in the terms of a polynomial model, and each term's product."""
 
 from dataclasses import dataclass, replace
 
@@ -8,14 +8,14 @@ from estimation.arrays import Array, IntArray
 from estimation.identification.search.jit import compiled
 
 BEYOND = 0.1
-"""Share of its range by which a signal may leave it in a product before it is held [dimensionless]."""
+"""Share of its range by which a signal may leave it in a product before it is clipped [dimensionless]."""
 
 RELEASED = 2.0
-"""How many times as far from its middle a signal may go where it is held no longer than that [dimensionless]."""
+"""Factor on the distance from the middle at which a released signal is clipped [dimensionless]."""
 
 FRICTIONS = {"": 0, "position": 2, "velocity": 3}
-"""What an output that rubs is, and how many values its friction has: what is taken off below and above, and, of a
-velocity, where it rests; a position rests where it was."""
+"""Kinds of an output with friction, and number of its values: what is subtracted below and above, and, for a velocity,
+where it rests; a position rests at its previous value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +25,11 @@ class Variables:
     Parameters
     ----------
     source, lag : ndarray of int, shape (v,)
-        0 for the output, else the input's number from 1; and how many samples earlier.
+        0 for the output, otherwise the input's number from 1; and the lag in samples.
     limits : ndarray, shape (v, 2)
-        Ends at which each is held in products.
+        Ends at which each is clipped in products.
     friction : str
-        One of `FRICTIONS`: dry friction takes a level off what the terms give, and holds the output within it.
+        One of `FRICTIONS`: dry friction subtracts a constant from the sum of the terms, and holds the output within it.
     """
 
     source: IntArray
@@ -50,7 +50,7 @@ class Variables:
         return own + BEYOND * inner * np.array([1.0, -1.0])
 
     def around(self, share: float) -> Array:
-        """Return ends that a share of the range beyond what was seen is added to, shape (2,).
+        """Return ends extended by a share of the range, shape (2,).
 
         Parameters
         ----------
@@ -66,13 +66,13 @@ class Variables:
         return np.array([low, high]) + share * (high - low) * np.array([-1.0, 1.0])
 
     def released(self) -> "Variables":
-        """Return the same signals, held where they are `RELEASED` times as far from the middle of their range."""
+        """Return the same signals, clipped `RELEASED` times as far from the middle of their range."""
         middle = self.limits.mean(axis=1, keepdims=True)
         return replace(self, limits=middle + RELEASED * (self.limits - middle))
 
     @property
     def n_start(self) -> int:
-        """First values of the output that a run needs."""
+        """Number of first outputs that a run needs."""
         own = self.lag[self.source == 0]
         return int(own.max()) if own.size else 0
 
@@ -83,7 +83,7 @@ def products(variables: Variables, terms: IntArray, u: Array, y: Array) -> Array
     Parameters
     ----------
     terms : ndarray of int, shape (k, 3)
-        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
+        Variables of each term, followed by -1 if there are fewer than three; -1 stands for 1.
     u : ndarray, shape (n, m)
         Inputs.
     y : ndarray, shape (n,)
@@ -92,7 +92,7 @@ def products(variables: Variables, terms: IntArray, u: Array, y: Array) -> Array
     Returns
     -------
     ndarray, shape (n, k)
-        One column a term.
+        One column per term.
     """
     out = np.empty((y.size, terms.shape[0]))
     write_products(*lagged_signals(variables, u, y), terms, out)
@@ -106,9 +106,9 @@ def write_products(single: Array, held: Array, terms: IntArray, out: Array) -> N
     Parameters
     ----------
     single, held : ndarray, shape (n, v)
-        Variables as they are, for terms of one, and held at their ends, for products.
+        Variables as they are, for terms of one, and clipped at their ends, for products.
     terms : ndarray of int, shape (k, 3)
-        As `products` takes them.
+        As in `products`.
     out : ndarray, shape (n, p)
         Its first k columns are written.
     """
@@ -126,7 +126,7 @@ def write_products(single: Array, held: Array, terms: IntArray, out: Array) -> N
 
 
 def lagged_signals(variables: Variables, u: Array, y: Array) -> tuple[Array, Array]:
-    """Return the lagged signals as they are and held at their ends, one column each.
+    """Return the lagged signals as they are and clipped at their ends, one column each.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def lagged_signals(variables: Variables, u: Array, y: Array) -> tuple[Array, Arr
     Returns
     -------
     tuple of ndarray, shape (n, v)
-        Before the first sample each signal stood at its first value.
+        Before the first sample each signal had its first value.
     """
     single = np.empty((y.size, variables.lag.size))
     for v, (source, lag) in enumerate(zip(variables.source, variables.lag, strict=True)):

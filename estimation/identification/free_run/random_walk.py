@@ -1,11 +1,11 @@
-"""Outputs that wander by themselves, as a random walk: linear models fitted to changes from sample to sample.
+"""Outputs with a random walk: linear models fitted to changes from sample to sample.
 
-What adds up at an output, such as the drift of a sensor, is no noise that a free run averages out: the fit follows it
-with slow poles, and its gain is anything. Changes from sample to sample obey the same transfer function, and a walk's
-own changes are white there (Box and Jenkins 1970). Whether there is a walk is told by what such a fit leaves: summed,
-it does not come back to its trend (Dickey and Fuller 1979), and its changes have no memory beyond one sample. What a
-plant's nonlinearity or a pole too few leave comes back, or is smooth. White noise of a sensor beside the walk adds to
-neighbouring changes with opposite signs, so these may be unlike.
+Accumulated noise, such as the drift of a sensor, does not average out in a free run: the fit follows it with slow
+poles, and its gain is arbitrary. Changes from sample to sample obey the same transfer function, and those of a random
+walk are white (Box and Jenkins 1970). Whether there is a walk is decided by the residual of such a fit: its sum does
+not return to its trend (Dickey and Fuller 1979), and its changes have no memory beyond one sample. The residual of a
+plant's nonlinearity or a missing pole returns, or is smooth. White sensor noise beside the walk adds to neighbouring
+changes with opposite signs, so these may be negatively correlated.
 """
 
 from collections.abc import Sequence
@@ -35,48 +35,49 @@ from estimation.trust.chi_square import chi_square_tail
 from plant.notes import Note
 
 FEWEST = 200
-"""Outputs in a row below which a walk is not told from slow noise; of white noise the statistic is -7 there."""
+"""Least number of consecutive outputs to distinguish a walk from slow noise; the statistic of white noise is -7
+there."""
 
 COMES_BACK = -3.96
-"""Statistic of Dickey and Fuller, with a trend, that a walk falls below in 1 % of all long records (their table)."""
+"""Statistic of Dickey and Fuller, with a trend, below which a walk falls in 1 % of all long records (their table)."""
 
 LAGS_SHARE = 50
-"""Changes that the test allows for are at most one in so many samples, so that white noise has a statistic of about
--7, the root of this number; and at most as many as Schwert (1989) takes for noise beside a walk."""
+"""Inverse of the largest number of changes in the test over the number of samples, so that white noise has a statistic
+of about -7, the root of this number; and at most as many as Schwert (1989) uses for noise beside a walk."""
 
 REMEMBERED = 1e-3
-"""Probability, were changes white beyond one sample, below which they are held to remember: a walk is missed as
-often."""
+"""Significance level at which changes have memory beyond one sample: a walk is missed as often."""
 
 ALIKE = 3.0
-"""Correlation of neighbouring changes from which they are smooth, not white [standard errors]: the same probability."""
+"""Correlation of neighbouring changes from which they are smooth, not white [standard errors]: the same significance
+level."""
 
 SMOOTH = 0.1
-"""Share of the power of changes that those two samples ago or more explain beyond chance, from which no more poles
-than `ORDER` are asked whether it is a walk: poles that are missing leave less, and bends more (0.2 to 4; judged)."""
+"""Share of the power of changes that earlier ones than the previous explain beyond chance, from which no more poles
+than `ORDER` are tested for a walk: missing poles leave less, and nonlinearities more (0.2 to 4; judged)."""
 
 MATERIAL = 0.15
-"""Least root mean square by which the output wanders on blocks held back, over its deviation: bends leave up to 0.12
-behind a linear model that looks like a walk and white noise (five of 99 logs without one), and less moves a gain by
-little."""
+"""Least root mean square of the walk on held-back blocks, over the output's deviation: a nonlinearity leaves up to 0.12
+behind a linear model that looks like a walk with white noise (five of 99 logs without one), and a smaller walk changes
+a gain by little."""
 
 
 @dataclass(frozen=True, eq=False)
 class Wandering:
-    """A linear model that was fitted to changes, brought to the levels of its data.
+    """A linear model fitted to changes, applied to the levels of its data.
 
     Parameters
     ----------
     fit : LinearFit
-        Scaled as the levels are; its offset and initial states by least squares of the levels.
+        Scaled as the levels are; offset and initial states by least squares of the levels.
     changes, by : Channels, Scaling
-        What it was fitted to, scaled, and how.
+        The fitted changes, scaled, and the scaling.
     of_changes : LinearFit
         The fit in their scale.
     held_back : float
         Free-run error on blocks held back, over the output's deviation [dimensionless].
     candidates : tuple of Candidate
-        What was compared, on changes.
+        Models that were compared, on changes.
     """
 
     fit: LinearFit
@@ -90,14 +91,14 @@ class Wandering:
 def wandering(
     data: Channels, part: Channels, orders: Sequence[int], delays: tuple[int, ...] | None, sizes: int | None
 ) -> Wandering | None:
-    """Return the linear model of changes of an output that wanders by itself; None where it does not.
+    """Return the linear model of changes of an output with a random walk; None if it has none.
 
     Parameters
     ----------
     data, part : Channels
         Levels, scaled: all, and those on which models are compared.
     orders : sequence of int
-        As `linear_candidates` takes them.
+        As in `linear_candidates`.
     delays : tuple of int or None
         Dead time of each input [samples]; None estimates it.
     sizes : int, optional
@@ -128,7 +129,7 @@ def wandering(
 
 
 def from_changes(walk: Wandering, data: Channels, by: Scaling) -> Identified:
-    """Return the model of an output that wanders, its covariance that of the changes.
+    """Return the model of an output with a random walk, with the covariance of the changes.
 
     Parameters
     ----------
@@ -153,27 +154,27 @@ def from_changes(walk: Wandering, data: Channels, by: Scaling) -> Identified:
 
 
 def followed_walk(data: Channels, part: Channels, orders: Sequence[int], structure: str) -> list[Note]:
-    """Return a note where an output wanders by itself and a structure that is fitted to levels was asked for.
+    """Return a note if an output has a random walk and a structure fitted to levels was requested.
 
     Parameters
     ----------
     data, part : Channels
-        As `wandering` takes them.
+        As in `wandering`.
     orders : sequence of int
         Likewise.
     structure : str
-        What was asked for.
+        The requested structure.
     """
     return [] if wandering(data, part, orders, None, None) is None else [walk_followed(data.output, structure)]
 
 
 def walk_followed(output: str, structure: str) -> Note:
-    """Return the note on a structure that is fitted to levels of an output that wanders."""
+    """Return the note on a structure fitted to levels of an output with a random walk."""
     return IdentificationCode.WALK_FOLLOWED.note(output=output, structure=structure)
 
 
 def changes_of(data: Channels) -> Channels:
-    """Return how much each channel changes from the sample before; of the first one, inputs by nothing.
+    """Return the change of each channel from the sample before; that of the first input sample is zero.
 
     Parameters
     ----------
@@ -188,7 +189,7 @@ def changes_of(data: Channels) -> Channels:
 
 
 def walks(fit: LinearFit, changes: Channels) -> bool:
-    """Return whether what a model leaves of changes is white beyond one sample, and its sum does not come back.
+    """Return whether the residual of changes is white beyond one sample, and its sum does not return.
 
     Parameters
     ----------
@@ -202,17 +203,17 @@ def walks(fit: LinearFit, changes: Channels) -> bool:
 
 
 def returns(changes: Array) -> float:
-    """Return the statistic of Dickey and Fuller of the sum of changes: how surely it comes back to its trend.
+    """Return the statistic of Dickey and Fuller of the sum of changes: how surely it returns to its trend.
 
     Parameters
     ----------
     changes : ndarray, shape (n,)
-        No gaps.
+        Without gaps.
 
     Returns
     -------
     float
-        Negative where it comes back [standard errors].
+        Negative if it returns [standard errors].
 
     Examples
     --------
@@ -235,12 +236,12 @@ def returns(changes: Array) -> float:
 def remembers(changes: Array) -> bool:
     """Return whether changes depend on earlier ones otherwise than white noise beside a walk makes them.
 
-    Neighbours may be unlike, and not alike; those two samples ago or more are asked as Box and Pierce (1970) do.
+    Neighbours may be negatively correlated, not positively; larger lags are tested as in Box and Pierce (1970).
 
     Parameters
     ----------
     changes : ndarray, shape (n,)
-        No gaps.
+        Without gaps.
 
     Examples
     --------
@@ -255,14 +256,14 @@ def remembers(changes: Array) -> bool:
 
 
 def at_levels(fit: LinearFit, data: Channels, by: Scaling) -> LinearFit:
-    """Return a fit of changes as one of levels, offset and initial states by least squares.
+    """Return a fit of changes as one of levels, with offset and initial states by least squares.
 
     Parameters
     ----------
     data : Channels
-        Levels, scaled; the changes are theirs.
+        Levels, scaled.
     by : Scaling
-        Of the changes.
+        Scaling of the changes.
     """
     form = fit.form
     b = [one * by.y_std / std for one, std in zip(fit.numerators, by.u_std, strict=True)]
@@ -276,33 +277,33 @@ def at_levels(fit: LinearFit, data: Channels, by: Scaling) -> LinearFit:
 
 
 def _correlations(changes: Array) -> Array:
-    """Return how changes are correlated with those one sample ago, two, and so on [dimensionless]."""
+    """Return the autocorrelation of changes at one sample, two, and so on [dimensionless]."""
     centred = changes - changes.mean()
     power = max(float(centred @ centred), 1e-300)
     return np.array([centred[k:] @ centred[:-k] for k in range(1, DEFAULT_LAGS + 1)]) / power
 
 
 def _by_chance(correlations: Array, changes: Array) -> float:
-    """Return the variance of correlations at lags where changes that remember one sample at most have none."""
+    """Return the variance of autocorrelations at lags without correlation, for changes with memory of one sample."""
     # Bartlett (1946), of a moving average of one term
     return (1.0 + 2.0 * float(correlations[0]) ** 2) / changes.size
 
 
 def _explained(changes: Array) -> float:
-    """Return the share of the power of changes that those two samples ago or more explain, less what chance does."""
+    """Return the share of the power of changes that those two samples ago or more explain, beyond chance."""
     found = _correlations(changes)
     return float(np.sum(found[1:] ** 2 - _by_chance(found, changes)))
 
 
 def longest_rest(fit: LinearFit, changes: Channels) -> Array:
-    """Return what a model leaves of the longest row of outputs without gaps.
+    """Return the residual of a model over the longest row of outputs without gaps.
 
     Parameters
     ----------
     fit : LinearFit
         The model.
     changes : Channels
-        Changes, or levels; scaled as the model's.
+        Changes, or levels; scaled as for the model.
 
     Returns
     -------
@@ -315,7 +316,7 @@ def longest_rest(fit: LinearFit, changes: Channels) -> Array:
 
 
 def longest(parts: Sequence[Array]) -> Array:
-    """Return the longest row without gaps; an empty one where there is none.
+    """Return the longest row without gaps; empty if there is none.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from plant.errors import HydrostateError
 
 
 def save_models(models: Sequence[FreeRunModel], path: str | Path) -> None:
-    """Write models as JSON, whole or not at all.
+    """Write models as JSON, completely or not at all.
 
     Raises
     ------

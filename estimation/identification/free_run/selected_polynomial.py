@@ -1,8 +1,8 @@
-"""Polynomial models of few products, chosen one by one by how much of the one-step error each explains.
+"""Polynomial models with few products, chosen one by one by how much of the one-step error each explains.
 
-Orthogonal least squares on lagged signals (Chen, Billings and Luo 1989; the error reduction ratio), begun at nothing.
-A model of every product spends its samples on products that are not there. Each block that is held back has a selection
-of its own, which never saw it.
+Orthogonal least squares on lagged signals (Chen, Billings and Luo 1989; the error reduction ratio), started from
+nothing. A model with every product wastes its samples on absent products. Each held-back block has a selection of its
+own, which never used it.
 """
 
 from collections.abc import Sequence
@@ -27,16 +27,16 @@ from estimation.identification.free_run.polynomial_moments import moments
 from estimation.identification.free_run.polynomial_variables import Variables
 
 LAGS = (2, 3, 4)
-"""Of the output and of each input, that terms are taken from."""
+"""Lags of the output and of each input, for the pool of terms."""
 
 COUNTS = (6, 9, 13, 18, 25)
-"""Terms that are kept."""
+"""Numbers of terms that are kept."""
 
 MOST_POOL = 250
-"""Terms that are chosen from at most: where there would be more, those of three are left out, then the last of two."""
+"""Most terms in the pool: if there would be more, those of degree three are left out, then the last of degree two."""
 
 INDEPENDENT = 1e-8
-"""Share of a term's square that the terms before it must leave, or it is passed over."""
+"""Least share of a term's square that earlier terms must not explain; otherwise it is skipped."""
 
 DESCENDED = 3
 """Selections whose free run is descended."""
@@ -51,9 +51,9 @@ class Selection:
     form : Form
         Lags.
     count : int
-        Terms, the constant and linear ones among them.
+        Number of terms, including the constant and linear ones.
     descended : bool
-        Whether the one-step estimate is a start of the free run's descent.
+        Whether the one-step estimate starts a descent of the free run.
     """
 
     form: Form
@@ -61,7 +61,7 @@ class Selection:
     descended: bool = False
 
     def fit(self, data: Channels) -> PolynomialFit | None:
-        """Return the model of given data; None where it runs away or there are too few samples.
+        """Return the model of given data; None if it diverges or there are too few samples.
 
         Parameters
         ----------
@@ -74,14 +74,14 @@ class Selection:
 
 
 def forms_selected(delays: tuple[int, ...], asked: Asked) -> list[Form]:
-    """Return the lags that terms are taken from.
+    """Return the lags for the pool of terms.
 
     Parameters
     ----------
     delays : tuple of int
-        Dead time of each input that is tried beside none and one sample [samples].
+        Dead time of each input that is tried beside zero and one sample [samples].
     asked : Asked
-        What is given and not chosen.
+        What the user gives.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def forms_selected(delays: tuple[int, ...], asked: Asked) -> list[Form]:
 def judged_selections(
     data: Channels, parts: Sequence[Channels], forms: Sequence[Form]
 ) -> list[JudgedRecipe[Selection]]:
-    """Return models of few products, each judged on blocks that neither its terms nor its values have seen.
+    """Return models with few products, each judged on blocks that neither its terms nor its values have used.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def judged_selections(
     parts : sequence of Channels
         The same without one block each.
     forms : sequence of Form
-        Lags that terms are taken from.
+        Lags for the pool of terms.
     """
     judged: list[JudgedRecipe[Selection] | None] = []
     for form in forms:
@@ -125,7 +125,7 @@ def judged_selections(
 
 @dataclass(frozen=True, eq=False)
 class _Ordered:
-    """Terms in the order in which they explain the one-step error, and the moments of all."""
+    """Terms in the order in which they explain the one-step error, and all moments."""
 
     variables: Variables
     terms: IntArray
@@ -133,7 +133,7 @@ class _Ordered:
     right: Array
 
     def model(self, count: int, data: Channels) -> PolynomialFit | None:
-        """Return the model of the first terms, run free; None where it runs away or there are not so many."""
+        """Return the free-running model of the first terms; None if it diverges or there are not so many."""
         if self.terms.shape[0] < count:
             return None
         terms = self.terms[:count]
@@ -149,7 +149,7 @@ class _Ordered:
 
 
 def _ordered(form: Form, data: Channels) -> _Ordered | None:
-    """Return the terms of some lags, best first; None where there are too few samples."""
+    """Return the terms of some lags, best first; None if there are too few samples."""
     variables = variables_of(LinearFit(form, np.zeros(form.n_values), 0.0), data)[0]
     pool = every_term(variables.lag.size, 3)
     if pool.shape[0] > MOST_POOL:
@@ -162,21 +162,21 @@ def _ordered(form: Form, data: Channels) -> _Ordered | None:
 
 
 def best_first(gram: Array, right: Array, most: int) -> IntArray:
-    """Return which regressors explain most of what is wanted, each beside those before it.
+    """Return the regressors that explain most of a target, each in addition to those before it.
 
     Parameters
     ----------
     gram : ndarray, shape (k, k)
         Products of regressors, summed.
     right : ndarray, shape (k,)
-        Products with what is wanted, summed.
+        Products with the target, summed.
     most : int
-        How many are wanted at most.
+        Most regressors.
 
     Returns
     -------
     ndarray of int, shape (most,) or less
-        Regressors, best first; those that others before them give already are left out.
+        Regressors, best first; dependent ones are left out.
 
     Examples
     --------

@@ -14,14 +14,14 @@ from estimation.identification.search.experiments import Experiments, data_hash
 
 
 def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
-    """Return a fit of one input with its covariance, the robust one where the residual is not white.
+    """Return a fit of one input with its covariance, the robust one if the residual is not white.
 
     Parameters
     ----------
     data : Channels
         Scaled.
     by : Scaling
-        What they were scaled by.
+        The scaling.
     """
     form, problem = fit.form, Problem(fit.form, data)
     output, residual, spreads, coloured = _spreads(fit, problem)
@@ -56,19 +56,19 @@ def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
 
 
 def gain_deviations(fit: LinearFit, data: Channels, by: Scaling) -> tuple[float, ...]:
-    """Return the standard deviation of the steady gain from each input, robust where the residual is not white.
+    """Return the standard deviation of the steady gain from each input, robust if the residual is not white.
 
     Parameters
     ----------
     data : Channels
         Scaled.
     by : Scaling
-        What they were scaled by.
+        The scaling.
 
     Returns
     -------
     tuple of float
-        One an input [output unit / input unit].
+        One per input [output unit / input unit].
     """
     form, total = fit.form, float(fit.f.sum())
     _, _, (white, robust), coloured = _spreads(fit, Problem(form, data))

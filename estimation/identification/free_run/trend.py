@@ -1,8 +1,8 @@
 """A linear trend that the inputs do not explain: a sensor that drifts, or a bench that warms up.
 
-Inputs whose mean is not zero make an integrator go up like a trend, so that a pole at 1 or a slow one follows it, and
-the steady gain means nothing. A trend behind a settled plant is a trend again, so time is one more input here. If the
-slow pole then explains no more than chance, and white noise is left, it was the trend.
+With inputs of non-zero mean an integrator rises like a trend, so a pole at 1 or a slow one follows it, and the steady
+gain is arbitrary. A trend behind a stable plant is again a trend, so time is one more input here. If the slow pole then
+explains no more than chance, and white noise is left, it was the trend.
 """
 
 from collections.abc import Sequence
@@ -30,9 +30,9 @@ class Detrended:
     Parameters
     ----------
     linear : LinearComparison
-        Models of what is left.
+        Models of the remainder.
     trends : tuple of ndarray, shape (n,)
-        Of each log, zero in its middle [output unit].
+        For each log, zero in its middle [output unit].
     """
 
     linear: LinearComparison
@@ -40,14 +40,14 @@ class Detrended:
 
 
 def detrended(one: LinearComparison, orders: Sequence[int]) -> Detrended | None:
-    """Return models beside a trend; None where the model without one settles, or explains more than a trend does.
+    """Return models beside a trend; None if the model without one is stable, or explains more than a trend does.
 
     Parameters
     ----------
     one : LinearComparison
         Models without a trend.
     orders : sequence of int
-        Of models that are compared; the first few tell the trend.
+        Orders of the models that are compared; the first few determine the trend.
     """
     task = one.task
     part, slow = _beside_time(task.part), one.best.fit
@@ -88,7 +88,7 @@ def detrended(one: LinearComparison, orders: Sequence[int]) -> Detrended | None:
 
 
 def _leans(one: LinearComparison, part: Channels) -> bool:
-    """Return whether a trend explains more than chance beside a model that settles, and leaves white noise."""
+    """Return whether a trend explains more than chance beside a stable model, and leaves white noise."""
     fit = fit_linear(_beside(one.best.form), part, [one.best.fit.f], least_gain=COARSE)
     if not _bic(fit, part) < _bic(one.best.fit, one.task.part):
         return False

@@ -1,10 +1,10 @@
 """Whether inputs explain an output at all, or a slow model follows it without them.
 
-A pole slower than a block that is held back follows a ramp or a slow oscillation by its initial state alone, and sums
-any input to a wandering curve that looks like another. Blocks do not miss it, since the outputs on both sides pin the
-run, and neither does an information criterion, which counts samples as if what is left were white (spurious
-regression, Granger and Newbold 1974). The same inputs in other orders have no such relation to the output: what they
-explain of it is what chance does.
+A pole slower than a held-back block follows a ramp or a slow oscillation by its initial state alone, and integrates any
+input to a wandering curve that looks like another. Blocks do not reveal it, since the outputs on both sides determine
+the run, and neither does an information criterion, which counts samples as if the residual were white (spurious
+regression, Granger and Newbold 1974). The same inputs in other orders have no such relation to the output: they explain
+as much of it as chance does.
 """
 
 from collections.abc import Callable
@@ -17,22 +17,22 @@ from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.other_orders import reordered
 
 ORDERS = 19
-"""Other orders of the inputs: one that is told beforehand beats them all by chance in 5 % of unrelated logs."""
+"""Number of other orders of the inputs: one given in advance beats them all by chance in 5 % of unrelated logs."""
 
 MATERIAL = 1.1
-"""How much more another order of the inputs has to leave of an output that a pole at 1 follows [fraction]: such a model
-has a ramp of its own, and beside it an unrelated input wins by a few percent at times (judged)."""
+"""Least ratio of the error with another order of the inputs to that with the right one, if the model has a pole at 1:
+such a model has a ramp of its own, and beside it an unrelated input wins by a few percent at times (judged)."""
 
 
 def explains(cost: float, refit: Callable[[Channels], float], data: Channels) -> bool:
-    """Return whether inputs explain the output better than the same inputs do in any other order.
+    """Return whether inputs explain the output better than the same inputs in any other order.
 
     Parameters
     ----------
     cost : float
         Sum of squared residuals with the inputs as measured [dimensionless].
     refit : callable
-        The same of a fit to other data; infinite where there is none.
+        The same for a fit to other data; infinite if there is none.
     data : Channels
         Scaled.
 
@@ -48,7 +48,7 @@ def explains(cost: float, refit: Callable[[Channels], float], data: Channels) ->
 
 
 def linear_explains(fit: LinearFit, data: Channels) -> bool:
-    """Return the same of a linear model, whose poles are fitted anew to each order of the inputs.
+    """Return the same for a linear model, with its poles fitted again to each order of the inputs.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def linear_explains(fit: LinearFit, data: Channels) -> bool:
 
 
 def bend_explains(fit: HammersteinFit, data: Channels) -> bool:
-    """Return the same of a model with a nonlinearity at its input.
+    """Return the same for a model with a nonlinearity at its input.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def bend_explains(fit: HammersteinFit, data: Channels) -> bool:
 
 
 def polynomial_explains(found: PolynomialCandidate, data: Channels) -> bool:
-    """Return the same of a polynomial model.
+    """Return the same for a polynomial model.
 
     Parameters
     ----------
