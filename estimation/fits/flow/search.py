@@ -54,10 +54,6 @@ RELIEF_RISE = 0.05
 """Least pressure rise above its setting at which a relief valve passes the rated flow where searches begin [fraction]:
 valves need 0.05 to 0.2. The default slope would be a corner of 0.0004 in small rigs."""
 
-NEAR = 0.2
-"""Change of a balance's residuals up to which the last short step of a search is computed from slopes and not run
-[dimensionless], see `FreedProblem`: 0.02 in log-likelihood."""
-
 COMPLETED, TOO_FAR = 10.0, 150.0
 """Gain of short model steps and cracking valves up to which they hardly matter, and distance from a balance that leaves
 only noise, from which another balance is dropped [log-likelihood]. In one of 100 logs such a balance gained 180, and
@@ -261,7 +257,6 @@ def _finished(
         if not _plain(one):
             return one.problem, one.point, one.bounds
     problem, theta, bounds = _completed(one, log, led, bent=bent)
-    problem.near = NEAR if steps is not log.steps else 0.0
     return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
 
 

@@ -50,9 +50,6 @@ class FreedProblem(Problem):
         Two parameters that nearly cancel.
     """
 
-    near = 0.0
-    """Change of all residuals from a known point up to which its slopes give them without a run [deviations]."""
-
     def __init__(
         self,
         model: GreyBoxModel,
@@ -261,17 +258,10 @@ class FreedProblem(Problem):
         return weighed(here, columns)
 
     def _remembered(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
-        """Return the residuals and slopes at one of the last two points, or so near to one that its slopes suffice."""
-        last = [(theta - one[0], *one[2:]) for one in self._last if np.array_equal(one[1], variance)]
-        for away, here, columns in last:
-            if not np.any(away):
+        """Return the residuals and slopes at one of the last two points."""
+        for place, noise, here, columns in self._last:
+            if np.array_equal(place, theta) and np.array_equal(noise, variance):
                 return here, columns
-        for away, here, columns in last[::-1]:
-            if self.near > 0.0 and np.linalg.norm(moved := columns @ away) < self.near:
-                felt = np.linalg.norm(columns[..., self._logarithmic], axis=(0, 1))
-                bent = 0.5 * felt @ away[self._logarithmic] ** 2  # to second order, and nothing cancels
-                if bent < self.near:
-                    return here + moved, columns
         return None, None
 
     def _nudged(self, theta: Array) -> Array:
