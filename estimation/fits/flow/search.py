@@ -12,7 +12,6 @@ from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form,
 from estimation.fits.flow.rough_search import RIVAL, UNLIKELY, RoughOptimum, rough_optima
 from estimation.fits.flow.swept import with_first_fit
 from estimation.fits.flow.wide_valves import opens_wide
-from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.drive_noise import moved_by_drives
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, explained
@@ -53,11 +52,6 @@ presumed, in five under a constant load at most 0.14."""
 RELIEF_RISE = 0.05
 """Least pressure rise above its setting at which a relief valve passes the rated flow where searches begin [fraction]:
 valves need 0.05 to 0.2. The default slope would be a corner of 0.0004 in small rigs."""
-
-COMPLETED, TOO_FAR = 10.0, 150.0
-"""Gain of short model steps and cracking valves up to which they hardly matter, and distance from a balance that leaves
-only noise, from which another balance is dropped [log-likelihood]. In one of 100 logs such a balance gained 180, and
-the likeliest gained 43. If the likeliest gained less than 10, others gained at most 86."""
 
 VALVES = ("makeup_conductance", "makeup_opening", *CRACKS, BEND, STIFFNESS)
 """Parameters that all balances share to the last digits; oil and losses compensate for the differences of the
@@ -158,8 +152,6 @@ def balanced(
     if not explained(best[0], best[1]):
         led = (nearest((one.problem.on(here), one.point, one.bounds), best, starts[0]) for one in behind)
         behind = [replace(one, point=point) for one, point in zip(behind, led, strict=True)]
-    elif least - best[1].cost < COMPLETED and _is_noise(best):
-        behind = [one for one in behind if one.point.cost < best[1].cost + TOO_FAR]
     done += each(lambda one: _finished(one, log, steps, best[1].cost, bent=bent), behind)
     if valley is not None:
         done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
@@ -218,12 +210,6 @@ def _told(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> Sequence[G
         )
 
     return each(told, done)
-
-
-def _is_noise(one: Found) -> bool:
-    """Return whether the residuals at a minimum are no larger than noise by chance."""
-    problem, point, _ = one
-    return 2.0 * point.cost < largest_chi_square(problem.blocks, 1.0) * problem.blocks
 
 
 def _shaken(one: Found) -> Array | None:
