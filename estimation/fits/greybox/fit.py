@@ -4,7 +4,7 @@ The variance of an estimate has three parts: noise of the outputs, noise of the 
 the rig's own parameters. The last two follow from the fit's linear response to them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -170,7 +170,6 @@ def roughly(
     wanted: float = np.inf,
     *,
     hopeful: bool = False,
-    screen: Callable[[Array], Point] | None = None,
 ) -> Point:
     """Return the lowest cost from several starts, with one model step per sample.
 
@@ -187,9 +186,7 @@ def roughly(
     wanted : float
         Cost above which the result is of no use [dimensionless], see `estimation.fits.greybox.descent.descend`.
     hopeful : bool
-        Whether several starts are followed only if one explains the beginning; otherwise the cost is infinite.
-    screen : callable, optional
-        Cost on the beginning of a longer log, if another search has computed part of it.
+        Whether several starts are followed only if one explains the beginning; else the cost is infinite.
 
     Returns
     -------
@@ -201,8 +198,7 @@ def roughly(
 
     def descended(guess: Array, samples: int, evaluations: int) -> Point:
         if samples < len(log.measured):
-            at = screen if screen and samples == search.screened else problem.on(log.beginning(samples)).at
-            return descend(at, guess, evaluations, bounds, search.near_enough)
+            return descend(problem.on(log.beginning(samples)).at, guess, evaluations, bounds, search.near_enough)
         return descend(whole.at, guess, evaluations, bounds, search.near_enough, wanted=wanted)
 
     if len(guesses) > 1:
