@@ -13,25 +13,27 @@ ALIKE_BY_CHANCE = 3.3
 that root (Bartlett 1946) [dimensionless]."""
 
 
-def largest_chi_square(samples: float) -> float:
+def largest_chi_square(samples: float, least: float = LARGEST_CHI_SQUARE) -> float:
     """Return the mean squared normalised residual above which a model is said to leave something out.
 
     Parameters
     ----------
     samples : float
         Residuals that count [count].
+    least : float
+        The same of a long log [dimensionless].
 
     Returns
     -------
     float
-        That of a long log, or what one log of a thousand exceeds by chance, whichever is more [dimensionless].
+        The same, or what one log of a thousand exceeds by chance, whichever is more [dimensionless].
 
     Examples
     --------
     >>> [round(largest_chi_square(samples), 2) for samples in (400, 1_482, 20_000)]
     [1.39, 1.2, 1.2]
     """
-    return max(LARGEST_CHI_SQUARE, 1.0 + MORE_THAN_CHANCE / samples**0.5)
+    return max(least, 1.0 + MORE_THAN_CHANCE / samples**0.5)
 
 
 def alike_by_chance(samples: float) -> float:
