@@ -19,7 +19,7 @@ from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
-from estimation.fits.hypothesis_search.final_fits import ALIKE, behind_filter, without_idle
+from estimation.fits.hypothesis_search.final_fits import ALIKE, WORTH, behind_filter, without_idle
 from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain_beside
 from estimation.fits.hypothesis_search.ranking import (
     NEARLY_AS_GOOD,
@@ -46,9 +46,6 @@ NOISE = 1.05
 BESIDE = 50.0
 """Predicted gain in log-likelihood of another volume beside a pump that delivers less, from which the two are searched
 together [dimensionless]; judged."""
-
-WORTH = 10.0
-"""Gain in log-likelihood that a hypothesis must reach to be accepted [dimensionless]."""
 
 
 def explain(
@@ -121,8 +118,8 @@ def explain(
             finished = _distinct([*finished, *rig_and_load(wide, begun[0], finished[0], spared, accepted)])
         finished = _distinct([behind_filter(wide, finished[0]), *finished])
     if is_explained(finished[0], accepted):
-        finished = _leaner(without_idle(wide, finished[0], WORTH), finished, accepted)
-        stuck = [one for one in stuck_instead(wide, finished[0], spared, WORTH) if is_explained(one, accepted)]
+        finished = _leaner(without_idle(wide, finished[0]), finished, accepted)
+        stuck = [one for one in stuck_instead(wide, finished[0], spared) if is_explained(one, accepted)]
         finished = [*stuck, *finished[len(stuck) :]]
     if paired:
         worn = with_delivery(wide, finished[0], spared, accepted)

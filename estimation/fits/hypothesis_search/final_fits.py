@@ -53,9 +53,8 @@ all others 0.78 to 2."""
 LITTLE = 1e-3
 """Share of the cost below which a gain means nothing, if far more than noise is left [fraction]; judged."""
 
-EVEN = 10.0
-"""Gain in log-likelihood below which a drift of pressure is linear [dimensionless]: the required gain of a
-hypothesis."""
+WORTH = 10.0
+"""Gain in log-likelihood below which a hypothesis is not accepted, and a drift of pressure is even [dimensionless]."""
 
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
@@ -106,8 +105,8 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
     sound = best.meant and not is_too_close(first, log.passes_on)
     if SETTLING in last:  # an even drift is better known as one
         even = tuple(replace(one, at_end=()) if one.at_end == (SETTLING,) else one for one in tried.together)
-        evenly = final_fit(log, replace(tried, together=even), best.cost + EVEN, *details)
-        if evenly.cost < best.cost + EVEN:
+        evenly = final_fit(log, replace(tried, together=even), best.cost + WORTH, *details)
+        if evenly.cost < best.cost + WORTH:
             return replace(evenly, together=tried.together)
     if sound and all(one.told(best.values, first.std) for one in best.together):
         return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
@@ -178,8 +177,8 @@ def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
     return filtered if filtered.cost < tried.cost else tried
 
 
-def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
-    """Return the final fit of a set without those of its hypotheses whose effect vanished.
+def without_idle(log: GreyBoxLog, tried: Trial) -> Trial:
+    """Return the final fit of a set without a hypothesis of it that ended where what it says is absent.
 
     A second hypothesis may lead a search out of a false minimum and vanish at the end. Oil with air was explained
     together with a make-up valve stuck shut, whose conductance was 1.02 ± 0.05 times the other's.
@@ -190,8 +189,6 @@ def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
         The log, widened.
     tried : Trial
         Several hypotheses, fitted to the end.
-    worth : float
-        Gain in log-likelihood that each hypothesis must add to be believed [dimensionless].
 
     Returns
     -------
@@ -201,11 +198,11 @@ def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
     if len(tried.together) < 2 or not tried.fits:
         return tried
     for one in tried.together:
-        if _is_absent(one, tried, (2.0 * worth) ** 0.5):
+        if _is_absent(one, tried, (2.0 * WORTH) ** 0.5):
             rest = tuple(other for other in tried.together if other != one)
             values = {**tried.values, **{name: tried.rig[name] for name in one.free}}
-            fewer = final_fit(log, replace(tried, together=rest, values=values), tried.cost + worth)
-            if fewer.cost < tried.cost + worth:
+            fewer = final_fit(log, replace(tried, together=rest, values=values), tried.cost + WORTH)
+            if fewer.cost < tried.cost + WORTH:
                 return fewer
     return tried
 

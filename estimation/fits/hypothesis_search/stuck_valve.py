@@ -6,13 +6,14 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import CHECKS_CRACK, MAKEUP_BLOCKED, MAKEUP_HIDDEN, UNLIKE_CRACKS
 from estimation.fits.hypothesis_search.decimation import Decimation
 from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.final_fits import WORTH
 from estimation.fits.hypothesis_search.ranking import likeliest
 from estimation.fits.hypothesis_search.screening import screen
 from estimation.fits.hypothesis_search.wide_log import delayed
 
 
-def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation, worth: float) -> list[Trial]:
-    """Return the best hypotheses with a stuck make-up valve, if one that opens much later is hardly likelier.
+def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation) -> list[Trial]:
+    """Return the best hypotheses with a stuck make-up valve, where one that opens far later is hardly likelier.
 
     A valve that never opens in a log looks like one that opens as late as the log allows. It is one fault with one
     unknown in place of two drops, and it leaves the class of the log undecided.
@@ -24,9 +25,7 @@ def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation, worth: float
     best : Trial
         The likeliest hypotheses.
     spared : Decimation
-        Samples and starts of the search.
-    worth : float
-        Gain in log-likelihood below which the late valve is not preferred [dimensionless].
+        What is spared, and where searches begin.
 
     Returns
     -------
@@ -38,6 +37,6 @@ def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation, worth: float
     if stuck or len(others) == len(best.together) or abs(best.values[CHECKS_CRACK.free[1]]) < UNLIKE_CRACKS:
         return []
     together = (*others, MAKEUP_BLOCKED if CHECKS_CRACK in best.together else MAKEUP_HIDDEN)
-    late, starts, wanted = delayed(log, best.delays), (best.values, *spared.starts), best.cost + worth
+    late, starts, wanted = delayed(log, best.delays), (best.values, *spared.starts), best.cost + WORTH
     tried = likeliest(late, [[*screen(late, together, starts, every=spared.every)]], wanted, spared)
     return [replace(one, delays=best.delays) for one in tried if one.fits and one.cost < wanted]

@@ -14,6 +14,7 @@ from estimation.fits.hypotheses import DELIVERY, OFFSET, Hypothesis
 from estimation.fits.hypothesis_search import explain
 from estimation.fits.hypothesis_search.decimation import FAINT, FEW, Decimation
 from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.final_fits import WORTH
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
 
 COST = attrgetter("cost")
@@ -120,7 +121,7 @@ def test_a_pair_beside_a_rival_counts_only_below_what_is_known(pairing: Pairing)
 
     assert [one.cost for one in pairing(2, screened, led_on, 1461.0)] == [1450.0] * 4
     assert not pairing(2, screened, led_on, 1459.0)
-    assert useful == [1461.0 - explain.WORTH, 1459.0 - explain.WORTH]
+    assert useful == [1461.0 - WORTH, 1459.0 - WORTH]
 
 
 def test_a_speed_that_is_late_and_one_that_is_early_are_one_where_they_came_to_one_place() -> None:

@@ -210,7 +210,7 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     monkeypatch.setattr(explain, "cost_over_noise", lambda *_: chi)
     monkeypatch.setattr(explain, "_paired", paired)
     monkeypatch.setattr(explain, "with_delivery", lambda *_: [])
-    monkeypatch.setattr(explain, "without_idle", lambda _, tried, __: tried)
+    monkeypatch.setattr(explain, "without_idle", lambda _, tried: tried)
     monkeypatch.setattr(conclusion, "weighed", lambda _: {})
     monkeypatch.setattr(conclusion, "usual_pressure", lambda *_: 0.0)
     monkeypatch.setattr(conclusion, "delivery_beside", lambda *_: NO_GAIN)

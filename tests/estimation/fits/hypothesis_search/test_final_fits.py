@@ -123,5 +123,5 @@ def test_a_hypothesis_that_ended_at_its_absence_is_not_told_beside_another(
 
     monkeypatch.setattr(final_fits, "final_fit", fewer)
     nothing: Any = None
-    told = final_fits.without_idle(nothing, both, 10.0)
+    told = final_fits.without_idle(nothing, both)
     assert told.together == ((AIR,) if alone else (AIR, MAKEUP_BLOCKED))

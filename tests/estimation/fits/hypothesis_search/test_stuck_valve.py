@@ -41,7 +41,7 @@ def stuck(
     monkeypatch.setattr(stuck_valve, "screen", lambda _, together, *__, **___: iter([trial(together, cost)]))
     monkeypatch.setattr(stuck_valve, "likeliest", lambda _, tried, *__: [way for one in tried for way in one])
     best = trial([crack, *beside], 1000.0, later)
-    return [one.together for one in stuck_valve.stuck_instead(NOTHING, best, NO_DECIMATION, 10.0)]
+    return [one.together for one in stuck_valve.stuck_instead(NOTHING, best, NO_DECIMATION)]
 
 
 def test_a_stuck_valve_is_told_where_a_late_one_is_hardly_likelier(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,7 +59,7 @@ def test_a_valve_that_is_stuck_already_is_not_stuck_twice(monkeypatch: pytest.Mo
 
 def test_valves_that_open_alike_are_both_sound(monkeypatch: pytest.MonkeyPatch) -> None:
     assert stuck(monkeypatch, 900.0, 0.5 * UNLIKE_CRACKS) == []
-    assert stuck_valve.stuck_instead(NOTHING, trial([DELIVERY], 1000.0), NO_DECIMATION, 10.0) == []
+    assert stuck_valve.stuck_instead(NOTHING, trial([DELIVERY], 1000.0), NO_DECIMATION) == []
 
 
 @pytest.mark.slow
