@@ -117,11 +117,6 @@ def find_condition(name: str) -> Condition:
 def parameters_for(condition: Condition, base: EhaParameters = PAPER_RIG) -> EhaParameters:
     """Return the actuator in a condition: Tables 3 and 4 on the paper's rig, a like change on any other.
 
-    Parameters
-    ----------
-    base : EhaParameters
-        The healthy actuator.
-
     Returns
     -------
     EhaParameters

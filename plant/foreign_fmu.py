@@ -98,11 +98,6 @@ def simulate_fmu(
 def fmu_variables(path: Path) -> frozenset[str]:
     """Return the names of an FMU's variables.
 
-    Returns
-    -------
-    frozenset of str
-        Inputs, outputs, parameters and what is inside.
-
     Raises
     ------
     HydrostateError

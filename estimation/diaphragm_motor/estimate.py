@@ -70,11 +70,6 @@ def estimate_motor(
     calibration : Signature, optional
         Of this motor when it was healthy, under the same drive: it corrects the electrodes' gains.
 
-    Returns
-    -------
-    MotorEstimate
-        Estimates, and how far the electrodes' pattern bears them.
-
     Raises
     ------
     LogError

@@ -203,11 +203,6 @@ def steady_drive(voltage: Floats, sample_time: float) -> Drive:
     sample_time : float
         Time between samples [s].
 
-    Returns
-    -------
-    Drive
-        Frequency, swing, phase.
-
     Raises
     ------
     LogError

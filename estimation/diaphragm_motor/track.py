@@ -155,11 +155,6 @@ def motor_blocks(record: Record, drive: Drive) -> list[Block]:
     record : Record
         Middle electrode and position.
 
-    Returns
-    -------
-    list[Block]
-        The blocks, one after the other.
-
     Raises
     ------
     LogError

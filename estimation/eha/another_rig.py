@@ -55,16 +55,7 @@ def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
 def unless_rig_contradicted(slips: tuple[Note, ...], record: Record, p: EhaParameters) -> tuple[Note, ...]:
     """Return wrong signs and units that a fit names; the objection to the rig file if only pressure would be wrong.
 
-    The unit of pressure does not change how far the pump moves the piston.
-
-    Parameters
-    ----------
-    slips : tuple of Note
-        The slips that the fit names.
-    record : Record
-        The log.
-    p : EhaParameters
-        The healthy actuator.
+    The unit of pressure changes nothing about how far the pump sends the piston.
     """
     of_pressure = all(one.data.get("channel") == PRESSURE for one in slips)
     return (rig_contradicted(record, p) if of_pressure else ()) or slips

@@ -168,11 +168,6 @@ def estimate_clean(
     uncertainties : Mapping[str, float or Spread], optional
         Uncertainty of the actuator's parameters [fraction]; it changes neither outcome nor gate.
 
-    Returns
-    -------
-    BulkModulusEstimate
-        Value, interval, bound and verdict.
-
     Raises
     ------
     HydrostateError

@@ -189,11 +189,6 @@ def estimate_by_flow_filter(
     guess : float, optional
         First guess of bulk modulus [Pa]; the actuator's if not given.
 
-    Returns
-    -------
-    BulkModulusEstimate
-        Value, interval, bound and verdict.
-
     Raises
     ------
     HydrostateError

@@ -75,11 +75,6 @@ def filter_flow(
     guess : float, optional
         First guess of bulk modulus [Pa]; the rig's if not given.
 
-    Returns
-    -------
-    FlowReading
-        Sample by sample, and the last reading.
-
     Raises
     ------
     LogError

@@ -86,12 +86,7 @@ def run_bank(members: Sequence[Member], near: tuple[int, ...]) -> Reading:
     members : sequence of Member
         Filters of one log; those of a model run side by side. All models have the same states.
     near : tuple of int
-        Indices of the states by which filters are told apart.
-
-    Returns
-    -------
-    Reading
-        The mixture, and its likeliest filter.
+        Places of the states in which filters are told apart.
     """
     first = members[0].problem
     samples, every = len(first.measured), first.every

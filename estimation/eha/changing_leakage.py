@@ -20,11 +20,6 @@ LEAST_GROWN = 1e-3
 def growth_note(found: Explanation, _: EhaParameters) -> Note:
     """Return the note on a leakage that changes throughout a log: drifting as oil warms, or growing.
 
-    Parameters
-    ----------
-    found : Explanation
-        The explanation of the log.
-
     Returns
     -------
     Note
@@ -55,11 +50,6 @@ def changed_note(factor: float, last: float) -> Note:
 
 def step_note(found: Explanation, _: EhaParameters) -> Note:
     """Return the note on a leakage that steps.
-
-    Parameters
-    ----------
-    found : Explanation
-        The explanation of the log.
 
     Returns
     -------

@@ -74,11 +74,6 @@ class EntrainedAir(NamedTuple):
 def entrained_air(found: Explanation | None) -> EntrainedAir | None:
     """Return the air that is in the oil from the beginning of a log.
 
-    Parameters
-    ----------
-    found : Explanation or None
-        The explanation of the log.
-
     Returns
     -------
     EntrainedAir or None
@@ -95,13 +90,6 @@ def with_air(parameters: EhaParameters, found: Explanation | None) -> EhaParamet
     """Return an actuator with the oil and air that a log shows, for a circuit, whose bubbles are isothermal.
 
     Their compliance equals the log's where it matters most: at the inner circuit's pressure.
-
-    Parameters
-    ----------
-    parameters : EhaParameters
-        The actuator.
-    found : Explanation or None
-        The explanation of the log.
 
     Returns
     -------
@@ -141,13 +129,7 @@ def amount_of_air(
 
 
 def air_note(found: Explanation, _: EhaParameters) -> Note:
-    """Return the note on air that explains a log, from its beginning or from some time on.
-
-    Parameters
-    ----------
-    found : Explanation
-        The explanation with that air.
-    """
+    """Return the note on air that explains a log, from its beginning or from some time on."""
     softness, std = found.values["air_softness"]
     said = {"percent": 100.0 * softness / ATMOSPHERE, "half_width": 100.0 * NORMAL_95 * std / ATMOSPHERE}
     if (air := entrained_air(found)) is None:

@@ -65,36 +65,12 @@ def estimate_log(record: Record, rig: Rig, options: EstimateOptions = DEFAULT_OP
 
 
 def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanLog, BulkModulusEstimate]:
-    """Return a log, after its checks, with its estimate.
-
-    Parameters
-    ----------
-    options : EstimateOptions
-        Options of the estimate.
-
-    Returns
-    -------
-    tuple of CleanLog and BulkModulusEstimate
-        Both.
-    """
+    """Return a log with its estimate."""
     return log, estimate_clean(log, rig.parameters, options, rig.spreads)
 
 
 def finding_of(log: CleanLog, found: BulkModulusEstimate, rig: Rig) -> Finding:
-    """Return an estimate as a finding.
-
-    Parameters
-    ----------
-    found : BulkModulusEstimate
-        Its estimate.
-    rig : Rig
-        The actuator, as its file has it.
-
-    Returns
-    -------
-    Finding
-        Without a condition.
-    """
+    """Return an estimate as a finding."""
     return Finding(
         actuator=KIND,
         outcome=found.outcome,

@@ -55,11 +55,6 @@ OUTSIDE = {
 def notes_of(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
     """Return notes on the explanation of a log, each with its value and 95 % half width.
 
-    Parameters
-    ----------
-    found : Explanation
-        The hypotheses that were accepted.
-
     Returns
     -------
     tuple of Note
@@ -246,11 +241,6 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
 def at_pump_speed(log: CleanLog, turning: Turning) -> CleanLog:
     """Return a log with the speed at which a pump without ripple delivers the same flow.
 
-    Parameters
-    ----------
-    turning : Turning
-        Pump ripple, and offset of the logged speed.
-
     Returns
     -------
     CleanLog
@@ -319,14 +309,6 @@ def _brought_forward(record: Record, channel: str, late: float) -> Array:
 
 
 def rig_set_right(parameters: EhaParameters, found: Explanation) -> EhaParameters:
-    """Return the rig with the pump's delivery and the chambers' volumes and areas that explain a log.
-
-    Parameters
-    ----------
-    parameters : EhaParameters
-        The rig file's actuator.
-    found : Explanation
-        The explanation of the log.
-    """
+    """Return the rig with the pump's delivery and the chambers' volumes and areas that explain a log."""
     names = [name for name in RIG_ENTRIES if name in found.values]
     return replace(parameters, **{name: found.values[name][0] for name in names})

@@ -110,12 +110,7 @@ class BulkModulusEstimate:
         name : str
             Its name.
         one : Quantity
-            The quantity with the interval given the rig [in its unit].
-
-        Returns
-        -------
-        Quantity
-            With both intervals.
+            With the interval that holds if the rig file is right [in its unit].
         """
         return with_total(one, self.responses.get(name), self.spreads)
 
@@ -174,12 +169,7 @@ def without_number(
     channels : tuple of str
         Channels that were examined beside motor speed.
     bound : float
-        Relative Cramér-Rao bound [fraction]; NaN if it was not computed.
-
-    Returns
-    -------
-    BulkModulusEstimate
-        With its gate shut.
+        Relative Cramér-Rao bound [fraction]; NaN where it was not asked for.
     """
     return BulkModulusEstimate(
         outcome=outcome,

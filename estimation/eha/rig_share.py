@@ -157,11 +157,6 @@ def _log_ratio(value: float, more: float) -> float:
 def wear_left_open(remarks: Sequence[Note]) -> float:
     """Return the uncertainty of pump delivery below displacement, if a log cannot separate wear from leakage.
 
-    Parameters
-    ----------
-    remarks : sequence of Note
-        Notes on what a fit leaves open.
-
     Returns
     -------
     float
@@ -191,11 +186,6 @@ class OpenDelivery(NamedTuple):
 def delivery_left_open(remarks: Sequence[Note]) -> OpenDelivery | None:
     """Return the pump delivery from a log that cannot separate wear from leakage.
 
-    Parameters
-    ----------
-    remarks : sequence of Note
-        Notes on what a fit leaves open.
-
     Returns
     -------
     OpenDelivery or None
@@ -216,20 +206,7 @@ def _said_of_wear(remarks: Sequence[Note]) -> Mapping[str, Any] | None:
 
 
 def with_wear(spreads: Mapping[str, Spread], remarks: Sequence[Note]) -> Mapping[str, Spread]:
-    """Return the uncertainties of rig entries, with displacement's lower one widened by undetermined pump wear.
-
-    Parameters
-    ----------
-    spreads : Mapping[str, Spread]
-        Uncertainty of each entry, from the rig file.
-    remarks : sequence of Note
-        Notes on what a fit leaves open.
-
-    Returns
-    -------
-    Mapping[str, Spread]
-        By entry.
-    """
+    """Return the uncertainties of rig entries, displacement's lower one widened by undetermined pump wear."""
     down, up = spreads.get(DELIVERY_ENTRY, (0.0, 0.0))
     worn = wear_left_open(remarks)
     return {**spreads, DELIVERY_ENTRY: Spread(worn, up)} if worn > down else spreads

@@ -34,13 +34,7 @@ def entry(P: Covariance, i: int, j: int) -> Expression:
 
 
 def total(terms: Sequence[Expression]) -> Expression:
-    """Return the sum of terms, in their order.
-
-    Parameters
-    ----------
-    terms : sequence of Expression
-        What to add.
-    """
+    """Return the sum of terms, in their order."""
     return sum(terms, ZERO)
 
 
@@ -134,11 +128,6 @@ def bounded(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]
     ----------
     mean : sequence of Expression
         The state in the filter's units.
-
-    Returns
-    -------
-    list of Expression
-        The state within its bounds.
     """
     held: list[Expression] = []
     for z, state in zip(mean, model.states, strict=True):
@@ -202,11 +191,6 @@ def believed(model: ProcessModel, mean: Sequence[Expression], covariance: Covari
         The state in the filter's units.
     covariance : dict
         Upper triangle.
-
-    Returns
-    -------
-    dict[str, Expression]
-        New value of each mean and covariance symbol.
     """
     held = {f"z{i}": z for i, z in enumerate(bounded(model, mean))}
     return held | {f"P{i}_{j}": value for (i, j), value in covariance.items()}

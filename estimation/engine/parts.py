@@ -124,13 +124,7 @@ class RuleFunctions:
 
 
 def rule_functions(rule: Rule, model: ProcessModel, channels: tuple[str, ...], suffix: str = "") -> RuleFunctions:
-    """Write a rule's halves as functions.
-
-    Returns
-    -------
-    RuleFunctions
-        Their source, and what they read and write.
-    """
+    """Write a rule's halves as functions."""
     count = len(channels)
     carried = (*belief_names(model.width), *(f"{name}{c}" for name in rule.memory for c in range(count)))
     halves = halves_of(rule, model, channels, scored=False)

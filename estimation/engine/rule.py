@@ -98,11 +98,6 @@ def weighing(rule: Rule, robust: str) -> Rule:
 def chosen_settings(problem: FilterProblem, method: str, known: Sequence[Setting] = ()) -> dict[str, float]:
     """Return a method's settings, the user's in place of the defaults.
 
-    Parameters
-    ----------
-    problem : FilterProblem
-        The task, with what its user set.
-
     Returns
     -------
     dict[str, float]

@@ -134,11 +134,6 @@ def read_off(
         Logarithms of the products flushed on the way [dimensionless].
     traces : sequence of Trace
         Tracks and innovations of as many tasks as are wanted.
-
-    Returns
-    -------
-    list of Trace
-        The same with final beliefs and scores.
     """
     width, carried = lanes[0].model.width, work[: len(places.carried)]
     rows, columns = upper_triangle(width)

@@ -13,18 +13,7 @@ from plant.compiled.hints import is_waypoint
 
 
 def waypoints_of(outputs: Sequence[Expression]) -> list[Expression]:
-    """Return the waypoints of a step, each after those that it depends on.
-
-    Parameters
-    ----------
-    outputs : sequence of Expression
-        The state one step later.
-
-    Returns
-    -------
-    list of Expression
-        Nodes that the model marked.
-    """
+    """Return the waypoints of a step, each after those that it depends on."""
     return [item for item in ordered(outputs, by_slopes=True) if is_waypoint(item)]
 
 

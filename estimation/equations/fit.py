@@ -98,11 +98,6 @@ def fit_equations(
     seed : int
         Of what is drawn.
 
-    Returns
-    -------
-    EquationsFit
-        Values, intervals, gate, and what the logs do not tell.
-
     Raises
     ------
     HydrostateError

@@ -117,11 +117,6 @@ def searched(
 def noise_of(parts: Sequence[Part]) -> Array:
     """Return the standard deviation of each output's noise by its second differences, which hold nothing smooth.
 
-    Parameters
-    ----------
-    parts : sequence of Part
-        The logs.
-
     Returns
     -------
     ndarray, shape (outputs,)

@@ -65,11 +65,6 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
 def require_no_limits(model: FreeRunModel) -> None:
     """Refuse a model whose output has limits: a transfer function alone goes on behind them.
 
-    Parameters
-    ----------
-    model : FreeRunModel
-        Any.
-
     Raises
     ------
     HydrostateError

@@ -21,11 +21,6 @@ def filter_fmu(problem: FilterProblem, method: str, fmi: str, *, name: str) -> b
     name : str
         The model's identifier.
 
-    Returns
-    -------
-    bytes
-        The archive.
-
     Raises
     ------
     HydrostateError

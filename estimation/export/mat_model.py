@@ -16,18 +16,6 @@ def model_in_mat(model: FreeRunModel, *, name: str) -> dict[str, bytes]:
     ``numerator`` and ``denominator`` are in powers of the delay operator, an input a row; the output is that of the
     transfer functions of the inputs less ``input_mean``, and ``output_level``.
 
-    Parameters
-    ----------
-    model : FreeRunModel
-        A linear one.
-    name : str
-        What the file is called.
-
-    Returns
-    -------
-    dict[str, bytes]
-        The file by its name.
-
     Raises
     ------
     HydrostateError

@@ -134,11 +134,6 @@ def linearised_update(
         Measurement variances [SI squared].
     robust : str
         How innovations that are too large count, see `estimation.engine.robust`.
-
-    Returns
-    -------
-    Update
-        The belief, and what was seen on the way.
     """
     mean, covariance = belief_symbols(model)
     seen, inflated, earlier = Outputs(), list[Expression](), None

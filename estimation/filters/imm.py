@@ -51,11 +51,6 @@ def imm(problem: FilterProblem) -> Trace:
     problem : FilterProblem
         The task; it may set ``dwell_time`` [s]. What the model estimates itself is not varied.
 
-    Returns
-    -------
-    Trace
-        Moments of the mixture, its innovations and likelihood.
-
     Raises
     ------
     HydrostateError

@@ -189,25 +189,13 @@ def filter_problem(
 
 
 def predicted_channels(model: ProcessModel) -> tuple[str, ...]:
-    """Return the channels that a model predicts.
-
-    Returns
-    -------
-    tuple of str
-        Channel names, in the model's order.
-    """
+    """Return the channels that a model predicts."""
     state = tuple(symbol(f"z{i}") for i in range(model.width))
     return tuple(model.observe(state, parameter_symbols(model.parameters)))
 
 
 def available_channels(model: ProcessModel, record: Record) -> tuple[str, ...]:
-    """Return the channels that the model predicts and the record has.
-
-    Returns
-    -------
-    tuple of str
-        Channel names, in the model's order.
-    """
+    """Return the channels that the model predicts and the record has."""
     return tuple(channel for channel in predicted_channels(model) if channel in record)
 
 

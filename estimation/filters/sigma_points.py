@@ -112,13 +112,6 @@ def root(P: Covariance, n: int) -> Matrix:
 def is_affine(item: Expression, mean: Sequence[Expression]) -> bool:
     """Return whether an expression is affine in the states.
 
-    Parameters
-    ----------
-    item : Expression
-        The expression.
-    mean : sequence of Expression
-        Symbols of the states.
-
     Returns
     -------
     bool
@@ -203,11 +196,6 @@ def sigma_predict(model: ProcessModel, spread_of: SpreadOf) -> Outputs:
 
     The model is asked about states within their physical bounds only: a point beyond them is projected onto them
     (Kandepu, Foss and Imsland 2008, section 3), while a state that the step hands through keeps its own points.
-
-    Returns
-    -------
-    dict[str, Expression]
-        New value of each mean and covariance symbol.
     """
     n = model.width
     mean, P = belief_symbols(model)

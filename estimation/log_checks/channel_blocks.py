@@ -61,11 +61,6 @@ def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBl
         The actuator, for its pump.
     length : float
         Length of a block [s].
-
-    Returns
-    -------
-    ChannelBlocks
-        Means and slopes.
     """
     size = max(FEWEST_SAMPLES, round(length / record.sample_time))
     span = size * record.sample_time

@@ -71,11 +71,6 @@ class CleanLog:
     def objections_to(self, channels: tuple[str, ...]) -> tuple[Note, ...]:
         """Return the objections to the sensors of some channels.
 
-        Parameters
-        ----------
-        channels : tuple of str
-            The channels.
-
         Returns
         -------
         tuple of Note
@@ -93,11 +88,6 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
         The log.
     parameters : EhaParameters
         The actuator, for its relief valve and for the motion due to its pump.
-
-    Returns
-    -------
-    CleanLog
-        The log to fit, and the findings.
 
     Raises
     ------

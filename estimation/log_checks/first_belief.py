@@ -38,11 +38,6 @@ def first_belief(model: ProcessModel, record: Record, start: float, start_std: f
         First guess of effective bulk modulus [Pa].
     start_std : float
         Its standard deviation [Pa].
-
-    Returns
-    -------
-    Gaussian
-        The prior.
     """
     firsts = {POSITION: _first(record, POSITION), BULK_MODULUS: start}
     firsts[PRESSURE] = _first(record, PRESSURE)

@@ -15,11 +15,6 @@ some ten cycles or more."""
 def require_live(record: Record, names: Iterable[str]) -> None:
     """Refuse a log in which one of these channels is constant for long.
 
-    Parameters
-    ----------
-    names : iterable of str
-        The channels.
-
     Raises
     ------
     LogError

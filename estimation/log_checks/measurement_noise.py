@@ -38,13 +38,6 @@ def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[st
     quantised: its variance is the mean square of its small differences, and at least one twelfth of the squared
     quantum.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-    channels : sequence of str
-        Channels wanted.
-
     Returns
     -------
     Mapping[str, float]

@@ -27,13 +27,6 @@ a rig file may have a fifth too much of it. Loads may need more."""
 def sliding_pressure(record: Record, p: EhaParameters) -> float:
     """Return the median pressure while the piston slides, over what the rig's friction takes at its speed.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-    p : EhaParameters
-        The actuator.
-
     Returns
     -------
     float

@@ -50,14 +50,7 @@ class Travels(NamedTuple):
 def travels(record: Record, p: EhaParameters) -> Travels | None:
     """Return the travel of piston and pump, with noise averaged out over blocks; None if one is not logged.
 
-    Without position, velocity is used, less an offset of no more flow than one of motor speed may have.
-
-    Parameters
-    ----------
-    record : Record
-        The log.
-    p : EhaParameters
-        The actuator.
+    Without position, velocity tells, less an offset that is worth no more flow than one of motor speed may be.
     """
     blocks = channel_blocks(record, p, MIDDLE)
     offset = p.pump_displacement * LIMITS["motor_speed_rad_s"].least

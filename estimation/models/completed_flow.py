@@ -26,11 +26,6 @@ def completed(form: GreyBoxModel, *, bent: bool = False) -> GreyBoxModel:
         One of `estimation.models.flow` whose volumes swing.
     bent : bool
         Whether the valves are orifices at a large drop, which costs a root of each in each step.
-
-    Returns
-    -------
-    GreyBoxModel
-        With more unknowns behind its own.
     """
     sizes, names = tuple((name, USUAL_CRACK) for name in CRACKS), CRACKS
     if bent:

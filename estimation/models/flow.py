@@ -326,11 +326,6 @@ def reaches_relief(pressure: Array, setting: float) -> bool:
     setting : float
         The valve's setting [Pa].
 
-    Returns
-    -------
-    bool
-        Whether pressure comes near the setting.
-
     Examples
     --------
     >>> reaches_relief(np.array([0.0, np.nan, -3.4e6]), 3.4475e6)

@@ -211,11 +211,6 @@ def prepared(
     channels : collection of str
         What is used of what is logged.
 
-    Returns
-    -------
-    StackRuns
-        The log, and the runs that are compared with it.
-
     Raises
     ------
     LogError

@@ -113,11 +113,6 @@ def wander(estimate: Estimate, state: str) -> float:
     The estimate of a constant is a martingale under its own model: each stretch moves it with the variance by which
     the stretch reduces its own. Only what comes after settling counts.
 
-    Parameters
-    ----------
-    state : str
-        A state that is constant in time.
-
     Returns
     -------
     float

@@ -37,11 +37,6 @@ def rewritten(outputs: Outputs, replacement: Mapping[str, Expression]) -> Output
     replacement : Mapping[str, Expression]
         What stands for a symbol, by its name.
 
-    Returns
-    -------
-    dict[str, Expression]
-        The same names.
-
     Examples
     --------
     >>> x = symbol("x")
@@ -78,11 +73,6 @@ def directional(outputs: Outputs, moving: Mapping[str, Expression]) -> Outputs:
         The expressions.
     moving : Mapping[str, Expression]
         By how much each symbol moves, by its name.
-
-    Returns
-    -------
-    dict[str, Expression]
-        Derivatives, under the same names.
 
     Examples
     --------

@@ -140,11 +140,6 @@ def tune(
         What the filter is told of the log, as `estimation.log_checks.told_once` has it; all of it if not given. What
         the sensors resolve is read off the log itself.
 
-    Returns
-    -------
-    Tuning
-        The levels found, with their likelihood and NIS, and the published ones beside.
-
     Raises
     ------
     LogError
@@ -190,11 +185,6 @@ def noise_coordinates(
         quarter of what the noise of measured motor speed makes it.
     speed_variance : float, optional
         Measurement variance of motor speed [rad^2/s^2]; read off the log if not given.
-
-    Returns
-    -------
-    list of Coordinate
-        One a state with noise, then one a channel.
     """
     names = layout(EKF, problem.model, problem.channels).rows
     unseen = speed_noise(record, parameters, speed_variance)

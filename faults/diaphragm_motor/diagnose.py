@@ -181,11 +181,6 @@ def diagnose_motor(
         Of this motor when it was healthy, under the same drive and load; what it differs by from the model is taken
         to stay.
 
-    Returns
-    -------
-    MotorDiagnosis
-        Hypotheses by probability.
-
     Raises
     ------
     LogError
@@ -196,13 +191,7 @@ def diagnose_motor(
 
 
 def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters) -> MotorDiagnosis:
-    """Lay a signature beside every fault's curve (`diagnose_motor`).
-
-    Returns
-    -------
-    MotorDiagnosis
-        Hypotheses by probability.
-    """
+    """Lay a signature beside every fault's curve (`diagnose_motor`)."""
     point = _operating_point(seen)
     simulated = _simulated(healthy, *point)
     whitening = _whitening(tolerance(healthy, *point) + seen.covariance)

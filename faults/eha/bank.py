@@ -39,13 +39,7 @@ LIBRARY_DURATION = 60.0
 
 @lru_cache(maxsize=16)
 def mathematical_bank(rig: EhaParameters) -> Mapping[str, EhaParameters]:
-    """Return the actuator's parameters in each of the nine conditions, kept for the next log.
-
-    Parameters
-    ----------
-    rig : EhaParameters
-        The healthy actuator.
-    """
+    """Return the actuator's parameters in each of the nine conditions, kept for the next log."""
     return MappingProxyType({name: parameters_for(condition, rig) for name, condition in CONDITIONS.items()})
 
 

@@ -270,11 +270,6 @@ def plate_modes(p: PlateParameters, count: int = 6) -> list[PlateMode]:
     In place of the paper's finite-element figures; liquid lowers them all. Source: Leissa, Vibration of Plates (1969),
     section 2.1.
 
-    Returns
-    -------
-    list of PlateMode
-        Modes by rising frequency.
-
     Examples
     --------
     >>> [round(mode.frequency, -2) for mode in plate_modes(PlateParameters(), 3)]

@@ -121,11 +121,6 @@ def cylinder_circuit(duty: Duty, bore: float, rod: float) -> CylinderCircuit:
     bore, rod : float
         Diameters [m].
 
-    Returns
-    -------
-    CylinderCircuit
-        Forces, flows, and the sizes of valve, check valves, relief valve and pipes.
-
     Raises
     ------
     HydrostateError
@@ -169,11 +164,6 @@ def cylinder_circuit(duty: Duty, bore: float, rod: float) -> CylinderCircuit:
 
 def size_cylinder(duty: Duty) -> CylinderCircuit:
     """Return the smallest standard cylinder that does its duty, with its circuit (section 5.1).
-
-    Parameters
-    ----------
-    duty : Duty
-        Loads, speeds, pressures.
 
     Returns
     -------

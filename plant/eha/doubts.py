@@ -139,11 +139,6 @@ def doubts_of(parameters: Any) -> Mapping[str, Doubt]:
     ----------
     parameters : dataclass or its type
         The actuator's parameters [SI].
-
-    Returns
-    -------
-    Mapping[str, Doubt]
-        By entry.
     """
     from plant.eha.model import EhaParameters
 

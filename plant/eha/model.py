@@ -125,11 +125,6 @@ EhaValues: TypeAlias = EhaParameters | SimpleNamespace
 def piston_areas(p: EhaValues) -> tuple[Scalar, Scalar]:
     """Return the areas of the piston's sides A and B.
 
-    Parameters
-    ----------
-    p : EhaParameters or namespace of Expression
-        The actuator.
-
     Returns
     -------
     tuple of float or Expression

@@ -59,13 +59,7 @@ class ParameterPath:
 
     @classmethod
     def constant(cls, parameters: EhaParameters) -> "ParameterPath":
-        """Return the path on which nothing changes.
-
-        Returns
-        -------
-        ParameterPath
-            One parameter set at all times.
-        """
+        """Return the path on which nothing changes."""
         return cls((0.0,), (parameters,))
 
     @property

@@ -42,11 +42,6 @@ def friction_scales(p: EhaParameters) -> Mapping[str, float]:
     Friction goes with that differential pressure times the piston's area, at the same share of the velocity that the
     pump's rated flow would give without losses.
 
-    Parameters
-    ----------
-    p : EhaParameters
-        The healthy actuator.
-
     Returns
     -------
     Mapping[str, float]
@@ -99,11 +94,6 @@ def natural_frequency(p: EhaParameters) -> float:
     """Return the natural frequency of the piston on its oil, pump and valves shut, in the middle position.
 
     Source: Merritt, Hydraulic Control Systems (1967), section 6-2, for two chambers of ``2 V_0`` each.
-
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
 
     Returns
     -------

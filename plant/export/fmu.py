@@ -53,11 +53,6 @@ def plant_fmu(plant: Plant, parameters: EhaParameters, sample_time: float, fmi: 
     name : str
         The model's identifier.
 
-    Returns
-    -------
-    bytes
-        The archive.
-
     Raises
     ------
     HydrostateError
