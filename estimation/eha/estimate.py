@@ -65,7 +65,7 @@ def estimate_log(record: Record, rig: Rig, options: EstimateOptions = DEFAULT_OP
 
 
 def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanLog, BulkModulusEstimate]:
-    """Return a log with its estimate."""
+    """Return a log, after its checks, with its estimate."""
     return log, estimate_clean(log, rig.parameters, options, rig.spreads)
 
 

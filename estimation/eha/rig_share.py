@@ -206,7 +206,7 @@ def _said_of_wear(remarks: Sequence[Note]) -> Mapping[str, Any] | None:
 
 
 def with_wear(spreads: Mapping[str, Spread], remarks: Sequence[Note]) -> Mapping[str, Spread]:
-    """Return the uncertainties of rig entries, displacement's lower one widened by undetermined pump wear."""
+    """Return the uncertainties of rig entries, with displacement's lower one widened by undetermined pump wear."""
     down, up = spreads.get(DELIVERY_ENTRY, (0.0, 0.0))
     worn = wear_left_open(remarks)
     return {**spreads, DELIVERY_ENTRY: Spread(worn, up)} if worn > down else spreads

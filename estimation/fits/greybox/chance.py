@@ -14,19 +14,19 @@ that root (Bartlett 1946) [dimensionless]."""
 
 
 def largest_chi_square(samples: float, least: float = LARGEST_CHI_SQUARE) -> float:
-    """Return the mean squared normalised residual above which a model is said to leave something out.
+    """Return the mean squared normalised residual above which a model does not explain its log.
 
     Parameters
     ----------
     samples : float
-        Residuals that count [count].
+        Number of residuals [count].
     least : float
-        The same of a long log [dimensionless].
+        The limit for a long log [dimensionless].
 
     Returns
     -------
     float
-        The same, or what one log of a thousand exceeds by chance, whichever is more [dimensionless].
+        That limit, or the value that one log in a thousand exceeds by chance, whichever is larger [dimensionless].
 
     Examples
     --------
