@@ -67,6 +67,7 @@ def descend(
     radius: float = FIRST_RADIUS,
     wanted: float = np.inf,
     least_share: float = 0.0,
+    good: float = -np.inf,
 ) -> Point:
     """Return the lowest cost found downhill from a start: Gauss-Newton steps within a trust region and bounds.
 
@@ -91,7 +92,9 @@ def descend(
         Cost above which the result is of no use [dimensionless]: a search ends if all remaining steps would not reach
         it, should each gain what the last one did or the next one promises.
     least_share : float
-        Share of the remaining cost that a further step must promise [fraction].
+        Share of the cost that is left which a further step must promise [fraction].
+    good : float
+        Cost below which the search ends: how far it would come is not asked [dimensionless].
 
     Returns
     -------
@@ -117,6 +120,7 @@ def descend(
         radius,
         wanted,
         least_share,
+        good,
     )[0]
 
 
@@ -129,6 +133,7 @@ def descend_together(
     radius: float = FIRST_RADIUS,
     wanted: float = np.inf,
     least_share: float = 0.0,
+    good: float = -np.inf,
 ) -> list[Point]:
     """Return the lowest cost found downhill from each of several starts, with steps in parallel; see `descend`.
 
@@ -150,6 +155,8 @@ def descend_together(
         See `descend` [dimensionless].
     least_share : float
         See `descend` [fraction].
+    good : float
+        See `descend` [dimensionless].
 
     Returns
     -------
@@ -157,8 +164,8 @@ def descend_together(
         The best point from each start.
     """
 
-    def worth(_: Point, hoped: float) -> bool:
-        return not hoped > wanted
+    def worth(best: Point, hoped: float) -> bool:
+        return not hoped > wanted and not best.cost < good
 
     searches = [search(start, evaluations, bounds, least_gain, radius, worth, least_share) for start in starts]
     asked = {i: next(search) for i, search in enumerate(searches)}

@@ -308,7 +308,7 @@ def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
     samples = len(problem.log.measured)
     chi_square = 2.0 * problem.at(begun.theta).cost / samples  # where the search begins: it is not run twice
     spared = chi_square < share * SPARED_NIS or share_of_motion(chi_square, problem.log) < share * SPARED_SHARE
-    return explained(problem) if spared and samples > SCREENED else np.inf
+    return explained(problem) if spared and samples * problem.log.sample_time > SCREENED else np.inf
 
 
 def _rival(second: Ended, whole: FreedProblem, best: Point, *, told: bool) -> list[GreyBoxFit]:

@@ -25,11 +25,11 @@ from estimation.models.motion import LINEAR, UNKNOWNS
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
 
-SCREENED = 4_000
-"""Samples on which starts are compared."""
+SCREENED = 4.0
+"""Beginning on which starts are compared [s]."""
 
-SEARCHED = 10_000
-"""Samples on which a start that explains those is searched further; the search of a longer log continues from there."""
+SEARCHED = 10.0
+"""Beginning on which a start that explains that is carried on [s]; a longer log goes on from where it ends."""
 
 UNCHANGED = (1.0, 1.0)
 """Factors that leave the noise as it is [dimensionless]."""
@@ -70,8 +70,8 @@ HOPELESS = 3.0
 """The same from which only the likeliest start of each way is tried [dimensionless]."""
 
 FOREIGN = 10.0
-"""The same, on the first `SEARCHED` samples, from which a near explanation of the first `SCREENED` is not left for a
-lower minimum [dimensionless]. Judged: such ends had 100 to 600, and little moved in the beginning."""
+"""The same, on the first `SEARCHED` seconds, from which what nearly explains the first `SCREENED` is not left for a
+deeper minimum [dimensionless]. Judged: such ends had 100 to 600, and the beginning held little that moves."""
 
 SLIGHT = 1e-3
 """Cost that a further step must promise if nothing explains the log, over that of an explanation [fraction]."""
@@ -130,7 +130,7 @@ class MotionSearch:
     whole : FreedProblem
         The problem on the whole log.
     part, short : FreedProblem
-        The same on its first `SEARCHED` and `SCREENED` samples.
+        The same on its first `SEARCHED` and `SCREENED` seconds.
     guesses : list of ndarray, shape (unknowns,)
         Starts [dimensionless].
     bounds : tuple of ndarray, shape (unknowns,)
@@ -165,7 +165,7 @@ class MotionSearch:
         soft = followed(log, parameter_names(form.parameters))
         bounds, near = (search_bounds(whole.model, guesses, limits) for limits in (lead, lead | soft))
         speed = log.drives[:, form.drives.index("motor_speed_rad_s")]
-        lengths = (driven_samples(speed, samples) for samples in (SEARCHED, SCREENED))
+        lengths = (driven_samples(speed, round(length / log.sample_time)) for length in (SEARCHED, SCREENED))
         part, short = (whole.on(log.beginning(samples)) for samples in lengths)
         return cls(whole, part, short, guesses, bounds, near)
 
@@ -223,7 +223,7 @@ class Ended:
     point : Point
         The best point that it found, on the longest beginning that it reached.
     explains : bool
-        Whether it explains the log's first `SEARCHED` samples.
+        Whether it explains the log's first `SEARCHED` seconds.
     """
 
     search: MotionSearch
@@ -277,7 +277,7 @@ class _Tries:
         return self._begun.work <= MOST_WORK * (1.0 if promising else share)
 
     def carried_on(self, near: Array) -> Point | None:
-        """Return the optimum from a start on the first `SEARCHED` samples if it explains them.
+        """Return the optimum from a start on the first `SEARCHED` seconds if it explains them.
 
         What explains the shorter beginning is searched once per local minimum, and once in all after `MOST_WORK`.
         """
@@ -315,7 +315,7 @@ class _Tries:
         """Return whether more of the log is nearly explained from a point that nearly explains its beginning."""
         search, wanted = self.search, FOREIGN * explained(self.search.part)
         at = self._begun.at(search.part)
-        return descend(at, point.theta, FINISHING, search.bounds, ENOUGH, wanted=wanted).cost < wanted
+        return descend(at, point.theta, FINISHING, search.bounds, ENOUGH, wanted=wanted, good=wanted).cost < wanted
 
 
 def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
