@@ -31,7 +31,6 @@ from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
-from plant.solvers.adaptive import LANES
 
 SOFTENED = 30.0
 """Log-likelihood that two circuits must gain before softer oil is tested [dimensionless]: steady training logs of the
@@ -283,15 +282,11 @@ def _when(blocks: Blocks, before: Array, after: Array, place: int, actuator: Act
     first = max(place - round(LATE / step), blocks.first)
     candidates = np.arange(first, min(place + round(EARLY / step), len(blocks.velocity) - 1))
     (row,) = parameter_rows(after[None], actuator.circuit, actuator.rated)
-    costs: list[float] = []
-    least, best = np.inf, before
-    for some in np.array_split(candidates, range(LANES, len(candidates), LANES)):
-        changing = replace(blocks, earlier=(blocks.block * some, before))
-        for run in predicted(changing, np.repeat(row[None], len(some), axis=0)):
-            left = (blocks.outputs - run)[blocks.first :] / least_scales(blocks)
-            costs.append(0.5 * float(np.nansum(left**2)))
-            if costs[-1] < least:
-                least, best = costs[-1], run
-    room = LIKELY * max(1.0, lasting_misfit(best, blocks) ** 2)
-    likely = candidates[np.array(costs) <= least + room]
-    return int(likely[0]) - 1, int(candidates[int(np.argmin(costs))]), int(likely[-1]) + 1
+    changing = replace(blocks, earlier=(blocks.block * candidates, before))
+    runs = predicted(changing, np.repeat(row[None], len(candidates), axis=0))
+    scales = least_scales(blocks)
+    costs = [0.5 * float(np.nansum(((blocks.outputs - run)[blocks.first :] / scales) ** 2)) for run in runs]
+    best = int(np.argmin(costs))
+    room = LIKELY * max(1.0, lasting_misfit(runs[best], blocks) ** 2)
+    likely = candidates[np.array(costs) <= costs[best] + room]
+    return int(likely[0]) - 1, int(candidates[best]), int(likely[-1]) + 1

@@ -18,7 +18,7 @@ from plant.eha.circuit_start import at_rest, under_pressure
 from plant.eha.model import EhaParameters
 from plant.eha.one_sided import as_wide, circuit_groups, circuit_plant
 from plant.eha.simulate import CIRCUIT
-from plant.solvers.adaptive import MEANS, SAMPLES, STRAIGHT
+from plant.solvers.adaptive import LANES, MEANS, SAMPLES, STRAIGHT
 from plant.solvers.block_means import block_means
 from plant.solvers.steps import parameter_row
 
@@ -49,6 +49,8 @@ LEAST_FORCE = 1e-3
 DRIFT_STEPS = 50
 """Steps in which leakage drifts over a log without pressure: for a factor of two 1.4 % each, a tenth of the difference
 between actuators of one kind."""
+
+_WHOLE = slice(None)
 
 COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
 
@@ -177,41 +179,55 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     rows = _as_logged(blocks, rows)[None]
     if blocks.earlier is not None:
         until, before = blocks.earlier
-        if isinstance(until, int) and until % blocks.block == 0 and blocks.course is None:
-            brought, place = _brought(blocks, rows.shape[-1])
-            gone_on = _run(blocks, np.repeat(place, rows.shape[1], axis=0), rows, until)
-            return np.concatenate([np.repeat(brought, rows.shape[1], axis=0), gone_on], axis=1)
+        ends = np.broadcast_to(until, rows.shape[1])
+        if blocks.course is None and not np.any(ends % blocks.block):
+            some = (slice(first, first + LANES) for first in range(0, len(ends), LANES))
+            return np.concatenate([_changed(blocks, rows[:, these], ends[these]) for these in some])
         before = as_wide(_as_logged(blocks, before[None])[0], rows.shape[-1])
         rows = _after(until, before, rows[0], len(blocks.speed))
     if blocks.course is not None:
         if blocks.pressure is None and len(rows) == 1:
             return _in_steps(blocks, blocks.course, rows)
         rows = rows * _drift(blocks.course, rows.shape[-1])[:, None, :]
-    return _run(blocks, _starts(blocks, rows[0]), rows)
+    return _run(blocks, _starts(blocks, rows[0]), rows)[0]
+
+
+def _changed(blocks: Blocks, rows: Array, ends: IntArray) -> Array:
+    """Return the outputs of circuits that each go on from another one at the end of a block, (m, blocks, outputs)."""
+    since, before, outputs, state = _brought(blocks, rows.shape[-1])
+    found, starts = [np.repeat(outputs, len(ends), axis=0)], np.repeat(state, len(ends), axis=0)
+    for first, last in pairwise(np.unique([since, *ends, _last_end(blocks)]).tolist()):
+        here = np.where((ends <= first)[:, None], rows, before)
+        outputs, starts = _run(blocks, starts, here, slice(first, last + 1))
+        found.append(outputs)
+    return np.concatenate(found, axis=1)
 
 
 @lru_cache(maxsize=2)
-def _brought(blocks: Blocks, width: int) -> tuple[Array, Array]:
-    """Return outputs up to a change and the states at it, each for one circuit.
+def _brought(blocks: Blocks, width: int) -> tuple[int, Array, Array, Array]:
+    """Return the first change, the circuit before it, its outputs up to there and its state then.
 
     All circuits after the change begin there, so it is run once.
     """
     until, before = blocks.earlier or (0, np.empty(0))
-    rows = as_wide(_as_logged(blocks, before[None])[0], width)[None, None]
-    speed = blocks.speed[: until + 1]
-    (states,) = circuit_groups(_starts(blocks, rows[0]), speed, rows, blocks.sample_time, **_allowed(blocks))
-    return _outputs(blocks, states, rows), np.ascontiguousarray(states[-1].T)
+    first, row = int(np.min(until)), as_wide(_as_logged(blocks, before[None])[0], width)[None, None]
+    return first, row, *_run(blocks, _starts(blocks, row[0]), row, slice(first + 1))
 
 
-def _run(blocks: Blocks, starts: Array, rows: Array, since: int = 0) -> Array:
-    """Return the outputs of circuits from given states at a sample on, shape (m, blocks, outputs)."""
-    groups = circuit_groups(starts, blocks.speed[since:], rows, blocks.sample_time, **_allowed(blocks))
-    found, first = list[Array](), 0
+def _last_end(blocks: Blocks) -> int:
+    return (len(blocks.speed) - 1) // blocks.block * blocks.block
+
+
+def _run(blocks: Blocks, starts: Array, rows: Array, span: slice = _WHOLE) -> tuple[Array, Array]:
+    """Return the outputs of circuits over a span of samples, (m, blocks, outputs), and their states after it."""
+    groups = circuit_groups(starts, blocks.speed[span], rows, blocks.sample_time, **_allowed(blocks))
+    found, ends, first = list[Array](), list[Array](), 0
     for states in groups:
         last = first + states.shape[2]
         found.append(_outputs(blocks, states, rows[:, first:last]))
+        ends.append(states[-1].T)
         first = last
-    return found[0] if len(found) == 1 else np.concatenate(found)
+    return found[0] if len(found) == 1 else np.concatenate(found), np.concatenate(ends)
 
 
 def _allowed(blocks: Blocks) -> dict[str, float]:
@@ -226,16 +242,13 @@ def _in_steps(blocks: Blocks, course: Array, rows: Array) -> Array:
 
     Rows of parameters for every sample take some 50 MB and five times as long.
     """
-    count = (len(blocks.speed) - 1) // blocks.block
+    count = _last_end(blocks) // blocks.block
     ends = blocks.block * np.unique(np.linspace(0, count, min(DRIFT_STEPS, count) + 1).astype(np.intp))
     found, starts = list[Array](), _starts(blocks, rows[0])
     for first, last in pairwise(ends.tolist()):
         here = rows * _drift(course[[(first + last) // 2]], rows.shape[-1])[:, None, :]
-        speed = blocks.speed[first : last + 1]
-        states = [*circuit_groups(starts, speed, here, blocks.sample_time, **_allowed(blocks))]
-        together = states[0] if len(states) == 1 else np.concatenate(states, axis=2)
-        found.append(_outputs(blocks, together, here))
-        starts = np.ascontiguousarray(together[-1].T)
+        outputs, starts = _run(blocks, starts, here, slice(first, last + 1))
+        found.append(outputs)
     return np.concatenate(found, axis=1)
 
 

@@ -109,8 +109,8 @@ def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(
 ) -> None:
     log = heard(short_log(2.0))
     monkeypatch.setattr(motion_fit, "without_chatter", lambda problem, _: problem)
-    monkeypatch.setattr(motion_search, "SCREENED", 500)
-    monkeypatch.setattr(motion_search, "SEARCHED", 1000)
+    monkeypatch.setattr(motion_search, "SCREENED", 0.5)
+    monkeypatch.setattr(motion_search, "SEARCHED", 1.0)
     searches = searches_of(log)
     ended = likeliest(searches)
     first = next(one for one in ended if one.explains)

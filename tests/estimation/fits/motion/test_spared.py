@@ -11,23 +11,25 @@ from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion.fit import BEGINNING, SPARED_NIS, SPARED_SHARE
 from estimation.fits.motion.search import EXPLAINED, SCREENED, Ended
 
+LONG = round(1e3 * SCREENED) + 1
+
 BEGUN = Point(np.ones(1), 1.0, np.zeros(1), np.zeros((1, 1)))
 
 
 def problem_of(chi_square: float, samples: int) -> Any:
     """Return a problem of which every point leaves so much."""
     point = Point(np.ones(1), 0.5 * chi_square * samples, np.zeros(1), np.zeros((1, 1)))
-    return SimpleNamespace(log=SimpleNamespace(measured=np.zeros((samples, 1))), at=lambda _: point)
+    return SimpleNamespace(log=SimpleNamespace(measured=np.zeros((samples, 1)), sample_time=1e-3), at=lambda _: point)
 
 
 @pytest.mark.parametrize("counts", [1.0, BEGINNING])
 @pytest.mark.parametrize(
     ("large", "far", "samples", "ends"),
     [
-        (0.99, 9.0, SCREENED + 1, True),  # no class is refused for so little noise
-        (1.01, 0.99, SCREENED + 1, True),  # nor for so small a share of the motion
-        (1.01, 1.01, SCREENED + 1, False),
-        (0.99, 0.99, SCREENED, False),  # short logs take little
+        (0.99, 9.0, LONG, True),  # no class is refused for so little noise
+        (1.01, 0.99, LONG, True),  # nor for so small a share of the motion
+        (1.01, 1.01, LONG, False),
+        (0.99, 0.99, LONG - 1, False),  # short logs take little
     ],
 )
 def test_a_search_need_not_go_on_that_cannot_come_to_explain_a_log_whose_class_stands(
