@@ -22,10 +22,8 @@ RESCALED = 3
 """Most often that an optimum is replaced by a better one found in this way."""
 
 BETTER = 5.0
-"""Decrease of the cost from which a better optimum is tested again [dimensionless]."""
-
-ELSEWHERE = 0.005
-"""Relative difference in bulk modulus from which it is tested again [fraction]."""
+"""Fall of the cost from which a better optimum is left in its turn [dimensionless], if it is so far away in bulk modulus
+that the two would disagree: nearer to the last one, the same places are searched again."""
 
 ALMOST, NEARBY = 1e-3, 0.3
 """Relative difference in bulk modulus, and the same over its deviation, up to which a nearby optimum counts as the
@@ -109,7 +107,7 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
         moved = abs(np.log(bulk_modulus(problem, lowest) / bulk_modulus(problem, best)))
         over, best = lowest.cost > best.cost - BETTER, lowest
         moduli = [bulk_modulus(problem, one) for one in found if one is not best and one.cost < way.explained]
-        if over or moved < ELSEWHERE or disagree([bulk_modulus(problem, best), *moduli]):
+        if over or moved < np.log(1.0 + LARGEST_DISAGREEMENT) or disagree([bulk_modulus(problem, best), *moduli]):
             break
     return best, moduli
 

@@ -142,7 +142,8 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
 def _last_of(window: Record, actuator: Actuator) -> LastPart:
     blocks = with_lead(blocks_of(window), actuator)
     blocks, fits = stopped(blocks, fit_classes(blocks, actuator), actuator)
-    two, drift = parted(blocks, fits, actuator), drift_of(blocks, fits, actuator)
+    two = parted(blocks, fits, actuator)
+    drift = drift_of(blocks, fits, actuator, 0.0 if two is None else two.gain)
     if drift is not None and (two is None or drift.gain > two.gain):
         return LastPart(window, window, blocks, fits, None, drift=drift)
     against = () if two is None else softened(two)

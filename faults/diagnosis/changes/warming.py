@@ -46,6 +46,10 @@ DOUBLED = float(np.log(2.0))
 FARTHEST, NEAR, ROUNDS = 0.7, 0.05, 4
 """Longest step in the logarithm, the step that ends a search [dimensionless], and the most steps."""
 
+HOPED = 2.0
+"""How many times what the last step gained, or what the next one promises, each step that is left may gain
+[dimensionless]: steps to a tenfold leakage gained up to twice the one before, or the promise."""
+
 NUDGE = 0.02
 """Step of the finite difference in the logarithm [dimensionless]."""
 
@@ -75,7 +79,7 @@ class Drift(NamedTuple):
         return abs(self.logarithm) >= LEAST and self.gain - 0.5 * (self.logarithm / PRESUMED) ** 2 > np.log(LIKELIER)
 
 
-def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Drift | None:
+def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator, wanted: float = 0.0) -> Drift | None:
     """Return the drift of leakage that a log without pressure shows.
 
     Parameters
@@ -86,6 +90,9 @@ def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Drift | Non
         The circuits with constant leakage that were fitted to it.
     actuator : Actuator
         The healthy actuator.
+    wanted : float
+        Gain below which a drift is of no use [dimensionless]: a search ends where the steps that are left would hardly
+        bring it to that, see `HOPED`.
 
     Returns
     -------
@@ -107,7 +114,9 @@ def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Drift | Non
         starts = [(way * DOUBLED, 0.5 * way * DOUBLED * _LEAKS_MORE) for way in (1.0, -1.0)]
     else:
         return None
-    found = max((_searched(blocks, none, *one, condition, actuator) for one in starts), key=lambda one: one.gain)
+    found = max(
+        (_searched(blocks, none, *one, condition, actuator, wanted) for one in starts), key=lambda one: one.gain
+    )
     followed = found.fit.scales[0] <= most  # what follows the log no better than one must explains nothing
     return found if found.shown and followed else None
 
@@ -166,18 +175,20 @@ def with_course(log: CleanLog, found: Drift) -> tuple[CleanLog, Note]:
     return replace(log, record=log.record.replace(**{LEAKAGE_COURSE: course})), changed_note(factor, last)
 
 
-def _searched(blocks: Blocks, none: Drift, moved: float, step: Array, condition: str, actuator: Actuator) -> Drift:
+def _searched(
+    blocks: Blocks, none: Drift, moved: float, step: Array, condition: str, actuator: Actuator, wanted: float
+) -> Drift:
     """Return the end of a search that starts from a circuit with a given drift."""
     found = none
-    for _ in range(ROUNDS):
+    for left in range(ROUNDS - 1, -1, -1):
         there = drifting(blocks, found.logarithm + moved)
         fit = fit_freely(there, actuator, condition, found.fit.coordinates + step)
         gain = (misfit(blocks, none.fit.fitted) - misfit(there, fit.fitted)) / LASTING
         if found is not none and not gain > found.gain:
             break
-        found = Drift(found.logarithm + moved, fit, gain)
-        _, moved, step = _step(blocks, found, actuator)
-        if not abs(moved) >= NEAR:
+        last, found = found.gain, Drift(found.logarithm + moved, fit, gain)
+        promised, moved, step = _step(blocks, found, actuator)
+        if not abs(moved) >= NEAR or gain + left * HOPED * max(promised, gain - last) < wanted:
             break
     return found
 
