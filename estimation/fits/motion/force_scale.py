@@ -22,7 +22,7 @@ RESCALED = 3
 """Most often that an optimum is replaced by a better one found in this way."""
 
 BETTER = 5.0
-"""Fall of the cost from which a better optimum is left in its turn [dimensionless], if it is so far away in bulk modulus
+"""Fall of the cost from which a better optimum is left in its turn [dimensionless], if its bulk modulus is so far away
 that the two would disagree: nearer to the last one, the same places are searched again."""
 
 ALMOST, NEARBY = 1e-3, 0.3
