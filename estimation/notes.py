@@ -272,8 +272,8 @@ class RigCode(Code):
     AREAS_VAGUE = "the ratio of the piston's areas is known to ± {percent:.0f} % only: give two areas in the rig file"
     VOLUME_DIFFERS = "the chamber volume is {percent:.1f} ± {half_width:.2g} % of that in the rig file"
     STARTS_UNDER_LOAD = (
-        "the log begins at a differential pressure of {pressure_pa:.3g|bar} bar: the piston moves, or friction or "
-        "a load of {force_n:.3g} N holds it"
+        "the log begins at a differential pressure of {pressure_pa:.3g|bar} bar, its lower chamber {level_pa:.3g|bar} "
+        "bar above the accumulator: the piston moves, or friction or a load of {force_n:.3g} N holds it"
     )
     AIR_ENTRAINED = (
         "the oil contains {percent:.2g} ± {half_width:.2g} % of air at atmospheric pressure; bulk modulus is given at "
@@ -347,4 +347,4 @@ class RigCode(Code):
         "the make-up valves open {crack_pa:.3g|bar} ± {half_width_pa:.2g|bar} bar below the rig file's accumulator "
         "pressure (mean of both), that of chamber {side} {later_pa:.3g|bar} ± {later_half_width_pa:.2g|bar} bar lower"
     )
-    EXPLAINED_OTHERWISE = "other explanations fit the log about as well ({count}); the interval includes them"
+    EXPLAINED_OTHERWISE = "the log is explained about as well by {others!w}; the interval includes this"

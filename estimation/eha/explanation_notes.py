@@ -62,7 +62,7 @@ def notes_of(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
     """
     notes = [_NOTES[name](found, parameters) for name in found.names]
     if found.rivals:
-        notes.append(RigCode.EXPLAINED_OTHERWISE.note(count=found.rivals))
+        notes.append(RigCode.EXPLAINED_OTHERWISE.note(others=", ".join(found.rivals)))
     return tuple(notes)
 
 
@@ -167,8 +167,8 @@ def _single_rod(found: Explanation, p: EhaParameters) -> Note:
 
 
 def _load(found: Explanation, p: EhaParameters) -> Note:
-    value = found.values["start_pressure"][0]
-    return RigCode.STARTS_UNDER_LOAD.note(pressure_pa=value, force_n=value * p.piston_area)
+    value, level = (found.values[name][0] for name in ("start_pressure", "start_level"))
+    return RigCode.STARTS_UNDER_LOAD.note(pressure_pa=value, force_n=value * p.piston_area, level_pa=level)
 
 
 def _bends(found: Explanation, _: EhaParameters) -> Note:

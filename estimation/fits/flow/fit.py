@@ -310,8 +310,8 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
     doubts += [BUBBLES] if {AIR.name, AIR_MIDWAY.name} & set(strange.names) else []
     left = float(np.linalg.norm(doubts))
     unseen = () if MAKEUP_BLOCKED.name in strange.names else unseen_valve_note(one)
-    most, weights = share_lost(plain.log, one.values, p.pump_displacement, strange.names), weights_of(strange.fits)
-    found, correlation = with_lumped(strange.values, strange.fits, weights, p, plain.log.measured_rms)
+    most = share_lost(plain.log, one.values, p.pump_displacement, strange.names)
+    found, correlation = with_lumped(strange.values, strange.fits, strange.weights, p, plain.log.measured_rms)
     return FormFit(
         parameters=with_structure(with_shifts(found, one.small_teeth, one.noise_shift), left),
         bound=bound,

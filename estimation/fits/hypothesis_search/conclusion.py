@@ -1,15 +1,17 @@
 """`conclude(log, parameters, counted, accepted) -> Explanation`: the result of hypotheses that explain a log."""
 
+import math
+import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeAlias
 
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY
+from estimation.fits.hypotheses import DELIVERY, VOLUME
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
 from estimation.fits.hypothesis_search.final_fits import with_details
-from estimation.fits.hypothesis_search.form_fit import weighed
+from estimation.fits.hypothesis_search.form_fit import TEMPER, weighed
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain, predicted_gain_beside
 from estimation.fits.hypothesis_search.wide_log import balanced_by, delayed, usual_pressure
 from estimation.models.completed_flow import CRACKS
@@ -30,13 +32,15 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
     parameters : EhaParameters
         The actuator.
     counted : sequence of Trial
-        Sets that explain the log about equally well, fitted to the end, the best first.
+        Sets that explain the log alike, fitted to the end.
     accepted : callable
         ``accepted(fit)``: whether a fit explains the log.
     """
-    best = counted[0]
-    fits = tuple(fit for one in counted for fit in one.fits)
-    values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()} | dict(weighed(fits))
+    best, *rivals = sorted(counted, key=lambda one: one.cost - TEMPER * math.log(beforehand(log, one)))
+    fits = tuple(fit for one in (best, *rivals) for fit in one.fits)
+    likely = tuple(beforehand(log, one) for one in (best, *rivals) for _ in one.fits)
+    values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()}
+    values |= dict(weighed(fits, beforehand=likely))
     if any(name in values for name in GROWTH):  # what is told of a leakage is what it is at the end
         ended = float(grown_leakage(1.0, *(values.get(name, (0.0, 0.0))[0] for name in GROWTH)))
         value, std = values["leakage_coefficient"]
@@ -46,11 +50,38 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
         values=values,
         delays=best.delays,
         fits=fits,
-        rivals=len(counted) - 1,
+        rivals=tuple(" and ".join(each.name for each in one.together) for one in rivals),
         stated_pressure=usual_pressure(log, parameters),
         opening=partial(delivery_beside, log, best),
-        detailing=partial(_detailed, log, parameters, counted, accepted),
+        detailing=partial(_detailed, log, parameters, (best, *rivals), accepted),
+        beforehand=likely,
     )
+
+
+def beforehand(log: GreyBoxLog, tried: Trial) -> float:
+    """Return how likely a set of hypotheses is before the log is seen, by what its rig file says of the dead volume.
+
+    Where a piston goes one way, chambers of another volume look as those of an encoder that was homed elsewhere. The
+    file states how far its volume may be off, so that 1.8 times of it is hardly likely if another set explains the log.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, with the relative uncertainties of the rig file.
+    tried : Trial
+        The set, fitted to the end.
+
+    Returns
+    -------
+    float
+        Over that with the volume of the file [dimensionless].
+    """
+    (name,) = VOLUME.free
+    told = any(one.name == VOLUME.name for one in tried.together)
+    if not told or not (doubt := log.uncertainties.get(name, 0.0)):
+        return 1.0
+    off = math.log(tried.values[name] / tried.rig[name]) / doubt
+    return max(math.exp(-0.5 * off**2), sys.float_info.min)
 
 
 def is_explained(tried: Trial, accepted: Accepted) -> bool:

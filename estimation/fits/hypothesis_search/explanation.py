@@ -8,7 +8,9 @@ import numpy as np
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import Hypothesis
+from estimation.fits.hypothesis_search.form_fit import weights_of
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain
+from plant.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,30 +79,38 @@ class Explanation:
     delays : Mapping[str, float]
         Delays of channels beside their lags [s].
     fits : tuple of GreyBoxFit
-        The fits over which values are weighted, the likelier balance first.
-    rivals : int
-        How many other sets of hypotheses explain the log about as well.
+        The fits that values are weighed over: first that under them by the likelier balance.
+    rivals : tuple of str
+        Other sets of hypotheses that explain the log about as well, by the names of each.
     stated_pressure : float
         Absolute pressure at which bulk modulus is stated, if the oil contains air [Pa].
     opening : callable
         Computes `delivery_open`, which needs further slopes.
     detailing : callable
-        Computes `in_detail`, which needs a further fit: most explanations are used for their cost only.
+        Works out `in_detail`, for which the log is fitted further: of most explanations costs alone are read.
+    beforehand : tuple of float, optional
+        Weight of each fit before the log is seen [dimensionless]; equal ones if not given.
     """
 
     names: tuple[str, ...]
     values: Mapping[str, tuple[float, float]]
     delays: Mapping[str, float]
     fits: tuple[GreyBoxFit, ...]
-    rivals: int
+    rivals: tuple[str, ...]
     stated_pressure: float
     opening: Callable[[], PredictedGain] = lambda: NO_GAIN
     detailing: Callable[[], "Explanation | None"] = lambda: None
+    beforehand: tuple[float, ...] | None = None
 
     @property
     def fit(self) -> GreyBoxFit:
         """The fit under them."""
         return self.fits[0]
+
+    @property
+    def weights(self) -> Array:
+        """The probability of each fit [fraction]."""
+        return weights_of(self.fits, beforehand=self.beforehand)
 
     @property
     def delivery_open(self) -> PredictedGain:

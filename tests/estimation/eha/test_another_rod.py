@@ -10,7 +10,7 @@ from estimation.notes import RigCode
 
 
 def explained(**values: tuple[float, float]) -> Explanation:
-    return Explanation(("single_rod",), values, {}, (), 0, 1e5)
+    return Explanation(("single_rod",), values, {}, (), (), 1e5)
 
 
 def test_a_ratio_of_areas_that_is_known_to_a_percent_is_believed_and_one_to_three_percent_is_not() -> None:

@@ -22,7 +22,7 @@ def explanation(share: float = SHARE, liquid: float = LIQUID, quickness: float =
     whole = 1.0 / (1.0 / liquid + (1.0 - quickness) * bubbles / STATED)
     found = {"air_softness": share * ATMOSPHERE, "bulk_modulus": whole, "air_quickness": quickness} | values
     told = {name: (value, 0.1 * value) for name, value in found.items()}
-    return Explanation(("air",), told, {}, (), 0, STATED)  # type: ignore[arg-type]
+    return Explanation(("air",), told, {}, (), (), STATED)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("quickness", [0.0, 0.2, QUICKEST])

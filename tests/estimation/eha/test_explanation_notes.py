@@ -33,12 +33,14 @@ STATED = 3e5
 PRESSURE = "differential_pressure_pa"
 
 
-def explanation(*names: str, delay: float = 0.0, rivals: int = 0, **values: tuple[float, float]) -> Explanation:
+def explanation(
+    *names: str, delay: float = 0.0, rivals: tuple[str, ...] = (), **values: tuple[float, float]
+) -> Explanation:
     fit: Any = None
     return Explanation(names, values, {PRESSURE: delay}, (fit,), rivals, STATED)
 
 
-def told(*names: str, delay: float = 0.0, rivals: int = 0, **values: tuple[float, float]) -> Note:
+def told(*names: str, delay: float = 0.0, rivals: tuple[str, ...] = (), **values: tuple[float, float]) -> Note:
     (note, *_) = notes_of(explanation(*names, delay=delay, rivals=rivals, **values), P)
     return note
 
@@ -126,7 +128,12 @@ def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:
         "rig_volume_percent": 100.0,
         "rig_pilot_share": 0.0,
     }
-    assert data(told("start_load", start_pressure=(5e5, 1e3))) == {"pressure_pa": 5e5, "force_n": 5e5 * P.piston_area}
+    begun = told("start_load", start_pressure=(5e5, 1e3), start_level=(2e5, 1e3))
+    assert data(begun) == {
+        "pressure_pa": 5e5,
+        "force_n": 5e5 * P.piston_area,
+        "level_pa": 2e5,
+    }
     assert data(told("relief_low", relief_pressure=(2e6, 1e4))) == {
         "setting_pa": 2e6,
         "half_width_pa": 1e4 * NORMAL,
@@ -198,9 +205,10 @@ def test_the_port_that_drains_more_leaks_if_no_sound_pump_drains_so(share: float
     assert note.data.get("side", "") == leaks
 
 
-def test_rivals_are_counted_last() -> None:
-    *_, last = notes_of(explanation("pressure_offset", rivals=2, pressure_offset=(1e5, 1.0)), P)
-    assert last == RigCode.EXPLAINED_OTHERWISE.note(count=2)
+def test_rivals_are_named_last() -> None:
+    rivals = ("encoder_zero", "volume and start_load")
+    *_, last = notes_of(explanation("pressure_offset", rivals=rivals, pressure_offset=(1e5, 1.0)), P)
+    assert "encoder zero, volume and start load" in str(last)
     assert len(notes_of(explanation("pressure_offset", pressure_offset=(1e5, 1.0)), P)) == 1
 
 

@@ -26,7 +26,7 @@ N = 60
 
 
 def explanation(
-    names: tuple[str, ...], delays: dict[str, float] | None = None, rivals: int = 0, **values: Any
+    names: tuple[str, ...], delays: dict[str, float] | None = None, rivals: tuple[str, ...] = (), **values: Any
 ) -> Explanation:
     fit: Any = None
     return Explanation(names, values, {PRESSURE: 0.0, **(delays or {})}, (fit,), rivals, 3e5)
@@ -47,6 +47,7 @@ VALUES: dict[str, tuple[float, float]] = {
     "volume_difference": (-0.2, 0.1),
     "pilot_share": (1.0, 0.1),
     "start_pressure": (5e5, 1e3),
+    "start_level": (2e5, 1e3),
     "air_softness": (300.0, 20.0),
     "bulk_modulus": (1.5e8, 1e6),
     "relief_pressure": (2e6, 1e4),
@@ -80,7 +81,7 @@ def what_explains_a_log() -> dict[str, Any]:
         values = VALUES | {key: (value, 0.01) for key, value in changed.items()}
         return str(notes_of(explanation((name,), **values), P)[0].code)
 
-    rivals = notes_of(explanation(("volume",), None, 3, **VALUES), P)
+    rivals = notes_of(explanation(("volume",), None, ("encoder_zero", "air and volume"), **VALUES), P)
     midway = notes_of(explanation(("air_midway",), air_onset=(0.4, 0.01), **VALUES), P)[0]
     return {
         **told,

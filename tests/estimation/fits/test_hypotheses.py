@@ -117,7 +117,7 @@ def test_a_velocity_from_a_late_encoder_comes_forward_with_it_and_one_of_its_own
     record = log("steps")
     behind = {name: np.concatenate([np.zeros(5), record[name][:-5]]) for name in ("position_m", "velocity_m_s")}
     fit = cast("GreyBoxFit", None)
-    found = Explanation(("position_late",), {"position_lag": (0.0, 1e-4)}, {"position_m": 5e-3}, (fit,), 0, 1e6)
+    found = Explanation(("position_late",), {"position_lag": (0.0, 1e-4)}, {"position_m": 5e-3}, (fit,), (), 1e6)
     both = set_right(clean_log(record.replace(**behind), HEALTHY), found).record["velocity_m_s"]
     alone = clean_log(record.replace(position_m=behind["position_m"]), HEALTHY)
     assert np.nanstd(both - record["velocity_m_s"]) < 0.1 * np.std(behind["velocity_m_s"] - record["velocity_m_s"])

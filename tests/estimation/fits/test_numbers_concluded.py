@@ -54,7 +54,7 @@ def concluded(
 ) -> Any:
     """Return what is told of a log by its plain fits, and by one under hypotheses."""
     values = {name: (value, strange.std[name]) for name, value in strange.values.items() if name in strange.std}
-    explanation = Explanation(names, values, {}, (strange,), 0, 1e6, lambda: open_by)
+    explanation = Explanation(names, values, {}, (strange,), (), 1e6, lambda: open_by)
     asked: list[Any] = []
 
     def explained(*_: Any, asked: Any, paired: bool, by_mass: bool, **__: Any) -> Any:

@@ -169,7 +169,7 @@ def plan_of_explanations() -> dict[str, Any]:
                 told[f"{name}, paired: {paired}"] = {
                     "descents": grouped(plan),
                     "names": list(found.names),
-                    "rivals": found.rivals,
+                    "rivals": len(found.rivals),
                     "delays": dict(found.delays),
                 }
     return told

@@ -92,7 +92,7 @@ def hypotheses_about_strange_logs() -> dict[str, Any]:
         assert found is not None
         told[name] = {
             "names": list(found.names),
-            "rivals": found.rivals,
+            "rivals": len(found.rivals),
             "delays": dict(found.delays),
             "points": Roughly(len(points), 0.1),
             "values": {of: Found(*pair) for of, pair in found.values.items()},

@@ -208,7 +208,7 @@ def explanations() -> dict[str, Any]:
     )
     return {
         "names": list(found.names),
-        "rivals": found.rivals,
+        "rivals": len(found.rivals),
         "delays": dict(found.delays),
         "stated pressure [Pa]": found.stated_pressure,
         "values": {name: Found(*pair) for name, pair in found.values.items()},

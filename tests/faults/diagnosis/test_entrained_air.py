@@ -44,7 +44,7 @@ def estimate() -> BulkModulusEstimate:
         channels=("position_m", "differential_pressure_pa"),
         nis={},
         others={},
-        explanation=Explanation(("air",), told, {}, (), 0, STATED),  # type: ignore[arg-type]
+        explanation=Explanation(("air",), told, {}, (), (), STATED),  # type: ignore[arg-type]
     )
 
 

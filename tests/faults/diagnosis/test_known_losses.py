@@ -49,7 +49,7 @@ def diagnosis(**changed: Any) -> Diagnosis:
 
 
 def explained(**delays: float) -> Explanation:
-    return Explanation(("made up",), {}, delays, (), 0, 1e6)
+    return Explanation(("made up",), {}, delays, (), (), 1e6)
 
 
 def told(one: Diagnosis, by: BulkModulusEstimate, log: Record = NOTHING) -> Diagnosis:

@@ -6,7 +6,7 @@ from tests.estimation.fits.short_logs import made_fit
 
 
 def explanation(name: str, cost: float) -> Explanation:
-    return Explanation((name,), {}, {}, (made_fit(cost, 2e8, 1e5),), 0, 1e6)
+    return Explanation((name,), {}, {}, (made_fit(cost, 2e8, 1e5),), (), 1e6)
 
 
 def test_gauges_of_unlike_gains_are_told_where_nothing_else_is_as_likely() -> None:

@@ -30,7 +30,7 @@ def told(offset: float) -> PlainFits:
 
 def explanation(cost: float, shown: float = 0.0, gain: float = 0.0) -> Explanation:
     offset = ShownOffset(shown, gain, STD, np.zeros(1))
-    return Explanation((ENCODER_ZERO.name,), {}, {}, (replace(made_fit(cost, 2e8, 1e5), speed_offset=offset),), 0, 1e6)
+    return Explanation((ENCODER_ZERO.name,), {}, {}, (replace(made_fit(cost, 2e8, 1e5), speed_offset=offset),), (), 1e6)
 
 
 @pytest.mark.parametrize(

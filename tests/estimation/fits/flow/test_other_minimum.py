@@ -157,7 +157,7 @@ def test_a_hypothesis_is_believed_where_it_gains_over_its_own_valley_alone(
         return (PORTS_DRAIN[:1] if given[2].cost > best().cost + 1.0 or believed == "hypothesis" else (), ())
 
     fit = replace(best(), cost=best().cost + cost)
-    explanation = Explanation(("port_a_drains",), found(), {}, (fit,), 0, 1e6)
+    explanation = Explanation(("port_a_drains",), found(), {}, (fit,), (), 1e6)
     monkeypatch.setattr(plain_flow, "balanced", lost)
     monkeypatch.setattr(flow_fit, "hypotheses_asked", asked)
     monkeypatch.setattr(flow_fit, "explain", lambda *_, **__: explanation)

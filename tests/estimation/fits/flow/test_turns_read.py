@@ -109,7 +109,7 @@ def test_what_looks_strange_is_believed_where_it_gains_with_turns_read_too(
     def explain(*_: object, **__: object) -> Explanation:
         values: Mapping[str, Any] = {name: (value, 1.0) for name, value in sound.values.items()}
         return Explanation(
-            (PUMP_COMPRESSES.name,), values, {}, (replace(sound, cost=100.0 if gains else 395.0),), 0, 1e6
+            (PUMP_COMPRESSES.name,), values, {}, (replace(sound, cost=100.0 if gains else 395.0),), (), 1e6
         )
 
     monkeypatch.setattr(plain_flow, "balanced", fitted)

@@ -1,0 +1,57 @@
+"""What hypotheses that explain a log alike say of it."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.hypotheses import ENCODER_ZERO, VOLUME, Hypothesis
+from estimation.fits.hypothesis_search import conclusion
+from estimation.fits.hypothesis_search.conclusion import beforehand, conclude
+from estimation.fits.hypothesis_search.explanation import Explanation, Trial
+from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN
+from plant.eha.model import EhaParameters
+from tests.estimation.fits.short_logs import made_fit
+
+NAME = VOLUME.free[0]
+LOG: Any = SimpleNamespace(uncertainties={NAME: 0.15})
+CERTAIN: Any = SimpleNamespace(uncertainties={})
+
+
+def tried(one: Hypothesis, cost: float, modulus: float, volume: float = 1.0) -> Trial:
+    point = Point(np.zeros(1), cost, np.zeros(1), np.eye(1))
+    return Trial((one,), point, {NAME: volume}, {}, {NAME: 1.0}, fits=(made_fit(cost, modulus, 1e5),))
+
+
+def told(monkeypatch: pytest.MonkeyPatch, volume: float, behind: float) -> Explanation:
+    """Return what is told where a zero is less likely than another volume by so much in log-likelihood."""
+    monkeypatch.setattr(conclusion, "usual_pressure", lambda *_: 0.0)
+    monkeypatch.setattr(conclusion, "delivery_beside", lambda *_: NO_GAIN)
+    monkeypatch.setattr(conclusion, "with_details", lambda _, one: one)
+    sets = tried(VOLUME, 100.0, 2.7e8, volume), tried(ENCODER_ZERO, 100.0 + behind, 2e8)
+    return conclude(LOG, EhaParameters(), sets, lambda _: True)
+
+
+def test_a_volume_that_the_rig_file_hardly_allows_yields_to_what_explains_the_log_alike(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """`position_zero_at_stop`, validation 23751: chambers of 181 % were likelier than the zero by 1.5."""
+    for found in (told(monkeypatch, 1.81, 1.5), told(monkeypatch, 1.81, 1.5).in_detail):
+        assert found.names == (ENCODER_ZERO.name,)
+        assert found.rivals == (VOLUME.name,)
+        value, std = found.values["bulk_modulus"]
+        assert abs(value / 2e8 - 1.0) < 1e-3
+        assert std < 0.02 * value
+    likelier = told(monkeypatch, 1.1, 6.0)
+    assert likelier.names == (VOLUME.name,)
+    assert likelier.weights[0] > 0.6
+
+
+def test_the_file_s_own_uncertainty_says_how_likely_a_volume_is() -> None:
+    off = tried(VOLUME, 100.0, 2e8, float(np.exp(0.3)))
+    assert beforehand(LOG, off) == pytest.approx(np.exp(-2.0))
+    assert beforehand(CERTAIN, off) == 1.0
+    assert beforehand(LOG, tried(ENCODER_ZERO, 100.0, 2e8, 2.0)) == 1.0
+    assert beforehand(LOG, tried(VOLUME, 100.0, 2e8, 1e12)) > 0.0
