@@ -49,6 +49,10 @@ class AgainstCode(Code):
         "a load on the rod that changes over the log explains its force balance: it varies by about {force_n:.2g} N "
         "(root mean square), and the circuits have none"
     )
+    FRICTION_VARIES = (
+        "friction is intermittent: at times, most at {at_s:.3g} s, {force_n:.2g} N more than usual hold the piston "
+        "back, whichever way it slides, and the circuits have one friction"
+    )
     PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g|bar} bar"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
     OIL_STIFF = "the oil's bulk modulus is {share:.2f} times that in the rig file: another oil, or a wrong rig file"
@@ -158,6 +162,7 @@ class AdviceCode(Code):
     INSPECT_PUMP = "inspect the teeth and the side plates of the pump"
     FREE_PISTON = "check whether rod or piston is blocked, then log again while the piston moves"
     HOLD_LOAD = "log again without the load on the rod, or with one that is constant"
+    FREE_ROD = "find what grips at times: a bent rod, a load from the side, dirt, or a torn seal"
     CHECK_INLET = "check the pump's inlet: accumulator pressure, suction line, strainer, oil temperature"
     CHECK_VALVES = "check the seats of relief and check valves, and the piston seal"
     CHECK_MAKEUP = "check the make-up valve of chamber {side}: poppet, seat and spring"

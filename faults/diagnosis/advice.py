@@ -221,6 +221,8 @@ def _work_on(fault: Note) -> Note | None:
             return AdviceCode.FREE_PISTON.note()
         case AgainstCode.LOAD_VARIES:
             return AdviceCode.HOLD_LOAD.note()
+        case AgainstCode.FRICTION_VARIES:
+            return AdviceCode.FREE_ROD.note()
         case RigCode.LEAKAGE_LIFTS | RigCode.LEAKS_ONE_WAY:
             return AdviceCode.CHECK_VALVES.note()
         case RigCode.PUMP_WORN | AgainstCode.PUMP_DELIVERS_LESS | ClassCode.WEAR_NOT_TOLD:

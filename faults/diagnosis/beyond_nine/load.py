@@ -67,8 +67,8 @@ def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkMo
     Returns
     -------
     Loaded
-        The diagnosis, and the actuator with its load; those of the rig file if no load explains the log. A load that
-        changes is a reason against all conditions.
+        The diagnosis, and the actuator with its load; those of the rig file where no load explains the log. Where a
+        load or friction that changes does, that speaks against all conditions.
     """
     first = diagnosed(parameters, 0.0)
     blocks = first.scoreboard.blocks

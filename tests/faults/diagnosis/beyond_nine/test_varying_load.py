@@ -31,7 +31,17 @@ def test_a_wave_on_the_rod_is_named_with_its_size(size: float) -> None:
 
 
 def test_friction_that_comes_and_goes_is_no_load() -> None:
-    assert varying_load(under(np.abs(WAVE) * np.sign(to_and_fro())), PAPER) is None
+    grips = 800.0 * (np.abs(TIME - 3.0) < 0.8) * np.sign(to_and_fro())
+    note = varying_load(under(grips), PAPER)
+    assert note is not None
+    assert note.code is AgainstCode.FRICTION_VARIES
+    assert note.data["force_n"] == pytest.approx(800.0, rel=0.05)
+    assert note.data["at_s"] == pytest.approx(3.0, abs=0.8)
+
+
+def test_what_holds_back_one_way_alone_may_be_a_load() -> None:
+    grips = 800.0 * (np.abs(TIME - 3.0) < 0.8) * np.sign(to_and_fro())
+    assert varying_load(under(np.maximum(grips, 0.0)), PAPER) is None
 
 
 def test_constant_load_and_noise_are_none_that_varies() -> None:
@@ -48,7 +58,10 @@ def test_without_pressure_nothing_is_said_of_it() -> None:
     assert varying_load(replace(under(WAVE), pressure=None), PAPER) is None
 
 
-def test_the_next_log_is_asked_for_without_the_load() -> None:
-    note = AgainstCode.LOAD_VARIES.note(force_n=500.0)
+def test_the_next_step_frees_the_rod_of_its_load_or_of_what_grips() -> None:
     record = Record(1e-3, {"motor_speed_rad_s": np.zeros(100)})
-    assert [one.code for one in advice_for(record, {}, (note,), (), ())] == [AdviceCode.HOLD_LOAD]
+    for note, advice in (
+        (AgainstCode.LOAD_VARIES.note(force_n=500.0), AdviceCode.HOLD_LOAD),
+        (AgainstCode.FRICTION_VARIES.note(force_n=500.0, at_s=2.0), AdviceCode.FREE_ROD),
+    ):
+        assert [one.code for one in advice_for(record, {}, (note,), (), ())] == [advice]
