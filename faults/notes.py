@@ -53,6 +53,10 @@ class AgainstCode(Code):
         "friction is intermittent: at times, most at {at_s:.3g} s, {force_n:.2g} N more than usual hold the piston "
         "back, whichever way it slides, and the circuits have one friction"
     )
+    GRIPS_ONE_WAY = (
+        "at times, most at {at_s:.3g} s, {force_n:.2g} N more than usual hold the piston back, which slides one way "
+        "then: friction is intermittent, or a load comes and goes, and the circuits have neither"
+    )
     PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g|bar} bar"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
     OIL_STIFF = "the oil's bulk modulus is {share:.2f} times that in the rig file: another oil, or a wrong rig file"

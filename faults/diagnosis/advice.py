@@ -221,7 +221,7 @@ def _work_on(fault: Note) -> Note | None:
             return AdviceCode.FREE_PISTON.note()
         case AgainstCode.LOAD_VARIES:
             return AdviceCode.HOLD_LOAD.note()
-        case AgainstCode.FRICTION_VARIES:
+        case AgainstCode.FRICTION_VARIES | AgainstCode.GRIPS_ONE_WAY:
             return AdviceCode.FREE_ROD.note()
         case RigCode.LEAKAGE_LIFTS | RigCode.LEAKS_ONE_WAY:
             return AdviceCode.CHECK_VALVES.note()

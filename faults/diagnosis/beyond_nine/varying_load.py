@@ -56,7 +56,8 @@ def varying_load(blocks: Blocks, p: EhaParameters) -> Note | None:
     -------
     Note or None
         None without pressure, and where no such cause explains the force balance. While a piston slides one way, load
-        and friction look alike; friction is told where all that is unusual holds the piston back, both ways.
+        and friction look alike; friction is told where all that is unusual holds the piston back, both ways, and
+        friction or load where it does so one way.
     """
     balance = sliding_balance(blocks, p)
     if balance is None:
@@ -76,11 +77,14 @@ def varying_load(blocks: Blocks, p: EhaParameters) -> Note | None:
         return AgainstCode.LOAD_VARIES.note(force_n=float(np.std(force)))
     more = way[:, 0] * _beyond(balance.columns, balance.push)
     grips = np.maximum(more, 0.0) ** 2
-    one_way = float(np.sum(grips[way[:, 0] > 0.0])) / max(float(np.sum(grips)), np.finfo(np.float64).tiny)
-    at_times = np.sum(grips) >= HOLDS_BACK * np.sum(more**2) and min(one_way, 1.0 - one_way) >= BOTH_WAYS
+    at_times = np.sum(grips) >= HOLDS_BACK * np.sum(more**2)
     if of_friction > (1.0 - EXPLAINED) * none or not at_times or float(np.sqrt(np.mean(grips))) < matters:
         return None
-    return AgainstCode.FRICTION_VARIES.note(force_n=float(np.quantile(more, 0.99)), at_s=float(time[np.argmax(more)]))
+    size, at = float(np.quantile(more, 0.99)), float(time[np.argmax(more)])
+    one_way = float(np.sum(grips[way[:, 0] > 0.0]) / np.sum(grips))
+    if min(one_way, 1.0 - one_way) < BOTH_WAYS:
+        return AgainstCode.GRIPS_ONE_WAY.note(force_n=size, at_s=at)
+    return AgainstCode.FRICTION_VARIES.note(force_n=size, at_s=at)
 
 
 def _beyond(columns: Array, push: Array) -> Array:

@@ -41,7 +41,10 @@ def test_friction_that_comes_and_goes_is_no_load() -> None:
 
 def test_what_holds_back_one_way_alone_may_be_a_load() -> None:
     grips = 800.0 * (np.abs(TIME - 3.0) < 0.8) * np.sign(to_and_fro())
-    assert varying_load(under(np.maximum(grips, 0.0)), PAPER) is None
+    note = varying_load(under(np.maximum(grips, 0.0)), PAPER)
+    assert note is not None
+    assert note.code is AgainstCode.GRIPS_ONE_WAY
+    assert varying_load(under(np.minimum(np.abs(grips), 800.0) * np.sin(9.0 * TIME)), PAPER) is None
 
 
 def test_constant_load_and_noise_are_none_that_varies() -> None:
