@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+import numpy as np
+
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, LEAST_DELIVERY, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search.conclusion import Accepted, delivery_beside, is_explained
@@ -13,11 +15,6 @@ from estimation.fits.hypothesis_search.ranking import likeliest
 from estimation.fits.hypothesis_search.screening import screen
 from estimation.fits.hypothesis_search.wide_log import delayed
 
-AS_WELL = 0.5
-"""Share of the largest predicted gain from which another delivery is searched to its end, if no hypothesis explains a
-log alone [fraction]; judged. With an area 5 % low, slopes promised four ways of leakage that changes more than the
-delivery, and a relief valve that opens early came nearest."""
-
 BESIDE_OTHERS = 20.0
 """Predicted gain in log-likelihood of another delivery beside an explanation, from which both are searched together
 [dimensionless]; judged, twice what a hypothesis must gain. With a pump of 90 % and a pressure 3.7 ms late, slopes
@@ -25,18 +22,19 @@ promised 27, and bulk modulus was 11 % too low."""
 
 
 def delivery_followed(
-    log: GreyBoxLog, finished: Sequence[Trial], gains: Mapping[str, float], spared: Decimation, accepted: Accepted
+    log: GreyBoxLog, finished: Sequence[Trial], spared: Decimation, accepted: Accepted
 ) -> list[Trial]:
-    """Return the end of a search for another pump delivery, if slopes promise it nearly as much as any hypothesis.
+    """Return the end of a search for another pump delivery, where nothing explains a log alone.
+
+    A worn pump leads the plain form's leakage, bulk modulus and valves astray together. Slopes promise nothing of it
+    then, and a few steps come less low than air or late valves do, which explain as little.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     finished : sequence of Trial
-        Hypotheses tried alone, the best first.
-    gains : Mapping[str, float]
-        Predicted gain of each hypothesis [dimensionless].
+        What was tried alone, the best first.
     spared : Decimation
         Samples and starts of the search.
     accepted : callable
@@ -45,13 +43,13 @@ def delivery_followed(
     Returns
     -------
     list of Trial
-        Empty if the delivery was searched already, or if a hypothesis explains the log.
+        None where it has been followed already, or something explains the log; not to its end if it is far from the
+        best.
     """
-    promises = DELIVERY.name in gains and gains[DELIVERY.name] >= AS_WELL * max(gains.values())
     followed = any(one.together == (DELIVERY,) and one.fits for one in finished)
-    if not promises or followed or is_explained(finished[0], accepted):
+    if followed or is_explained(finished[0], accepted):
         return []
-    return _sought(log, (DELIVERY,), spared)
+    return _sought(log, (DELIVERY,), spared, known=finished[0].cost)
 
 
 def with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
@@ -134,9 +132,10 @@ def _sought(
     accepted: Accepted | None = None,
     delays: Mapping[str, float] = MappingProxyType({}),
     starts: Sequence[Mapping[str, float]] = (),
+    known: float = np.inf,
 ) -> list[Trial]:
     """Return the ends of a search for hypotheses together, best first; on request only those that explain the log."""
     late = delayed(log, delays)
     tried = [*screen(late, together, starts or spared.starts, every=spared.every)]
-    ended = [replace(one, delays={**delays, **one.delays}) for one in likeliest(late, [tried], spared=spared)]
+    ended = [replace(one, delays={**delays, **one.delays}) for one in likeliest(late, [tried], known, spared)]
     return [one for one in ended if accepted is None or is_explained(one, accepted)]

@@ -94,14 +94,14 @@ def explain(
     """
     wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
     plain = _plain_point(wide, starts[0])
-    likely, others, gains = by_predicted_gain(wide, (), starts[0], asked)
+    likely, others, _ = by_predicted_gain(wide, (), starts[0], asked)
     if homed and ENCODER_ZERO in others:  # far from the middle slopes promise nothing of it, nor do a few steps
         likely, others = [ENCODER_ZERO, *likely], [one for one in others if one is not ENCODER_ZERO]
     left = cost_over_noise(wide, plain.cost)
     spared = Decimation(decimation_limit(wide, starts[0], decimation_for(wide, left)), left, starts)
     finished = _alone(wide, plain.cost, likely, others, spared, accepted, useful)
-    if paired and finished[0].cost < hopeless:
-        finished = ranked([*finished, *delivery_followed(wide, finished, gains, spared, accepted)])
+    if paired:
+        finished = ranked([*finished, *delivery_followed(wide, finished, spared, accepted)])
     finished = _distinct([behind_filter(wide, finished[0]), *finished])
     if paired and homed:
         finished = _distinct([*finished, *with_zero(wide, finished[0], spared, accepted)])
