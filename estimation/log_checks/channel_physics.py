@@ -103,7 +103,7 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     if _repeats_one_row(record):
         return (ChannelCode.NOTHING_CHANGES.note(channel=" and ".join(one for one in MEASURED if one in record)),)
     short, middle, long = (channel_blocks(record, p, length) for length in (SHORT, MIDDLE, LONG))
-    found = _swapped(short) or _motions_disagree(short, long, p)
+    found = _swapped(short) or _swapped(long) or _motions_disagree(short, long, p)
     if found:
         return tuple(_or_of_time(one, record.sample_time) for one in found)
     balance = flow_balance(record, p, MIDDLE)
@@ -140,9 +140,10 @@ def _near(ratio: float, slips: Mapping[float, str], least: float = 1.0 / NEAR, m
     return min(close, key=lambda one: abs(np.log(ratio / one)), default=None)
 
 
-def _swapped(short: ChannelBlocks) -> tuple[Note, ...]:
-    there, ratio = alike(short.velocity_slope, short.position)
-    here, _ = alike(short.slope, short.velocity)
+def _swapped(blocks: ChannelBlocks) -> tuple[Note, ...]:
+    """Compare the slope of velocity with position; the noise of a piston that hardly moves asks for long blocks."""
+    there, ratio = alike(blocks.velocity_slope, blocks.position)
+    here, _ = alike(blocks.slope, blocks.velocity)
     if there < SURE or not 1.0 / NEAR <= ratio <= NEAR or here > 0.5:
         return ()
     return (ChannelCode.CHANNELS_SWAPPED.note(channel=POSITION, other=VELOCITY, correlation=there),)
