@@ -43,6 +43,10 @@ SHARPEST_RELIEF = 3e-3
 Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters: slopes are then so steep
 that the deviation of bulk modulus comes out twenty times too small."""
 
+LEAST_SETTING = 0.3
+"""Least setting at which a relief valve is sought, as a share of the log's largest pressure [fraction]; judged: one that
+passes all that is pumped at three times its setting is a leak."""
+
 FASTEST_MAKEUP, FASTEST_FOLLOWED = 0.5 * LONGEST_STEP, 0.02 * LONGEST_STEP
 """Least time in which an open make-up valve fills a chamber, and the same with implicit steps [s]. At a fifth of a
 model step the model may chatter, as at a sharp relief valve: the deviation of bulk modulus came out nine times too
@@ -247,8 +251,12 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
         return [*near, {POSITION_ZERO: 0.5 * float(np.min(read) + np.max(read))}]
     if not one.shares_of_peak:
         return one.starts
-    peak = max(float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
-    return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
+    return [{"relief_pressure": share * _peak(log), "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
+
+
+def _peak(log: GreyBoxLog) -> float:
+    """Return the largest differential pressure of a log [Pa]."""
+    return max(float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
 
 
 def widest_makeup(chamber_volume: float, bulk_modulus: float, log: GreyBoxLog) -> float:
@@ -295,6 +303,8 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     stiffest = stiffness * np.exp(MOST_DEVIATIONS * doubt)
     latest = 0.0 if log.course is None else -log.sample_time
     limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
+    peak = _peak(log)  # a valve that is set higher never opens, and no slope leads back
+    limits["relief_pressure"] = (LEAST_SETTING * peak, max(peak, rig["relief_pressure"]))
     limits[START_LEVEL] = (-rig["accumulator_pressure"], shut_in(log))
     place = model.unknowns.index("bulk_modulus")  # fitted as a logarithm
     softest, stiffest_guess = (float(np.exp(end(guess[place] for guess in guesses))) for end in (min, max))
