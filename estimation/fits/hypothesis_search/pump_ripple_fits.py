@@ -152,7 +152,7 @@ def with_pump_ripple(
     worth = plain.best.cost - TEETH_WORTH
     found = None
     for begun in (plain,) if shifted is None else (shifted, plain):
-        found = _with_teeth(log, begun, fitted)
+        found = _with_teeth(log, begun, fitted, needed=not explains(begun.best))
         if found is not None and found.best.cost < worth and explains(found.best):
             return found
         if (
@@ -224,9 +224,9 @@ def _shifted(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float)
     return None if found is plain else found
 
 
-def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted) -> RippleFits | None:
-    """Return fits with the ripple that other fits show, corrected until nothing is left; None if there is none."""
-    if (first := _asked_for(begun.best)) is None:
+def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted, *, needed: bool) -> RippleFits | None:
+    """Return the fits with the teeth that others ask for, corrected until nothing is left; None if there are none."""
+    if (first := _asked_for(begun.best, needed=needed)) is None:
         return None
     found, taken, offset = None, [first.teeth], begun.log.speed_offset + first.offset
     for _ in range(ROUNDS):
@@ -255,16 +255,16 @@ def _felt(fit: GreyBoxFit) -> float:
     return abs(moved) * value / fit.std["bulk_modulus"] if moved else 0.0
 
 
-def _shown(fit: GreyBoxFit, *, small: bool = False) -> list[ShownRipple]:
-    """Return the ripple that a fit's residuals show, the likeliest first; none if its size does not matter.
+def _shown(fit: GreyBoxFit, *, small: bool = False, needed: bool = False) -> list[ShownRipple]:
+    """Return the teeth that a fit's residuals show, the likeliest first; none if their size does not matter.
 
-    ``small`` ripple matters if it moves bulk modulus.
+    ``small`` ones matter where they move bulk modulus, or are ``needed`` as a log is not explained without them.
     """
     ranked = sorted((one for one in fit.teeth.values() if _possible(one, fit)), key=lambda one: -one.gain)
     if not ranked or ranked[0].gain < TEETH_WORTH:
         return []
     large = ranked[0].teeth.amplitude > LEAST_TEETH or ranked[0].offset != 0.0
-    return ranked if large or (small and _felt(fit) > MOST_LINEAR) else []
+    return ranked if large or needed or (small and _felt(fit) > MOST_LINEAR) else []
 
 
 def _possible(one: ShownRipple, fit: GreyBoxFit) -> bool:
@@ -281,9 +281,9 @@ def _surely_large(one: ShownRipple) -> bool:
     return one.teeth.amplitude - ONE_SIDED_95 * one.std > LEAST_TEETH
 
 
-def _asked_for(fit: GreyBoxFit) -> ShownRipple | None:
-    """Return the ripple that a fit's residuals show, if no other tooth count fits as well except its overtones."""
-    if not (ranked := _shown(fit, small=True)):
+def _asked_for(fit: GreyBoxFit, *, needed: bool) -> ShownRipple | None:
+    """Return the teeth that a fit's residuals ask for, if no other count does as well but their overtones."""
+    if not (ranked := _shown(fit, small=True, needed=needed)):
         return None
     count = ranked[0].teeth.count
     apart = [one for one in ranked[1:] if one.teeth.count % count and count % one.teeth.count]
