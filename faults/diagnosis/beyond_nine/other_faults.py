@@ -23,6 +23,7 @@ from faults.diagnosis.beyond_nine.left_open import (
     not_excluded,
     odds_of_hidden_relief,
     odds_of_wear,
+    presumed_of_wear,
     probabilities_of,
 )
 from faults.diagnosis.beyond_nine.sound_circuit import Tried, sound_circuit
@@ -31,6 +32,7 @@ from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import LASTING, PointFit, misfit, nominal_runs
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, is_stuck
+from faults.diagnosis.circuits.rivals import counted
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
@@ -145,24 +147,26 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     gains, likeliest, worn = dict[str, float](), dict[str, Array](), list[Tried]()
     found: tuple[float, _Fault, Tried] | None = None
     for fault, tried in _with_each(blocks, sound, runs):
-        gain = tried.score - sound.score + fault.presumed
+        gain = _gain(blocks, tried, sound.score) + fault.presumed
         if gain >= gains.get(fault.name, gain):
             gains[fault.name], likeliest[fault.name] = gain, tried.fits.scores
         worn += [tried] if fault.name == WORN else []
         if found is None or gain > found[0]:
             found = gain, fault, tried
-    best, delivered = sound.fits.scores, [one.score for one in worn]
-    wear = odds_of_wear(delivered, sound.score)
+    best = sound.fits.scores
+    delivered = [_gain(blocks, one, sound.score) for one in worn]
+    wear = odds_of_wear(delivered, 0.0)
     if found is not None and (found[0] > GAIN or wear > math.log(LIKELIER)):
         # a search may end short of the best: the sound circuit is asked again from where the faulty one ended, and anew
         _, fault, tried = found
         starts = (tried.fits.best.coordinates, None)
         again = [fit_classes(blocks, sound.actuator, runs=runs, start=start).scores for start in starts]
         best = max([best, *again], key=lambda scores: float(np.max(scores)))
-        gains[fault.name] = tried.score - float(np.max(best)) + fault.presumed
+        gains[fault.name] = _gain(blocks, tried, float(np.max(best))) + fault.presumed
         if gains[fault.name] > GAIN:
             return Outside((fault.note,))
-        wear = odds_of_wear(delivered, float(np.max(best)))
+        delivered = [_gain(blocks, one, float(np.max(best))) for one in worn]
+        wear = odds_of_wear(delivered, 0.0)
         if wear > math.log(LIKELIER):
             return Outside((_delivering(DELIVERIES[int(np.argmax(delivered))]),))
     odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
@@ -179,7 +183,9 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     told = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
     above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"} if likeliest[EARLY] is best else {}
     open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
-    scores = np.array([best, *(one.fits.scores for one in worn)]) if WORN in odds else None
+    pairs = zip(worn, delivered, strict=True)
+    each = [one.fits.scores - one.score + float(np.max(best)) + gain for one, gain in pairs]
+    scores = np.array([best, *each]) if WORN in odds else None
     return Outside((), not_excluded(open_, best), scores, sum(chances.values()))
 
 
@@ -282,6 +288,11 @@ def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: floa
     return max(roughly, anew, key=lambda one: one.score)
 
 
+def _gain(blocks: Blocks, tried: Tried, sound: float) -> float:
+    """Return what a circuit with a fault gains on a sound one that scores so much [dimensionless]."""
+    return counted(tried.score - sound, blocks, tried.fits.best)
+
+
 def _delivering(share: float) -> Note:
     return AgainstCode.PUMP_DELIVERS_LESS.note(percent=100.0 * share)
 
@@ -291,7 +302,8 @@ def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
     sound = actuator.circuit
     for share in DELIVERIES:
         worn = replace(sound, pump_displacement=share * sound.pump_displacement)
-        yield _Fault(_delivering(share), WORN, worn, elsewhere=True)
+        (presumed,) = presumed_of_wear((share,)).tolist()
+        yield _Fault(_delivering(share), WORN, worn, elsewhere=True, presumed=presumed)
     for share in SETTINGS if 0.0 < pressure < math.inf else ():
         early = replace(sound, relief_pressure=share * pressure)
         yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, presumed=SO_SET)
