@@ -112,8 +112,9 @@ class Outside(NamedTuple):
 class _Fault:
     """A fault: its note if found, its name if not excluded, and a circuit with it.
 
-    A search for a fault that moves the log into another condition begins in that, any other at the sound circuit. The
-    prior is the log-probability of its size [dimensionless].
+    The search for one that moves the log into another condition begins in that, any other at the sound circuit.
+    What is presumed is the log-likelihood of its size before a log is seen, and beyond `GAIN` it must gain what
+    `odds_of_wear` presumes of a pump [dimensionless].
     """
 
     note: Note
@@ -121,6 +122,7 @@ class _Fault:
     circuit: CircuitParameters
     elsewhere: bool = False
     presumed: float = 0.0
+    beyond: float = 0.0
 
 
 def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outside:
@@ -151,8 +153,8 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         if gain >= gains.get(fault.name, gain):
             gains[fault.name], likeliest[fault.name] = gain, tried.fits.scores
         worn += [tried] if fault.name == WORN else []
-        if found is None or gain > found[0]:
-            found = gain, fault, tried
+        if found is None or gain - fault.beyond > found[0]:
+            found = gain - fault.beyond, fault, tried
     best = sound.fits.scores
     delivered = [_gain(blocks, one, sound.score) for one in worn]
     wear = odds_of_wear(delivered, 0.0)
@@ -163,7 +165,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         again = [fit_classes(blocks, sound.actuator, runs=runs, start=start).scores for start in starts]
         best = max([best, *again], key=lambda scores: float(np.max(scores)))
         gains[fault.name] = _gain(blocks, tried, float(np.max(best))) + fault.presumed
-        if gains[fault.name] > GAIN:
+        if gains[fault.name] - fault.beyond > GAIN:
             return Outside((fault.note,))
         delivered = [_gain(blocks, one, float(np.max(best))) for one in worn]
         wear = odds_of_wear(delivered, 0.0)
@@ -303,7 +305,7 @@ def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
     for share in DELIVERIES:
         worn = replace(sound, pump_displacement=share * sound.pump_displacement)
         (presumed,) = presumed_of_wear((share,)).tolist()
-        yield _Fault(_delivering(share), WORN, worn, elsewhere=True, presumed=presumed)
+        yield _Fault(_delivering(share), WORN, worn, elsewhere=True, beyond=-presumed)
     for share in SETTINGS if 0.0 < pressure < math.inf else ():
         early = replace(sound, relief_pressure=share * pressure)
         yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, presumed=SO_SET)

@@ -28,7 +28,8 @@ Score = Callable[[CircuitParameters], float]
 
 
 def fits(score: float) -> Any:
-    return SimpleNamespace(scores=np.array([score - 9.0, score]), best=SimpleNamespace(coordinates=np.full(7, score)))
+    best = SimpleNamespace(coordinates=np.full(7, score), scales=0.05 * LOG.sizes)
+    return SimpleNamespace(scores=np.array([score - 9.0, score]), best=best)
 
 
 def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, list[tuple[Any, bool]]]:
@@ -59,7 +60,10 @@ def worn(circuit: CircuitParameters) -> float:
 
 
 @pytest.mark.parametrize(("gain", "named"), [(3.9, False), (4.1, True)])
-def test_a_fault_is_named_from_a_gain_of_four(gain: float, named: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_is_named_from_a_gain_of_four_and_what_is_presumed_of_a_pump(
+    gain: float, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gain += 0.5 * (np.log(0.9) / 0.15) ** 2 + np.log(2.0)
     against, open_, _ = decided(
         monkeypatch, lambda one: gain if worn(one) == 0.9 else -30.0 if worn(one) < 0.9 else 0.0
     )
@@ -71,6 +75,15 @@ def test_a_fault_is_named_from_a_gain_of_four(gain: float, named: bool, monkeypa
     else:
         assert against == ()
         assert "worn pump" in open_[0].data["faults"]
+
+
+@pytest.mark.parametrize(("share", "named"), [(1.0, True), (0.3, False)])
+def test_a_gain_counts_in_as_many_looks_as_the_log_gives(
+    share: float, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(other_faults, "counted", lambda gain, *_: share * gain)
+    against, _, _ = decided(monkeypatch, lambda one: 12.0 if getattr(one, "makeup_shut_b", 0.0) == 1.0 else 0.0)
+    assert [note.code for note in against] == ([AgainstCode.MAKEUP_STUCK] if named else [])
 
 
 @pytest.mark.parametrize(("gain", "open_"), [(-2.9, True), (-3.1, False)])

@@ -10,7 +10,7 @@ from faults.diagnosis.circuits import class_regions
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.circuits.class_fit import WITHIN, PointFit
+from faults.diagnosis.circuits.class_fit import LASTING, WITHIN, PointFit
 from faults.diagnosis.circuits.class_regions import (
     ALIKE,
     PRESSURE_SCALE,
@@ -58,6 +58,20 @@ def test_without_pressure_the_scale_of_pressure_is_not_believed() -> None:
     believed = believed_information(fit(0, outputs=1), blocks(pressure=False))
     assert float(PRESSURE_SCALE @ believed @ PRESSURE_SCALE) == pytest.approx(0.0, abs=1e-6)
     assert believed_information(fit(0), blocks(pressure=True)) == pytest.approx(INFORMATION)
+
+
+@pytest.mark.parametrize(("times", "stays"), [(0.9, False), (1.1, True)])
+def test_a_fit_keeps_its_scale_of_pressure_where_the_log_tells_it_better_than_what_is_presumed(
+    times: float, stays: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A relief valve that opened told it: from the likeliest scale, where it stays shut, no valve was told as stuck."""
+    there = ACTUATOR.conditions[0] + 0.1 * PRESSURE_SCALE
+    told = times * LASTING * float(PRESSURE_SCALE @ np.linalg.solve(WITHIN, PRESSURE_SCALE))
+    along = np.outer(PRESSURE_SCALE, PRESSURE_SCALE) / float(PRESSURE_SCALE @ PRESSURE_SCALE) ** 2
+    ended = replace(fit(0, outputs=1), coordinates=there, information=told * along)
+    monkeypatch.setattr(class_regions, "fit_freely", lambda *_: ended)
+    found = fit_classes(blocks(pressure=False), ACTUATOR, start=ACTUATOR.conditions[0]).best.coordinates
+    assert found == pytest.approx(there if stays else ACTUATOR.conditions[0])
 
 
 def test_circuits_for_a_spread_are_run_where_it_is_asked_for_and_once(monkeypatch: pytest.MonkeyPatch) -> None:
