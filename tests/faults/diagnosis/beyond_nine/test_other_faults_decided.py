@@ -303,7 +303,7 @@ def test_what_the_condition_would_be_beside_a_fault_that_is_not_excluded_is_said
 ) -> None:
     def ahead(*, first: bool) -> Any:
         scores = np.array([0.0, -9.0] if first else [-9.0, 0.0])
-        return SimpleNamespace(scores=scores, best=SimpleNamespace(coordinates=np.zeros(7)))
+        return SimpleNamespace(scores=scores, best=fits(0.0).best)
 
     def fitted(_: Any, actuator: Any, **__: Any) -> Any:
         if actuator.circuit.relief_pressure < SOUND.relief_pressure:  # excluded, but not above the log's pressures
