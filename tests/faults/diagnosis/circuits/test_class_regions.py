@@ -254,8 +254,10 @@ def test_without_pressure_a_fit_is_moved_along_the_scale_to_its_condition_unless
     runs = np.array([log.outputs * (1.0 if i == 0 else 2.0) for i in range(len(CONDITIONS))])
     away = ACTUATOR.conditions[0] + off * PRESSURE_SCALE
     told = times * LASTING * float(PRESSURE_SCALE @ np.linalg.solve(WITHIN, PRESSURE_SCALE))
-    along = np.outer(PRESSURE_SCALE, PRESSURE_SCALE) / float(PRESSURE_SCALE @ PRESSURE_SCALE) ** 2
-    found = replace(fit(0, outputs=1), coordinates=away, fitted=log.outputs, information=told * along)
+    length = float(PRESSURE_SCALE @ PRESSURE_SCALE)
+    along = np.outer(PRESSURE_SCALE, PRESSURE_SCALE) / length
+    information = told / length * along + 1e4 * (np.eye(7) - along)
+    found = replace(fit(0, outputs=1), coordinates=away, fitted=log.outputs, information=information)
     monkeypatch.setattr(class_regions, "nominal_runs", lambda *_: runs)
     monkeypatch.setattr(class_regions, "fit_freely", lambda *_: found)
     best = fit_classes(log, ACTUATOR).best.coordinates
