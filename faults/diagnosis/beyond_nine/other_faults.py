@@ -30,8 +30,8 @@ from faults.diagnosis.beyond_nine.sound_circuit import Tried, sound_circuit
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.circuits.class_fit import LASTING, PointFit, misfit, nominal_runs
-from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, is_stuck
+from faults.diagnosis.circuits.class_fit import LASTING, WITHIN, PointFit, misfit, nominal_runs
+from faults.diagnosis.circuits.class_regions import PRESSURE_SCALE, ClassFits, fit_classes, is_stuck
 from faults.diagnosis.circuits.rivals import counted
 from faults.notes import AgainstCode
 from plant.arrays import Array
@@ -84,6 +84,10 @@ SETTINGS = (0.75, 0.9)
 SO_SET = math.log(math.log(SETTINGS[1] / SETTINGS[0]) / math.log(10.0))
 """Prior log-probability of such a setting [dimensionless]: it may be as low as a tenth of the right one, below which no
 piston slides, and each of `SETTINGS` stands for those near it."""
+
+SET_AS_SAID = 0.1
+"""Deviation of the logarithm of a relief valve's setting, judged [dimensionless]: one sound about the rig file's, and
+one set low about the nearest of `SETTINGS`."""
 
 
 class Outside(NamedTuple):
@@ -149,25 +153,24 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     gains, likeliest, worn = dict[str, float](), dict[str, Array](), list[Tried]()
     found: tuple[float, _Fault, Tried] | None = None
     for fault, tried in _with_each(blocks, sound, runs):
-        gain = _gain(blocks, tried, sound.score) + fault.presumed
+        gain = _gain(blocks, tried, sound) + fault.presumed
         if gain >= gains.get(fault.name, gain):
             gains[fault.name], likeliest[fault.name] = gain, tried.fits.scores
         worn += [tried] if fault.name == WORN else []
         if found is None or gain - fault.beyond > found[0]:
             found = gain - fault.beyond, fault, tried
-    best = sound.fits.scores
-    delivered = [_gain(blocks, one, sound.score) for one in worn]
+    delivered = [_gain(blocks, one, sound) for one in worn]
     wear = odds_of_wear(delivered, 0.0)
     if found is not None and (found[0] > GAIN or wear > math.log(LIKELIER)):
         # a search may end short of the best: the sound circuit is asked again from where the faulty one ended, and anew
         _, fault, tried = found
         starts = (tried.fits.best.coordinates, None)
-        again = [fit_classes(blocks, sound.actuator, runs=runs, start=start).scores for start in starts]
-        best = max([best, *again], key=lambda scores: float(np.max(scores)))
-        gains[fault.name] = _gain(blocks, tried, float(np.max(best))) + fault.presumed
+        again = [fit_classes(blocks, sound.actuator, runs=runs, start=start) for start in starts]
+        sound = max([sound, *(Tried(sound.actuator, fits) for fits in again)], key=lambda one: one.score)
+        gains[fault.name] = _gain(blocks, tried, sound) + fault.presumed
         if gains[fault.name] - fault.beyond > GAIN:
             return Outside((fault.note,))
-        delivered = [_gain(blocks, one, float(np.max(best))) for one in worn]
+        delivered = [_gain(blocks, one, sound) for one in worn]
         wear = odds_of_wear(delivered, 0.0)
         if wear > math.log(LIKELIER):
             return Outside((_delivering(DELIVERIES[int(np.argmax(delivered))]),))
@@ -176,7 +179,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         odds[WORN] = wear
     if STUCK in odds:  # one that never has to open has the likelihood of a sound one, and keeps what is presumed of it
         odds[STUCK] = max(odds[STUCK], min(gains[STUCK], 0.0) + LEFT_UNSEEN)
-    pressure = largest_pressure(blocks, sound.fits.best, sound.actuator)
+    best, pressure = sound.fits.scores, largest_pressure(blocks, sound.fits.best, sound.actuator)
     hidden = odds_of_hidden_relief(pressure, sound.actuator.circuit.relief_pressure) - GAIN
     likeliest[EARLY] = likeliest[EARLY] if odds.get(EARLY, -math.inf) > hidden else best  # none moves what it hides in
     odds[EARLY] = float(np.logaddexp(odds.get(EARLY, -math.inf), hidden))
@@ -186,7 +189,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"} if likeliest[EARLY] is best else {}
     open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
     pairs = zip(worn, delivered, strict=True)
-    each = [one.fits.scores - one.score + float(np.max(best)) + gain for one, gain in pairs]
+    each = [one.fits.scores - one.score + sound.score + gain for one, gain in pairs]
     scores = np.array([best, *each]) if WORN in odds else None
     return Outside((), not_excluded(open_, best), scores, sum(chances.values()))
 
@@ -290,9 +293,24 @@ def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: floa
     return max(roughly, anew, key=lambda one: one.score)
 
 
-def _gain(blocks: Blocks, tried: Tried, sound: float) -> float:
-    """Return what a circuit with a fault gains on a sound one that scores so much [dimensionless]."""
-    return counted(tried.score - sound, blocks, tried.fits.best)
+def _gain(blocks: Blocks, tried: Tried, sound: Tried) -> float:
+    """Return what a circuit with a fault gains on a sound one [dimensionless].
+
+    A relief valve that opens tells the scale of all pressures, of which no score knows.
+    """
+    gain = counted(tried.score - sound.score, blocks, tried.fits.best)
+    low = tried.actuator.circuit.relief_pressure < sound.actuator.circuit.relief_pressure
+    if not low or largest_pressure(blocks, sound.fits.best, sound.actuator) < sound.actuator.circuit.relief_pressure:
+        return gain
+    return gain + _likely_scale(tried) - _likely_scale(sound)
+
+
+def _likely_scale(tried: Tried) -> float:
+    """Return the log-likelihood of a circuit's scale of pressures in the condition that holds it [dimensionless]."""
+    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    told = float(pull @ PRESSURE_SCALE)
+    off = tried.fits.best.coordinates - tried.actuator.conditions[int(np.argmax(tried.fits.scores))]
+    return -0.5 * (float(pull @ off) / told) ** 2 / (1.0 / told + SET_AS_SAID**2)
 
 
 def _delivering(share: float) -> Note:
