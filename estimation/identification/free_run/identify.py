@@ -172,8 +172,10 @@ def _identified(
 
 
 def _of_changes(task: Task) -> Identified | None:
-    """Return the linear model of an output with a random walk; None if it has none."""
-    walk = wandering(task.whole, task.part, task.orders, task.delays, task.asked.n_numerator)
+    """Return the linear model of an output that wanders; None where it does not."""
+    walk, free = wandering(task.whole, task.part, task.orders, task.delays, task.asked.n_numerator), task.free
+    if walk is not None and free is not None and wandering(free.whole, free.part, free.orders, None, None) is None:
+        return None
     found = None if walk is None else from_changes(walk, task.data, task.by)
     # a controller that answers the output's noise bends a fit of changes more than one of levels
     return None if found is None or fed_back(found.model, task.data, changes=True) else found

@@ -32,6 +32,9 @@ controller's action its set-point."""
 LEADS = (1, 2, 3, 4, 5)
 """Samples by which an input may be logged late [count]."""
 
+SMALL_ORDERS = (1, 2, 3)
+"""Orders that are tried beside a given one before a limit or a walk is believed."""
+
 
 @dataclass(frozen=True, eq=False)
 class Task:
@@ -60,6 +63,15 @@ class Task:
     asked: Asked
     orders: list[int]
     delays: tuple[int, ...] | None
+
+    @property
+    def free(self) -> "Task | None":
+        """The same with sizes that the data choose; None where none is given.
+
+        What a given size that is too large or too small leaves may look like a limit or a walk.
+        """
+        orders = sorted({*SMALL_ORDERS, *self.orders})
+        return None if self.asked == Asked() else replace(self, asked=Asked(), orders=orders, delays=None)
 
 
 @dataclass(frozen=True, eq=False)

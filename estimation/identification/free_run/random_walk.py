@@ -111,8 +111,10 @@ def wandering(
     changed, by = scaled(changes)
     if not all(np.isfinite(y).any() for y in changed.y):  # of an output that always changes by the same
         return None
-    late = estimate_delays(changed) if delays is None else delays
-    first = fit_linear(Form(ORDER, (ORDER + 1,) * len(late), late), changed, least_gain=COARSE)
+    # a dead time that is estimated beside a walk may be wrong
+    late = {estimate_delays(changed), (0,) * len(data.inputs)} if delays is None else {delays}
+    firsts = [fit_linear(Form(ORDER, (ORDER + 1,) * len(one), one), changed, least_gain=COARSE) for one in late]
+    first = min(firsts, key=lambda fit: fit.cost)
     rest = longest_rest(first, changed)
     if rest.size < FEWEST or returns(rest) <= COMES_BACK or _explained(rest) > SMOOTH:
         return None
