@@ -194,6 +194,9 @@ class AdviceCode(Code):
         "hold two or more motor speeds, each for half a second: this log holds {speeds}, too few to separate leakage "
         "from flow bias (a constant loss of the pump)"
     )
+    LOG_FASTER = (
+        "log at 1 kHz: with a sample every {step_ms:.3g} ms, many sound actuators have no verdict, or an unsure one"
+    )
     LOG_LONGER = (
         "log 10 s or more of steps at several speeds: this log of {duration_s:.3g} s leaves more than one condition "
         "possible"
@@ -204,4 +207,4 @@ class AdviceCode(Code):
         "alike"
     )
     DRAW_OIL = "use a drive that draws oil into chamber {side}: this log does not show whether its make-up valve opens"
-    NOTHING = "no further measurement is needed: this log is conclusive"
+    NOTHING = "no other log is needed: this one is conclusive"

@@ -47,6 +47,12 @@ CANDIDATES: Mapping[str, Sequence[str]] = {
 }
 """Units that are tried if a file states none, the usual ones first."""
 
+SPEEDS = ("m/s", "mm/s", "in/s", "cm/s", "ft/s", "m/min", "mm/min", "in/min", "um/s")
+"""Units of a velocity that are tried against the slope of position."""
+
+SLOPE_NEAR = 1.1
+"""Factor by which the slope of position may miss a unit of velocity [dimensionless]; judged."""
+
 MOST_PRESSURES = 100
 """Columns among which differences are searched, those most like a pressure first [count]; judged."""
 
@@ -274,14 +280,19 @@ def _with_units(
     p: EhaParameters,
 ) -> tuple[ChannelGuess, ...]:
     made: list[ChannelGuess] = []
-    for one in found:
+    for one in sorted(found, key=lambda one: one.channel == VELOCITY):  # position's unit tells that of velocity
         notes = list(why.get((one.channel, one.place), ()))
         heading = headings[one.place]
         if heading.stamped:
             notes = [GuessCode.DATES.note()]
         elif (one.unit is None and heading.name != one.channel) and one.channel in CANDIDATES:
-            unit, *others = _usual_units(one.channel, columns[one.place], p)
-            notes.append(GuessCode.UNIT_GUESSED.note(unit=unit, usual=" or ".join([unit, *others])))
+            known = {other.guess.channel: other.guess for other in made}
+            by_slope = _unit_of_slope(columns[one.place], known, columns) if one.channel == VELOCITY else None
+            unit, *others = [by_slope] if by_slope else _usual_units(one.channel, columns[one.place], p)
+            if by_slope:
+                notes.append(GuessCode.UNIT_OF_SLOPE.note(column=known[POSITION].place + 1, unit=unit))
+            else:
+                notes.append(GuessCode.UNIT_GUESSED.note(unit=unit, usual=" or ".join([unit, *others])))
             one = Guess(one.channel, one.place, one.name, unit, one.points, UNIT_DOUBT * one.sure)
         elif one.unit is not None:
             notes.append(GuessCode.UNIT_FITS.note(unit=one.unit))
@@ -289,7 +300,30 @@ def _with_units(
         if named is not None and named >= 2.5:
             notes.insert(0, GuessCode.CALLED_SO.note(channel=one.channel))
         made.append(ChannelGuess(one, tuple(notes)))
-    return tuple(made)
+    order = {one.channel: place for place, one in enumerate(found)}
+    return tuple(sorted(made, key=lambda one: order[one.guess.channel]))
+
+
+def _unit_of_slope(velocity: Array, known: Mapping[str, Guess], columns: Mapping[int, Any]) -> str | None:
+    """Return the unit in which a velocity is the slope of position, None where there is none."""
+    if not {TIME, POSITION} <= known.keys():
+        return None
+    stamps: Any = columns[known[TIME].place]
+    dated = stamps.dtype.kind == "M"
+    time = (stamps - stamps[:1]) / np.timedelta64(1, "s") if dated else stamps * _factor(known[TIME].unit or "s", "s")
+    position = columns[known[POSITION].place] * _factor(known[POSITION].unit or "m", "m")
+    if not len(time) == len(position) == len(velocity):
+        return None
+    there = np.isfinite(time) & np.isfinite(position) & np.isfinite(velocity)
+    time, position, velocity = time[there], position[there], velocity[there]
+    if len(time) < 20:
+        return None
+    way = np.append(0.0, np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)))
+    if abs(_alike(way, position)) < SURE:
+        return None
+    ratio = float(np.std(position) / np.std(way))
+    best = min(SPEEDS, key=lambda unit: abs(np.log(ratio / _factor(unit, "m/s"))))
+    return best if 1.0 / SLOPE_NEAR <= ratio / _factor(best, "m/s") <= SLOPE_NEAR else None
 
 
 def _usual_units(channel: str, values: Array, p: EhaParameters) -> list[str]:

@@ -10,6 +10,7 @@ class GuessCode(Code):
     DATES = "it holds dates or times of the day"
     UNIT_FITS = "{unit} is a unit of this channel"
     UNIT_GUESSED = "no unit is given; its size is usual in {usual}: {unit} was taken, so check it"
+    UNIT_OF_SLOPE = "no unit is given; {unit} was taken, which makes it the slope of column {column}"
     INCREASES = "it increases by {step:.6g} from row to row"
     HAS_SLOPE = "column {column} is its slope (correlation {correlation:.3f})"
     IS_SLOPE = "it is the slope of column {column} (correlation {correlation:.3f})"

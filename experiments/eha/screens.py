@@ -9,13 +9,20 @@ from experiments.command.options import PRESSURE
 from experiments.command.terminal import short_names, table
 from experiments.command.visible_text import visible_name
 from experiments.eha.entries import costs
-from experiments.eha.verdict_words import equally_likely, margin_word, verdict_lines
+from experiments.eha.verdict_words import equally_likely, verdict_lines
 from experiments.log_pages.screens import told_in_lines
 from experiments.page.condition_names import in_words
-from experiments.page.numbers import decimals_of
+from experiments.page.numbers import decimals_of, percent_text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+COLUMNS = {
+    "leakage_flow": "leakage [L/min]",
+    "velocity_lost": "velocity lost [%]",
+    "added_friction": "added friction [N]",
+}
+"""Severities in a table of many logs."""
 
 MOST_MESSAGES = 3
 """Most logs of which everything that speaks against a result is shown [count]."""
@@ -99,17 +106,23 @@ def _agreement(result: Result) -> str:
 
 
 def _summary(results: Sequence[Result]) -> "RenderableType":
-    shown = table("log", "condition", "probability [%]", "runner-up", "error of runner-up / best", "reliable")
+    shown = table("log", "condition", "probability [%]", "runner-up", *COLUMNS.values(), "reliable")
     for name, result in zip(short_names(results), results, strict=True):
-        margin, shares = result["margin"], result["probabilities"]
-        words = "-" if margin is None or result["condition"] is None else f"{margin:.2f}, {margin_word(margin)}"
+        shares = result["probabilities"]
         alike: list[str] = [] if shares is None else equally_likely(result)
-        share = "-" if shares is None else f"{100.0 * sum(shares[one] for one in alike):.1f}"
+        share = "-" if shares is None else percent_text(sum(shares[one] for one in alike))
         named = " or ".join(alike) if len(alike) > 1 else result["condition"] or "-"
         believe = "UNKNOWN" if result["unknown"] else "-" if shares is None else "yes"
         second = "-" if result["runner_up"] in alike else result["runner_up"] or "-"
-        shown.add_row(name, named, share, second, words, believe)
+        sizes = [_size(result, severity) for severity in COLUMNS]
+        shown.add_row(name, named, share, second, *sizes, believe)
     return shown
+
+
+def _size(result: Result, severity: str) -> str:
+    """Return a severity without its interval; a dash where the log does not tell it."""
+    value = None if result["severity"] is None else result["severity"][severity]["value"]
+    return "-" if value is None or not math.isfinite(value) else f"{value:z.1f}"
 
 
 def _scores_table(result: Result) -> "RenderableType":

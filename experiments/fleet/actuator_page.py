@@ -11,7 +11,7 @@ from markupsafe import Markup, escape
 
 from estimation.finding import interval_95
 from experiments.fleet.actuators import ActuatorRow
-from experiments.fleet.outlook import Outlook, outlook_of
+from experiments.fleet.outlook import REACHED, Outlook, outlook_of
 from experiments.fleet.page import IF_RIGHT, found_in, untold_since, worst_in
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.charts import Charts
@@ -172,8 +172,8 @@ def _forecast(one: Outlook, newest: LogRow) -> dict[str, str]:
         "level": f"{shown} {unit} ({low} to {high}){_as_of(one, newest)}",
         "limit": f"{number(scale * one.series.limit, 3)} {unit}",
         "growth": f"{fixed(growth, places)}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{fixed(growth_std, places)} {unit}",
-        "half": one.when(1, 3) or MISSING,
-        "most": one.when(0, 4) or MISSING,
+        "half": REACHED if one.past else one.when(1, 3) or MISSING,
+        "most": REACHED if one.past else one.when(0, 4) or MISSING,
         "outlook": f"{one.words}{one.doubt}",
     }
 

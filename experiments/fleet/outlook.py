@@ -14,6 +14,9 @@ from experiments.fleet.rows import LogRow
 from faults.trend.crossing import HORIZON
 from faults.trend.trend import FEWEST, Series, Trend, trends
 
+REACHED = "reached"
+"""What stands in place of a date that is past."""
+
 LEAST_STD = 1e-3
 """Least standard deviation of a log, as a share of the way from healthy to the limit [fraction]."""
 
@@ -93,7 +96,7 @@ class Outlook:
             return ""
         ends = [float(self.trend.crossing.quantiles[place]) for place in (low, high)]
         if ends[1] <= 0.0:
-            return "reached"
+            return REACHED
         growth, std = self.trend.growth
         if math.copysign(1.0, self.series.size) * growth + std < 0.0:
             return OUT_OF_SIGHT  # futures may turn round, but no reader looks for that in a severity that recedes

@@ -181,7 +181,8 @@ def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
     from estimation.log_checks.notes import GuessCode
 
     rows = [row for one in tables for row in one["columns"]]
-    guessed = [row for row in rows if GuessCode.UNIT_GUESSED in (why["code"] for why in row["why"])]
+    codes = {GuessCode.UNIT_GUESSED, GuessCode.UNIT_OF_SLOPE}
+    guessed = [row for row in rows if codes.intersection(why["code"] for why in row["why"])]
     return list(dict.fromkeys((row["channel"], row["name"]) for row in guessed))
 
 

@@ -101,7 +101,7 @@ def fleet(
         store = _diagnosed(Path(place), logs, out, plant, rig, rigs, load_columns(columns), sample_time, workers)
     table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities", "against"]).to_pylist()
     files = [row["file"] for row in table if row["file"]]
-    named, unnamed = _names(files, pattern, names, Path(place).name if from_logs else "")
+    named, unnamed = _names(files, pattern, names, Path(place).resolve().name if from_logs else "")
     if pattern is None and names is None:
         _say_split(named)
     rows = actuator_rows(log_rows(table, named, limits), repairs)
@@ -110,7 +110,7 @@ def fleet(
     base = Path(place) if from_logs else Path()
     paths = {spelt(one.relative_to(base).as_posix()): one for one in logs}
     links = write_pages(rows, out, pages, _page_writer(base, paths, plant, rig, rigs, columns, sample_time))
-    write_whole(out / PAGE, fleet_page(rows, links, Path(place).name), "--out", parents=True)
+    write_whole(out / PAGE, fleet_page(rows, links, Path(place).resolve().name), "--out", parents=True)
     _warn(rows, repairs, unnamed)
     failed = sum(one.state == "failed" for row in rows for one in row.logs)
     total = sum(len(row.logs) for row in rows)

@@ -67,7 +67,8 @@ def inspect(
             pages.write(log, inspect_page({"file": str(log), **found}, tables))
         if write is not None:
             _write_rig(write, found, actuator(found["plant"]))
-            note(f"{write}: check units and parameters, then run: hydrostate diagnose {log} --rig {write}")
+            run = f"check units and parameters, then run: hydrostate diagnose {log} --rig {write}"
+            note(f"{write}: {run if found['reads'] else 'the log cannot be diagnosed with it; the last line says why'}")
         return {"outcome": "ok", **found}
 
     if (write is not None or beside) and len(logs) > 1:

@@ -19,6 +19,9 @@ SURE = 0.9
 LONG_ENOUGH = 10.0
 """Length of a log from which a longer one does not help [s]."""
 
+SLOW = 0.01
+"""Time between samples from which many sound actuators have no verdict [s]; at half of it, intervals are wider only."""
+
 STRETCH, FEWEST = 0.05, 4
 """Length of a stretch in which speed may be constant [s], and least number of samples in it."""
 
@@ -94,8 +97,9 @@ def advice_for(
     """
     not_told = tuple(not_told)
     doubts, unclear = list(against), {note.code for note in not_told}
+    slow = [AdviceCode.LOG_FASTER.note(step_ms=1e3 * record.sample_time)] if record.sample_time >= SLOW else []
     if doubts:
-        return _mended(doubts)
+        return _mended(doubts, slow)
     found: list[Note] = []
     if PRESSURE not in channels:
         found.append(AdviceCode.LOG_PRESSURE.note())
@@ -109,9 +113,10 @@ def advice_for(
         if speeds < 2 or alike:
             found.append((AdviceCode.MORE_SPEEDS if speeds < 2 else AdviceCode.CLOSER_SPEEDS).note(speeds=speeds))
     if probabilities and max(probabilities.values()) < SURE * sum(probabilities.values()):
+        found += slow
         if record.duration < LONG_ENOUGH:
             found.append(AdviceCode.LOG_LONGER.note(duration_s=record.duration))
-        elif AdviceCode.MOVE_PISTON not in [note.code for note in found]:  # that asks for larger steps already
+        elif not slow and AdviceCode.MOVE_PISTON not in [note.code for note in found]:  # that asks for larger steps
             found.append(AdviceCode.CONDITIONS_OPEN.note())
     return tuple(found) or ((AdviceCode.NOTHING.note(),) if probabilities else ())
 
@@ -183,8 +188,8 @@ def rig_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaPara
     return ()
 
 
-def _mended(doubts: list[Note]) -> tuple[Note, ...]:
-    """Return what to repair before the next log: the suspected sensors, otherwise rig file and units."""
+def _mended(doubts: list[Note], slow: Iterable[Note]) -> tuple[Note, ...]:
+    """Return what to repair before the next log: the suspected sensors, else rig file and units."""
     if any(note.code == ChannelCode.NOTHING_CHANGES for note in doubts):
         return (AdviceCode.CHECK_LOGGER.note(),)
     if any(isinstance(note.code, ChannelCode) for note in doubts):
@@ -202,7 +207,7 @@ def _mended(doubts: list[Note]) -> tuple[Note, ...]:
     if any(note.code == EstimateCode.RIG_CONTRADICTED for note in doubts):
         return (AdviceCode.CHECK_RIG.note(),)
     if any(isinstance(note.code, EstimateCode) or note.code == AgainstCode.NONE_FITS for note in doubts):
-        return (AdviceCode.FIT_DOUBTED.note(),)
+        return (*slow, AdviceCode.FIT_DOUBTED.note())
     return (AdviceCode.CHECK_RIG.note(),)
 
 

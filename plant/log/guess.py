@@ -63,6 +63,15 @@ OTHERWISE = re.compile(
 NOT_IT, UNIT_FITS, NONE_OF_THEM = -4.0, 3.0, 2.0
 """What such a word says, what a unit says, and that none of the columns may be the channel [log-odds]; judged."""
 
+VALVES = re.compile(r"spool|valve|ventil|schieber")
+"""Names of the columns of an actuator that a valve controls."""
+
+VALVE = (
+    "; an actuator that a valve controls cannot be diagnosed, but `hydrostate identify FILE --input COLUMN "
+    "--output COLUMN` fits a model"
+)
+"""What is said of a log without motor speed that has such a column."""
+
 SHOWN = 0.5
 """Probability from which an error names a guess."""
 
@@ -306,7 +315,10 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
         "; a column in V needs its sensor's scale: --columns 'position_m=NAME:20 mm/V', for example" if volts else ""
     )
     other = "" if options or TIME in channels else "; if a second logger's file has it, add --with FILE"
-    return f"{may}{put}; {INSPECT}{scale}{other}{timeless}"
+    valve = (
+        VALVE if "motor_speed_rad_s" in channels and any(VALVES.search(one.name.lower()) for one in headings) else ""
+    )
+    return f"{may}{put}; {INSPECT}{scale}{other}{timeless}{valve}"
 
 
 def in_order(channels: Iterable[str]) -> list[str]:

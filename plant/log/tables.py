@@ -91,6 +91,8 @@ def gathered(
             return replace(dated, notes=(note, *dated.notes))
         headings[place] = heading
     if timeless or missing:
+        if not found and not any(len(one) for table in tables for one in table.numbers().values()):
+            raise LogError("a log needs rows of numbers below its header line, this file has none", source)
         wanted = [TIME] * timeless + missing
         raise missing_channels(wanted, headings, source, found)
     with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number is refused or noted later

@@ -55,6 +55,21 @@ def test_a_unit_that_is_not_given_is_guessed_and_makes_less_sure(record: Record)
     assert found["position_m"].guess.sure < 0.75
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("in/s", 1.0 / 0.0254), ("mm/s", 1e3), ("m/s", -1.0)])
+def test_a_velocity_without_unit_takes_that_in_which_it_is_the_slope_of_position(
+    record: Record, unit: str, factor: float
+) -> None:
+    """Its size alone says m/s of one in in/s, and of a slow one in mm/s; a reversed sensor has a unit too."""
+    scale = {"position_m": 1.0 / 0.0254, "velocity_m_s": factor}
+    found = guess(record, {"position_m": "Stroke (in)", "velocity_m_s": "Vel"}, scale)["velocity_m_s"]
+    assert (found.guess.unit, found.why[-1].code) == (unit, "unit_of_slope")
+
+
+def test_a_velocity_that_no_unit_makes_the_slope_of_position_is_guessed_by_its_size(record: Record) -> None:
+    found = guess(record, {"position_m": "Weg [mm]", "velocity_m_s": "Vel"}, {"position_m": 1e3, "velocity_m_s": 5.0})
+    assert found["velocity_m_s"].why[-1].code == "unit_guessed"
+
+
 def test_own_names_are_sure(record: Record) -> None:
     found = guess(record, {}, {})
     assert {name for name, one in found.items() if one.guess.sure > 0.9} >= set(NAMES)

@@ -232,6 +232,12 @@ def test_no_line_ends_within_a_date() -> None:
     assert 'past the limit since <span class="date">2026-02-16</span>.</p>' in page
 
 
+def test_a_limit_that_the_last_logs_are_past_is_reached_whatever_the_trend_says() -> None:
+    page = actuator_page(weekly([1.0] * 8 + [4.0] * 2), {})
+    assert "still within it: log again" in page
+    assert page.count(">reached</td>") == 2
+
+
 def test_a_repair_is_named_on_the_page() -> None:
     page = actuator_page(actuator(GROWING, maintained=(9.5,)), {})
     assert "Every severity is followed from the log of 10 on, after a repair." in page

@@ -69,7 +69,7 @@ def test_no_line_ends_within_an_option_and_all_can_be_copied(tmp_path: Path) -> 
     options = re.findall(r'<span class="option">(.*?)</span>', said)
     assert "--columns motor_speed_rad_s=MOTOR_RPM:rpm" in options
     assert "--columns differential_pressure_pa=DP_PA:Pa" in options  # the unit as it is written, not as names have it
-    assert re.sub(r"<.*?>|\s+", " ", said).split() == " ".join(options).split()
+    assert re.sub(r"<.*?>", "", said).split() == " ".join(options).split()  # as a browser copies them
 
 
 def test_units_are_to_be_checked_where_the_file_gives_none_and_the_columns_are_named(tmp_path: Path) -> None:

@@ -166,6 +166,14 @@ def test_where_something_speaks_against_a_log_that_is_mended_first() -> None:
     assert codes(advice_for(record, UNSURE, (contradicted, residuals), (), ALL)) == [AdviceCode.CHECK_RIG]
 
 
+def test_a_log_without_a_sure_verdict_at_100_hz_or_less_is_to_be_sampled_faster() -> None:
+    slow = Record(0.01, {"motor_speed_rad_s": np.full(200, 100.0)})
+    assert codes(advice_for(slow, UNSURE, (), (), ALL)) == [AdviceCode.LOG_FASTER, AdviceCode.LOG_LONGER]
+    doubted = (AgainstCode.NONE_FITS.note(percent=90.0),)
+    assert codes(advice_for(slow, UNSURE, doubted, (), ALL)) == [AdviceCode.LOG_FASTER, AdviceCode.FIT_DOUBTED]
+    assert codes(advice_for(slow, SURE, (), (), ALL)) == [AdviceCode.NOTHING]
+
+
 def test_without_probabilities_nothing_is_said_to_be_decided() -> None:
     assert advice_for(staircase([100.0]), {}, (), (), ALL) == ()
     (mend,) = advice_for(staircase([100.0]), {}, (AgainstCode.NONE_FITS.note(percent=90.0),), (), ALL)

@@ -114,6 +114,20 @@ def test_a_log_of_one_logger_says_how_the_other_is_merged(tmp_path: Path) -> Non
         read_record(path)
 
 
+def test_a_log_of_a_valve_without_motor_speed_says_what_can_be_done_with_it(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,spool_command,position_m\n" + ROWS)
+    with pytest.raises(LogError, match=r"an actuator that a valve controls cannot be diagnosed, but .*identify FILE"):
+        read_record(path)
+
+
+def test_a_letter_is_no_log(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("Dear Bob,\n\nplease find the log attached.\n")
+    with pytest.raises(LogError, match="needs rows of numbers below its header line, this file has none"):
+        read_record(path)
+
+
 def test_columns_in_volts_say_that_the_scale_of_the_sensor_is_needed() -> None:
     volts, bars = (
         hint_of(["position_m"], [Heading("Time", "s"), Heading("CH1", unit), Heading("CH2", "V")])
