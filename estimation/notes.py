@@ -105,8 +105,8 @@ class EstimateCode(Code):
         "the true uncertainty is larger than the covariance"
     )
     BOUND_TOO_WIDE = (
-        "the Cramér-Rao bound is {percent:.0f} % of the value, more than the 3 % allowed: bulk modulus is not "
-        "observable"
+        "this log determines bulk modulus to no better than {percent:.0f} % (Cramér-Rao bound; 3 % is allowed): larger "
+        "steps, or 1 kHz where it was logged more slowly, may help"
     )
     KNOWN_AS_THE_RIG = (
         "measure {entry}: its uncertainty in the rig file causes {percent:.0f} % of the variance of {quantity!w} with "
@@ -125,7 +125,7 @@ class EstimateCode(Code):
         "the flow balance does not explain the log: the pressure residuals are {ratio:.1f} times the sensor's noise"
     )
     PRESSURE_RESIDUALS_SMALL = (
-        "pressure fits {ratio:.1f} times better than the noise of position_m allows: so close a fit is not believed"
+        "pressure fits {ratio:.1f} times more closely than the noise of position_m allows: the fit is not believed"
     )
     PRESSURE_RESIDUALS_CORRELATED = (
         "the flow balance leaves something out: successive pressure residuals have a correlation of {correlation:.2f} "

@@ -87,7 +87,7 @@ class ClassCode(Code):
         "spread of this factor among actuators of one kind"
     )
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate leakage coefficient and flow bias (a constant loss of the pump)"
-    VELOCITY_LOST_TOLD = "the velocity lost is known: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
+    VELOCITY_LOST_TOLD = "of leakage, the log tells the velocity lost: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
     STUCK_NOT_TOLD = (
         "a make-up valve that is stuck shut but never had to open leaves no trace; this fault, which is not one of "
         "the nine conditions, keeps a probability of {percent:.0f} %"
@@ -191,8 +191,8 @@ class AdviceCode(Code):
     LOG_PRESSURE = "log differential pressure: leakage and friction are then known several times better"
     MOVE_PISTON = "use steps that move the piston: this log cannot show friction"
     MORE_SPEEDS = (
-        "hold two or more motor speeds, each for half a second: this log holds {speeds}, too few to separate leakage "
-        "from flow bias (a constant loss of the pump)"
+        "hold two or more motor speeds, each for half a second (this log: {speeds}): leakage and flow bias (a constant "
+        "loss of the pump) can then be told apart"
     )
     LOG_FASTER = (
         "log at 1 kHz: with a sample every {step_ms:.3g} ms, many sound actuators have no verdict, or an unsure one"
