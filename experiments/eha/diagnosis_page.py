@@ -25,6 +25,7 @@ from experiments.page.sentences import sentence
 from experiments.page.severity_rows import severity_rows
 from experiments.page.words import in_words
 from faults.diagnosis.circuits.blocks import blocks_of
+from plant.eha.rig import UNNAMED
 
 if TYPE_CHECKING:
     from estimation.finding import Finding
@@ -32,6 +33,12 @@ if TYPE_CHECKING:
 
 CHANNELS = (("velocity", "mm/s", 1e3), ("pressure", "bar", 1e-5))
 """What a circuit is fitted to: name, unit shown and factor from SI."""
+
+DESCRIBE = (
+    "Describe your actuator in a rig file (hydrostate rig init rig.toml), then diagnose again: this page assumes the "
+    "paper's actuator, so its numbers hold for that one only."
+)
+"""What to do where no rig file tells whose log it is."""
 
 LEAST_SHARE = 0.0005
 """Probability below which a condition is said to have next to none [probability]."""
@@ -51,7 +58,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "result": result,
         "file": name,
         "title": verdict(result),
-        "to_do": what_to_do(result),
+        "to_do": [*what_to_do(result), *([DESCRIBE] if result["rig"] == UNNAMED else [])],
         "sureness": sureness(result),
         "reasons": reasons_apart(result),
         "another_size": of_another_size(result),

@@ -164,6 +164,8 @@ def _answer_errors(app: FastAPI) -> None:
         where, *names = map(str, found["loc"]) if found["loc"] else ("request",)
         if found.get("type") == "missing":
             return answered(request, 422, f"the {where} has no {' '.join(names)!r}; it must give one")
+        if found.get("type") == "string_pattern_mismatch":
+            return answered(request, 422, f"{str(found['input'])[:80]!r} is none of this server's logs or streams")
         return answered(request, 422, f"{' '.join((where, *names))}: {found['msg']}")
 
     async def strange(_: Request, error: Exception) -> Response:

@@ -4,7 +4,7 @@ A rig is of any kind of actuator: its parameters are a frozen dataclass whose fi
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
@@ -121,7 +121,7 @@ class Rig(Generic[P]):
 
 
 def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant: str = EHA) -> Rig[Any]:
-    """Read a rig file; a parameter that it leaves out keeps the default.
+    """Read a rig file; what it leaves out keeps the default, a name that is the template's gives way to the file's.
 
     Parameters
     ----------
@@ -143,7 +143,9 @@ def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant
     content = _content(Path(path))
     try:
         with wrong_kinds():
-            return _rig(content, parameter_class, plant)
+            found = _rig(content, parameter_class, plant)
+        own = found.name == UNNAMED and found.parameters != parameter_class()
+        return replace(found, name=Path(path).stem) if own else found
     except RigError as error:
         raise RigError(f"{path}: {error}") from error
 

@@ -45,6 +45,7 @@ def test_the_page_says_what_how_bad_and_what_to_do(page: str) -> None:
     assert "<h1>The actuator leaks inside more than it should (minor leakage); friction is normal.</h1>" in page
     assert page.index("What to do") < page.index("How far from the limits") < page.index("Measured and fitted")
     assert "Plan a check of pump and piston seal." in page
+    assert "Describe your actuator in a rig file" in page
     assert "The fault was there before the log began." in page
     assert page.count("data:image/svg+xml;base64,") == 2
     assert page.count('class="limit"') == 6

@@ -27,6 +27,13 @@ def test_the_template_gives_the_papers_parameters_exactly(tmp_path: Path) -> Non
     assert dict(rig.columns) == {}
 
 
+def test_a_filled_in_template_that_kept_its_name_is_not_the_papers_actuator(tmp_path: Path) -> None:
+    """A page called a file with parameters of its own "no rig file of your own"."""
+    own = rig_template().replace("moving_mass = 7.376", "moving_mass = 9.0")
+    assert rig_of(tmp_path, own).name == "rig"  # as its file
+    assert rig_of(tmp_path, own.replace('name = "paper"', 'name = "Press 4"')).name == "Press 4"
+
+
 def test_every_parameter_of_the_template_has_its_unit_meaning_and_source() -> None:
     lines = rig_template().splitlines()
     for name, note in notes(EhaParameters).items():
