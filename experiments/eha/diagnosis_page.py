@@ -34,10 +34,7 @@ if TYPE_CHECKING:
 CHANNELS = (("velocity", "mm/s", 1e3), ("pressure", "bar", 1e-5))
 """What a circuit is fitted to: name, unit shown and factor from SI."""
 
-DESCRIBE = (
-    "Describe your actuator in a rig file (hydrostate rig init rig.toml), then diagnose again: this page assumes the "
-    "paper's actuator, so its numbers hold for that one only."
-)
+DESCRIBE = "Describe your actuator in a rig file: without one, these numbers are for the paper's actuator."
 """What to do where no rig file tells whose log it is."""
 
 LEAST_SHARE = 0.0005
@@ -58,7 +55,8 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "result": result,
         "file": name,
         "title": verdict(result),
-        "to_do": [*what_to_do(result), *([DESCRIBE] if result["rig"] == UNNAMED else [])],
+        "to_do": what_to_do(result),
+        "describe": DESCRIBE if result["rig"] == UNNAMED else "",
         "sureness": sureness(result),
         "reasons": reasons_apart(result),
         "another_size": of_another_size(result),
