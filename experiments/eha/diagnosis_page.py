@@ -15,7 +15,7 @@ from experiments.eha.plain_verdict import (
     verdict,
     what_to_do,
 )
-from experiments.eha.verdict_words import SHOWN, amount, library_sentence, ranked_shares
+from experiments.eha.verdict_words import SHOWN, amount, library_sentence, ranked_shares, refused_oil
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.charts import Charts
 from experiments.page.numbers import MINUS, percent_text
@@ -61,7 +61,9 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "reasons": reasons_apart(result),
         "another_size": of_another_size(result),
         "library": library_sentence(result),
-        "not_told": [sentence(said) for said in result["not_told"]] if not is_doubted(result) else [],
+        "not_told": [
+            sentence(said) for said in ([*refused_oil(result), *result["not_told"]] * (not is_doubted(result)))
+        ],
         "warnings": [sentence(said) for said in _beside(result)],
         "shares": [
             (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)

@@ -240,7 +240,22 @@ def believed(result: Mapping[str, Any]) -> str:
         told = causes(result)
         more = len(result["reasons"]) - len(told)
         return f"no: {NEXT_LINE.join(told)}{f'; {more} more in --json, which may follow from this' if more else ''}"
-    return NEXT_LINE.join(["yes: a circuit in one of the nine conditions reproduces the log", *result["not_told"]])
+    told = [
+        "yes: a circuit in one of the nine conditions reproduces the log",
+        *refused_oil(result),
+        *result["not_told"],
+    ]
+    return NEXT_LINE.join(told)
+
+
+def refused_oil(result: Mapping[str, Any]) -> list[str]:
+    """Return why not to rely on a bulk modulus that is shown beside a class although its check refused it."""
+    gate, estimated = result["gate"], result["bulk_modulus_pa"]
+    if result["unknown"] or gate is None or gate["passed"] or estimated is None or estimated["value"] is None:
+        return []
+    if result["severity"]["bulk_modulus"]["value"] != estimated["value"]:  # the circuit's, which has its own interval
+        return []
+    return [f"do not rely on bulk modulus: {'; '.join(gate['reasons'])}"]
 
 
 def next_step(result: Mapping[str, Any]) -> str:

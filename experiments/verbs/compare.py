@@ -27,8 +27,8 @@ def compare(
 ) -> None:
     """Show what changed between two logs: every severity, the difference, and its 95 % interval.
 
-    Of two batch studies, show what got better and what got worse from A to B, with 95 % intervals by bootstrap; the
-    seed draws it. Cases are paired: the same series with the same treatment. If each study uses one filter (or form,
+    Of two batch studies, show what got better and what got worse from A to B, with 95 % intervals by bootstrap, which
+    uses the seed. Cases are paired: the same series with the same treatment. If each study uses one filter (or form,
     plant, ...) throughout and the two studies differ in it, that difference is compared.
     """
     from experiments.batch.compare import compare_studies

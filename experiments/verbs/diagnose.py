@@ -62,10 +62,10 @@ def diagnose(
     """Find what is wrong: which of nine conditions, how probable, how severe; or that none of the nine fits.
 
     The nine conditions are no, minor or major leakage, each with no, minor or major friction. The command fits a
-    hydraulic circuit to each log and compares it with the nine; errors of nine models and nine filters also enter.
+    hydraulic circuit to each log and compares it with the nine; the errors of nine models and nine filters also count.
     Probabilities were calibrated on simulated logs. Severities have 95 % intervals; the wider ones ("with rig error")
     include the uncertainty of the rig file. In the table of --scores, a model error is in velocity [m/s], or
-    relative to the signals [dimensionless] if differential pressure is used. The seed draws the tests behind the
-    transfer functions.
+    relative to the signals [dimensionless] if differential pressure is used. The seed sets the simulated runs from
+    which transfer functions of your own rig are identified.
     """
     run_log_verb(context, "diagnose", "diagnosing", locals())

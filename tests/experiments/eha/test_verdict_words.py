@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from estimation.finding import Change, Finding, Gate, Outcome, Quantity
+from estimation.notes import EstimateCode
 from experiments.eha.entries import diagnosis_entries
 from experiments.eha.plain_verdict import verdict
 from experiments.eha.verdict_words import (
@@ -192,6 +193,18 @@ def test_the_numbers_of_an_unknown_log_are_preceded_by_a_warning() -> None:
         said = verdict_lines({"file": "run.csv", **entries})
         assert (warned in said) is there
         assert not there or said.index(warned) < next(i for i, line in enumerate(said) if line.startswith("  leakage"))
+
+
+@pytest.mark.parametrize(("shown", "said"), [(2.07e8, True), (2.2e8, False)])
+def test_a_bulk_modulus_that_its_check_refused_is_not_relied_on_beside_a_class_that_stands(
+    shown: float, said: bool
+) -> None:
+    """Diagnose printed a number that estimate calls doubtful, below "reliable: yes"; the circuit's own is another."""
+    small = EstimateCode.PRESSURE_RESIDUALS_SMALL.note(ratio=1.6)
+    found = found_as("normal")
+    severities = {**found.severities, "bulk_modulus": Quantity.normal(shown, 1e6, "Pa")}
+    entries = diagnosis_entries(replace(found, gate=Gate(False, (small,)), severities=severities))
+    assert (f"do not rely on bulk modulus: {small}" in believed(entries)) is said
 
 
 def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
