@@ -62,6 +62,9 @@ UNKNOWN_UNIT, UNKNOWN_RIG = "another unit", "another unit, or a rig file of anot
 LOSSY = "another unit, such as mm read as m where much of the flow is lost, or a rig file of another actuator"
 """Words for a factor that no known slip makes, or that one makes if most of the flow is lost."""
 
+INCHES = {1.0 / 0.0254: "inches read as m", 25.4: "inches read as mm, or mm read as inches"}
+"""Slips of a length in inches, by how far one sensor of a motion then goes beyond the other [dimensionless]."""
+
 EXPLAINED, KNOWN, TOLD = 0.9, 0.1, 4.0
 """Share of the flow that a balance must explain, relative deviation up to which its factor counts, and deviations from
 zero from which a sign does."""
@@ -176,7 +179,9 @@ def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameter
         large, small = (POSITION, VELOCITY) if abs(ratio) > 1.0 else (VELOCITY, POSITION)
         too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
         guilty = large if too_far else f"{large} or {small}"
-        found.append(_unit(guilty, small, max(abs(ratio), 1.0 / abs(ratio)), UNKNOWN_UNIT))
+        times = max(abs(ratio), 1.0 / abs(ratio))
+        inches = _near(times, INCHES, 0.95, 1.05)
+        found.append(_unit(guilty, small, times, UNKNOWN_UNIT if inches is None else INCHES[inches]))
     return tuple(found)
 
 

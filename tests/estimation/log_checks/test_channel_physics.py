@@ -164,6 +164,12 @@ def test_a_factor_that_no_known_slip_makes_is_another_unit(
         assert said.data["slip"].startswith("another unit")
 
 
+@pytest.mark.parametrize(("factor", "slip"), [(39.37, "inches read as m"), (25.4, "inches read as mm, or mm")])
+def test_a_velocity_in_inches_is_called_so(factor: float, slip: str) -> None:
+    (said,) = channel_mistakes(scaled(VELOCITY, factor)(run("normal", "steps")), HEALTHY)
+    assert said.data["slip"].startswith(slip)
+
+
 def test_a_piston_too_far_for_its_pump_tells_the_unit_where_the_balance_takes_motion_for_leakage(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
