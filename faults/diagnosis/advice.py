@@ -189,7 +189,7 @@ def rig_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaPara
 
 
 def _mended(doubts: list[Note], slow: Iterable[Note]) -> tuple[Note, ...]:
-    """Return what to repair before the next log: the suspected sensors, else rig file and units."""
+    """Return what to repair before the next log: the suspected sensors, otherwise rig file and units."""
     if any(note.code == ChannelCode.NOTHING_CHANGES for note in doubts):
         return (AdviceCode.CHECK_LOGGER.note(),)
     if any(isinstance(note.code, ChannelCode) for note in doubts):

@@ -225,7 +225,7 @@ def _shifted(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float)
 
 
 def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted, *, needed: bool) -> RippleFits | None:
-    """Return the fits with the teeth that others ask for, corrected until nothing is left; None if there are none."""
+    """Return fits with the ripple that other fits show, corrected until nothing is left; None if there is none."""
     if (first := _asked_for(begun.best, needed=needed)) is None:
         return None
     found, taken, offset = None, [first.teeth], begun.log.speed_offset + first.offset
@@ -282,7 +282,7 @@ def _surely_large(one: ShownRipple) -> bool:
 
 
 def _asked_for(fit: GreyBoxFit, *, needed: bool) -> ShownRipple | None:
-    """Return the teeth that a fit's residuals ask for, if no other count does as well but their overtones."""
+    """Return the ripple that a fit's residuals show, if no other tooth count fits as well except its overtones."""
     if not (ranked := _shown(fit, small=True, needed=needed)):
         return None
     count = ranked[0].teeth.count

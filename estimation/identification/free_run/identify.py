@@ -172,7 +172,7 @@ def _identified(
 
 
 def _of_changes(task: Task) -> Identified | None:
-    """Return the linear model of an output that wanders; None where it does not."""
+    """Return the linear model of an output with a random walk; None if it has none."""
     walk, free = wandering(task.whole, task.part, task.orders, task.delays, task.asked.n_numerator), task.free
     if walk is not None and free is not None and wandering(free.whole, free.part, free.orders, None, None) is None:
         return None
