@@ -1,4 +1,4 @@
-"""The finding: what a log says of an actuator, once. Estimate, diagnosis, batch, page and stream are views on it."""
+"""The finding: the result of a log for an actuator. Estimate, diagnosis, batch, page and stream are views of it."""
 
 import math
 from collections.abc import Mapping
@@ -15,8 +15,8 @@ NORMAL_95 = 1.959963984540054
 """Half-width of a 95 % normal interval, in standard deviations."""
 
 LARGE, WIDEST = 0.03, 100.0
-"""Relative deviation over which the interval of a positive quantity is one of its logarithm [fraction], and the
-farthest that this logarithm reaches, for the sake of finite numbers [dimensionless]."""
+"""Relative deviation above which the interval of a positive quantity is one of its logarithm [fraction], and the
+largest distance of that logarithm, so that numbers stay finite [dimensionless]."""
 
 
 def interval_95(value: float, std: float) -> tuple[float, float]:
@@ -38,7 +38,7 @@ def interval_95(value: float, std: float) -> tuple[float, float]:
 
 
 def positive_interval_95(value: float, std: float) -> tuple[float, float]:
-    """Return a 95 % interval of a quantity that cannot be negative: on a logarithmic scale where it is wide.
+    """Return a 95 % interval of a positive quantity: on a logarithmic scale if it is wide.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ NOT_OBSERVABLE_WITH_PRESSURE = (
     "With this drive, bulk modulus is not observable although differential pressure was used: the Cramér-Rao bound is "
     "over 3 %. Drive with larger, slower steps."
 )
-"""What that outcome means of a log with pressure."""
+"""Meaning of that outcome for a log with pressure."""
 
 OUTCOMES: Mapping[Outcome, str] = {
     Outcome.OK: "The result is given, with its interval and the verdict of the consistency check.",
@@ -95,7 +95,7 @@ OUTCOMES: Mapping[Outcome, str] = {
     Outcome.DIVERGED: "The estimate stopped being finite; check units, rig parameters and the form of the model.",
     Outcome.FAILED: "The log could not be read or used; the message says why.",
 }
-"""What each outcome means, as a sentence for a reader."""
+"""Meaning of each outcome, as a sentence for a reader."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Quantity:
     Parameters
     ----------
     value : float or None
-        The estimate [in its unit]; None where the log does not tell it.
+        The estimate [in its unit]; None if the log does not determine it.
     unit : str
         The unit; ``"1"`` for a number without one.
     ci95 : tuple of float, optional
@@ -113,7 +113,7 @@ class Quantity:
     std : float, optional
         Its standard deviation, likewise [in its unit].
     ci95_total : tuple of float, optional
-        Ends of its 95 % interval with what is not known of the rig [in its unit]; None where that was not asked.
+        Limits of its 95 % interval including the rig's uncertainty [in its unit]; None if it was not computed.
 
     Examples
     --------
@@ -183,13 +183,13 @@ class Gate:
     passed : bool
         Whether the estimate and its interval can be believed.
     reasons : tuple of Note
-        What speaks against it.
+        Reasons against it.
     inflation : float
-        Factor by which the standard deviation has to grow for the structure that is left in the innovations
-        [dimensionless]; 1 where there is none. It is an estimate of magnitude: right within a factor of about two on
-        plants that the model does not describe, where it turns errors of 5 to 400 standard deviations into 0.1 to 3.
+        Factor by which the standard deviation must grow because the innovations are correlated [dimensionless]; 1 if
+        they are not. It is an order of magnitude, right within a factor of about two on plants that the model does not
+        describe, where it turns errors of 5 to 400 standard deviations into 0.1 to 3.
     whiteness : tuple of Whiteness
-        The innovations of each channel; empty where they were not kept.
+        The innovations of each channel; empty if they were not kept.
     """
 
     passed: bool
@@ -226,7 +226,7 @@ class Finding:
     actuator : str
         Kind of actuator, by its name in the registry.
     outcome : Outcome
-        How it went.
+        The outcome.
     quantities : Mapping[str, Quantity]
         What was estimated, by name.
     gate : Gate
@@ -236,18 +236,18 @@ class Finding:
     notes : tuple of Note
         What else a reader should know: what was left out of the log, what an absent channel costs.
     condition : str or None
-        The most probable condition or fault; None where none was asked for, or none can be named.
+        The most probable condition or fault; None if none was requested, or none can be named.
     alike : tuple of str
-        Conditions that the log does not tell from it.
+        Conditions that the log does not distinguish from it.
     probabilities : Mapping[str, float]
-        Of each condition [probability]. Where another fault is as likely and a note names it, they sum to less than 1
-        by its probability; else they are those of a log that is in one of them.
+        Probability of each condition [probability]. If another fault is as likely and a note names it, they sum to less
+        than 1 by its probability; otherwise they hold for a log that is in one of them.
     unknown : bool
-        Whether something speaks against all of them.
+        Whether there is a reason against all of them.
     against : tuple of Note
-        What.
+        The reasons.
     faults : tuple of Note
-        What else is wrong, beside the condition.
+        Further faults.
     severities : Mapping[str, Quantity]
         How bad it is.
     healthy : Mapping[str, float]
@@ -283,11 +283,12 @@ class Finding:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The condition and those that are not told from it; empty where none is named."""
+        """The condition and those that cannot be distinguished from it; empty if none is named."""
         return () if self.condition is None else (self.condition, *self.alike)
 
     @property
     def all_notes(self) -> tuple[Note, ...]:
-        """Every note, each once: of the gate, the class, other faults, what is not told, the log, and the advice."""
+        """Every note, each once: on the gate, the class, other faults, what is not determined, the log, and the
+        advice."""
         groups = (self.gate.reasons, self.against, self.faults, self.not_told, self.notes, self.advice)
         return distinct(note for group in groups for note in group)

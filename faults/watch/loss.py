@@ -1,14 +1,15 @@
-"""Slow growth of leakage: the share of the pumped flow that is lost, span by span, beside what warming oil explains.
+"""Slow growth of leakage: the share of the pumped flow that is lost, span by span, compared with the effect of warming
+oil.
 
-The balances of `faults.watch.balances` forget within half a minute, so what grows more slowly is learnt and not seen.
-A *span* of some seconds measures what is lost. With pressure it is a share of the pump's work, and oil that is only
-squeezed gives back what it took. Without pressure it is the part of the speed that the piston never follows, from a
-regression in which its lag has coefficients of its own.
+The balances of `faults.watch.balances` forget within half a minute, so they learn slower growth and do not detect it. A
+*span* of some seconds measures the loss. With pressure it is a share of the pump's work, in which compressed oil
+returns what it took. Without pressure it is the part of the speed that the piston never follows, from a regression in
+which its lag has coefficients of its own.
 
-Thinner oil leaks more, but at most in inverse proportion to its viscosity (`OIL`); what is lost beyond that is a leak.
-A load or a speed that changes is none: over pumped flow lost flow rises with load, over pressure it does not; over
-pumped flow it rises at less speed, over time it does not. So the smaller of the two shares counts. Without pressure
-that is not enough, since the lag depends on the drive: there only spans of a drive like the one learnt count.
+Thinner oil leaks more, but at most in inverse proportion to its viscosity (`OIL`); a larger loss is a leak. A change of
+load or speed is none. Relative to pumped flow, lost flow rises with load, relative to pressure it does not; relative to
+pumped flow it rises at lower speed, relative to time it does not. So the smaller of the two shares counts. Without
+pressure that is not enough, since the lag depends on the drive: only spans with a drive like the one learnt count.
 """
 
 import math
@@ -19,32 +20,33 @@ from faults.watch.balances import BENT, solve
 from plant.arrays import Array
 
 DELAYS = 16
-"""Intervals over which the piston's lag behind the motor is regressed."""
+"""Intervals in the regression of the piston's lag behind the motor."""
 
 WORK = 5
 """Sums of a span with pressure."""
 
 WORK_QP, WORK_WP, WORK_PP, WORK_PV, WORK_VV = range(WORK)
-"""Places in them: of q p, the size of w p, p p, p v and v v."""
+"""Indices of these: q p, the magnitude of w p, p p, p v and v v."""
 
 SPAN_TELLS = 6
-"""Numbers that a span tells."""
+"""Results of a span."""
 
 SPAN_SHARE, SPAN_OTHER_SHARE, SPAN_RATIO, SPAN_RESISTANCE, SPAN_FAST, SPAN_LIVELY = range(SPAN_TELLS)
-"""Places in them: two shares lost, the ratio that makes them one, pressure at a velocity (0 for a span that tells
-nothing), and how fast and how lively the drive is."""
+"""Indices of these: two lost shares, the ratio that makes them comparable, pressure at a velocity (0 for a span without
+a result), and how fast and how lively the drive is."""
 
 OIL = 2.0
-"""By what thinner oil may raise what is lost [fraction]: an oil of VG 46 thins by half in 23 K (judged)."""
+"""Largest rise of the loss by thinner oil [fraction]: the viscosity of VG 46 halves in 23 K (judged)."""
 
 LEAST_LOSS = 0.05
-"""What counts as lost at the least [fraction]: a rig's sizes may be wrong by that much (judged)."""
+"""Least loss for comparison [fraction]: a rig's entries may be wrong by that much (judged)."""
 
 LEAST_TOLD = 0.02
-"""Share of the speed that its last changes must leave open [fraction], so that lost speed and lag are told apart."""
+"""Share of the speed that its previous changes must not explain [fraction], so that lost speed and lag can be
+separated."""
 
 ALIKE = 1.25
-"""By what factor a span's drive may differ from the one learnt, without pressure [fraction] (judged)."""
+"""Factor by which a span's drive may differ from the one learnt, without pressure [fraction] (judged)."""
 
 SPAN = 200
 """Blocks of motion in a span."""
@@ -53,31 +55,31 @@ LEARNT = 12.0
 """Spans from which the usual loss is learnt again after an alarm [count]."""
 
 LEAST_LEARNT = 3.0
-"""Spans that it takes at the least [count]."""
+"""Least number of spans [count]."""
 
 ALLOWED = 0.5
-"""What a span's score must exceed for the CUSUM to rise [standard deviations]."""
+"""Score of a span above which the CUSUM rises [standard deviations]."""
 
 LARGEST = 4.0
-"""Cap of a span's score [standard deviations]: no two spans decide."""
+"""Limit of a span's score [standard deviations]: two spans cannot decide."""
 
 NARROWEST = 0.1
-"""Standard deviation of a span at the least, as a share of what oil may raise [fraction] (judged)."""
+"""Least standard deviation of a span, over the largest effect of oil [fraction] (judged)."""
 
 SPREAD_MEMORY = 360.0
-"""Spans from which the standard deviation is known [count]."""
+"""Spans from which the standard deviation is determined [count]."""
 
 OVERSHOOT = 1.166
-"""By how much a CUSUM overshoots, twice (Siegmund, Sequential Analysis, 1985, chapter X.2) [standard deviations]."""
+"""Twice the overshoot of a CUSUM (Siegmund, Sequential Analysis, 1985, chapter X.2) [standard deviations]."""
 
 BLOCKS, SPANS, WANTED, SHARE, RATIO, RESISTANCE, FAST, LIVELY, OTHERS = range(9)
-"""Places in what is known of the loss: blocks in the span; spans in what is usual, and how many it wants; the usual
-share, ratio of the two shares, pressure at a velocity, and how fast and lively the drive is; spans in a row of another
-drive."""
+"""Indices in the memory of the loss: blocks in the span; spans in the usual loss, and how many it needs; the usual
+share, ratio of the two shares, pressure at a velocity, and how fast and lively the drive is; successive spans of
+another drive."""
 
 SPREAD, KNOWN, LAST, LAST_RESISTANCE, RISEN, LIMIT, SEEN = range(9, 16)
-"""More of them: variance of a span, and spans that it is from; the last level, and the last pressure at a velocity; the
-CUSUM and its threshold [standard deviations]; spans so far."""
+"""Further indices: variance of a span, and the number of spans behind it; the last level, and the last pressure at a
+velocity; the CUSUM and its threshold [standard deviations]; spans so far."""
 
 
 def count_work(w: float, v: float, p: float, work: Array) -> None:
@@ -90,14 +92,14 @@ def count_work(w: float, v: float, p: float, work: Array) -> None:
 
 
 def count_lag(w: float, v: float, full: bool, speeds: Array, lag: Array, lost: Array) -> None:
-    """Add an interval to the normal equations of lost speed, once the last speeds are known.
+    """Add an interval to the normal equations of lost speed, once the previous speeds are known.
 
     Parameters
     ----------
     w, v : float
         Speed and velocity, relative to the rated ones [dimensionless].
     full : bool
-        Whether the last speeds follow on each other.
+        Whether the previous speeds are consecutive.
     speeds : ndarray, shape (2, delays + 2)
         The last speeds, and the regressors: speed, its last changes, its direction.
     lag : ndarray, shape (delays + 2, delays + 2)
@@ -123,7 +125,7 @@ def count_lag(w: float, v: float, full: bool, speeds: Array, lag: Array, lost: A
 
 
 def measure_work(work: Array, told: Array) -> None:
-    """Set what a span with pressure tells: shares lost of the pump's work and of pressure; nothing at rest.
+    """Set the results of a span with pressure: lost shares of the pump's work and of pressure; none at rest.
 
     Parameters
     ----------
@@ -139,9 +141,9 @@ def measure_work(work: Array, told: Array) -> None:
 
 
 def measure_lag(lag: Array, lost: Array, told: Array) -> None:
-    """Set what a span without pressure tells: shares lost of speed and of its direction, as `measure_work` does.
+    """Set the results of a span without pressure: lost shares of speed and of its direction, as in `measure_work`.
 
-    It tells nothing where the drive's changes say all about its speed, as a sine's do: the lag may be anything then.
+    There is no result if the drive's changes determine its speed, as for a sine: the lag is then arbitrary.
     """
     last = DELAYS + 1
     told[SPAN_RESISTANCE] = 0.0
@@ -159,7 +161,7 @@ def measure_lag(lag: Array, lost: Array, told: Array) -> None:
 
 
 def drive_is_alike(told: Array, loss: Array) -> bool:
-    """Return whether a span's drive is like the one learnt; one that stays another is learnt instead."""
+    """Return whether a span's drive is like the one learnt; a lasting change of drive is learnt instead."""
     if loss[SPANS] < loss[WANTED]:
         return True
     fast, lively = told[SPAN_FAST] / loss[FAST], told[SPAN_LIVELY] / loss[LIVELY]
@@ -173,12 +175,12 @@ def drive_is_alike(told: Array, loss: Array) -> bool:
 
 
 def judge_loss(told: Array, now: float, loss: Array, levels: Array) -> bool:
-    """Take what a span has measured; return whether more is lost than warming oil explains.
+    """Process the results of a span; return whether the loss exceeds the effect of warming oil.
 
     Parameters
     ----------
     told : ndarray, shape (6,)
-        As `measure_work` sets it.
+        From `measure_work`.
     now : float
         Blocks so far [count].
     loss : ndarray, shape (16,)
@@ -213,28 +215,28 @@ def judge_loss(told: Array, now: float, loss: Array, levels: Array) -> bool:
 
 
 def oil_allows(usual: float) -> float:
-    """Return how much more may be lost than is usual before it is a leak [fraction]."""
+    """Return how much the loss may exceed the usual one before it is a leak [fraction]."""
     return (OIL - 1.0) * max(usual, LEAST_LOSS)
 
 
 def learn_loss_again(loss: Array) -> None:
-    """Forget the usual loss: what has been told is usual from here on."""
+    """Forget the usual loss: the present one is usual from here on."""
     loss[SPANS] = loss[RISEN] = loss[OTHERS] = 0.0
     loss[WANTED] = LEARNT
 
 
 def loss_threshold(expected: float) -> float:
-    """Return the threshold that the CUSUM of white Gaussian scores passes at a rate (Siegmund's approximation).
+    """Return the threshold that the CUSUM of white Gaussian scores exceeds at a given rate (Siegmund's approximation).
 
     Parameters
     ----------
     expected : float
-        How often it may be passed in a span [count].
+        Expected alarms per span [count].
 
     Returns
     -------
     float
-        The threshold [standard deviations], with oil as thin as `OIL` allows: cooler oil passes it less often.
+        The threshold [standard deviations], for the thinnest oil that `OIL` allows: cooler oil exceeds it less often.
 
     Examples
     --------

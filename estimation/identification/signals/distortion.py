@@ -12,24 +12,24 @@ from estimation.identification.signals.period import find_period
 from plant.errors import HydrostateError
 
 EXCITED = 1e-3
-"""Amplitude of a line over the largest, from which it is driven [fraction]."""
+"""Amplitude of a line over the largest, above which it is excited [fraction]."""
 
 NEIGHBOURS = 15
-"""Detection lines whose mean power tells the distortion of an excited line."""
+"""Detection lines whose mean power is used for the distortion of an excited line."""
 
 PARTS = 8
-"""Of half a period, whose powers of distortion tell how much a level scatters from one multisine to another.
-
-High powers of a signal have heavy tails: of few long parts the means are more nearly normal."""
+"""Parts of half a period, whose powers of distortion show how much a level varies from one multisine to another. High
+powers of a signal have heavy tails: with few long parts the means are closer to normal."""
 
 BESIDE, CURVED = 4, 2
-"""Excited lines on either side over which a response is a polynomial, and its degree."""
+"""Excited lines on either side over which the response is a polynomial, and its degree."""
 
 ALIKE = 2.0
-"""Distortion on excited lines over that on silent ones, from which the response is not such a polynomial [fraction]."""
+"""Distortion on excited lines over that on silent ones, above which the response is not such a polynomial
+[fraction]."""
 
 NEAR = 1.0
-"""How near to its mean over multisines a level is wanted [dB]."""
+"""Required accuracy of a level relative to its mean over multisines [dB]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,17 +41,17 @@ class Distortion:
     response : FrequencyResponse
         Best linear approximation at the excited lines; its variance holds noise and stochastic distortion.
     period : int
-        Samples after which the input repeats itself.
+        Period of the input in samples.
     periods : int
         Whole periods that were used.
     frequency : ndarray, shape (k,)
         Lines between zero and half the sample rate [Hz].
     excited, odd : ndarray of bool, shape (k,)
-        Lines that are driven; odd multiples of the lowest frequency.
+        Lines that are excited; odd multiples of the lowest frequency.
     noise, power : ndarray, shape (k,)
         Variance of the noise in the mean over periods, and power of that mean [output unit squared].
     stray : ndarray of complex, shape (k,)
-        Output on silent lines, and what a smooth response leaves on excited ones [output unit].
+        Output on silent lines, and the residual of a smooth response on excited ones [output unit].
     """
 
     response: FrequencyResponse
@@ -65,7 +65,7 @@ class Distortion:
     stray: ComplexArray
 
     def level(self, *, odd: bool) -> float:
-        """Return the mean power of distortion a line, by what stands on lines that are not driven, noise taken off.
+        """Return the mean power of distortion per line, from the lines that are not excited, less noise.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class Distortion:
         Returns
         -------
         float
-            Below the highest excited line [output unit squared]; NaN where all such lines are driven.
+            Below the highest excited line [output unit squared]; NaN if all such lines are excited.
         """
         silent = _silent(self.excited, self.odd == odd)
         return float(np.mean(self.power[silent] - self.noise[silent])) if silent.any() else float("nan")
@@ -83,21 +83,20 @@ class Distortion:
     def level_interval(self, *, odd: bool, probability: float = 0.95) -> tuple[float, float]:
         """Return an interval for the mean of a level over multisines of the same lines with other phases.
 
-        A period is a short stretch of a random signal: high powers of it rise and fall from multisine to multisine by
-        more than lines that are independent would tell. How much is read off the distortion's power in parts of the
-        period.
+        A period is a short part of a random signal: high powers of it vary from multisine to multisine by more than
+        independent lines would. The variation is determined from the distortion's power in parts of the period.
 
         Parameters
         ----------
         odd : bool
             Of odd distortion; of even otherwise.
         probability : float
-            With which it holds the mean [probability].
+            Probability that it contains the mean [probability].
 
         Returns
         -------
         tuple of float
-            Ends [output unit squared]; NaN where they cannot be told.
+            Limits [output unit squared]; NaN if they cannot be determined.
         """
         level, reach = self.level(odd=odd), self._reach(odd, probability)
         if not np.isfinite(reach):
@@ -109,7 +108,7 @@ class Distortion:
         return level / factor, level * factor
 
     def period_wanted(self, *, odd: bool) -> int | None:
-        """Return the period at which 95 % of multisines would tell a level within `NEAR`; None where it is not known.
+        """Return the period for which 95 % of multisines have a level within `NEAR`; None if unknown.
 
         Parameters
         ----------
@@ -130,7 +129,7 @@ class Distortion:
         return float(stdtrit(PARTS - 1, 0.5 + 0.5 * probability)) * self._spread(odd)
 
     def _spread(self, odd: bool) -> float:
-        """Return the standard deviation of a level from multisine to multisine; NaN where it is not known."""
+        """Return the standard deviation of a level from multisine to multisine; NaN if unknown."""
         kind = self.odd == odd
         silent = _silent(self.excited, kind)
         if not self.power[silent].sum() > 0.0 or self.period // 2 < 8 * PARTS:
@@ -162,11 +161,11 @@ def _silent(excited: BoolArray, kind: BoolArray) -> BoolArray:
 def best_linear_approximation(
     u: ArrayLike, y: ArrayLike, sample_time: float, *, period: int | None = None, settling: int = 1
 ) -> Distortion:
-    """Tell a plant's linear behaviour, its noise and its distortion apart from some periods of one multisine.
+    """Separate a plant's linear behaviour, its noise and its distortion, from some periods of one multisine.
 
-    Noise is what changes from period to period. Distortion of odd and even degree stands on odd and even lines that the
-    input leaves out (Pintelon and Schoukens 2012, System Identification, section 4.3.1). A multisine of odd lines of
-    which one in four is left out at random tells both; of one that drives every line, neither is told.
+    Noise is what changes from period to period. Distortion of odd and even degree appears on odd and even lines that
+    the input leaves out (Pintelon and Schoukens 2012, System Identification, section 4.3.1). A multisine of odd lines
+    of which one in four is left out at random shows both; one that excites every line shows neither.
 
     Parameters
     ----------
@@ -175,14 +174,14 @@ def best_linear_approximation(
     sample_time : float
         Seconds between samples [s].
     period : int, optional
-        Samples after which the input repeats itself; found unless told.
+        Period of the input in samples; found by default.
     settling : int
         Periods at the beginning that are left out.
 
     Returns
     -------
     Distortion
-        Response, levels by line.
+        Response, and levels by line.
 
     Raises
     ------
@@ -221,7 +220,7 @@ def best_linear_approximation(
 
 
 def _stray(excited: BoolArray, odd: BoolArray, power: Array, at: IntArray) -> Array:
-    """Return the mean power on the nearest lines that are not driven and of the same kind; NaN where there are none."""
+    """Return the mean power on the nearest silent lines of the same kind; NaN if there are none."""
     found = np.full(len(at), np.nan)
     for kind in (True, False):
         silent = np.flatnonzero(_silent(excited, odd == kind))
@@ -235,7 +234,7 @@ def _stray(excited: BoolArray, odd: BoolArray, power: Array, at: IntArray) -> Ar
 
 
 def _left(output: ComplexArray, inside: ComplexArray) -> ComplexArray:
-    """Return the residual of a polynomial over neighbouring excited lines; NaN where they are too few."""
+    """Return the residual of a polynomial over neighbouring excited lines; NaN if there are too few."""
     n, span = len(output), 2 * BESIDE + 1
     if n < span:
         return np.full(n, np.nan, dtype=np.complex128)

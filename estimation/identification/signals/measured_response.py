@@ -12,13 +12,13 @@ from estimation.identification.signals.period import find_period
 from plant.errors import HydrostateError
 
 SETTLING, FEWEST_PERIODS = 1, 2
-"""Periods that are left out at the beginning, and periods wanted behind them."""
+"""Periods that are left out at the beginning, and least number of periods after them."""
 
 TOLD = (
     *("period_samples", "periods", "noise_power", "odd_power", "even_power"),
     *("odd_power_interval", "even_power_interval", "odd_period_for_1_db", "even_period_for_1_db"),
 )
-"""What only a multisine tells, by the names of the JSON contract."""
+"""Results that only a multisine gives, by the names of the JSON contract."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class MeasuredResponse:
 
 
 def measured_response(u: Array, y: Array, sample_time: float) -> MeasuredResponse:
-    """Return the frequency response of one log: as a multisine's where its input repeats itself, else whatever it is.
+    """Return the frequency response of one log: by periods if its input is periodic, otherwise for any input.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""After how many samples inputs repeat themselves.
+"""The common period of inputs.
 
 See decision 295.
 """
@@ -9,21 +9,20 @@ from numpy.typing import ArrayLike
 from estimation.arrays import Array
 
 REPEATS = 1e-4
-"""Power of an input's change over a period, over its own, up to which it repeats itself [fraction]."""
+"""Power of an input's change over a period, over its own, up to which it is periodic [fraction]."""
 
 NEARLY = 0.01
-"""Likewise where the inputs are measured with noise [fraction]."""
+"""The same if the inputs are measured with noise [fraction]."""
 
 OTHERWISE = 0.5
-"""Such a share from which a signal is no longer what it was: a period is longer than a lag at which it is
-[fraction]."""
+"""The same from which a signal has changed: a period is longer than a lag with such a change [fraction]."""
 
 LEAST_SHARED = 0.2
-"""Share of a log that has to be there a second time [fraction]."""
+"""Least share of a log that is repeated [fraction]."""
 
 
 def find_period(u: ArrayLike) -> int | None:
-    """Return after how many samples an input repeats itself; None where it does not within half of the log.
+    """Return the period of an input in samples; None if there is none within half of the log.
 
     Parameters
     ----------
@@ -47,7 +46,7 @@ def find_period(u: ArrayLike) -> int | None:
 
 
 def common_period(u: Array) -> int | None:
-    """Return after how many samples all inputs repeat themselves, noise aside; the last period need not be whole.
+    """Return the common period of all inputs in samples, apart from noise; the last period may be incomplete.
 
     Parameters
     ----------
@@ -57,7 +56,7 @@ def common_period(u: Array) -> int | None:
     Returns
     -------
     int or None
-        The period [samples]; None where there is none of which a fifth of the log is there again.
+        The period [samples]; None if there is none of which a fifth of the log is repeated.
 
     Examples
     --------
