@@ -288,7 +288,6 @@ class Finding:
 
     @property
     def all_notes(self) -> tuple[Note, ...]:
-        """Every note, each once: on the gate, the class, other faults, what is not determined, the log, and the
-        advice."""
+        """Every note, each once: on the gate, the class, other faults, what is undetermined, the log, and advice."""
         groups = (self.gate.reasons, self.against, self.faults, self.not_told, self.notes, self.advice)
         return distinct(note for group in groups for note in group)

@@ -1,5 +1,4 @@
-"""Slow growth of leakage: the share of the pumped flow that is lost, span by span, compared with the effect of warming
-oil.
+"""Slow growth of leakage: the lost share of the pumped flow, span by span, compared with the effect of warming oil.
 
 The balances of `faults.watch.balances` forget within half a minute, so they learn slower growth and do not detect it. A
 *span* of some seconds measures the loss. With pressure it is a share of the pump's work, in which compressed oil
