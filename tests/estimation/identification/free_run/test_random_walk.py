@@ -11,7 +11,9 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run import identify
 from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.dense_polynomial import Asked
 from estimation.identification.free_run.identify import Identified, identify_channels
+from estimation.identification.free_run.linear_comparison import Task
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.random_walk import (
@@ -118,6 +120,19 @@ def test_auto_leaves_changes_where_a_nonlinear_model_of_levels_leaves_clearly_le
     monkeypatch.setattr(identify, "_nonlinear_or_linear", lambda *_: other)
     found = identify._or_nonlinear(walk, cast(Any, None), "output-error" if left is None else "auto")
     assert found is {"other": other, "walk": walk}[taken]
+
+
+@pytest.mark.parametrize(("order", "told"), [(1, False), (None, True)])
+def test_a_walk_at_sizes_that_are_given_is_one_at_others_too(
+    order: int | None, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What poles that are missing leave may look like a walk."""
+    data = log(16801)
+    whole, by = scaled(data)
+    walk = wandering(whole, whole, [1], (1,), None)
+    monkeypatch.setattr(identify, "wandering", lambda _data, _part, orders, *_: walk if orders == [1] else None)
+    task = Task(data, whole, by, whole, Asked(order), [1], None)
+    assert (identify._of_changes(task) is not None) is told
 
 
 def test_logs_and_gaps_and_two_inputs() -> None:
