@@ -87,28 +87,30 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     # a run between stops may drift as a pole at 1 does, and is believed where that is: not if it leaves most of it;
     # what is cut off leaves noise: an output that bends towards an end gains less, and goes beyond it in other logs
     best, stops = one.best, taken.limits.stops
+    if not _explains_more(taken, best):
+        return None
     settled, between_ends = _levels_at_ends(data, limits)
     if stops:
         least = min((SETTLED if settled else 1.0 - MARGIN) * best.held_back, BELIEVED)
     else:
         least = 0.0 if settled else CUT_OFF * best.held_back
-    if taken.held_back < least and _explains_more(taken, best):
+    if taken.held_back < least and told_apart(taken.block_errors, best.block_errors):
         free = one.task.free
         return taken if free is None or _explains_more(taken, linear_comparison(free).best) else None
     # where an input that stays at each end has other levels, too, these tell the gain: a staircase asks no one to check
     open_end = between_ends < 1.0 - NEARLY if settled else not stops
-    if open_end and taken.bic < best.bic and taken.held_back < best.held_back:
+    if open_end:
         shown, share = told_limits(data, one.task.by, limits)
         one.notes.append(IdentificationCode.OUTPUT_AT_END.note(output=data.output, limits=shown, share=share))
     return None
 
 
 def _explains_more(taken: LimitedCandidate, linear: Compared) -> bool:
-    """Return whether a model between limits is surely better on blocks, and explains more of the whole log.
+    """Return whether a model between limits is better on blocks and has the lower BIC of the whole log.
 
     Where dry friction holds an output at its turns, stops may win on blocks alone.
     """
-    return taken.bic < linear.bic and told_apart(taken.block_errors, linear.block_errors)
+    return taken.bic < linear.bic and taken.held_back < linear.held_back
 
 
 def _levels_at_ends(data: Channels, limits: Limits) -> tuple[bool, float]:

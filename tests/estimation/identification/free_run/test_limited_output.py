@@ -128,7 +128,7 @@ def rubbing(seed: int, n: int = 300) -> Channels:
     return channels_from([u[:, None]], [x + 0.002 * x.std() * rng.normal(size=n)], 0.01, ["u"], "x")
 
 
-@pytest.mark.parametrize(("seed", "order"), [(3, 1), (7, 4)])
+@pytest.mark.parametrize(("seed", "order"), [(3, 1), (104, 4)])
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_a_given_order_that_is_wrong_tells_no_stops(seed: int, order: int) -> None:
     """A linear model of another order explains more than stops do."""
