@@ -32,8 +32,8 @@ controller's action its set-point."""
 LEADS = (1, 2, 3, 4, 5)
 """Samples by which an input may be logged late [count]."""
 
-SMALL_ORDERS = (1, 2, 3)
-"""Orders that are tried beside a given one before a limit or a walk is believed."""
+COMPARED = 3
+"""Orders up to this one at least are compared with a given one before a limit or a random walk is accepted [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class Task:
 
         What a given size that is too large or too small leaves may look like a limit or a walk.
         """
-        orders = sorted({*SMALL_ORDERS, *self.orders})
+        orders = list(range(1, max(COMPARED, *self.orders) + 1))  # each order's starts come from one less
         return None if self.asked == Asked() else replace(self, asked=Asked(), orders=orders, delays=None)
 
 

@@ -133,6 +133,8 @@ def test_a_walk_at_sizes_that_are_given_is_one_at_others_too(
     monkeypatch.setattr(identify, "wandering", lambda _data, _part, orders, *_: walk if orders == [1] else None)
     task = Task(data, whole, by, whole, Asked(order), [1], None)
     assert (identify._of_changes(task) is not None) is told
+    free = replace(task, orders=[5]).free
+    assert told if free is None else free.orders == [1, 2, 3, 4, 5], "each order's starts come from one less"
 
 
 def test_logs_and_gaps_and_two_inputs() -> None:
