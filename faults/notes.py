@@ -136,9 +136,9 @@ class ClassCode(Code):
         "class and severities are counted from these, so enter those of your healthy actuator"
     )
     MAKEUP_TOO_SMALL = (
-        "by the rig file, the oil by which this single rod's sides differ takes {drop_pa:.2g|bar} bar in the "
-        "make-up valves at rated speed, and the inner circuit has {has_pa:.2g|bar} bar: leave makeup_conductance out, "
-        "or enter that of your valves"
+        "the sides of a single rod take different flows; by the rig file, the difference needs {drop_pa:.2g|bar} bar "
+        "across the make-up valves at rated speed, but the inner circuit has {has_pa:.2g|bar} bar: leave "
+        "makeup_conductance out, or enter that of your valves"
     )
     PRESSURE_ABSENT_CLASS = (
         "without differential_pressure_pa, friction shows only in velocity: classes are usually told apart less clearly"

@@ -102,7 +102,7 @@ def _why_not(view: IdentifiedView) -> str:
 def answer_of(view: IdentifiedView) -> str:
     """Return the meaning of the verdict's number, and the size of the error."""
     inputs = ", ".join(one.name for one in view.inputs)
-    said = f"The model runs free from {inputs}: it never sees the measured output. "
+    said = f"The model is simulated from {inputs} alone: it never sees the measured output. "
     error = _held_back_error(view)
     size = "" if error is None else f"{view.output.amount(number(error, 2))}{_unit_of(view.output)} (rms)"
     if wanders(view):
