@@ -120,11 +120,12 @@ def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[s
         row |= {"first": pair[0], "second": pair[1], "difference": None, "interval": None, "changed": False}
         if len(known) == 2:
             row["difference"] = known[1]["value"] - known[0]["value"]
-            stds = [std for std in map(_std_of, known) if std is not None]
-            if len(stds) == 2:
-                half = NORMAL_95 * math.hypot(*stds)
-                row["interval"] = [row["difference"] - half, row["difference"] + half]
-                row["changed"] = abs(row["difference"]) > half
+            halves = [one for one in map(_halves_of, known) if one is not None]
+            if len(halves) == 2:  # each end of the difference from the ends that make it so
+                (below_first, above_first), (below, above) = halves
+                low = row["difference"] - math.hypot(below, above_first)
+                high = row["difference"] + math.hypot(above, below_first)
+                row["interval"], row["changed"] = [low, high], low > 0.0 or high < 0.0
         rows.append(row)
     return rows
 
@@ -172,12 +173,12 @@ def quantities_of(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _std_of(one: Mapping[str, Any]) -> float | None:
-    """Return the standard deviation of an entry, from its interval where it has no own [its unit]."""
-    if one.get("std") is not None:
-        return float(one["std"])
-    ends = one.get("ci95")
-    return None if not ends or None in ends else (float(ends[1]) - float(ends[0])) / (2.0 * NORMAL_95)
+def _halves_of(one: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return how far the 95 % interval of a quantity reaches below and above its value; None where it has none."""
+    value, std, ends = one["value"], one.get("std"), one.get("ci95")
+    if ends and None not in ends:
+        return value - ends[0], ends[1] - value
+    return None if std is None else (NORMAL_95 * std, NORMAL_95 * std)
 
 
 def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:

@@ -85,7 +85,10 @@ def compare_logs(
 
 def _shown(first: Mapping[str, Any], second: Mapping[str, Any]) -> "list[RenderableType]":
     rows = compared(first, second)
-    said = [f"{one['file']}: {plain_words(one) or one['message']}" for one in (first, second)]
+    said = [
+        f"{one['file']}: {plain_words(one) or one['message']}{' Do not rely on its numbers.' * bool(one.get('unknown'))}"
+        for one in (first, second)
+    ]
     shown = table("quantity", "verdict", first["file"], second["file"], "difference", "95 % interval of the difference")
     for row in quantities_shown(rows).to_dict("records"):
         shown.add_row(*(row[name] for name in ("quantity", "says", "first", "second", "difference", "interval")))

@@ -28,6 +28,15 @@ def test_a_quantity_changed_where_the_interval_of_the_difference_leaves_out_zero
     assert row["changed"] is changed
 
 
+def test_a_lopsided_interval_gives_a_lopsided_difference() -> None:
+    """Leakage of 6 L/min (3 to 16), less one of 6.04, was said to lie between -7 and 6."""
+    wide = {"value": 6.0, "std": None, "ci95": [3.0, 16.0], "unit": "N"}
+    (row,) = compared(result(6.0, 0.02), {"file": "b", "message": "so", "severity": {"added_friction": wide}})
+    assert row["interval"] == pytest.approx([-3.0, 10.0], abs=0.01)
+    (back,) = compared({"file": "b", "message": "so", "severity": {"added_friction": wide}}, result(6.0, 0.02))
+    assert back["interval"] == pytest.approx([-10.0, 3.0], abs=0.01)
+
+
 @pytest.mark.parametrize("second", [result(None, None), result(12.0, None), {"file": "b", "message": "no"}])
 def test_without_both_intervals_nothing_is_said_to_have_changed(second: dict[str, Any]) -> None:
     (row,) = compared(result(10.0, 1.0), second)
@@ -46,7 +55,8 @@ def test_quantities_of_every_kind_of_result_are_found() -> None:
 def test_the_page_of_two_logs_shows_readers_units_and_no_tag_of_a_name() -> None:
     bulk = {"value": 2.0e8, "std": 1e6, "ci95": [1.98e8, 2.02e8]}
     first = {"file": "<img src=x>.csv", "message": "one", "bulk_modulus_pa": bulk, "probabilities": {"normal": 0.9}}
-    page = compare_view(first, {**first, "file": "b.csv", "bulk_modulus_pa": {**bulk, "value": 1.5e8}})
+    lower = {"value": 1.5e8, "std": 1e6, "ci95": [1.48e8, 1.52e8]}
+    page = compare_view(first, {**first, "file": "b.csv", "bulk_modulus_pa": lower})
     assert "In the second log, bulk modulus is lower." in page
     assert "200.0 (198.0 to 202.0)" in page
     assert "bulk modulus [MPa]" in page
