@@ -85,8 +85,9 @@ def compare_logs(
 
 def _shown(first: Mapping[str, Any], second: Mapping[str, Any]) -> "list[RenderableType]":
     rows = compared(first, second)
+    doubt = " Do not rely on its numbers."
     said = [
-        f"{one['file']}: {plain_words(one) or one['message']}{' Do not rely on its numbers.' * bool(one.get('unknown'))}"
+        f"{one['file']}: {plain_words(one) or one['message']}{doubt if one.get('unknown') else ''}"
         for one in (first, second)
     ]
     shown = table("quantity", "verdict", first["file"], second["file"], "difference", "95 % interval of the difference")
