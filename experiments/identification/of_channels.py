@@ -188,7 +188,8 @@ def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Pat
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
-    shown = table("log", "fit [%]", "gain", "bandwidth [Hz]", "coefficients, q^0 q^-1 ...")
+    unit = "m/rad" if (results[0]["input"], results[0]["output"]) == (INPUT, OUTPUT) else "SI"
+    shown = table("log", "fit [%]", f"gain [{unit}]", "bandwidth [Hz]", "coefficients, q^0 q^-1 ...")
     for name, result in zip(short_names(results), results, strict=True):
         bandwidth = "-" if result["bandwidth_hz"] is None else f"{result['bandwidth_hz']:.3g}"
         coefficients = f"b {_spaced(result['numerator'])}\nf {_spaced(result['denominator'])}"
