@@ -114,10 +114,13 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     sound, late = without_late_velocity(sound)
     known = [name for name in MEASURED if name in sound]
     objections = (*sensor_objections(sound, parameters), *logged_on_change(sampled))
-    stale = any(note.data["channel"] == PRESSURE for note in objections)  # froze, or was logged on change
+    accused = {note.data["channel"] for note in objections}
+    stale = PRESSURE in accused  # froze, or was logged on change
     mistakes = changes or channel_mistakes(sound.replace(**{PRESSURE: None}) if stale else sound, parameters)
     if mistakes:  # a sensor cannot be judged by channels of another meaning
         objections = steps = ()
+    if VELOCITY in accused:  # of a dead sensor an offset says nothing
+        offset = ()
     every, (sound, filtered) = sound, without_correlated_noise(sound, natural_frequency(parameters))
     as_logged = (*digits, *held, *twice, *dropouts, *alone)
     left_out = (*as_logged, *outliers, *clipped, *beyond, *steps, *hum, *offset, *late, *filtered)

@@ -86,3 +86,13 @@ def test_a_class_is_told_with_an_offset_of_the_velocity_sensor() -> None:
     assert found.condition == "normal"
     assert found.against == ()
     assert [note.code for note in found.notes].count(SensorCode.VELOCITY_OFFSET) == 1
+
+
+def test_of_a_velocity_that_froze_no_offset_is_told() -> None:
+    """A sensor that froze while the piston moved was said to read 20 mm/s too much, then to have frozen."""
+    log = moved(seed=4, size=0.2)
+    frozen = log.replace(velocity_m_s=np.where(np.arange(8000) < 1000, log["velocity_m_s"], 0.03))
+    assert without_velocity_offset(frozen)[1]
+    cleaned = clean_log(frozen, PAPER)
+    assert [note.code for note in cleaned.objections] == [SensorCode.SENSOR_FROZE]
+    assert SensorCode.VELOCITY_OFFSET not in [note.code for note in cleaned.left_out]
