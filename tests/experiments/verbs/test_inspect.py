@@ -63,7 +63,7 @@ def test_a_page_that_cannot_be_written_costs_nothing_that_was_found(
 
 
 def test_advice_to_inspect_is_not_given_by_inspect_itself(tmp_path: Path) -> None:
-    (tmp_path / "letter.txt").write_text("hello world\nthis is a letter\n")
+    (tmp_path / "letter.txt").write_text("hello world\n" + 12 * "1 2\n")
     done = invoke(tmp_path / "letter.txt")
     assert "cannot be read: columns time_s" in done.stdout
     assert "hydrostate inspect" not in done.stdout
