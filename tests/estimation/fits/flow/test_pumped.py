@@ -1,4 +1,4 @@
-"""Straight lines between means of a fast log pump what its samples do."""
+"""Straight lines pump what a motor does: between means of a fast log, and between samples."""
 
 from dataclasses import replace
 
@@ -21,13 +21,13 @@ def turning(time: Array) -> Array:
     return 60.0 * np.sin(2.0 * np.pi * 23.0 * time)
 
 
-def seen(sample_time: float, parameters: EhaParameters = P) -> GreyBoxLog:
+def seen(sample_time: float, parameters: EhaParameters = P, *, held: bool = False) -> GreyBoxLog:
     """A piston at rest whose pressure sensor is noisy, as the flow form sees it."""
     still = dict.fromkeys(("position_m", "differential_pressure_pa"), np.zeros(3000))
     record = Record(
         sample_time, {"motor_speed_rad_s": turning(sample_time * np.arange(3000, dtype=np.float64)), **still}
     )
-    return flow_log(record, parameters, {}, dict.fromkeys(record.channels, 1e10))
+    return flow_log(record, parameters, {}, dict.fromkeys(record.channels, 1e10), held=held)
 
 
 def drives(sample_time: float) -> Array:
@@ -59,6 +59,16 @@ def test_a_flow_bias_that_a_fit_has_found_takes_the_place_of_the_rig_files() -> 
     assert np.std(wanted - seen(SAMPLE).drives) > 1e-8
 
 
-def test_a_log_that_is_not_averaged_is_what_it_was() -> None:
-    assert np.all(drives(1e-3)[:, 1] == 0.0)
-    assert np.all(pumped_evenly_at(seen(1e-3), P, {"flow_bias": 6.0 * P.flow_bias}).drives[:, 1] == 0.0)
+@pytest.mark.parametrize("bias", [1.0, 6.0])
+def test_straight_lines_between_samples_pass_the_pumps_dead_zone_as_the_motor_does(bias: float) -> None:
+    log = pumped_evenly_at(seen(1e-3), P, {"flow_bias": bias * P.flow_bias})
+    course = pumped(turning(1e-3 / FINE * np.arange(2999 * FINE + 1, dtype=np.float64)), 1e-3 / FINE, bias)[::FINE]
+    lines = np.interp(np.arange(2999 * FINE + 1), FINE * np.arange(3000), log.drives[:, 0])
+    straight = pumped(lines, 1e-3 / FINE, bias)[::FINE] - course
+    assert np.std(straight - P.piston_area * log.drives[:, 1]) < 0.4 * np.std(straight)
+
+
+def test_a_motor_whose_command_is_held_and_a_slow_log_keep_straight_lines() -> None:
+    for log in (seen(1e-3, held=True), seen(2e-3)):
+        assert log.sampled is None
+        assert np.all(pumped_evenly_at(log, P, {"flow_bias": 6.0 * P.flow_bias}).drives[:, 1] == 0.0)
