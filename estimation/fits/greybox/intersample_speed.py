@@ -43,16 +43,17 @@ def straightened(speed: Array, *, slow: bool = False) -> Array:
     return speed - (steady_bend(speed) if slow else median) / 12.0
 
 
-FINE = 8
+FINE = 16
 """Parts of a sample time in which a curved course is told."""
+
 
 def curved(speed: Array) -> Array:
     """Return motor speed between samples as well, on cubics whose slopes at the samples are shared.
 
     Parts that share their slopes deliver, from rest to rest, what the trapezoidal rule says (Euler and Maclaurin), and
-    bend where the motor does. A lagging motor sets off sharply and nears its new speed smoothly: its slope at a sample
-    shows in the two samples after it, not in those before. Source of the limit, by which no part overshoots: Fritsch
-    and Carlson, SIAM Journal on Numerical Analysis 17 (1980).
+    bend where the motor does. Where bends are alike the slope is that of a polynomial through the five samples about.
+    Elsewhere a lagging motor has set off at a corner, and its slope shows in the two samples that follow, not in those
+    before; no part overshoots its samples then (Fritsch and Carlson, SIAM Journal on Numerical Analysis 17, 1980).
 
     Parameters
     ----------
@@ -66,14 +67,18 @@ def curved(speed: Array) -> Array:
 
     Examples
     --------
-    >>> curved(np.array([0.0, 0.0, 4.0, 6.0, 7.0, 7.0]))[::4].tolist()
+    >>> curved(np.array([0.0, 0.0, 4.0, 6.0, 7.0, 7.0]))[:: FINE // 2].tolist()
     [0.0, 0.0, 0.0, 1.6875, 4.0, 5.125, 6.0, 6.6875, 7.0, 7.0, 7.0]
     """
-    rise = np.pad(np.diff(speed), (1, 2))
-    before, after, following = rise[:-2], rise[1:-1], rise[2:]
+    rise = np.pad(np.diff(speed), 2)
+    earlier, before, after, following = rise[:-3], rise[1:-2], rise[2:-1], rise[3:]
+    bends = before - earlier, after - before, following - after
+    apart = np.maximum(np.maximum(*bends[:2]), bends[2]) - np.minimum(np.minimum(*bends[:2]), bends[2])
+    smooth = apart <= ALIKE * np.abs(bends[1])
     most = np.where(before * after > 0.0, 3.0 * np.minimum(np.abs(before), np.abs(after)), 0.0)
     way = np.sign(after)
-    slope = way * np.clip(way * (1.5 * after - 0.5 * following), 0.0, most)
+    cornered = way * np.clip(way * (1.5 * after - 0.5 * following), 0.0, most)
+    slope = np.where(smooth, (7.0 * (before + after) - earlier - following) / 12.0, cornered)
     share = np.arange(FINE) / FINE
     left = (1.0 - share) ** 2
     begins, ends = (1.0 + 2.0 * share) * left, share**2 * (3.0 - 2.0 * share)
