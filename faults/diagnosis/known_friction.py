@@ -87,8 +87,10 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     noise_x, noise_p = position_variance(position), measurement_variances(record, (PRESSURE,))[PRESSURE]
     if is_coarse(pressure, noise_p):
         return None
-    position, known = np.nan_to_num(position), np.isfinite(position + pressure)
-    slope = np.linalg.pinv(np.vander(np.arange(-reach, reach + 1.0), 4, increasing=True))[1] / step
+    lost = np.convolve(np.isnan(position), np.ones(2 * reach + 1), "same") > 0.0
+    position, known = np.nan_to_num(position), np.isfinite(pressure) & ~lost
+    cubic = np.vander(np.arange(-reach, reach + 1.0), 4, increasing=True)
+    slope = np.asarray(np.linalg.pinv(cubic)[1], dtype=np.float64) / step
     velocity, noise_v = np.convolve(position, slope[::-1], "same"), noise_x * float(slope @ slope)
     way = np.where(known & (np.abs(velocity) >= SLOWEST), np.sign(velocity), 0.0)
     way[:reach], way[-reach:] = 0.0, 0.0
