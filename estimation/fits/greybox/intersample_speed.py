@@ -72,8 +72,10 @@ def curved(speed: Array) -> Array:
 
     Examples
     --------
-    >>> curved(np.array([0.0, 0.0, 4.0, 6.0, 7.0, 7.0]))[:: FINE // 2].tolist()
-    [0.0, 0.0, 0.0, 1.6875, 4.0, 5.125, 6.0, 6.6875, 7.0, 7.0, 7.0]
+    A motor that sets off at a corner:
+
+    >>> curved(np.array([0.0, 0.0, 0.0, 4.0, 6.0]))[:: FINE // 2].tolist()
+    [0.0, 0.0, 0.0, 0.0, 0.0, 1.625, 4.0, 5.375, 6.0]
     """
     rise = np.pad(np.diff(speed), 2)
     earlier, before, after, following = rise[:-3], rise[1:-2], rise[2:-1], rise[3:]
