@@ -24,8 +24,7 @@ def test_bulk_modulus_with_air_is_that_at_the_stated_pressure(index: int) -> Non
     Bubbles of 17101 are squeezed with an exponent under high pressure, and slopes promise too little of air in 17109.
     """
     made = make("entrained_air", "training", index)
-    channels = {name: made.log[name].to_numpy() for name in made.log.columns if name != "time_s"}
-    fit = fit_flow(Record(1e-3, channels), EhaParameters(), EhaParameters().bulk_modulus)
+    fit = fit_flow(Record.from_frame(made.log), EhaParameters(), EhaParameters().bulk_modulus)
     found, setup = fit.explanation, made.setup
     assert found is not None
     assert not fit.reasons

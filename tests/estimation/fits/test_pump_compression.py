@@ -29,11 +29,10 @@ def filled_at_its_inlet() -> tuple[Record, float]:
     drawing, driving, logging = np.random.default_rng(5).spawn(3)
     drawn = draw_plain("major_friction", "steps", drawing).with_machine(bulk_modulus=6e7)
     setup = replace(drawn, duration=6.0)
-    table = setup.logger.log(run(setup.machine, course_of(setup, driving)), logging)
-    channels = {name: table[name].to_numpy() for name in table.columns if name != "time_s"}
-    speed, beta = channels["motor_speed_rad_s"], setup.machine.bulk_modulus
-    squeezed = np.sign(speed) * channels["differential_pressure_pa"] / beta
-    return Record(setup.logger.sample_time, {**channels, "motor_speed_rad_s": speed / (1.0 - SHARE * squeezed)}), beta
+    log = Record.from_frame(setup.logger.log(run(setup.machine, course_of(setup, driving)), logging))
+    speed, beta = log["motor_speed_rad_s"], setup.machine.bulk_modulus
+    squeezed = np.sign(speed) * log["differential_pressure_pa"] / beta
+    return log.replace(motor_speed_rad_s=speed / (1.0 - SHARE * squeezed)), beta
 
 
 def test_a_pump_that_fills_at_its_inlet_is_named_and_leaves_bulk_modulus_right() -> None:

@@ -40,10 +40,8 @@ def leaking(share: float) -> tuple[Record, float, float]:
     drawing, driving, logging = np.random.default_rng(3).spawn(3)
     drawn = draw_plain("minor_leakage_minor_friction", "prbs", drawing).with_machine(turbulent=share)
     setup = replace(drawn, duration=6.0)
-    states = run(setup.machine, course_of(setup, driving))
-    table = setup.logger.log(states, logging)
-    channels = {name: table[name].to_numpy() for name in table.columns if name != "time_s"}
-    return Record(setup.logger.sample_time, channels), setup.machine.bulk_modulus, setup.machine.leakage
+    log = setup.logger.log(run(setup.machine, course_of(setup, driving)), logging)
+    return Record.from_frame(log), setup.machine.bulk_modulus, setup.machine.leakage
 
 
 def test_a_turbulent_share_of_the_leakage_is_named_and_leaves_bulk_modulus_right() -> None:

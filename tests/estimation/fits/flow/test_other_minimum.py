@@ -169,8 +169,7 @@ def test_a_hypothesis_is_believed_where_it_gains_over_its_own_valley_alone(
 @pytest.mark.slow
 def test_a_plain_log_whose_plain_form_has_two_valleys_is_explained_by_the_lower_one() -> None:
     made = make("plain", "training", 667)
-    time, channels = made.log["time_s"], {name: made.log[name].to_numpy() for name in made.log if name != "time_s"}
-    answer = flow_fit.fit_flow(Record(float(time[1] - time[0]), channels), PAPER, PAPER.bulk_modulus)
+    answer = flow_fit.fit_flow(Record.from_frame(made.log), PAPER, PAPER.bulk_modulus)
     assert answer.explanation is None
     value, std = answer.parameters["bulk_modulus"]
     assert value == pytest.approx(made.bulk_modulus[0], abs=2.0 * std)
@@ -180,8 +179,7 @@ def test_a_plain_log_whose_plain_form_has_two_valleys_is_explained_by_the_lower_
 def test_the_drain_of_a_side_that_a_load_shuts_in_is_sought_from_below_too() -> None:
     """The minimum with fourteen times the drain put leakage twelve deviations off."""
     made = make("constant_load", "validation", 17804)
-    channels = {name: made.log[name].to_numpy() for name in made.log if name != "time_s"}
-    answer = flow_fit.fit_flow(Record(1e-3, channels), PAPER, PAPER.bulk_modulus)
+    answer = flow_fit.fit_flow(Record.from_frame(made.log), PAPER, PAPER.bulk_modulus)
     value, std = answer.parameters["leakage_coefficient"]
     assert value == pytest.approx(made.setup.machine.leakage, abs=2.0 * std)
     assert value == pytest.approx(made.setup.machine.leakage, rel=1.5e-3)

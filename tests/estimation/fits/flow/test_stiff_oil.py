@@ -36,8 +36,7 @@ def fitted(condition: str, seed: int) -> tuple[FormFit, float]:
     setup = replace(draw_plain(condition, "prbs", drawing, LARGE), rated_speed=157.08, duration=5.0, travel=0.2)
     setup = setup.with_machine(stroke=0.6, ripple=0.0)
     log = setup.logger.log(run(setup.machine, course_of(setup, driving)), logging)
-    channels = {name: log[name].to_numpy() for name in log.columns if name != "time_s"}
-    return fit_flow(Record(1e-3, channels), RIG, 3e8), setup.machine.bulk_modulus
+    return fit_flow(Record.from_frame(log), RIG, 3e8), setup.machine.bulk_modulus
 
 
 @pytest.mark.parametrize(

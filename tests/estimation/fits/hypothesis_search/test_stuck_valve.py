@@ -67,7 +67,6 @@ def test_valves_that_open_alike_are_both_sound(monkeypatch: pytest.MonkeyPatch) 
 def test_a_valve_that_stays_shut_as_far_as_a_log_reaches_is_stuck(index: int) -> None:
     """Both logs were in a class: one plain with a drop of 11 kPa (67 %), one with valves that open late (99.9 %)."""
     log = make("makeup_check_stuck_shut", "training", index).log
-    channels = {name: log[name].to_numpy() for name in log.columns if name != "time_s"}
-    fit = fit_flow(Record(1e-3, channels), EhaParameters(), EhaParameters().bulk_modulus)
+    fit = fit_flow(Record.from_frame(log), EhaParameters(), EhaParameters().bulk_modulus)
     assert fit.explanation is not None
     assert fit.explanation.names == (MAKEUP_BLOCKED.name,)

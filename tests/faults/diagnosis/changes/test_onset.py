@@ -134,9 +134,7 @@ def test_a_log_in_one_condition_is_judged_whole() -> None:
 
 def foreign(kind: str, index: int) -> Record:
     """Return a log of the open benchmark, whose physics no circuit here shares."""
-    log = make(kind, "training", index).log
-    channels = {str(name): log[name].to_numpy() for name in log if name != "time_s"}
-    return clean_log(Record(1e-3, channels), HEALTHY).record
+    return clean_log(Record.from_frame(make(kind, "training", index).log), HEALTHY).record
 
 
 @pytest.mark.parametrize("index", thinned([7, 17], [7]))
