@@ -27,7 +27,6 @@ DOUBLES = ctypes.POINTER(ctypes.c_double)
 SHORT, LONG = 3_000, 100_000
 EXACT = "-DEXPORTED_EXACT"
 """Products are fused by the library, so that no test depends on the processor."""
-EVERY_FORM = pytest.mark.parametrize("form", EXPORTED_FORMS)
 
 
 def rows_of(problem: FilterProblem) -> list[str]:

@@ -21,7 +21,6 @@ from tests.thinned import thinned
 RIG, STEP = EhaParameters(leakage_coefficient=2e-11), 1e-3
 TIME = STEP * np.arange(401)
 DRIVE = sine(len(TIME) * STEP, STEP, RIG.rated_speed, 5.0)
-EVERY_PLANT = pytest.mark.parametrize("plant", PLANTS.values(), ids=PLANTS)
 EVERY_VERSION = pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 
 
