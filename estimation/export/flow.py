@@ -5,15 +5,15 @@ make-up valves' opening are taken as known, and the filter is as good as its fir
 """
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from types import SimpleNamespace
 from typing import Any
 
-from estimation.models.chambers import OPENING, logarithm_of, observe_chambers
+from estimation.models.chambers import CHAMBERS, OPENING, logarithm_of
 from estimation.models.completed_flow import CRACKS
-from estimation.models.eha_forms import BULK_MODULUS, volume_left_open
+from estimation.models.eha_forms import BULK_MODULUS
 from estimation.models.flow import flow_rates
-from estimation.models.model import ProcessModel, StateVariable
+from estimation.models.model import StateVariable
 from plant.compiled.expression import ONE, as_expression, jacobian
 from plant.compiled.functions import Scalar
 from plant.eha.model import EhaParameters
@@ -72,14 +72,5 @@ def flow_filter_step(state: tuple[Scalar, ...], drives: Any, p: Any, h: Scalar) 
     return (*(x + dx for x, dx in zip(pressures, moved, strict=True)), *state[2:])
 
 
-FLOW_FILTER = ProcessModel(
-    "flow_filter",
-    STATES,
-    flow_filter_step,
-    observe_chambers,
-    longest_step=2.5e-4,
-    drives=("motor_speed_rad_s", "position_m"),
-    parameters=EhaParameters,
-    opening=volume_left_open,
-)
+FLOW_FILTER = replace(CHAMBERS, name="flow_filter", states=STATES, step=flow_filter_step)
 """The flow form as a process model: driven by what is measured, so friction plays no part."""

@@ -1,13 +1,11 @@
 """The flow form with what matters to the last digits alone: make-up valves that crack, and an accumulator."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
+from functools import partial
 
 from estimation.models.flow import FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, all_at_rest, fed_rates
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.inner_circuit import BEND, USUAL_BEND
-from plant.compiled.functions import Scalar
 
 CRACKS = ("crack_a", "crack_b")
 """Drops at which the two make-up valves leave their seats [Pa]."""
@@ -15,6 +13,12 @@ CRACKS = ("crack_a", "crack_b")
 USUAL_CRACK = 2e3
 """Their standard deviation before a log is seen, and typical size: 0.02 bar, judged [Pa]. A drop of 2 kPa that is left
 out puts bulk modulus of leaky actuators up to 0.3 % off at 10 kHz."""
+
+
+BY_VOLUME = partial(fed_rates, by_mass=False)
+BENT_BY_VOLUME = partial(fed_rates, by_mass=False, bent=True)
+BENT_BY_MASS = partial(fed_rates, by_mass=True, bent=True)
+"""Rates with an accumulator; what is bent has orifices for make-up valves."""
 
 
 def completed(form: GreyBoxModel, *, bent: bool = False) -> GreyBoxModel:
@@ -31,32 +35,14 @@ def completed(form: GreyBoxModel, *, bent: bool = False) -> GreyBoxModel:
     if bent:
         sizes, names = (*sizes, (BEND, USUAL_BEND)), (*names, BEND)
     if form.rates is FLOW_FORM.rates:
-        form = replace(form, name="flow_volume", initial=all_at_rest, rates=_by_volume, jump=MASS_FLOW_FORM.jump)
+        form = replace(form, name="flow_volume", initial=all_at_rest, rates=BY_VOLUME, jump=MASS_FLOW_FORM.jump)
         names = (*names, STIFFNESS)
-        form = replace(form, rates=_bent_by_volume) if bent else form
+        form = replace(form, rates=BENT_BY_VOLUME) if bent else form
     elif bent:
-        form = replace(form, rates=_bent_by_mass)
+        form = replace(form, rates=BENT_BY_MASS)
     return replace(form, unknowns=(*form.unknowns, *names), linear=(*form.linear, *sizes))
 
 
 def balances_mass(form: GreyBoxModel) -> bool:
     """Return whether a form, completed or not, balances mass."""
-    return form.rates in (MASS_FLOW_FORM.rates, _bent_by_mass)
-
-
-def _by_volume(
-    state: tuple[Scalar, Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar
-) -> tuple[Scalar, Scalar, Scalar]:
-    return fed_rates(state, drives, p, share, by_mass=False)
-
-
-def _bent_by_volume(
-    state: tuple[Scalar, Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar
-) -> tuple[Scalar, Scalar, Scalar]:
-    return fed_rates(state, drives, p, share, by_mass=False, bend=p.makeup_bend)
-
-
-def _bent_by_mass(
-    state: tuple[Scalar, Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar
-) -> tuple[Scalar, Scalar, Scalar]:
-    return fed_rates(state, drives, p, share, by_mass=True, bend=p.makeup_bend)
+    return form.rates in (MASS_FLOW_FORM.rates, BENT_BY_MASS)

@@ -1,6 +1,7 @@
 """The wide flow form behind a pressure filter of second order, as an amplifier's or a logger's mostly is."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,18 +31,6 @@ def _rates(
     return rise, fall, rise - fall - climbs, fed, left / (p.filter_time * p.filter_time)
 
 
-def _turbulent(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    return _rates(state, drives, p, share, turbulent=True)
-
-
-def _quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    return _rates(state, drives, p, share, quick=True)
-
-
-def _turbulent_quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    return _rates(state, drives, p, share, turbulent=True, quick=True)
-
-
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
     return *WIDE_FLOW_FORM.initial(p), 0.0
 
@@ -59,8 +48,10 @@ FILTERED_FLOW_FORM = replace(
     observe=_shown,
     jump=(*WIDE_FLOW_FORM.jump, 0.0),
 )
-FILTERED_TURBULENT_FLOW_FORM = replace(FILTERED_FLOW_FORM, name="filtered_flow_turbulent", rates=_turbulent)
-FILTERED_QUICK_FLOW_FORM = replace(FILTERED_FLOW_FORM, name="filtered_flow_quick", rates=_quick)
+FILTERED_TURBULENT_FLOW_FORM = replace(
+    FILTERED_FLOW_FORM, name="filtered_flow_turbulent", rates=partial(_rates, turbulent=True)
+)
+FILTERED_QUICK_FLOW_FORM = replace(FILTERED_FLOW_FORM, name="filtered_flow_quick", rates=partial(_rates, quick=True))
 FILTERED_TURBULENT_QUICK_FLOW_FORM = replace(
-    FILTERED_FLOW_FORM, name="filtered_flow_turbulent_quick", rates=_turbulent_quick
+    FILTERED_FLOW_FORM, name="filtered_flow_turbulent_quick", rates=partial(_rates, turbulent=True, quick=True)
 )

@@ -6,6 +6,7 @@ appear at all.
 """
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -218,7 +219,7 @@ def fed_rates(
     share: Scalar,
     *,
     by_mass: bool,
-    bend: Scalar = 0.0,
+    bent: bool = False,
 ) -> tuple[Scalar, Scalar, Scalar]:
     """Return the rates of both chambers and of the inner circuit that feeds them.
 
@@ -229,13 +230,13 @@ def fed_rates(
     drives : tuple
         As of `flow_rates`.
     p : namespace
-        As of `flow_rates`, and `accumulator_stiffness` [Pa/m^3].
+        As of `flow_rates`, and `accumulator_stiffness` [Pa/m^3] and, of bent ones, `makeup_bend` [1/Pa].
     share : float or Expression
         How far into the step [fraction].
     by_mass : bool
         See `chamber_rates`.
-    bend : float or Expression
-        See `inner_flows` [1/Pa].
+    bent : bool
+        Whether make-up valves are orifices at a large drop, see `inner_flows`.
 
     Returns
     -------
@@ -243,14 +244,11 @@ def fed_rates(
         Rates [Pa/s].
     """
     p1, p2, supply = state
+    bend = p.makeup_bend if bent else 0.0
     fed = SimpleNamespace(**{**vars(p), "accumulator_pressure": supply})
     into_1, into_2 = inner_flows((p1, p2), fed, (p.crack_a, p.crack_b), bend)
     pushed_back = accumulator_rate(into_1 + into_2, supply, p)
     return *flow_rates((p1, p2), drives, fed, share, by_mass=by_mass, bend=bend), pushed_back
-
-
-def _by_mass(state: Any, drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    return fed_rates(state, drives, p, share, by_mass=True)
 
 
 def _held(state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar]:
@@ -302,7 +300,7 @@ MASS_FLOW_FORM = replace(
     name="flow_mass",
     unknowns=(*FLOW_FORM.unknowns, STIFFNESS),
     initial=all_at_rest,
-    rates=_by_mass,
+    rates=partial(fed_rates, by_mass=True),
     jump=(0.5, -0.5, 0.0),
 )
 """Balanced by mass, with an inner circuit whose pressure rises with the oil that it takes."""

@@ -5,6 +5,7 @@ are held there.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -281,23 +282,13 @@ WIDE_FLOW_FORM = GreyBoxModel(
 """Without unknowns of its own: which of its parameters are free is a hypothesis, see `estimation.fits.hypotheses`."""
 
 
-def _turbulent(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    return wide_rates(state, drives, p, share, turbulent=True)
-
-
-def _quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    return wide_rates(state, drives, p, share, quick=True)
-
-
-def _turbulent_quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    return wide_rates(state, drives, p, share, turbulent=True, quick=True)
-
-
-TURBULENT_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_turbulent", rates=_turbulent)
-QUICK_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_quick", rates=_quick)
-TURBULENT_QUICK_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_turbulent_quick", rates=_turbulent_quick)
-"""The same with a share of the leakage turbulent, with `QUICKNESS` of bubbles, and with both. They are separate forms,
-so that plain logs, for which the wide form is used too, need not compute roots and powers."""
+TURBULENT_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_turbulent", rates=partial(wide_rates, turbulent=True))
+QUICK_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_quick", rates=partial(wide_rates, quick=True))
+TURBULENT_QUICK_FLOW_FORM = replace(
+    WIDE_FLOW_FORM, name="wide_flow_turbulent_quick", rates=partial(wide_rates, turbulent=True, quick=True)
+)
+"""The same with a share of the leakage turbulent, with `QUICKNESS` of bubbles, and with both. Plain logs, which the
+wide form is asked of too, pay for no roots and no powers."""
 
 LINEAR = {
     "speed_lead": 1e-5,
