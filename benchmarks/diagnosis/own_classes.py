@@ -70,11 +70,6 @@ def rig_verdicts(features: pd.DataFrame, labels: pd.DataFrame) -> "Mapping[str, 
         A row a cycle.
     labels : pandas.DataFrame
         See `read_rig_cycles`.
-
-    Returns
-    -------
-    Mapping[str, Verdicts]
-        By column of labels.
     """
     return {name: hs.Classifier().judge(features, labels[name], blocks=BLOCKS) for name in COMPONENTS}
 

@@ -92,16 +92,6 @@ def unlike(p: CircuitParameters, rng: np.random.Generator) -> CircuitParameters:
     Seals, make-up valves, motor, moving mass, accumulator and the pump's share of the leakage are drawn at random from
     wide ranges; what a diagnosis looks for, and geometry and pump, stay.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of the draw.
-
-    Returns
-    -------
-    CircuitParameters
-        The other circuit.
-
     Examples
     --------
     >>> other = unlike(CircuitParameters(), np.random.default_rng(0))
@@ -154,11 +144,6 @@ def draw_logs(
         What the bench sees.
     duration, sample_time : float
         Length of a log and time between samples [s].
-
-    Yields
-    ------
-    Drawn
-        A log, its condition and its actuator.
 
     Raises
     ------

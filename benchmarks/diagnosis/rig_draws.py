@@ -89,11 +89,6 @@ def draw_bench(seed: int) -> Bench:
     ----------
     seed : int
         Of every draw.
-
-    Returns
-    -------
-    Bench
-        The log and its truth.
     """
     rng = stream(seed, "random rigs")
     while True:
@@ -117,11 +112,6 @@ def draw_bench(seed: int) -> Bench:
 
 def draw_rig(rng: np.random.Generator) -> CircuitParameters:
     """Return a healthy actuator of a random size.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of the draw.
 
     Returns
     -------
@@ -205,11 +195,6 @@ def wrong_file(right: EhaParameters, seed: int) -> EhaParameters:
         What it should say.
     seed : int
         Of the errors.
-
-    Returns
-    -------
-    EhaParameters
-        What it says.
     """
     rng = stream(seed, "random rigs", "file")
     spreads: Mapping[str, float] = MappingProxyType({name: DOUBTS[name].usual.down for name in WRONG})

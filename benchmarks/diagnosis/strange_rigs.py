@@ -104,13 +104,7 @@ def _either(low: float, high: float, rng: np.random.Generator) -> float:
 
 
 def sized(healthy: EhaParameters) -> Mapping[str, Draw]:
-    """Return draws of kinds of the open benchmark in the size of a rig.
-
-    Parameters
-    ----------
-    healthy : EhaParameters
-        What its file says.
-    """
+    """Return draws of kinds of the open benchmark in the size of a rig."""
     p, force = healthy, healthy.relief_pressure * healthy.piston_area
     stroke = healthy.stroke or 0.0
     major = parameters_for(CONDITIONS["major_leakage"], healthy).leakage_coefficient

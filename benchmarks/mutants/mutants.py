@@ -93,11 +93,6 @@ def draw(root: Path, folders: Sequence[str], sample: int, seed: int) -> list[Mut
         How many [count]; all if there are fewer.
     seed : int
         Of the draw.
-
-    Returns
-    -------
-    list of Mutant
-        In random order.
     """
     files = sorted({path for folder in folders for path in _sources(root / folder)})
     texts = {path: path.read_text(encoding="utf-8") for path in files}

@@ -100,11 +100,6 @@ def mutants_of(path: str, text: str, chosen: Sequence[int]) -> Iterator[Mutant]:
         Its source.
     chosen : sequence of int
         Which faults, from 0 to `count_mutants` - 1.
-
-    Yields
-    ------
-    Mutant
-        The file with one fault.
     """
     tree = ast.parse(text)
     edits = list(_edits(tree))

@@ -103,11 +103,6 @@ def fit_oscillator(
         First guess, as `linear_start` gives it.
     periodic : bool
         Whether the force is one period of a signal on which the oscillator has settled; else it starts at rest.
-
-    Returns
-    -------
-    HysteresisFit
-        The six parameters.
     """
     names = [field.name for field in fields(OscillatorParameters)]
     run = _oscillator_run(tuple(names))

@@ -54,11 +54,6 @@ def at_oil_temperature(base: CircuitParameters, warmer: float) -> CircuitParamet
     warmer : float
         Temperature over that [K].
 
-    Returns
-    -------
-    CircuitParameters
-        The circuit.
-
     Examples
     --------
     >>> round(at_oil_temperature(CircuitParameters(), 10.0).leakage_coefficient * 1e12, 3)
@@ -135,13 +130,7 @@ class CircuitStream:
         return np.column_stack([record[name] for name in names])
 
     def reseed(self, rng: np.random.Generator) -> None:
-        """Go on from here with other drive and noise.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-            Their source.
-        """
+        """Go on from here with other drive and noise."""
         self._rng = rng
 
     def _circuit(self) -> CircuitParameters:
@@ -200,11 +189,6 @@ def learnt(seed: int, hours: float, false_alarms: float = 1.0) -> tuple[CircuitS
         How long it runs [h].
     false_alarms : float
         Rate set [1/h].
-
-    Returns
-    -------
-    tuple
-        The stream and its watch.
     """
     running = CircuitStream(seed)
     watch = Watch(CircuitParameters(), SAMPLE_TIME, false_alarms=false_alarms, learning=3600.0 * hours)
@@ -222,11 +206,6 @@ def false_alarms(running: CircuitStream, watch: Watch, hours: float) -> list[Ala
         Its watch, which has learnt.
     hours : float
         How long it runs [h].
-
-    Returns
-    -------
-    list of Alarm
-        The alarms, all of them false.
     """
     events = [event for _ in range(round(3600.0 * hours / PIECE)) for event in watch.take(running.run(PIECE))]
     return [event for event in events if isinstance(event, Alarm)]
@@ -247,11 +226,6 @@ def detect_fault(running: CircuitStream, watch: Watch, condition: str, seed: int
         Seed of when, and of drive and noise from here on.
     seconds : float
         How long to wait for an alarm [s].
-
-    Returns
-    -------
-    Found
-        What came of it.
     """
     running, watch = deepcopy((running, watch))
     rng = stream(seed, "watching", condition)
