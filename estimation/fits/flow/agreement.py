@@ -6,8 +6,8 @@ from typing import NamedTuple
 from estimation.fits.flow.asked_hypotheses import worth_in
 from estimation.fits.flow.plain import PlainFits
 from estimation.fits.hypotheses import Hypothesis
+from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.final_fits import WORTH
 from plant.notes import Note
 
 

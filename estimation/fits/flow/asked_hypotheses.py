@@ -32,7 +32,7 @@ from estimation.fits.hypotheses import (
     Hypothesis,
 )
 from estimation.fits.hypothesis_search.coarse_search import VANISHED
-from estimation.fits.hypothesis_search.final_fits import WORTH
+from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains, is_too_close
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain, predicted_gain, predicted_gains, slopes_of

@@ -9,8 +9,8 @@ from estimation.fits.flow.accumulator import is_far_stiffer
 from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, OFFSET, PLAY, PRESSURE_LATE, Hypothesis
+from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.final_fits import WORTH
 from estimation.fits.hypothesis_search.fit_objections import fit_explains_all
 
 LITTLE = 0.01

@@ -44,9 +44,8 @@ from estimation.fits.hypotheses import (
     PRESSURE_SIDES,
     Hypothesis,
 )
-from estimation.fits.hypothesis_search.explain import explain
+from estimation.fits.hypothesis_search.explain import WORTH, explain
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.final_fits import WORTH
 from estimation.fits.hypothesis_search.fit_objections import doubted, limits, objections_and_play
 from estimation.fits.hypothesis_search.form_fit import DISCRETISED, FormFit, averaged, weights_of, with_structure
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost, unseen_valve_note

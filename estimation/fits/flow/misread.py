@@ -24,8 +24,7 @@ from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.side_by_side import LANES
 from estimation.fits.hypotheses import CHECKS_CRACK, MAKEUP_BENDS, OFFSET, PRESSURE_DRIFT
-from estimation.fits.hypothesis_search.explain import Explanation
-from estimation.fits.hypothesis_search.final_fits import WORTH
+from estimation.fits.hypothesis_search.explain import WORTH, Explanation
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.flow_balance import MOST_LOST

@@ -10,7 +10,7 @@ from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
-from estimation.fits.hypothesis_search.final_fits import WORTH
+from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.fits.hypothesis_search.not_excluded import blocked_note, unseen_note
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.models.completed_flow import CRACKS

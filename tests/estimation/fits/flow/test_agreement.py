@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from estimation.fits.flow.agreement import Answered, agreed, wanted_of
-from estimation.fits.hypothesis_search.final_fits import WORTH
+from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.notes import RigCode
 
 TURNS = 9.0

@@ -12,7 +12,7 @@ from estimation.fits.flow.log import without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.plain import FitStart, Logged, plain_fits
 from estimation.fits.flow.shut_valves import BEHIND, shut_valves
-from estimation.fits.hypothesis_search.final_fits import WORTH
+from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import HELD_FLOW_FORM
 from estimation.notes import RigCode
