@@ -4,7 +4,7 @@ Runs without slopes are cheap, so many guesses are compared first and the likeli
 the log, no other is made; otherwise searches begin at the leakages and flow biases of all conditions.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil
@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.flow.guesses import guesses_about
-from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.descent import Point, descend, remembered
 from estimation.fits.greybox.driven import driven_samples
 from estimation.fits.greybox.fit import NEAR_ENOUGH, Search, explained, roughly
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -109,15 +109,16 @@ def _led(
     afar = log.taken_at(parameters.bulk_modulus)
     begun = FreedProblem.of(forms[0], afar.beginning(_search(afar).screened).coarsened())
     guess, near = _guess(begun, afar, parameters, starts)
+    screen = remembered(begun.at)
     if not near:  # in a wrong valley the whole log takes all steps that there are
-        first = _searched(forms[0], log, afar, starts, hopeful=True)
+        first = _searched(forms[0], log, afar, starts, hopeful=True, screen=screen)
         if _explains(first):
             return [first, *_others(forms[1:], log, afar, first)]
     first = _searched(forms[0], log, afar, [guess], alone=True)
     others = _others(forms[1:], log, afar, first, alone=True)
     if _explains(first) or _explains(others[0]):
         return _brought_near([first, *others], forms, log, afar)
-    first = _searched(forms[0], log, afar, [*starts, first.values])
+    first = _searched(forms[0], log, afar, [*starts, first.values], screen=screen)
     return [first, *_others(forms[1:], log, afar, first)]
 
 
@@ -185,6 +186,7 @@ def _searched(
     alone: bool = False,
     wanted: float = np.inf,
     hopeful: bool = False,
+    screen: Callable[[Array], Point] | None = None,
 ) -> RoughOptimum:
     """Return the best optimum from several starts, at first with position noise at the rig's bulk modulus."""
     search, fed = _search(log), {STIFFNESS: first_stiffness(log)}
@@ -192,9 +194,9 @@ def _searched(
     guesses = [form.theta({**fed, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
     if not log.passes_on:
-        point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful)
+        point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful, screen=screen)
         return RoughOptimum(problem, point, bounds)
-    point = roughly(problem, guesses, search, bounds, hopeful=hopeful)
+    point = roughly(problem, guesses, search, bounds, hopeful=hopeful, screen=screen)
     if np.isinf(point.cost):
         return RoughOptimum(problem, point, bounds)
     problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]

@@ -12,6 +12,7 @@ from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form,
 from estimation.fits.flow.rough_search import RIVAL, UNLIKELY, RoughOptimum, rough_optima
 from estimation.fits.flow.swept import with_first_fit
 from estimation.fits.flow.wide_valves import opens_wide
+from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.drive_noise import moved_by_drives
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, explained
@@ -52,6 +53,15 @@ presumed, in five under a constant load at most 0.14."""
 RELIEF_RISE = 0.05
 """Least pressure rise above its setting at which a relief valve passes the rated flow where searches begin [fraction]:
 valves need 0.05 to 0.2. The default slope would be a corner of 0.0004 in small rigs."""
+
+NEAR = 0.2
+"""How far the residuals of a balance move at the end of a search before it is told, up to which they are taken along
+their slopes and not run [dimensionless], see `FreedProblem`: 0.02 in log-likelihood."""
+
+COMPLETED, TOO_FAR = 10.0, 150.0
+"""Log-likelihood that short model steps, and valves that crack, gain at most where they hardly matter, and how far a
+balance is then behind one that leaves noise alone to be given up [dimensionless]. Of 100 logs one gained 180, where the
+likeliest balance gained 43; beside likeliest ones that gained less than 10 they gained 86 at most."""
 
 VALVES = ("makeup_conductance", "makeup_opening", *CRACKS, BEND, STIFFNESS)
 """Parameters that all balances share to the last digits; oil and losses compensate for the differences of the
@@ -152,6 +162,8 @@ def balanced(
     if not explained(best[0], best[1]):
         led = (nearest((one.problem.on(here), one.point, one.bounds), best, starts[0]) for one in behind)
         behind = [replace(one, point=point) for one, point in zip(behind, led, strict=True)]
+    elif least - best[1].cost < COMPLETED and _is_noise(best):
+        behind = [one for one in behind if one.point.cost < best[1].cost + TOO_FAR]
     done += each(lambda one: _finished(one, log, steps, best[1].cost, bent=bent), behind)
     if valley is not None:
         done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
@@ -212,6 +224,12 @@ def _told(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> Sequence[G
     return each(told, done)
 
 
+def _is_noise(one: Found) -> bool:
+    """Return whether a minimum leaves no more of its log than noise does by chance."""
+    problem, point, _ = one
+    return 2.0 * point.cost < largest_chi_square(problem.blocks, 1.0) * problem.blocks
+
+
 def _shaken(one: Found) -> Array | None:
     """Return the effect of drive noise on the residuals of the likeliest balance, which the others share."""
     log = one[0].log
@@ -243,6 +261,7 @@ def _finished(
         if not _plain(one):
             return one.problem, one.point, one.bounds
     problem, theta, bounds = _completed(one, log, led, bent=bent)
+    problem.near = NEAR if steps is not log.steps else 0.0
     return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
 
 

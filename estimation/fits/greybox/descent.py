@@ -181,6 +181,25 @@ def descend_together(
     return [ended[i] for i in range(len(searches))]
 
 
+def remembered(at: Callable[[Array], Point]) -> Callable[[Array], Point]:
+    """Return a cost that is worked out once at each point: searches from the same starts begin alike.
+
+    Parameters
+    ----------
+    at : callable
+        The cost at given coordinates.
+    """
+    known: dict[bytes, Point] = {}
+
+    def asked(theta: Array) -> Point:
+        place = theta.tobytes()
+        if place not in known:
+            known[place] = at(theta)
+        return known[place]
+
+    return asked
+
+
 def search(
     start: Array,
     evaluations: int,

@@ -4,7 +4,7 @@ The variance of an estimate has three parts: noise of the outputs, noise of the 
 the rig's own parameters. The last two follow from the fit's linear response to them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -170,6 +170,7 @@ def roughly(
     wanted: float = np.inf,
     *,
     hopeful: bool = False,
+    screen: Callable[[Array], Point] | None = None,
 ) -> Point:
     """Return the lowest cost from several starts, with one model step per sample.
 
@@ -187,6 +188,8 @@ def roughly(
         Cost above which the result is of no use [dimensionless], see `estimation.fits.greybox.descent.descend`.
     hopeful : bool
         Whether several starts are followed only if one explains the beginning; else the cost is infinite.
+    screen : callable, optional
+        The misfit on the beginning of a log that is longer, if another search has asked for some of it.
 
     Returns
     -------
@@ -198,7 +201,8 @@ def roughly(
 
     def descended(guess: Array, samples: int, evaluations: int) -> Point:
         if samples < len(log.measured):
-            return descend(problem.on(log.beginning(samples)).at, guess, evaluations, bounds, search.near_enough)
+            at = screen if screen and samples == search.screened else problem.on(log.beginning(samples)).at
+            return descend(at, guess, evaluations, bounds, search.near_enough)
         return descend(whole.at, guess, evaluations, bounds, search.near_enough, wanted=wanted)
 
     if len(guesses) > 1:

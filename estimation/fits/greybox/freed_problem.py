@@ -50,6 +50,9 @@ class FreedProblem(Problem):
         Two parameters that nearly cancel.
     """
 
+    near = 0.0
+    """How far a run moves all residuals from a known one, up to which they are taken along its slopes [deviations]."""
+
     def __init__(
         self,
         model: GreyBoxModel,
@@ -258,10 +261,17 @@ class FreedProblem(Problem):
         return weighed(here, columns)
 
     def _remembered(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
-        """Return the residuals and slopes at one of the last two points."""
-        for place, noise, here, columns in self._last:
-            if np.array_equal(place, theta) and np.array_equal(noise, variance):
+        """Return the residuals and slopes at one of the last two points, or so near to one that slopes lead there."""
+        last = [(theta - one[0], *one[2:]) for one in self._last if np.array_equal(one[1], variance)]
+        for away, here, columns in last:
+            if not np.any(away):
                 return here, columns
+        for away, here, columns in last[::-1]:
+            if self.near > 0.0 and np.linalg.norm(moved := columns @ away) < self.near:
+                felt = np.linalg.norm(columns[..., self._logarithmic], axis=(0, 1))
+                bent = 0.5 * felt @ away[self._logarithmic] ** 2  # to second order, and nothing cancels
+                if bent < self.near:
+                    return here + moved, columns
         return None, None
 
     def _nudged(self, theta: Array) -> Array:

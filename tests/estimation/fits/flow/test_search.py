@@ -146,6 +146,19 @@ def test_a_log_that_rests_for_long_before_it_moves_is_explained_by_the_plain_for
     assert likeliest.values["bulk_modulus"] == pytest.approx(p.bulk_modulus, rel=0.01)
 
 
+@pytest.mark.parametrize(("behind", "forms"), [(flow_search.TOO_FAR - 5.0, 2), (flow_search.TOO_FAR + 5.0, 1)])
+def test_a_balance_far_behind_one_that_leaves_noise_alone_is_given_up(
+    monkeypatch: pytest.MonkeyPatch, behind: float, forms: int
+) -> None:
+    def left_behind(*given: Any) -> list[rough_search.RoughOptimum]:
+        volume, mass, _ = rough_search.rough_optima(*given)
+        return [volume, replace(mass, point=replace(mass.point, cost=volume.point.cost + behind))]
+
+    monkeypatch.setattr(flow_search, "rough_optima", left_behind)
+    fits = balanced(seen(recorded("normal")), HEALTHY, STARTS)
+    assert len(fits) == forms
+
+
 def test_what_is_told_has_short_steps_throughout_though_less_drain_was_found_with_long_ones(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -1,6 +1,6 @@
 import numpy as np
 
-from estimation.fits.greybox.descent import Point, descend, descend_together
+from estimation.fits.greybox.descent import Point, descend, descend_together, remembered
 
 FAR = np.full(3, 10.0)
 
@@ -47,6 +47,22 @@ def test_searches_together_end_where_each_ends_alone() -> None:
         np.testing.assert_array_equal(found.theta, descend(bowl, start, 60, (-FAR, FAR), 1e-12).theta)
     assert evaluated[0] == len(starts)  # the search that begins at the optimum leaves the others alone
     assert evaluated[-1] < len(starts)
+
+
+def test_a_second_search_from_the_same_start_works_out_only_what_is_new() -> None:
+    tried: list[np.ndarray] = []
+
+    def counted(x: np.ndarray) -> Point:
+        tried.append(x)
+        return bowl(x)
+
+    at, start = remembered(counted), np.array([-5.0, 4.0, 1.5])
+    short = descend(at, start, 2, (-FAR, FAR), 1e-12, radius=1.0)
+    assert len(tried) == 2
+    long = descend(at, start, 5, (-FAR, FAR), 1e-12, radius=1.0)
+    assert len(tried) == 5
+    assert long.cost < short.cost
+    np.testing.assert_array_equal(long.theta, descend(bowl, start, 5, (-FAR, FAR), 1e-12, radius=1.0).theta)
 
 
 def test_a_search_whose_end_is_of_no_use_is_given_up_and_any_other_is_not() -> None:

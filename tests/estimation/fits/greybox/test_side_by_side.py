@@ -166,6 +166,22 @@ def test_what_was_run_at_one_of_the_last_two_points_is_not_run_again(
         own.at(third)
 
 
+def test_a_point_near_a_known_one_lies_along_its_slopes_where_that_is_asked_for(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, (theta,) = problem.on(problem.log), points(problem, 1)
+    own.near, slopes = 0.2, own.slopes(theta)
+    near, far = (theta + size * np.eye(len(theta))[0] / np.linalg.norm(slopes[:, 0]) for size in (0.19, 0.21))
+    _, sizes, along = np.linalg.svd(slopes, full_matrices=False)
+    bent = theta + (along * (0.19 / sizes)[:, None])[sizes > 0.05][-1]  # effects cancel, and logarithms bend
+    exact = problem.on(problem.log).at(near)
+    monkeypatch.setattr(own, "_side_by_side", lambda *_: pytest.fail("this point was run"))
+    assert own.at(near).cost == pytest.approx(exact.cost, abs=1e-2)
+    for one in (far, bent):
+        with pytest.raises(pytest.fail.Exception, match="this point was run"):
+            own.at(one)
+
+
 def test_residuals_under_several_rigs_are_those_of_each(problem: FreedProblem) -> None:
     (theta,) = points(problem, 1)
     wider = problem.log.parameters.copy()
