@@ -287,8 +287,8 @@ QUICK_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_quick", rates=partial(
 TURBULENT_QUICK_FLOW_FORM = replace(
     WIDE_FLOW_FORM, name="wide_flow_turbulent_quick", rates=partial(wide_rates, turbulent=True, quick=True)
 )
-"""The same with a share of the leakage turbulent, with `QUICKNESS` of bubbles, and with both. Plain logs, which the
-wide form is asked of too, pay for no roots and no powers."""
+"""The same with a share of the leakage turbulent, with `QUICKNESS` of bubbles, and with both. They are separate forms,
+so that plain logs, for which the wide form is used too, need not compute roots and powers."""
 
 LINEAR = {
     "speed_lead": 1e-5,

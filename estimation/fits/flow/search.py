@@ -55,13 +55,13 @@ RELIEF_RISE = 0.05
 valves need 0.05 to 0.2. The default slope would be a corner of 0.0004 in small rigs."""
 
 NEAR = 0.2
-"""How far the residuals of a balance move at the end of a search before it is told, up to which they are taken along
-their slopes and not run [dimensionless], see `FreedProblem`: 0.02 in log-likelihood."""
+"""Change of a balance's residuals up to which the last short step of a search is computed from slopes and not run
+[dimensionless], see `FreedProblem`: 0.02 in log-likelihood."""
 
 COMPLETED, TOO_FAR = 10.0, 150.0
-"""Log-likelihood that short model steps, and valves that crack, gain at most where they hardly matter, and how far a
-balance is then behind one that leaves noise alone to be given up [dimensionless]. Of 100 logs one gained 180, where the
-likeliest balance gained 43; beside likeliest ones that gained less than 10 they gained 86 at most."""
+"""Gain of short model steps and cracking valves up to which they hardly matter, and distance from a balance that leaves
+only noise, from which another balance is dropped [log-likelihood]. In one of 100 logs such a balance gained 180, and
+the likeliest gained 43. If the likeliest gained less than 10, others gained at most 86."""
 
 VALVES = ("makeup_conductance", "makeup_opening", *CRACKS, BEND, STIFFNESS)
 """Parameters that all balances share to the last digits; oil and losses compensate for the differences of the
@@ -225,7 +225,7 @@ def _told(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> Sequence[G
 
 
 def _is_noise(one: Found) -> bool:
-    """Return whether a minimum leaves no more of its log than noise does by chance."""
+    """Return whether the residuals at a minimum are no larger than noise by chance."""
     problem, point, _ = one
     return 2.0 * point.cost < largest_chi_square(problem.blocks, 1.0) * problem.blocks
 

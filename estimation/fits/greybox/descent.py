@@ -182,7 +182,7 @@ def descend_together(
 
 
 def remembered(at: Callable[[Array], Point]) -> Callable[[Array], Point]:
-    """Return a cost that is worked out once at each point: searches from the same starts begin alike.
+    """Return a cost function that is computed once per point: searches from the same starts share their first points.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ class FreedProblem(Problem):
     """
 
     near = 0.0
-    """How far a run moves all residuals from a known one, up to which they are taken along its slopes [deviations]."""
+    """Change of all residuals from a known point up to which its slopes give them without a run [deviations]."""
 
     def __init__(
         self,
@@ -261,7 +261,7 @@ class FreedProblem(Problem):
         return weighed(here, columns)
 
     def _remembered(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
-        """Return the residuals and slopes at one of the last two points, or so near to one that slopes lead there."""
+        """Return the residuals and slopes at one of the last two points, or so near to one that its slopes suffice."""
         last = [(theta - one[0], *one[2:]) for one in self._last if np.array_equal(one[1], variance)]
         for away, here, columns in last:
             if not np.any(away):
