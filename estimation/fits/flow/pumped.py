@@ -12,6 +12,7 @@ from estimation.arrays import Array
 from estimation.fits.greybox.block_averages import block_means
 from estimation.fits.greybox.intersample_speed import FINE, curved
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.pump_ripple import delivering
 from estimation.models.flow import FLOW_FORM
 from plant.components.valves import pumped_flow
 from plant.eha.model import EhaParameters
@@ -85,7 +86,8 @@ def _led(
     sampled, sample_time = samples
     block = round(means.sample_time / sample_time)
     speed, position = (FLOW_FORM.drives.index(name) for name in FLOW_FORM.drives)
-    every, turned = block * np.arange(len(means.drives)), sampled - means.speed_offset
+    every = block * np.arange(len(means.drives))
+    turned = delivering(sampled, means.teeth, means.speed_offset, sample_time)  # as the means, which hold the teeth
     lines = np.interp(np.arange(len(sampled)), every, means.drives[:, speed])
     drives = means.drives.copy()
     for factor, bias in biases:
