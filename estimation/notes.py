@@ -250,9 +250,9 @@ class RigCode(Code):
     )
     PUMP_RIPPLES = "the pump's {teeth} teeth make its flow ripple by {percent:.1f} ± {half_width:.2g} % (in the fit)"
     MAKEUP_BENDS = (
-        "the make-up valves act as orifices: at {drop_pa:.2g|bar} bar they pass half as much flow per bar as at a "
-        "small drop; the fit includes this"
+        "make-up valves act as orifices: at {drop_pa:.2g|bar} bar they pass half as much per bar (in the fit)"
     )
+    PARTLY_EXPLAINED = "a hint, no conclusion: {cause!w} explains all but {left:.2g} % of what the balance leaves"
     GAS_CONTRADICTED = (
         "the accumulator holds at {limit} {ratio:.2g} times the gas that the rig file states, or its charge differs"
     )

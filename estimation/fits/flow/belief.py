@@ -6,12 +6,20 @@ from functools import partial
 import numpy as np
 
 from estimation.fits.flow.accumulator import is_far_stiffer
+from estimation.fits.flow.agreement import wanted_of
+from estimation.fits.flow.log import homed_at_stop
+from estimation.fits.flow.log_traits import LogTraits
 from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, OFFSET, PLAY, PRESSURE_LATE, Hypothesis
 from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.fit_objections import fit_explains_all
+from estimation.notes import RigCode
+from plant.notes import Note
+
+NEARLY_ALL = 0.1
+"""What may be left of what no plain form explains, for a hint on its cause [fraction]; judged."""
 
 LITTLE = 0.01
 """Share of the plain form's misfit beyond noise that the best hypothesis must remove before pairs are tried
@@ -85,6 +93,49 @@ def wanted_cost(
     if tuple(names) == (ENCODER_ZERO.name,) and homed:
         return min(best.cost + WORTH, swinging.cost - (0.0 if astray else worth))
     return best.cost - worth
+
+
+def wanted_in(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: float) -> float:
+    """Return the cost below which hypotheses are believed rather than the plain form of a log.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The hypotheses.
+    plain : PlainFits
+        The log's plain fits.
+    traits : LogTraits
+        How the log was logged.
+    left : float
+        Mean squared normalised residual under them [dimensionless].
+    """
+    best, swinging, worth = plain.best, plain.swinging, wanted_of(plain, left)
+    homed, astray = homed_at_stop(plain.log), is_far_stiffer(plain.log, swinging.values)
+    return wanted_cost(names, best, swinging, homed=homed, late=traits.filtered, astray=astray, worth=worth)
+
+
+def nearly_explained(plain: PlainFits, strange: Explanation) -> tuple[Note, ...]:
+    """Return a note on what comes near to explaining a log that nothing explains.
+
+    A chamber whose make-up valve is stuck shut boils, and no model follows its vapour to the noise; but a valve that
+    takes 98 % away of what was unexplained is where to look first.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        The log's plain fits.
+    strange : Explanation
+        The likeliest hypotheses, which are not believed.
+
+    Returns
+    -------
+    tuple of Note
+        None where the plain form explains the log, and where much is left.
+    """
+    before, left = (max(fit.chi_square[0] - 1.0, 0.0) for fit in (plain.best, strange.fit))
+    if plain.explains(plain.best) or left > NEARLY_ALL * before:
+        return ()
+    return (RigCode.PARTLY_EXPLAINED.note(cause=strange.names[0], left=100.0 * left / before),)
 
 
 def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:

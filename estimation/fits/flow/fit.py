@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from estimation.fits.flow.accumulator import gas_contradicted, is_far_stiffer
+from estimation.fits.flow.accumulator import gas_contradicted
 from estimation.fits.flow.agreement import Answered, agreed, wanted_of
 from estimation.fits.flow.asked_hypotheses import (
     ALWAYS_ASKED,
@@ -16,7 +16,7 @@ from estimation.fits.flow.asked_hypotheses import (
     is_astray,
     near_starts,
 )
-from estimation.fits.flow.belief import hopeless_cost, likelier, told_by, wanted_cost
+from estimation.fits.flow.belief import hopeless_cost, likelier, nearly_explained, told_by, wanted_in
 from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, with_lumped, with_lumped_slopes
@@ -177,20 +177,21 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
             continue
         plain = by_course(logged, plain)
         asked, open_ends = _asked(plain, sensed, traits)
+        hints = list[Note]()
         try:
             with work.counted():
                 if not start.turns_read and _misread(corrected, plain, asked, traits):
                     return Answered(plain, (), (), None)
-                strange = _strange(plain, asked, traits) if asked else None
+                strange = _strange(plain, asked, traits, hints) if asked else None
                 for one in asked_alone(plain, asked):
                     strange = likelier(strange, _strange(plain, (one,), traits))
                 plain, strange = offset_settled(plain, strange, asked, partial(_strange, traits=traits))
                 if asked and strange is None:
                     plain = with_open_turns(logged, plain)
         except WorkSpentError:
-            return Answered(plain, asked, open_ends, None, ended=True)
+            return Answered(plain, asked, (*open_ends, *hints), None, ended=True)
         if (elsewhere := strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))) is None:
-            return Answered(plain, asked, open_ends, strange)
+            return Answered(plain, asked, (*open_ends, *hints), strange)
         start = elsewhere  # with the motor's course that was found
 
 
@@ -216,8 +217,10 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
     return asked, open_ends
 
 
-def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
-    """Return the hypotheses that explain a log, if believed; a log that begins at rest has `BEGUN` tested alone."""
+def _strange(
+    plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits, hints: list[Note] | None = None
+) -> Explanation | None:
+    """Return the hypotheses that explain a log, if believed, else hint at what nearly does; `BEGUN` is alone."""
     explains = told_by(plain, begun=BEGUN in asked)
     moving, astray = traits.loaded or traits.moving, is_astray(plain.log, plain.swinging, plain.start.parameters)
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=moving, astray=astray)
@@ -234,20 +237,17 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
         hopeless=hopeless_cost(plain.swinging, asked),
         by_mass=balances_mass(plain.swinging.model),
         homed=homed_at_stop(plain.log),
-        useful=_wanted((asked[0].name,), plain, traits, 0.0) if alone else np.inf,
+        useful=wanted_in((asked[0].name,), plain, traits, 0.0) if alone else np.inf,
     )
     if strange is None:
         return None
-    lower = strange.fit.cost < _wanted(strange.names, plain, traits, strange.fit.chi_square[0])
+    lower = strange.fit.cost < wanted_in(strange.names, plain, traits, strange.fit.chi_square[0])
     crossed = PLAY.name not in strange.names or not doubted(strange.fit)  # a play leaves sensor noise alone
-    return strange if lower and crossed and explains(strange.fit) else None
-
-
-def _wanted(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: float) -> float:
-    """Return the cost below which hypotheses that leave ``left`` are believed rather than the plain form."""
-    best, swinging, worth = plain.best, plain.swinging, wanted_of(plain, left)
-    homed, astray = homed_at_stop(plain.log), is_far_stiffer(plain.log, swinging.values)
-    return wanted_cost(names, best, swinging, homed=homed, late=traits.filtered, astray=astray, worth=worth)
+    if lower and crossed and explains(strange.fit):
+        return strange
+    if hints is not None:
+        hints += nearly_explained(plain, strange)
+    return None
 
 
 def _uneven(plain: PlainFits, traits: LogTraits) -> VaryingLoss | None:

@@ -1,6 +1,11 @@
-"""Which of two explanations of a log is believed."""
+"""Which of two explanations of a log is believed, and what is hinted at where none is."""
 
-from estimation.fits.flow.belief import likelier
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from estimation.fits.flow.belief import likelier, nearly_explained
 from estimation.fits.hypothesis_search.explanation import Explanation
 from tests.estimation.fits.short_logs import made_fit
 
@@ -18,3 +23,17 @@ def test_gauges_of_unlike_gains_are_told_where_nothing_else_is_as_likely() -> No
     assert likelier(None, gauges) is gauges
     assert likelier(offset, None) is offset
     assert likelier(None, None) is None
+
+
+@pytest.mark.parametrize(("chi", "left"), [(1.1, 0.1), (9.0, 8.0), (12.0, None)])
+def test_what_takes_nearly_all_away_that_is_unexplained_is_hinted_at(chi: float, left: float | None) -> None:
+    """`makeup_check_stuck_shut`, validation 25300: a blocked valve left 1.14 of 1100, which is no explanation."""
+    plain: Any = SimpleNamespace(best=made_fit(5e4, 2e8, 1e5, chi=101.0), explains=lambda fit: fit.chi_square[0] < 1.05)
+    blocked = Explanation(("makeup_blocked",), {}, {}, (made_fit(1e3, 2e8, 1e5, chi=chi),), (), 1e6)
+    said = nearly_explained(plain, blocked)
+    assert [one.data for one in said] == [{"cause": "makeup_blocked", "left": left}] * (left is not None)
+
+
+def test_a_log_that_the_plain_form_explains_gets_no_hint() -> None:
+    plain: Any = SimpleNamespace(best=made_fit(5e4, 2e8, 1e5, chi=1.02), explains=lambda fit: fit.chi_square[0] < 1.05)
+    assert nearly_explained(plain, explanation("makeup_blocked", 1e3)) == ()
