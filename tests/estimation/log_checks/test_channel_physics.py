@@ -204,16 +204,6 @@ def test_a_pump_that_would_deliver_what_none_can_is_a_speed_in_another_unit(
     assert (found.value is None) == named
 
 
-def test_swapped_channels_show_where_noise_hides_velocity_from_block_to_block() -> None:
-    """`position_velocity_swapped`, validation 25301: a stiff piston moves 0.2 mm, and velocity is mostly noise."""
-    time, noise = 1e-3 * np.arange(20000), 1.5e-3 * np.random.default_rng(1).normal(size=20000)
-    position, velocity = 2e-4 * np.sin(5.0 * time), 1e-3 * np.cos(5.0 * time) + noise
-    sound = Record(1e-3, {SPEED: 50.0 * np.cos(5.0 * time), POSITION: position, VELOCITY: velocity})
-    assert channel_mistakes(sound, HEALTHY) == ()
-    (said,) = channel_mistakes(swapped(sound), HEALTHY)
-    assert said.code is ChannelCode.CHANNELS_SWAPPED
-
-
 @pytest.mark.parametrize("mistake", [scaled(SPEED, -1.0), swapped, scaled(POSITION, -1.0), scaled(VELOCITY, 1e3)])
 def test_a_mistake_shows_without_pressure(mistake: Callable[[Record], Record]) -> None:
     for drive in ("steps", "prbs"):

@@ -210,6 +210,7 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     monkeypatch.setattr(explain, "cost_over_noise", lambda *_: chi)
     monkeypatch.setattr(explain, "_paired", paired)
     monkeypatch.setattr(explain, "with_delivery", lambda *_: [])
+    monkeypatch.setattr(explain, "delivery_followed", lambda *_: [])
     monkeypatch.setattr(explain, "without_idle", lambda _, tried: tried)
     monkeypatch.setattr(conclusion, "weighed", lambda *_, **__: {})
     monkeypatch.setattr(conclusion, "usual_pressure", lambda *_: 0.0)
