@@ -108,6 +108,11 @@ def wanted_in(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: f
         How the log was logged.
     left : float
         Mean squared normalised residual under them [dimensionless].
+
+    Returns
+    -------
+    float
+        As of `wanted_cost` [dimensionless].
     """
     best, swinging, worth = plain.best, plain.swinging, wanted_of(plain, left)
     homed, astray = homed_at_stop(plain.log), is_far_stiffer(plain.log, swinging.values)
