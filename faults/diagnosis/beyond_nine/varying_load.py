@@ -89,7 +89,7 @@ def varying_load(blocks: Blocks, p: EhaParameters) -> Note | None:
 
 def _beyond(columns: Array, push: Array) -> Array:
     """Return what columns leave of a force by least absolute values [N]: what is there at times alone is left whole."""
-    weights = np.ones(len(push))
+    weights, left = np.ones(len(push)), push
     for _ in range(ROUNDS):
         root = np.sqrt(weights)
         _, found = _left(columns * root[:, None], push * root)
