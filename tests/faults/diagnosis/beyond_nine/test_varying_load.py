@@ -31,7 +31,7 @@ def test_a_wave_on_the_rod_is_named_with_its_size(size: float) -> None:
 
 
 def test_friction_that_comes_and_goes_is_no_load() -> None:
-    grips: Array = 800.0 * (np.abs(TIME - 3.0) < 0.8) * np.sign(to_and_fro())
+    grips = np.asarray(800.0 * (np.abs(TIME - 3.0) < 0.8) * np.sign(to_and_fro()), dtype=np.float64)
     note = varying_load(under(grips), PAPER)
     assert note is not None
     assert note.code is AgainstCode.FRICTION_VARIES
@@ -40,7 +40,7 @@ def test_friction_that_comes_and_goes_is_no_load() -> None:
 
 
 def test_what_holds_back_one_way_alone_may_be_a_load() -> None:
-    grips: Array = 800.0 * (np.abs(TIME - 3.0) < 0.8) * np.sign(to_and_fro())
+    grips = np.asarray(800.0 * (np.abs(TIME - 3.0) < 0.8) * np.sign(to_and_fro()), dtype=np.float64)
     note = varying_load(under(np.maximum(grips, 0.0)), PAPER)
     assert note is not None
     assert note.code is AgainstCode.GRIPS_ONE_WAY
