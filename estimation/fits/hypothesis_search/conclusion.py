@@ -50,12 +50,16 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
         values=values,
         delays=best.delays,
         fits=fits,
-        rivals=tuple(" and ".join(each.name for each in one.together) for one in rivals),
+        rivals=tuple(name for name in dict.fromkeys(map(_named, rivals)) if name != _named(best)),
         stated_pressure=usual_pressure(log, parameters),
         opening=partial(delivery_beside, log, best),
         detailing=partial(_detailed, log, parameters, (best, *rivals), accepted),
         beforehand=likely,
     )
+
+
+def _named(tried: Trial) -> str:
+    return " and ".join(one.name for one in tried.together)
 
 
 def beforehand(log: GreyBoxLog, tried: Trial) -> float:

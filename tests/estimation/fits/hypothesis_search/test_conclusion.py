@@ -49,6 +49,13 @@ def test_a_volume_that_the_rig_file_hardly_allows_yields_to_what_explains_the_lo
     assert likelier.weights[0] > 0.6
 
 
+def test_a_set_is_no_rival_of_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stuck valve, `makeup_check_stuck_shut` 25331, was found beside a late one and alone."""
+    monkeypatch.setattr(conclusion, "usual_pressure", lambda *_: 0.0)
+    alike = [tried(ENCODER_ZERO, cost, 2e8) for cost in (100.0, 101.0)]
+    assert conclude(LOG, EhaParameters(), alike, lambda _: True).rivals == ()
+
+
 def test_the_file_s_own_uncertainty_says_how_likely_a_volume_is() -> None:
     off = tried(VOLUME, 100.0, 2e8, float(np.exp(0.3)))
     assert beforehand(LOG, off) == pytest.approx(np.exp(-2.0))
