@@ -232,6 +232,9 @@ MAKEUP_HIDDEN = replace(MAKEUP_BLOCKED, far=False, beside=CRACKS)
 VOLUME_HIDDEN = replace(VOLUME, beside=(*CRACKS, STIFFNESS))
 """The same beside a plain fit: valves, and an accumulator whose level follows the piston, have absorbed part of it."""
 
+ZERO_HIDDEN = replace(ENCODER_ZERO, beside=(*CRACKS, STIFFNESS))
+"""The same of an encoder's zero: an accumulator far stiffer than presumed has taken it up, and valves a part."""
+
 MAY_HIDE = (MAKEUP_HIDDEN, *PORTS_DRAIN, LEAKAGE_RISE, OFFSET, PUMP_COMPRESSES, VOLUME_HIDDEN)
 """Also tested if the plain form explains the log: opening drops and leakage may absorb the effect. With `DELIVERY` and
 `ENCODER_ZERO` they are nine, for which one evaluation is made beside the fit: slopes predict the gain of each,

@@ -29,6 +29,7 @@ from estimation.fits.hypotheses import (
     SPEED_LATE,
     START_LOAD,
     UNLIKE_CRACKS,
+    ZERO_HIDDEN,
     Hypothesis,
 )
 from estimation.fits.hypothesis_search.coarse_search import VANISHED
@@ -64,6 +65,9 @@ times the noise."""
 
 ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO, *MAY_HIDE)
 """Effects that are tested even if the plain form explains the log, where slopes promise a gain: each may be hidden."""
+
+UNPAIRED = (*ALWAYS_ASKED, ZERO_HIDDEN, CHECKS_HIDDEN, PLAY, PRESSURE_SIDES)
+"""What is not sought in pairs, where nothing else is asked."""
 
 LEAST_ZERO, LEAST_SHIFT = 5e-3, 3.6e-3
 """Smallest encoder zero that is searched for [m], and the same over the length of a chamber in mid-stroke, if that is
@@ -134,17 +138,18 @@ def hypotheses_asked(
         slopes=slopes_of(swinging, log),
     )
     delivery, zero, *hidden = _possible(promises, swinging)
+    sought = ZERO_HIDDEN if is_far_stiffer(log, swinging.values) else ENCODER_ZERO
     shows_zero = best is swinging or homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zero = max(zero, predicted_gain(log, parameters, best.values, ENCODER_ZERO))
-    if is_far_stiffer(log, swinging.values):  # else slopes promise what the accumulator leaves of a zero: nothing
+    if sought is ZERO_HIDDEN:  # else slopes promise what the accumulator leaves of a zero: nothing
         zero = max(zero, predicted_gain(log, parameters, _unheld(swinging.values), ENCODER_ZERO, by_mass=by_mass))
     worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) * ZERO_SIZE > _least_zero(parameters)
     plays = play_shows(swinging.play, sensed)
     lead = swinging.values.get("speed_lead", 0.0) / log.sample_time
     behind, ahead = lead > FARTHEST_LEAD, lead < -FARTHEST_LEAD
-    tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind), (PRESSURE_LATE, ahead)
+    tried = (DELIVERY, worn), (sought, shifted), (PLAY, plays), (SPEED_LATE, behind), (PRESSURE_LATE, ahead)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > worth)
     asked += tuple(one for one in _late_valves(swinging) if one not in asked)

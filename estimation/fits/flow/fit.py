@@ -11,6 +11,7 @@ from estimation.fits.flow.agreement import Answered, agreed, wanted_of
 from estimation.fits.flow.asked_hypotheses import (
     ALWAYS_ASKED,
     MOST_ASKED,
+    UNPAIRED,
     asked_alone,
     hypotheses_asked,
     is_astray,
@@ -36,12 +37,11 @@ from estimation.fits.hypotheses import (
     AIR,
     AIR_MIDWAY,
     BEGUN,
-    CHECKS_HIDDEN,
     HYPOTHESES,
     MAKEUP_BLOCKED,
     PLAY,
     PRESSURE_LATE,
-    PRESSURE_SIDES,
+    ZERO_HIDDEN,
     Hypothesis,
 )
 from estimation.fits.hypothesis_search.explain import WORTH, explain
@@ -226,14 +226,14 @@ def _strange(
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=moving, astray=astray)
     if plain.best is not plain.swinging and explains(plain.best):
         near = [plain.best.values, *near]
-    alone = len(asked) == 1 and asked[0] in ALWAYS_ASKED  # it has no rival
+    alone = len(asked) == 1 and asked[0] in (*ALWAYS_ASKED, ZERO_HIDDEN)  # it has no rival
     strange = explain(
         asked_for_ripple(plain.log),
         plain.start.parameters,
         near,
         explains,
         asked=asked,
-        paired=any(one not in (*ALWAYS_ASKED, CHECKS_HIDDEN, PLAY, PRESSURE_SIDES, moving or BEGUN) for one in asked),
+        paired=any(one not in (*UNPAIRED, moving or BEGUN) for one in asked),
         hopeless=hopeless_cost(plain.swinging, asked),
         by_mass=balances_mass(plain.swinging.model),
         homed=homed_at_stop(plain.log),
