@@ -29,6 +29,7 @@ from estimation.fits.hypotheses import (
     PRESSURE_LATE,
     SPEED_LATE,
     UNLIKE_CRACKS,
+    ZERO_HIDDEN,
     Hypothesis,
 )
 from estimation.fits.hypothesis_search.fit_objections import DOUBTED, QUIET
@@ -131,7 +132,8 @@ def test_an_encoder_s_zero_is_asked_for_where_the_accumulator_took_it_up(deviati
 
     with all_promise(NO_GAIN), patch.object(asked_hypotheses, "predicted_gain", beside_none):
         asked, _ = hypotheses_asked(plain, PAPER, fit, fit, loaded=False, moving=False)
-    assert (ENCODER_ZERO in asked) is wanted
+    assert (ZERO_HIDDEN in asked) is wanted  # with what has taken it up: 25311 was 1.5 % low, the zero not believed
+    assert ENCODER_ZERO not in asked
     (near,) = near_starts(fit, (), lambda _: True, in_motion=False)
     assert STIFFNESS in near
     assert is_astray(plain, fit, PAPER) is wanted
