@@ -12,7 +12,7 @@ from faults.diagnosis.circuits.class_regions import how_near
 from faults.diagnosis.circuits.open_classes import circuits_left_open
 from faults.diagnosis.circuits.out_of_model import reasons_against
 from faults.diagnosis.circuits.two_sensors import sensors_disagree
-from faults.diagnosis.evidence import Scoreboard, weigh
+from faults.diagnosis.evidence import weigh
 from faults.diagnosis.not_told import what_is_not_told
 from faults.diagnosis.severity import healthy_severities, limits_of, severities
 
@@ -49,26 +49,7 @@ def diagnose_clean(log: CleanLog, actuator: Actuator, calibration: Calibration |
 
 def _around(log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosis:
     """Return the diagnosis of a log around one healthy circuit."""
-    found = told_by_board(weigh(log.record, actuator), log, actuator, numbers)
-    # a log that drifts is diagnosed again, where it does
-    drifts = found.scoreboard.drift is not None or found.scoreboard.blocks.course is not None
-    return found if drifts else whatever_fault(found, actuator, numbers)
-
-
-def told_by_board(board: Scoreboard, log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosis:
-    """Return what evidences say of a log, of faults that are among the nine.
-
-    Parameters
-    ----------
-    board : Scoreboard
-        The evidences.
-    log : CleanLog
-        The log.
-    actuator : Actuator
-        The healthy actuator.
-    numbers : Calibration
-        Weights of the evidences.
-    """
+    board = weigh(log.record, actuator)
     pressure = board.blocks.pressure is not None
     region = how_near(board.fits, board.blocks, actuator)
     against = (
@@ -81,7 +62,7 @@ def told_by_board(board: Scoreboard, log: CleanLog, actuator: Actuator, numbers:
     circuits = circuits_left_open(board.blocks, board.fits, actuator, probabilities)
     told_by = partial(severities, board.fits, actuator, numbers.widths(pressure), circuits)
     severity = told_by(None, None)
-    return Diagnosis(
+    found = Diagnosis(
         probabilities,
         against,
         severity,
@@ -91,3 +72,6 @@ def told_by_board(board: Scoreboard, log: CleanLog, actuator: Actuator, numbers:
         board,
         told_by,
     )
+    # a log that drifts is diagnosed again, where it does
+    drifts = board.drift is not None or board.blocks.course is not None
+    return found if drifts else whatever_fault(found, actuator, numbers)

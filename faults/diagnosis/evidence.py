@@ -9,7 +9,7 @@ from estimation.finding import Change
 from estimation.identification.model.linear_model import LinearModel
 from faults.conditions import CONDITIONS
 from faults.diagnosis.calibration import Calibration
-from faults.diagnosis.changes.onset import LastPart, last_part
+from faults.diagnosis.changes.onset import last_part
 from faults.diagnosis.changes.warming import Drift
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
@@ -111,11 +111,7 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     LogError
         If the log has neither position nor velocity, or is too short.
     """
-    return scored(last_part(record, actuator), actuator, library)
-
-
-def scored(part: LastPart, actuator: Actuator, library: Mapping[str, LinearModel] | None = None) -> Scoreboard:
-    """Return the scores of the evidences on a part of a log to which circuits are fitted; see `weigh`."""
+    part = last_part(record, actuator)
     record, blocks, fits = part.record, part.blocks, part.fits
     found = {
         "models": models_scores(fits),

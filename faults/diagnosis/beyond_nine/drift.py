@@ -16,16 +16,14 @@ from estimation.log_checks.clean import CleanLog
 from estimation.notes import RigCode
 from faults.diagnosis.beyond_nine.load import Loaded
 from faults.diagnosis.beyond_nine.wear import whatever_fault
-from faults.diagnosis.by_circuits import told_by_board
 from faults.diagnosis.calibration import Calibration, shipped_calibration
-from faults.diagnosis.changes.onset import LastPart
-from faults.diagnosis.changes.warming import Drift, with_course
+from faults.diagnosis.changes.warming import with_course
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import LASTING, misfit
 from faults.diagnosis.circuits.class_regions import fit_classes
-from faults.diagnosis.evidence import Scoreboard, models_scores, scored
+from faults.diagnosis.evidence import Scoreboard, models_scores
 from faults.diagnosis.severity import severities
 from faults.notes import AgainstCode
 from plant.arrays import Array
@@ -35,9 +33,6 @@ EARLIER = (0.5, 0.0)
 """Other places of the rig file's oil besides the end of a log [fraction of it]: over a factor of 2, as in a log that
 warms by some 15 K, neighbouring places are three deviations of actuators of one kind apart, so none is farther than 1.5
 away."""
-
-LEAST_LEFT = 0.1
-"""Least friction at rated velocity from which a search begins, over what of it is not viscous [fraction]."""
 
 PLACED = {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}
 """Objections to a log with one oil, and not with another."""
@@ -75,14 +70,12 @@ def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Se
         return last
     course = log.record[LEAKAGE_COURSE]
     there = [float(course[round(share * (len(course) - 1))]) for share in EARLIER]
-    calibration, found = shipped_calibration(), [last.diagnosis]
-    if drift is None:
-        found += [diagnosed(_with_oil_of(log, one)).diagnosis for one in there]
+    found = [last.diagnosis, *(diagnosed(_with_oil_of(log, one)).diagnosis for one in there)]
     placed = next((one for one in found if _is_placed(one)), found[0])
+    calibration = shipped_calibration()
     if drift is not None:
         actuator = actuator_of(last.parameters)
-        found[0] = _followed(found[0], drift, actuator, calibration)
-        found += [_elsewhere(found[0], one, log, actuator, calibration) for one in there]
+        found[0] = _followed(found, [1.0, *there], actuator, calibration)
         # first whether the circuit lies in a condition there, then its evidence
         ranks = [(_is_placed(one), _evidence(one.scoreboard, calibration)) for one in found]
         likeliest = ranks.index(max(ranks))
@@ -101,36 +94,23 @@ def _is_placed(one: Diagnosis) -> bool:
     return not any(note.code in PLACED for note in one.against)
 
 
-def _followed(last: Diagnosis, drift: Drift, actuator: Actuator, calibration: Calibration) -> Diagnosis:
-    """Return the diagnosis at the end of a log, its circuit fitted on from the drift's where that follows better.
+def _followed(
+    found: Sequence[Diagnosis], courses: Sequence[float], actuator: Actuator, calibration: Calibration
+) -> Diagnosis:
+    """Return the diagnosis at the end of a log, its circuit fitted on from another place's where that follows better.
 
     A doubled leakage is far from all conditions, and a search from these may end too early.
     """
-    board = last.scoreboard
-    if misfit(board.blocks, board.fits.best.fitted) < misfit(board.blocks, drift.fit.fitted) + LASTING:
+    misfits = [misfit(one.scoreboard.blocks, one.scoreboard.fits.best.fitted) for one in found]
+    best, last = int(np.argmin(misfits)), found[0]
+    if misfits[0] < misfits[best] + LASTING:
         return last
-    fits = fit_classes(board.blocks, actuator, start=drift.fit.coordinates)
+    start = found[best].scoreboard.fits.best.coordinates.copy()
+    start[COORDINATES.index("leakage")] -= np.log(courses[best])
+    board = last.scoreboard
+    fits = fit_classes(board.blocks, actuator, start=start)
     severity = severities(fits, actuator, calibration.widths(board.blocks.pressure is not None))
     return replace(last, scoreboard=replace(board, fits=fits), severity=severity)
-
-
-def _elsewhere(
-    last: Diagnosis, leakage: float, log: CleanLog, actuator: Actuator, calibration: Calibration
-) -> Diagnosis:
-    """Return the diagnosis with the rig file's oil where leakage is so much of what it is at the end of a log.
-
-    The circuit is that at the end, whose leakage and viscous friction count from there; its search begins so.
-    """
-    board = last.scoreboard
-    blocks, start = board.blocks, board.fits.best.coordinates.copy()
-    blocks = replace(blocks, course=None if blocks.course is None else blocks.course / leakage)
-    rest, bent, rated = (COORDINATES.index(f"friction_{name}") for name in ("rest", "quadratic", "rated"))
-    sliding = np.exp(start[rest]) + np.exp(start[bent])
-    start[COORDINATES.index("leakage")] += np.log(leakage)
-    start[rated] = np.log(max(sliding + (np.exp(start[rated]) - sliding) / leakage, LEAST_LEFT * sliding))
-    fits = fit_classes(blocks, actuator, start=start)
-    part = LastPart(board.window, board.window, blocks, fits, board.onset, board.against)
-    return told_by_board(scored(part, actuator), log, actuator, calibration)
 
 
 def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str, float]:

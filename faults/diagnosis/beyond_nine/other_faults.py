@@ -10,6 +10,7 @@ several sound circuits is used.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -259,6 +260,7 @@ def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELE
         yield fault, _with(fault, blocks, sound, runs, behind)
 
 
+@lru_cache(maxsize=2)
 def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
     """Return the largest pressure that a fitted circuit reaches in a log without pressure.
 
