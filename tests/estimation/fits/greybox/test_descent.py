@@ -84,6 +84,12 @@ def test_a_search_whose_end_is_of_no_use_is_given_up_and_any_other_is_not() -> N
     tried.clear()
     descend(bent, start, 40, (-far, far), 1e-9, 0.5, wanted=-20.0)
     assert len(tried) < needed
+    tried.clear()
+    assert descend(bent, start, 40, (-far, far), 1e-9, 0.5, good=6.0).cost < 6.0  # how far it would come is not asked
+    assert len(tried) < needed
+    tried.clear()
+    descend(bent, start, 40, (-far, far), 1e-9, 0.5, good=99.0)
+    assert len(tried) == 1
 
 
 def test_a_step_that_promises_less_than_its_share_is_not_taken() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.motion import force_scale
 from estimation.fits.motion.force_scale import Way, disagree, rescaled
 from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
 
@@ -97,6 +98,16 @@ def test_another_stiffness_alone_is_not_asked_where_scales_of_force_disagree() -
 def test_a_valley_that_goes_on_for_ever_is_left_after_three_rounds() -> None:
     best, _, _ = searched(flat(lambda theta: 100.0 * theta[0]), explained=-np.inf)
     assert best.theta[0] - HERE[0] == pytest.approx(3.0 * np.log(0.8))
+
+
+@pytest.mark.parametrize(("moved", "rounds"), [(0.04, 1), (0.07, 3)])
+def test_an_optimum_is_left_in_its_turn_only_where_it_is_another(
+    moved: float, rounds: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(force_scale, "SCALES", ())
+    monkeypatch.setattr(force_scale, "STIFFENED", (1.0 - moved,))
+    best, _, _ = searched(flat(lambda theta: 200.0 * theta[0]), explained=-np.inf)
+    assert best.theta[0] - HERE[0] == pytest.approx(rounds * np.log(1.0 - moved))
 
 
 def test_optima_that_disagree_end_the_search() -> None:

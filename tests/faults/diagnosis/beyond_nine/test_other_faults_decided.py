@@ -203,8 +203,8 @@ def test_a_worn_pump_is_weighed_against_the_sound_one_as_it_is_found_anew(monkey
     assert found.faulty == pytest.approx(odds / (1.0 + odds), rel=1e-3)
 
 
-@pytest.mark.parametrize(("rough", "thorough"), [(-19.9, True), (-20.1, False)])
-def test_a_worn_pump_is_sought_thoroughly_unless_a_rough_search_leaves_it_twenty_behind(
+@pytest.mark.parametrize(("rough", "thorough"), [(-7.9, True), (-8.1, False)])
+def test_a_worn_pump_is_sought_thoroughly_unless_a_rough_search_leaves_it_eight_behind(
     rough: float, thorough: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, _, asked = decided(monkeypatch, lambda one: rough if worn(one) < 1.0 else 0.0)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -91,6 +92,27 @@ def test_a_drift_with_which_no_circuit_follows_the_log_explains_nothing(monkeypa
     for share, is_one in ((1.1, True), (0.9, False)):
         monkeypatch.setattr(warming, "UNEXPLAINED", (share * left, 1.0))
         assert (drift_of(blocks, fits, ACTUATOR) is not None) == is_one
+
+
+def test_a_drift_is_not_followed_that_will_gain_less_than_is_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    blocks, fits = fitted("minor_leakage", 2.0)
+    whole, searched, fitted_on = drift_of(blocks, fits, ACTUATOR), list[float](), warming.fit_freely
+    assert whole is not None
+
+    def counted(*given: Any) -> Any:
+        searched.append(1.0)
+        return fitted_on(*given)
+
+    monkeypatch.setattr(warming, "fit_freely", counted)
+    monkeypatch.setattr(warming, "NEAR", 0.0)  # else one fit may be all
+    monkeypatch.setattr(warming, "FARTHEST", 0.2)
+    found = drift_of(blocks, fits, ACTUATOR, 0.5 * whole.gain)
+    assert found is not None
+    assert found.gain > 0.5 * whole.gain
+    needed = len(searched)
+    searched.clear()
+    drift_of(blocks, fits, ACTUATOR, 100.0 * whole.gain)
+    assert len(searched) == 1 < needed
 
 
 def test_of_a_piston_that_hardly_moves_a_drift_explains_how_its_seals_yield(monkeypatch: pytest.MonkeyPatch) -> None:
