@@ -143,17 +143,17 @@ class Blocks:
 
     @property
     def travel(self) -> float:
-        """Total travel of the piston in both directions [m]."""
-        return float(np.ptp(self._gone))
+        """Total travel of the piston to and fro [m]."""
+        return float(np.ptp(self.gone))
 
     @cached_property
     def reach(self) -> float:
         """Largest distance of the piston from its start [m], to either side."""
-        return float(np.max(np.abs(self._gone), initial=0.0))
+        return float(np.max(np.abs(self.gone), initial=0.0))
 
     @cached_property
-    def _gone(self) -> Array:
-        """Travel of the piston up to each block [m], with gaps bridged at the neighbouring velocity."""
+    def gone(self) -> Array:
+        """Distance of the piston up to each block [m], gaps bridged at the neighbouring speed."""
         known = bridged(self.velocity) if np.any(np.isfinite(self.velocity)) else np.zeros(len(self.velocity))
         return np.cumsum(known) * self.block * self.sample_time
 

@@ -33,6 +33,9 @@ PRESLIDING_REACH = 3.0
 AT_STOP = 0.02
 """A log shows a stop if its piston reversed this near to one, as a share of half the stroke [fraction]."""
 
+SOFTEST_END = 0.01
+"""Stiffness of an end that yields most, over what is judged [fraction]; judged."""
+
 ALLOWED = {"tolerance": 1e-4, "drive_tolerance": 2e-3}
 """Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_groups`: far below what
 matters."""
@@ -306,8 +309,26 @@ def _between_stops(blocks: Blocks, rows: Array) -> Array:
         return rows
     half = 0.5 * rows[:, COLUMN["stroke"]]
     shown = np.abs(blocks.reach - half) <= AT_STOP * half
+    rows[:, COLUMN["end_stop_stiffness"]] = _pressed_ends(blocks, rows, half)
     rows[:, COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(circuit_values(rows)))
     return rows
+
+
+def _pressed_ends(blocks: Blocks, rows: Array, half: Array) -> Array:
+    """Return the stiffness of ends that the log shows, by how far pressure drives the piston past them [N/m].
+
+    Ends are no stiffer than judged: those of small actuators may yield far more, with half a chamber's pressure.
+    """
+    judged = rows[:, COLUMN["end_stop_stiffness"]]
+    if blocks.pressure is None or blocks.reach <= np.min(half):
+        return judged
+    area, load, spring = (rows[:, COLUMN[name]] for name in ("piston_area", "load_force", "load_stiffness"))
+    depth = np.abs(blocks.gone[:, None]) - half
+    beyond = np.any(depth > 0.0, axis=1) & np.isfinite(blocks.pressure)
+    gone, depth = blocks.gone[beyond, None], np.maximum(depth[beyond], 0.0)
+    push = np.sign(gone) * (area * blocks.pressure[beyond, None] - load - spring * (blocks.place + gone))
+    found = np.sum(push * depth, axis=0) / np.maximum(np.sum(depth**2, axis=0), np.finfo(float).tiny)
+    return np.where(np.any(depth > 0.0, axis=0), np.clip(found, SOFTEST_END * judged, judged), judged)
 
 
 def _outputs(blocks: Blocks, states: Array, rows: Array) -> Array:
