@@ -44,8 +44,8 @@ Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the mode
 that the deviation of bulk modulus comes out twenty times too small."""
 
 LEAST_SETTING = 0.3
-"""Least setting at which a relief valve is sought, as a share of the log's largest pressure [fraction]; judged: one that
-passes all that is pumped at three times its setting is a leak."""
+"""Least setting at which a relief valve is sought, as a share of the log's largest pressure [fraction]; judged: one
+that passes all that is pumped at three times its setting is a leak."""
 
 FASTEST_MAKEUP, FASTEST_FOLLOWED = 0.5 * LONGEST_STEP, 0.02 * LONGEST_STEP
 """Least time in which an open make-up valve fills a chamber, and the same with implicit steps [s]. At a fifth of a

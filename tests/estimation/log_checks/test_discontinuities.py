@@ -49,6 +49,15 @@ def test_behind_a_zero_of_pressure_that_is_set_anew_the_longer_part_is_used(driv
     assert np.array_equal(found[PRESSURE], given[PRESSURE][ROW:])
 
 
+@pytest.mark.parametrize(("rows", "named"), [(1, True), (3, False)])
+def test_a_pressure_that_rises_over_several_rows_was_not_set_anew(rows: int, *, named: bool) -> None:
+    """A piston that bounces off a stop compresses a small chamber by 60 bar in four rows: the log was cut there."""
+    record = circuit_log("multisine")
+    risen = 2e6 * np.clip(np.arange(len(record)) - ROW + 1, 0, rows)
+    _, notes = without_discontinuities(record.replace(**{PRESSURE: record[PRESSURE] + risen}))
+    assert [note.code for note in notes] == [SensorCode.PRESSURE_REZEROED] * named
+
+
 @pytest.mark.parametrize(("drive", "rows"), [("multisine", 120), ("multisine", 400), ("prbs", 400)])
 def test_lost_rows_are_named_and_the_longest_part_is_used(drive: str, rows: int) -> None:
     record = circuit_log(drive)

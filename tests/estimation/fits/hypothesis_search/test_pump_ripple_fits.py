@@ -74,8 +74,8 @@ def well(_: GreyBoxFit) -> bool:
 
 
 def test_teeth_are_not_taken_up_where_the_log_stays_unexplained() -> None:
-    for explained in (True, False):
-        fitted, _ = told(fit(500.0, shown(12, 200.0)), fit(300.0, shown(12, 0.0)))
+    for explained, size in ((True, 0.1), (False, 0.1), (True, 0.01)):  # small ones too, where they are needed
+        fitted, _ = told(fit(500.0, shown(12, 200.0, size)), fit(300.0, shown(12, 0.0)))
         found = with_pump_ripple(PLAIN, fitted, lambda one, said=explained: said and one.cost == 300.0)
         assert bool(found.remarks) is explained
         assert bool(found.left) is not explained

@@ -24,6 +24,7 @@ from estimation.fits.hypotheses import (
 )
 from estimation.fits.hypothesis_search.wide_log import START_LEVEL, usual_values, widened
 from estimation.fits.hypothesis_search.wide_problem import (
+    LEAST_SETTING,
     MOST_WORN,
     POSITION_ZERO,
     flow_bounds,
@@ -33,7 +34,7 @@ from estimation.fits.hypothesis_search.wide_problem import (
     own_starts,
     worn_start,
 )
-from estimation.models.flow import FLOW_FORM
+from estimation.models.flow import FLOW_FORM, relieving
 from estimation.models.flow_parameters import flow_parameters
 from estimation.models.wide_flow import grown_leakage
 from faults.conditions import CONDITIONS, parameters_for
@@ -68,6 +69,17 @@ def test_leakage_that_grows_with_time_squared_is_within_bounds(factor: float) ->
         assert least <= of_halfway <= most
     grown = halfway * grown_leakage(elapsed, of_halfway, of_halfway, 0.0)
     np.testing.assert_allclose(grown, 1.0 + (factor - 1.0) * elapsed**2, rtol=1e-9, atol=1e-9 * factor)
+
+
+@pytest.mark.parametrize("share", [0.98, 1.1])
+def test_a_relief_valve_is_sought_where_the_log_shows_one_open(share: float) -> None:
+    """A search stepped to a setting that pressure never reached, from where no slope leads back."""
+    peak, form = share * RIG.relief_pressure, relieving(FLOW_FORM)
+    reached = replace(seen(log(0.2)), measured=np.full((200, 1), -peak))
+    place = form.unknowns.index("relief_pressure")
+    least, most = (np.exp(end[place]) for end in flow_bounds(form, [form.theta(flow_starts(RIG, 2e8)[0])], reached))
+    assert least == pytest.approx(LEAST_SETTING * peak)
+    assert most == pytest.approx(max(peak, RIG.relief_pressure))
 
 
 def test_an_encoder_is_first_taken_to_read_zero_in_mid_travel() -> None:

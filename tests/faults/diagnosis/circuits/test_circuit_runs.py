@@ -10,7 +10,14 @@ from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits import circuit_runs
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import BLOCK, Blocks, blocks_of
-from faults.diagnosis.circuits.circuit_runs import COLUMN, _between_stops, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import (
+    COLUMN,
+    SOFTEST_END,
+    _between_stops,
+    coordinates_of,
+    parameter_rows,
+    predicted,
+)
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
@@ -50,6 +57,18 @@ def test_a_piston_that_turned_within_two_percent_of_a_stop_met_it(beyond: float,
     (row,) = _between_stops(log, parameter_rows(CENTRE[None], replace(ACTUATOR.circuit, stroke=0.06), ACTUATOR.rated))
     assert bool(row[COLUMN["stroke"]] == pytest.approx(0.06)) is shown
     assert row[COLUMN["stroke"]] > 0.059
+
+
+@pytest.mark.parametrize(("stiffness", "read"), [(2e7, 2e7), (1e9, 1e8), (1e5, SOFTEST_END * 1e8)])
+def test_an_end_of_the_stroke_is_as_stiff_as_the_log_shows_it_pressed(stiffness: float, read: float) -> None:
+    """Ends that yielded 0.6 mm in place of 0.1 left 10 % of a small strut's pressure, and its log unexplained."""
+    healthy, moved, pressure = replace(ACTUATOR.circuit, stroke=0.06), np.zeros(20), np.zeros(20)
+    moved[5], pressure[5:] = 0.0302 / 0.01, 0.0002 * stiffness / healthy.piston_area  # 0.2 mm past the stop
+    log = Blocks(np.zeros(201), 1e-3, 10, moved, pressure, np.ones(2))
+    (row,) = _between_stops(log, parameter_rows(CENTRE[None], healthy, ACTUATOR.rated))
+    assert row[COLUMN["end_stop_stiffness"]] == pytest.approx(read)
+    (blind,) = _between_stops(replace(log, pressure=None), parameter_rows(CENTRE[None], healthy, ACTUATOR.rated))
+    assert blind[COLUMN["end_stop_stiffness"]] == healthy.end_stop_stiffness
 
 
 @pytest.mark.parametrize("sample_time", [1e-4, 1e-3, 2e-3])
