@@ -143,7 +143,7 @@ class Blocks:
 
     @property
     def travel(self) -> float:
-        """Total travel of the piston to and fro [m]."""
+        """Total travel of the piston in both directions [m]."""
         return float(np.ptp(self.gone))
 
     @cached_property
