@@ -16,6 +16,7 @@ from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_regions import PRESSURE_SCALE
 from faults.diagnosis.evidence import Scoreboard
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters
@@ -167,6 +168,27 @@ def test_a_low_relief_valve_gains_over_all_settings_that_it_may_have(
     against, open_, _ = decided(monkeypatch, score)
     assert [note.code for note in against] == ([AgainstCode.RELIEF_EARLY] if named else [])
     assert bool(open_ and other_faults.EARLY in open_[0].data["faults"]) == said
+
+
+@pytest.mark.parametrize(("pressure", "off", "named"), [(1e6, 0.5, False), (3.5e6, 0.5, True), (3.5e6, 0.1, False)])
+def test_a_relief_valve_is_set_low_where_all_pressures_would_have_to_be_too_large_for_it_to_open_as_set(
+    pressure: float, off: float, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a log in which it opened at 22 in place of 34 bar each circuit made pressures half as large again."""
+    places = ACTUATOR.conditions[1] + np.outer([0.0, off], PRESSURE_SCALE)
+
+    def fitted(_: Any, actuator: Any, **__: Any) -> Any:
+        best = SimpleNamespace(
+            coordinates=places[int(actuator.circuit.relief_pressure == SOUND.relief_pressure)], scales=LOG.noise
+        )
+        return SimpleNamespace(scores=np.array([-9.0, 0.0]), best=best)
+
+    looked(monkeypatch, lambda _: 0.0)
+    for module in (other_faults, sound_circuit):
+        monkeypatch.setattr(module, "fit_classes", fitted)
+    monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: pressure)
+    against = faults_outside(LOG, fitted(LOG, ACTUATOR), ACTUATOR).against
+    assert [note.code for note in against] == ([AgainstCode.RELIEF_EARLY] if named else [])
 
 
 def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circuit(
