@@ -169,7 +169,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     if found is not None and (found[0] > GAIN or wear > math.log(LIKELIER)):
         # a search may end short of the best: the sound circuit is asked again from where the faulty one ended, and anew
         _, fault, tried = found
-        starts = (tried.fits.best.coordinates, None)
+        starts = (tried.fits.best.as_run.coordinates, None)
         again = [fit_classes(blocks, sound.actuator, runs=runs, start=start) for start in starts]
         sound = max([sound, *(Tried(sound.actuator, fits) for fits in again)], key=lambda one: one.score)
         gains[fault.name] = _gain(blocks, tried, sound) + fault.presumed
@@ -256,7 +256,7 @@ def gains_of_others(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Mapp
 
 def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELESS) -> Iterator[tuple[_Fault, Tried]]:
     """Yield each fault, and the circuit with it that explains a log best."""
-    for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
+    for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best.as_run, sound.actuator)):
         yield fault, _with(fault, blocks, sound, runs, behind)
 
 
@@ -288,7 +288,7 @@ def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: floa
     faulty = replace(sound.actuator, circuit=fault.circuit)
     wanted = LASTING * (behind - sound.score)  # no region holds a circuit better than its misfit says
     if not fault.elsewhere:
-        start = sound.fits.best.coordinates
+        start = sound.fits.best.as_run.coordinates
         return Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
     runs = nominal_runs(blocks, faulty)
     start = faulty.conditions[int(np.argmin([misfit(blocks, run) for run in runs]))]
@@ -305,17 +305,18 @@ def _gain(blocks: Blocks, tried: Tried, sound: Tried) -> float:
     A relief valve that opens tells the scale of all pressures, of which no score knows.
     """
     gain = counted(tried.score - sound.score, blocks, tried.fits.best)
-    low = tried.actuator.circuit.relief_pressure < sound.actuator.circuit.relief_pressure
-    if not low or largest_pressure(blocks, sound.fits.best, sound.actuator) < sound.actuator.circuit.relief_pressure:
-        return gain
-    return gain + _likely_scale(tried) - _likely_scale(sound)
+    setting = sound.actuator.circuit.relief_pressure
+    if tried.actuator.circuit.relief_pressure < setting:
+        if largest_pressure(blocks, sound.fits.best.as_run, sound.actuator) >= setting:
+            gain += _likely_scale(tried) - _likely_scale(sound)
+    return gain
 
 
 def _likely_scale(tried: Tried) -> float:
     """Return the log-likelihood of a circuit's scale of pressures in the condition that holds it [dimensionless]."""
     pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
     told = float(pull @ PRESSURE_SCALE)
-    off = tried.fits.best.coordinates - tried.actuator.conditions[int(np.argmax(tried.fits.scores))]
+    off = tried.fits.best.as_run.coordinates - tried.actuator.conditions[int(np.argmax(tried.fits.scores))]
     return -0.5 * (float(pull @ off) / told) ** 2 / (1.0 / told + SET_AS_SAID**2)
 
 

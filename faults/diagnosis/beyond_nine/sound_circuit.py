@@ -64,7 +64,7 @@ def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Arr
     wider = {"makeup_conductance": WIDER * healthy.makeup_conductance}
     for circuit in (undrained, replace(healthy, **wider), replace(undrained, **wider)):
         other = replace(actuator, circuit=circuit)
-        tried.append(Tried(other, fit_classes(blocks, other, runs=runs, start=fits.best.coordinates)))
+        tried.append(Tried(other, fit_classes(blocks, other, runs=runs, start=fits.best.as_run.coordinates)))
     return max(tried, key=lambda one: one.score)
 
 

@@ -79,6 +79,8 @@ class PointFit:
         Outputs of the circuit [m/s, Pa].
     slopes : ndarray, shape (7, n, outputs)
         Its derivatives with respect to the coordinates.
+    ran : ndarray, shape (7,), optional
+        Coordinates that were run, where others are told, at which motion is the same unless a relief valve opens.
     """
 
     coordinates: Array
@@ -87,6 +89,12 @@ class PointFit:
     scales: Array
     fitted: Array
     slopes: Array
+    ran: Array | None = None
+
+    @property
+    def as_run(self) -> "PointFit":
+        """The circuit where the search ended: from there another search goes on."""
+        return self if self.ran is None else replace(self, coordinates=self.ran)
 
 
 @lru_cache(maxsize=2)

@@ -56,7 +56,7 @@ and the weight of that prior in deviations [dimensionless]."""
 _NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
 
 PRESSURE_SCALE = np.array([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Direction in which all pressures scale and no motion changes, unless a relief valve opens or oil boils."""
+"""Direction in which all pressures scale and no motion changes [dimensionless]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,10 +217,10 @@ def fit_classes(
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:
-    """Return a fit without pressure at a condition's likeliest scale; as it is where the log tells its scale better."""
-    pull, told = np.linalg.solve(WITHIN, PRESSURE_SCALE), fit.information @ PRESSURE_SCALE / LASTING
-    moved = fit.coordinates + PRESSURE_SCALE * float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
-    return fit if float((told - pull) @ PRESSURE_SCALE) > 0.0 else replace(fit, coordinates=moved)
+    """Return a fit without pressure at the scale that is the most likely within a condition."""
+    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
+    return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE, ran=fit.coordinates)
 
 
 def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) -> Array:

@@ -16,6 +16,7 @@ from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import PointFit
 from faults.diagnosis.circuits.class_regions import PRESSURE_SCALE
 from faults.diagnosis.evidence import Scoreboard
 from faults.notes import AgainstCode, ClassCode
@@ -29,8 +30,11 @@ Score = Callable[[CircuitParameters], float]
 
 
 def fits(score: float) -> Any:
-    best = SimpleNamespace(coordinates=np.full(7, score), scales=0.05 * LOG.sizes)
-    return SimpleNamespace(scores=np.array([score - 9.0, score]), best=best)
+    return SimpleNamespace(scores=np.array([score - 9.0, score]), best=made_fit_at(np.full(7, score)))
+
+
+def made_fit_at(place: Any) -> PointFit:
+    return PointFit(place, 0.0, np.eye(7), 0.05 * LOG.sizes, LOG.outputs, np.zeros((7, *LOG.outputs.shape)))
 
 
 def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, list[tuple[Any, bool]]]:
