@@ -306,10 +306,10 @@ def _gain(blocks: Blocks, tried: Tried, sound: Tried) -> float:
     """
     gain = counted(tried.score - sound.score, blocks, tried.fits.best)
     setting = sound.actuator.circuit.relief_pressure
-    if tried.actuator.circuit.relief_pressure < setting:
-        if largest_pressure(blocks, sound.fits.best.as_run, sound.actuator) >= setting:
-            gain += _likely_scale(tried) - _likely_scale(sound)
-    return gain
+    if not tried.actuator.circuit.relief_pressure < setting:
+        return gain
+    opens = largest_pressure(blocks, sound.fits.best.as_run, sound.actuator) >= setting
+    return gain + _likely_scale(tried) - _likely_scale(sound) if opens else gain
 
 
 def _likely_scale(tried: Tried) -> float:

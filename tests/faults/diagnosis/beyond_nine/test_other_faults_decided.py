@@ -182,10 +182,8 @@ def test_a_relief_valve_is_set_low_where_all_pressures_would_have_to_be_too_larg
     places = ACTUATOR.conditions[1] + np.outer([0.0, off], PRESSURE_SCALE)
 
     def fitted(_: Any, actuator: Any, **__: Any) -> Any:
-        best = SimpleNamespace(
-            coordinates=places[int(actuator.circuit.relief_pressure == SOUND.relief_pressure)], scales=LOG.noise
-        )
-        return SimpleNamespace(scores=np.array([-9.0, 0.0]), best=best)
+        place = places[int(actuator.circuit.relief_pressure == SOUND.relief_pressure)]
+        return SimpleNamespace(scores=np.array([-9.0, 0.0]), best=made_fit_at(place))
 
     looked(monkeypatch, lambda _: 0.0)
     for module in (other_faults, sound_circuit):
