@@ -10,7 +10,6 @@ several sound circuits is used.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -27,13 +26,12 @@ from faults.diagnosis.beyond_nine.left_open import (
     presumed_of_wear,
     probabilities_of,
 )
-from faults.diagnosis.beyond_nine.sound_circuit import Tried, sound_circuit
+from faults.diagnosis.beyond_nine.sound_circuit import Tried, largest_pressure, sound_circuit
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.circuits.class_fit import LASTING, WITHIN, PointFit, misfit, nominal_runs
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import LASTING, WITHIN, misfit, nominal_runs
 from faults.diagnosis.circuits.class_regions import PRESSURE_SCALE, ClassFits, fit_classes, is_stuck
-from faults.diagnosis.circuits.rivals import counted
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
@@ -158,25 +156,24 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     gains, likeliest, worn = dict[str, float](), dict[str, Array](), list[Tried]()
     found: tuple[float, _Fault, Tried] | None = None
     for fault, tried in _with_each(blocks, sound, runs):
-        gain = _gain(blocks, tried, sound) + fault.presumed
+        gain = tried.score - sound.score + fault.presumed + _by_scale(blocks, tried, sound)
         if gain >= gains.get(fault.name, gain):
             gains[fault.name], likeliest[fault.name] = gain, tried.fits.scores
         worn += [tried] if fault.name == WORN else []
         if found is None or gain - fault.beyond > found[0]:
             found = gain - fault.beyond, fault, tried
-    delivered = [_gain(blocks, one, sound) for one in worn]
-    wear = odds_of_wear(delivered, 0.0)
+    delivered = [one.score for one in worn]
+    wear = odds_of_wear(delivered, sound.score)
     if found is not None and (found[0] > GAIN or wear > math.log(LIKELIER)):
         # a search may end short of the best: the sound circuit is asked again from where the faulty one ended, and anew
         _, fault, tried = found
-        starts = (tried.fits.best.as_run.coordinates, None)
+        starts = (tried.fits.best.coordinates, None)
         again = [fit_classes(blocks, sound.actuator, runs=runs, start=start) for start in starts]
         sound = max([sound, *(Tried(sound.actuator, fits) for fits in again)], key=lambda one: one.score)
-        gains[fault.name] = _gain(blocks, tried, sound) + fault.presumed
+        gains[fault.name] = tried.score - sound.score + fault.presumed + _by_scale(blocks, tried, sound)
         if gains[fault.name] - fault.beyond > GAIN:
             return Outside((fault.note,))
-        delivered = [_gain(blocks, one, sound) for one in worn]
-        wear = odds_of_wear(delivered, 0.0)
+        wear = odds_of_wear(delivered, sound.score)
         if wear > math.log(LIKELIER):
             return Outside((_delivering(DELIVERIES[int(np.argmax(delivered))]),))
     odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
@@ -193,9 +190,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     told = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
     above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"} if likeliest[EARLY] is best else {}
     open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
-    pairs = zip(worn, delivered, strict=True)
-    each = [one.fits.scores - one.score + sound.score + gain for one, gain in pairs]
-    scores = np.array([best, *each]) if WORN in odds else None
+    scores = np.array([best, *(one.fits.scores for one in worn)]) if WORN in odds else None
     return Outside((), not_excluded(open_, best), scores, sum(chances.values()))
 
 
@@ -256,31 +251,8 @@ def gains_of_others(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Mapp
 
 def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELESS) -> Iterator[tuple[_Fault, Tried]]:
     """Yield each fault, and the circuit with it that explains a log best."""
-    for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best.as_run, sound.actuator)):
+    for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
         yield fault, _with(fault, blocks, sound, runs, behind)
-
-
-@lru_cache(maxsize=2)
-def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
-    """Return the largest pressure that a fitted circuit reaches in a log without pressure.
-
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-    fit : PointFit
-        The circuit.
-    actuator : Actuator
-        The actuator around it.
-
-    Returns
-    -------
-    float
-        Mean over a block [Pa].
-    """
-    seen = replace(blocks, pressure=np.zeros(len(blocks.velocity)))
-    rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
-    return float(np.max(np.abs(predicted(seen, rows)[0, blocks.first :, 1])))
 
 
 def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: float) -> Tried:
@@ -288,7 +260,7 @@ def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: floa
     faulty = replace(sound.actuator, circuit=fault.circuit)
     wanted = LASTING * (behind - sound.score)  # no region holds a circuit better than its misfit says
     if not fault.elsewhere:
-        start = sound.fits.best.as_run.coordinates
+        start = sound.fits.best.coordinates
         return Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
     runs = nominal_runs(blocks, faulty)
     start = faulty.conditions[int(np.argmin([misfit(blocks, run) for run in runs]))]
@@ -299,17 +271,16 @@ def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: floa
     return max(roughly, anew, key=lambda one: one.score)
 
 
-def _gain(blocks: Blocks, tried: Tried, sound: Tried) -> float:
-    """Return what a circuit with a fault gains on a sound one [dimensionless].
+def _by_scale(blocks: Blocks, tried: Tried, sound: Tried) -> float:
+    """Return what a low relief valve gains by the scale of pressures, of which no score knows [dimensionless].
 
-    A relief valve that opens tells the scale of all pressures, of which no score knows.
+    Nothing where the sound circuit's valve stays shut: one that opens tells the scale.
     """
-    gain = counted(tried.score - sound.score, blocks, tried.fits.best)
     setting = sound.actuator.circuit.relief_pressure
     if not tried.actuator.circuit.relief_pressure < setting:
-        return gain
+        return 0.0
     opens = largest_pressure(blocks, sound.fits.best.as_run, sound.actuator) >= setting
-    return gain + _likely_scale(tried) - _likely_scale(sound) if opens else gain
+    return _likely_scale(tried) - _likely_scale(sound) if opens else 0.0
 
 
 def _likely_scale(tried: Tried) -> float:

@@ -5,12 +5,14 @@ log that they explain is explained.
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.class_fit import nominal_runs
+from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import PointFit, nominal_runs
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
 from faults.diagnosis.circuits.out_of_model import unexplained
 from plant.arrays import Array
@@ -60,12 +62,61 @@ def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Arr
         That circuit: the actuator's, one without a drain from the pump's case, with wider make-up valves, or both.
     """
     tried, healthy = [Tried(actuator, fits)], actuator.circuit
+    start = as_told(blocks, fits.best, actuator).coordinates
     undrained = replace(healthy, pump_case_leakage=0.0)
     wider = {"makeup_conductance": WIDER * healthy.makeup_conductance}
     for circuit in (undrained, replace(healthy, **wider), replace(undrained, **wider)):
         other = replace(actuator, circuit=circuit)
-        tried.append(Tried(other, fit_classes(blocks, other, runs=runs, start=fits.best.as_run.coordinates)))
-    return max(tried, key=lambda one: one.score)
+        tried.append(Tried(other, fit_classes(blocks, other, runs=runs, start=start)))
+    best = max(tried, key=lambda one: one.score)
+    told = as_told(blocks, best.fits.best, best.actuator)
+    return best if told is best.fits.best else replace(best, fits=replace(best.fits, best=told))
+
+
+def as_told(blocks: Blocks, fit: PointFit, actuator: Actuator) -> PointFit:
+    """Return a circuit at the scale that a log without pressure determines, if its relief valve opened as it ran.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks, without pressure.
+    fit : PointFit
+        The circuit, at its likeliest scale.
+    actuator : Actuator
+        The actuator around it.
+
+    Returns
+    -------
+    PointFit
+        As it ran; unchanged if its relief valve stayed shut, since motion then determines no scale.
+    """
+    if fit.ran is None:
+        return fit
+    opened = largest_pressure(blocks, fit.as_run, actuator) >= actuator.circuit.relief_pressure
+    return fit.as_run if opened else fit
+
+
+@lru_cache(maxsize=4)
+def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
+    """Return the largest pressure that a fitted circuit reaches in a log without pressure.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fit : PointFit
+        The circuit.
+    actuator : Actuator
+        The actuator around it.
+
+    Returns
+    -------
+    float
+        Mean over a block [Pa].
+    """
+    seen = replace(blocks, pressure=np.zeros(len(blocks.velocity)))
+    rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    return float(np.max(np.abs(predicted(seen, rows)[0, blocks.first :, 1])))
 
 
 def another_sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Actuator | None:

@@ -93,7 +93,7 @@ class PointFit:
 
     @property
     def as_run(self) -> "PointFit":
-        """The circuit where the search ended: from there another search goes on."""
+        """The circuit where its search ended."""
         return self if self.ran is None else replace(self, coordinates=self.ran)
 
 

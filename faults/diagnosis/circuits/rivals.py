@@ -150,32 +150,10 @@ def behind(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
     for at, fit in enumerate(fits):
         if np.all(np.isfinite(fit.fitted)):
             others = scales_of(blocks, fit.fitted)
-            error = 0.0 if blocks.pressure is None else _roughness(blocks, np.minimum(scales, others), noise)
+            error = _roughness(blocks, np.minimum(scales, others), noise)
             looks = blocks.counts / (LASTING + error * blocks.counts / LOOKS)
             found[at] = float(looks @ np.log(others / scales))
     return found
-
-
-def counted(gain: float, blocks: Blocks, fit: PointFit) -> float:
-    """Return what a circuit gains on another where it follows a piston roughly: a few looks at a wrong model's error.
-
-    Parameters
-    ----------
-    gain : float
-        A log-likelihood in which a look lasts `LASTING` blocks [dimensionless].
-    blocks : Blocks
-        The log.
-    fit : PointFit
-        The circuit that gains.
-
-    Returns
-    -------
-    float
-        The same in as many looks as `behind` counts with pressure; what is lost counts in full [dimensionless].
-    """
-    error = _roughness(blocks, fit.scales, NOISE_ALONE * least_scales(blocks))
-    share = LASTING / (LASTING + float(np.max(error * blocks.counts)) / LOOKS)
-    return share * gain if gain > 0.0 else gain
 
 
 def _roughness(blocks: Blocks, scales: Array, noise: Array) -> Array:
@@ -183,6 +161,8 @@ def _roughness(blocks: Blocks, scales: Array, noise: Array) -> Array:
 
     All beyond noise from twice `ROUGHLY` on, nothing up to it [dimensionless].
     """
+    if blocks.pressure is None:
+        return np.zeros(len(scales))
     tiny = float(np.finfo(float).tiny)
     rough = min(max(float(scales[0]) / max(ROUGHLY * float(blocks.sizes[0]), tiny) - 1.0, 0.0), 1.0)
     return np.asarray(rough * np.maximum(1.0 - (noise / scales) ** 2, 0.0), dtype=np.float64)

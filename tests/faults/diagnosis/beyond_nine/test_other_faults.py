@@ -9,7 +9,8 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import other_faults
-from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside, largest_pressure
+from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
+from faults.diagnosis.beyond_nine.sound_circuit import largest_pressure
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks

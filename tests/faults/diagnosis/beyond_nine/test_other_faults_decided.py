@@ -82,15 +82,6 @@ def test_a_fault_is_named_from_a_gain_of_four_and_what_is_presumed_of_a_pump(
         assert "worn pump" in open_[0].data["faults"]
 
 
-@pytest.mark.parametrize(("share", "named"), [(1.0, True), (0.3, False)])
-def test_a_gain_counts_in_as_many_looks_as_the_log_gives(
-    share: float, named: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(other_faults, "counted", lambda gain, *_: share * gain)
-    against, _, _ = decided(monkeypatch, lambda one: 12.0 if getattr(one, "makeup_shut_b", 0.0) == 1.0 else 0.0)
-    assert [note.code for note in against] == ([AgainstCode.MAKEUP_STUCK] if named else [])
-
-
 @pytest.mark.parametrize(("gain", "open_"), [(-2.9, True), (-3.1, False)])
 def test_a_fault_is_excluded_below_a_gain_of_minus_three(
     gain: float, open_: bool, monkeypatch: pytest.MonkeyPatch

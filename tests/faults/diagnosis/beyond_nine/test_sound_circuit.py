@@ -61,3 +61,23 @@ def test_a_plain_log_that_wider_valves_explain_gets_its_class(monkeypatch: pytes
     board = found.scoreboard
     rigs = fit_classes(board.blocks, ACTUATOR)
     assert unexplained(board.blocks, rigs, ACTUATOR)
+
+
+@pytest.mark.parametrize(("pressure", "opened"), [(0.99, False), (1.01, True)])
+def test_a_circuit_is_followed_from_the_scale_at_which_it_ran_where_its_relief_valve_opened_there(
+    pressure: float, opened: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the likeliest scale, where the valve stays shut, no search found back: a stuck make-up valve lost 2.6."""
+    setting = ACTUATOR.circuit.relief_pressure
+    monkeypatch.setattr(subject, "largest_pressure", lambda *_: pressure * setting)
+    fit = FITS.best
+    assert fit.ran is not None
+    expected = fit.ran if opened else fit.coordinates
+    np.testing.assert_array_equal(subject.as_told(LOG, fit, ACTUATOR).coordinates, expected)
+    begun: list[np.ndarray] = []
+    monkeypatch.setattr(
+        subject, "fit_classes", lambda *_, start, **__: begun.append(start) or replace(FITS, scores=FITS.scores - 1.0)
+    )
+    found = sound_circuit(LOG, FITS, ACTUATOR, nominal_runs(LOG, ACTUATOR))
+    for start in (*begun, found.fits.best.coordinates):
+        np.testing.assert_array_equal(start, expected)

@@ -13,16 +13,7 @@ from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import LASTING, PointFit, misfit
 from faults.diagnosis.circuits.model_doubt import NOISE_ALONE
-from faults.diagnosis.circuits.rivals import (
-    LOOKS,
-    ROUGHLY,
-    behind,
-    between_fits,
-    counted,
-    creeps,
-    doubts_left,
-    other_friction,
-)
+from faults.diagnosis.circuits.rivals import LOOKS, ROUGHLY, behind, between_fits, creeps, doubts_left, other_friction
 from plant.eha.model import EhaParameters
 
 ACTUATOR = actuator_of(EhaParameters())
@@ -83,17 +74,6 @@ def test_without_pressure_and_of_a_circuit_that_ran_away_the_misfit_decides() ->
     assert behind([other], best, one)[0] == pytest.approx(one.counts[0] * np.log(1.3) / LASTING, rel=1e-12)
     away = replace(other, fitted=np.full_like(other.fitted, np.inf))
     assert behind([best, away], best, one).tolist() == [0.0, np.inf]
-
-
-@pytest.mark.parametrize(("times", "looks"), [(0.9, 2_000 / LASTING), (4.0, LOOKS)])
-def test_what_a_fault_gains_without_pressure_counts_in_few_looks_where_it_follows_roughly(
-    times: float, looks: float
-) -> None:
-    one = log(pressure=False)
-    gain = 2_000 / LASTING
-    fit = leaving(times * ROUGHLY * SIZES[0] / NOISE[0], 1.0, one)
-    assert counted(gain, one, fit) == pytest.approx(looks, rel=0.08)
-    assert counted(-gain, one, fit) == -gain
 
 
 def test_ends_of_a_search_that_explain_alike_widen_and_worse_ones_do_not() -> None:
