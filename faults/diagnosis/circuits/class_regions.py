@@ -56,7 +56,7 @@ and the weight of that prior in deviations [dimensionless]."""
 _NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
 
 PRESSURE_SCALE = np.array([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Direction in which all pressures scale and no motion changes [dimensionless]."""
+"""Direction in which all pressures scale without a change of motion [dimensionless]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +217,7 @@ def fit_classes(
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:
-    """Return a fit without pressure at the scale that is the most likely within a condition."""
+    """Return a fit without pressure at the scale that is most likely within a condition."""
     pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
     shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
     return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE, ran=fit.coordinates)
