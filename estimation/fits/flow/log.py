@@ -179,9 +179,9 @@ def flow_log(
         uncertainties={name: one for name, one in uncertainties.items() if name != GAS},  # its stiffness is fitted
     )
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
-    drives, course = log.drives.copy(), log.drives[:, speed]
+    drives = log.drives.copy()
     if not held:
-        drives[:, speed] = straightened(course, slow=record.sample_time >= SLOW)
+        drives[:, speed] = straightened(log.drives[:, speed], slow=record.sample_time >= SLOW)
     passed_on = _swept_share(log.drives[:, position], parameters) * position_variance(sensed["position_m"]) ** 0.5
     open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
     log = replace(
@@ -202,9 +202,7 @@ def flow_log(
         },
         within=WITHIN,
     )
-    told = not held and record.sample_time < SLOW and not len(open_gaps)
-    means = averaged(log, LONGEST_STEP, _block(log, parameters))
-    log = pumped_evenly(means, log, parameters, course if told else None)
+    log = pumped_evenly(averaged(log, LONGEST_STEP, _block(log, parameters)), log, parameters)
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
     return _noisy(log, parameters, record) if felt else log.taken_at(parameters.bulk_modulus)
 

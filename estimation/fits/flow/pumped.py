@@ -1,6 +1,6 @@
-"""`pumped_evenly(means, log, ...)`: a log whose straight lines pump as much oil as its motor does.
+"""`pumped_evenly(means, log, ...)`: block means whose straight lines pump as much oil as the samples of the log do.
 
-See decisions 343, 430 and 437.
+See decisions 343 and 430.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,7 +10,6 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.fits.greybox.block_averages import block_means
-from estimation.fits.greybox.intersample_speed import FINE, curved
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.pump_ripple import delivering
 from estimation.models.flow import FLOW_FORM
@@ -18,16 +17,15 @@ from plant.components.valves import pumped_flow
 from plant.eha.model import EhaParameters
 
 
-def pumped_evenly(means: GreyBoxLog, log: GreyBoxLog, p: EhaParameters, course: Array | None = None) -> GreyBoxLog:
-    """Return a log with positions led by what straight lines between its samples or means pump too much.
+def pumped_evenly(means: GreyBoxLog, log: GreyBoxLog, p: EhaParameters) -> GreyBoxLog:
+    """Return means whose positions are corrected for the oil that straight lines between them pump too much.
 
-    Between them the flow form moves the motor on a straight line. A speed that bends, ``w'' = -(2 pi f)^2 w``, pumps
-    up to ``T^2 / 12`` of its acceleration more, and one that passes the pump's dead zone (errata E8) is blunted there.
-    Pumped and swept oil nearly cancel, so that the compressed oil is off by far more: means over 0.6 ms of a chirp up
-    to 23 Hz put bulk modulus 0.09 % low, 3.2 deviations. The log's own samples tell what was pumped; a position that
-    leads by as much over the piston's area sweeps it. Where nothing was averaged, a motor that bends smoothly passes
-    the dead zone on a curve through the samples. The rig file's flow bias serves until a fit has found another, see
-    `pumped_evenly_at`.
+    The flow form moves the motor on a straight line between means. A curved speed, ``w'' = -(2 pi f)^2 w``, pumps up to
+    ``T^2 / 12`` of its acceleration more. The averaging also rounds off the pump's dead zone (errata E8). Pumped and
+    swept oil nearly cancel, so the relative error of the compressed oil is far larger: with means over 0.6 ms of a
+    chirp up to 23 Hz, bulk modulus was 0.09 % low, 3.2 deviations. The samples of the log say how much was pumped. The
+    difference over the piston area, added to position, sweeps the same volume. The rig file's flow bias serves until a
+    fit has found another, see `pumped_evenly_at`.
 
     Parameters
     ----------
@@ -37,20 +35,15 @@ def pumped_evenly(means: GreyBoxLog, log: GreyBoxLog, p: EhaParameters, course: 
         The log before averaging.
     p : EhaParameters
         The actuator.
-    course : ndarray, shape (n,), optional
-        Motor speed as it was logged, if it bends smoothly between samples [rad/s].
 
     Returns
     -------
     GreyBoxLog
-        The means; the same ones where the log was not averaged and no course is given.
+        The means; unchanged if the log was not averaged.
     """
-    if means is not log:
-        sampled = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")], log.sample_time
-    elif course is not None:
-        sampled = curved(course), log.sample_time / FINE
-    else:
+    if means is log:
         return means
+    sampled = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")], log.sample_time
     return _led(replace(means, sampled=sampled), sampled, p, ((1.0, p.flow_bias),))
 
 
@@ -72,7 +65,7 @@ def pumped_evenly_at(means: GreyBoxLog, p: EhaParameters, values: Mapping[str, f
     Returns
     -------
     GreyBoxLog
-        The same one where no course was told.
+        The same log if it was not averaged.
     """
     if means.sampled is None:
         return means
@@ -91,9 +84,7 @@ def _led(
     lines = np.interp(np.arange(len(sampled)), every, means.drives[:, speed])
     drives = means.drives.copy()
     for factor, bias in biases:
-        course = _pumped(turned, sample_time, p, bias)
-        averaged = len(sampled) > every[-1] + 1
-        wanted = block_means(course[block // 2 + 1 :], block) if averaged else course[every[1:]]
+        wanted = block_means(_pumped(turned, sample_time, p, bias)[block // 2 + 1 :], block)
         excess = _pumped(lines, sample_time, p, bias)[every[1:]] - wanted
         drives[1:, position] += factor * excess / p.piston_area
     return replace(means, drives=drives)

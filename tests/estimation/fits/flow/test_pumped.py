@@ -1,4 +1,4 @@
-"""Straight lines pump what a motor does: between means of a fast log, and between samples."""
+"""Straight lines between means of a fast log pump what its samples do."""
 
 from dataclasses import replace
 
@@ -22,13 +22,13 @@ def turning(time: Array) -> Array:
     return 60.0 * np.sin(2.0 * np.pi * 23.0 * time)
 
 
-def seen(sample_time: float, parameters: EhaParameters = P, *, held: bool = False) -> GreyBoxLog:
+def seen(sample_time: float, parameters: EhaParameters = P) -> GreyBoxLog:
     """A piston at rest whose pressure sensor is noisy, as the flow form sees it."""
     still = dict.fromkeys(("position_m", "differential_pressure_pa"), np.zeros(3000))
     record = Record(
         sample_time, {"motor_speed_rad_s": turning(sample_time * np.arange(3000, dtype=np.float64)), **still}
     )
-    return flow_log(record, parameters, {}, dict.fromkeys(record.channels, 1e10), held=held)
+    return flow_log(record, parameters, {}, dict.fromkeys(record.channels, 1e10))
 
 
 def drives(sample_time: float) -> Array:
@@ -60,32 +60,6 @@ def test_a_flow_bias_that_a_fit_has_found_takes_the_place_of_the_rig_files() -> 
     assert np.std(wanted - seen(SAMPLE).drives) > 1e-8
 
 
-@pytest.mark.parametrize("bias", [1.0, 6.0])
-def test_straight_lines_between_samples_pass_the_dead_zone_as_a_lagging_motor_does(bias: float) -> None:
-    """Its command goes from one speed to the other within a sample; it lags by two."""
-    time = np.arange(400 * FINE + 1) / FINE
-    turns, speed = [0.0, 10.0, 11.0, 60.0, 61.0, 100.0], -90.0
-    command = np.interp(time % 100.0, turns, [-90.0, -90.0, 90.0, 90.0, -90.0, -90.0])
-    course = np.array([speed := speed + (one - speed) / (2.0 * FINE) for one in command])
-    still = dict.fromkeys(("position_m", "differential_pressure_pa"), np.zeros(401))
-    record = Record(1e-3, {"motor_speed_rad_s": course[::FINE], **still})
-    log = flow_log(record, P, {}, dict.fromkeys(record.channels, 1e10))
-    log = pumped_evenly_at(log, P, {"flow_bias": bias * P.flow_bias})
-    lines = np.interp(time, np.arange(401), log.drives[:, 0])
-    straight = (pumped(lines, 1e-3 / FINE, bias) - pumped(course, 1e-3 / FINE, bias))[::FINE]
-    lead = np.stack([np.ones(401), course[::FINE]], axis=1)  # is fitted
-    over = straight - lead @ np.linalg.lstsq(lead, straight)[0]
-    left = straight - P.piston_area * log.drives[:, 1]
-    left -= lead @ np.linalg.lstsq(lead, left)[0]
-    assert np.std(left) < 0.25 * np.std(over)
-
-
-def test_a_motor_whose_command_is_held_and_a_slow_log_keep_straight_lines() -> None:
-    for log in (seen(1e-3, held=True), seen(2e-3)):
-        assert log.sampled is None
-        assert np.all(pumped_evenly_at(log, P, {"flow_bias": 6.0 * P.flow_bias}).drives[:, 1] == 0.0)
-
-
 def test_teeth_that_means_hold_are_not_taken_back_by_positions() -> None:
     """`logged_at_5_kHz`, validation 25301: teeth of 2.7 % gained 3 of 36 promised, and were "left" in a refused log."""
     found, means = {"flow_bias": 6.0 * P.flow_bias}, seen(SAMPLE)
@@ -97,3 +71,8 @@ def test_teeth_that_means_hold_are_not_taken_back_by_positions() -> None:
         np.cumsum(speed * (np.abs(means.drives[:, 0]) > 30.0)) * BLOCK * SAMPLE * P.pump_displacement / P.piston_area
     )
     assert np.std(more) < 0.02 * np.std(teeth)
+
+
+def test_a_log_that_is_not_averaged_is_what_it_was() -> None:
+    assert np.all(drives(1e-3)[:, 1] == 0.0)
+    assert np.all(pumped_evenly_at(seen(1e-3), P, {"flow_bias": 6.0 * P.flow_bias}).drives[:, 1] == 0.0)
