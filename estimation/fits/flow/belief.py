@@ -120,10 +120,10 @@ def wanted_in(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: f
 
 
 def nearly_explained(plain: PlainFits, strange: Explanation) -> tuple[Note, ...]:
-    """Return a note on what comes near to explaining a log that nothing explains.
+    """Return a note on hypotheses that nearly explain a log that nothing explains.
 
-    A chamber whose make-up valve is stuck shut boils, and no model follows its vapour to the noise; but a valve that
-    takes 98 % away of what was unexplained is where to look first.
+    If a make-up valve is stuck shut, the oil in its chamber boils, and no model follows the vapour to the noise. But a
+    valve that explains 98 % of the misfit is the first suspect.
 
     Parameters
     ----------
@@ -135,10 +135,10 @@ def nearly_explained(plain: PlainFits, strange: Explanation) -> tuple[Note, ...]
     Returns
     -------
     tuple of Note
-        None where the plain form explains the log, and where much is left.
+        Empty if the plain form explains the log, or if much is left.
     """
     before, left = (max(fit.chi_square[0] - 1.0, 0.0) for fit in (plain.best, strange.fit))
-    if plain.explains(plain.best) or left > NEARLY_ALL * before:
+    if plain.explains(plain.best) or left >= NEARLY_ALL * before:
         return ()
     return (RigCode.PARTLY_EXPLAINED.note(cause=strange.names[0], left=100.0 * left / before),)
 

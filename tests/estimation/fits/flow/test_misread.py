@@ -121,7 +121,7 @@ def test_slips_are_tried_of_what_nothing_explains_unless_an_offset_of_pressure_d
     monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, *_: (plain, strange))
     monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY, OFFSET), ()))
     by_offset = named == OFFSET.name
-    monkeypatch.setattr(flow_fit, "_strange", lambda _, asked, __: strange if by_offset or len(asked) > 1 else None)
+    monkeypatch.setattr(flow_fit, "_strange", lambda _, asked, *__: strange if by_offset or len(asked) > 1 else None)
     monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: None)
     monkeypatch.setattr(flow_fit, "quieter", lambda *_: None)
     monkeypatch.setattr(CorrectedLogs, "is_kin", lambda _, __, found: found == "kin")
