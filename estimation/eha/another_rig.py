@@ -53,9 +53,9 @@ def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
 
 
 def unless_rig_contradicted(slips: tuple[Note, ...], record: Record, p: EhaParameters) -> tuple[Note, ...]:
-    """Return wrong signs and units that a fit names; the objection to the rig file if only pressure would be wrong.
+    """Return the wrong signs and units that a fit names, or the rig file's error if only pressure seems wrong.
 
-    The unit of pressure changes nothing about how far the pump sends the piston.
+    The unit of pressure does not change how far the pump moves the piston.
     """
     of_pressure = all(one.data.get("channel") == PRESSURE for one in slips)
     return (rig_contradicted(record, p) if of_pressure else ()) or slips

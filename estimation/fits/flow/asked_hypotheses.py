@@ -67,7 +67,7 @@ ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO, *MAY_HIDE)
 """Effects that are tested even if the plain form explains the log, where slopes promise a gain: each may be hidden."""
 
 UNPAIRED = (*ALWAYS_ASKED, ZERO_HIDDEN, CHECKS_HIDDEN, PLAY, PRESSURE_SIDES)
-"""What is not sought in pairs, where nothing else is asked."""
+"""Hypotheses that are not tried in pairs unless another hypothesis is tested too."""
 
 LEAST_ZERO, LEAST_SHIFT = 5e-3, 3.6e-3
 """Smallest encoder zero that is searched for [m], and the same over the length of a chamber in mid-stroke, if that is

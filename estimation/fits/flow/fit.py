@@ -327,8 +327,8 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
 def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *, begun: bool) -> FormFit:
     """Return the result of a log that the plain form is believed to explain."""
     best, p = plain.best, plain.start.parameters
-    beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
-    weights = weights_of(plain.fits, SURER * plain.log.passes, beforehand)
+    priors = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
+    weights = weights_of(plain.fits, SURER * plain.log.passes, priors)
     found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, p, plain.log.measured_rms)
     found = with_shifts(found, best.small_teeth, best.noise_shift)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates

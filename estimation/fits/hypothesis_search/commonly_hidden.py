@@ -24,17 +24,17 @@ promised 27, and bulk modulus was 11 % too low."""
 def delivery_followed(
     log: GreyBoxLog, finished: Sequence[Trial], spared: Decimation, accepted: Accepted
 ) -> list[Trial]:
-    """Return the end of a search for another pump delivery, where nothing explains a log alone.
+    """Return the final fit of another pump delivery, if no single hypothesis explains the log.
 
-    A worn pump leads the plain form's leakage, bulk modulus and valves astray together. Slopes promise nothing of it
-    then, and a few steps come less low than air or late valves do, which explain as little.
+    A worn pump biases leakage, bulk modulus and valves of the plain form together. The slopes there do not show it, and
+    after a few steps its cost is still above that of air or late valves, which do not explain the log either.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     finished : sequence of Trial
-        What was tried alone, the best first.
+        Single hypotheses, the best first.
     spared : Decimation
         Samples and starts of the search.
     accepted : callable
@@ -43,8 +43,8 @@ def delivery_followed(
     Returns
     -------
     list of Trial
-        None where it has been followed already, or something explains the log; not to its end if it is far from the
-        best.
+        Empty if this fit exists already, or if a hypothesis explains the log. The search stops early if its cost stays
+        far above the best.
     """
     followed = any(one.together == (DELIVERY,) and one.fits for one in finished)
     if followed or is_explained(finished[0], accepted):

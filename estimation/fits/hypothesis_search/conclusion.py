@@ -36,11 +36,11 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
     accepted : callable
         ``accepted(fit)``: whether a fit explains the log.
     """
-    best, *rivals = sorted(counted, key=lambda one: one.cost - TEMPER * math.log(beforehand(log, one)))
+    best, *rivals = sorted(counted, key=lambda one: one.cost - TEMPER * math.log(prior_weight(log, one)))
     fits = tuple(fit for one in (best, *rivals) for fit in one.fits)
-    likely = tuple(beforehand(log, one) for one in (best, *rivals) for _ in one.fits)
+    likely = tuple(prior_weight(log, one) for one in (best, *rivals) for _ in one.fits)
     values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()}
-    values |= dict(weighed(fits, beforehand=likely))
+    values |= dict(weighed(fits, priors=likely))
     if any(name in values for name in GROWTH):  # what is told of a leakage is what it is at the end
         ended = float(grown_leakage(1.0, *(values.get(name, (0.0, 0.0))[0] for name in GROWTH)))
         value, std = values["leakage_coefficient"]
@@ -54,7 +54,7 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
         stated_pressure=usual_pressure(log, parameters),
         opening=partial(delivery_beside, log, best),
         detailing=partial(_detailed, log, parameters, (best, *rivals), accepted),
-        beforehand=likely,
+        priors=likely,
     )
 
 
@@ -62,23 +62,23 @@ def _named(tried: Trial) -> str:
     return " and ".join(one.name for one in tried.together)
 
 
-def beforehand(log: GreyBoxLog, tried: Trial) -> float:
-    """Return how likely a set of hypotheses is before the log is seen, by what its rig file says of the dead volume.
+def prior_weight(log: GreyBoxLog, tried: Trial) -> float:
+    """Return the prior weight of a set of hypotheses: how likely the rig file makes its chamber volume.
 
-    Where a piston goes one way, chambers of another volume look as those of an encoder that was homed elsewhere. The
-    file states how far its volume may be off, so that 1.8 times of it is hardly likely if another set explains the log.
+    If the piston moves only one way, a wrong chamber volume looks like a wrong zero of the encoder. The rig file states
+    the uncertainty of its volume: 1.8 times that volume is unlikely if another set explains the log as well.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, with the relative uncertainties of the rig file.
     tried : Trial
-        The set, fitted to the end.
+        The set, with its final fit.
 
     Returns
     -------
     float
-        Over that with the volume of the file [dimensionless].
+        1 if the volume is that of the file, or is not in the set [dimensionless].
     """
     (name,) = VOLUME.free
     told = any(one.name == VOLUME.name for one in tried.together)

@@ -87,8 +87,8 @@ class Explanation:
     opening : callable
         Computes `delivery_open`, which needs further slopes.
     detailing : callable
-        Works out `in_detail`, for which the log is fitted further: of most explanations costs alone are read.
-    beforehand : tuple of float, optional
+        Computes `in_detail`, which needs further fits; of most explanations only the cost is read.
+    priors : tuple of float, optional
         Weight of each fit before the log is seen [dimensionless]; equal ones if not given.
     """
 
@@ -100,7 +100,7 @@ class Explanation:
     stated_pressure: float
     opening: Callable[[], PredictedGain] = lambda: NO_GAIN
     detailing: Callable[[], "Explanation | None"] = lambda: None
-    beforehand: tuple[float, ...] | None = None
+    priors: tuple[float, ...] | None = None
 
     @property
     def fit(self) -> GreyBoxFit:
@@ -110,7 +110,7 @@ class Explanation:
     @property
     def weights(self) -> Array:
         """The probability of each fit [fraction]."""
-        return weights_of(self.fits, beforehand=self.beforehand)
+        return weights_of(self.fits, priors=self.priors)
 
     @property
     def delivery_open(self) -> PredictedGain:

@@ -178,17 +178,17 @@ def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
 
 
 def without_idle(log: GreyBoxLog, tried: Trial) -> Trial:
-    """Return the final fit of a set without a hypothesis of it that ended where what it says is absent.
+    """Return the final fit of a set without a hypothesis whose effect vanished.
 
-    A second hypothesis may lead a search out of a false minimum and vanish at the end. Oil with air was explained
-    together with a make-up valve stuck shut, whose conductance was 1.02 ± 0.05 times the other's.
+    A second hypothesis may lead a search out of a false minimum, and its effect then vanishes. Air in the oil was found
+    together with a stuck make-up valve, whose conductance was 1.02 ± 0.05 times that of the other valve.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     tried : Trial
-        Several hypotheses, fitted to the end.
+        Several hypotheses, with their final fit.
 
     Returns
     -------

@@ -83,7 +83,7 @@ def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -
     return {**found, "bulk_modulus": (value, float(np.hypot(std, structure * value)))}
 
 
-def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: Sequence[float] | None = None) -> Array:
+def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, priors: Sequence[float] | None = None) -> Array:
     """Return the probability of each of several models of one log.
 
     Parameters
@@ -92,7 +92,7 @@ def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: S
         Of the same log.
     temper : float
         Divisor of log-likelihood differences [dimensionless].
-    beforehand : sequence of float, optional
+    priors : sequence of float, optional
         Prior weights [dimensionless]; equal if not given.
 
     Returns
@@ -102,12 +102,12 @@ def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: S
     """
     costs = np.array([fit.cost for fit in fits])
     weights = np.exp(-np.minimum((costs - np.min(costs)) / temper, 700.0))
-    weights *= 1.0 if beforehand is None else np.array(beforehand)
+    weights *= 1.0 if priors is None else np.array(priors)
     return np.asarray(weights / np.sum(weights), dtype=np.float64)
 
 
 def weighed(
-    fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: Sequence[float] | None = None
+    fits: Sequence[GreyBoxFit], temper: float = TEMPER, priors: Sequence[float] | None = None
 ) -> Mapping[str, tuple[float, float]]:
     """Return values and deviations over several models of one log, each weighted by its likelihood.
 
@@ -121,7 +121,7 @@ def weighed(
         Of the same log, with the same unknowns.
     temper : float
         Divisor of log-likelihood differences [dimensionless].
-    beforehand : sequence of float, optional
+    priors : sequence of float, optional
         Prior weights [dimensionless]; equal if not given.
 
     Returns
@@ -129,7 +129,7 @@ def weighed(
     Mapping[str, tuple of float]
         Value and deviation by parameter [SI].
     """
-    return averaged(fits, weights_of(fits, temper, beforehand))
+    return averaged(fits, weights_of(fits, temper, priors))
 
 
 def averaged(fits: Sequence[GreyBoxFit], weights: Array) -> Mapping[str, tuple[float, float]]:

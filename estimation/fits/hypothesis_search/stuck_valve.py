@@ -1,4 +1,4 @@
-"""`stuck_instead(log, best, ...) -> list[Trial]`: a make-up valve that never opens, in place of one that opens late."""
+"""`stuck_instead(log, best, ...) -> list[Trial]`: replaces a valve that opens very late by a stuck one."""
 
 from dataclasses import replace
 
@@ -13,24 +13,24 @@ from estimation.fits.hypothesis_search.wide_log import delayed
 
 
 def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation) -> list[Trial]:
-    """Return the best hypotheses with a stuck make-up valve, where one that opens far later is hardly likelier.
+    """Return the best set with a stuck make-up valve in place of a very late one, if both explain the log.
 
-    A valve that never opens in a log looks like one that opens as late as the log allows. It is one fault with one
-    unknown in place of two drops, and it leaves the class of the log undecided.
+    A valve that never opens looks like one that opens as late as the log allows. A stuck valve is the simpler fault: it
+    has one unknown, not two pressure drops. It leaves the class of the log undecided.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     best : Trial
-        The likeliest hypotheses.
+        The likeliest set of hypotheses.
     spared : Decimation
-        What is spared, and where searches begin.
+        Which samples the search uses, and its starts.
 
     Returns
     -------
     list of Trial
-        One at most.
+        At most one set.
     """
     others = tuple(one for one in best.together if one.name != CHECKS_CRACK.name)
     stuck = any(one.name == MAKEUP_BLOCKED.name for one in others)

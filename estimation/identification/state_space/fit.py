@@ -38,10 +38,10 @@ class Effort:
 
 
 THOROUGH = Effort(3, 6, 25, 1e-7)
-"""To the end."""
+"""Effort of the final fit."""
 
 DESCENDED = 2
-"""Starts from which the search descends."""
+"""Number of starts from which the search descends [count]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,11 +32,11 @@ MATTERS = 0.05
 does."""
 
 HOLDS_BACK = 0.95
-"""Share of what is left by the usual friction that must hold the piston back, as a sum of squares [fraction]. A load
-that changes by itself helps as often; eight logs with six bursts of friction leave 0.997 and more."""
+"""Least share of the force left over by the usual friction that must oppose the motion, as a sum of squares [fraction].
+A load that changes by itself also drives the piston; eight logs with six bursts of friction give at least 0.997."""
 
 BOTH_WAYS = 0.02
-"""Least share of it in either way [fraction]; judged. One way alone it may be a load."""
+"""Least share of it in each direction of motion [fraction]; judged. In one direction alone it may be a load."""
 
 ROUNDS = 20
 """Rounds of reweighted least squares [count]; judged."""

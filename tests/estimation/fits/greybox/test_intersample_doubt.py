@@ -70,9 +70,9 @@ def fitted(rate: int, seed: int) -> tuple[FormFit, float]:
     """What a log says, and how sure a balance is of what it gains beside the others."""
     tempers, original = list[float](), fit.weights_of
 
-    def heard(fits: Sequence[GreyBoxFit], temper: float, beforehand: Sequence[float]) -> np.ndarray:
+    def heard(fits: Sequence[GreyBoxFit], temper: float, priors: Sequence[float]) -> np.ndarray:
         tempers.append(temper)
-        return original(fits, temper, beforehand)
+        return original(fits, temper, priors)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fit, "weights_of", heard)

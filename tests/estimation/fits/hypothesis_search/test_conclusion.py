@@ -9,7 +9,7 @@ import pytest
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import ENCODER_ZERO, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search import conclusion
-from estimation.fits.hypothesis_search.conclusion import beforehand, conclude
+from estimation.fits.hypothesis_search.conclusion import conclude, prior_weight
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN
 from plant.eha.model import EhaParameters
@@ -58,7 +58,7 @@ def test_a_set_is_no_rival_of_itself(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_file_s_own_uncertainty_says_how_likely_a_volume_is() -> None:
     off = tried(VOLUME, 100.0, 2e8, float(np.exp(0.3)))
-    assert beforehand(LOG, off) == pytest.approx(np.exp(-2.0))
-    assert beforehand(CERTAIN, off) == 1.0
-    assert beforehand(LOG, tried(ENCODER_ZERO, 100.0, 2e8, 2.0)) == 1.0
-    assert beforehand(LOG, tried(VOLUME, 100.0, 2e8, 1e12)) > 0.0
+    assert prior_weight(LOG, off) == pytest.approx(np.exp(-2.0))
+    assert prior_weight(CERTAIN, off) == 1.0
+    assert prior_weight(LOG, tried(ENCODER_ZERO, 100.0, 2e8, 2.0)) == 1.0
+    assert prior_weight(LOG, tried(VOLUME, 100.0, 2e8, 1e12)) > 0.0
