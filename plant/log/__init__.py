@@ -1,1 +1,1 @@
-"""`Record`, and every door through which a log comes in or goes out."""
+"""`Record`, and everything that reads or writes a log."""

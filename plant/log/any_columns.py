@@ -1,4 +1,4 @@
-"""Logs of anything: columns by whatever name they have, in whatever unit, beside a column of time or none."""
+"""Logs of any origin: columns with any name, in any unit, with or without a time column."""
 
 import re
 import warnings
@@ -44,7 +44,7 @@ def read_any(
     most_missing: float = MOST_MISSING,
     assumed: float = 1.0,
 ) -> Record:
-    """Read columns of a log as they stand, without knowing what they are.
+    """Read columns of a log unchanged, without knowing what they measure.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def read_any(
 
 
 def _table(tables: Sequence[Table], names: Sequence[str] | None) -> Table:
-    """Return the table that has most of the columns wanted, or most columns."""
+    """Return the table that holds most of the wanted columns, or the most columns."""
 
     def rank(table: Table) -> tuple[int, int]:
         own = {one.name.lower() for one in cleaned(table.headings)}
@@ -113,7 +113,7 @@ def _table(tables: Sequence[Table], names: Sequence[str] | None) -> Table:
 
 
 def _every(table: Table, headings: Sequence[Heading], time: Column | None) -> dict[str, Array]:
-    """Return every column of numbers that has a name of its own, and the time [s]."""
+    """Return every numeric column that has its own name, and the time [s]."""
     numbers = table.numbers(time)
     found: dict[str, Array] = {} if time is None else {TIME: _seconds(numbers[time.position], time)}
     for place, values in numbers.items():
@@ -126,7 +126,7 @@ def _every(table: Table, headings: Sequence[Heading], time: Column | None) -> di
 def _wanted(
     table: Table, headings: Sequence[Heading], time: Column | None, names: Sequence[str], source: str
 ) -> dict[str, Array]:
-    """Return the columns wanted, and the time [s], read at once: a row that is left out is left out of all."""
+    """Return the wanted columns and the time [s], read together: a row that is skipped in one is skipped in all."""
     chosen = [_named(headings, name, source) for name in dict.fromkeys(names)]
     raw = table.read(chosen if time is None else [time, *chosen])
     found: dict[str, Array] = {} if time is None else {TIME: _seconds(raw[time], time)}
@@ -170,7 +170,7 @@ def _time_column(headings: Sequence[Heading]) -> Column | None:
 
 
 def _seconds(values: Array, column: Column) -> Array:
-    """Return time in seconds; dates count from the first."""
+    """Return time in seconds; dates count from the first one."""
     if values.dtype.kind != "M":
         return values * column.factor
     missing = np.isnat(values)

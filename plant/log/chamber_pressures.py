@@ -1,4 +1,4 @@
-"""Differential pressure of a log whose sensors sit in the two chambers: the one place that knows what makes it."""
+"""Differential pressure of a log whose sensors sit in the two chambers. No other module computes it."""
 
 from collections.abc import Collection, Mapping
 
@@ -20,7 +20,7 @@ def tells_difference(channels: Collection[str]) -> bool:
 
 
 def with_difference(channels: Mapping[str, Array]) -> Mapping[str, Array]:
-    """Return channels with the differential pressure where both chambers' are logged, and it is not.
+    """Return channels with differential pressure, computed from both chamber pressures if it is not logged.
 
     Parameters
     ----------

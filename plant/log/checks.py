@@ -1,4 +1,4 @@
-"""Checks that a log must pass to be trusted: clock, gaps, finite numbers. Repairs are reported."""
+"""Checks that a log must pass: clock, gaps, finite numbers. Repairs are reported."""
 
 from collections.abc import Collection, Iterable
 
@@ -36,7 +36,7 @@ def trusted(
     clock: Clock | None = None,
     most_missing: float = MOST_MISSING,
 ) -> Checked:
-    """Return a log on a uniform clock if it can be trusted.
+    """Return a log on a uniform clock if it passes all checks.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def trusted(
 
 
 def alternatives(wanted: str) -> list[str]:
-    """Return the channels, at least one of which is wanted.
+    """Return the channels of which at least one is required.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def alternatives(wanted: str) -> list[str]:
 
 
 def lacking(required: Iterable[str], names: Collection[str]) -> list[str]:
-    """Return the required channels that a log lacks.
+    """Return the required channels that are missing from a log.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def _counted(count: int, total: int) -> dict[str, float]:
 
 
 def all_missing(name: str, values: Array) -> Note | None:
-    """Return a note if a channel has no sample at all.
+    """Return a note if a channel has no samples at all.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _finite(columns: Channels, source: str) -> None:
 
 
 def _rows_with_time(columns: Channels, source: str, notes: list[Note]) -> Channels:
-    """Drop the rows whose time is empty; inside the log they leave gaps, which are counted again there."""
+    """Drop rows without a time. Inside the log they leave gaps, which are counted there."""
     columns = _without_end(columns, notes)
     empty = np.isnan(columns[TIME])
     count, total = int(empty.sum()), len(empty)
@@ -163,7 +163,7 @@ def _rows_with_time(columns: Channels, source: str, notes: list[Note]) -> Channe
 
 
 def _without_end(columns: Channels, notes: list[Note]) -> Channels:
-    """Leave out the last rows in which nothing was written, as of arrays that were made before the test."""
+    """Drop empty rows at the end, which remain when an array was allocated before the test."""
     if not np.isnan(columns[TIME][-1:]).any():
         return columns
     written = np.flatnonzero(~np.logical_and.reduce([np.isnan(values) for values in columns.values()]))
@@ -187,7 +187,7 @@ def _derived(channels: Channels, notes: list[Note]) -> Channels:
 
 
 def _slower(values: Array) -> int:
-    """Return every how many samples a channel is logged, where it is slower than the clock but steady; 1 for others."""
+    """Return every how many samples a channel is logged that is steady but slower than the clock; 1 for others."""
     present = np.flatnonzero(np.isfinite(values))
     if len(present) < FEWEST_SAMPLES:
         return 1
@@ -196,7 +196,7 @@ def _slower(values: Array) -> int:
 
 
 def _logged_together(on_clock: Checked, notes: list[Note], most_missing: float) -> tuple[int, Channels]:
-    """Return the first sample of the part in which each channel of `BALANCED` is logged, and that part."""
+    """Return the first sample of the part in which all channels of `BALANCED` are logged, and that part."""
     channels = on_clock.channels
     total = len(next(iter(channels.values())))
     first, behind = 0, total

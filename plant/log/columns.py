@@ -1,4 +1,4 @@
-"""Which column of a log is which channel, and in what unit: canonical names, unit suffixes, foreign names."""
+"""Maps the columns of a log to channels and units: canonical names, unit suffixes, foreign names."""
 
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -50,7 +50,7 @@ STEMS: Mapping[str, str] = MappingProxyType(_stems)
 
 
 def know_channels(units: Mapping[str, str]) -> None:
-    """Let logs have further channels, as a kind of actuator that is not among the shipped ones brings them.
+    """Register further channels of logs, for a kind of actuator that is not shipped.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def know_channels(units: Mapping[str, str]) -> None:
 
 
 def unit_ending(unit: str) -> str:
-    """Return the ending of a channel's name for a unit.
+    """Return the suffix of a channel's name that states its unit.
 
     Returns
     -------
@@ -108,7 +108,7 @@ class Column:
 def resolve_columns(
     names: "Sequence[str | Heading]", mapping: Mapping[str, str] | None, source: str
 ) -> tuple[Column, ...]:
-    """Return the columns of a log that become channels; all others are left unread.
+    """Return the columns of a log that become channels. All others are not read.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def resolve_columns(
 
 
 def _dated(headings: Sequence[Heading]) -> int | None:
-    """Return the one column of dates, where it is the time: no other is, nor is it called another channel."""
+    """Return the only column of dates if it is the time: no other is, and it is not mapped to a channel."""
     stamped = [position for position, heading in enumerate(headings) if heading.stamped]
     if len(stamped) != 1 or _channel_of(headings[stamped[0]]) is not None:
         return None
@@ -180,7 +180,7 @@ def _channel_of(heading: Heading) -> str | None:
 
 
 def _own(position: int, heading: Heading, channel: str, source: str) -> Column:
-    """Return the column of a channel's own name, converted by the unit that it says."""
+    """Return the column with a channel's own name, converted from the unit in that name."""
     name = heading.name
     if channel.startswith(TRUTH):
         return Column(position, name, channel)
@@ -231,7 +231,7 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
 
 
 def _require_one_unit(heading: Heading, named: str | None, channel: str, source: str) -> None:
-    """Refuse a column whose name says another unit, in brackets or at its end, than the file gives beside it."""
+    """Refuse a column whose name states one unit, in brackets or as a suffix, and whose file states another."""
     said = heading.said
     if said is None or named is None or not all(converts(one, UNITS.get(channel, named)) for one in (said, named)):
         return
@@ -264,13 +264,13 @@ def _known_channel(channel: str, error: Callable[[str], HydrostateError]) -> Non
 
 
 def listed(names: Collection[str], limit: int = 12) -> str:
-    """Return names as a list in words, the first few of many."""
+    """Return names as a list in words; of many names only the first few."""
     shown = ", ".join(repr(name[:40]) for name in list(names)[:limit])
     return (shown or "no columns") + (f" and {len(names) - limit} more" if len(names) > limit else "")
 
 
 def check_columns(mapping: Mapping[str, str]) -> dict[str, str]:
-    """Return a mapping of channels to foreign columns, after checking its channels and units.
+    """Return a checked mapping of channels to foreign columns, with its units.
 
     Parameters
     ----------
@@ -296,7 +296,7 @@ def check_columns(mapping: Mapping[str, str]) -> dict[str, str]:
 
 
 def parse_columns(texts: Sequence[str]) -> dict[str, str]:
-    """Return ``CHANNEL=NAME:UNIT`` texts, as a command line gives them, as a mapping.
+    """Return ``CHANNEL=NAME:UNIT`` texts of a command line as a mapping.
 
     Parameters
     ----------

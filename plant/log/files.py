@@ -1,4 +1,4 @@
-"""Records on disk: CSV, Parquet and MAT by suffix, checked when read, whole when written."""
+"""Records on disk: CSV, Parquet and MAT by suffix, checked when read, and written atomically."""
 
 import json
 import math
@@ -36,7 +36,7 @@ def read_record(
     beside: Sequence[str | Path] = (),
     most_missing: float = MOST_MISSING,
 ) -> Record:
-    """Read a log, convert its columns to SI, and refuse it if it cannot be trusted.
+    """Read a log, convert its columns to SI, and refuse it if it fails a check.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def read_record(
 
 
 def source_of(log: str | Path | Table | tuple[Table, ...]) -> str:
-    """Return the name of a log in messages."""
+    """Return the name of a log for messages."""
     first = log[0] if isinstance(log, tuple) else log
     return first.source if isinstance(first, Table) else str(first)
 
@@ -163,7 +163,7 @@ def write_record(record: Record, path: str | Path) -> None:
 
 
 def sidecar(path: Path) -> Path:
-    """Return the file beside a CSV that holds its metadata.
+    """Return the path of the metadata file of a CSV.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def _kind(path: Path) -> str:
 
 
 def _beside(path: Path) -> str | None:
-    """Return the metadata beside a CSV, None where there are none."""
+    """Return the metadata of a CSV; None if it has no metadata file."""
     notes = sidecar(path)
     try:
         return notes.read_text(errors="replace") if notes.is_file() else None
@@ -211,7 +211,7 @@ def _plain(value: object) -> object:
 
 
 def _document(text: str | None) -> tuple[dict[str, Any], list[Note]]:
-    """Return the document that `write_record` left, empty where there is none or another's."""
+    """Return the document that `write_record` wrote; empty if there is none or it is a different one."""
     if text is None:
         return {}, []
     try:

@@ -19,12 +19,12 @@ SOURCE = "the table"
 
 
 def is_frame(given: object) -> "TypeGuard[pd.DataFrame]":
-    """Return whether something is a pandas DataFrame, without importing pandas."""
+    """Return whether an object is a pandas DataFrame, without importing pandas."""
     return hasattr(given, "iloc") and hasattr(given, "columns") and hasattr(given, "index")
 
 
 def by_name(given: object) -> "Mapping[str, Any] | None":
-    """Return the columns of a table of Polars or Arrow, of NumPy's records, or of a mapping; None of anything else.
+    """Return the columns of a Polars or Arrow table, a NumPy structured array or a mapping; None for others.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def frame_table(given: "pd.DataFrame | Mapping[str, Any]") -> Table:
     """Return a table in memory as an open log.
 
     The index of a DataFrame is its time if it holds dates, durations or floats, or has a name such as ``time_ms``,
-    unless a column is called time.
+    unless a column is named time.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def _is_time(name: str) -> bool:
 
 
 def _time(index: "pd.Index[Any]") -> dict[str, Any]:
-    """Return an index as a column of time; nothing where it only counts rows, as after rows were chosen."""
+    """Return an index as a time column; empty if it only counts rows, also after a selection of rows."""
     name = "" if index.name is None else str(index.name)
     if index.dtype.kind in "iuf" and (_is_time(name) or index.dtype.kind == "f"):
         return {name if _is_time(name) else TIME: _plain(index)}
@@ -112,7 +112,7 @@ def _time(index: "pd.Index[Any]") -> dict[str, Any]:
 
 
 def _seconds(spans: Any) -> Any:
-    """Return durations in seconds, NaN where there is none."""
+    """Return durations in seconds, with NaN for missing ones."""
     exact = np.asarray(spans).astype("timedelta64[ns]")
     return np.where(np.isnat(exact), np.nan, exact.astype(np.int64) * 1e-9)
 
@@ -124,7 +124,7 @@ def _columns(given: Any, names: Sequence[str]) -> list[Any]:
 
 
 def _of_quantity(name: str, quantity: Any) -> tuple[Any, str | None]:
-    """Return the numbers of a quantity with units: in the unit that the name says, or with their own."""
+    """Return the numbers of a quantity with units, in the unit of its name or else in its own unit."""
     named = resolve_columns([name], None, SOURCE)
     try:
         if named and not named[0].channel.startswith(TRUTH):
@@ -140,7 +140,7 @@ def _text(name: object) -> str:
 
 
 def _plain(column: Any) -> Any:
-    """Return a column or an index of pandas as NumPy has it; dates in UTC."""
+    """Return a pandas column or index as a NumPy array, with dates in UTC."""
     if getattr(column.dtype, "tz", None) is not None:
         column = getattr(column, "dt", column).tz_convert(None)
     return column.to_numpy()

@@ -1,4 +1,4 @@
-"""Which column is which channel, guessed by name and unit; its values are looked at later."""
+"""Guesses which column is which channel by name and unit. Other code then checks the values."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -78,7 +78,7 @@ SHOWN = 0.5
 
 @dataclass(frozen=True)
 class Guess:
-    """Which column a channel may be.
+    """A column that may be a channel.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ _SUFFIX = re.compile(
 
 
 def unit_of(heading: Heading) -> str | None:
-    """Return the unit of a column: the one given for it, or else the one that its name ends in.
+    """Return the unit of a column: the one given for it, or the suffix of its name.
 
     Examples
     --------
@@ -204,7 +204,7 @@ def guessed(points: Mapping[str, Mapping[int, float]], headings: Sequence[Headin
 
 
 def guess_by_name(headings: Sequence[Heading], channels: Collection[str] = (TIME, *CHANNELS)) -> tuple[Guess, ...]:
-    """Return which column each channel may be, by name and unit alone.
+    """Return the columns that each channel may be, by name and unit alone.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def guess_by_name(headings: Sequence[Heading], channels: Collection[str] = (TIME
 def missing_channels(
     wanted: Sequence[str], headings: Sequence[Heading], source: str, found: Collection[str] = ()
 ) -> NoChannelError:
-    """Return the error for channels that a log lacks: what it has, what may be meant, and what shows more.
+    """Return the error for missing channels: what the log has, what may be meant, which command shows more.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def missing_channels(
 
 
 def absent(wanted: Sequence[str]) -> str:
-    """Return the clause that says which columns are missing.
+    """Return the clause that names missing columns.
 
     Examples
     --------
@@ -265,7 +265,7 @@ def absent(wanted: Sequence[str]) -> str:
 
 
 def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Note, ...]:
-    """Return notes on columns left unread that may be what an estimate gains most by: pressure, or a second motion.
+    """Return notes on unused columns that may improve an estimate most: pressure, or a second measurement of motion.
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ INSPECT = (
 
 
 def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence[str] = ()) -> str:
-    """Return which columns may be meant, as an option, and the command that shows more.
+    """Return an option with the columns that may be meant, and the command that shows more.
 
     Parameters
     ----------
@@ -322,7 +322,7 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
 
 
 def in_order(channels: Iterable[str]) -> list[str]:
-    """Return channels as a log is usually written: time, motor speed, motion, pressures.
+    """Return channels in the usual order: time, motor speed, motion, pressures.
 
     Examples
     --------
@@ -334,7 +334,7 @@ def in_order(channels: Iterable[str]) -> list[str]:
 
 
 def _shown(headings: Sequence[Heading], channels: Sequence[str]) -> Iterator[tuple[Guess, str]]:
-    """Yield the guesses that are sure enough to be shown, each with the option that reads it."""
+    """Yield the guesses that are certain enough to show, each with the option that uses it."""
     for one in guess_by_name(headings, [name for name in channels if name in UNITS]):
         if one.sure >= SHOWN and one.spec.isprintable():
             told = one.unit is not None or one.channel == TIME or one.name == one.channel

@@ -1,4 +1,4 @@
-"""Heading of a column: its name, and its unit in brackets, in a row of units or in an attribute."""
+"""Headings of columns: the name, and the unit in brackets, in a row of units or in an attribute."""
 
 import re
 from collections.abc import Sequence
@@ -59,12 +59,12 @@ def _split(name: str) -> tuple[str, str | None]:
 
 
 def unit_or_none(text: str) -> str | None:
-    """Return the unit that a file gives; None if it says that there is none."""
+    """Return the unit that a file gives; None if it states that there is none."""
     return None if text.strip().lower() in _NO_UNIT else text.strip()
 
 
 def is_unit(text: str) -> bool:
-    """Return whether a text is a unit, spelt as such, that a bench uses.
+    """Return whether a text is a unit that a bench uses, in its usual spelling.
 
     Examples
     --------
@@ -93,7 +93,7 @@ _KNOWN = _SCALED | frozenset(
 
 
 def cleaned(names: Sequence["str | Heading"]) -> list[Heading]:
-    """Return names as headings, without blanks and marks around them.
+    """Return names as headings, without surrounding blanks and quotes.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def cleaned(names: Sequence["str | Heading"]) -> list[Heading]:
 
 
 def is_unit_row(row: Sequence[str]) -> bool:
-    """Return whether cells are units or say that there is none; the first may announce the others as units.
+    """Return whether cells are units or state that there is none. The first cell may be a label for the row.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Contents of a log file as it is: columns with range and gaps, and the clock of its rows."""
+"""Contents of a log file: columns with range and gaps, and the clock of its rows."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ class ColumnFacts:
 
 @dataclass(frozen=True)
 class ClockFacts:
-    """The stamps of a log as they are.
+    """The time stamps of a log as written.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def inspect_table(table: Table) -> TableFacts:
 
 
 def _unit_of_dates(values: Array) -> str | None:
-    """Return the unit in which a column that never falls is dates; None for others."""
+    """Return the unit in which a column that never decreases holds dates; None for others."""
     there = values[np.isfinite(values)]
     dates = unit_of_dates(there) if len(there) > 2 and bool((np.diff(there) >= 0.0).all()) else None
     return None if dates is None else dates[0]

@@ -1,4 +1,4 @@
-"""Numbers that a logger writes in place of a sample that it has lost, such as -9999."""
+"""Numbers such as -9999 that a logger writes for a lost sample."""
 
 import numpy as np
 
@@ -22,9 +22,10 @@ KNOWN, IN_A_ROW = 100, 50
 
 
 class LostInStream:
-    """The same of samples that come one by one: such a number is lost if it is farther from all before than they reach.
+    """The same test for samples of a stream.
 
-    One that stays is believed after `IN_A_ROW` samples.
+    A number is lost if it lies outside the range of all earlier samples by more than that range. A number that stays is
+    accepted after `IN_A_ROW` samples.
 
     Examples
     --------
@@ -38,7 +39,7 @@ class LostInStream:
         self._known = self._together = 0
 
     def is_lost(self, value: float) -> bool:
-        """Return whether the next sample is a mark of a lost value; NaN is not.
+        """Return whether the next sample marks a lost value. NaN does not.
 
         Parameters
         ----------
@@ -59,9 +60,10 @@ class LostInStream:
 
 
 def without_lost(values: Array, channel: str) -> tuple[Array, list[Note]]:
-    """Return a column without the number that stands for a lost sample, and what to say of it.
+    """Return a column without the number that marks lost samples, and a note.
 
-    It must be one of `LOST_VALUES`, come twice or more, and be farther from all other samples than they reach.
+    The number must be one of `LOST_VALUES`, occur at least twice, and lie outside the range of all other samples by
+    more than that range.
 
     Parameters
     ----------

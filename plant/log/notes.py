@@ -1,4 +1,4 @@
-"""Notes of reading a log: repairs, and suspected slips of units."""
+"""Notes of reading a log: repairs, and suspected errors of units."""
 
 from plant.notes import Code
 

@@ -1,4 +1,4 @@
-"""Suspected slips of units in a log, for actuators between a desk model and an excavator."""
+"""Suspected errors of units in a log, for actuators between a desk model and an excavator."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ LARGEST, SMALLEST = 1e15, 1e-30
 
 
 def require_measurable(channels: Mapping[str, Array], source: str) -> None:
-    """Refuse values that no sensor gives; what is computed of them would be no number.
+    """Refuse values that no sensor gives, because results would not be finite numbers.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def require_measurable(channels: Mapping[str, Array], source: str) -> None:
 
 
 def implausible(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
-    """Return a note for each thing that looks like a slip of units, or that nothing moves.
+    """Return a note for each suspected error of units, and if nothing moves.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def _integrated(sample_time: float, rate: Array) -> Array:
 
 
 def _gain(output: Array, cause: Array, alike: float) -> float | None:
-    """Return the ratio of sizes of two signals without their trends, None where their shapes differ."""
+    """Return the ratio of the amplitudes of two signals without their trends; None if their shapes differ."""
     there = np.isfinite(output) & np.isfinite(cause)
     if there.sum() < 3 or not _above_noise(output):
         return None

@@ -1,4 +1,4 @@
-"""`Record`, the noun that every layer shares: one run or log; uniform time, named SI channels, metadata."""
+"""`Record`, which all layers share: one run or log with a uniform clock, named SI channels and metadata."""
 
 import warnings
 from collections.abc import Collection, Iterator, Mapping
@@ -126,7 +126,7 @@ class Record:
         return self.sample_time * (len(self) - 1)
 
     def replace(self, **changes: NDArray[np.float64] | None) -> "Record":
-        """Return a copy with channels set, or dropped where the value is None.
+        """Return a copy with channels set, or removed if the value is None.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class Record:
         return Record(self.sample_time, kept, self.metadata, self.start_time)
 
     def annotate(self, **metadata: object) -> "Record":
-        """Return a copy whose metadata has these entries added.
+        """Return a copy with these metadata entries added.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class Record:
         return Record(self.sample_time, self.channels, {**self.metadata, **metadata}, self.start_time)
 
     def slice(self, start: int = 0, stop: int | None = None, step: int = 1) -> "Record":
-        """Return samples ``start:stop:step``, with the clock moved and slowed to match.
+        """Return samples ``start:stop:step``, with the clock shifted and slowed to match.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class Record:
         return Record(self.sample_time * step, part, self.metadata, begin)
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return a DataFrame with ``time_s`` and one column a channel."""
+        """Return a DataFrame with ``time_s`` and one column for each channel."""
         import pandas as pd
 
         return pd.DataFrame({"time_s": self.time, **self.channels})
@@ -187,7 +187,7 @@ class Record:
         *,
         required: Collection[str] = REQUIRED,
     ) -> "Record":
-        """Return a DataFrame as a record, its columns converted and checked as those of a log file are.
+        """Return a DataFrame as a record. Its columns are converted and checked as those of a log file.
 
         Parameters
         ----------
@@ -233,7 +233,7 @@ class Record:
 
 
 def with_samples(record: Record) -> tuple[Record, tuple[LogWarning, ...]]:
-    """Return a record without channels of which no sample is there, as files are read.
+    """Return a record without channels that have no samples, as for files.
 
     Parameters
     ----------

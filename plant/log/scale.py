@@ -1,4 +1,4 @@
-"""A sensor's scale in the unit of a column: ``50 bar/V - 25 bar`` of an oscilloscope's volts."""
+"""Scales of sensors in the unit of a column: ``50 bar/V - 25 bar`` for volts of an oscilloscope."""
 
 import re
 from math import isfinite
@@ -53,7 +53,7 @@ def conversion_of(unit: str, wanted: str, logged: str | None = None) -> tuple[fl
 
 
 def _factor(name: str, wanted: str, logged: str | None) -> float:
-    """Return the factor of a unit, or of a unit divided by the one in which the column is logged."""
+    """Return the factor of a unit, or of a unit divided by the unit in which the column is logged."""
     top, slash, under = name.rpartition("/")
     try:
         factor, offset = conversion_to(name, wanted)

@@ -1,4 +1,4 @@
-"""`Table`: a log file, open, with one clock: what its columns are called, and a way to read some of them."""
+"""`Table`: an open log file with one clock, the names of its columns, and a way to read some of them."""
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -97,7 +97,7 @@ class Table:
         return {column.position: values for column, values in found.items()}
 
     def _require_room(self, columns: Sequence[Column]) -> None:
-        """Refuse what is too much for all columns to be held at once, before all of them are."""
+        """Refuse a table that is too large for memory, before its columns are read."""
         if len(columns) <= FEW:
             return
         first = next((values for column in columns if (values := self._tried(column)) is not None), None)
@@ -122,7 +122,7 @@ class Table:
 def table_of(
     source: str, named: Mapping[str, Any], *, units: Mapping[str, str | None] | None = None, **more: Any
 ) -> Table:
-    """Return a table of columns that are in memory, or are read one by one.
+    """Return a table of columns in memory, or of columns that are read on request.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The tables of a log, a logger or a group each: which column is which, when its rows were taken, one clock."""
+"""The tables of a log, one for each logger or group: maps columns to channels and merges the clocks."""
 
 import warnings
 from collections.abc import Collection, Mapping, Sequence
@@ -105,7 +105,7 @@ def gathered(
 
 
 def _time_without_unit(tables: Sequence[Table]) -> tuple[int, Heading, tuple[str, str] | None] | None:
-    """Return the column that may be the time but says no unit: its place, it with a likely unit, its unit as dates."""
+    """Return the likely time column that states no unit: its place, and its likely unit or the unit of its dates."""
     owners = [(table, place) for table in tables for place in range(len(table.headings))]
     headings = [table.headings[place] for table, place in owners]
     (guess,) = guess_by_name(headings, [TIME])[:1] or (None,)
@@ -127,7 +127,7 @@ def _time_without_unit(tables: Sequence[Table]) -> tuple[int, Heading, tuple[str
 def _without_text(
     table: Table, columns: Sequence[Column], found: list[str], required: Collection[str], notes: list[Note]
 ) -> dict[str, Array]:
-    """Return the channels of a table, without those that nobody asked for and that hold text."""
+    """Return the channels of a table without text columns that were not requested."""
     try:
         return _read(table, columns, notes)
     except TextColumnError as error:
@@ -146,7 +146,7 @@ def _without_text(
 
 
 def _overlooked(chosen: Chosen, tables: Sequence[Table]) -> tuple[Note, ...]:
-    """Return a note for each column that was left unread and may be a channel that the log seems to lack."""
+    """Return a note for each unused column that may be a channel that the log seems to lack."""
     read = {id(table): {column.position for column in columns} for table, columns in chosen}
     left = [
         heading
@@ -158,7 +158,7 @@ def _overlooked(chosen: Chosen, tables: Sequence[Table]) -> tuple[Note, ...]:
 
 
 def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, source: str) -> Chosen:
-    """Return the columns of each table that become channels; tables without any are left out.
+    """Return the columns of each table that become channels. Tables without any are left out.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, s
 
 
 def _labelled(table: Table, mapping: Mapping[str, str]) -> Sequence[Heading]:
-    """Return headings, with the group before a name that the mapping gives it to."""
+    """Return headings, with the group name in front of a name that the mapping refers to."""
     if not table.label:
         return table.headings
     asked = [spec for spec in mapping.values() if spec.startswith(f"{table.label}/")]
@@ -226,7 +226,7 @@ def _has(headings: Sequence[Heading], channel: str, spec: str) -> bool:
 
 
 def _once(chosen: Chosen, source: str) -> None:
-    """Refuse a channel that two tables have."""
+    """Refuse a channel that occurs in two tables."""
     owners: dict[str, list[tuple[Table, Column]]] = {}
     for table, columns in chosen:
         for column in columns:
@@ -264,7 +264,7 @@ def _timed(
     sample_time: float | None,
     source: str,
 ) -> Timed:
-    """Return a table's channels with their time: its own, its step, that of a table as long, or what was asked for."""
+    """Return a table's channels with their time: its own, from its step, from an equal table, or as requested."""
     channels = {name: one for name, one in values.items() if name != TIME}
     rows = len(next(iter(values.values()), ()))
     if TIME in values:
@@ -283,7 +283,7 @@ def _timed(
 
 
 def _from_start(columns: Mapping[str, Any]) -> tuple[dict[str, Array], str | None]:
-    """Return times of the day as seconds from the first, and when that was."""
+    """Return times of day as seconds from the first, and the first time."""
     out = dict(columns)
     time: Any = out.get(TIME)
     if time is None or time.dtype.kind != "M":

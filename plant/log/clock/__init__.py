@@ -1,1 +1,1 @@
-"""From the time stamps of a log to one uniform clock."""
+"""Converts the time stamps of a log to one uniform clock."""

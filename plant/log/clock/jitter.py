@@ -1,4 +1,4 @@
-"""Stamps that jitter or were rounded: the uniform clock behind them, and what the samples are on it."""
+"""Stamps with jitter or rounding: the uniform clock behind them, and the samples on that clock."""
 
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ ROUNDED = 1.25
 
 
 class Grid(NamedTuple):
-    """A uniform clock for stamps that jitter: its times, what is a gap in them, and how far the steps scatter.
+    """A uniform clock for stamps with jitter: its times, its gaps, and the scatter of the steps.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Grid(NamedTuple):
     most: float
 
     def lacking(self, time: Array) -> NDArray[np.bool_]:
-        """Return at which times of the clock a gap between samples leaves nothing to go by.
+        """Return the times of the clock at which a gap leaves no sample nearby.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ def usual_step(step: Array) -> float:
 
 
 def grid_of(time: Array) -> Grid:
-    """Return the uniform clock for stamps that increase.
+    """Return the uniform clock for increasing stamps.
 
     Parameters
     ----------
@@ -110,11 +110,11 @@ def grid_of(time: Array) -> Grid:
 
 
 def resampled(grid: Grid, time: Array, values: Array) -> Array:
-    """Return a channel on a uniform clock: each time has its nearest sample, moved along the local slope.
+    """Return a channel on a uniform clock: each time takes its nearest sample, moved along the local slope.
 
-    The slope is that of a cubic fitted to five samples, so a sample that is moved by a tenth of the sample time keeps
-    its noise: white, and larger by 1 % of its variance. Interpolation would average the noise of neighbours, and what
-    is read off the log afterwards would be too small. Array on a sensor's quanta stay on them.
+    The slope is that of a cubic through five samples. A sample that moves by a tenth of the sample time keeps white
+    noise, with 1 % more variance. Interpolation would average the noise of neighbours, and a noise estimate from the
+    result would be too small. A channel on a sensor's quanta stays on them.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ TOGETHER = 0.01
 
 
 def _slopes(t: Array, y: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the slope of a cubic through five samples at each, and whether they tell one: no gap lies between them."""
+    """Return the slope of a cubic through five samples at each sample, and whether no gap lies between them."""
     half, usual = POINTS // 2, float(np.median(np.diff(t)))
     first = np.clip(np.arange(len(t)) - half, 0, len(t) - POINTS)
     rows = first[:, None] + np.arange(POINTS)
@@ -184,7 +184,7 @@ def _on_quanta(found: Array, measured: Array) -> Array:
 
 
 def rounded_clock(time: Array, slots: Array) -> tuple[float, float, float] | None:
-    """Return the uniform clock whose times, rounded, are a log's stamps; None if rounding does not explain them.
+    """Return the uniform clock whose rounded times are a log's stamps; None if rounding does not explain them.
 
     Parameters
     ----------

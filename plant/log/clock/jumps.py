@@ -1,4 +1,4 @@
-"""A clock that is set while it is logged, or a counter that runs over: stamps jump where rows go on evenly."""
+"""Clocks that were set during a log, and counters that overflowed: stamps jump although rows were sampled evenly."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ count]; judged: of ten such lengths a decade, a few thousandths are hit."""
 
 
 def without_jumps(time: Array) -> tuple[Array, list[tuple[int, int]]]:
-    """Return stamps without jumps of whole hours, after which the next row comes one step later.
+    """Return stamps without jumps of whole hours: the next row comes one step after the last.
 
     Parameters
     ----------
@@ -65,17 +65,17 @@ def without_jumps(time: Array) -> tuple[Array, list[tuple[int, int]]]:
 
 
 def _longest(step: Array) -> float:
-    """Return the longest of steps that leaves no row out."""
+    """Return the longest step that skips no row."""
     if not len(step):
         return np.inf
     return GAP * max(usual_step(step), float(np.min(step[step > 0.0], initial=np.inf)))
 
 
 def without_overruns(time: Array) -> tuple[Array, tuple[int, int, float] | None]:
-    """Return stamps of a counter that ran over, as if it had gone on counting.
+    """Return stamps of a counter that overflowed, as if it had gone on counting.
 
-    All stamps that fall do so by one number of ticks, 2^16, 2^24, 2^31 or 2^32 of a power of ten of a second, less one
-    step. A test that begins again falls to where the log begins, and stays.
+    All falls have the same size: 2^16, 2^24, 2^31 or 2^32 ticks of a power of ten of a second, less one step. If a test
+    starts again, its stamps fall back to the start of the log; these stay unchanged.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def without_overruns(time: Array) -> tuple[Array, tuple[int, int, float] | None]
     ndarray, shape (n,)
         The stamps [s].
     tuple of int, int and float, or None
-        How often it ran over, the first row after, from 0, and what it counts to [s].
+        Number of overflows, the first row after the first one (from 0), and the period of the counter [s].
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Two loggers of one test, put on one clock: that of the faster one, while both were running."""
+"""Merges loggers of one test onto the clock of the faster one, for the time in which both ran."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Timed:
 
 @dataclass(frozen=True, eq=False)
 class Merged:
-    """Channels on one time.
+    """Channels on a common clock.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ class Merged:
 
 
 def merged(parts: Sequence[Timed], source: str) -> Merged:
-    """Return the channels of several loggers on the clock of the fastest, while all of them were running.
+    """Return the channels of several loggers on the clock of the fastest, for the time in which all ran.
 
-    Stamps with dates are laid beside each other as they are; seconds are taken to count from one moment in all.
+    Stamps with dates are compared directly. Seconds are assumed to count from the same moment in all loggers.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def _same_time(one: Any, other: Any) -> bool:
 
 
 def _span(time: Any) -> str:
-    """Return from when to when stamps go, in words."""
+    """Return the first and last time of stamps, in words."""
     if time.dtype.kind != "M":
         there = time[np.isfinite(time)]
         return f"{there.min():g} to {there.max():g} s"
@@ -130,7 +130,7 @@ def _span(time: Any) -> str:
 
 
 def _exchanged(parts: Sequence[Timed]) -> str:
-    """Return what to do where two loggers would be of one day, had one of them day and month the other way round."""
+    """Return advice if loggers would be of the same day with day and month exchanged in one of them."""
     days = [str(np.nanmin(one.time).astype("datetime64[D]")).split("-") for one in parts]
     turned = {(year, day, month) for year, month, day in days} & {tuple(day) for day in days}
     if not turned or len({tuple(day) for day in days}) == 1:
@@ -155,7 +155,7 @@ def _checked(one: Timed, epoch: Any, source: str, notes: list[Note]) -> Checked:
 
 
 def _on(even: Array, T: float, one: Checked, *, is_fastest: bool, first: int) -> dict[str, Array]:
-    """Return a logger's channels at the times of the common clock, missing where it has no sample near."""
+    """Return a logger's channels at the times of the common clock; missing where it has no sample nearby."""
     if is_fastest:
         return {name: values[first : first + len(even)] for name, values in one.channels.items()}
     times: Array = one.start_time + one.sample_time * np.arange(_length(one), dtype=np.float64)

@@ -1,8 +1,8 @@
-"""`stalled_clock(time)`: stamps of a computer that was busy at times, and wrote rows down as they came.
+"""`stalled_clock(time)`: stamps of a computer that was busy at times and stamped rows late.
 
-A converter samples evenly and its rows wait in a queue. While the computer is busy none is stamped; then all that wait
-are stamped at once. So stamps are late, never early, and come back to the line that they left. Where rows are lost they
-do not come back, and where the clock itself jitters no row is late by several sample times.
+A converter samples evenly, and its rows wait in a queue. A busy computer stamps none of them, then all waiting rows at
+once. So stamps are late, never early, and return to the original line. If rows are lost the stamps do not return, and
+if the clock itself has jitter no row is late by several sample times.
 """
 
 from collections.abc import Mapping
@@ -32,7 +32,7 @@ FEWEST_ROWS = 50
 
 
 class StalledClock(NamedTuple):
-    """An even clock behind stamps that stall.
+    """The even clock behind stamps that stall.
 
     Parameters
     ----------
@@ -95,10 +95,10 @@ def stalled_clock(time: Array) -> StalledClock | None:
 
 
 def waited_in_a_queue(time: Array, channels: Mapping[str, Array], sample_time: float) -> bool:
-    """Return whether rows of stamps that stall were sampled evenly, and not when they were stamped.
+    """Return whether rows with stalled stamps were sampled evenly, and only stamped late.
 
-    A loop in software that overruns has the same stamps, and samples late as well. Where a channel moves, values tell
-    the two apart: on the right times each lies nearer to the line between its neighbours.
+    A software loop that overruns gives the same stamps, but it also samples late. If a channel moves, its values tell
+    the two apart: at the right times, each value lies nearer to the line between its neighbours.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Time stamps as dates and times of the day: text to nanoseconds since 1970, in universal time."""
+"""Time stamps with dates and times of day: converts text to nanoseconds since 1970 in universal time."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -78,12 +78,12 @@ def is_stamp(cell: str) -> bool:
 
 @lru_cache(maxsize=64)
 def _shaped(text: str) -> bool:
-    """Return whether a text with masked digits has the form of a stamp; all stamps of a column look alike."""
+    """Return whether a text with masked digits has the form of a stamp. All stamps of a column have one form."""
     return any(one.fullmatch(text) for one in (*_PATTERNS, _MINUTES))
 
 
 def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception | None]) -> Stamps:
-    """Return stamps as times; those without a zone are taken for universal time.
+    """Return stamps as times. Stamps without a zone are taken as universal time.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception | N
 
 
 def _all_alike(cells: Sequence[str]) -> Stamps | None:
-    """Return stamps that all have the shape of the first one, which NumPy reads quickly; None for others."""
+    """Return stamps that all have the form of the first, which NumPy reads quickly; None for others."""
     first = _ISO.fullmatch(cells[0].strip()) if cells else None
     if first is None or any(len(cell) != len(cells[0]) for cell in cells):
         return None
@@ -138,7 +138,7 @@ def _all_alike(cells: Sequence[str]) -> Stamps | None:
 
 
 def _offset(zone: str) -> int:
-    """Return the offset of a zone from universal time [ns]; a zone that is only named is the log's own."""
+    """Return the offset of a zone from universal time [ns]. A zone given only by name is that of the log."""
     if zone[:1] not in ("+", "-"):
         return 0
     digits = zone[1:].replace(":", "").ljust(4, "0")
@@ -146,7 +146,7 @@ def _offset(zone: str) -> int:
 
 
 def _months_first(cells: Sequence[str]) -> bool:
-    """Return whether 3/4/2026 is in March: yes, unless no month has that number, or days would be months apart."""
+    """Return whether 3/4/2026 is in March: yes, unless a month is impossible or the days are months apart."""
     found = (_EITHER.fullmatch(cell.strip()) for cell in cells)
     days = {(int(one["one"]), int(one["two"]), int(one["Y"])) for one in found if one}
     if any(one > 12 for one, _, _ in days) or any(two > 12 for _, two, _ in days):
@@ -157,7 +157,7 @@ def _months_first(cells: Sequence[str]) -> bool:
 
 
 def _months_apart(days: Sequence[tuple[int, int, int]]) -> int:
-    """Return the span of days given as year, month and day, with 31 days in every month."""
+    """Return the time span of days given as year, month and day, with 31 days in every month."""
     counted = [372 * year + 31 * month + day for year, month, day in days]
     return max(counted, default=0) - min(counted, default=0)
 
@@ -191,7 +191,7 @@ def _fraction(digits: str | None) -> int:
 
 
 def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
-    """Return the day, counted from 1970; 0 where a stamp has none, the day of the year where it has no year."""
+    """Return the day since 1970; 0 if a stamp has no day, and the day of the year if it has no year."""
     if part.get("Y") is None:
         return 0 if part.get("N") is None else _day_of_year(part["N"])
     year = int(part["Y"])
@@ -211,14 +211,14 @@ def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
 
 
 def _day_of_year(text: str) -> int:
-    """Return a day of the year, counted from 0."""
+    """Return the day of the year, counted from 0."""
     if not 1 <= int(text) <= 366:
         raise ValueError(text)
     return int(text) - 1
 
 
 def over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Let times without a date that fall back by most of a day go on to the next one.
+    """Move times without a date to the next day where they fall back by most of a day.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The unit of a column of time that says none: sure where its values are dates, else likely by the steps."""
+"""The unit of a time column that states none: certain if its values are dates, otherwise the likeliest by its steps."""
 
 import numpy as np
 
@@ -20,9 +20,9 @@ USUAL = 1e-3
 
 
 def unit_of_dates(values: Array) -> tuple[str, str] | None:
-    """Return the unit in which values are dates since 2000, and the first of them; None if they are none.
+    """Return the unit in which values are dates since 2000, and the first date; None if they are not dates.
 
-    Dates are counted from 1970 in s, ms, us or ns, or in days as spreadsheets and MATLAB do.
+    Dates count from 1970 in s, ms, us or ns, or in days as in spreadsheets and MATLAB.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def unit_of_dates(values: Array) -> tuple[str, str] | None:
 
 
 def likely_unit(values: Array) -> str | None:
-    """Return the unit in which the steps are most like those of a log; None where there are no steps.
+    """Return the unit that gives the most usual steps of a log; None if there are no steps.
 
     Parameters
     ----------

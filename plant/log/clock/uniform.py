@@ -1,4 +1,4 @@
-"""The uniform clock of a log: gaps for samples left out; stamps that jitter, repeat, stall or were rounded, mended."""
+"""The uniform clock of a log: missing samples become gaps; jitter, repeats, stalls and rounding are repaired."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Checked:
-    """A log on a uniform clock, and what was mended on the way.
+    """A log on a uniform clock, with its repairs.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Checked:
 def on_uniform_clock(
     columns: Channels, source: str, clock: Clock | None, notes: list[Note], most_missing: float = MOST_MISSING
 ) -> Checked:
-    """Return a log on a uniform clock; what was mended is added to the notes.
+    """Return a log on a uniform clock; notes list the repairs.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def on_uniform_clock(
 
 
 def _steps_of_a_clock(time: Array, source: str) -> None:
-    """Refuse stamps whose steps are too large for a number."""
+    """Refuse stamps whose steps are too large to represent."""
     with np.errstate(over="ignore", invalid="ignore"):
         step = np.diff(time)
         span = float(time[-1] - time[0])
@@ -135,7 +135,7 @@ def _steps_of_a_clock(time: Array, source: str) -> None:
 
 
 def _mended(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
-    """Put stamps that were rounded, stall, repeat or jitter on a uniform clock; any other is no clock."""
+    """Put stamps that are rounded, stalled, repeated or jittered on a uniform clock; refuse all others."""
     step = np.diff(time)
     again = np.flatnonzero(step == 0.0) + 1
     if step.min() < 0.0 or len(again) == len(step):
@@ -163,7 +163,7 @@ def _mended(time: Array, channels: Channels, source: str, notes: list[Note]) -> 
 
 
 def _without(again: NDArray[np.int64], time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
-    """Leave out rows whose stamp was there before; those that said something new leave a gap."""
+    """Drop rows with repeated stamps; rows that held new values leave a gap."""
     count, percent = len(again), 100.0 * len(again) / len(time)
     notes.append(LogCode.TIME_REPEATS.note(channel=TIME, count=count, total=len(time), percent=percent))
     kept = {name: np.delete(values, again) for name, values in {TIME: time, **channels}.items()}
@@ -207,7 +207,7 @@ def _not_increasing(time: Array, source: str) -> ClockError:
 
 
 def _own_times(channels: Channels) -> bool:
-    """Return whether a channel was logged at times of its own, in rows where the fastest one is missing."""
+    """Return whether a channel was logged at its own times, in rows where the fastest channel is missing."""
     there = {name: np.isfinite(values) for name, values in channels.items()}
     fastest = max(there.values(), key=np.count_nonzero)
     if np.all(fastest) or np.count_nonzero(fastest) < FEWEST_SAMPLES:
@@ -216,9 +216,10 @@ def _own_times(channels: Channels) -> bool:
 
 
 def _merged(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
-    """Put channels that were logged at times of their own on the clock of the fastest.
+    """Put channels that were logged at their own times on the clock of the fastest.
 
-    A slower channel's sample goes to the nearest tick, as interpolated there between the channel's own samples.
+    A sample of a slower channel goes to the nearest tick, with the value interpolated there between the channel's
+    samples.
     """
     there = {name: np.isfinite(values) for name, values in channels.items()}
     fastest = max(there, key=lambda name: int(there[name].sum()))
@@ -240,7 +241,7 @@ def _merged(time: Array, channels: Channels, source: str, notes: list[Note]) -> 
 
 
 def _whole_ticks(time: Array) -> Array | None:
-    """Return the number of sample times in each step; None if one is not a whole number within 1 %."""
+    """Return the number of sample times in each step; None if a step is not a whole number within 1 %."""
     step = np.diff(time)
     if step.min() <= 0.0:
         return None
@@ -264,12 +265,12 @@ def _agrees(time: Array, clock: Clock) -> bool:
 
 
 def _resolution(time: Array, sample_time: float) -> float:
-    """Return the largest apparent jitter from rounding of times to floats, in sample times."""
+    """Return the largest apparent jitter from rounding of times to floats [sample times]."""
     return 4.0 * float(np.spacing(np.abs(time[[0, -1]]).max())) / sample_time
 
 
 def _spread(channels: Channels, slots: NDArray[np.int64]) -> Channels:
-    """Put the samples in their slots of the uniform clock, NaN in the slots that the log leaves out."""
+    """Put the samples in their places on the uniform clock, with NaN where the log has no sample."""
     total = int(slots[-1]) + 1
     if total == len(slots):
         return channels
@@ -280,7 +281,7 @@ def _spread(channels: Channels, slots: NDArray[np.int64]) -> Channels:
 
 
 def long_enough(columns: Channels, source: str) -> None:
-    """Refuse columns of several lengths, or too short.
+    """Refuse columns of different lengths, or too few rows.
 
     Raises
     ------

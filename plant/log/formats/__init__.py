@@ -1,1 +1,1 @@
-"""Files of logs in every format that is read, and which format a file is in."""
+"""Log files in every format that can be read, and the detection of the format."""

@@ -1,4 +1,7 @@
-"""Columns between NumPy and Arrow; Arrow's own ways would import pandas, which takes longer than reading a log."""
+"""Converts columns between NumPy and Arrow.
+
+Arrow's own conversion imports pandas, which takes longer than reading a log.
+"""
 
 from typing import Any, cast
 
@@ -9,7 +12,7 @@ from plant.arrays import Array
 
 
 def from_arrow(column: "pa.ChunkedArray[Any]") -> Array:
-    """Return a column of Arrow's as an array of its own, NaN where it has no value.
+    """Return an Arrow column as a new array, with NaN for missing values.
 
     Parameters
     ----------
@@ -39,7 +42,7 @@ def from_arrow(column: "pa.ChunkedArray[Any]") -> Array:
 
 
 def to_arrow(values: Array) -> "pa.Array[Any]":
-    """Return an array as a column of Arrow's, without a value where it is NaN.
+    """Return an array as an Arrow column, with NaN as missing values.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Contents of a cell in a text log: a number, one with its unit, a stamp, or a word for nothing measured."""
+"""Contents of a text cell: a number, a number with its unit, a stamp, or a word for a missing value."""
 
 import re
 from functools import lru_cache
@@ -18,7 +18,7 @@ _MEASURED = re.compile(rf"(?P<number>{_DIGITS})\s*(?P<unit>[^\W\d_].*|[%°\[].*)
 
 
 def is_value(cell: str) -> bool:
-    """Return whether a cell is data: a number with or without a unit, a stamp, or a word for no value."""
+    """Return whether a cell is data: a number with or without a unit, a stamp, or a word for a missing value."""
     text = cell.strip()
     if not text or len(text) > 60:
         return False
@@ -27,7 +27,7 @@ def is_value(cell: str) -> bool:
 
 
 def unit_behind(cell: str) -> str:
-    """Return the unit that a cell holds behind its number, empty where it holds none.
+    """Return the unit that follows the number in a cell; empty if there is none.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def unit_behind(cell: str) -> str:
 
 
 def parted(text: str) -> tuple[str, str]:
-    """Return a number, as it is written, and what stands behind it; nothing behind a text that is no such pair.
+    """Return a number as written, and the text that follows it; that text is empty if the cell is not such a pair.
 
     Examples
     --------
@@ -60,12 +60,12 @@ def _is_known_unit(text: str) -> bool:
 
 
 def without_unit(cell: str) -> str:
-    """Return a cell without the unit behind its number."""
+    """Return a cell without the unit that follows its number."""
     return cell.removesuffix(unit_behind(cell)).rstrip()
 
 
 def without_that_unit(cell: str, unit: str) -> str:
-    """Return a cell of a column whose numbers have one unit behind them without it; words for no value stay whole.
+    """Return a cell of a column with one unit, without that unit. Words for missing values stay complete.
 
     Examples
     --------

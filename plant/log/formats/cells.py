@@ -1,4 +1,4 @@
-"""Cells of a log as numbers: what is one, what says that nothing was measured, and what is refused."""
+"""Converts cells of a log to numbers: which are numbers, which are missing values, and which are refused."""
 
 import re
 import warnings
@@ -35,7 +35,7 @@ SHOWN = 60
 
 
 def number(text: str) -> float:
-    """Return a cell of text as a number, NaN if it is empty or says that nothing was measured.
+    """Return a text cell as a number; NaN if it is empty or a word for a missing value.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def number(text: str) -> float:
 
 
 def numbers(values: NDArray[Any], name: str, source: str) -> Array:
-    """Return a column as floats, shape (n,), NaN where nothing was measured and where a few cells are no numbers.
+    """Return a column as floats, shape (n,), with NaN for missing values and for a few cells that are not numbers.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def numbers(values: NDArray[Any], name: str, source: str) -> Array:
 
 
 def values_of(name: str, given: Any, source: str) -> Any:
-    """Return a user's column as an array, masked values as missing ones.
+    """Return a user's column as an array, with NaN for masked values.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def values_of(name: str, given: Any, source: str) -> Any:
 
 
 def no_numbers(name: str, count: int, where: str, place: int, said: str) -> Note:
-    """Return the note on a few cells of a column that are no numbers.
+    """Return the note on a few cells of a column that are not numbers.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def no_numbers(name: str, count: int, where: str, place: int, said: str) -> Note
 
 
 def each_read(columns: Iterable[Column], read: Callable[[Column], Array]) -> dict[Column, Array]:
-    """Return columns as they are read, but for simulated truth that holds no numbers.
+    """Return columns as they are read, without columns of simulated truth that hold no numbers.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def each_read(columns: Iterable[Column], read: Callable[[Column], Array]) -> dic
 
 
 def wrong_width(source: str, wanted: int, got: int, row: int) -> LogError:
-    """Return the error for a row that has not as many cells as the header; rows count from 0 here."""
+    """Return the error for a row whose number of cells differs from the header. Rows count from 0 here."""
     return LogError(
         f"every row must have {wanted} cells as the header has, got {got} in row {row + 1}, counted below the header",
         source,

@@ -1,4 +1,4 @@
-"""CSV logs: what they hold as numbers; fast through pyarrow, and cell by cell to name what is wrong."""
+"""CSV logs as numbers: read quickly by pyarrow, or cell by cell to name the cell that is wrong."""
 
 import gzip
 import io
@@ -27,7 +27,7 @@ _BLOCK = 1 << 20
 
 
 def open_csv(path: Path, metadata: str | None) -> Table:
-    """Open a text log: a CSV, or the like with tabs, semicolons or blanks, plain or packed by gzip or zstd.
+    """Open a text log: CSV, or with tabs, semicolons or blanks; plain or compressed by gzip or zstd.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def open_csv(path: Path, metadata: str | None) -> Table:
 
 
 def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
-    """Return columns as logged, NaN in empty cells; refuse a row of another width, or a cell that is no number."""
+    """Return columns as logged, NaN in empty cells. Refuse a row of another width, or a cell without a number."""
     found: dict[Column, Array] | None = None
     if layout.delimiter != BLANKS:
         with suppress(pa.ArrowInvalid, UnicodeError, _NotFastError):  # stray bytes harm nobody outside their cell
@@ -63,7 +63,7 @@ def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, 
 
 
 def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool) -> None:
-    """Write columns as CSV, shortest digits that read back exactly, missing samples as empty cells.
+    """Write columns as CSV, with the shortest digits that read back exactly; missing samples are empty cells.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool)
 
 
 class _NotFastError(Exception):
-    """A log must be read line by line."""
+    """A log that must be read line by line."""
 
 
 @contextmanager
@@ -92,9 +92,10 @@ def _text(path: Path, layout: Layout, errors: str = "replace") -> Generator[Text
 
 
 def _source(path: Path, layout: Layout) -> Path | bytes:
-    """Return the input for pyarrow: the file itself, which it reads in parallel, or else its text in UTF-8.
+    """Return the input for pyarrow: the file itself, which it reads in parallel, or its text in UTF-8.
 
-    No thread of pyarrow may call Python back: an error raised there, as of too large a file, ends or hangs the process.
+    No thread of pyarrow may call Python: an error raised there, such as for too large a file, ends or hangs the
+    process.
     """
     if layout.encoding.startswith("utf-16"):
         with _text(path, layout, errors="strict") as text:
@@ -125,7 +126,7 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
 
 
 def _arrow_table(source: Path | bytes, layout: Layout, kinds: Mapping[str, Any]) -> Any:
-    """Return columns as Arrow reads them, each of its kind, by their places as text."""
+    """Return columns as Arrow reads them, each with its own type; the names are positions as text."""
     return arrow_csv.read_csv(
         cast("Any", source if isinstance(source, Path) else pa.BufferReader(source)),
         read_options=arrow_csv.ReadOptions(
@@ -142,7 +143,7 @@ def _arrow_table(source: Path | bytes, layout: Layout, kinds: Mapping[str, Any])
 
 
 def _texts(path: Path, layout: Layout, column: Column) -> list[str]:
-    """Return the cells of a column as they are written."""
+    """Return the cells of a column as written."""
     if layout.delimiter != BLANKS:
         with suppress(pa.ArrowInvalid, UnicodeError):
             label = str(column.position)
@@ -157,7 +158,7 @@ def _refused(row: int, cell: str) -> Exception:
 
 
 def _lines_if_quoted(source: Path | bytes, layout: Layout) -> int | None:
-    """Return the number of non-blank lines below the header; None if they have no quote."""
+    """Return the number of lines below the header that are not blank; None if they contain no quote."""
     with source.open("rb") if isinstance(source, Path) else io.BytesIO(source) as file:
         for _ in range(layout.skipped):
             file.readline()
@@ -169,14 +170,14 @@ def _lines_if_quoted(source: Path | bytes, layout: Layout) -> int | None:
 
 
 def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
-    """Read what pyarrow will not, line by line, or say in which row and column it is no number."""
+    """Read line by line what pyarrow cannot read, or name the row and column that is not a number."""
     with _rows(path, layout) as rows:
         return read_cells(rows, layout, chosen, str(path))
 
 
 @contextmanager
 def _rows(path: Path, layout: Layout) -> Generator[Iterator[list[str]]]:
-    """Open what stands below the header, as the cells of each line."""
+    """Open the lines below the header, as lists of cells."""
     with _text(path, layout) as text:
         # files that were put behind each other have a mark of their order of bytes within
         lines = (line.rstrip("\n").removeprefix("\ufeff") for line in islice(text, layout.skipped, None))

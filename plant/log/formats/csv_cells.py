@@ -1,4 +1,4 @@
-"""A log of text, or of a sheet, cell by cell: which lines are rows of data, and which cell is no number."""
+"""Reads a text log or a sheet cell by cell: which lines are rows of data, and which cells are not numbers."""
 
 import warnings
 from array import array
@@ -28,12 +28,12 @@ TOGETHER = 1000
 def read_cells(
     rows: Iterable[Sequence[str]], layout: Layout, chosen: Sequence[Column], source: str
 ) -> dict[Column, Array]:
-    """Return columns of rows; lines that are no rows of data are left out where they are few.
+    """Return the columns of the rows. A few lines that are not rows of data are left out.
 
-    A line of comment and a header that comes again are skipped. Of all rows, 1 % may have too few or too many cells, or
-    a cell that is no number: such a row is left out where its time is unknown or it is one of the last, else only the
-    cell is missing. In a log without a column of time no row within the data is left out, for those below it would come
-    too early.
+    Comments and repeated headers are skipped. At most 1 % of all rows may have too few or too many cells, or a cell
+    that is not a number. Such a row is left out if its time is unknown or if it is one of the last; otherwise only the
+    cell is missing. In a log without a time column, no row within the data is left out, because the rows below it would
+    come too early.
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ def read_cells(
 
 
 def _are_names(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Return whether a row repeats the header; a column without a name has its number as name."""
+    """Return whether a row repeats the header. A column without a name has its number as name."""
     if cells[0] not in (names[0], "") or len(cells) != len(names):
         return False
     return [cell.strip() or f"column {place + 1}" for place, cell in enumerate(cells)] == list(names)
 
 
 class _Row(NamedTuple):
-    """A line of the file, and which row it is below the header, from 0."""
+    """A line of the file, and its row number below the header, from 0."""
 
     line: int
     row: int
@@ -104,7 +104,7 @@ class _Row(NamedTuple):
 
 
 class _Strange(NamedTuple):
-    """A line that is no row of data."""
+    """A line that is not a row of data."""
 
     line: int
     said: str
@@ -114,7 +114,7 @@ class _Strange(NamedTuple):
 
 @dataclass
 class _Body:
-    """The rows of a log as they are read."""
+    """The rows of a log during reading."""
 
     layout: Layout
     columns: dict[Column, Cells]
@@ -125,7 +125,7 @@ class _Body:
     skipped: int = 0
 
     def note_width(self, row: _Row, waiting: int) -> None:
-        """Keep a row of another width in mind; most rows of a log are not so."""
+        """Remember a row of another width; refuse the log if most of its rows have one."""
         wanted, got = len(self.layout.headings), len(row.cells)
         error = wrong_width(self.source, wanted, got, row.row)
         self.strange.append(_Strange(row.line, row.said, error, got == wanted - 1 and _is_header(row.cells)))
@@ -133,7 +133,7 @@ class _Body:
             raise self.strange[0].error
 
     def take(self, block: Sequence[_Row]) -> None:
-        """Add rows to the columns, but for headers and units that stand among them."""
+        """Append rows to the columns, without repeated headers and units."""
         odd = {place for column in self.columns for place in self._read(column, self._cells(column, block))[1]}
         headers = {place for place in odd if _is_header(block[place].cells)}
         for row in (block[place] for place in sorted(headers)):
@@ -166,7 +166,7 @@ class _Body:
         )
 
     def _cells(self, column: Column, rows: Sequence[_Row]) -> list[str]:
-        """Return the cells of a column, without the unit that stands behind each number."""
+        """Return the cells of a column without the unit that follows each number."""
         cells = [row.cells[column.position] for row in rows]
         unit = self.layout.in_cells.get(column.position)
         return cells if unit is None else [without_that_unit(cell, unit) for cell in cells]
@@ -195,7 +195,7 @@ class _Body:
         return values, bad
 
     def judged(self) -> tuple[dict[Column, Array], list[Note]]:
-        """Return the columns without garbage, and what was left out; refuse a log that has much of it."""
+        """Return the columns without bad rows, and what was left out. Refuse a log with too many bad rows."""
         for column, cells in self.columns.items():
             cells.settle(column, self.layout.decimal_point, self.source)
             if column.channel == TIME:
@@ -238,7 +238,7 @@ class _Body:
         return read_stamps(["" if row in cells.bad else one for row, one in enumerate(cells.values)], refuse)
 
     def _note_out_of_order(self, found: Mapping[Column, Any]) -> None:
-        """Count a row that holds a cell of text as garbage where its time does not lie between those beside it."""
+        """Count a row with a text cell as bad if its time does not lie between those of its neighbours."""
         for time in (values for column, values in found.items() if column.channel == TIME):
             for bad in (self.columns[column].bad for column in found):
                 for row, cell in bad.items():
@@ -250,7 +250,7 @@ class _Body:
     def _refuse(
         self, found: Iterable[Column], within: Sequence[_Strange], taken: int, allowed: float, *, spared: bool
     ) -> None:
-        """Refuse rows if too many are no data, by the first of them; another header comes before all others."""
+        """Refuse rows if too many are not data. The error names the first one, or a repeated header if there is one."""
         for one in within:
             if one.is_header:
                 raise one.error
@@ -293,7 +293,7 @@ def _is_header(cells: Sequence[str]) -> bool:
 
 
 def _number(cell: str, decimal_point: str) -> float:
-    """Return a cell as a number, also one with its thousands apart; ValueError for others."""
+    """Return a cell as a number, with or without separators of thousands; ValueError for others."""
     try:
         return number(cell if decimal_point == "." else cell.replace(",", "."))
     except ValueError:

@@ -1,4 +1,4 @@
-"""A column of a text log as it is read: a column tells as a whole what its points and commas are."""
+"""A column of a text log during reading. The whole column decides what its points and commas mean."""
 
 import re
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ _DECIMAL = re.compile(r"[-+]?\d*,\d+")
 
 @dataclass
 class Cells:
-    """A column as it is read.
+    """A column during reading.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Cells:
     parts_thousands: bool = False
 
     def note_parted(self, cells: Sequence[str], first: int, point: str) -> None:
-        """Keep numbers of further rows that may have separators of thousands.
+        """Keep numbers of further rows that may contain separators of thousands.
 
         Parameters
         ----------

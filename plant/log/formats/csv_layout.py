@@ -1,4 +1,4 @@
-"""Layout of a text log: encoding, delimiter, decimal comma, lines above the header, row of units."""
+"""The layout of a text log: encoding, delimiter, decimal comma, lines above the header, row of units."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""Headers of some programs above the rows of a text log: units, the time step, a clock for each channel."""
+"""Headers that some programs write above the rows of a text log: units, the time step, a clock for each channel."""
 
 import re
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ TWINCAT_STEP = "SampleTime[ms]"
 
 
 def without_remarks(lines: Sequence[str]) -> list[str]:
-    """Return lines whose header does not name LabVIEW's column of remarks, where rows have none.
+    """Return lines whose header does not name LabVIEW's column of comments, if rows have none.
 
     Parameters
     ----------

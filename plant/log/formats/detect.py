@@ -1,4 +1,4 @@
-"""Which format a log file is in, told by its first bytes, and the file opened as tables."""
+"""Detects the format of a log file by its first bytes, and opens it as tables."""
 
 import re
 import zlib
@@ -78,7 +78,7 @@ REFUSED: Mapping[str, str] = {
 
 
 def format_of(path: Path) -> str:
-    """Return which format a file is in.
+    """Return the format of a file.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def format_of(path: Path) -> str:
 
 
 def _in_zip(path: Path) -> str:
-    """Return the format of a zip archive: NumPy's arrays, a sheet of OpenDocument, or else one of Excel."""
+    """Return the format of a zip archive: NumPy arrays, an OpenDocument sheet, or otherwise Excel."""
     try:
         with ZipFile(path) as archive:
             names = archive.namelist()
@@ -115,7 +115,7 @@ def _in_zip(path: Path) -> str:
 
 
 def _by_suffix(path: Path, start: bytes) -> str:
-    """Return the format of a file that its first bytes do not identify: by its suffix, unless it is text."""
+    """Return the format of a file by its suffix, if its first bytes do not identify it and it is not text."""
     kind = SUFFIXES.get(path.suffix.lower(), "csv")
     text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
     if kind == "csv" and re.match(rb"<(?:\?xml|!doctype|html|table)\b", text, re.IGNORECASE):
@@ -159,7 +159,7 @@ def open_tables(path: Path, metadata: str | None = None) -> tuple[Table, ...]:
 
 
 def _guarded(table: Table, kind: str, path: Path) -> Table:
-    """Return a table whose columns are refused in a sentence where they are damaged."""
+    """Return a table that refuses damaged columns with a clear error."""
 
     def read(columns: Sequence[Column]) -> dict[Column, Array]:
         try:
@@ -171,7 +171,7 @@ def _guarded(table: Table, kind: str, path: Path) -> Table:
 
 
 def refusal(error: BaseException, kind: str, path: Path) -> BaseException:
-    """Return the error that is shown for one that a reader of files raised; a damaged file brings up any.
+    """Return the error that a user sees for an exception of a file reader. A damaged file may raise any exception.
 
     Parameters
     ----------

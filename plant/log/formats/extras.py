@@ -1,4 +1,4 @@
-"""Libraries that only some formats take: imported when such a file comes, and named when they are absent."""
+"""Libraries that only some formats need. They are imported when such a file is read, and named if they are missing."""
 
 import logging
 from importlib import import_module
@@ -8,7 +8,7 @@ from plant.errors import LogError
 
 
 def library(name: str, kind: str, source: str) -> Any:
-    """Return a library that reads one kind of file.
+    """Return a library that reads one format.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""HDF5 logs, MAT 7.3 among them: vectors in groups, columns of a matrix, or fields of a table."""
+"""HDF5 logs, including MAT 7.3: vectors in groups, columns of a matrix, or fields of a table."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -69,7 +69,7 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
 
 
 def _data_sets(h5py: Any, file: Any) -> Iterator[tuple[str, Any]]:
-    """Return each data set by each of its names: one may have several, and groups may lie within each other."""
+    """Return each data set under each of its names. It may have several, and groups may be nested."""
     waiting, entered, count = [("", file)], set[int](), 0
     while waiting:
         name, one = waiting.pop()
@@ -90,7 +90,7 @@ def _holds_numbers(one: Any) -> bool:
 
 
 def _columns(one: Any, leaf: str) -> dict[str, Any]:
-    """Return the columns that a data set of numbers holds."""
+    """Return the columns of a numeric data set."""
     kind, values = one.dtype, _unpacked(one, np.asarray(one[()]))
     if kind.names is not None:
         if values.ndim != 1:
@@ -105,7 +105,7 @@ def _columns(one: Any, leaf: str) -> dict[str, Any]:
 
 
 def _unpacked(one: Any, values: Any) -> Any:
-    """Return values with what the conventions of netCDF say of them: no value, scale and offset."""
+    """Return values with the netCDF conventions applied: missing value, scale and offset."""
     told = {name: _number(one, name) for name in PACKED}
     if values.dtype.names is not None or not any(number is not None for number in told.values()):
         return values
@@ -115,7 +115,7 @@ def _unpacked(one: Any, values: Any) -> Any:
 
 
 def _number(one: Any, name: str) -> float | None:
-    """Return an attribute that is one finite number, else None."""
+    """Return an attribute that is one finite number; None for others."""
     try:
         value = np.asarray(one.attrs.get(name))
     except (OSError, KeyError, TypeError, ValueError):
@@ -126,7 +126,7 @@ def _number(one: Any, name: str) -> float | None:
 
 
 def _attribute(one: Any, name: str) -> str:
-    """Return an attribute as text, empty where there is none."""
+    """Return an attribute as text; empty if there is none."""
     try:
         value = one.attrs.get(name)
     except (OSError, KeyError, TypeError):
@@ -139,7 +139,7 @@ def _attribute(one: Any, name: str) -> str:
 
 
 def _names(one: Any) -> list[str]:
-    """Return the names that a data set gives its columns, none where it gives none."""
+    """Return the names that a data set gives its columns; empty if it gives none."""
     for name in NAMES:
         value = one.attrs.get(name)
         if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "OSU":

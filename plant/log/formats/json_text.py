@@ -1,4 +1,4 @@
-"""JSON logs: rows as objects, one a line or in a list, rows as lists below their names, or an object of columns."""
+"""JSON logs: rows as objects, one on a line or in a list; rows as lists below their names; or an object of columns."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -79,7 +79,7 @@ def _columns(document: Any) -> dict[str, list[Any]]:
 
 
 def _array(values: list[Any]) -> Any:
-    """Return a column as numbers, NaN for null; as it is where it holds others."""
+    """Return a column as numbers, with NaN for null; unchanged if it holds other values."""
     if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
         return np.array([np.nan if value is None else float(value) for value in values])
     made = np.empty(len(values), dtype=object)

@@ -1,8 +1,7 @@
-"""Layouts of CSV logs that were read before: of a folder of like files only the first is puzzled over.
+"""Remembers layouts of CSV logs, so that only the first of many similar files in a folder is analysed.
 
-A file has the layout of an earlier one if it begins with the same bytes up to the first row of data, and if its rows
-are plain numbers as theirs were: as many, with decimal points, apart by commas. Everything that decides a layout is
-then the same.
+A file has a known layout if its bytes up to the first row of data are the same, and if its rows are plain numbers in as
+many columns, with decimal points and commas between them. Everything that decides a layout is then the same.
 """
 
 import re
@@ -32,7 +31,7 @@ _seen: dict[bytes, "Layout"] = {}
 
 
 def remembered(start: bytes, lines: int) -> "Layout | None":
-    """Return the layout of an earlier file that was written alike.
+    """Return the layout of an earlier file with the same header.
 
     Parameters
     ----------
@@ -52,7 +51,7 @@ def _alike(start: bytes) -> Mapping[bytes, "Layout"]:
 
 
 def remember(start: bytes, lines: int, layout: "Layout") -> None:
-    """Keep a layout for files that are written alike.
+    """Keep a layout for files with the same header.
 
     Parameters
     ----------

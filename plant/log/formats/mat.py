@@ -1,4 +1,4 @@
-"""MAT logs: structs whose fields are columns, or plain variables; versions 5 to 7 here, 7.3 as the HDF5 it is."""
+"""MAT logs: structs whose fields are columns, or plain variables. Versions 5 to 7 are read here, 7.3 as HDF5."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -82,7 +82,7 @@ def tables_of(content: Mapping[str, Value], source: str) -> tuple[Table, ...]:
 
 
 def _columns(struct: Mapping[str, Value], above: str = "") -> tuple[dict[str, Any], dict[str, str | None]]:
-    """Return a struct's columns by name, fields of structs within it as ``outer.inner``, and what units it gives."""
+    """Return a struct's columns by name, with nested fields as ``outer.inner``, and the units it gives."""
     columns: dict[str, Any] = {}
     units: dict[str, str | None] = {}
     if "time" in struct and "signals" in struct:
@@ -98,7 +98,7 @@ def _columns(struct: Mapping[str, Value], above: str = "") -> tuple[dict[str, An
 
 
 def _recorded(struct: Mapping[str, Value]) -> list[tuple[dict[str, Any], dict[str, str | None]]]:
-    """Return the columns of what dSPACE records, a raster each: signals in Y, each with its place in the times of X."""
+    """Return the columns of a dSPACE recording, one table for each raster: signals in Y refer to their times in X."""
     if not {"X", "Y"} <= struct.keys():
         return []
     times, signals = (
@@ -125,7 +125,7 @@ def _unit(struct: Mapping[str, Any]) -> str | None:
 
 
 def _simulink(struct: Mapping[str, Value]) -> tuple[dict[str, Any], dict[str, str | None]]:
-    """Return the columns of what Simulink calls a structure with time: its time is in seconds."""
+    """Return the columns of Simulink's "structure with time"; its time is in seconds."""
     columns: dict[str, Any] = {"time": struct["time"]}
     signals = struct["signals"]
     many: Sequence[Any] = signals if isinstance(signals, Sequence) and not isinstance(signals, str) else [signals]
@@ -137,7 +137,7 @@ def _simulink(struct: Mapping[str, Value]) -> tuple[dict[str, Any], dict[str, st
 
 
 def spread(name: str, values: Any) -> dict[str, Any]:
-    """Return a vector under its name, a matrix that is longer than wide as one column a column of it.
+    """Return a vector under its name, or each column of a matrix that is longer than wide.
 
     Parameters
     ----------

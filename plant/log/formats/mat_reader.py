@@ -1,7 +1,7 @@
 """A reader of MAT files of versions 5 to 7 for numbers, text and structs, which a damaged file cannot crash.
 
-scipy's reader trusts the tags of a file: one wrong byte can end the process. Layout as in "MAT-File Format",
-The MathWorks; what is not read here (cells, objects, sparse matrices) is skipped.
+scipy's reader trusts the tags of a file: one wrong byte can end the process. The layout is that of "MAT-File Format",
+The MathWorks. Other contents (cells, objects, sparse matrices) are skipped.
 """
 
 import zlib
@@ -36,7 +36,7 @@ class DamagedMatError(ValueError):
 
 @dataclass
 class _Reader:
-    """A walk through the elements of one stretch of a file."""
+    """A cursor over the elements of one part of a file."""
 
     data: memoryview
     order: Literal["little", "big"]
@@ -50,7 +50,7 @@ class _Reader:
         return self.at + 8 <= len(self.data)
 
     def element(self) -> tuple[int, memoryview]:
-        """Return the kind and the content of the next element, and step over it."""
+        """Return the type and the content of the next element, and move past it."""
         if not self.more():
             raise DamagedMatError("the file ends within an element")
         kind, count, start = self.integer(self.at), self.integer(self.at + 4), self.at + 8
@@ -149,7 +149,7 @@ def _text(reader: _Reader) -> str:
 
 
 def _structs(reader: _Reader, count: int) -> list[Mapping[str, Value]]:
-    """Return the structs of an array of them, which have the same fields."""
+    """Return the structs of an array; all have the same fields."""
     width, (_, labels) = reader.numbers(), reader.element()
     if len(width) != 1 or int(width[0]) < 1:
         raise DamagedMatError("a struct without a length of its field names")

@@ -1,4 +1,4 @@
-"""Structs of a MAT file as tables: those within that have a time of their own, and arrays of structs."""
+"""Structs of a MAT file as tables: nested structs with their own time, and arrays of structs."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,10 +16,10 @@ Struct = Mapping[str, Any]
 
 
 def structs_of(name: str, value: Value) -> dict[str, Struct]:
-    """Return a variable as structs that are a table each, by what they are called; none for other variables.
+    """Return a variable as structs by name, one for each table; empty for other variables.
 
-    A struct within another is apart if it has a time of its own. An array of structs has one a sample, whose fields are
-    numbers; one a signal, with its name and samples; or one a test.
+    A nested struct with its own time is a table of its own. An array of structs has one struct for each sample, with
+    numeric fields; or one for each signal, with its name and samples; or one for each test.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def structs_of(name: str, value: Value) -> dict[str, Struct]:
 
 
 def each_struct(value: Value) -> list[Struct]:
-    """Return the structs of an array of them, or the only one; none of anything else.
+    """Return the structs of an array, or a single struct; empty for anything else.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def _is_vector(value: Any) -> bool:
 
 
 def _of_samples(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
-    """Return an array with a struct a sample as one struct of columns; empty if it is none."""
+    """Return an array with one struct for each sample as one struct of columns; empty for other arrays."""
     numbers = [key for key, value in each[0].items() if isinstance(value, np.ndarray) and value.size == 1]
     if not numbers or any(key not in one or np.size(one[key]) != 1 for one in each for key in numbers):
         return {}
@@ -73,7 +73,7 @@ def _of_samples(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
 
 
 def _of_signals(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
-    """Return an array with a struct a signal: together, but apart those with own times; empty if it is none."""
+    """Return an array with one struct for each signal as tables, split by time; empty for other arrays."""
     found: dict[str, Struct] = {}
     together: dict[str, Any] = {}
     for place, one in enumerate(each, start=1):

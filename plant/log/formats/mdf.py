@@ -1,4 +1,4 @@
-"""MDF logs, version 3 and 4, as INCA, CANape and others write them: groups of channels, each with its clock."""
+"""MDF logs, versions 3 and 4, as INCA, CANape and others write them: groups of channels, each with its clock."""
 
 import gc
 import sys
@@ -90,20 +90,20 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
 
 
 def _clock(group: Any, master: int | None) -> tuple[str, str | None]:
-    """Return name and unit of what the samples of a group are counted by."""
+    """Return name and unit of the master channel of a group."""
     if master is None or getattr(group.channels[master], "sync_type", IN_TIME[1]) in IN_TIME:
         return "time", "s"
     return _last(group.channels[master].name), group.channels[master].unit or None
 
 
 def _names(group: Any) -> list[str]:
-    """Return the names of channels, without their device unless two would then share a name."""
+    """Return the names of channels, without their device unless two would then have the same name."""
     short = Counter(_last(one.name) for one in group.channels)
     return [_last(one.name) if short[_last(one.name)] == 1 else one.name for one in group.channels]
 
 
 def _taken_formula(channel: Any) -> tuple[str | None, str | None]:
-    """Return the formula of a channel, and the unit beside it, and let asammdf return raw numbers in its place."""
+    """Return the formula and unit of a channel, and make asammdf return its raw numbers."""
     conversion = channel.conversion
     formula = _formula_in(conversion)
     if formula is None:
@@ -113,7 +113,7 @@ def _taken_formula(channel: Any) -> tuple[str | None, str | None]:
 
 
 def _formula_in(conversion: Any, depth: int = 0) -> str | None:
-    """Return the formula of a conversion; that of one which another refers to is no formula that is evaluated."""
+    """Return the formula of a conversion. The formula of a conversion that another refers to is not evaluated."""
     if own := str(getattr(conversion, "formula", "") or "").strip(" \t\r\n\0"):
         return own if depth == 0 else f"{own[:80]} in a part of its range"
     within: Mapping[str, Any] = getattr(conversion, "referenced_blocks", None) or {}
@@ -123,7 +123,7 @@ def _formula_in(conversion: Any, depth: int = 0) -> str | None:
 
 
 def _valid(signal: Any, formula: str | None, source: str) -> Any:
-    """Return the samples of a channel, NaN where the logger called them invalid, or what refuses them."""
+    """Return the samples of a channel, NaN where the logger marked them invalid, or the error."""
     samples, invalid = signal.samples, signal.invalidation_bits
     if formula is not None:
         try:
@@ -143,12 +143,12 @@ def _refuse(message: str, source: str) -> Any:
 
 
 def _record_bytes(group: Any) -> int:
-    """Return the bytes of a record of a group, with those that say which samples are invalid."""
+    """Return the bytes of a group's record, including those that mark invalid samples."""
     return group.channel_group.samples_byte_nr + getattr(group.channel_group, "invalidation_bytes_nr", 0)
 
 
 def _require_within(group: Any, source: str) -> None:
-    """Refuse a group with a channel outside its records: asammdf copies from there unchecked, and the process ends."""
+    """Refuse a group with a channel outside its records. asammdf copies from there unchecked, and the process ends."""
     bits = 8 * _record_bytes(group)
     for channel in group.channels:
         if getattr(channel, "channel_type", 0) in VIRTUAL:
@@ -162,5 +162,5 @@ def _require_within(group: Any, source: str) -> None:
 
 
 def _last(name: str) -> str:
-    """Return a channel's name without the device that INCA puts behind it."""
+    """Return a channel's name without the device that INCA appends."""
     return name.split("\\")[0]

@@ -1,7 +1,7 @@
-"""Formulas by which an MDF file converts raw numbers into physical ones.
+"""Formulas by which an MDF file converts raw numbers to physical values.
 
-They are evaluated here: asammdf returns raw numbers for a formula that it cannot evaluate, takes for ever with
-``9**9**9**9``, and with SymPy installed it runs whatever program the formula is.
+They are evaluated here because asammdf returns raw numbers for a formula that it cannot evaluate, never ends with
+``9**9**9**9``, and with SymPy installed runs any program that the formula contains.
 """
 
 import ast
@@ -34,7 +34,7 @@ _FUNCTIONS: Mapping[str, tuple[int, Callable[..., Any]]] = {
 
 
 def evaluated(formula: str, raw: Array) -> Array:
-    """Return physical numbers of raw ones.
+    """Return the physical values of raw numbers.
 
     Parameters
     ----------

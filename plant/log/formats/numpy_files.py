@@ -1,4 +1,4 @@
-"""NumPy's own files: an array (.npy), or an archive of arrays (.npz), each a column by its name."""
+"""NumPy files: an array (.npy), or an archive of named arrays (.npz)."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from plant.log.table import Table, table_of
 
 
 def open_npz(path: Path) -> Table:
-    """Open an archive of NumPy's arrays.
+    """Open an archive of NumPy arrays.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def open_npz(path: Path) -> Table:
 
 
 def open_npy(path: Path) -> Table:
-    """Open an array of NumPy's: of records, a column each, or of rows.
+    """Open a NumPy array: a structured array with one column for each field, or rows of numbers.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Bytes of a log file, packed or not: regular files alone, and never more than a real log unpacks to."""
+"""Bytes of a log file, compressed or not. Only regular files are read, up to the size of a real log."""
 
 import io
 import stat
@@ -20,7 +20,7 @@ _BLOCK = 1 << 18
 
 
 def require_regular(path: Path) -> None:
-    """Refuse what is no regular file, without opening it: a pipe would wait for ever.
+    """Refuse a path that is not a regular file, without opening it: a pipe would block.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def require_regular(path: Path) -> None:
 
 
 def most_unpacked(size: int) -> int:
-    """Return the largest size to which a file may unpack.
+    """Return the largest size to which a file may decompress.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def most_unpacked(size: int) -> int:
 
 
 def too_large(source: str, most: int) -> LogError:
-    """Return the error for a file that unpacks to more than a log does."""
+    """Return the error for a file that decompresses to more than a log can hold."""
     return LogError(
         f"it unpacks to more than {most / 2**20:.0f} MB, the most that is read of a packed file of its size "
         f"({ALWAYS >> 20} MB, or {MOST_TIMES} times the file); unpack it first if it is a log",
@@ -62,7 +62,7 @@ def too_large(source: str, most: int) -> LogError:
 
 
 class Unpacked(io.RawIOBase):
-    """The bytes of a packed file, up to a limit; each use has one of its own.
+    """The bytes of a compressed file, up to a limit. Each use opens its own.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Unpacked(io.RawIOBase):
         self._file, self._most, self._source, self._count = file, most, source, 0
 
     def readable(self) -> bool:
-        """Return that it can be read."""
+        """Return that the content can be read."""
         return True
 
     def readinto(self, buffer: Any) -> int:
@@ -96,20 +96,20 @@ class Unpacked(io.RawIOBase):
         return len(part)
 
     def close(self) -> None:
-        """Close the file beneath."""
+        """Close the underlying file."""
         self._file.close()
         super().close()
 
 
 def packing_of(path: Path) -> str | None:
-    """Return the compression of a file, ``gzip`` or ``zstd``, by its first bytes; None without one."""
+    """Return the compression of a file, ``gzip`` or ``zstd``, by its first bytes; None if it has none."""
     with path.open("rb") as file:
         start = file.read(4)
     return "gzip" if start.startswith(GZIP) else "zstd" if start == ZSTD else None
 
 
 def opened(path: Path) -> BinaryIO:
-    """Open a file for reading what is in it.
+    """Open the decompressed content of a file.
 
     Returns
     -------

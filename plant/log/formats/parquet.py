@@ -1,4 +1,4 @@
-"""Parquet and Feather logs, both of Arrow's tables."""
+"""Parquet and Feather logs, read as Arrow tables."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -63,7 +63,7 @@ def open_parquet(path: Path) -> Table:
 
 
 def _in_parts(path: Path, file: Any, chosen: Sequence[Column], before: Sequence[int]) -> dict[Column, Array]:
-    """Return very many columns, some at a time: each reading of the file looks at the names of all."""
+    """Return a very large number of columns in parts, because each read of the file examines all names."""
     names, out = file.schema_arrow.names, dict[Column, Array]()
     for first in range(0, len(chosen), MANY):
         part = chosen[first : first + MANY]
@@ -77,7 +77,7 @@ def _in_parts(path: Path, file: Any, chosen: Sequence[Column], before: Sequence[
 
 
 def _before(names: Sequence[str]) -> list[int]:
-    """Return for each column how many before it have the same name."""
+    """Return for each column how many earlier columns have the same name."""
     seen, out = Counter[str](), list[int]()
     for name in names:
         out.append(seen[name])
@@ -86,13 +86,13 @@ def _before(names: Sequence[str]) -> list[int]:
 
 
 def _named(table: Any, name: str, before: int) -> Any:
-    """Return the column of a name that has so many others of that name before it."""
+    """Return the column of a name that follows so many others of that name."""
     places = table.schema.get_all_field_indices(name)
     return table.column(places[min(before, len(places) - 1)])
 
 
 def open_feather(path: Path) -> Table:
-    """Open a Feather file, which is Arrow's own.
+    """Open a Feather file, the format of Arrow.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def _table(path: Path, schema: pa.Schema, read: Any) -> Table:
 
 
 def _said(field: "pa.Field[Any]") -> str | None:
-    """Return the unit that a field gives; a duration is in the one that its name says, or in seconds."""
+    """Return the unit that a field gives; for a duration the unit in its name, or seconds."""
     if pa.types.is_duration(field.type):
         return _unit_of_duration(field.name)
     metadata: Mapping[bytes, bytes] = field.metadata or {}
@@ -171,7 +171,7 @@ def _values(values: "pa.ChunkedArray[Any]", column: Column, source: str) -> Any:
 
 
 def write_parquet(columns: Mapping[str, Array], metadata: str, file: BinaryIO) -> None:
-    """Write columns as a Parquet file, metadata in its schema.
+    """Write columns as a Parquet file, with metadata in its schema.
 
     Parameters
     ----------

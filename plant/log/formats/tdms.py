@@ -1,4 +1,4 @@
-"""TDMS logs, as LabVIEW writes them: groups of channels, each with its unit, and a time step in place of stamps."""
+"""TDMS logs, as LabVIEW writes them: groups of channels, each with its unit and a time step instead of stamps."""
 
 from collections import defaultdict
 from pathlib import Path
@@ -55,7 +55,7 @@ def open_tdms(path: Path) -> tuple[Table, ...]:
 
 
 def _number(value: Any) -> float | None:
-    """Return a step, None where it is none."""
+    """Return a time step; None if it is not one."""
     try:
         step = float(value)
     except (TypeError, ValueError):
@@ -64,7 +64,7 @@ def _number(value: Any) -> float | None:
 
 
 def _offset(value: Any) -> float:
-    """Return the delay of the first sample after the beginning [s]."""
+    """Return the delay of the first sample after the start [s]."""
     try:
         offset = float(value)
     except (TypeError, ValueError):
@@ -73,7 +73,7 @@ def _offset(value: Any) -> float:
 
 
 def _stamp(value: Any) -> Any:
-    """Return when a channel begins, None where nothing is said; LabVIEW's zero of 1904 says nothing."""
+    """Return the start of a channel; None if it is not given or is LabVIEW's zero in 1904."""
     try:
         stamp = np.datetime64(value).astype("datetime64[ns]")
     except (TypeError, ValueError, OverflowError):

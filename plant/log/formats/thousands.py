@@ -1,4 +1,4 @@
-"""Separators of thousands: those that can be nothing else are taken out, others would make a thousandth of a number."""
+"""Separators of thousands: removed where they are certain, refused elsewhere."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -34,7 +34,7 @@ LEAST = 30
 
 
 def without_thousands(cell: str, decimal_point: str) -> str | None:
-    """Return a number without its separators of thousands and with a decimal point, None if they may be decimal signs.
+    """Return a number with a decimal point and no separators of thousands; None if they may be decimal signs.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def without_thousands(cell: str, decimal_point: str) -> str | None:
 
 
 def decimal_point_of(numbers: Iterable[str]) -> str:
-    """Return the decimal sign of numbers in which points, commas or both stand.
+    """Return the decimal sign of numbers with points, commas or both.
 
     Parameters
     ----------
@@ -83,9 +83,9 @@ def decimal_point_of(numbers: Iterable[str]) -> str:
 
 
 def groups_thousands(cells: Sequence[str]) -> bool:
-    """Return whether a column holds whole numbers with separated thousands, such as 998 and 1,002.
+    """Return whether a column holds whole numbers with separators of thousands, such as 998 and 1,002.
 
-    Decimals leave other counts of digits behind the comma, or a zero before it.
+    Decimals have other numbers of digits after the comma, or a zero before it.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ def groups_thousands(cells: Sequence[str]) -> bool:
 
 
 def is_grouped(cell: str) -> bool:
-    """Return whether a cell may have separated thousands, or three decimals: 1.002, not 0.998 or 1.02."""
+    """Return whether a cell may have separators of thousands, or three decimals: 1.002, not 0.998 or 1.02."""
     return _GROUPED.fullmatch(cell) is not None
 
 
 def may_group_thousands(values: Array) -> bool:
-    """Return whether numbers read as decimals may be whole ones, such as 998 and 1.002; only their text tells.
+    """Return whether numbers read as decimals may be whole ones, such as 998 and 1.002. Only their text decides.
 
     Parameters
     ----------
@@ -193,10 +193,10 @@ def require_none_grouped(cells: Iterable[str], name: str, source: str) -> None:
 
 
 def require_decimal_points(rows: Sequence[Sequence[str]], above: Sequence[str], source: str) -> None:
-    """Refuse rows at whose commas numbers are cut: two whole numbers below each name, such as ``0,05,1,2`` below two.
+    """Refuse rows in which commas split numbers: two whole numbers below each name.
 
-    A fraction has no sign, and one that begins with a zero shows that it is one: whole numbers below a title are not
-    refused.
+    ``0,05,1,2`` below two names is such a row. A fraction has no sign, and one that begins with a zero is certain.
+    Whole numbers below a title are not refused.
 
     Parameters
     ----------

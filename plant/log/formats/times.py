@@ -1,4 +1,4 @@
-"""Columns in memory that are dates and times: of NumPy, of Python, or as text."""
+"""Columns of dates and times in memory: from NumPy, from Python, or as text."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -10,7 +10,7 @@ from plant.log.formats.cells import not_a_number
 
 
 def is_time(values: "np.ndarray[Any, Any]") -> bool:
-    """Return whether a column holds dates or times of the day, told by its first value.
+    """Return whether a column holds dates or times of day, by its first value.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def moments(values: "np.ndarray[Any, Any]", name: str, source: str) -> Any:
 
 
 def _said(value: Any) -> str:
-    """Return a moment as text; that of a zone in universal time."""
+    """Return a moment as text; a moment with a zone in universal time."""
     if not isinstance(value, datetime):
         return str(value)
     plain = value if value.tzinfo is None else value.astimezone(UTC).replace(tzinfo=None)

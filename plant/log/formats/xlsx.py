@@ -1,4 +1,4 @@
-"""Excel workbooks: every sheet with rows of numbers is a table, laid out as a text log would be."""
+"""Excel workbooks: every sheet with rows of numbers is a table with the layout of a text log."""
 
 import re
 import zlib
@@ -74,9 +74,9 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
 
 
 def _listed_units(rows: Cells) -> dict[str, str]:
-    """Return the units that a sheet lists, by each text that stands in their rows: one is the name of a channel.
+    """Return the units that a sheet lists, by each text in their rows; one of these is the name of a channel.
 
-    A text that stands beside several units, such as the kind of a sensor, is none.
+    A text with several units, such as the type of a sensor, is ignored.
     """
     found = (
         (below, place)
@@ -96,18 +96,18 @@ def _listed_units(rows: Cells) -> dict[str, str]:
 
 
 def _with_unit(heading: Heading, units: Mapping[str, str]) -> Heading:
-    """Return a heading with the unit that another sheet lists for it, where it has none itself."""
+    """Return a heading with the unit that another sheet lists for it, if it has none."""
     if heading.unit is not None or heading.stamped or heading.name not in units:
         return heading
     return replace(heading, said=unit_or_none(units[heading.name]))
 
 
 def _no_charts(*_: object) -> None:
-    """Pass over a sheet of charts, which holds no cells; openpyxl fails at an empty one."""
+    """Skip a sheet of charts, which holds no cells; openpyxl fails on an empty one."""
 
 
 def _bounded(path: Path) -> bool:
-    """Refuse what unpacks to more than a log, whatever the archive says; return whether formulas lack values."""
+    """Refuse a workbook that decompresses to more than a log can hold; return whether formulas lack values."""
     uncomputed = False
     most = left = most_unpacked(path.stat().st_size)
     with ZipFile(path) as archive, path.open("rb") as file:
@@ -147,7 +147,7 @@ def _cells(sheet: Any, source: str) -> Cells:
 
 
 def _said(cell: Any, *, of_numbers: bool = False) -> str:
-    """Return a cell as a text log would have it; yes or no in a column of numbers is a word."""
+    """Return a cell as in a text log. Yes or no in a column of numbers is a word."""
     if cell is None:
         return ""
     if isinstance(cell, datetime):
@@ -164,7 +164,7 @@ def _said(cell: Any, *, of_numbers: bool = False) -> str:
 
 
 def _table(path: Path, title: str, rows: Cells, uncomputed: bool = False) -> Table | None:
-    """Return a sheet as a table, None where it has no rows of numbers; formulas of it may lack their values."""
+    """Return a sheet as a table; None if it has no rows of numbers. Its formulas may lack values."""
     width = max((len(row) for row in islice(rows, LINES)), default=0)
     while width and all(len(row) < width or row[width - 1] is None for row in islice(rows, LINES)):
         width -= 1

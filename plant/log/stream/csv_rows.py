@@ -1,4 +1,4 @@
-"""Rows of a CSV that is still being written: lines in, samples on a uniform clock out."""
+"""Rows of a CSV that is still being written: lines go in, samples on a uniform clock come out."""
 
 import csv
 import warnings
@@ -40,12 +40,12 @@ _Placed: TypeAlias = tuple[int, NDArray[np.float64]]
 
 
 class CsvStream:
-    r"""The rows of a CSV, read as they come.
+    r"""The rows of a CSV, read as they arrive.
 
-    A row with too few or too many cells, or whose time is no number or does not increase, is left out. A cell that is
-    no number is a missing sample. Both are counted in `left_out`, and the stream is refused when there are too many: as
-    in a log (`MOST_STRANGE`) in the long run, and at most `BURST` in a row. A usual number for lost samples, such as
-    -9999, is a missing sample too if it stands out; it is counted, but refuses nothing.
+    A row with too few or too many cells, or whose time is not a number or does not increase, is left out. A cell that
+    is not a number is a missing sample. Both are counted in `left_out`. The stream is refused if they become too many:
+    as in a log (`MOST_STRANGE`) in the long run, and more than `BURST` in a row. A usual mark for lost samples, such as
+    -9999, is also a missing sample if it stands out; it is counted, but never causes a refusal.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ class CsvStream:
         self._pending = chain(first, rows)
 
     def samples(self, most: int) -> Iterator[tuple[float, NDArray[np.float64], bool]]:
-        """Yield samples, a few at a time.
+        """Yield samples in small groups.
 
         Yields
         ------
@@ -155,7 +155,7 @@ class CsvStream:
             yield last, np.array(waiting), gap
 
     def _without_strange_start(self, first: list[_Placed]) -> list[_Placed]:
-        """Return the first rows from one on that most of the others follow: a time far ahead would end the stream."""
+        """Return the first rows from one that most others follow. A time far in the future would end the stream."""
         while len(first) > 2:
             (place, begin), *others = first
             if 2 * sum(row[0] > begin[0] for _, row in others) >= len(others):
@@ -166,7 +166,7 @@ class CsvStream:
         return first
 
     def _in_order(self) -> Iterator[NDArray[np.float64]]:
-        """Yield the rows whose time increases; a jump ahead is believed if the next row does not go back before it."""
+        """Yield the rows whose time increases. A jump forward is accepted if the next row does not go back."""
         last, held = self.start_time - self.sample_time, None
         for place, row in self._pending:
             if held is not None:
@@ -193,7 +193,7 @@ class CsvStream:
         return LogError(said, self._source)
 
     def _leave_out(self, error: LogError) -> None:
-        """Count what is garbage.
+        """Count bad rows and cells.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class CsvStream:
         self.first_left_out = self.first_left_out or error.message
 
     def _rows(self) -> Iterator[tuple[int, NDArray[np.float64]]]:
-        """Yield rows, each with its place below the header, from 0."""
+        """Yield rows with their number below the header, from 0."""
         for line in self._lines:
             if not line.strip():
                 continue
@@ -234,7 +234,7 @@ class CsvStream:
                 yield place, row
 
     def _quoted(self, line: str) -> list[str] | None:
-        """Return the cells of a line with quotes, or nothing where it has none: with a line's end within."""
+        """Return the cells of a line with quotes; None if it is empty or breaks the rules of CSV."""
         try:
             return next(csv.reader([line], delimiter=self._delimiter))
         except (csv.Error, StopIteration):

@@ -37,7 +37,7 @@ def _whole(held: mmap.mmap, place: int) -> int:
 
 
 class RingWriter:
-    """Writes rows into a ring file; an older file is replaced.
+    """Writes rows into a ring file, and replaces an older file.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class RingWriter:
         self._held[: len(MAGIC)] = MAGIC
 
     def room(self) -> int:
-        """Return the number of rows that can be written before an unread one is lost."""
+        """Return the number of rows that can be written before an unread row is lost."""
         return len(self._rows) - 1 - (self.written - _whole(self._held, READ_AT))
 
     def write(self, rows: Array, *, wait: bool = False) -> None:
@@ -107,7 +107,7 @@ class RingWriter:
 
 
 class RingReader:
-    """Reads rows of a ring as they come, from where its last reader was.
+    """Reads rows of a ring as they arrive, from the position of its last reader.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class RingReader:
         """Rows that were written over before they were read."""
 
     def take(self) -> NDArray[np.float64]:
-        """Return the rows that are new, shape (n, columns), none where nothing is."""
+        """Return the new rows, shape (n, columns); empty if there are none."""
         size, begin, written = len(self._slots), _whole(self._held, READ_AT), _whole(self._held, WRITTEN_AT)
         oldest = max(begin, written - size + 1)  # the one before may just be written over
         end = min(written, oldest + MOST)
@@ -151,13 +151,13 @@ class RingReader:
 
     @property
     def ended(self) -> bool:
-        """Whether no row will come any more."""
+        """Whether the stream has ended."""
         over = bool(struct.unpack_from("<I", self._held, ENDED_AT)[0])
         return over and _whole(self._held, READ_AT) == _whole(self._held, WRITTEN_AT)
 
 
 def ring_lines(path: Path, lost: Callable[[int, int], None]) -> Iterator[str]:
-    """Yield header and rows of a ring as lines of CSV, as they come.
+    """Yield header and rows of a ring as lines of CSV, as they arrive.
 
     Parameters
     ----------

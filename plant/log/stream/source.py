@@ -1,9 +1,10 @@
 """Lines of a stream: from a TCP connection, in numbered batches from an MQTT broker, or from a ring in memory.
 
-Over TCP nothing is lost: rows that are not read yet wait at the sender. From a broker rows come in batches, since one
-row a message reaches some thousand a second. A batch is text: ``rows N`` with its number, the header, the rows; an
-empty message ends the stream. A batch whose number came already is late and left out; numbers that never come are lost.
-Up to `QUEUED` batches wait here; one that finds no room is dropped. All are counted, their rows are missing in time.
+Over TCP nothing is lost: unread rows wait at the sender. A broker sends rows in batches, because one message for each
+row is limited to some thousand rows a second. A batch is text: ``rows N`` with its number, the header, the rows; an
+empty message ends the stream. A batch whose number has already arrived is late and is dropped; numbers that never
+arrive are lost. Up to `QUEUED` batches wait here, and a batch that finds the queue full is dropped. All of these are
+counted, and their rows are missing in time.
 """
 
 import queue
@@ -82,7 +83,7 @@ def is_stream(address: str) -> bool:
 
 
 def stream_lines(address: str, received: BatchCounts) -> Iterator[str]:
-    """Yield header and rows of a stream as they come.
+    """Yield header and rows of a stream as they arrive.
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ def _parts(address: str) -> tuple[str, str | None, int | None, str]:
 
 
 def broker_package(address: str) -> tuple[Any, Any]:
-    """Return paho's client and its versions of callbacks.
+    """Return the paho client and its callback versions.
 
     Parameters
     ----------
@@ -163,7 +164,7 @@ def broker_package(address: str) -> tuple[Any, Any]:
 
 
 def connect(client: Any, host: str, port: int, address: str) -> None:
-    """Connect a client to its broker, and begin its loop.
+    """Connect a client to its broker, and start its loop.
 
     Parameters
     ----------
@@ -215,7 +216,7 @@ def _tcp(host: str, port: int, address: str) -> Iterator[str]:
 
 
 def bounded_lines(file: TextIO, source: str) -> Iterator[str]:
-    """Yield the lines of a text that may never end.
+    """Yield the lines of a text that may have no end.
 
     Parameters
     ----------
