@@ -1,6 +1,6 @@
-"""System identification: from input and output samples to a transfer function that says how sure it is.
+"""System identification: from samples of input and output to a transfer function with its uncertainty.
 
-Its modules are imported when a name of theirs is first asked for.
+Modules are imported when one of their names is first used.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""Order, delay and structure chosen from the data, and the table that the choice rests on."""
+"""Chooses order, delay and structure from the data, and returns the table behind the choice."""
 
 import warnings
 from collections.abc import Callable, Sequence
@@ -42,7 +42,7 @@ LEAST = 200
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """A model with what its order and structure were chosen by.
+    """A model, and the scores by which its order and structure were chosen.
 
     Parameters
     ----------
@@ -71,9 +71,9 @@ def choose_model(
     input_name: str = "input",
     output_name: str = "output",
 ) -> Choice:
-    """Fit every structure at the order that BIC prefers, and return the one that best runs free on data held back.
+    """Fit every structure at the order that BIC prefers, and return the best free run on held-back data.
 
-    Orders at which a zero nearly cancels a pole are passed over, if there are others.
+    Orders at which a zero nearly cancels a pole are skipped if there are others.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def choose_model(
 def compare_structures(
     u: Signals, y: Signals, sample_time: float, form: dict[str, Any], structures: Sequence[str]
 ) -> "pd.DataFrame":
-    """Return the scores of structures of one size on the last third of the data, fitted to the rest.
+    """Return the scores of structures of one size on the last third of the data, after a fit to the rest.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def compare_structures(
 
 
 def held_back_percent(model: LinearModel, u: Array, y: Array) -> float | None:
-    """Return the fit on the last third of a log, by a model of the same structure and size fitted to the rest.
+    """Return the fit on the last third of a log, of a model with the same structure and size fitted to the rest.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def held_back_percent(model: LinearModel, u: Array, y: Array) -> float | None:
 
 
 def split_record(u: Signals, y: Signals) -> tuple[tuple[list[Array], list[Array]], tuple[list[Array], list[Array]]]:
-    """Return the data to fit and to hold back: the last third of the experiments, or of each of two or one.
+    """Return the data to fit and to hold back: the last third of the experiments, or of each of one or two.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def _continuous(
     output_name: str,
     **_: Any,
 ) -> LinearModel:
-    """Fit a strictly proper model; a held input answers one sample late without any dead time."""
+    """Fit a strictly proper model. With a held input, its output responds one sample late even without dead time."""
     names = {"input_name": input_name, "output_name": output_name}
     late, n = max(delay - 1, 0) * sample_time, n_denominator
     return fit_continuous(u, y, sample_time, n_zeros=n - 1, n_poles=n, dead_time=late, **names)

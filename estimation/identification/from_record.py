@@ -1,4 +1,4 @@
-"""From a log to a linear model in one verb."""
+"""From a log to a linear model in one call."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -40,8 +40,8 @@ def identify_record(
 ) -> LinearModel:
     """Identify a record's transfer function, by default in the form of Table 6 of the EHA paper.
 
-    The paper names neither unit nor sample time of Table 6; rad/s to m/s at 1 ms is the reading that fits its
-    gains and resonances (errata E14).
+    The paper states neither unit nor sample time of Table 6; rad/s to m/s at 1 ms is the reading that fits its gains
+    and resonances (errata E14).
 
     Parameters
     ----------

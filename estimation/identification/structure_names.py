@@ -1,4 +1,4 @@
-"""Structures of a linear model, and what the command line calls them."""
+"""Structures of a linear model, with their names on the command line."""
 
 from collections.abc import Mapping
 from typing import Literal, TypeAlias

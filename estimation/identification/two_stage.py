@@ -1,7 +1,8 @@
-"""Models between columns of logs, and of a closed loop by two stages (Van den Hof and Schrama 1993).
+"""Models between columns of logs, including closed loops by two stages (Van den Hof and Schrama 1993).
 
-In a closed loop the input carries the output's noise, and a fit from input to output is biased. What the loop's
-reference explains of the input carries none: the first stage finds it, the second relates it to the output.
+In a closed loop the input contains noise of the output, so a fit from input to output is biased. The part of the input
+that the loop's reference explains contains none. The first stage finds this part, and the second relates it to the
+output.
 """
 
 import warnings
@@ -35,7 +36,7 @@ def identify_columns(
     sample_time: float | None = None,
     options: Mapping[str, Any] = MappingProxyType({}),
 ) -> tuple[list[Identified], list[Channels]]:
-    """Identify a model an output from columns of logs.
+    """Identify one model for each output from columns of logs.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ def identify_columns(
 
 
 def identify_by_reference(data: Sequence[Channels], drives: Sequence[Channels], **options: Any) -> list[Identified]:
-    """Identify outputs of a closed loop from what references explain of its inputs.
+    """Identify outputs of a closed loop from the parts of its inputs that references explain.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def identify_by_reference(data: Sequence[Channels], drives: Sequence[Channels], 
 
 
 def _explained(drive: Channels) -> tuple[list[Array], Note]:
-    """Return the part of an input that references explain, log by log, with a note of its share."""
+    """Return the part of an input that references explain, for each log, with a note of its share."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
         stage = identify_channels(drive)

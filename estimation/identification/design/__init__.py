@@ -1,1 +1,1 @@
-"""Inputs to identify with, dead time, and sticking."""
+"""Test signals for identification, dead time, and detection of sticking."""

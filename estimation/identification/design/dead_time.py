@@ -19,7 +19,7 @@ STEPS = 60
 
 
 def estimate_delay(u: ArrayLike, y: ArrayLike, *, n_numerator: int = 2, n_denominator: int = 2, most: int = 20) -> int:
-    """Return the dead time with which an output-error model of given size fits best.
+    """Return the dead time with which an output-error model of a given size fits best.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Test signals for identification: made for a bandwidth, held within limits, ranked by the accuracy they promise."""
+"""Test signals for identification: made for a bandwidth, kept within limits, ranked by predicted accuracy."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -57,8 +57,8 @@ class Limits:
 def prbs_for(bandwidth_hz: float, sample_time: float, limits: Limits, *, slowest: float, duration: float) -> Array:
     """Return a maximum-length binary signal whose clock and length suit a bandwidth.
 
-    The clock is 0.4 / bandwidth, so that its power is 3 dB down there; the register is the shortest whose sequence
-    lasts five of the slowest time constants, repeated to the duration wanted.
+    The clock period is 0.4 / bandwidth, so that the power is 3 dB lower at the bandwidth. The register is the shortest
+    whose sequence lasts five of the slowest time constants. The sequence repeats for the given duration.
 
     Parameters
     ----------
@@ -103,9 +103,9 @@ def prbs_for(bandwidth_hz: float, sample_time: float, limits: Limits, *, slowest
 
 
 def multisine_for(frequencies_hz: Array, sample_time: float, limits: Limits, *, duration: float) -> Array:
-    """Return sines of equal power and low crest, scaled to the highest speed.
+    """Return sines of equal power with a low crest factor, scaled to the highest speed.
 
-    Schroeder's phases, then those of the signal clipped, again and again (Van der Ouderaa and others 1988).
+    The phases are Schroeder's, then repeatedly those of the clipped signal (Van der Ouderaa and others 1988).
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def multisine_for(frequencies_hz: Array, sample_time: float, limits: Limits, *, 
 
 
 def violations(model: LinearModel, u: Array, limits: Limits) -> list[str]:
-    """Return the limits that a test would violate in a simulation; none if it may be run.
+    """Return the limits that a test would violate in a simulation; empty if it may be run.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def violations(model: LinearModel, u: Array, limits: Limits) -> list[str]:
 
 
 def predicted_covariance(model: LinearModel, u: Array, noise_std: float) -> Array:
-    """Return the covariance that an efficient fit to a test would have, the Cramér-Rao bound at the model.
+    """Return the covariance of an efficient fit to a test: the Cramér-Rao bound at the model.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def rank_inputs(
     frequencies_hz: Array,
     limits: Limits,
 ) -> "pd.DataFrame":
-    """Return the accuracy of the response that each test would give, best first.
+    """Return the accuracy of the response for each test, best first.
 
     Parameters
     ----------

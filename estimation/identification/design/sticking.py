@@ -1,8 +1,8 @@
-"""Whether a piston rests while it is driven, which no linear model does, and poles of high order imitate.
+"""Detects a piston that rests while it is driven. No linear model does so, and poles of high order imitate it.
 
-Where friction holds a piston at each reversal until the pressure has turned round, velocity stays at zero for 50 to
-100 ms and then breaks loose. Output error of first or second order passes through zero; with every further pole it
-waits a little longer, and fits better, so information criteria take all that are offered.
+If friction holds a piston at each reversal until the pressure has reversed, velocity stays at zero for 50 to 100 ms and
+then breaks loose. Output error of first or second order passes through zero. Each further pole waits a little longer
+and fits better, so information criteria accept every order that is offered.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ often. That flags 17 of 18 logs of a bench with friction (the excess is 1.6 to 1
 
 
 def rest_shares(u: Array, y: Array, sample_time: float) -> tuple[float, float]:
-    """Return in which share of the driven samples the output rests, and in which a second-order model would.
+    """Return the share of the driven samples in which the output rests, and in which a second-order model would rest.
 
     Parameters
     ----------

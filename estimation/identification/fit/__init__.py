@@ -1,1 +1,1 @@
-"""One structure a file; order, validation and intervals."""
+"""Fits: one structure in each file; order, validation and intervals."""

@@ -45,7 +45,7 @@ def fit_continuous(
     input_name: str = "input",
     output_name: str = "output",
 ) -> LinearModel:
-    """Fit ``exp(-dead_time s) B(s)/A(s)`` by output error, the input held between samples.
+    """Fit ``exp(-dead_time s) B(s)/A(s)`` by output error, with the input held between samples.
 
     Parameters
     ----------
@@ -81,9 +81,9 @@ def fit_continuous(
 
 
 class _At(NamedTuple):
-    """A model at one point: discrete numerator, denominator and delay, derivatives by them, and by initial states.
+    """A model at one point: discrete numerator, denominator and delay, and derivatives by them and by initial states.
 
-    The residual is that with initial states at their best.
+    The residual uses the best initial states.
     """
 
     values: Array
@@ -96,7 +96,7 @@ class _At(NamedTuple):
 
 
 class _Problem:
-    """One continuous-time fit in scaled time: values are numerator, denominator behind its 1, and dead time if free."""
+    """One continuous-time fit in scaled time. Values are numerator, denominator after its 1, and dead time if free."""
 
     def __init__(
         self, data: Experiments, sample_time: float, n_zeros: int, n_poles: int, dead_time: float | None
@@ -108,7 +108,7 @@ class _Problem:
     def without_whole_samples(self) -> "_Problem":
         """Return the same fit with a known dead time of less than a sample, see `Experiments.advanced`.
 
-        A dead time of 200 samples has 200 initial values, which take up next to all of a search's time.
+        A dead time of 200 samples has 200 initial values, which take almost all the time of a search.
         """
         if self.dead_time is None:
             return self
@@ -120,15 +120,15 @@ class _Problem:
         return _Problem(self.data.advanced(whole), self.sample_time, self.n_zeros, self.n_poles, rest)
 
     def discrete(self, values: Array) -> tuple[Array, Array, int]:
-        """Return numerator, denominator, delay at one sample a unit of time."""
+        """Return numerator, denominator and delay, with one sample for each unit of time."""
         n_b = self.n_zeros + 1
         late = self.dead_time / self.sample_time if self.dead_time is not None else values[-1]
         return held_input_model(values[:n_b], values[n_b : n_b + self.n_poles], max(float(late), 0.0), 1.0)
 
     def _at(self, values: Array) -> _At:
-        """Return the common part of residual and Jacobian, cached for the last point, since a search asks twice.
+        """Return the common part of residual and Jacobian, cached for the last point because a search needs it twice.
 
-        The derivative by the continuous values is left to `parts`: a residual alone is asked for more often.
+        `parts` computes the derivative by the continuous values: the residual alone is needed more often.
         """
         if self._last is not None and np.array_equal(self._last.values, values):
             return self._last
@@ -143,7 +143,7 @@ class _Problem:
         return self._last
 
     def parts(self, values: Array) -> tuple[Array, Array]:
-        """Return Jacobian by continuous values and initial states, and the residual, initial states at their best."""
+        """Return Jacobian by continuous values and initial states, and the residual, with the best initial states."""
         at = self._at(values)
         b, f, delay = at.b, at.f, at.delay
         moved = np.zeros((at.main.shape[1], values.size))
@@ -160,7 +160,7 @@ class _Problem:
         return np.concatenate([at.main @ moved, at.initial], axis=1), at.residual
 
     def descend(self, start: Array) -> tuple[float, Array]:
-        """Return cost and values of the minimum that one start leads to."""
+        """Return cost and values of the minimum that a descent from one start reaches."""
         refused = np.full(self.data.u.size, 1e3)
 
         def residual(values: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Covariance of fitted coefficients: for a white residual, and robust where it is coloured."""
+"""Covariance of fitted coefficients: for a white residual, and robust for a coloured one."""
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def _spread(matrix: Array, felt: BoolArray) -> Array:
 
 
 def _coloured_meat(columns: Array, residual: Array, n_used: int) -> Array:
-    """Return ``J'RJ``, R's autocovariance tapered by Parzen's window, which keeps it positive."""
+    """Return ``J'RJ``, with R's autocovariance tapered by Parzen's window, which keeps it positive."""
     size = 1 << int(np.ceil(np.log2(2 * residual.size)))
     n_lags = max(1, min(n_used // 10, int(4.0 * n_used**0.5)))
     correlation = np.fft.irfft(np.abs(np.fft.rfft(residual, size)) ** 2, size)[: n_lags + 1] / n_used

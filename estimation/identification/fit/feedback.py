@@ -1,4 +1,4 @@
-"""Whether an input follows the noise of the output that it drives, said as a note."""
+"""Tests whether an input follows the noise of the output that it drives, and returns a note."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ FEEDBACK_SAMPLES = 20_000
 
 
 def feedback_note(residual: Array, u: Array, names: tuple[str, str]) -> Note | None:
-    """Return a note where an input follows what a model leaves of the output; None elsewhere, and of short records.
+    """Return a note if an input follows the residual of a model; None otherwise, and for short records.
 
     Parameters
     ----------

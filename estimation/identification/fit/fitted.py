@@ -1,4 +1,4 @@
-"""From fitted values to the one result type: scaling undone, both covariances, quality of fit."""
+"""From fitted values to the common result type: original units, both covariances, quality of fit."""
 
 import warnings
 from dataclasses import dataclass, replace
@@ -170,7 +170,7 @@ def _fit_percent(residual: Array, measured: Array) -> float:
 
 
 def _require_effect(rss: float, power: float, n_used: int, n_parameters: int, names: tuple[str, str]) -> None:
-    """Refuse a model that by BIC is no better than none: whatever its coefficients, they would be of noise."""
+    """Refuse a model that by BIC is no better than none: its coefficients would describe only noise."""
     if rss > 0.0 and n_used * np.log(power / rss) < n_parameters * np.log(n_used):
         raise NoEffectError(
             f"input {names[0]!r} does not move {names[1]!r} above its noise: by BIC the model explains no more than "

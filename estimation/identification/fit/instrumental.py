@@ -35,10 +35,10 @@ def fit_instrumental(
     input_name: str = "input",
     output_name: str = "output",
 ) -> LinearModel:
-    """Fit ``y = B/F u + C/D e`` by refined instrumental variables; without C and D, the simplified method (SRIV).
+    """Fit ``y = B/F u + C/D e`` by refined instrumental variables; without C and D, by the simplified method (SRIV).
 
-    Each pass filters input and output by the present ``D/(C F)`` and takes the noise-free simulated output as the
-    instrument, which removes the bias of ARX. Begun from ARX and from a reduced high-order ARX; the better end counts.
+    Each pass filters input and output by the current ``D/(C F)``. The noise-free simulated output is the instrument,
+    which removes the bias of ARX. The starts are ARX and a reduced high-order ARX; the better result is returned.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _pass(form: Structure, values: Array, data: Experiments, c: Array, d: Array)
 
 
 def _with_initial(form: Structure, f: Array, data: Experiments) -> Array:
-    """Return the best numerator and initial states for a denominator; the numerator is the longest experiment's."""
+    """Return the best numerator and initial states for a denominator, by the longest experiment."""
     fits = [profile(form, f, data.u[part], data.y[part], data.used[part])[1] for part in data.slices]
     sizes = [part.stop - part.start for part in data.slices]
     return np.concatenate([fits[int(np.argmax(sizes))][: form.n_main], *(fit[form.n_main :] for fit in fits)])

@@ -25,7 +25,7 @@ SURROGATES = 19
 
 @dataclass(frozen=True, eq=False)
 class OrderTest:
-    """Singular values of a record, and what noise alone would have given.
+    """Singular values of a record, and those that noise alone would give.
 
     Parameters
     ----------
@@ -85,11 +85,11 @@ def order_test(
     n_rows: int = 15,
     rng: np.random.Generator | None = None,
 ) -> OrderTest:
-    """Return the singular values that tell the order of a linear system (Figure 7 of the EHA paper).
+    """Return the singular values that show the order of a linear system (Figure 7 of the EHA paper).
 
-    The floor is what the same computation makes of records that hold only noise with the spectrum of the
-    residual (its Fourier phases drawn anew), so it holds for coloured noise too. The projected values are the
-    sharper test: the impulse response of a slowly switching input is poorly determined at high frequency.
+    The floor is the same computation on records that hold only noise with the spectrum of the residual (with new random
+    Fourier phases), so it also holds for coloured noise. The projected values are the sharper test: a slowly switching
+    input determines the impulse response poorly at high frequency.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def _require_record(u: Array, y: Array, n_wanted: int) -> None:
 
 
 def _impulse_responses(u: Array, outputs: Array, n_lags: int) -> Array:
-    """Return the least-squares impulse response behind each row of outputs, shape (m, n_lags)."""
+    """Return the least-squares impulse response for each row of outputs, shape (m, n_lags)."""
     _require_record(u, outputs[0], 3 * n_lags)
     begin = n_lags - 1
     gram = _lag_gram(u, n_lags)
@@ -243,10 +243,10 @@ def _surrogates(residual: Array, n_samples: int, rng: np.random.Generator) -> Ar
 
 
 def _projected_values(u: Array, outputs: Array, past: Array, n_rows: int) -> list[Array]:
-    """Return the projected singular values behind each row of outputs, on one set of instruments.
+    """Return the projected singular values for each row of outputs, with one set of instruments.
 
-    Future outputs less what future inputs explain, on past inputs and outputs (Verhaegen and Dewilde, 1992);
-    divided by the square root of the samples.
+    Future outputs less the part that future inputs explain are projected on past inputs and outputs (Verhaegen and
+    Dewilde, 1992), and divided by the square root of the number of samples.
     """
     width = u.size - 2 * n_rows + 1
 

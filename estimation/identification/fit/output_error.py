@@ -130,7 +130,7 @@ def minimise(structure: Structure, data: Experiments) -> Array:
 
 
 def screened(structure: Structure, data: Experiments) -> list[tuple[float, Array]]:
-    """Return the best of the starts after a few steps from each, on the liveliest section of a long record.
+    """Return the best starts after a few steps from each, on the liveliest section of a long record.
 
     Parameters
     ----------
@@ -157,10 +157,10 @@ def screened(structure: Structure, data: Experiments) -> list[tuple[float, Array
 
 
 def _one_order_less(structure: Structure, data: Experiments) -> list[Array]:
-    """Return starts that hold the minimum of one order less, beside a pole that a zero cancels.
+    """Return starts that hold the minimum of one order less, and a pole that a zero cancels.
 
-    Of several experiments only: in the spectra of short ones a slow pole is not told from drift, and the starts found
-    there all hold one.
+    They are only for several experiments: the spectra of short experiments do not separate a slow pole from drift, and
+    all starts from such spectra hold one.
     """
     n_b, n_f = structure.n_numerator - 1, structure.n_denominator - 1
     if data.count == 1 or min(n_b, n_f) < 1:
@@ -181,7 +181,7 @@ def _one_order_less(structure: Structure, data: Experiments) -> list[Array]:
 def descend_from(
     structure: Structure, start: Array, data: Experiments, steps: int, tolerance: float = TOLERANCE
 ) -> tuple[float, Array]:
-    """Return cost and values of the minimum that one start leads to.
+    """Return cost and values of the minimum that a descent from one start reaches.
 
     Parameters
     ----------

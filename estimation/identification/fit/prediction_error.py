@@ -110,7 +110,7 @@ def fit_box_jenkins(
 
 
 def _fit(task: Task, u: Signals, y: Signals, structure: str, *, tied: bool) -> LinearModel:
-    """Fit from every start; where tied, D is F."""
+    """Fit from every start; if tied, D is F."""
     data, form = task.experiments(u, y), task.form
     found = [_descend(task, tied, start, data) for start in _starts(task, tied, data)]
     _, theta, error, jacobian = min(found, key=lambda one: one[0])
@@ -120,7 +120,7 @@ def _fit(task: Task, u: Signals, y: Signals, structure: str, *, tied: bool) -> L
 
 
 def _split(task: Task, theta: Array) -> list[Array]:
-    """Return numerator with denominator, the denominator, C and D, behind their 1, and all initial states."""
+    """Return numerator with denominator, the denominator, C and D (each after its 1), and all initial states."""
     at_c = task.form.n_main
     main, c, d, initial = np.split(theta, [at_c, at_c + task.n_c, at_c + task.n_c + task.n_d])
     return [main, main[task.form.n_numerator :], c, d, initial]
@@ -133,7 +133,7 @@ def _acceptable(task: Task, tied: bool, theta: Array) -> bool:
 
 
 def _starts(task: Task, tied: bool, data: Experiments) -> list[Array]:
-    """Return starts: the output-error model with the noise that it leaves, with none, and from ARX."""
+    """Return starts: the output-error model with a model of its noise, the same without one, and ARX."""
     form, longest = task.form, data.longest
     output_error = minimise(form, data)
     main, initial = output_error[: form.n_main], output_error[form.n_main :]
@@ -153,7 +153,7 @@ def _starts(task: Task, tied: bool, data: Experiments) -> list[Array]:
 
 
 def _descend(task: Task, tied: bool, start: Array, data: Experiments) -> tuple[float, Array, Array, Array]:
-    """Return cost, values, prediction errors and Jacobian of the minimum that one start leads to."""
+    """Return cost, values, prediction errors and Jacobian of the minimum that a descent from one start reaches."""
     n, p, form = data.u.size, start.size, task.form
     sizes = np.array([form.n_numerator, form.n_denominator, task.n_c, task.n_d, form.delay, form.n_initial])
 

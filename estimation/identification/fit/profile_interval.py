@@ -1,8 +1,8 @@
-"""Intervals of the steady-state gain by profile likelihood, where the Hessian's would lie.
+"""Intervals of the steady-state gain by profile likelihood, for models whose Hessian gives wrong ones.
 
-Where a pole nearly cancels a zero the gain is far from linear in the coefficients, and the interval from the covariance
-covers too little: 68 % instead of 95 % on the fourth model of Table 6 at 50 % noise. The profile asks
-instead which gains a fit can be forced to at a cost that chance explains (Venzon and Moolgavkar 1988).
+If a pole nearly cancels a zero, the gain is far from linear in the coefficients, and the interval from the covariance
+covers too little: 68 % instead of 95 % on the fourth model of Table 6 at 50 % noise. The profile finds the range of
+gains to which a fit can be forced at a cost that chance explains (Venzon and Moolgavkar 1988).
 """
 
 from collections.abc import Callable
@@ -40,9 +40,9 @@ def dc_gain_interval(
 ) -> tuple[float, float]:
     """Return the interval of the steady-state gain by profile likelihood.
 
-    Where the model's covariance gives the gain another variance than the white one, the threshold is stretched by
-    their ratio. Where a pole is nearly cancelled its place is not determined, the likelihood ratio exceeds
-    that of regular models, and each such pole counts as one more degree of freedom.
+    If the model's covariance gives the gain another variance than the white one, the threshold is stretched by their
+    ratio. The place of a nearly cancelled pole is not determined, so the likelihood ratio exceeds that of regular
+    models. Each such pole counts as one more degree of freedom.
 
     Parameters
     ----------
@@ -100,9 +100,9 @@ def dc_gain_interval(
 
 
 def _crossing(excess: Callable[[float], float], gain: float, step: float) -> float:
-    """Return the gain, away from the fitted one, at which the excess turns positive.
+    """Return the gain, away from the fitted one, at which the excess becomes positive.
 
-    By bisection: another basin may take over between two gains, so the excess is not smooth.
+    It bisects, because the excess is not smooth: another minimum may become the best between two gains.
     """
     inside = gain
     for _ in range(WIDENINGS):
@@ -119,7 +119,7 @@ def _crossing(excess: Callable[[float], float], gain: float, step: float) -> flo
 
 
 def _stretch(model: LinearModel) -> float:
-    """Return the gain's variance over what a white residual would give; 1 where both agree or are not known."""
+    """Return the gain's variance over that of a white residual; 1 if both agree or are unknown."""
     plain = replace(model, covariance=model.covariance_white).dc_gain_std
     return (model.dc_gain_std / plain) ** 2 if plain > 0.0 and np.isfinite(model.dc_gain_std / plain) else 1.0
 

@@ -1,4 +1,4 @@
-"""Chi-square tests of a residual: whether it is white, and whether past inputs are left in it."""
+"""Chi-square tests of a residual: whether it is white, and whether it depends on past inputs."""
 
 from dataclasses import dataclass
 
@@ -90,10 +90,10 @@ def cross_correlation_test(
     n_lags: int = DEFAULT_LAGS,
     jacobian: ArrayLike | None = None,
 ) -> ResidualTest:
-    """Test whether past inputs are left in a residual.
+    """Test whether a residual depends on past inputs.
 
-    The residual is projected on the lagged inputs, from which what the fit could already absorb (the columns
-    of `jacobian`) has been removed; without that step the usual statistic rejects a right model too often.
+    The residual is projected on the lagged inputs, after removal of everything that the fit could already absorb (the
+    columns of `jacobian`). Without that step the usual statistic rejects a correct model too often.
 
     Parameters
     ----------
@@ -142,10 +142,10 @@ def cross_correlation_test(
 
 
 def feedback_test(residual: ArrayLike, u: ArrayLike, *, n_lags: int = DEFAULT_LAGS) -> ResidualTest:
-    """Test whether inputs follow what the output's noise did before: whether a loop was closed around the plant.
+    """Test whether inputs follow earlier noise of the output, which shows a closed loop around the plant.
 
-    The residual is whitened by a long autoregression and freed of past and present inputs, so that neither its colour
-    nor a model that is too simple counts as feedback; then future inputs are looked for in it.
+    A long autoregression whitens the residual, and past and present inputs are removed from it, so that neither its
+    colour nor a model that is too simple counts as feedback. The test then looks for future inputs in it.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def feedback_test(residual: ArrayLike, u: ArrayLike, *, n_lags: int = DEFAULT_LA
 
 
 def correlations(residual: ArrayLike, other: ArrayLike, lags: ArrayLike) -> Array:
-    """Return the correlation of a residual with another signal, or itself, some samples earlier.
+    """Return the correlation of a residual with another signal, or with itself, some samples earlier.
 
     Parameters
     ----------

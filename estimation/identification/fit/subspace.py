@@ -1,4 +1,4 @@
-"""Subspace identification (MOESP with past inputs and outputs as instruments), its order read off a noise floor."""
+"""Subspace identification (MOESP with past inputs and outputs as instruments), with the order from a noise floor."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ BLOCK_ROWS = 15
 
 @dataclass(frozen=True, eq=False)
 class SubspaceFit:
-    """A subspace model with what its order rests on.
+    """A subspace model, and the singular values behind its order.
 
     Parameters
     ----------
@@ -49,8 +49,8 @@ def fit_subspace(
 ) -> SubspaceFit:
     """Fit a state-space model by PO-MOESP (Verhaegen 1994), without iteration, and give its transfer function.
 
-    The shift structure of the extended observability matrix has the poles; numerator and initial state then follow by
-    least squares on the simulated output.
+    The shift structure of the extended observability matrix gives the poles. Least squares on the simulated output then
+    gives numerator and initial state.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether an identified model may be believed: fit, residual whiteness, what of the input is left in it."""
+"""Validates an identified model: fit, whiteness of the residual, and its dependence on the input."""
 
 from dataclasses import dataclass
 
@@ -35,7 +35,7 @@ class Validation:
 
 
 def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
-    """Return ``100 (1 - |y - yhat| / |y - mean y|)`` over the samples that are there.
+    """Return ``100 (1 - |y - yhat| / |y - mean y|)`` over the samples that are present.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
 
 
 def rmse(y: ArrayLike, simulated: ArrayLike) -> float:
-    """Return the root-mean-square difference over the samples that are there.
+    """Return the root-mean-square difference over the samples that are present.
 
     Parameters
     ----------

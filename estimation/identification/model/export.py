@@ -21,7 +21,7 @@ COVARIANCES = ("covariance", "covariance_white", "covariance_robust")
 
 
 def to_control(model: "LinearModel") -> "control.TransferFunction":
-    """Return the model as a python-control object, with sample time and signal names; dead time in s left out."""
+    """Return the model as a python-control object, with sample time and signal names, without dead time in s."""
     import control  # slow to import, and few callers need it
 
     names = {"inputs": [model.input_name], "outputs": [model.output_name]}
@@ -50,12 +50,12 @@ def to_ss(model: "LinearModel") -> "control.StateSpace":
 
 
 def to_dict(model: "LinearModel") -> dict[str, Any]:
-    """Return JSON values at full precision, None for a number not known; `from_dict` is the inverse."""
+    """Return JSON values at full precision, with None for an unknown number; `from_dict` is the inverse."""
     return {entry: _plain(getattr(model, name)) for name, entry in _ENTRIES.items()}
 
 
 def to_mat(model: "LinearModel", path: str | Path) -> None:
-    """Write the model to a MAT file at full precision, whole or not at all, one variable an entry of `to_dict`.
+    """Write the model to a MAT file at full precision and atomically, with one variable for each entry of `to_dict`.
 
     Parameters
     ----------

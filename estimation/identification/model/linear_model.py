@@ -1,4 +1,4 @@
-"""`LinearModel`: an identified transfer function with everything needed to believe it, or not."""
+"""`LinearModel`: an identified transfer function with its uncertainty and everything needed to judge it."""
 
 from dataclasses import dataclass, field
 from typing import overload
@@ -148,12 +148,12 @@ class LinearModel:
 
     @property
     def free_numerator(self) -> Array:
-        """Numerator behind its dead time, shape (n_numerator,)."""
+        """Numerator after its dead time, shape (n_numerator,)."""
         return self.numerator[self.delay :]
 
     @property
     def poles(self) -> ComplexArray:
-        """Roots of the denominator in z (or s), largest modulus first, shape (n_denominator,); dead time left out."""
+        """Roots of the denominator in z (or s), largest modulus first, shape (n_denominator,); without dead time."""
         return sorted_roots(self.denominator)
 
     @property
@@ -176,7 +176,7 @@ class LinearModel:
 
     @property
     def cancellations(self) -> tuple[Cancellation, ...]:
-        """Poles that a zero cancels, as far as the data can tell; intervals then need `dc_gain_interval`."""
+        """Poles that a zero may cancel, within the accuracy of the data; intervals then need `dc_gain_interval`."""
         return cancellations(self.free_numerator, self.denominator, self.covariance, 0.0 if self.continuous else 1.0)
 
     @property
@@ -195,7 +195,7 @@ class LinearModel:
     def dc_gain_std(self) -> float:
         """Standard deviation of `dc_gain`, first order in the covariance (delta method).
 
-        Too small where a pole nearly cancels a zero: see `cancellations` and `dc_gain_interval`.
+        It is too small if a pole nearly cancels a zero: see `cancellations` and `dc_gain_interval`.
         """
         return float(self.frequency_response([0.0], ci=0.95).gain_std[0])
 
@@ -206,12 +206,12 @@ class LinearModel:
 
     @property
     def bandwidth_hz(self) -> float | None:
-        """Lowest frequency at which the gain is 3 dB below `dc_gain` [Hz]; None if it never is."""
+        """Lowest frequency at which the gain is 3 dB below `dc_gain` [Hz]; None if there is none."""
         return bandwidth(self)
 
     @property
     def bandwidth_std_hz(self) -> float | None:
-        """Standard deviation of `bandwidth_hz` [Hz], first order in the covariance; None where there is none."""
+        """Standard deviation of `bandwidth_hz` [Hz], first order in the covariance; None if there is no bandwidth."""
         return bandwidth_std(self)
 
     def response_gradient(self, frequency_hz: ArrayLike) -> tuple[ComplexArray, ComplexArray]:

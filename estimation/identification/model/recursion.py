@@ -1,6 +1,6 @@
-"""A series through a transfer function in discrete time: the recursion that `scipy.signal.lfilter` runs, to the bit.
+"""Runs a series through a discrete transfer function, with the same recursion and bits as `scipy.signal.lfilter`.
 
-scipy.signal drags in scipy.stats, and takes longer to import than a model to fit.
+scipy.signal imports scipy.stats, and the import takes longer than the fit of a model.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The step response of a linear model, with what its covariance says of it."""
+"""The step response of a linear model, with its uncertainty from the covariance."""
 
 from dataclasses import dataclass, replace
 

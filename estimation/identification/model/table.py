@@ -1,4 +1,4 @@
-"""Models side by side in one table."""
+"""Several models in one table."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def model_table(models: Mapping[str, LinearModel]) -> "pd.DataFrame":
-    """Return one row a model: coefficients, poles, gain with its deviation, bandwidth, and quality of fit.
+    """Return one row for each model: coefficients, poles, gain with its deviation, bandwidth, and quality of fit.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ COINCIDE = 1e-8
 
 @dataclass(frozen=True)
 class Cancellation:
-    """A pole and a zero that the data do not clearly tell apart.
+    """A pole and a zero that the data do not clearly separate.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def complex_std(gradients: ComplexArray, covariance: Array) -> ComplexArray:
 def cancellations(
     numerator: Array, denominator: Array, covariance: Array, at_rest: complex
 ) -> tuple[Cancellation, ...]:
-    """Return the poles that a zero nearly cancels, as far as the data can tell.
+    """Return the poles that a zero nearly cancels, within the accuracy of the data.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _deviations(distance: Array, spread: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ResponseBand:
-    """A frequency response with what the covariance says of it.
+    """A frequency response with its uncertainty from the covariance.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Criterion, first guesses and descent."""
+"""The criterion, starts and descent of a fit."""

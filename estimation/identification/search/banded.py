@@ -1,7 +1,7 @@
-"""The output-error criterion on a periodogram summed into bands, compiled: microseconds a candidate.
+"""The output-error criterion on a periodogram summed into bands, compiled: microseconds for each candidate.
 
-With input power ``P`` and cross spectrum ``C`` of each band, the criterion is ``sum P |B/F - C/P|^2`` and a constant.
-It neglects the initial state and what changes within a band, so it ranks and improves starts, and decides nothing.
+With input power ``P`` and cross spectrum ``C`` of each band, the criterion is ``sum P |B/F - C/P|^2`` plus a constant.
+It neglects the initial state and changes within a band. So it only ranks and improves starts.
 """
 
 import numpy as np

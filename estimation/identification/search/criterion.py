@@ -1,4 +1,4 @@
-"""The output-error criterion: structure, simulation, exact sensitivities, and the linear part solved out."""
+"""The output-error criterion: structure, simulation, exact sensitivities, and elimination of the linear part."""
 
 from dataclasses import dataclass
 
@@ -40,7 +40,7 @@ class Structure:
 
     @property
     def sizes(self) -> IntArray:
-        """As the compiled descent takes them."""
+        """The sizes as the compiled descent needs them."""
         return np.array([self.n_numerator, self.n_denominator, self.delay, self.n_initial])
 
     @property

@@ -197,8 +197,8 @@ def descend(
 ) -> tuple[float, Array, Array, bool]:
     """Minimise the output-error criterion from one start.
 
-    A step that leaves the unit circle is rejected like one that raises the cost, and the next is shorter; so stability
-    costs no bound that an optimum could be pressed against.
+    A step that leaves the unit circle is rejected like one that raises the cost, and the next step is shorter. So
+    stability needs no bound, at which an optimum could get stuck.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""One or more experiments as a fit takes them, checked at the door with sentences."""
+"""One or more experiments in the form that a fit needs, checked with clear errors."""
 
 import hashlib
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ class Experiments:
 
     @property
     def n_used(self) -> int:
-        """Outputs that are there."""
+        """Number of outputs that are present."""
         return int(np.count_nonzero(self.used))
 
     @property
@@ -70,10 +70,10 @@ class Experiments:
         return replace(self, u=self.u / u_scale, y=self.y / y_scale, u_scale=u_scale, y_scale=y_scale)
 
     def advanced(self, samples: int) -> "Experiments":
-        """Return the outputs brought forward, without the last inputs, whose answers are not there.
+        """Return the outputs moved forward, without the last inputs, whose responses are not logged.
 
-        A model that is late by so many samples has as many more initial values, which give it any output before its
-        input arrives. Without them it is the same criterion, to the last sample that counts.
+        A model with a delay of so many samples has as many more initial values, which give it any output before its
+        input arrives. Without them the criterion is the same, over all samples that count.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class Experiments:
         return np.where(self.used, self.y, np.nan)
 
     def bridged(self) -> list[tuple[Array, Array]]:
-        """Return input and output of each experiment, gaps of the output filled by straight lines."""
+        """Return input and output of each experiment, with gaps of the output filled by straight lines."""
         pairs: list[tuple[Array, Array]] = []
         for part in self.slices:
             u, y, used = self.u[part], self.y[part], self.used[part]
@@ -168,7 +168,7 @@ def data_hash(data: Experiments, sample_time: float) -> str:
 
 
 def listed(signals: Signals) -> list[Array]:
-    """Return signals as a list with one array an experiment.
+    """Return signals as a list with one array for each experiment.
 
     Parameters
     ----------

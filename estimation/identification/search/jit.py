@@ -1,4 +1,4 @@
-"""Compilation of this package's plain loops: one decorator, which type checkers see through."""
+"""Compiles this package's plain loops: one decorator, which type checkers see through."""
 
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
@@ -10,7 +10,7 @@ Result = TypeVar("Result")
 
 
 def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
-    """Compile a loop to machine code with what it calls, cached, without holding the interpreter's lock.
+    """Compile a loop and the functions it calls to machine code, cached, without the interpreter's lock.
 
     Sums may be reordered, so that they vectorise; NaN and infinity keep their meaning.
 

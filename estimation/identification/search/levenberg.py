@@ -1,6 +1,6 @@
-"""Levenberg and Marquardt's descent on any criterion that gives its normal equations.
+"""Levenberg-Marquardt descent on any criterion that gives its normal equations.
 
-`estimation.identification.search.descent` has it compiled into one criterion, where thousands of starts are tried.
+`estimation.identification.search.descent` compiles it together with one criterion, for thousands of starts.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ def levenberg(
     least_gain: float = 0.0,
     within: Callable[[Array, Array, Array, float], tuple[Array, float] | None] | None = None,
 ) -> tuple[float, Array]:
-    """Minimise a sum of squares from one start; a step that is not acceptable is rejected like one that raises it.
+    """Minimise a sum of squares from one start. A step that is not acceptable is rejected like one that raises it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Linear least squares of a few unknowns; scipy.linalg takes longer to import than a model to fit."""
+"""Linear least squares of a few unknowns. The import of scipy.linalg takes longer than the fit of a model."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ EPSILON = float(np.finfo(np.float64).eps)
 
 
 def least_squares(matrix: NDArray[np.float64], wanted: NDArray[np.float64]) -> Array:
-    """Return the least solution of least squares.
+    """Return the least-squares solution of smallest norm.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""First guesses of an ARMA noise model (Hannan and Rissanen, 1982)."""
+"""Starts of an ARMA noise model (Hannan and Rissanen, 1982)."""
 
 import numpy as np
 

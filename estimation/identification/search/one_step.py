@@ -1,6 +1,6 @@
 """One-step-ahead prediction errors of ``y = B/F u + C/D e`` with exact sensitivities, compiled.
 
-A missing output is replaced by its prediction, so the recursion goes on and the error there is no error.
+A missing output is replaced by its prediction: the recursion continues, and its error is zero.
 """
 
 import numpy as np

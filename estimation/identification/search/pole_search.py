@@ -1,8 +1,8 @@
-"""A search for the poles of an output-error model over their possible places, in the frequency domain.
+"""A search for the poles of an output-error model over all possible positions, in the frequency domain.
 
-For a given denominator the best numerator is a small least-squares problem whose terms are sums over the
-periodogram. Summed once into logarithmic bands, they cost microseconds a candidate, so thousands of pole positions
-can be tried, the best refined, and every basin of the criterion gets a start.
+For a given denominator the best numerator is a small least-squares problem whose terms are sums over the periodogram.
+Summed once into logarithmic bands, they take microseconds for each candidate. So the search can try thousands of pole
+positions and refine the best, and every basin of the criterion gets a start.
 """
 
 from typing import NamedTuple
@@ -159,14 +159,14 @@ def _single_candidates(
 
 
 def _real_poles(n_samples: int) -> Array:
-    """Return first-order denominators behind the 1, in the order of the pole, shape (m, 1)."""
+    """Return first-order denominators after the 1, in the order of the pole, shape (m, 1)."""
     time_constants = np.geomspace(0.4, n_samples / 3.0, 44)
     poles = np.concatenate([[-0.98, -0.9, -0.7, -0.45, -0.2, 0.02], np.exp(-1.0 / time_constants)])
     return -poles[:, None]
 
 
 def _pole_pairs(n_samples: int) -> Array:
-    """Return second-order denominators behind the 1, shape (m, 2)."""
+    """Return second-order denominators after the 1, shape (m, 2)."""
     frequencies = np.geomspace(8.0 * np.pi / n_samples, 0.97 * np.pi, 32)
     zeta = np.array(DAMPING_RATIOS)[:, None]
     pole = np.exp(frequencies * (-zeta + 1j * np.sqrt(1.0 - zeta**2))).ravel()
@@ -178,7 +178,7 @@ def _pole_pairs(n_samples: int) -> Array:
 
 
 def _multiplied(kept: Array, additions: Array) -> Array:
-    """Return every product of two lists of monic polynomials, each given behind its leading 1."""
+    """Return every product of two lists of monic polynomials, each given after its leading 1."""
     left = np.concatenate([np.ones((len(kept), 1)), kept], axis=1)
     right = np.concatenate([np.ones((len(additions), 1)), additions], axis=1)
     product = np.zeros((len(kept), len(additions), left.shape[1] + right.shape[1] - 1))
@@ -211,7 +211,7 @@ def _sorted_poles(rows: Array) -> ComplexArray:
 
 
 def reflected(denominators: list[Array]) -> Array:
-    """Return monic denominators as rows behind their 1, unstable roots reflected into the unit circle.
+    """Return monic denominators as rows after their 1, with unstable roots reflected into the unit circle.
 
     Parameters
     ----------

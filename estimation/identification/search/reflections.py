@@ -1,4 +1,4 @@
-"""Denominators by their reflection coefficients: any values within one are stable, so a step cannot leave the bound."""
+"""Denominators by their reflection coefficients: all values within ±1 are stable, so no step can leave the bound."""
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def reflections(coefficients: Array) -> Array:
 
 
 def denominator(reflected: Array) -> tuple[Array, Array]:
-    """Return a denominator by its reflection coefficients, and its derivative by them.
+    """Return the denominator of reflection coefficients, and its derivative by them.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""State space of several inputs and outputs: subspace start, output-error end, with covariance."""
+"""State-space models of several inputs and outputs: subspace start, output-error fit, covariance."""

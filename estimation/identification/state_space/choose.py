@@ -1,4 +1,4 @@
-"""Order of a state space by its free run on blocks held back, all outputs together."""
+"""Chooses the order of a state-space model by its free run on held-back blocks, over all outputs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ Form = tuple[bool, tuple[int, ...]]
 
 @dataclass(frozen=True, eq=False)
 class StateCandidate:
-    """A size with what speaks for it.
+    """A size, and the scores in its favour.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def state_candidates(data: Sequence[Channels], orders: Sequence[int], delay: int
 
 
 def _forms(data: Sequence[Channels], delay: int | None) -> list[Form]:
-    """Return with and without a direct path, and behind the dead time that all outputs share."""
+    """Return forms with and without a direct path, and after the dead time that all outputs share."""
     m = len(data[0].inputs)
     if delay is not None:
         return [(delay == 0, (max(delay - 1, 0),) * m)]
@@ -136,14 +136,14 @@ def _candidate(fit: StateSpaceFit, delays: tuple[int, ...], data: Joint, first: 
 
 
 def _doubt(fit: StateSpaceFit, data: Joint) -> str:
-    """Return ``time_constant`` where the slowest time constant is longer than the longest log, or nothing."""
+    """Return ``time_constant`` if the slowest time constant is longer than the longest log; otherwise empty."""
     radius = float(np.abs(np.linalg.eigvals(fit.a)).max())
     longest = max(len(u) for u in data.u)
     return "time_constant" if radius >= 1.0 or (radius > 0.0 and -1.0 / np.log(radius) > longest) else ""
 
 
 def chosen_state(candidates: Sequence[StateCandidate]) -> StateCandidate:
-    """Return, of the state spaces that do nearly as well on held-back blocks as the best one, that of the least BIC.
+    """Return the model of least BIC among those that do nearly as well on held-back blocks as the best.
 
     Parameters
     ----------

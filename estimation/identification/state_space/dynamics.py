@@ -1,4 +1,4 @@
-"""One output of a state space in the data's scale: its free run and its JSON form."""
+"""One output of a state-space model in the data's scale: its free run and its JSON form."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -38,18 +38,18 @@ class StateSpaceDynamics(OutputErrorDynamics):
 
     @property
     def level(self) -> float:
-        """Output where inputs stand at zero [scaled]."""
+        """Output if all inputs are zero [scaled]."""
         return float(self.system.level[self.place])
 
     def unanswered(self, length: int) -> int:
-        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
+        """Return how many first outputs of a log of some length [samples] respond to inputs from before the log."""
         return unanswered(max(self.system.delays), length)
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its initial state by least squares of the outputs that are there.
+        """Return the free run, with the initial state by least squares from the outputs that are present.
 
-        Where there are too few of them it begins at rest under the first inputs. Behind a long dead time it begins with
-        the first output that answers the log's inputs; that one stands for those before it too.
+        If these are too few, it starts at rest under the first inputs. After a long dead time it starts with the first
+        output that responds to inputs of the log; that output also stands for the earlier ones.
         """
         one, n, known = self.system, self.system.order, np.isfinite(y)
         late, a = delayed(u, one.delays), np.ascontiguousarray(one.a)

@@ -1,4 +1,4 @@
-"""Output error of a state space of several inputs and outputs: as probable as can be, with covariance."""
+"""Maximum-likelihood output error of a state-space model with several inputs and outputs, with covariance."""
 
 from dataclasses import dataclass
 
@@ -70,7 +70,7 @@ class StateSpaceFit:
 
 
 def fit_state_space(size: Size, data: Joint, start: Array | None = None, effort: Effort = THOROUGH) -> StateSpaceFit:
-    """Return the most probable model of a size: white noise at each output, of unknown covariance between outputs.
+    """Return the maximum-likelihood model of a size: white output noise, with unknown covariance.
 
     Parameters
     ----------
@@ -120,12 +120,12 @@ def _completed(problem: Problem, a: Array, c: Array) -> Array:
 
 
 def _left(problem: Problem, theta: Array) -> Array:
-    """Return the residual, zero where an output is missing, shape (samples, p)."""
+    """Return the residual, zero for missing outputs, shape (samples, p)."""
     return np.where(problem.used, problem.outputs(problem.unpacked(theta)) - problem.y, 0.0)
 
 
 def _noise(problem: Problem, theta: Array) -> Array:
-    """Return the covariance of the residual, of the samples at which both outputs are there."""
+    """Return the covariance of the residual over the samples at which both outputs are present."""
     left, used = _left(problem, theta), problem.used.astype(np.float64)
     noise = left.T @ left / np.maximum(used.T @ used, 1.0)
     size = np.sqrt(np.diag(noise)) + 1e-12
@@ -160,7 +160,7 @@ def _descended(problem: Problem, start: Array, effort: Effort) -> StateSpaceFit:
 
 
 def _chart(problem: Problem, theta: Array, white: Array, effort: Effort) -> tuple[float, Array]:
-    """Return the least weighted cost near some values, and where it is."""
+    """Return the least weighted cost near given values, and its position."""
     basis = problem.directions(theta)
 
     def at(moved: Array) -> tuple[float, Array, Array]:
@@ -187,7 +187,7 @@ def _whitened(problem: Problem, theta: Array, basis: Array, white: Array) -> tup
 
 
 def system_of(fit: StateSpaceFit, data: Joint, delays: tuple[int, ...]) -> StateSpace:
-    """Return a fit with its covariance, the robust one where the residual of an output is not white.
+    """Return a fit with its covariance; the robust one if the residual of an output is not white.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From channels of several outputs to their models: one state space of all, or a model an output."""
+"""From channels of several outputs to their models: one state-space model, or one model for each output."""
 
 import warnings
 from collections.abc import Sequence
@@ -93,16 +93,16 @@ def identify_outputs(
 
 
 def _left(found: Sequence[Identified]) -> float:
-    """Return the held-back error of all outputs, each over its deviation."""
+    """Return the held-back error of all outputs, each divided by its standard deviation."""
     return pooled([1.0 - one.held_back_percent / 100.0 for one in found])
 
 
 def identify_state_space(
     data: Sequence[Channels], *, order: int | None = None, delay: int | None = None
 ) -> list[Identified]:
-    """Identify one state space from all inputs to all outputs, with levels, initial states and covariance.
+    """Identify one state-space model from all inputs to all outputs, with levels, initial states and covariance.
 
-    It begins at a subspace estimate and ends where white noise of unknown covariance at the outputs is most probable.
+    It starts at a subspace estimate, and maximises the likelihood for white output noise of unknown covariance.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def identify_state_space(
 
 
 def _fitted_to_levels(data: Sequence[Channels], order: int | None, delay: int | None) -> list[Identified]:
-    """Return the state space of a size that logs are long enough for."""
+    """Return the state-space model of a size for which the logs are long enough."""
     require_size(order, delay, None)
     for one in data:
         require_room(one, None, delay, None)  # whether it is long enough for the order, the fit itself says
@@ -148,7 +148,7 @@ def _fitted_to_levels(data: Sequence[Channels], order: int | None, delay: int | 
 
 
 def _followed(data: Channels) -> list[Note]:
-    """Return a note where an output wanders by itself."""
+    """Return a note if an output drifts by itself."""
     whole, _ = scaled(data)
     return followed_walk(whole, section(whole, MOST_CHOSEN), range(1, HIGHEST + 1), STATE_SPACE)
 

@@ -1,4 +1,4 @@
-"""Inputs and all outputs of one or more logs side by side, in their scale."""
+"""Inputs and all outputs of one or more logs together, in their scale."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -56,10 +56,10 @@ class Joint:
         return replace(self, y=tuple(np.where(mask[:, None], np.nan, y) for y, mask in zip(self.y, masks, strict=True)))
 
     def delayed(self, delays: Sequence[int]) -> "Joint":
-        """Return the same with inputs that come some samples later; before the log they stood at their first values.
+        """Return the same with inputs that arrive some samples later; before the log they had their first values.
 
-        Outputs that a long dead time leaves to inputs from before the log are held back, and the log is run behind
-        them: of an initial state at its first sample, what has decayed by then could not be fitted.
+        Outputs that respond only to inputs from before the log, because of a long dead time, are held back, and the run
+        starts after them: an initial state at the first sample could not be fitted to parts that have decayed by then.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ def delayed(u: Array, delays: Sequence[int]) -> Array:
 
 
 def joined(data: Sequence[Channels]) -> Joint:
-    """Return outputs of the same logs side by side.
+    """Return the outputs of the same logs together.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Loops of a state-space model: its states, and what a push on each of them does to every output later."""
+"""Loops of a state-space model: its states, and the effect of a push on each of them on every later output."""
 
 from estimation.arrays import Array
 from estimation.identification.search.jit import compiled

@@ -1,7 +1,7 @@
-"""Outputs of a state-space model and their derivatives, without the directions that only turn its basis.
+"""Outputs of a state-space model and their derivatives, without the directions that only change its basis.
 
-Every matrix is free (McKelvey, Helmersson and Ribarits, Automatica 40, 2004, page 1629: data-driven local coordinates):
-the search goes where outputs change, at right angles to changes of basis.
+Every matrix is free. The search moves where outputs change, orthogonally to changes of basis (data-driven local
+coordinates: McKelvey, Helmersson and Ribarits, Automatica 40, 2004, page 1629).
 """
 
 from dataclasses import dataclass
@@ -163,7 +163,7 @@ class Problem:
         return (x @ v.c.T + self.u @ v.d.T + v.level).T, whole
 
     def directions(self, theta: Array) -> Array:
-        """Return orthonormal directions that change outputs, and not the basis alone.
+        """Return orthonormal directions that change outputs, not only the basis.
 
         Parameters
         ----------

@@ -11,7 +11,7 @@ HORIZONS = (6, 12, 24)
 
 
 def subspace_starts(data: Joint, order: int) -> list[tuple[Array, Array]]:
-    """Return A and C by PO-MOESP (Verhaegen 1994), one pair a horizon; unstable poles are drawn into the unit circle.
+    """Return A and C by PO-MOESP (Verhaegen 1994), one pair for each horizon, with poles inside the unit circle.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def _hankel(x: Array, first: int, rows: int) -> Array:
 
 
 def _inside(a: Array, n_samples: int) -> Array:
-    """Return a transition with its poles within the unit circle: those outside are reflected."""
+    """Return a transition matrix with its poles inside the unit circle; those outside are reflected."""
     values, vectors = np.linalg.eig(a)
     limit = 1.0 - 1.0 / n_samples
     radius = np.abs(values)

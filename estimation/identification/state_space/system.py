@@ -48,7 +48,7 @@ class StateSpace:
 
     @property
     def n_values(self) -> int:
-        """Values that are free: those of the matrices, less the choice of a basis, and levels."""
+        """Number of free values: those of the matrices, less the choice of a basis, plus levels."""
         n, (p, m) = self.order, self.d.shape
         return n * (p + m) + p * m * self.direct + p
 
