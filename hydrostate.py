@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     __version__: str
 
 OF_A_LOG = ("estimate", "diagnose", "identify")
-"""Verbs of the command that Python asks of a log."""
+"""Verbs of the command that are methods of a log in Python."""
 
 LONGEST_PATH = 4096
-"""Characters of a path; a longer text is a log itself."""
+"""Largest length of a path [characters]; a longer text is taken as the log itself."""
 
 PACKAGES = ("plant", "estimation", "faults", "experiments")
 
@@ -75,7 +75,7 @@ __all__ = [
 
 
 def _refuse_shadows() -> None:
-    """Refuse packages of the same names that stand in front of ours."""
+    """Raise an error if other packages with the same names come before ours on the path."""
     home = Path(__file__).resolve().parent
     for name in PACKAGES:
         found = find_spec(name)
@@ -101,7 +101,7 @@ _late = lazily("hydrostate", __file__)
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name when it is first asked for."""
+    """Import a name on first use."""
     if name == "__version__":
         from importlib.metadata import version
 
@@ -120,12 +120,12 @@ def __dir__() -> list[str]:
 
 
 def actuators() -> Mapping[str, str]:
-    """Return the kinds of actuator, each with a line that says what it is.
+    """Return the kinds of actuator, each with a one-line description.
 
     Returns
     -------
     Mapping[str, str]
-        Description by name; the names are what ``plant=`` takes.
+        Description by name; these names can be used as ``plant=``.
 
     Examples
     --------
@@ -146,31 +146,31 @@ def read(
     sample_time: float | None = None,
     beside: "Sequence[str | Path] | str | Path" = (),
 ) -> "Log":
-    """Read a log, of an actuator or of anything.
+    """Read a log, of an actuator or of anything else.
 
-    If no rig, columns or kind is given, a log without the actuator's channels is read as it stands: every column of
-    numbers under its own name, for `Log.identify`. Up to half of the samples may be missing for `Log.identify`; at most
-    5 % for everything else.
+    If no rig, columns or kind is given, a log without the actuator's channels is read unchanged: every numeric column
+    under its own name, for `Log.identify`. Up to half of the samples may be missing for `Log.identify`; at most 5 % for
+    everything else.
 
     Parameters
     ----------
     path : str, bytes, path-like, pandas.DataFrame or Mapping[str, array_like]
         Text, Parquet, Feather or MAT; with the extra ``bench`` also XLSX, TDMS, MDF and HDF5. `hydrostate inspect`
-        shows what a strange one holds. Or a table, also of Polars or Arrow, NumPy's records, or arrays by name, with
-        ``time_s`` or its index as time: seconds, durations or dates. Masked values are missing ones; quantities of Pint
-        are converted.
+        shows the contents of an unknown file. Or a table, also from Polars or Arrow, NumPy records, or arrays by name,
+        with ``time_s`` or the index as time: seconds, durations or dates. Masked values count as missing; Pint
+        quantities are converted.
     rig : Rig, str or Path, optional
         The actuator, or its rig file; the paper's if not given.
     columns : Mapping[str, str], optional
         Columns under other names, with their units: ``{"position_m": "POS_MM:mm"}``.
     plant : str, optional
-        Kind of actuator, one of `actuators`; the one that the columns' names tell if not given, else the gear-pump
-        actuator.
+        Kind of actuator, one of `actuators`. If not given, it is inferred from the column names; the gear-pump actuator
+        is the default.
     sample_time : float, optional
-        Time between rows [s] of a log that has no time, or of an actuator's whose times do not increase. In a table of
-        anything else, time is then not read.
+        Time between rows [s], for a log without a time column, or for an actuator's log whose times do not increase.
+        For a table of anything else, its time is then not read.
     beside : str, Path or sequence of them
-        Files of other loggers of the same test; all are put on one clock.
+        Files from other loggers in the same test; all are converted to one clock.
 
     Returns
     -------
@@ -243,7 +243,7 @@ def read(
 
 
 def load_model(path: "str | Path") -> "Relation":
-    """Read a model between any channels that `Relation.save` or ``hydrostate identify --out`` wrote.
+    """Read a model between any channels, saved by `Relation.save` or ``hydrostate identify --out``.
 
     Parameters
     ----------
@@ -253,12 +253,12 @@ def load_model(path: "str | Path") -> "Relation":
     Returns
     -------
     Relation
-        Ready to simulate and to be tested on logs.
+        Ready to simulate and to be validated on logs.
 
     Raises
     ------
     HydrostateError
-        If the file cannot be read or holds no such model.
+        If the file cannot be read or contains no such model.
     """
     from estimation.identification.free_run.saved import load_models
     from experiments.python_user.relation import Relation
@@ -281,7 +281,7 @@ def simulate(
     Parameters
     ----------
     condition : str, optional
-        What is wrong with the actuator, one of `conditions`; the healthy one if not given.
+        Condition of the actuator, one of `conditions`; healthy if not given.
     rig : Rig, str or Path, optional
         The actuator, or its rig file.
     plant : str
@@ -295,7 +295,7 @@ def simulate(
     Returns
     -------
     Log
-        The run; `Log.record` holds what made it in its metadata.
+        The run; the metadata of `Log.record` say how it was made.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Arrays as annotations name them."""
+"""Array types for annotations."""
 
 from typing import TypeAlias
 

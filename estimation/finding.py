@@ -15,8 +15,8 @@ NORMAL_95 = 1.959963984540054
 """Half-width of a 95 % normal interval, in standard deviations."""
 
 LARGE, WIDEST = 0.03, 100.0
-"""Relative deviation above which the interval of a positive quantity is one of its logarithm [fraction], and the
-largest distance of that logarithm, so that numbers stay finite [dimensionless]."""
+"""Relative deviation above which the interval of a positive quantity is computed on its logarithm [fraction], and the
+largest half-width on that logarithm, so that numbers stay finite [dimensionless]."""
 
 
 def interval_95(value: float, std: float) -> tuple[float, float]:
@@ -25,7 +25,7 @@ def interval_95(value: float, std: float) -> tuple[float, float]:
     Parameters
     ----------
     value : float
-        Its middle [any unit].
+        Its centre [any unit].
     std : float
         Standard deviation [the same unit].
 
@@ -43,14 +43,14 @@ def positive_interval_95(value: float, std: float) -> tuple[float, float]:
     Parameters
     ----------
     value : float
-        Its middle, positive [any unit].
+        Its centre, positive [any unit].
     std : float
         Standard deviation [the same unit].
 
     Returns
     -------
     tuple of float
-        Lower and upper end, both positive; those of `interval_95` for a deviation of `LARGE` or less, where the two
+        Lower and upper end, both positive; those of `interval_95` for a deviation of `LARGE` or less, at which the two
         differ by 0.2 % of the value at most.
 
     Examples
@@ -67,7 +67,7 @@ def positive_interval_95(value: float, std: float) -> tuple[float, float]:
 
 
 class Outcome(StrEnum):
-    """Outcome of a log; the words that JSON prints."""
+    """Outcome of a log; its values are the words printed in JSON."""
 
     OK = "ok"
     NOT_OBSERVABLE = "not_observable"
@@ -95,7 +95,7 @@ OUTCOMES: Mapping[Outcome, str] = {
     Outcome.DIVERGED: "The estimate stopped being finite; check units, rig parameters and the form of the model.",
     Outcome.FAILED: "The log could not be read or used; the message says why.",
 }
-"""Meaning of each outcome, as a sentence for a reader."""
+"""Meaning of each outcome, as a sentence."""
 
 
 @dataclass(frozen=True)
@@ -130,19 +130,19 @@ class Quantity:
     ci95_total: tuple[float, float] | None = None
 
     def __str__(self) -> str:
-        """Return the value with its 95 % interval and its unit, as a reader wants them."""
+        """Return the value with its 95 % interval and its unit, for a reader."""
         if self.value is None:
             return "not determined"
         within = "" if self.ci95 is None else f" ({self.ci95[0]:.4g} to {self.ci95[1]:.4g})"
         return f"{self.value:.4g}{within} {self.unit}"
 
     def __repr__(self) -> str:
-        """Return the same in brackets, since mappings of quantities are read at a prompt."""
+        """Return the same in brackets, for mappings of quantities at a prompt."""
         return f"<{self}>"
 
     @staticmethod
     def normal(value: float, std: float, unit: str) -> "Quantity":
-        """Return a quantity whose interval is that of a normal law.
+        """Return a quantity with the interval of a normal distribution.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class Quantity:
         Returns
         -------
         bool
-            False too where there is no interval.
+            Also False if there is no interval.
         """
         return self.ci95 is not None and self.ci95[0] <= truth <= self.ci95[1]
 
@@ -205,11 +205,11 @@ class Change:
     Parameters
     ----------
     since : float
-        When [s].
+        Time of the change [s].
     ci95 : tuple of float
         Its 95 % interval [s].
     before : str
-        Condition up to then.
+        Condition before the change.
     """
 
     since: float
@@ -228,13 +228,13 @@ class Finding:
     outcome : Outcome
         The outcome.
     quantities : Mapping[str, Quantity]
-        What was estimated, by name.
+        Estimates, by name.
     gate : Gate
         Whether the quantities can be believed.
     channels : tuple of str
         Channels that were used.
     notes : tuple of Note
-        What else a reader should know: what was left out of the log, what an absent channel costs.
+        Further notes for the reader: what was left out of the log, what an absent channel costs.
     condition : str or None
         The most probable condition or fault; None if none was requested, or none can be named.
     alike : tuple of str
@@ -243,23 +243,23 @@ class Finding:
         Probability of each condition [probability]. If another fault is as likely and a note names it, they sum to less
         than 1 by its probability; otherwise they hold for a log that is in one of them.
     unknown : bool
-        Whether there is a reason against all of them.
+        Whether there is an objection to all of them.
     against : tuple of Note
-        The reasons.
+        The objections.
     faults : tuple of Note
         Further faults.
     severities : Mapping[str, Quantity]
-        How bad it is.
+        Severities of faults, by name.
     healthy : Mapping[str, float]
-        The same of the healthy actuator [each in the same unit].
+        The severities of the healthy actuator [each in the same unit].
     not_told : tuple of Note
         What the log does not determine.
     since : Change or None
         When the condition began; None if it did so before the log.
     advice : tuple of Note
-        What to do or to measure next.
+        What to do or measure next.
     evidence : object
-        Results of the engines behind it, of the actuator's own kind.
+        Results of the engines behind it, specific to the actuator.
     """
 
     actuator: str
@@ -288,6 +288,6 @@ class Finding:
 
     @property
     def all_notes(self) -> tuple[Note, ...]:
-        """Every note, each once: on the gate, the class, other faults, what is undetermined, the log, and advice."""
+        """Every note, once: on the gate, the class, other faults, undetermined quantities, the log, and advice."""
         groups = (self.gate.reasons, self.against, self.faults, self.not_told, self.notes, self.advice)
         return distinct(note for group in groups for note in group)

@@ -98,7 +98,7 @@ class ChannelCode(Code):
 
 
 class EstimateCode(Code):
-    """Notes on an estimate of bulk modulus: what speaks against it, or what it lacks."""
+    """Notes on an estimate of bulk modulus: objections to it, or what it lacks."""
 
     NOT_DETERMINED = (
         "this record does not determine the coefficients separately (a pole cancels a zero, or the order is too high): "

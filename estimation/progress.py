@@ -1,4 +1,4 @@
-"""Progress of a long search, reported to any listener; the search need not know who listens."""
+"""Progress of a long search, reported to any listener; the search does not depend on who listens."""
 
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -9,12 +9,12 @@ _LISTENER: ContextVar[Callable[[str], None] | None] = ContextVar("listener", def
 
 @contextmanager
 def listening(listener: Callable[[str], None]) -> Generator[None]:
-    """Hear what is tried within a block.
+    """Report to a listener what is tried within a block.
 
     Parameters
     ----------
     listener : callable
-        Called with what is being tried, once for each model.
+        Called with the kind of model that is tried next, once for each model.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def listening(listener: Callable[[str], None]) -> Generator[None]:
 
 
 def tell(what: str) -> None:
-    """Say what is tried next, if anybody listens.
+    """Report what is tried next, if there is a listener.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`stretches(where)`: the samples in a row for which something holds."""
+"""`stretches(where)`: consecutive samples for which a condition holds."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from estimation.arrays import BoolArray, IntArray
 
 
 def stretches(where: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the stretches of samples for which something holds.
+    """Return the stretches of consecutive samples for which a condition holds.
 
     Parameters
     ----------
@@ -16,7 +16,7 @@ def stretches(where: BoolArray) -> tuple[IntArray, IntArray]:
     Returns
     -------
     tuple of ndarray of int, shape (stretches,)
-        The first sample of each, and the one behind its last.
+        The first sample of each stretch, and the one after its last.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def in_long_stretches(where: BoolArray, least: float) -> BoolArray:
     Parameters
     ----------
     where : ndarray of bool, shape (n,)
-        Whether something holds.
+        Whether a condition holds.
     least : float
         Length of the shortest stretch that counts [samples].
 

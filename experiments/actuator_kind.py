@@ -1,4 +1,4 @@
-"""`ActuatorKind`: what a kind of actuator gives; every verb, batch and page works on it (see docs/add-a-plant.md)."""
+"""`ActuatorKind`: what each kind of actuator provides; every verb, batch and page uses it (see docs/add-a-plant.md)."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from plant.notes import Note
 
 Options: TypeAlias = Mapping[str, Any]
-"""Options of the command line by name, ``sample_time``; those not given stand at the kind's own defaults."""
+"""Command line options by name, such as ``sample_time``; options not given have the kind's own defaults."""
 
 Screen: TypeAlias = "Callable[[Sequence[Result], Options], Iterable[RenderableType]]"
-"""What a terminal shows of the logs that did not fail."""
+"""Terminal output for the logs that did not fail."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,9 @@ class Run:
     Parameters
     ----------
     record : Record
-        What the bench would have logged; its metadata say what made it.
+        The log that the test bench would have recorded; its metadata say how it was made.
     about : Mapping[str, Any]
-        The same for the reader: condition, drive, sensors.
+        The same for readers: condition, drive, sensors.
     """
 
     record: "Record"
@@ -48,10 +48,10 @@ class Simulation:
     Parameters
     ----------
     run : callable
-        ``run(rig, options) -> Run``; ``options["seed"]`` is the seed of all that is random, ``options["plant"]`` the
-        name that was asked for, one of the kind's `ActuatorKind.models` where it has several.
+        ``run(rig, options) -> Run``. ``options["seed"]`` is the seed of all that is random; ``options["plant"]`` is the
+        name given by the user, one of `ActuatorKind.models` if the kind has several.
     options : Options
-        Options that it understands, with what they are where they are not given.
+        The options that it accepts, with their defaults.
     """
 
     run: "Callable[[Rig[Any], Options], Run]"
@@ -60,30 +60,30 @@ class Simulation:
 
 @dataclass(frozen=True, kw_only=True)
 class LogVerb:
-    """How `hydrostate estimate` or `hydrostate diagnose` treats a log and shows its finding.
+    """How `hydrostate estimate` or `hydrostate diagnose` processes a log and shows its finding.
 
     Parameters
     ----------
     run : callable
-        ``run(record, rig, options) -> Finding``, with rig and options as `prepare` returned them.
+        ``run(record, rig, options) -> Finding``, with rig and options as returned by `prepare`.
     run_beside : callable, optional
-        ``run_beside(record, rig, options, kept) -> Finding``, the same for a log that several verbs are asked of: each
-        leaves in the dictionary ``kept``, empty at first, what others can begin from.
+        ``run_beside(record, rig, options, kept) -> Finding``, the same for a log on which several verbs are run. Each
+        verb stores results in the dictionary ``kept``, empty at first, for the others to start from.
     options : Options
-        Options that it understands, with what they are where they are not given. ``healthy`` comes as a Record.
+        The options that it accepts, with their defaults. ``healthy`` is passed as a Record.
     prepare : callable
-        ``prepare(rig, options) -> (rig, options)``, once for all logs: refuses what cannot be used, and may put what
-        the options say of the actuator into the rig.
+        ``prepare(rig, options) -> (rig, options)``, called once for all logs: rejects what cannot be used, and may copy
+        what the options say about the actuator into the rig.
     entries : callable
-        From a finding to its JSON entries, ``outcome`` and ``message`` among them.
+        From a finding to its JSON entries, including ``outcome`` and ``message``.
     blank : Mapping[str, Any]
         The entries of a log that could not be used.
     page : callable, optional
         ``page(result, finding, record) -> HTML``; the page of `experiments.log_pages.finding_page` if not given.
     figure : callable, optional
-        ``figure(finding, log's name, path)`` writes what ``--figure`` asks for.
+        ``figure(finding, log's name, path)`` writes the figure of ``--figure``.
     remarks : callable
-        What is said once of all results, on standard error.
+        Remarks on all results together, printed once on standard error.
     """
 
     run: "Callable[[Record, Rig[Any], Any], Finding]"
@@ -100,15 +100,15 @@ class LogVerb:
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """How `hydrostate identifiability` judges an experiment.
+    """How `hydrostate identifiability` evaluates an experiment.
 
     Parameters
     ----------
     run : callable
-        ``run(rig, options) -> findings``: one for each experiment that was looked at, its quantities the healthy
-        values with the least standard deviation that any method could reach.
+        ``run(rig, options) -> findings``: one for each experiment that was evaluated. Its quantities are the healthy
+        values with the smallest standard deviation that any method could reach.
     options : Options
-        Options that it understands, with what they are where they are not given.
+        The options that it accepts, with their defaults.
     """
 
     run: "Callable[[Rig[Any], Options], Sequence[Finding]]"
@@ -124,25 +124,25 @@ class ActuatorKind:
     Parameters
     ----------
     name : str
-        What ``--plant`` and rig files call it.
+        Its name in ``--plant`` and in rig files.
     parameters : type
         Frozen dataclass of its parameters: every field has an `SI` note and a default, the healthy actuator's.
     channels : Mapping[str, str]
-        Unit of every channel that a log may hold, by name.
+        Unit of every channel that a log may contain, by name.
     required : tuple of str
-        Channels that a log must hold; ``"position_m or velocity_m_s"`` asks for one of the two.
+        Channels that a log must contain; ``"position_m or velocity_m_s"`` requires one of the two.
     conditions : tuple of str
-        What a diagnosis may name, the healthy actuator first.
+        Conditions that a diagnosis may name, the healthy actuator first.
     models : tuple of str
-        Names of its models, where `simulate` has several; the kind's own if empty.
+        Names of its models, if `simulate` has several; the kind's own name if empty.
     rig_name : str
-        What the default rig is called.
+        Name of the default rig.
     simulate : Simulation or None
-        Runs, with its faults.
+        Simulation of runs, including faults.
     estimate, diagnose : LogVerb or None
-        What a log says.
+        Verbs that analyse a log.
     identifiability : Experiment or None
-        What an experiment would tell.
+        Prediction of what an experiment would determine.
     """
 
     name: str
@@ -166,7 +166,7 @@ class ActuatorKind:
         return Rig(self.rig_name, self.parameters())
 
     def read_rig(self, path: Path | None) -> "Rig[Any]":
-        """Return the rig of a file, the default one where there is none.
+        """Return the rig from a file; without a file, the default rig.
 
         Raises
         ------

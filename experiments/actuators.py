@@ -1,4 +1,4 @@
-"""The kinds of actuator, each registered by one line; they are imported when one is asked for."""
+"""The kinds of actuator, each registered by one line and imported on first use."""
 
 from collections.abc import Collection, Iterator, Mapping
 from importlib import import_module
@@ -18,26 +18,27 @@ ACTUATORS: Mapping[str, str] = {
     "piezo-stack": "experiments.piezo_stack.kind:PIEZO_STACK",
     "diaphragm-motor": "experiments.diaphragm_motor.kind:DIAPHRAGM_MOTOR",
 }
-"""Where each kind's `experiments.actuator_kind.ActuatorKind` is, by name."""
+"""Location of each kind's `experiments.actuator_kind.ActuatorKind`, by name."""
 
 DEFAULT = "eha"
 
 ENTRY_POINTS = "hydrostate.actuators"
-"""Group of entry points by which an installed package registers kinds of its own: ``name = "module:OBJECT"``."""
+"""Group of entry points with which an installed package registers its own kinds: ``name = "module:OBJECT"``."""
 
 
 def actuator(name: str) -> "ActuatorKind":
-    """Return the kind of actuator of this name.
+    """Return the kind of actuator with this name.
 
     Parameters
     ----------
     name : str
-        Of `ACTUATORS` or an installed package; or of one of a kind's models, ``circuit``.
+        A name from `ACTUATORS` or from an installed package; or the name of one of a kind's models, such as
+        ``circuit``.
 
     Returns
     -------
     ActuatorKind
-        The kind; its channels are known from here on.
+        The kind; its channels are now registered.
 
     Raises
     ------
@@ -54,12 +55,12 @@ def actuator(name: str) -> "ActuatorKind":
 
 
 def kind_of_rig(rig: "Rig[Any]", usual: str) -> "ActuatorKind":
-    """Return the kind of actuator that a log's rig file names, or the usual one where it names none."""
+    """Return the kind of actuator named in a log's rig file, or the default kind if it names none."""
     return actuator(rig.plant or usual)
 
 
 def actuators() -> "Iterator[ActuatorKind]":
-    """Yield every kind of actuator, the project's own first."""
+    """Yield every kind of actuator, the project's own kinds first."""
     from importlib.metadata import entry_points  # 20 ms, which a log of the project's own kind can do without
 
     yield from (_loaded(name, place) for name, place in ACTUATORS.items())
@@ -68,9 +69,9 @@ def actuators() -> "Iterator[ActuatorKind]":
 
 
 def kinds_by_columns(columns: Collection[str]) -> tuple[str, ...]:
-    """Return the kinds of actuator of which a log has the most channels, under the channels' own names.
+    """Return the kinds of actuator with the most channels in a log, by the channels' own names.
 
-    A log that has what the gear-pump actuator needs is one of it.
+    A log with the channels that the gear-pump actuator requires always belongs to that kind.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def kinds_by_columns(columns: Collection[str]) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        One name; several where kinds share these channels; none where the log lacks what every kind needs.
+        One name; several if kinds share these channels; none if the log has too few channels for every kind.
 
     Examples
     --------
@@ -102,21 +103,21 @@ def kinds_by_columns(columns: Collection[str]) -> tuple[str, ...]:
 
 
 def kind_meant(error: "NoChannelError", plant: str | None, rig: object) -> str:
-    """Return the kind of actuator that a log is of, which lacks the channels of the gear-pump actuator.
+    """Return the kind of actuator for a log that lacks the channels of the gear-pump actuator.
 
     Parameters
     ----------
     error : NoChannelError
-        What reading it as one of the gear-pump actuator brought up.
+        The error from reading it as a gear-pump log.
     plant : str or None
-        Kind of actuator that was asked for.
+        The requested kind of actuator.
     rig : object
-        Rig that was given; None where none was.
+        The given rig; None if none was given.
 
     Raises
     ------
     NoChannelError
-        If a kind or a rig was given, no kind has these channels, or several have them: then it says how to name one.
+        If a kind or a rig was given, or no kind or several have these channels; for several, it says how to choose.
     """
     from plant.errors import NoChannelError
 
@@ -141,14 +142,14 @@ def _loaded(name: str, place: str) -> "ActuatorKind":
 
 
 def read_own_rig(path: "Path", common: "ActuatorKind") -> "Rig[Any]":
-    """Return the rig of a file that lies among logs of several kinds of actuator.
+    """Return the rig from a file that lies among logs of several kinds of actuator.
 
     Parameters
     ----------
     path : Path
         The rig file.
     common : ActuatorKind
-        Kind of a file that names none.
+        Kind of actuator for a file that names none.
 
     Raises
     ------
@@ -162,7 +163,7 @@ def read_own_rig(path: "Path", common: "ActuatorKind") -> "Rig[Any]":
 
 
 def offered(kind: "ActuatorKind", verb: str) -> Any:
-    """Return the function that a kind of actuator offers for a verb.
+    """Return a kind of actuator's function for a verb.
 
     Parameters
     ----------

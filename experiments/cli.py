@@ -17,10 +17,10 @@ from experiments.command.terminal import INTERRUPTED, HydrostateGroup, emit
 from plant.compiled.native.recipes import trust_sources
 
 LEFT_TO_END = 10.0
-"""How long a thread that still runs when a command is done is waited for [s]."""
+"""Longest wait for threads that still run when a command has finished [s]."""
 
 OBJECTS_AT_START = 500_000
-"""More objects than imports and one log leave behind; garbage is looked for after so many [objects]."""
+"""Threshold of the garbage collector [objects], above the number left by imports and one log."""
 
 EPILOG = """
 Exit codes: 0 all done, not_observable included; 1 some logs failed or diverged (standard error names each), or an
@@ -66,13 +66,13 @@ VERBS: Mapping[str, Sequence[str]] = {
         "open_benchmark.command",
     ),
 }
-"""Modules that hold a verb each, by the heading that the help has over them, in its order."""
+"""Modules with one verb each, by the heading in the help text, in its order."""
 
 GROUPS = {"verbs.rig": "rig", "verbs.export": "export", "open_benchmark.command": "benchmark"}
-"""Modules whose verbs have a name before theirs."""
+"""Modules whose verbs follow the name of a group."""
 
 ALONE = {"estimate": "verbs.estimate", "diagnose": "verbs.diagnose", "identify": "verbs.identify"}
-"""Verbs of a single log, whose module is imported without the others: these take a twentieth of a short run."""
+"""Verbs for a single log. Their module is imported alone, since importing all takes a twentieth of a short run."""
 
 if TYPE_CHECKING:
     app: typer.Typer
@@ -131,13 +131,13 @@ def _whole() -> typer.Typer:
 
 
 def app_for(words: Sequence[str]) -> typer.Typer:
-    """Return the command line that understands what was typed."""
+    """Return a command line that includes the verb that was typed."""
     alone = ALONE.get(words[0]) if words else None
     return _whole() if alone is None else _of({"": [alone]})
 
 
 def _with_streams() -> None:
-    """Open what was closed when the command began, as by a shell's ``>&-``: what is said must have somewhere to go."""
+    """Open standard streams that were closed at the start, as by a shell's ``>&-``, so that output can be written."""
     for name, how, mode in (("stdin", os.O_RDONLY, "r"), ("stdout", os.O_WRONLY, "w"), ("stderr", os.O_WRONLY, "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, how), mode, encoding="utf-8"))
@@ -146,10 +146,10 @@ def _with_streams() -> None:
 def main() -> None:
     """Run the command line and exit with its code.
 
-    A short run is spent importing: no garbage is looked for meanwhile, and in the end nothing is freed piece by piece,
-    which by themselves take a third of it. What asked to be called at the exit is called. Linear algebra has one
-    thread, as in all workers, unless the environment says otherwise: its matrices are small, its own threads would take
-    three times as long as they save, and results would depend on the count of cores.
+    A short run spends most of its time importing. Meanwhile no garbage is collected, and nothing is freed piece by
+    piece at the end: together they would take a third of the run. Exit handlers are still called. Linear algebra uses
+    one thread, as in all workers, unless the environment says otherwise: its matrices are small, so its own threads
+    would cost three times what they save, and results would depend on the number of cores.
     """
     gc.set_threshold(OBJECTS_AT_START)
     _with_streams()

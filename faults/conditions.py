@@ -15,7 +15,7 @@ from plant.units import SI
 Level: TypeAlias = Literal["none", "minor", "major"]
 
 LEVELS: tuple[Level, ...] = get_args(Level)
-"""The levels in rising order; a level's place is its severity."""
+"""The levels in rising order; the index of a level is its severity."""
 
 HIGHEST_SEVERITY = 5.0
 """End of the extrapolation: above leakage 5.5 the paper's rig does not move at its rated speed."""
@@ -40,7 +40,7 @@ class FrictionLevel:
 
 LEAKAGE_COEFFICIENTS = tuple(field.name for field in fields(LeakageLevel))
 FRICTION_COEFFICIENTS = tuple(field.name for field in fields(FrictionLevel))
-"""What leakage and friction change."""
+"""Names of the coefficients that friction changes; `LEAKAGE_COEFFICIENTS` are those that leakage changes."""
 
 LEAKAGE_TABLE: Mapping[Level, LeakageLevel] = {
     "none": LeakageLevel(leakage_coefficient=4.784e-12, flow_bias=2.413e-6),
@@ -115,7 +115,7 @@ def find_condition(name: str) -> Condition:
 
 
 def parameters_for(condition: Condition, base: EhaParameters = PAPER_RIG) -> EhaParameters:
-    """Return the actuator in a condition: Tables 3 and 4 on the paper's rig, a like change on any other.
+    """Return the actuator in a condition: Tables 3 and 4 on the paper's rig, an equivalent change on any other.
 
     Returns
     -------
@@ -133,16 +133,16 @@ def parameters_for(condition: Condition, base: EhaParameters = PAPER_RIG) -> Eha
 def severity(leakage: float, friction: float, base: EhaParameters = PAPER_RIG) -> EhaParameters:
     """Return the actuator at a continuous severity of leakage and of friction: 0 is none, 1 minor, 2 major.
 
-    Every coefficient runs linearly between the rows of Tables 3 and 4 and beyond the last, so that friction
-    force and lost flow rise with severity at every velocity and pressure, although a_2 alone dips
-    (errata E12).
+    Every coefficient is interpolated linearly between the rows of Tables 3 and 4 and extrapolated beyond the last, so
+    that friction force and lost flow rise with severity at every velocity and pressure, although a_2 alone dips (errata
+    E12).
 
-    A base that is not the paper's rig keeps its own values at 0 and has the tables' increments over "none"
-    added so that they mean the same: section 3 defines leakage by the share of velocity it costs and friction by the
-    share of pressure it adds, both in the normal state at rated speed. So flow bias scales with the rated pump flow
-    ``Q = D_p * rated_speed``, the leakage coefficient with ``Q / p``, and friction with ``p A`` at the same share of
-    the ideal velocity ``v = Q / A``: a_1 with ``p A / v^2``, a_2 with ``p A / v``, a_3 with ``p A``, where p is the
-    differential pressure that the healthy actuator settles at, all relative to the paper's rig.
+    A base that is not the paper's rig keeps its own values at 0. The tables' increments over "none" are added, scaled
+    to have the same meaning: section 3 defines leakage by the share of velocity it costs and friction by the share of
+    pressure it adds, both in the normal state at rated speed. So flow bias scales with the rated pump flow ``Q = D_p *
+    rated_speed``, the leakage coefficient with ``Q / p``, and friction with ``p A`` at the same share of the ideal
+    velocity ``v = Q / A``: a_1 with ``p A / v^2``, a_2 with ``p A / v``, a_3 with ``p A``, where p is the differential
+    pressure at which the healthy actuator settles, all relative to the paper's rig.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def severity(leakage: float, friction: float, base: EhaParameters = PAPER_RIG) -
 
 @lru_cache(maxsize=256)
 def _at_severity(leakage: float, friction: float, base: EhaParameters) -> EhaParameters:
-    """Return the actuator as `severity` describes it; a batch asks for the same nine of one rig with every log."""
+    """Return the actuator described by `severity`; cached, since a batch requests the same nine with every log."""
     leaking = _changed(base, LEAKAGE_TABLE, leakage, leakage_scales(base))
     rubbing = _changed(base, FRICTION_TABLE, friction, friction_scales(base))
     return replace(base, **leaking, **rubbing)

@@ -4,7 +4,7 @@ from plant.notes import Code
 
 
 class CylinderAdviceCode(Code):
-    """Advice on a cylinder that leaks or whose rod moves hard."""
+    """Advice on a cylinder that leaks or whose rod is hard to move."""
 
     LOOK_AT_PISTON_SEAL = "inspect the seal of the cylinder's piston"
     LOOK_AT_ROD = "inspect the rod seals, the guide and its alignment"

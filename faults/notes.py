@@ -1,4 +1,4 @@
-"""Notes of a diagnosis of the gear-pump actuator: against a class, on undetermined severities, on next steps."""
+"""Notes of a diagnosis of the gear-pump actuator: objections to a class, undetermined severities, next steps."""
 
 from plant.notes import Code
 

@@ -9,7 +9,7 @@ from faults.conditions import CONDITIONS
 
 
 def confusion_matrix(true: Sequence[str], found: Sequence[str], names: Collection[str] = CONDITIONS) -> pd.DataFrame:
-    """Count how often each true condition was found to be which.
+    """Count how often each true condition was classified as each condition.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ def confusion_matrix(true: Sequence[str], found: Sequence[str], names: Collectio
     Returns
     -------
     pandas.DataFrame
-        Counts; a row for each true condition, a column for each found one, in the order of the names.
+        Counts; one row for each true condition, one column for each found one, in the order of the names.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Atomic writes: a file is either complete or does not exist."""
 
 import errno
 import os
@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 @contextmanager
 def replacing(path: Path) -> Generator[BinaryIO]:
-    """Open a temporary file that takes the name ``path`` when the block ends well, and vanishes otherwise.
+    """Open a temporary file that is renamed to ``path`` if the block succeeds, and is deleted otherwise.
 
     Parameters
     ----------

@@ -6,12 +6,12 @@ from plant.notes import Note
 
 
 class HydrostateError(ValueError):
-    """A user's input cannot be used; the message says what was wanted and what was given.
+    """A user's input cannot be used; the message says what was expected and what was given.
 
     Parameters
     ----------
     source : str, optional
-        The file that it is about, which stands in front of the sentence.
+        The file concerned, which precedes the sentence.
     """
 
     def __init__(self, message: str, source: str | None = None) -> None:
@@ -39,20 +39,20 @@ class LogError(HydrostateError):
 
 
 class NoMemoryError(LogError, MemoryError):
-    """Reading a log needs more memory than there is; another log, or a column alone, may fit."""
+    """Reading a log needs more memory than is available; another log, or a single column, may fit."""
 
 
 class MissingColumnError(LogError):
-    """A column that a mapping names is not in the log.
+    """A column named in a mapping is not in the log.
 
     Parameters
     ----------
     channel, column : str
-        The channel, and the column that was wanted for it.
+        The channel, and the column that was expected for it.
     known : str
         The columns that the log has, as a list in words.
     hint : str
-        Which of them may be meant, as a clause with its semicolon.
+        The column that may be meant, as a clause with its semicolon.
     """
 
     def __init__(self, channel: str, column: str, known: str, source: str | None = None, hint: str = "") -> None:
@@ -60,7 +60,7 @@ class MissingColumnError(LogError):
         super().__init__(f"{wanted}; name one of them as {channel}=NAME:UNIT{hint}", source)
         self.channel, self.column, self.known, self.hint = channel, column, known, hint
         self.bare = wanted
-        """The sentence without advice for a command line."""
+        """The sentence without command-line advice."""
 
     def __reduce__(self) -> tuple[object, ...]:
         return MissingColumnError, (self.channel, self.column, self.known, self.source, self.hint)
@@ -72,9 +72,9 @@ class TextColumnError(LogError):
     Parameters
     ----------
     column : str
-        What the column is called.
+        Name of the column.
     text : str
-        What it holds.
+        The text found.
     """
 
     def __init__(self, message: str, source: str | None = None, column: str = "", text: str = "") -> None:
@@ -83,16 +83,16 @@ class TextColumnError(LogError):
 
 
 class NoChannelError(LogError):
-    """A log lacks the channels of an actuator; as a log of anything it may still be read.
+    """A log lacks the channels of an actuator; it may still be read as a log of any origin.
 
     Parameters
     ----------
     message : str
-        What is missing, and what is there.
+        The missing channels, and the channels found.
     hint : str
-        What to do on a command line, as clauses, each after a semicolon.
+        Advice for the command line, as clauses, each after a semicolon.
     columns : tuple of str
-        Names of the log's columns: they may be the channels of another kind of actuator.
+        Names of the log's columns, which may be channels of another kind of actuator.
     """
 
     def __init__(self, message: str, source: str | None = None, hint: str = "", columns: tuple[str, ...] = ()) -> None:
@@ -104,11 +104,11 @@ class NoChannelError(LogError):
 
 
 class ClockError(LogError):
-    """Times of a log do not increase."""
+    """The time stamps of a log do not increase."""
 
 
 class SparseLogError(LogError):
-    """A log lacks too many samples to be estimated; models between its channels may still be identified."""
+    """A log lacks too many samples for estimation; models between its channels may still be identified."""
 
 
 class RigError(HydrostateError):
@@ -116,7 +116,7 @@ class RigError(HydrostateError):
 
 
 class DriveError(HydrostateError):
-    """A drive signal exceeds what the actuator can do, or its description is unusable."""
+    """A drive signal exceeds the actuator's limits, or its description is unusable."""
 
 
 class ModelError(HydrostateError, TypeError):
@@ -124,12 +124,12 @@ class ModelError(HydrostateError, TypeError):
 
 
 class LogWarning(UserWarning):
-    """A log was accepted, with something the reader should know.
+    """A log was accepted, but the reader should know something about it.
 
     Parameters
     ----------
     source : str, optional
-        The file that it is about, which stands in front of the sentence.
+        The file concerned, which precedes the sentence.
     """
 
     def __init__(self, note: Note, source: str | None = None) -> None:
@@ -142,13 +142,13 @@ class LogWarning(UserWarning):
 
 
 class CovarianceWarning(LogWarning):
-    """A model was fitted whose covariance says too little; what it predicts is not affected."""
+    """The covariance of a fitted model is not informative; the model's predictions are not affected."""
 
 
 def require_known(
     what: str, name: object, known: Iterable[str], error: type[HydrostateError] = HydrostateError
 ) -> None:
-    """Refuse a name that is not among those known.
+    """Refuse an unknown name.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def require_known(
 
 
 def require_each_known(what: str, names: Sequence[str], known: Sequence[str]) -> None:
-    """Refuse names if one of them is unknown or comes twice.
+    """Refuse names if one of them is unknown or repeated.
 
     Raises
     ------

@@ -1,7 +1,8 @@
-"""A plant of another tool: an FMU for co-simulation, run under a drive, as a record like every other plant's.
+"""A plant from another tool: an FMU for co-simulation, run under a drive; it gives a record like any other plant.
 
-So a study, a fit or a diagnosis can be tried on physics that are not this project's. Its variables are named as the
-columns of a foreign log are. FMPy runs it (``hydrostate[fmu]``). An FMU is a program: run none that you do not trust.
+So a study, a fit or a diagnosis can be tested on physics that do not come from this project. Its variables are mapped
+in the same way as the columns of a foreign log. FMPy runs it (``hydrostate[fmu]``). An FMU is a program: do not run one
+that you do not trust.
 """
 
 from collections.abc import Mapping
@@ -30,7 +31,7 @@ def simulate_fmu(
     sensors: Sensors = IDEAL,
     rng: np.random.Generator | None = None,
 ) -> Record:
-    """Run an FMU for co-simulation under a drive and return what sensors log.
+    """Run an FMU for co-simulation under a drive and return the sensors' log.
 
     Parameters
     ----------
@@ -41,26 +42,26 @@ def simulate_fmu(
     sample_time : float
         Seconds between samples [s], one communication step.
     columns : Mapping[str, str], optional
-        Foreign variable by channel, with its unit where it is not SI: ``{"position_m": "cylinder.x:mm"}``. The motor's
-        speed is an input, all others are what the FMU computes.
+        Foreign variable for each channel, with its unit if it is not SI: ``{"position_m": "cylinder.x:mm"}``. The motor
+        speed is an input; all others are outputs of the FMU.
     parameters : Mapping[str, float], optional
         Start values of the FMU's own variables [each in its own unit].
     sensors : Sensors
-        What the bench sees; `IDEAL` by default.
+        Sensors of the bench; `IDEAL` by default.
     rng : numpy.random.Generator, optional
         Source of sensor noise; needed unless the sensors are ideal.
 
     Returns
     -------
     Record
-        The run; position or velocity, and pressure where the FMU has it.
+        The run; position or velocity, and pressure if the FMU has it.
 
     Raises
     ------
     DriveError
         If the drive is not a finite series of at least two samples.
     HydrostateError
-        If FMPy is missing, the FMU cannot be run, lacks what is wanted, or its run stops being finite.
+        If FMPy is missing, the FMU cannot be run, lacks a requested variable, or its run stops being finite.
     """
     speed, fmpy = checked_series(drive), _package()
     told = _description(path)
@@ -101,7 +102,7 @@ def fmu_variables(path: Path) -> frozenset[str]:
     Raises
     ------
     HydrostateError
-        If FMPy is missing or the file is no FMU.
+        If FMPy is missing or the file is not an FMU.
     """
     return frozenset(one.name for one in _description(path).modelVariables)
 
@@ -126,7 +127,7 @@ def _package() -> Any:
 def _run(
     fmpy: Any, path: Path, speed: Array, sample_time: float, driven: Column, wanted: list[str], start: dict[str, float]
 ) -> Mapping[str, Array]:
-    """Return the wanted variables at every sample, by name."""
+    """Return the requested variables at every sample, by name."""
     time = sample_time * np.arange(len(speed))
     foreign = (speed - driven.offset) / driven.factor
     foreign[:-1] = 0.5 * (foreign[:-1] + foreign[1:])

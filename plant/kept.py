@@ -1,4 +1,4 @@
-"""State of long runs, kept over a restart: arrays in one file that is there whole or not at all."""
+"""State of long runs, kept across a restart: arrays in one file, which is either complete or does not exist."""
 
 import io
 import zipfile
@@ -15,14 +15,14 @@ from plant.errors import HydrostateError
 
 
 def write_kept(path: Path, kind: str, values: Mapping[str, Any]) -> None:
-    """Write arrays into a file of a kind.
+    """Write arrays to a file of a given kind.
 
     Parameters
     ----------
     path : Path
-        Where to.
+        The file to write.
     kind : str
-        What wrote it, with the number of its format: ``hydrostate watch 2``.
+        Name of the writer, with the number of its format: ``hydrostate watch 2``.
     values : Mapping[str, ndarray], each of its own shape
         Numbers or texts by name [any unit].
 
@@ -42,14 +42,14 @@ def write_kept(path: Path, kind: str, values: Mapping[str, Any]) -> None:
 
 
 def read_kept(path: Path, kind: str) -> dict[str, Array]:
-    """Read arrays from a file of a kind.
+    """Read arrays from a file of a given kind.
 
     Parameters
     ----------
     path : Path
-        A file of `write_kept`.
+        A file written by `write_kept`.
     kind : str
-        What must have written it.
+        Expected name of the writer.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Names of a package that are imported when they are first asked for, so that importing the package costs nothing."""
+"""Package names that are imported at first use, so that importing the package itself is cheap."""
 
 import ast
 from collections.abc import Callable, Mapping
@@ -9,14 +9,15 @@ from typing import Any
 
 
 def lazily(package: str, file: str) -> Callable[[str], Any]:
-    """Return a package's ``__getattr__`` (PEP 562) by the imports that it makes for type checkers alone.
+    """Return a package's ``__getattr__`` (PEP 562), built from the imports that it makes only for type checkers.
 
-    Its ``__all__`` is found the same way: the names of those imports.
+    Its ``__all__`` comes from the same imports: their names.
 
     Parameters
     ----------
     file : str
-        Its ``__file__``, in which every such import reads ``from package.module import name as name``, or as another.
+        Its ``__file__``; every such import in it reads ``from package.module import name as name``, or uses another
+        alias.
     """
 
     @cache

@@ -1,7 +1,7 @@
-"""Notes: what a reader should know of a log or a result, as a code with data; sentences are made of it at the edge.
+"""Notes on a log or a result for the reader: each is a code with data; sentences are formed only for output.
 
-A code is a member of an enum that stands beside the method that raises it, and carries one sentence template.
-Programs decide by code and data alone; no sentence is read back.
+A code is a member of an enum that stands next to the method that raises it, and has one sentence template. Programs use
+only code and data; no sentence is parsed.
 """
 
 import math
@@ -21,28 +21,28 @@ WORKSHOP: Mapping[str, float] = {
     "rpm": 30.0 / math.pi,
     "L/(min bar)": 6e9,
 }
-"""Units that a sentence may give a number in, and the factor from SI."""
+"""Units that a sentence may use for a number, and their factor from SI."""
 
 WRITTEN_OUT = 1e7
-"""Size below which a reader is spared a power of ten."""
+"""Size below which a number is written without a power of ten."""
 
 
 MOST_DECIMALS = 6
-"""Decimals that a value with a half-width has at most [count]."""
+"""Largest number of decimals of a value with a half-width [count]."""
 
 UNTOLD = " ± inf"
-"""What a half width reads that no log bounds."""
+"""Text of a half-width that no log bounds."""
 
 
 def written_out(value: float, spec: str) -> str:
-    """Return a number in significant digits as a reader writes it: 100, not 1e+02.
+    """Return a number with a given number of significant digits, as a reader writes it: 100, not 1e+02.
 
     Parameters
     ----------
     value : float
         The number [any unit].
     spec : str
-        How many digits, as `format` has it: ``.2g``.
+        Number of digits, in the syntax of `format`: ``.2g``.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def written_out(value: float, spec: str) -> str:
 
 
 class _Sentence(Formatter):
-    """Fills a template; a number in significant digits is written out, in bar where a field says ``{a_pa:.3g|bar}``."""
+    """Fills a template; writes numbers without a power of ten, and in bar if a field says ``{a_pa:.3g|bar}``."""
 
     def format_field(self, value: Any, format_spec: str) -> Any:
         format_spec, _, unit = format_spec.partition("|")
@@ -66,7 +66,7 @@ class _Sentence(Formatter):
         return super().format_field(value, format_spec)
 
     def convert_field(self, value: Any, conversion: Any) -> Any:
-        """Return a name without underscores where a template says so: ``{quantity!w}``."""
+        """Return a name without underscores if a template asks for it: ``{quantity!w}``."""
         return str(value).replace("_", " ") if conversion == "w" else super().convert_field(value, conversion)
 
 
@@ -77,7 +77,7 @@ _WITH_HALF_WIDTH = re.compile(r"(\{\w+:z?\.\d)[fg](\|[^}]+)?\} ± \{(\w+):\.2g(\
 
 
 def _in_step(template: str, data: Mapping[str, Any]) -> str:
-    """Return a template whose values have as many decimals as their half-widths."""
+    """Return a template in which each value has as many decimals as its half-width."""
 
     def decimals(found: re.Match[str]) -> str:
         value, unit, half_width, _ = found.groups("")
@@ -91,11 +91,11 @@ def _in_step(template: str, data: Mapping[str, Any]) -> str:
 
 
 class Code(Enum):
-    """A kind of note; each layer and each actuator has an enum of its own, without members in common.
+    """A kind of note; each layer and each actuator has its own enum, and no two enums share a member.
 
     A member is written ``NAME = "sentence with {fields}"``; a note's data fill the fields. A field such as
-    ``{drop_pa:.3g|bar}`` converts its number from SI to one of the units in `WORKSHOP`. Its name in small letters is
-    the code, and equals that text.
+    ``{drop_pa:.3g|bar}`` converts its number from SI to one of the units in `WORKSHOP`. The code is the member's name
+    in lower case, and equals that text.
 
     Examples
     --------
@@ -129,19 +129,19 @@ class Code(Enum):
         Parameters
         ----------
         **data : float, int, str, bool or None
-            What the template's fields are filled with, in SI where the template does not say otherwise.
+            Values of the template's fields, in SI unless the template says otherwise.
         """
         return Note(self, data)
 
 
 @dataclass(frozen=True)
 class Note:
-    """One thing that a reader should know.
+    """One fact for the reader.
 
     Parameters
     ----------
     data : Mapping[str, float | int | str | bool | None]
-        Its numbers and names, by the fields of the code's template.
+        Its numbers and names, by field of the code's template.
     """
 
     code: Code
@@ -154,7 +154,7 @@ class Note:
         )
 
     def __repr__(self) -> str:
-        """Return code and sentence, since lists of notes are read at a prompt; the data where they do not fill it."""
+        """Return code and sentence, for lists of notes at a prompt; code and data if they do not fill the template."""
         try:
             return f"<{self.code}: {self}>"
         except (KeyError, TypeError, ValueError):
@@ -172,12 +172,12 @@ class Note:
 
 
 def distinct(notes: Iterable[Note]) -> tuple[Note, ...]:
-    """Return notes in order, each once.
+    """Return notes in order, without repetitions.
 
     Returns
     -------
     tuple of Note
-        Those that are equal to none before them.
+        The notes that do not equal an earlier one.
     """
     kept: list[Note] = []
     for one in notes:

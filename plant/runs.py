@@ -1,4 +1,4 @@
-"""Common parts of all simulated runs: sampling, a drive that is a series, finite states, white noise."""
+"""Common parts of all simulated runs: sampling, the check of a drive and of the states, white noise."""
 
 from collections.abc import Mapping
 from math import ceil, isfinite
@@ -9,11 +9,11 @@ from plant.arrays import Array
 from plant.errors import DriveError, HydrostateError
 
 MOST_SAMPLES = 100_000_000
-"""Longest signal that is made, in samples; a longer one is taken for a mistake in a unit."""
+"""Longest signal that is generated, in samples; a longer one is regarded as an error in a unit."""
 
 
 def sample_count(duration: float, sample_time: float) -> int:
-    """Return the number of samples of a signal: one every `sample_time` from zero, the end excluded.
+    """Return the number of samples of a signal: one every `sample_time` from zero, without the end.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def sample_count(duration: float, sample_time: float) -> int:
 
 
 def steps_a_sample(sample_time: float, longest_step: float) -> int:
-    """Return the number of steps in a sample.
+    """Return the number of steps per sample.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def require_positive(name: str, value: float, unit: str) -> None:
 
 
 def require_frequency(name: str, value: float, sample_time: float) -> None:
-    """Refuse a frequency that samples cannot carry.
+    """Refuse a frequency that cannot be sampled.
 
     Parameters
     ----------
@@ -112,19 +112,19 @@ def require_frequency(name: str, value: float, sample_time: float) -> None:
 
 
 def require_drivable(frequency: float, highest: float) -> None:
-    """Refuse a frequency that a drive does not have.
+    """Refuse a frequency outside the drive's range.
 
     Parameters
     ----------
     frequency : float
         Frequency [Hz].
     highest : float
-        The highest that it has [Hz].
+        The drive's highest frequency [Hz].
 
     Raises
     ------
     DriveError
-        If it is not above 0 and at most the highest.
+        If it is not above 0, or exceeds the highest.
     """
     if not isfinite(frequency) or not 0.0 < frequency <= highest:
         raise DriveError(f"frequency must be above 0 and at most {highest:g} Hz, got {frequency:g} Hz")
@@ -146,7 +146,7 @@ def checked_series(drive: Array) -> Array:
     Raises
     ------
     DriveError
-        If it is no series of two samples or more, or not finite.
+        If it is not a series of at least two samples, or not finite.
     """
     series = np.ascontiguousarray(drive, dtype=np.float64)
     if series.ndim != 1 or len(series) < 2:
@@ -158,7 +158,7 @@ def checked_series(drive: Array) -> Array:
 
 
 def require_finite(states: Array, sample_time: float, plant: str) -> None:
-    """Refuse a run whose state stopped being finite.
+    """Refuse a run with states that are not finite.
 
     Parameters
     ----------
@@ -167,12 +167,12 @@ def require_finite(states: Array, sample_time: float, plant: str) -> None:
     sample_time : float
         Seconds between samples [s].
     plant : str
-        What ran, for the message.
+        Name of the plant, for the message.
 
     Raises
     ------
     HydrostateError
-        If it did, with the time.
+        If a state is not finite; the message gives the time.
     """
     finite = np.isfinite(states).all(axis=1)
     if not finite.all():
@@ -183,18 +183,18 @@ def require_finite(states: Array, sample_time: float, plant: str) -> None:
 def with_noise(
     truth: Mapping[str, Array], deviations: Mapping[str, float], rng: np.random.Generator | None, *, keep_truth: bool
 ) -> dict[str, Array]:
-    """Return the log of sensors with white noise; each channel has a random stream of its own.
+    """Return the sensors' log with white noise; each channel has its own random stream.
 
     Parameters
     ----------
     truth : Mapping[str, ndarray, shape (n,)]
-        The channels as they are [SI].
+        The true channels [SI].
     deviations : Mapping[str, float]
         Standard deviation of each noisy channel [its unit].
     rng : numpy.random.Generator or None
         Parent of the streams; needed unless all deviations are zero.
     keep_truth : bool
-        Whether the noiseless channels stand beside as ``true_...``.
+        Whether the log also holds the noiseless channels as ``true_...``.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Files that a person wrote, rig and study files: regular and small, whatever the path names."""
+"""Files that a person wrote, such as rig and study files: only small regular files are read."""
 
 import errno
 import re
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 LARGEST = 1 << 20
-"""Bytes of the largest one that is read."""
+"""Size of the largest file that is read [bytes]."""
 
 _SLIPS = {
     "has a minus sign that is none of TOML, write a hyphen (-)": re.compile("[\u2212\u2013\u2014]"),
@@ -21,24 +21,24 @@ _SLIPS = {
     "has a space in its name, write an underscore (_)": re.compile(r"^[^\W\d]\w*\s+\w[\w\s]*="),
     "has a colon, write an equals sign (=)": re.compile(r"^\w+\s*:"),
 }
-"""Slips in a line of TOML, and how to tell them."""
+"""Common mistakes in a line of TOML, and the patterns that find them."""
 
 SHOWN = 120
-"""Characters that an error shows of an entry [count]."""
+"""Largest number of characters of an entry in an error [count]."""
 
 
 def small_file(path: Path, most: int = LARGEST) -> bytes:
-    """Return the content of a small regular file; a pipe would wait for ever, and a device has no end.
+    """Return the content of a small regular file; a pipe would block for ever, and a device has no end.
 
     Parameters
     ----------
     most : int
-        Bytes that it may have.
+        Largest size [bytes].
 
     Raises
     ------
     OSError
-        If it cannot be read, is no regular file, or is larger.
+        If it cannot be read, is not a regular file, or is larger than the limit.
     """
     about = path.stat()
     if not stat.S_ISREG(about.st_mode):
@@ -59,9 +59,9 @@ def small_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     OSError
-        As of `small_file`.
+        As for `small_file`.
     ValueError
-        If it is no TOML; a sign, a quote or a comma that is none of TOML is named.
+        If it is not TOML; the message names a sign, a quote or a comma that is not valid TOML.
     """
     text = ""
     try:
@@ -74,14 +74,14 @@ def small_toml(path: Path) -> dict[str, Any]:
 
 
 def _slip(line: str) -> str:
-    """Return what is wrong with a line that is no TOML, where it is a slip that a person makes; else empty."""
+    """Return the mistake in an invalid line of TOML if it is a common one, else an empty text."""
     entry = line.partition("#")[0].strip()
     slip = next((slip for slip, form in _SLIPS.items() if form.search(entry)), "")
     return f"; {entry[:SHOWN]} {slip}" if slip else ""
 
 
 def shown(entry: object) -> str:
-    """Return an entry of a file as an error shows it: as it would be written, and not all of a long one.
+    """Return an entry of a file for an error message, as it would be written; a long one is cut.
 
     Returns
     -------

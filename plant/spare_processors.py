@@ -1,7 +1,7 @@
-"""Work on processors that would idle while one log is answered.
+"""Use of processors that would be idle during the analysis of one log.
 
-Compiled kernels release the interpreter's lock, so threads share the work of a single log. A process of a pool has
-neighbours that use the other processors, and a thread was started to use its own: both work alone.
+Compiled kernels release the interpreter's lock, so threads share the work of a single log. A process of a pool works
+alone, since its neighbours use the other processors; so does a thread, which was started to use one of them.
 """
 
 import multiprocessing
@@ -18,7 +18,7 @@ Found = TypeVar("Found")
 
 
 def spare_processors() -> int:
-    """Return the number of processors that this thread may take beside its own [count]."""
+    """Return the number of processors that this thread may use besides its own [count]."""
     if multiprocessing.parent_process() is not None or threading.current_thread() is not threading.main_thread():
         return 0
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -26,17 +26,17 @@ def spare_processors() -> int:
 
 
 def begun(work: Callable[[], Found]) -> Callable[[], Found] | None:
-    """Begin work that may be wanted later, if a processor is spare.
+    """Start work that may be needed later, if a processor is idle.
 
     Parameters
     ----------
     work : callable
-        What is done; it changes nothing that others see.
+        The work; it changes nothing that others see.
 
     Returns
     -------
     callable or None
-        Waits for the work, and returns its result or raises what it raised. None if no processor is spare.
+        Waits for the work, and returns its result or raises its exception. None if no processor is idle.
 
     Examples
     --------
@@ -53,12 +53,12 @@ def begun(work: Callable[[], Found]) -> Callable[[], Found] | None:
 
 
 def each(run: Callable[[Case], Found], cases: Iterable[Case]) -> list[Found]:
-    """Return the results of independent cases, in their order; spare processors take part.
+    """Return the results of independent cases, in their order; idle processors take part.
 
     Parameters
     ----------
     run : callable
-        From a case to its result; depends on nothing but the case.
+        Function of a case; it depends only on the case.
     cases : iterable
         The cases.
 

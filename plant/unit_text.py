@@ -1,14 +1,14 @@
-"""Grammar of units in a header, an option or a rig file: names and small whole powers only.
+"""Grammar of units in a header, an option or a rig file: only names and small whole powers.
 
-A unit comes from a file that anybody may have written, and the library that converts units evaluates what it is given:
-``m*9**9**9`` would keep it busy for ever. This grammar decides first.
+A unit comes from a file that anybody may have written, and the library that converts units evaluates its input:
+``m*9**9**9`` would keep it busy for ever. So this grammar checks the text first.
 """
 
 import re
 from collections.abc import Mapping
 
 LONGEST = 40
-"""Characters of the longest unit that is read."""
+"""Number of characters of the longest unit that is read."""
 
 _NAME = r"[A-Za-zµμΩ°Δ%][A-Za-zµμΩ°%_]{0,23}"
 _POWER = r"(?:(?:\^|\*\*)[-+]?[1-9]|[-+][1-4]|[2-4])?"
@@ -23,7 +23,7 @@ _SIGNS = str.maketrans(
 )
 
 GAUGE = ("barg", "bar(g)")
-"""Bar above the atmosphere: of a difference of pressures, which a log has, just bar."""
+"""Gauge pressure in bar: for a pressure difference, which a log has, it equals bar."""
 
 SPELLINGS: Mapping[str, str] = {
     "°": "degree",
@@ -40,16 +40,16 @@ SPELLINGS: Mapping[str, str] = {
     "Volts": "V",
     **dict.fromkeys(GAUGE, "bar"),
 }
-"""What benches write, and what it means."""
+"""Spellings used on benches, and their meaning."""
 
 _TURNS = {"1/min", "min^-1", "u/min", "umdr/min", "tr/min", "r/min", "rev/min", "rpm", "upm"}
-"""Turns a minute, in lower case; a shaft's speed is often written without its angle."""
+"""Revolutions per minute, in lower case; a shaft's speed is often written without the angle."""
 
 _CASELESS = {
     **{one.lower(): one for one in ("kPa", "MPa", "GPa", "Pa", "hPa", "V", "mV", "kV", "Hz", "kHz", "N", "kN")},
     **{one: one for one in ("bar", "mbar", "psi", "mm", "cm", "um", "µm", "ms", "us", "mm/s", "cm/s", "m/s", "rad/s")},
 }
-"""Units that are meant whatever their case, by their lower case."""
+"""Units that are recognised in any case, by their lower-case spelling."""
 
 
 def plain_unit(unit: str, *, angular: bool = False) -> str:
@@ -58,9 +58,9 @@ def plain_unit(unit: str, *, angular: bool = False) -> str:
     Parameters
     ----------
     unit : str
-        As a header, an option or a rig file has it: ``"mm/s²"``, ``"U/min"``, ``"kgf/cm^2"``.
+        The unit as written in a header, an option or a rig file: ``"mm/s²"``, ``"U/min"``, ``"kgf/cm^2"``.
     angular : bool
-        Whether it is the speed of a shaft, so that turns need not be named.
+        Whether it is the speed of a shaft, so that the unit may omit the revolution.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def plain_unit(unit: str, *, angular: bool = False) -> str:
     Raises
     ------
     ValueError
-        If it is no product of names and small whole powers.
+        If it is not a product of names and small whole powers.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""Units: notes on parameters, readable by machine, and conversion of a log's columns to SI at the door.
+"""Units: machine-readable notes on parameters, and conversion of a log's columns to SI when the log is read.
 
-Inside the project everything is SI; a unit stands only in a name's suffix (``speed_rpm``) or in an `SI` note.
+Inside the project everything is SI; a unit occurs only in a name's suffix (``speed_rpm``) or in an `SI` note.
 """
 
 from collections.abc import Mapping
@@ -16,27 +16,27 @@ if TYPE_CHECKING:
     import pint
 
 LITRE_PER_MINUTE = 1e-3 / 60.0
-"""One litre a minute, in m^3/s."""
+"""One litre per minute, in m^3/s."""
 
 
 SMALLEST, LARGEST = 1e-40, 1e40
-"""Sizes of parameters [SI] beyond which they are no actuator's, whatever they measure."""
+"""Bounds of a parameter's size [SI]: no actuator has a parameter beyond them, in any unit."""
 
 
 @dataclass(frozen=True)
 class SI:
-    """The note on a parameter: its unit, its meaning, and where its value comes from.
+    """The note on a parameter: its unit, its meaning, and the source of its value.
 
     Parameters
     ----------
     unit : str
         SI unit, written with ``^`` and ``/``: ``"m^3/(s Pa)"``.
     meaning : str
-        What the quantity is, in a few words.
+        The quantity, in a few words.
     source : str
-        Table, equation or section of the source, with the erratum where one applies.
+        Table, equation or section of the source, with the erratum if one applies.
     signed, zero : bool
-        Whether it may have either sign, or be zero; otherwise it is positive.
+        Whether it may have either sign, or be zero; otherwise it must be positive.
     """
 
     unit: str
@@ -47,12 +47,12 @@ class SI:
 
 
 def si(default: Any, unit: str, meaning: str, source: str, *, signed: bool = False, zero: bool = False) -> Any:
-    """Return a field of a parameter dataclass, with its note, which takes the same but the default.
+    """Return a field of a parameter dataclass with its note; takes the arguments of `SI` and a default.
 
     Parameters
     ----------
     default : float, bool, tuple of float or None
-        Its value unless another is given [its unit]; a parameter may be what it is by default.
+        Its default value [its unit]; a parameter may always have its default value.
 
     Examples
     --------
@@ -72,7 +72,7 @@ def notes(parameter_class: type) -> Mapping[str, SI]:
     Parameters
     ----------
     parameter_class : type
-        A dataclass whose fields are ``si(...)``, or ``Annotated[float, SI(...)]`` where they have no default.
+        A dataclass whose fields are ``si(...)``, or ``Annotated[float, SI(...)]`` if they have no default.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def notes(parameter_class: type) -> Mapping[str, SI]:
 
 
 def require_number(name: str, value: object, *, signed: bool = False, zero: bool = False) -> None:
-    """Refuse a parameter that is not a finite number, or not of its sign.
+    """Refuse a parameter that is not a finite number, or has the wrong sign.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def require_number(name: str, value: object, *, signed: bool = False, zero: bool
     Raises
     ------
     RigError
-        If it is not what it must be.
+        If it is not a finite number, or has the wrong sign.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def require_number(name: str, value: object, *, signed: bool = False, zero: bool
 
 
 def require_numbers(parameters: Any) -> None:
-    """Refuse a set of parameters with a number, or a row of them, that is not finite or not of its sign.
+    """Refuse a set of parameters if a number, or a row of numbers, is not finite or has the wrong sign.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def require_numbers(parameters: Any) -> None:
     Raises
     ------
     RigError
-        If one is not what it must be, with its name.
+        If one is not finite or has the wrong sign; the message names it.
     """
     noted = notes(type(parameters))
     for one in fields(parameters):
@@ -156,7 +156,7 @@ def require_numbers(parameters: Any) -> None:
 
 @cache
 def unit_registry() -> "pint.UnitRegistry[Any]":
-    """Return the project's one pint registry, with the shop's ``lpm`` and ``rev`` added."""
+    """Return the project's only pint registry, with the workshop units ``lpm`` and ``rev`` added."""
     import pint
 
     registry: pint.UnitRegistry[Any] = pint.UnitRegistry()
@@ -211,7 +211,7 @@ USUAL: Mapping[str, tuple[str, float]] = {
     "N": ("N", 1.0),
     "kN": ("N", 1e3),
 }
-"""Units that benches log, with what they are of and their factor as pint has it, whose import takes as long as an
+"""Common units of logs, with their base unit and their factor from pint. Importing pint takes as long as an
 estimate."""
 
 
@@ -231,10 +231,10 @@ def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
     Parameters
     ----------
     unit : str
-        The unit that the values come in, e.g. ``"mm"``, ``"rpm"``, ``"bar"``; ``"-rpm"`` for a sensor that counts the
-        other way.
+        Unit of the values, e.g. ``"mm"``, ``"rpm"``, ``"bar"``; ``"-rpm"`` for a sensor that counts in the opposite
+        direction.
     wanted : str
-        The unit that is wanted, e.g. ``"m"``.
+        The unit to convert to, e.g. ``"m"``.
 
     Returns
     -------
@@ -244,7 +244,7 @@ def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
     Raises
     ------
     ValueError
-        If the unit is unknown, or measures something else.
+        If the unit is unknown, or measures another quantity.
 
     Examples
     --------
@@ -267,14 +267,14 @@ def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
 
 
 def by_pint(unit: str, name: str, wanted: str) -> tuple[float, float]:
-    """Return the result of `conversion_to`, for any unit that Pint knows.
+    """Return the result of `conversion_to` for any unit that Pint knows.
 
     Parameters
     ----------
     unit, name : str
-        The unit as it was given, and as Pint spells it.
+        The unit as given, and as Pint spells it.
     wanted : str
-        The unit that is wanted.
+        The unit to convert to.
 
     Returns
     -------
@@ -284,7 +284,7 @@ def by_pint(unit: str, name: str, wanted: str) -> tuple[float, float]:
     Raises
     ------
     ValueError
-        As `conversion_to`.
+        As for `conversion_to`.
     """
     import pint
 

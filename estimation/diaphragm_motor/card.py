@@ -12,10 +12,10 @@ from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import ELECTRODES
 
 UNKNOWNS = ("bulk_modulus", "gas_fraction", "crossport_leakage", "load_force")
-"""What the card asks for."""
+"""Unknowns of the card."""
 
 LEAKAGE, LOAD = 2e-12, 10.0
-"""Sizes that leakage [m^3/(s Pa)] and load [N] are relative to."""
+"""Reference sizes of leakage [m^3/(s Pa)] and load [N]."""
 
 
 def flow_change(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float, factor: float) -> float:
@@ -24,9 +24,9 @@ def flow_change(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: flo
     Parameters
     ----------
     frequency, peak_to_peak : float
-        Of the drive [Hz], [V].
+        Frequency and swing of the drive [Hz], [V].
     factor : float
-        On bulk modulus [dimensionless].
+        Factor on bulk modulus [dimensionless].
 
     Returns
     -------
@@ -45,13 +45,14 @@ def flow_change(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: flo
 def motor_card(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Card:
     """Return the identifiability of bulk modulus, gas, leakage and load under a sine, all unknown together.
 
-    Cramér-Rao bounds with the tolerance to which a motor is the one modelled, and a prior of 100 % on each. The
-    liquid's bulk modulus counts for no more than V_0/beta beside the diaphragm's compliance C_d, 400 times as large.
+    Cramér-Rao bounds with the tolerance to which a motor agrees with its model, and a prior of 100 % on each. The
+    liquid's bulk modulus has only the effect of V_0/beta beside the diaphragm's compliance C_d, which is 400 times as
+    large.
 
     Parameters
     ----------
     frequency, peak_to_peak : float
-        Of the drive [Hz], [V].
+        Frequency and swing of the drive [Hz], [V].
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Velocity control of the diaphragm motor: PID on the drive's voltage, by encoder or by the middle electrode alone.
 
-The controller acts once in some cycles, where the sine passes zero. The sign of the wanted velocity sets the 4/3 valve.
-Self-sensing reads velocity from the amplitude of A4 and the voltage through the healthy motor's maps, as section 4 of
-the diaphragm-motor paper is after; what leaks past the piston does not show there.
+The controller acts once in several cycles, at a zero crossing of the sine. The sign of the wanted velocity sets the 4/3
+valve. Self-sensing computes velocity from the amplitude of A4 and the voltage through the healthy motor's maps, as
+section 4 of the diaphragm-motor paper intends; it does not see leakage past the piston.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ CYCLES = 4
 """Cycles of the drive between actions of the controller."""
 
 SENSED_CYCLES = 2
-"""Last cycles of a period from which an electrode's amplitude is taken, when the motor has followed."""
+"""Last cycles of a period from which an electrode's amplitude is taken, after the motor has responded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,13 +32,14 @@ class VelocityController:
     Parameters
     ----------
     proportional : float
-        [V s/m].
+        Proportional gain [V s/m].
     integral : float
-        [V/m].
+        Integral gain [V/m].
     derivative : float
-        Of the measured velocity, not of the error [V s^2/m].
+        Derivative gain, on the measured velocity, not on the error [V s^2/m].
     most : float
-        Largest voltage peak to peak [V]; the integral stands still while the voltage is at a limit and would go on.
+        Largest voltage peak to peak [V]; the integral is held while the voltage is at a limit and the integral would
+        exceed it.
     """
 
     proportional: float = 8e3
@@ -52,9 +53,9 @@ class VelocityController:
         Parameters
         ----------
         error : float
-            Wanted less measured speed [m/s].
+            Wanted minus measured speed [m/s].
         change : float
-            What the measured speed gained over the last period [m/s].
+            Change of the measured speed over the last period [m/s].
         held : float
             The integral's part so far [V].
         period : float
@@ -79,14 +80,14 @@ class VelocityController:
 
 @dataclass(frozen=True, eq=False)
 class ControlledRun:
-    """A run under control, one row a period.
+    """A run under control, one row for each period.
 
     Parameters
     ----------
     time : ndarray, shape (n,)
         End of each period [s].
     wanted, measured, velocity : ndarray, shape (n,)
-        Reference, what the controller saw, and the piston's true mean velocity [m/s].
+        Reference, the controller's measurement, and the piston's true mean velocity [m/s].
     swing : ndarray, shape (n,)
         Voltage peak to peak [V].
     position : ndarray, shape (n,)
@@ -106,14 +107,14 @@ class ControlledRun:
         Parameters
         ----------
         since, until : float
-            From when to when [s].
+            The two times [s].
         band : float
             Share of the wanted velocity [dimensionless].
 
         Returns
         -------
         float
-            Time [s]; infinity if it never does, or there is no sample between the two times.
+            Time [s]; infinity if it never settles, or there is no sample between the two times.
         """
         here = (self.time > since) & (self.time <= until)
         off = np.abs(self.velocity[here] - self.wanted[here]) > band * np.abs(self.wanted[here])
@@ -140,17 +141,17 @@ def controlled_run(
     Parameters
     ----------
     schedule : sequence of tuple of float and DiaphragmMotorParameters
-        From when on [s] which motor; the spool is the controller's.
+        Start time [s] and motor of each part of the run; the controller sets the spool.
     wanted : callable
-        Velocity [m/s] by time [s].
+        Velocity [m/s] as a function of time [s].
     duration : float
         Length of the run [s].
     frequency : float
-        Of the drive [Hz].
+        Frequency of the drive [Hz].
     maps : MotorMaps
-        Of the healthy motor at this frequency, for self-sensing.
+        Maps of the healthy motor at this frequency, for self-sensing.
     controller : VelocityController, optional
-        Gains; those of the class if not given.
+        Gains; by default those of the class.
 
     Raises
     ------
@@ -192,7 +193,7 @@ def controlled_run(
 def _encoder_speed(
     position: Array, a_cycle: int, period: float, sensors: MotorSensors, rng: np.random.Generator
 ) -> float:
-    """Return the mean velocity of a period: its last cycle's mean position less its first's, free of ripple."""
+    """Return the mean velocity of a period: mean position of its last cycle minus that of its first, free of ripple."""
     noisy = position + sensors.position_m * rng.standard_normal(len(position))
     moved = float(noisy[-a_cycle:].mean() - noisy[:a_cycle].mean())
     return moved / (period * (CYCLES - 1) / CYCLES)

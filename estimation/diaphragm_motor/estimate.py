@@ -1,7 +1,7 @@
 """Leakage across the diaphragm motor's piston, load on its rod and gas in its pump, from electrodes and encoder.
 
-Gas and load are fitted to the tones of all electrodes first. Where that leaves no misfit, the pump is healthy but for
-its gas, and `estimation.diaphragm_motor.track` reads flow and pressure off the middle electrode.
+Gas and load are first fitted to the tones of all electrodes. If that leaves no misfit, the pump is healthy apart from
+its gas, and `estimation.diaphragm_motor.track` determines flow and pressure from the middle electrode.
 """
 
 from collections.abc import Mapping
@@ -27,10 +27,11 @@ from plant.diaphragm_motor.run import ELECTRODES
 from plant.log.record import Record
 
 CALIBRATED_SHARE = 0.2
-"""What is left of both tolerances when a healthy run of the same motor has set the gains, judged [dimensionless]."""
+"""Share of both tolerances that remains after a healthy run of the same motor has set the gains, judged
+[dimensionless]."""
 
 PATTERN_BELOW = 1e-3
-"""Probability of so large a chi-square of the electrodes' pattern below which the maps are not used."""
+"""Probability of the chi-square of the electrodes' pattern below which the maps are not used."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class MotorEstimate:
     pattern : float
         Chi-square of the electrodes' pattern over its degrees of freedom [dimensionless].
     pattern_holds : bool
-        Whether the pump is healthy but for gas, so that the maps hold.
+        Whether the pump is healthy apart from gas, so that the maps hold.
     """
 
     values: Mapping[str, float]
@@ -66,9 +67,9 @@ def estimate_motor(
     record : Record
         Drive, seven electrodes, position.
     healthy : DiaphragmMotorParameters
-        The motor as it should be; at the calibration's load, if there is one.
+        The healthy motor; at the calibration's load, if there is one.
     calibration : Signature, optional
-        Of this motor when it was healthy, under the same drive: it corrects the electrodes' gains.
+        Signature of this motor when it was healthy, under the same drive: it corrects the electrodes' gains.
 
     Raises
     ------

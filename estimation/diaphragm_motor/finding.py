@@ -13,17 +13,17 @@ from plant.log.record import Record
 from plant.notes import Code, Note
 
 MOST_DEVIATION = 0.3
-"""Standard deviation, over the value or the least fault's size, above which no number is given."""
+"""Standard deviation, over the value or over the size of a small fault, above which no number is given."""
 
 SIZES: Mapping[str, tuple[str, float]] = {
     "crossport_leakage": ("m^3/(s Pa)", LEAKAGE),
     "load_force": ("N", 10.0),
     "gas_fraction": ("1", 0.01),
 }
-"""Unit of each quantity, and the least fault's size that its deviation is judged by."""
+"""Unit of each quantity, and the size of a small fault to which its deviation is compared."""
 
 CLEARLY = 4.0
-"""Standard deviations of a negative leakage from which the maps are not believed."""
+"""Standard deviations of a negative leakage from which the maps are rejected."""
 
 
 class MotorCode(Code):
@@ -58,9 +58,9 @@ def motor_finding(
     record : Record
         Drive, seven electrodes, position.
     healthy : DiaphragmMotorParameters
-        The motor as it should be; at the calibration's load, if there is one.
+        The healthy motor; at the calibration's load, if there is one.
     calibration : Signature, optional
-        Of this motor when it was healthy, under the same drive.
+        Signature of this motor when it was healthy, under the same drive.
 
     Returns
     -------
@@ -99,14 +99,14 @@ def motor_finding(
 
 
 def motor_prospect(motor: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Finding:
-    """Say what a run under a steady sine would tell, before it is made (`estimation.diaphragm_motor.card`).
+    """Return what a run under a steady sine would determine, before it is made (`estimation.diaphragm_motor.card`).
 
     Parameters
     ----------
     motor : DiaphragmMotorParameters
         The motor, under its load.
     frequency, peak_to_peak : float
-        Of the drive [Hz], [V].
+        Frequency and swing of the drive [Hz], [V].
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""The diaphragm motor averaged over cycles: maps of flow and sensing, and the cylinder's slow motion on them.
+"""The diaphragm motor averaged over cycles: maps of flow and sensing, and the cylinder's slow motion with them.
 
 The fast plant is run on a grid of frequency, voltage and load; between the points the maps are linear. A filter or a
-controller then steps by tenths of a millisecond instead of microseconds, and an electrode's amplitude read against the
-maps says flow and pressure: what equation 19 of the diaphragm-motor paper is after (errata M19 says why it fails).
+controller then steps by tenths of a millisecond instead of microseconds, and an electrode's amplitude gives flow and
+pressure through the maps: the aim of equation 19 of the diaphragm-motor paper (errata M19 explains why it fails).
 """
 
 from collections.abc import Sequence
@@ -23,13 +23,13 @@ SWINGS = tuple(np.arange(0.0, 301.0, 50.0))
 """Voltages of a map, peak to peak [V]."""
 
 PRESSURES = tuple(np.arange(0.0, 1.21e5, 1e4))
-"""Differences of pressure over the piston in a map [Pa]; healthy pumps stall at 1.05e5 Pa on 200 V at 480 Hz."""
+"""Pressure differences over the piston in a map [Pa]; healthy pumps stall at 1.05e5 Pa on 200 V at 480 Hz."""
 
 AVERAGE_STEP = 2e-4
 """Step of the averaged motion, and time between its samples [s]."""
 
 MIDDLE = 3
-"""Place of the middle electrode, A4."""
+"""Index of the middle electrode, A4."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class MotorMaps:
     pressures : ndarray, shape (k,)
         Pressure differences over the piston [Pa], rising.
     flow : ndarray, shape (f, v, k)
-        Mean flow that the pump delivers [m^3/s].
+        Mean flow delivered by the pump [m^3/s].
     tones : ndarray of complex, shape (f, v, k, 7)
         Electrodes' voltages at the drive's frequency [V].
     """
@@ -65,9 +65,9 @@ class MotorMaps:
         values : ndarray, shape (f, v, k, ...)
             `flow`, or `tones` [any unit].
         frequency : float
-            Of the drive [Hz]; at a map's only frequency it must be that.
+            Frequency of the drive [Hz]; if a map has only one frequency, it must be this one.
         swing : float
-            Peak to peak [V].
+            Voltage peak to peak [V].
 
         Returns
         -------
@@ -91,16 +91,16 @@ class MotorMaps:
         Parameters
         ----------
         frequency : float
-            Of the drive [Hz].
+            Frequency of the drive [Hz].
         swing : float
-            Peak to peak [V].
+            Voltage peak to peak [V].
         amplitude : float
-            Of A4 at the drive's frequency [V].
+            Amplitude of A4 at the drive's frequency [V].
 
         Returns
         -------
         tuple of float
-            Flow [m^3/s] and pressure difference [Pa]; the map's ends beyond it.
+            Flow [m^3/s] and pressure difference [Pa]; limited to the ends of the map.
         """
         seen = np.abs(self.row(self.tones[..., MIDDLE], frequency, swing))[::-1]
         rising = np.maximum.accumulate(seen)
@@ -110,7 +110,7 @@ class MotorMaps:
 
 
 def _place(name: str, axis: Array, value: float, unit: str) -> tuple[int, float]:
-    """Return the cell of an axis that a value lies in, and how far in."""
+    """Return the cell of an axis that contains a value, and its position within the cell."""
     if not axis[0] - 1e-9 <= value <= axis[-1] + 1e-9:
         raise HydrostateError(f"the map's {name} goes from {axis[0]:g} to {axis[-1]:g} {unit}, got {value:g} {unit}")
     if len(axis) == 1:
@@ -130,11 +130,11 @@ def motor_maps(
     Parameters
     ----------
     p : DiaphragmMotorParameters
-        The motor; its Coulomb friction and load play no part, the map is against pressure.
+        The motor; its Coulomb friction and load are not used, since the map is against pressure.
     frequencies : sequence of float
-        Of the drive [Hz], rising.
+        Frequencies of the drive [Hz], rising.
     swings : sequence of float
-        Peak to peak [V], rising.
+        Voltages peak to peak [V], rising.
     pressures : sequence of float
         Pressure differences over the piston [Pa], rising.
 
@@ -163,7 +163,7 @@ def motor_maps(
 
 
 def _pressed(p: DiaphragmMotorParameters, pressure: float) -> Array:
-    """Return rest under a load that the fed side already carries."""
+    """Return the state at rest under a load that the fed side already carries."""
     state = at_rest(p)
     state[SIDE_A] = pressure
     return state
@@ -180,11 +180,11 @@ def average_run(
     Parameters
     ----------
     maps : MotorMaps
-        Of the healthy motor, or any other.
+        Maps of the healthy motor, or any other.
     frequency : float
-        Of the drive [Hz].
+        Frequency of the drive [Hz].
     swing : ndarray, shape (n,)
-        Peak to peak at samples `AVERAGE_STEP` apart [V].
+        Voltage peak to peak at samples `AVERAGE_STEP` apart [V].
 
     Returns
     -------

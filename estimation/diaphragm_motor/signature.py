@@ -1,9 +1,9 @@
 """Signature of a diaphragm motor's log: tones of the seven electrodes and mean velocity of the rod.
 
-Under a steady sine the electrodes' fundamentals and second harmonics, and the mean velocity, are 29 numbers. They come
-from a log by least squares over whole cycles, with their covariance from what is left over, and from the plant by
-`plant.diaphragm_motor.flow.operate`. To the sensors' noise the tolerance is added to which a motor is the one modelled,
-because noise alone would let the model claim what no bench can hold.
+Under a steady sine the electrodes' fundamentals and second harmonics, and the mean velocity, are 29 numbers. They are
+computed from a log by least squares over whole cycles, with their covariance from the residuals, and from the plant by
+`plant.diaphragm_motor.flow.operate`. The tolerance to which a motor agrees with its model is added to the sensors'
+noise, because with noise alone the model would claim an accuracy that no bench reaches.
 """
 
 from collections.abc import Mapping
@@ -22,19 +22,19 @@ from plant.errors import LogError
 from plant.log.record import Record
 
 DRIVE, POSITION = "drive_voltage_v", "position_m"
-"""Channels beside the electrodes."""
+"""Channels besides the electrodes."""
 
 SETTLED = 0.1
-"""Time from a log's start after which the motor has settled; the research gives 22 ms to 90 % [s]."""
+"""Time from a log's start after which the motor has settled; the research gives 22 ms for 90 % [s]."""
 
 FEWEST_CYCLES = 20
-"""Fewest whole cycles that are averaged."""
+"""Fewest whole cycles to average."""
 
 HARMONICS = 6
-"""Harmonics that are fitted, so that what is left over is noise."""
+"""Number of harmonics that are fitted, so that the residuals are noise."""
 
 STEADY = 0.01
-"""Root mean square, over the sine's amplitude, by which a drive may differ from a steady sine [dimensionless]."""
+"""Largest deviation of a drive from a steady sine: root mean square over the sine's amplitude [dimensionless]."""
 
 TOLERANCE: Mapping[str, float] = {
     "diaphragm_compliance": 0.005,
@@ -50,7 +50,7 @@ GAIN_TOLERANCE = 0.005
 """Relative standard deviation of each electrode's gain, judged [dimensionless]."""
 
 FLOOR = 0.002
-"""What the model is taken to miss in any tone, over the mean fundamental, and in velocity [dimensionless]."""
+"""Assumed error of the model in any tone, over the mean fundamental, and in velocity [dimensionless]."""
 
 
 @dataclass(frozen=True)
@@ -74,14 +74,14 @@ class Drive:
 
 @dataclass(frozen=True)
 class Signature:
-    """The 29 numbers that a log is compared by.
+    """The 29 numbers by which logs are compared.
 
     Parameters
     ----------
     values : ndarray, shape (29,)
-        Fundamentals' real and imaginary parts, second harmonics' likewise [V], mean velocity [m/s].
+        Fundamentals' real and imaginary parts, then those of the second harmonics [V], mean velocity [m/s].
     covariance : ndarray, shape (29, 29)
-        Of the sensors' noise alone.
+        Covariance from the sensors' noise alone.
     """
 
     drive: Drive
@@ -90,7 +90,7 @@ class Signature:
 
     @property
     def tones(self) -> Tones:
-        """Electrodes' fundamentals against the drive [V]: amplitude and phase."""
+        """Electrodes' fundamentals relative to the drive [V]: amplitude and phase."""
         return self.values[:7] + 1j * self.values[7:14]
 
     @property
@@ -100,17 +100,17 @@ class Signature:
 
 
 def modelled_signature(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Floats:
-    """Return a motor's signature by its model, without noise (section 7.1).
+    """Return a motor's signature from its model, without noise (section 7.1).
 
     Parameters
     ----------
     frequency, peak_to_peak : float
-        Of the drive [Hz], [V].
+        Frequency and swing of the drive [Hz], [V].
 
     Returns
     -------
     ndarray, shape (29,)
-        As `Signature.values`.
+        As in `Signature.values`.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def tolerance(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float
     p : DiaphragmMotorParameters
         The healthy motor.
     frequency, peak_to_peak : float
-        Of the drive [Hz], [V].
+        Frequency and swing of the drive [Hz], [V].
 
     Returns
     -------
@@ -155,19 +155,19 @@ def tolerance(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float
 
 
 def logged_signature(record: Record, start: float = SETTLED) -> Signature:
-    """Return the signature that a log shows after it has settled, over whole cycles, by least squares.
+    """Return the signature of a log after settling, over whole cycles, by least squares.
 
     Parameters
     ----------
     record : Record
         ``drive_voltage_v``, ``electrode_1_v`` to ``electrode_7_v`` and ``position_m``, under a steady sine.
     start : float
-        From when on the log counts [s].
+        Time from which the log is used [s].
 
     Returns
     -------
     Signature
-        Its values, and their covariance from what the tones leave.
+        Its values, and their covariance from the residuals of the tones.
 
     Raises
     ------
@@ -260,7 +260,7 @@ def fitted_tones(values: Floats, angle: Floats, *, trend: int) -> tuple[Floats, 
     Returns
     -------
     tuple of ndarray, shapes (trend + 1 + 2 harmonics, channels) and (channels,)
-        Coefficients (trend, then sine and cosine of each harmonic), standard deviation of what is left.
+        Coefficients (trend, then sine and cosine of each harmonic), standard deviation of the residuals.
     """
     line = np.linspace(-1.0, 1.0, len(angle))
     waves = [wave(k * angle) for k in range(1, HARMONICS + 1) for wave in (np.sin, np.cos)]
@@ -276,7 +276,7 @@ def whole_cycles(samples: int, sample_time: float, frequency: float) -> int:
     Parameters
     ----------
     samples : int
-        Samples.
+        Number of samples.
     sample_time, frequency : float
         Time between them [s], frequency [Hz].
 
@@ -294,7 +294,7 @@ def whole_cycles(samples: int, sample_time: float, frequency: float) -> int:
 
 
 def require_channels(record: Record) -> None:
-    """Refuse a log that lacks a channel or samples, ends before the motor has settled, or whose position stands still.
+    """Refuse a log that lacks a channel or samples, ends before the motor settles, or whose position stands still.
 
     Raises
     ------

@@ -1,8 +1,9 @@
 """Leakage and load of the diaphragm motor over time, without a sensor of pressure or flow.
 
-A healthy pump is its own flow meter: at a given drive the middle electrode's amplitude says which flow Q and which
-pressure p it delivers. What of Q the piston does not sweep leaks, G = (Q - A_c v - C p') / p; what of A_c p friction
-does not take is load. A Kalman filter follows both, 20 cycles at a time, and holds leakage while the pressure changes.
+A healthy pump is its own flow meter: at a given drive the middle electrode's amplitude gives the flow Q and the
+pressure p that it delivers. The part of Q that the piston does not sweep is leakage, G = (Q - A_c v - C p') / p; the
+part of A_c p that friction does not take is load. A Kalman filter tracks both, in blocks of 20 cycles, and holds
+leakage while the pressure changes.
 """
 
 from collections.abc import Sequence
@@ -31,29 +32,29 @@ from plant.errors import LogError
 from plant.log.record import Record
 
 MIDDLE = ELECTRODES[3]
-"""The electrode whose amplitude the maps are read by: it peaks with the flow (section 7.1)."""
+"""The electrode by whose amplitude the maps are read: it peaks with the flow (section 7.1)."""
 
 MAP_LOADS = tuple(float(load) for load in np.linspace(-10.0, 34.0, 12))
-"""Loads that the maps are made of [N]."""
+"""Loads from which the maps are made [N]."""
 
 FLOW_TOLERANCE = 0.005
-"""Relative standard deviation of the flow that the maps give, judged [dimensionless]."""
+"""Relative standard deviation of the flow from the maps, judged [dimensionless]."""
 
 LEAK_ALARM = 5e-13
-"""Leakage above which, with 97.5 % certainty and for `PERSISTENCE` blocks, the piston is said to leak [m^3/(s Pa)]."""
+"""Leakage above which the piston is said to leak, with 97.5 % certainty and for `PERSISTENCE` blocks [m^3/(s Pa)]."""
 
 PERSISTENCE = 3
-"""Blocks of 20 cycles for which a leak must show."""
+"""Number of blocks of 20 cycles for which a leak must show."""
 
 
 @dataclass(frozen=True)
 class HealthyMaps:
-    """Maps of a healthy pump at one drive: flow and pressure by the middle electrode's amplitude.
+    """Maps of a healthy pump at one drive: flow and pressure as functions of the middle electrode's amplitude.
 
     Parameters
     ----------
     flow, pressure : Polynomial
-        Mean flow into the cylinder [m^3/s], pressure across its piston [Pa], of the amplitude [V].
+        Mean flow into the cylinder [m^3/s] and pressure across its piston [Pa], as functions of the amplitude [V].
     """
 
     flow: Polynomial
@@ -62,7 +63,7 @@ class HealthyMaps:
 
 @dataclass(frozen=True)
 class MotorTrack:
-    """Leakage and load over time, an entry for each block of 20 cycles.
+    """Leakage and load over time, one entry for each block of 20 cycles.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ class MotorTrack:
 
     @property
     def alarm_time(self) -> float | None:
-        """When leakage has been certain for `PERSISTENCE` blocks [s]; None where it never was."""
+        """Time at which leakage has been certain for `PERSISTENCE` blocks [s]; None if it never was."""
         certain = (self.leakage - NORMAL_95 * self.leakage_std > LEAK_ALARM) & ~self.held
         for end in range(PERSISTENCE, len(certain) + 1):
             if certain[end - PERSISTENCE : end].all():
@@ -94,12 +95,12 @@ class MotorTrack:
 
 
 def healthy_maps(p: DiaphragmMotorParameters, drive: Drive) -> HealthyMaps:
-    """Return flow and pressure by the middle electrode's amplitude, over loads (section 7.2).
+    """Return flow and pressure as functions of the middle electrode's amplitude, over loads (section 7.2).
 
     Parameters
     ----------
     p : DiaphragmMotorParameters
-        The motor, its piston tight.
+        The motor, with a tight piston.
 
     Returns
     -------
@@ -135,9 +136,9 @@ class Block:
     end, length : float
         End and length [s].
     amplitude, velocity : float
-        Of the middle electrode [V], of the rod [m/s].
+        Amplitude of the middle electrode [V], velocity of the rod [m/s].
     deviations : ndarray, shape (2,)
-        Standard deviations of the two.
+        Standard deviations of amplitude and velocity.
     """
 
     end: float
@@ -182,12 +183,12 @@ def motor_blocks(record: Record, drive: Drive) -> list[Block]:
 def track_leakage(
     blocks: Sequence[Block], p: DiaphragmMotorParameters, maps: HealthyMaps, trust: float = 1.0
 ) -> MotorTrack:
-    """Filter leakage and load, a block at a time; leakage is held while the pressure changes.
+    """Filter leakage and load, one block at a time; leakage is held while the pressure changes.
 
     Parameters
     ----------
     maps : HealthyMaps
-        What its pump delivers.
+        Flow and pressure of its pump.
     trust : float
         Factor on the tolerances of the electrode's gain and of the flow [dimensionless].
     """
@@ -212,7 +213,7 @@ def track_leakage(
 
 
 def _balances(block: Block, rate: float, p: DiaphragmMotorParameters, maps: HealthyMaps) -> tuple[Floats, Floats]:
-    """Return the flow that is lost and the force that is left, with their covariance from the sensors' noise."""
+    """Return the lost flow and the remaining force, with their covariance from the sensors' noise."""
     compliance = p.line_compliance + p.cylinder_volume / p.cylinder_bulk_modulus
     amplitude, velocity = block.amplitude, block.velocity
     rubbed = tanh(velocity / p.friction_speed)
@@ -246,22 +247,23 @@ def _tilts(block: Block, state: Floats, p: DiaphragmMotorParameters, maps: Healt
 
 
 _LEAST_SPEED = 1e-4
-"""Velocity of the rod above which a point of operation counts for the maps [m/s]; judged."""
+"""Velocity of the rod above which an operating point is used for the maps [m/s]; judged."""
 
 _LEAST_PRESSURE = 1e3
-"""Pressure by which a lost flow is divided at least, for a leakage [Pa]; judged."""
+"""Least pressure by which lost flow is divided to give leakage [Pa]; judged."""
 
 _DEGREE = 5
-"""Of the polynomials by which flow and pressure go with the electrodes' amplitude; judged."""
+"""Degree of the polynomials for flow and pressure in the electrode's amplitude; judged."""
 
 _FIRST_LEAKAGE, _FIRST_LOAD = 2e-11, 50.0
-"""Standard deviations of leakage [m^3/(s Pa)] and load [N] before a log is seen, and of a load after a jump; judged."""
+"""Prior standard deviations of leakage [m^3/(s Pa)] and load [N], the latter also after a jump of load; judged."""
 
 _LEAKAGE_WALK, _LOAD_WALK = 5e-14, 0.05
-"""What both may change by within a block without a jump, one standard deviation [m^3/(s Pa), N]; judged."""
+"""Standard deviations of the change of both within a block without a jump [m^3/(s Pa), N]; judged."""
 
 _STILL, _SURE = 300.0, 6.0
-"""Change of pressure from block to block that is no jump [Pa], and deviations of its noise that are none; judged."""
+"""Change of pressure between blocks up to which there is no jump [Pa], and the same in deviations of its noise;
+judged."""
 
 _WAIT = 3
 """Blocks for which leakage is held after a jump [count]; judged."""

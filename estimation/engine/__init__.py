@@ -1,1 +1,1 @@
-"""The contract of a filter, the algebra of predict and update, layouts, and the kernels made of them."""
+"""The contract of a filter, the algebra of predict and update, layouts, and the compiled kernels."""

@@ -1,7 +1,7 @@
 """Input and output of a filter: the contract of every method in `METHODS`.
 
-A method is a function ``method(problem) -> Trace``. To add one, write such a function in a file of its own and give it
-a line in `estimation.filters.methods.METHODS`; nothing else changes.
+A method is a function ``method(problem) -> Trace``. To add one, write such a function in a file of its own and add it
+to `estimation.filters.methods.METHODS`; nothing else changes.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,14 +15,14 @@ from estimation.models.model import OPENING, ProcessModel
 
 
 class Samples(NamedTuple):
-    """A log as a loop reads it.
+    """A log in the form that a loop reads.
 
     Parameters
     ----------
     drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
         As in `FilterProblem` [SI].
     substeps, every : int
-        Steps of the model a sample, and samples a row of the track.
+        Steps of the model for each sample, and samples for each row of the track.
     """
 
     drives: Array
@@ -44,25 +44,24 @@ class FilterProblem:
     covariance : ndarray, shape (n, n)
         Prior covariance, scaled.
     drives : ndarray, shape (samples, drives)
-        Channels that drive the model, in SI, no sample missing; and what gaps in them open
+        Channels that drive the model, in SI, no sample missing; and the variances that gaps in them add
         (`estimation.log_checks.bridging`).
     measured : ndarray, shape (samples, channels)
         Measurements in SI; NaN is missing.
     parameters : ndarray, shape (parameters,)
         Row of parameters in SI.
     noise : ndarray, shape (n,)
-        Process-noise density, scaled units squared a second.
+        Process-noise density, scaled units squared per second.
     variances : ndarray, shape (channels,)
         Measurement variances in SI.
     sample_time : float
         Seconds between samples [s].
     every : int
-        The track keeps every so many samples.
+        Number of samples for each row of the track.
     robust : str
-        How innovations that are too large to be noise count, see `estimation.engine.robust.inflation`.
+        How innovations too large for noise count, see `estimation.engine.robust.inflation`.
     settings : Mapping[str, float]
-        What a method lets its user set, by name; its defaults hold for what is not here
-        [each in its own unit].
+        The user's settings of the method, by name; the method's defaults apply to all others [each in its own unit].
     """
 
     model: ProcessModel
@@ -83,12 +82,12 @@ class FilterProblem:
 
     @property
     def samples(self) -> Samples:
-        """The log, as loops take it."""
+        """The log, in the form that loops take."""
         return Samples(self.drives, self.measured, self.substeps, self.every)
 
     @property
     def opened(self) -> Array:
-        """Variance that each sample adds to each state beside the process noise, shape (samples, n), scaled."""
+        """Variance that each sample adds to each state besides the process noise, shape (samples, n), scaled."""
         added = np.zeros((len(self.drives), self.model.width))
         for i, state in enumerate(self.model.states):
             if OPENING + state.name in self.model.drives:
@@ -104,11 +103,11 @@ class Trace(NamedTuple):
     mean, covariance : ndarray, shapes (n,) and (n, n)
         Final belief.
     track, track_variance : ndarray, shape (rows, n)
-        Mean and variance at every so many samples.
+        Mean and variance at regular intervals of samples.
     nis : ndarray, shape (channels,)
         Sum of squared normalised innovations.
     count : ndarray, shape (channels,)
-        Count of samples present.
+        Number of samples present.
     log_likelihood : float
         Sum of the innovations' Gaussian log densities [dimensionless].
     residuals, residual_variances : ndarray, shape (samples or 0, channels)
@@ -127,7 +126,7 @@ class Trace(NamedTuple):
 
 
 Method: TypeAlias = Callable[[FilterProblem], Trace]
-"""A filter: from a problem to its trace."""
+"""A filter: maps a problem to its trace."""
 
 
 def empty_trace(problem: FilterProblem) -> Trace:

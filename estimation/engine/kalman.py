@@ -1,8 +1,8 @@
 """The algebra of filters, as expressions: a model's scaled step, prediction and update of mean and covariance.
 
-Structural zeros and ones of the Jacobian vanish, symmetric covariances are stored once, and measurements are processed
-one channel at a time, so no matrix is inverted and no absolute jitter is needed. `estimation.engine.kernels` makes a
-compiled filter of a rule, alone or in lanes; a new rule needs no kernel of its own.
+Structural zeros and ones of the Jacobian are eliminated, symmetric covariances are stored once, and measurements are
+processed one channel at a time, so no matrix is inverted and no absolute jitter is needed. `estimation.engine.kernels`
+compiles a filter from a rule, alone or in lanes; a new rule needs no kernel of its own.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ Covariance: TypeAlias = dict[tuple[int, int], Expression]
 
 Mean: TypeAlias = Sequence[Expression]
 Outputs: TypeAlias = dict[str, Expression]
-"""New values by the name of the symbol that they replace, and whatever else a rule returns by name."""
+"""New values by the name of the symbol that they replace, and any further results of a rule by name."""
 
 
 def entry(P: Covariance, i: int, j: int) -> Expression:
@@ -34,7 +34,7 @@ def entry(P: Covariance, i: int, j: int) -> Expression:
 
 
 def total(terms: Sequence[Expression]) -> Expression:
-    """Return the sum of terms, in their order."""
+    """Return the sum of terms, in the given order."""
     return sum(terms, ZERO)
 
 
@@ -69,7 +69,7 @@ def to_physical(model: ProcessModel, mean: Sequence[Expression]) -> tuple[Expres
 
 
 def drive_symbols(model: ProcessModel) -> list[tuple[Expression, Expression]]:
-    """Return each drive's value at the start and the end of a sub-step, linear between the samples ``a`` and ``b``."""
+    """Return each drive's value at the start and end of a sub-step, interpolated between samples ``a`` and ``b``."""
     pairs: list[tuple[Expression, Expression]] = []
     for i in range(len(model.drives)):
         slope = (symbol(f"b{i}") - symbol(f"a{i}")) * symbol("share")
@@ -84,7 +84,7 @@ def moved(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
     Returns
     -------
     list of Expression
-        The state one step later; one that the step hands through is the same node.
+        The state one step later; a state that the step leaves unchanged is the same node.
     """
     physical = to_physical(model, mean)
     pairs = drive_symbols(model)
@@ -97,7 +97,7 @@ def moved(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
 
 
 def _over_scale(z: Expression, old: Expression, new: Expression, state: StateVariable) -> Expression:
-    """Return a state after a step, in the filter's units; what the step adds is scaled without waiting for the sum."""
+    """Return a state after a step, in the filter's units; the step's increment is scaled before it is added."""
     if state.logarithmic:
         return log(new / state.scale)
     added = [term for term in new.arguments if term is not old] if new.operation == "+" else []
@@ -122,7 +122,7 @@ def observed(model: ProcessModel, mean: Sequence[Expression], channels: Sequence
 
 
 def bounded(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
-    """Hold the mean to its physical bounds; what is not a number stays so, for a diverged filter must show.
+    """Hold the mean to its physical bounds; NaN stays NaN, so that a diverged filter shows.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def projected(covariance: Covariance, H: Sequence[Expression]) -> tuple[list[Exp
 def corrected(
     mean: Mean, covariance: Covariance, PH: Sequence[Expression], step: Expression, loss: Expression
 ) -> tuple[list[Expression], Covariance]:
-    """Correct a belief along what a channel shows of it.
+    """Correct a belief by a channel.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def corrected(
     PH : sequence of Expression
         Covariance of each state with the channel.
     step, loss : Expression
-        How far along it the mean moves, and how much of its square the covariance loses.
+        Factor of the mean's move along ``P H'``, and factor of the covariance's reduction along its square.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def corrected(
 
 
 def believed(model: ProcessModel, mean: Sequence[Expression], covariance: Covariance) -> Outputs:
-    """Return a belief by the names of its symbols, the mean held to its bounds.
+    """Return a belief by the names of its symbols, with the mean held to its bounds.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def process_noise(model: ProcessModel, i: int) -> Expression:
     Returns
     -------
     Expression
-        Density times step, and the step's share of what a gap in the log opens.
+        Density times step, plus the step's share of the variance that a gap in the log adds.
     """
     variance = symbol(f"q{i}") * symbol("h")
     opening = OPENING + model.states[i].name

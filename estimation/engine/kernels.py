@@ -1,8 +1,8 @@
 """Compiled filters: a rule on a model for a set of channels, for one filter or for 32 side by side.
 
-What a filter carries, and what it computes from, stands in one flat buffer: all filters' values of one symbol, then
-all of the next. A step loads vectors from there, works through the rule's lines and stores the results. Both kernels
-compute in plain IEEE arithmetic, fused where the lines say so: a filter gives the same bits alone and in a batch.
+The values that a filter carries and uses are in one flat buffer: all filters' values of one symbol, then all of the
+next. A step loads vectors from there, computes the rule's lines and stores the results. Both kernels compute in plain
+IEEE arithmetic, fused only as the lines state: a filter gives the same bits alone and in a batch.
 """
 
 from functools import cache
@@ -20,7 +20,7 @@ from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.source import ROWS, Slot, lines_source, operations_source
 
 LANES = 32
-"""Filters side by side: as many as keep a vector unit busy; fewer leave it waiting, more do not help."""
+"""Filters side by side: enough to keep a vector unit busy; fewer leave it waiting, more do not help."""
 
 
 def _width(halves: Halves, lanes: int) -> int:
@@ -35,7 +35,7 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
     Parameters
     ----------
     lanes : int
-        One, or several vectors of the processor: `LANES`, or fewer where a batch is small.
+        One, or several vectors of the processor: `LANES`, or fewer for a small batch.
 
     Returns
     -------
@@ -79,9 +79,10 @@ def compile_kernel(
     Parameters
     ----------
     lanes : int
-        One, or several vectors of the processor: `LANES`, or fewer where a batch is small.
+        One, or several vectors of the processor: `LANES`, or fewer for a small batch.
     separate : bool
-        Whether several lanes filter separate logs, by ``run``; else logs that lie side by side already, by ``steps``.
+        Whether several lanes filter separate logs, by ``run``; otherwise logs that already lie side by side, by
+        ``steps``.
 
     Returns
     -------
@@ -102,7 +103,7 @@ _STEPS = """
 work : ndarray, shape (numbers,)
 drives, measured, begin, first, end, substeps, every : int
 """
-"""What `estimation.engine.lanes.steps` takes, beside its results."""
+"""Arguments of `estimation.engine.lanes.steps`, without its results."""
 
 _RUN = """
 work : ndarray, shape (numbers,)
@@ -110,4 +111,4 @@ drives, measured : ndarray of int, shape ({lanes},)
 rows : ndarray, shape (channels, samples a time, {lanes})
 samples, substeps, every : int
 """
-"""What `estimation.engine.lanes.run` takes, beside its results."""
+"""Arguments of `estimation.engine.lanes.run`, without its results."""

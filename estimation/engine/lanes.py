@@ -1,7 +1,7 @@
 """The loop of filters side by side over their logs; a single filter is one lane.
 
-All is addressed in bytes: what filters carry and compute from stands in one flat buffer, the values of one symbol
-in a line, line after line. Several lanes are stepped at a time, where they stand.
+All addresses are in bytes: the values that filters carry and use are in one flat buffer, the values of one symbol in a
+line, line after line. Several lanes are stepped at a time, in place.
 """
 
 import math
@@ -12,17 +12,17 @@ from estimation.arrays import Array, IntArray
 from plant.compiled.source import ROWS
 
 AHEAD = 512
-"""Bytes of each log that are fetched ahead of their use: the memory answers within a few samples of all lanes."""
+"""Bytes of each log that are prefetched: the memory answers within a few samples of all lanes."""
 
 FLUSH = 8
-"""Samples between looks at the running product of innovation variances: it cannot overflow that fast."""
+"""Samples between checks of the running product of innovation variances, which cannot overflow that fast."""
 
 LARGE = 1e60
-"""A product beyond this goes into the logarithm, and starts again at 1."""
+"""If the product exceeds this, its logarithm is added to the sum, and the product restarts at 1."""
 
 
 Results: TypeAlias = tuple[Array, Array, Array, Array, Array]
-"""Track and its variance, logarithms of flushed products, residuals and their variances, to be filled."""
+"""Output arrays: track and its variance, logarithms of flushed products, residuals and their variances."""
 
 
 Step: TypeAlias = Callable[[int, float, int, int, int], None]
@@ -35,22 +35,23 @@ class LanesKernel(Protocol):
     Attributes
     ----------
     LANES, LINE, LINES, WIDTH : int
-        Filters side by side, bytes of a line, how many lines there are, and how many filters a step takes.
+        Filters side by side, bytes in a line, number of lines, and number of filters in a step.
     STATES, DRIVES, CHANNELS : int
-        Counts of the model's states and drives, and of measured channels.
+        Numbers of the model's states and drives, and of measured channels.
     LAST : int
-        Where the drives at the last sample of the rows before stand [bytes].
+        Offset of the drives at the last sample of the previous rows [bytes].
     COUNT, PRODUCT, SEEN : int
-        Where counts of samples and products of innovation variances stand, and a single filter's innovations and
+        Offsets of the sample counts and products of innovation variances, and of a single filter's innovations and
         variances [numbers].
     prepare_at, predict_at, update_at, both_at : callable
-        ``predict_at(address, j, before, after, sample)``: take filters, from their first symbol on, through sub-step j
-        between the drives at two addresses; likewise the others. ``both_at`` takes the only step between two samples,
-        and the second one, of which no filter misses a channel; ``update_at`` takes missing ones off the counts.
+        ``predict_at(address, j, before, after, sample)``: advance filters, starting at their first symbol, through
+        sub-step j between the drives at two addresses; the others likewise. ``both_at`` takes the only step between two
+        samples, and updates by the second one, in which no filter misses a channel; ``update_at`` subtracts missing
+        channels from the counts.
     complete_at : callable
         ``complete_at(sample)``: whether no filter misses a channel.
     move : callable
-        ``move(source, target)``: copy as many numbers as a step takes.
+        ``move(source, target)``: copy the numbers that a step takes.
     transpose : callable
         ``transpose(places, offset, ahead, target, stride)``, see `plant.compiled.native.operations.transpose`.
     """
@@ -125,13 +126,13 @@ def steps(
 
 
 def hold(kernel: LanesKernel, drives: int, here: int) -> None:
-    """Hold the last drives, with which the first sample of the next rows begins."""
+    """Store the last drives, at which the first sample of the next rows begins."""
     for c in range(kernel.DRIVES):
         kernel.move(drives + kernel.LINE * c, here + kernel.LAST + kernel.LINE * c)
 
 
 def keep(kernel: LanesKernel, here: int, mean: int, variance: int) -> None:
-    """Keep a belief's mean and variances in the track; variances stand first in an upper triangle's rows."""
+    """Store a belief's mean and variances in the track; variances are first in an upper triangle's rows."""
     place, line = kernel.STATES, kernel.LINE
     for a in range(kernel.STATES):
         kernel.move(here + line * a, mean + line * a)
@@ -140,7 +141,7 @@ def keep(kernel: LanesKernel, here: int, mean: int, variance: int) -> None:
 
 
 def flush(kernel: LanesKernel, work: Array, logs: Array) -> None:
-    """Take the logarithm of products of innovation variances that have become large."""
+    """Take the logarithm of large products of innovation variances, and reset these."""
     above = 0
     for place in range(kernel.PRODUCT, kernel.PRODUCT + kernel.LANES * kernel.CHANNELS):
         above += work[place] > LARGE
@@ -155,7 +156,7 @@ def flush(kernel: LanesKernel, work: Array, logs: Array) -> None:
 
 
 def tally(kernel: LanesKernel, work: Array, samples: int) -> None:
-    """Count samples; updates have taken those off that are missing."""
+    """Add the number of samples to the counts; updates have already subtracted the missing ones."""
     for place in range(kernel.COUNT, kernel.COUNT + kernel.LANES * kernel.CHANNELS):
         work[place] += float(samples)
 
@@ -171,7 +172,7 @@ def run(
     every: int,
     results: Results,
 ) -> None:
-    """Filter separate logs, `ROWS` samples of each at a time; the last time some of them have been there before."""
+    """Filter separate logs, `ROWS` samples of each at a time; the last block may overlap the one before."""
     drive, sample = rows.ctypes.data, rows.ctypes.data + kernel.LINE * ROWS * kernel.DRIVES
     for begin in range(0, samples, ROWS):
         at = min(begin, samples - ROWS)
@@ -182,7 +183,7 @@ def run(
 
 
 def lay_side_by_side(kernel: LanesKernel, places: IntArray, begin: int, width: int, rows: int) -> None:
-    """Copy `ROWS` samples of each log, of so many numbers, into lines of all lanes."""
+    """Copy `ROWS` samples of each log into lines of all lanes."""
     line = kernel.LINE
     for lane in range(0, line, 8 * ROWS):
         for i in range(0, ROWS * width, ROWS):

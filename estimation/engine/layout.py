@@ -20,7 +20,7 @@ from plant.compiled.source import CALLED, symbols_in
 from plant.errors import HydrostateError
 
 _NUMBERED = re.compile(r"[abykcdtw](?:0|[1-9]\d{0,3})")
-"""Names that a kernel numbers."""
+"""Pattern of the numbered names that a kernel generates."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,10 @@ class Layout:
     Parameters
     ----------
     carried : tuple of str
-        What goes from sample to sample: belief, the rule's memory, then the sums ``nis``, ``count`` and ``product`` of
-        each channel.
+        Values carried from sample to sample: belief, the rule's memory, then the sums ``nis``, ``count`` and
+        ``product`` of each channel.
     rows : tuple of str
-        Inputs that stay the same: parameters, process noise ``q``, measurement variances ``r``, settings,
-        ``h``, ``share``.
+        Constant inputs: parameters, process noise ``q``, measurement variances ``r``, settings, ``h``, ``share``.
     """
 
     carried: tuple[str, ...]
@@ -54,7 +53,7 @@ class Layout:
         Returns
         -------
         ndarray, shape (carried,) or (carried, filters)
-            Its values.
+            The carried values.
         """
         values = np.zeros((len(self.carried), *mean.shape[:-1]))
         n = mean.shape[-1]
@@ -65,12 +64,12 @@ class Layout:
         return values
 
     def sums(self, carried: Array, name: str) -> Array:
-        """Return a sum of every channel.
+        """Return one of the sums for every channel.
 
         Parameters
         ----------
         carried : ndarray, shape (carried, ...)
-            What a kernel carried [dimensionless].
+            Carried values of a kernel [dimensionless].
         name : str
             ``nis``, ``count`` or ``product``.
 
@@ -118,14 +117,14 @@ def layout(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Layout
 
 @dataclass(frozen=True)
 class Halves:
-    """The two halves of a filter as expressions, what does not change from step to step hoisted out of them.
+    """The two halves of a filter as expressions; terms that are constant over all steps are moved out of them.
 
     Parameters
     ----------
     constants : dict[str, Expression]
-        What is computed once.
+        Expressions that are computed once.
     predict, update : dict[str, Expression]
-        What is computed at every step of the model and at every sample.
+        Expressions that are computed at every step of the model and at every sample.
     """
 
     constants: Outputs
@@ -139,14 +138,14 @@ def score_expressions(outputs: Mapping[str, Expression], channels: Sequence[str]
     Parameters
     ----------
     outputs : Mapping[str, Expression]
-        What an update returned: of each channel the innovation ``e``, its variance ``s`` and, where it is at hand, one
-        over that, ``w``.
+        Results of an update: for each channel the innovation ``e``, its variance ``s`` and, if available, one over
+        that, ``w``.
 
     Returns
     -------
     dict[str, Expression]
-        Sums of squared normalised innovations ``nis`` and of samples present ``count``, and the product of the
-        innovations' variances over the sensors' own ``product``, whose logarithm is in the likelihood.
+        Sums of squared normalised innovations ``nis`` and of samples present ``count``, and the product ``product`` of
+        the innovations' variances over the sensors' own, whose logarithm is part of the likelihood.
     """
     sums: Outputs = {}
     for c in range(len(channels)):
@@ -166,7 +165,7 @@ def halves_of(rule: Rule, model: ProcessModel, channels: tuple[str, ...], *, sco
     Parameters
     ----------
     scored : bool
-        Whether the score's expressions are among the update's.
+        Whether the update includes the score's expressions.
     """
     update = rule.update(model, channels)
     if scored:
@@ -184,14 +183,14 @@ def halves_of(rule: Rule, model: ProcessModel, channels: tuple[str, ...], *, sco
 
 
 def counting_missing(update: Outputs) -> Outputs:
-    """Return an update that takes missing samples off the sums ``count``; whoever runs it adds all samples up.
+    """Return an update that subtracts missing samples from the sums ``count``; the caller adds all samples.
 
-    Where no sample is missing, the sums need not be touched.
+    So the sums stay untouched if no sample is missing.
 
     Parameters
     ----------
     update : dict[str, Expression]
-        As `Halves` has it.
+        As in `Halves`.
     """
 
     def counted(name: str) -> Expression:
@@ -207,7 +206,7 @@ def all_present(update: Outputs) -> Outputs:
     Parameters
     ----------
     update : dict[str, Expression]
-        As `counting_missing` gives it; rounding was settled before (`plant.compiled.simplify.fused`).
+        As from `counting_missing`; rounding was fixed before (`plant.compiled.simplify.fused`).
     """
 
     def chosen(item: Expression, new: Nodes) -> Expression | None:
@@ -219,12 +218,12 @@ def all_present(update: Outputs) -> Outputs:
 
 
 def at_sample(predict: Outputs) -> Outputs:
-    """Return the model step that begins at a sample, where sub-step ``j`` is 0, for finite drives.
+    """Return the model step that begins at a sample, with sub-step ``j`` 0, for finite drives.
 
     Parameters
     ----------
     predict : dict[str, Expression]
-        As `Halves` has it.
+        As in `Halves`.
     """
 
     def begun(item: Expression, new: Nodes) -> Expression | None:

@@ -1,7 +1,8 @@
-"""A rule's halves as compiled functions, for kernels with a loop of their own: banks of models, smoothers, particles.
+"""A rule's halves as compiled functions, for kernels with their own loop: banks of models, smoothers, particles.
 
-`estimation.engine.kernels` runs one filter, or many side by side; what steps several at once, or backwards, has a loop
-of its own that calls these. In the loop's file they are keyword-only parameters (`plant.compiled.paste`).
+`estimation.engine.kernels` runs one filter, or many side by side. A kernel that steps several at once, or backwards,
+has its own loop that calls these functions. In the loop's file they are keyword-only parameters
+(`plant.compiled.paste`).
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -18,13 +19,13 @@ from plant.compiled.paste import INLINED
 from plant.compiled.source import lines_source, symbols_in
 
 Prepare: TypeAlias = Callable[[Array, Array], None]
-"""``prepare(rows, constants)``: compute what does not change from sample to sample."""
+"""``prepare(rows, constants)``: compute all that does not change from sample to sample."""
 
 Predict: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
 """``predict(state, constants, before, after, j)``: take sub-step j between samples of the drives."""
 
 Update: TypeAlias = Callable[[Array, Array, Array, Array], None]
-"""``update(state, constants, sample, seen)``: take a sample; put innovations and their variances in ``seen``."""
+"""``update(state, constants, sample, seen)``: update by a sample; store innovations and their variances in ``seen``."""
 
 
 def function_source(
@@ -39,11 +40,11 @@ def function_source(
     Parameters
     ----------
     reads : Mapping[str, str]
-        Where each symbol is read from; only those needed are.
+        Location from which each symbol is read; only the needed ones are.
     outputs : Mapping[str, Expression]
-        What is computed, by name.
+        Expressions to compute, by name.
     writes : Mapping[str, str], optional
-        Where each output goes; all are written after all are computed. By default they are returned, as a tuple.
+        Location to which each output is written, after all are computed. By default they are returned, as a tuple.
 
     Examples
     --------
@@ -106,16 +107,16 @@ def data_places(model: ProcessModel, channels: tuple[str, ...]) -> dict[str, str
 
 @dataclass(frozen=True)
 class RuleFunctions:
-    """A rule on a model, as source of functions.
+    """A rule on a model, as source text of functions.
 
     Parameters
     ----------
     source : str
-        ``prepare``, ``predict`` and ``update``, see `Prepare`, `Predict` and `Update`; their names end in the suffix.
+        ``prepare``, ``predict`` and ``update``, see `Prepare`, `Predict` and `Update`; their names end with the suffix.
     constants : int
         Length of ``constants``.
     carried : tuple of str
-        What ``state`` holds: belief, then the rule's memory.
+        Contents of ``state``: belief, then the rule's memory.
     """
 
     source: str

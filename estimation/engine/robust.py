@@ -1,4 +1,4 @@
-"""Robust updates: how an innovation that is too large to be noise counts."""
+"""Robust updates: how an innovation too large for noise counts."""
 
 from plant.compiled.expression import ONE, Expression, unary
 from plant.compiled.functions import where
@@ -17,8 +17,8 @@ def inflation(robust: str, ratio: Expression) -> Expression:
     ----------
     robust : str
         ``"none"``; ``"huber"``: beyond three standard deviations an innovation counts linearly (Huber 1964);
-        ``"student-t"``: the scale that a t distribution of four degrees of freedom expects (Lange, Little and Taylor
-        1989, equation 3), so that a gross outlier counts for nothing.
+        ``"student-t"``: the scale that a t distribution with four degrees of freedom expects (Lange, Little and Taylor
+        1989, equation 3), so that a gross outlier has no effect.
     ratio : Expression
         Innovation squared over its variance [dimensionless].
 

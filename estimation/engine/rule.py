@@ -1,4 +1,4 @@
-"""A filter as a rule: its two halves, its settings, and the weight of outliers."""
+"""A filter as a rule: its two halves, its settings, and its weighting of outliers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,16 +12,16 @@ from plant.errors import HydrostateError
 
 @dataclass(frozen=True)
 class Setting:
-    """A number that a method's user may set.
+    """A setting of a method.
 
     Parameters
     ----------
     default : float
-        What holds unless it is set [its own unit].
+        Default value [its own unit].
     wanted : str
-        What it must be, for the message; ``{n}`` is the count of states.
+        Requirement on the value, for the message; ``{n}`` is the number of states.
     allows : callable
-        Whether a value is that, given the count of states.
+        Whether a value meets it, given the number of states.
     """
 
     name: str
@@ -36,31 +36,31 @@ def positive(name: str, default: float) -> Setting:
     Parameters
     ----------
     default : float
-        What holds unless it is set [its own unit].
+        Default value [its own unit].
     """
     return Setting(name, default, "positive", lambda value, _: value > 0.0)
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A filter that predicts, then updates. Its file states a rule, and kernels are made of rules.
+    """A filter that predicts, then updates. Its file defines a rule, from which kernels are generated.
 
     Parameters
     ----------
     name : str
-        Name, in messages and of the kernel's file.
+        Name, for messages and the kernel's file.
     predict : callable
         ``predict(model)``: new ``z`` and ``P`` after one step of the model.
     update : callable
         ``update(model, channels)``: new ``z`` and ``P``, and innovation ``e`` and its variance ``s`` of every channel;
-        ``robust=`` says how outliers count, where the filter weighs them.
+        ``robust=`` selects how outliers count, if the filter weights them.
     settings : tuple of Setting
-        Numbers that the user sets; they are symbols of those names in both halves.
+        Settings of the user; they are symbols with those names in both halves.
     memory : tuple of str
-        Names of what else the filter carries from sample to sample for each channel, zero at first; the channel's
-        number is added to the name.
+        Names of further values that the filter carries from sample to sample for each channel, initially zero; the
+        channel's number is appended to the name.
     weighs_outliers : bool
-        Whether the update can be a robust one.
+        Whether the update can be robust.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Rule:
 
 @cache
 def weighing(rule: Rule, robust: str) -> Rule:
-    """Return a filter with outliers counting as wanted.
+    """Return a filter with the requested treatment of outliers.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def weighing(rule: Rule, robust: str) -> Rule:
 
 
 def chosen_settings(problem: FilterProblem, method: str, known: Sequence[Setting] = ()) -> dict[str, float]:
-    """Return a method's settings, the user's in place of the defaults.
+    """Return a method's settings, with the user's values replacing the defaults.
 
     Returns
     -------

@@ -25,7 +25,8 @@ def constant_row(problem: FilterProblem, settings: dict[str, float]) -> Array:
     Returns
     -------
     ndarray, shape (rows,)
-        Parameters [SI], process noise [dimensionless a second], variances [SI squared], settings, step [s], its share.
+        Parameters [SI], process noise [dimensionless per second], variances [SI squared], settings, step [s], its
+        share.
     """
     return constant_rows([problem], settings)[:, 0]
 
@@ -36,14 +37,14 @@ def constant_rows(problems: Sequence[FilterProblem], settings: dict[str, float])
     Parameters
     ----------
     problems : sequence of FilterProblem
-        The tasks, alike in model and sampling.
+        The tasks, with the same model and sampling.
     settings : dict[str, float]
         The rule's settings with their values, in the rule's order [each in its own unit].
 
     Returns
     -------
     ndarray, shape (rows, filters)
-        One column a filter, see `constant_row`.
+        One column for each filter, see `constant_row`.
     """
     first = problems[0]
     known = np.array([problem.parameters for problem in problems]).T[: len(fields(first.model.parameters))]
@@ -59,7 +60,7 @@ def run_rule(rule: Rule, problem: FilterProblem) -> Trace:
     Parameters
     ----------
     problem : FilterProblem
-        The task; it may set the rule's settings, and say how outliers count.
+        The task; it may set the rule's settings, and how outliers count.
 
     Raises
     ------
@@ -76,19 +77,19 @@ def run_rule(rule: Rule, problem: FilterProblem) -> Trace:
 
 
 def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, NativeKernel, Array]:
-    """Return layout and kernel of a rule, and what the kernel works in before the first sample.
+    """Return layout and kernel of a rule, and the kernel's buffer before the first sample.
 
     Parameters
     ----------
     lanes : sequence of FilterProblem
-        Tasks that differ in numbers only, side by side.
+        Tasks that differ only in numbers, side by side.
 
     Returns
     -------
     places : Layout
         The kernel's layout.
     kernel : NativeKernel
-        Compiled.
+        The compiled kernel.
     work : ndarray, shape (slots, lanes)
         Its buffer [dimensionless].
     """
@@ -103,7 +104,7 @@ def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, Native
 
 
 def aligned(*shape: int) -> Array:
-    """Return an array that begins where a cache line does: a vector across two of them takes twice as long.
+    """Return an array that begins at a cache line: a vector across two cache lines takes twice as long.
 
     Parameters
     ----------
@@ -124,16 +125,16 @@ def aligned(*shape: int) -> Array:
 def read_off(
     places: Layout, lanes: Sequence[FilterProblem], work: Array, logs: Array, traces: Sequence[Trace]
 ) -> list[Trace]:
-    """Read final beliefs and scores off what a kernel worked in.
+    """Read final beliefs and scores from a kernel's buffer.
 
     Parameters
     ----------
     work : ndarray, shape (slots, lanes)
         The kernel's buffer after the last sample [dimensionless].
     logs : ndarray, shape (channels, lanes)
-        Logarithms of the products flushed on the way [dimensionless].
+        Logarithms of the flushed products [dimensionless].
     traces : sequence of Trace
-        Tracks and innovations of as many tasks as are wanted.
+        Traces with tracks and innovations, one for each task.
     """
     width, carried = lanes[0].model.width, work[: len(places.carried)]
     rows, columns = upper_triangle(width)

@@ -1,7 +1,8 @@
-"""Covariance carried through a step from waypoint to waypoint, where the model names some.
+"""Propagates covariance through a step from waypoint to waypoint, if the model names waypoints.
 
-``F P F'`` waits for the whole Jacobian. What a step computes first, its covariance can be computed for first: each
-waypoint is a linear mixture of earlier ones, and so are its covariances with them. The result is the same to rounding.
+``F P F'`` must wait for the whole Jacobian. With waypoints, the covariance of the quantities that a step computes first
+can also be computed first: each waypoint is a linear combination of earlier ones, and so are its covariances with them.
+The result is the same up to rounding.
 """
 
 from collections.abc import Sequence
@@ -13,26 +14,26 @@ from plant.compiled.hints import is_waypoint
 
 
 def waypoints_of(outputs: Sequence[Expression]) -> list[Expression]:
-    """Return the waypoints of a step, each after those that it depends on."""
+    """Return the waypoints of a step, each after those on which it depends."""
     return [item for item in ordered(outputs, by_slopes=True) if is_waypoint(item)]
 
 
 def spread(outputs: Sequence[Expression], inputs: Sequence[Expression], covariance: Covariance) -> Covariance:
-    """Carry a covariance through a step by way of its waypoints.
+    """Propagate a covariance through a step by way of its waypoints.
 
     Parameters
     ----------
     outputs : sequence of Expression
         The state one step later, in the filter's units.
     inputs : sequence of Expression
-        The state before: symbols, in the filter's units.
+        The state before the step: symbols, in the filter's units.
     covariance : dict
-        Upper triangle of the covariance before.
+        Upper triangle of the covariance before the step.
 
     Returns
     -------
     dict
-        Upper triangle of the covariance after, without process noise.
+        Upper triangle of the covariance after the step, without process noise.
     """
     n, known, units, mixed = len(inputs), list(inputs), [ONE] * len(inputs), list[dict[int, Expression]]()
     for item in waypoints_of(outputs):
@@ -45,7 +46,7 @@ def spread(outputs: Sequence[Expression], inputs: Sequence[Expression], covarian
     made: Covariance = {}
 
     def between(i: int, j: int) -> Expression:
-        """Return the covariance of two quantities, the later one resolved into what it is mixed of."""
+        """Return the covariance of two quantities, with the later one resolved into its components."""
         first, last = min(i, j), max(i, j)
         if last < n:
             return covariance[first, last]
@@ -58,6 +59,6 @@ def spread(outputs: Sequence[Expression], inputs: Sequence[Expression], covarian
 
 
 def _mixed(item: Expression, known: Sequence[Expression], units: Sequence[Expression]) -> dict[int, Expression]:
-    """Return the nonzero slopes of a quantity by the known ones, each scaled by a unit of its own."""
+    """Return the nonzero slopes of a quantity by the known ones, each scaled by its own unit."""
     slopes = eliminated_jacobian([item], known)[0]
     return {k: slope * unit for k, (slope, unit) in enumerate(zip(slopes, units, strict=True)) if slope is not ZERO}

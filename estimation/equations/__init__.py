@@ -1,1 +1,1 @@
-"""Equations that a user writes, fitted to logs."""
+"""A user's own equations, fitted to logs."""

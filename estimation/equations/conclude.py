@@ -1,4 +1,4 @@
-"""Reliability of a fit of own equations: covariance, parameters that logs do not determine, failed checks."""
+"""Reliability of a fit of a user's equations: covariance, parameters that the logs do not determine, failed checks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,39 +19,41 @@ from plant.errors import HydrostateError
 from plant.notes import Note
 
 LOST = 1e-6
-"""Singular value of the scaled sensitivities, over the largest, below which a direction is not told [fraction]."""
+"""Singular value of the scaled sensitivities, over the largest, below which a direction is not determined
+[fraction]."""
 
 TOUCHED = 1e-3
-"""Share of an unknown in such a direction from which it is not told either [fraction]."""
+"""Share of an unknown in such a direction above which the unknown is not determined either [fraction]."""
 
 POOR = 0.5
-"""Relative deviation beyond which an unknown is called poorly told [fraction]."""
+"""Relative deviation above which an unknown is called poorly determined [fraction]."""
 
 CHANCE = 3.0
-"""Times the variance that as many unknowns explain of white noise, up to which nothing is explained [dimensionless]."""
+"""Explained variance, relative to what as many unknowns explain of white noise, up to which nothing counts as explained
+[dimensionless]."""
 
 BEYOND = 1.2
-"""Residuals over noise that is given, beyond which the equations leave something out [dimensionless]."""
+"""Residuals over given noise above which the equations miss something [dimensionless]."""
 
 CORRELATED = 0.2
-"""Correlation of neighbouring residuals beyond which they are not noise [dimensionless]."""
+"""Correlation of neighbouring residuals above which they are not noise [dimensionless]."""
 
 FOLLOWED, SURE = 0.01, 1e-3
-"""Share of the residuals that an input's past explains [fraction] and its significance [probability], both of which
-speak against the equations."""
+"""Share of the residuals that an input's past explains [fraction] and its significance [probability], which together
+count against the equations."""
 
 MOST_TESTED = 20_000
-"""Samples of a log on which that is tested."""
+"""Samples of a log on which this is tested."""
 
 MISSED, LEAST = 3.0, 1e-3
-"""Residuals at a limit over the noise beyond which the equations leave the limit out [dimensionless], and the least
-noise that counts, over the channel's spread [fraction]."""
+"""Residuals at a limit, over the noise, above which the equations do not include the limit [dimensionless], and the
+least noise that counts, over the channel's spread [fraction]."""
 
 AS_WELL = 2.0
-"""Difference of log-likelihood up to which two solutions explain the logs alike [dimensionless]."""
+"""Difference of log-likelihood up to which two solutions explain the logs equally well [dimensionless]."""
 
 APART = 3.0
-"""Standard deviations from which they are two."""
+"""Standard deviations above which two solutions differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +63,13 @@ class Covariance:
     Parameters
     ----------
     std : ndarray, shape (unknowns,)
-        In the coordinates of the search; infinite where the logs do not tell [dimensionless].
+        Standard deviations in the coordinates of the search; infinite if not determined [dimensionless].
     correlation : ndarray, shape (unknowns, unknowns)
-        NaN where the logs do not tell.
+        Correlations; NaN if not determined.
     condition : float
         Condition number of the sensitivities, each scaled to one [dimensionless].
     groups : tuple of tuple of int
-        Unknowns that the logs do not tell from each other, by place; one alone is not felt at all.
+        Indices of unknowns that the logs cannot separate; a group of one has no effect at all.
     """
 
     std: Array
@@ -77,12 +79,12 @@ class Covariance:
 
 
 def covariance_of(problem: Problem, theta: Array) -> Covariance:
-    """Return the covariance of the unknowns, that of coloured residuals included, and which the logs do not tell.
+    """Return the covariance of the unknowns, allowing for coloured residuals, and which are not determined.
 
     Parameters
     ----------
     problem : Problem
-        With more samples than unknowns.
+        The problem, with more samples than unknowns.
     theta : ndarray, shape (unknowns,)
         The solution [dimensionless].
     """
@@ -117,12 +119,12 @@ def concluded(solution: Solution, given: Array) -> tuple[Finding, Covariance]:
     Parameters
     ----------
     given : ndarray, shape (outputs,)
-        Noise that was given, NaN where it was read off the residuals [units of the outputs].
+        Given noise; NaN if it was estimated from the residuals [units of the outputs].
 
     Returns
     -------
     tuple of Finding and Covariance
-        Quantities are the parameters, and the initial states that were fitted.
+        Quantities are the parameters, and the fitted initial states.
     """
     problem, theta = solution.problem, solution.point.theta
     found = covariance_of(problem, theta)
@@ -164,7 +166,7 @@ def fits_of(problem: Problem, theta: Array) -> list[float]:
     Returns
     -------
     list of float
-        One an output: 100 is perfect, 0 as good as its mean [percent].
+        One for each output: 100 is perfect, 0 is as good as its mean [percent].
     """
     typical = spread(problem.parts)
     size = [float(np.sqrt(np.mean(row**2))) for row in problem.errors(theta)]
@@ -225,7 +227,7 @@ def _misfits(problem: Problem, theta: Array, residuals: Sequence[Array], given: 
 
 
 def _followed(residual: Array, source: Array, slopes: Array) -> float:
-    """Return which share of a residual the past of an input explains; 0 where chance would [fraction]."""
+    """Return the share of a residual that the past of an input explains; 0 if chance would [fraction]."""
     part = slice(0, MOST_TESTED)
     if np.ptp(source[part]) == 0.0:
         return 0.0
@@ -257,7 +259,7 @@ def _doubts(solution: Solution) -> list[Note]:
 
 
 def _limits(problem: Problem, residuals: Sequence[Array]) -> tuple[list[Note], list[Note]]:
-    """Return limits that the equations do not follow, and those that only should be known."""
+    """Return limits that the equations do not follow, and those that need only be mentioned."""
     against, known = list[Note](), list[Note]()
     noise, typical = noise_of(problem.parts), spread(problem.parts)
     for i, channel in enumerate(problem.equations.outputs):
@@ -293,7 +295,7 @@ def _missing(problem: Problem) -> list[Note]:
 
 
 def _not_told(problem: Problem, theta: Array, found: Covariance) -> tuple[Note, ...]:
-    """Return which unknowns the logs do not tell, or hardly."""
+    """Return the unknowns that the logs do not determine, or determine poorly."""
     notes, names = list[Note](), problem.names
     for group in found.groups:
         alike = ", ".join(names[j] for j in group)
@@ -318,7 +320,7 @@ def _not_told(problem: Problem, theta: Array, found: Covariance) -> tuple[Note, 
 
 
 def _others(solution: Solution, found: Covariance) -> list[Note]:
-    """Return a solution from another start that explains the logs as well and lies elsewhere."""
+    """Return a solution from another start that explains the logs equally well but lies elsewhere."""
     problem, best = solution.problem, solution.point
     for other in solution.others:
         away = np.abs(other - best.theta) / np.where(np.isfinite(found.std), found.std, np.inf)

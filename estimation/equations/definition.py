@@ -10,15 +10,15 @@ from typing import Any
 from plant.errors import HydrostateError
 
 Derivative = Callable[[Any, Any, Any], Any]
-"""``derivative(state, inputs, parameters)``: the rate of every state, a second."""
+"""``derivative(state, inputs, parameters)``: the rate of every state, per second."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """An unknown of a user's equations: where its search begins, how far it may go, its unit.
+    """An unknown of a user's equations: its start, bounds and unit.
 
-    One whose lower bound is positive is searched by its logarithm: a start that is wrong by a factor is then as near as
-    one that is wrong by its inverse.
+    If its lower bound is positive, its logarithm is searched: a start that is too large by a factor is then as near as
+    one that is too small by it.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class Parameter:
     bounds : tuple of float
         Least and largest value [its unit].
     unit : str
-        Its unit, for what is printed.
+        Its unit, for printing.
 
     Raises
     ------
@@ -61,12 +61,12 @@ class Parameter:
 
     @property
     def logarithmic(self) -> bool:
-        """Whether it is searched by its logarithm."""
+        """Whether its logarithm is searched."""
         return self.bounds[0] > 0.0
 
     @property
     def size(self) -> float:
-        """Size of a step [its unit], where it is not searched by its logarithm."""
+        """Size of a step [its unit], if its logarithm is not searched."""
         width = self.bounds[1] - self.bounds[0]
         return abs(self.start) or (0.1 * width if isfinite(width) else 1.0)
 
@@ -78,27 +78,28 @@ def _require_finite(what: str, value: object) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """A model as a user writes it.
+    """A user's model.
 
     Parameters
     ----------
     derivative : callable
-        ``derivative(state, inputs, parameters)``: the rates of all states, in their order. States and inputs come as
-        tuples whose parts have their names too, parameters by name. Arithmetic, comparisons and NumPy's functions
-        (`plant.compiled.numpy_calls.KNOWN`) may be used; what depends on a state is chosen by ``np.where``, not ``if``.
+        ``derivative(state, inputs, parameters)``: the rates of all states, in their order. States and inputs are tuples
+        whose elements also have names, parameters are accessed by name. Arithmetic, comparisons and NumPy's functions
+        (`plant.compiled.numpy_calls.KNOWN`) may be used; a choice that depends on a state is made by ``np.where``, not
+        ``if``.
     states, inputs, outputs : Mapping[str, str]
         Their names, each with its unit. Inputs and outputs are channels of a log.
     parameters : Mapping[str, Parameter]
-        What is fitted.
+        The parameters to fit.
     known : Mapping[str, float]
-        Constants that the functions read beside them [each its unit].
+        Constants that the functions read besides the parameters [each its unit].
     observe : callable, optional
         ``observe(state, inputs, parameters)``: the outputs, in their order; the states of the same names by default.
     initial : Mapping[str, Parameter or float]
-        The states at the first sample [their units]: a number is held, a `Parameter` is fitted, for every log anew. A
-        state that is not named is fitted from its first measured value, or from zero.
+        The states at the first sample [their units]: a number is held, a `Parameter` is fitted, separately for each
+        log. A state that is not named is fitted from its first measured value, or from zero.
     held : tuple of str
-        Inputs that stand still between samples, as a controller's commands do; the others are linear.
+        Inputs that are constant between samples, such as a controller's commands; the others are linear.
 
     Raises
     ------
@@ -148,7 +149,7 @@ class Equations:
 
     @property
     def every_parameter(self) -> tuple[str, ...]:
-        """Names of parameters that are fitted, then of those that are known."""
+        """Names of the fitted parameters, then of the known ones."""
         return (*self.parameters, *self.known)
 
     @property

@@ -1,4 +1,4 @@
-"""`fit_equations(equations, records) -> EquationsFit`: a user's own equations, fitted to one log or several."""
+"""`fit_equations(equations, records) -> EquationsFit`: a user's equations, fitted to one log or several."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,23 +16,23 @@ from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
 
 EXACT = 1e-5
-"""Error of a simulation's steps that counts, over the output's range [fraction]."""
+"""Error from a simulation's step length that counts, over the output's range [fraction]."""
 
 
 @dataclass(frozen=True, eq=False)
 class EquationsFit:
-    """Result of a fit of own equations.
+    """Result of a fit of a user's equations.
 
     Parameters
     ----------
     finding : Finding
         Parameters with their intervals, gate and notes.
     fit_percent : Mapping[str, float]
-        How well each output is followed: 100 is perfect, 0 as good as its mean [percent].
+        Fit of each output: 100 is perfect, 0 is as good as its mean [percent].
     noise : Mapping[str, float]
-        Standard deviation of each output's noise, as given or as the residuals show it [its unit].
+        Standard deviation of each output's noise, as given or estimated from the residuals [its unit].
     residuals : tuple of Mapping[str, ndarray, shape (n,)]
-        Predicted less measured by output, one mapping a log [its unit]; NaN where a sample is missing.
+        Predicted minus measured by output, one mapping for each log [its unit]; NaN if a sample is missing.
     """
 
     equations: Equations
@@ -45,7 +45,7 @@ class EquationsFit:
 
     @property
     def values(self) -> Mapping[str, float]:
-        """Every parameter [its unit], the known ones too, and one that the logs do not tell where the search ended."""
+        """Every parameter [its unit], known ones too; one that the logs do not determine has its last value."""
         found = self.solution.problem.values(self.solution.point.theta)
         return {**dict(zip(self.equations.parameters, map(float, found), strict=False)), **self.equations.known}
 
@@ -55,7 +55,7 @@ class EquationsFit:
         Parameters
         ----------
         record : Record
-            With the inputs; where it has the outputs too, free initial states are fitted to them.
+            Log with the inputs; if it also has the outputs, free initial states are fitted to them.
         initial : Mapping[str, float], optional
             The states at the first sample [their units]; those not named begin as in the fit.
 
@@ -88,15 +88,15 @@ def fit_equations(
     Parameters
     ----------
     records : sequence of Record
-        One log or several, with its inputs and outputs; each has initial states of its own.
+        One log or several, with inputs and outputs; each has its own initial states.
     noise : Mapping[str, float], optional
-        Standard deviation of an output's noise [its unit], where it is known; read off the residuals otherwise.
+        Standard deviation of an output's noise [its unit], if known; otherwise estimated from the residuals.
     robust : bool
-        Whether residuals beyond three deviations count linearly (Huber 1964), so that outliers do little.
+        Whether residuals beyond three deviations count linearly (Huber 1964), so that outliers have little effect.
     starts : int
-        Starts of the search; those after the first are drawn within the bounds.
+        Number of starts of the search; those after the first are drawn within the bounds.
     seed : int
-        Of what is drawn.
+        Seed of the random starts.
 
     Raises
     ------
@@ -165,16 +165,16 @@ def simulated(
     Parameters
     ----------
     record : Record
-        With the inputs.
+        Log with the inputs.
     values : Mapping[str, float]
-        Parameters [their units]; those not named have their starts.
+        Parameters [their units]; those not named have their start values.
     initial : Mapping[str, float]
         The states at the first sample [their units].
 
     Returns
     -------
     Mapping[str, ndarray]
-        By output [its unit], shape (n,); steps are short enough for six digits of its spread.
+        By output [its unit], shape (n,); the steps are short enough for six digits relative to its spread.
 
     Raises
     ------
@@ -199,7 +199,7 @@ def simulated(
 
 
 def _theta(problem: Problem, values: Mapping[str, float], initial: Mapping[str, float]) -> Array:
-    """Return the coordinates of parameters, and of the initial states that are named or else begin as in a fit."""
+    """Return the coordinates of parameters, and of the initial states, which if not named begin as in a fit."""
     model = problem.equations
     strangers = [name for name in initial if name not in model.free]
     if strangers:

@@ -21,7 +21,7 @@ Run: TypeAlias = Callable[[Array, Array, Array, float, int, Array, Array], None]
 """``run(values, known, inputs, sample_time, substeps, predicted, slopes)``, see `estimation.equations.loops.run`."""
 
 SCHEMES = {"rk4": rk4_step, "ros2": ros2_step}
-"""Explicit and of fourth order; L-stable and of second, for stiff equations."""
+"""One explicit and of fourth order; one L-stable and of second order, for stiff equations."""
 
 
 @lru_cache(maxsize=32)
@@ -36,7 +36,7 @@ def compile_equations(equations: Equations, scheme: str) -> Run:
     Returns
     -------
     callable
-        Takes what `estimation.equations.loops.run` does.
+        A function with the arguments of `estimation.equations.loops.run`.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def compile_equations(equations: Equations, scheme: str) -> Run:
 
 
 def traceable(equations: Equations) -> None:
-    """Call a user's functions with symbols once, before there is any log.
+    """Call a user's functions with symbols once, to check them before there is a log.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def traceable(equations: Equations) -> None:
 
 
 class _Symbols:
-    """Symbols of a model's numbers, by the places from which a kernel reads them."""
+    """Symbols of a model's numbers, with the array elements from which a kernel reads them."""
 
     def __init__(self, model: Equations) -> None:
         unknown = [f"v{j}" for j in range(len(model.parameters) + len(model.free))]
@@ -126,7 +126,7 @@ def _moved(model: Equations, scheme: str, own: _Symbols) -> list[Expression]:
 
 
 def _between(place: int, *, held: bool) -> tuple[Expression, Expression | float]:
-    """Return an input at the earlier sample, and its rise up to the later one."""
+    """Return an input at the earlier sample, and its increase up to the later one."""
     before = symbol(f"before{place}")
     return before, 0.0 if held else symbol(f"after{place}") - before
 

@@ -1,6 +1,6 @@
 """The loop that runs a user's equations along a log, with exact sensitivities, as a plain function.
 
-`estimation.equations.kernel` pastes it into a kernel file. What it finds in such a file is its parameter ``kernel``.
+`estimation.equations.kernel` pastes it into a kernel file. Its parameter ``kernel`` stands for that file's contents.
 """
 
 from collections.abc import Callable
@@ -14,17 +14,17 @@ from estimation.arrays import Array
 class EquationsKernel(Protocol):
     """Interface of a model's compiled kernel.
 
-    A point is a tuple with a row for each state: the state, and its derivatives by the unknowns.
+    A point is a tuple with one row for each state: the state, and its derivatives by the unknowns.
 
     Attributes
     ----------
     UNKNOWNS, OUTPUTS : int
-        Counts of unknowns and outputs.
+        Numbers of unknowns and outputs.
     settle, begin : callable
-        From unknowns and known numbers: what is the same at every step, and the point at the first sample.
+        From unknowns and known numbers: the values that are constant over all steps, and the point at the first sample.
     step : callable
         ``step(point, fixed, before, after, start, end, h)``: the point ``h`` [s] later, while the inputs go from one
-        share of the way between samples to another [fraction].
+        fraction of the interval between samples to another [fraction].
     observe : callable
         ``observe(point, fixed, after, shown)``: fill in the outputs, and their derivatives.
     """
@@ -47,14 +47,14 @@ def run(
     predicted: Array,
     slopes: Array,
 ) -> None:
-    """Fill in what the equations predict at every sample.
+    """Fill in the equations' prediction at every sample.
 
     Parameters
     ----------
     values : ndarray, shape (unknowns,)
-        Parameters that are fitted, then initial states that are [each its unit].
+        Fitted parameters, then fitted initial states [each its unit].
     known : ndarray, shape (known,)
-        Parameters that are known, then initial states that are [each its unit]; one number at least.
+        Known parameters, then known initial states [each its unit]; at least one number.
     inputs : ndarray, shape (n, inputs)
         Inputs at the samples [their units].
     sample_time : float
@@ -62,9 +62,9 @@ def run(
     substeps : int
         Steps between samples.
     predicted : ndarray, shape (outputs, n)
-        Room for the outputs.
+        Output for the predicted outputs.
     slopes : ndarray, shape (slopes, samples, unknowns)
-        Room for their derivatives, or empty.
+        Output for their derivatives, or empty.
     """
     shown = np.zeros((kernel.OUTPUTS, 1 + kernel.UNKNOWNS))
     fixed, point = kernel.settle(values, known), kernel.begin(values, known)

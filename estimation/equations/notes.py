@@ -4,7 +4,7 @@ from plant.notes import Code
 
 
 class EquationsCode(Code):
-    """Notes on a fit of your own equations: what speaks against it, what the logs do not determine."""
+    """Notes on a fit of your own equations: objections to it, and what the logs do not determine."""
 
     EQUATIONS_EXPLAIN_NOTHING = (
         "the equations predict {channel} no better than its mean does (fit {fit:.1f} %): check units, signs and start "

@@ -1,4 +1,4 @@
-"""The least-squares problem that a user's equations and one log or several make."""
+"""The least-squares problem of a user's equations and one log or several."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,12 +22,12 @@ Bounds: TypeAlias = tuple[Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One log, as a fit sees it.
+    """One log in the form that a fit uses.
 
     Parameters
     ----------
     inputs : ndarray, shape (n, inputs)
-        Inputs [their units], no sample missing; a column of zeros where there is none.
+        Inputs [their units], no sample missing; a column of zeros if there is no input.
     measured : ndarray, shape (outputs, n)
         Outputs [their units]; NaN is missing.
     sample_time : float
@@ -40,7 +40,7 @@ class Part:
 
 
 def part_of(equations: Equations, record: Record) -> Part:
-    """Return a log as a fit of these equations sees it.
+    """Return a log in the form that a fit of these equations uses.
 
     Raises
     ------
@@ -72,14 +72,14 @@ def part_of(equations: Equations, record: Record) -> Part:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Equations and logs, how the equations are stepped, and how noisy each output is taken to be.
+    """Equations and logs, the steps of the equations, and the assumed noise of each output.
 
     Parameters
     ----------
     parts : tuple of Part
         The logs.
     scheme, substeps : str, int
-        One of `estimation.equations.kernel.SCHEMES`, and its steps from sample to sample.
+        One of `estimation.equations.kernel.SCHEMES`, and its number of steps from sample to sample.
     noise : ndarray, shape (outputs,)
         Standard deviation of each output's noise [its unit].
     robust : bool
@@ -94,7 +94,7 @@ class Problem:
     robust: bool = False
 
     def with_noise(self, noise: Array) -> "Problem":
-        """Return the same problem under other noise.
+        """Return the same problem with other noise.
 
         Parameters
         ----------
@@ -105,7 +105,7 @@ class Problem:
 
     @cached_property
     def unknowns(self) -> tuple[Parameter, ...]:
-        """All that is fitted: the parameters, then the free initial states of every log."""
+        """All fitted quantities: the parameters, then the free initial states of every log."""
         first = [
             Parameter(start_of(self.equations, name, part), _bounds_of(self.equations, name))
             for part in self.parts
@@ -115,7 +115,7 @@ class Problem:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the unknowns, in words where they are initial states."""
+        """Names of the unknowns; those of initial states are in words."""
         several = len(self.parts) > 1
         first = [
             f"initial {name}" + (f" of log {number}" if several else "")
@@ -165,7 +165,7 @@ class Problem:
         return self.coordinates(low), self.coordinates(high)
 
     def predicted(self, theta: Array) -> list[Array]:
-        """Return the outputs that the equations give.
+        """Return the outputs that the equations predict.
 
         Parameters
         ----------
@@ -175,12 +175,12 @@ class Problem:
         Returns
         -------
         list of ndarray, shape (outputs, n)
-            One array a log, in units of the outputs.
+            One array for each log, in units of the outputs.
         """
         return [found for found, _ in self._runs(self.values(theta), sloped=False)]
 
     def residuals(self, theta: Array) -> list[Array]:
-        """Return predicted less measured, over the noise.
+        """Return predicted minus measured, over the noise.
 
         Parameters
         ----------
@@ -190,12 +190,12 @@ class Problem:
         Returns
         -------
         list of ndarray, shape (outputs, n)
-            One array a log; zero where a sample is missing [dimensionless].
+            One array for each log; zero if a sample is missing [dimensionless].
         """
         return [self._misfit(found, part) for found, part in zip(self.predicted(theta), self.parts, strict=True)]
 
     def errors(self, theta: Array) -> list[Array]:
-        """Return predicted less measured, in units of the outputs.
+        """Return predicted minus measured, in units of the outputs.
 
         Parameters
         ----------
@@ -205,7 +205,7 @@ class Problem:
         Returns
         -------
         list of ndarray, shape (samples that are there,)
-            One array an output, over all logs.
+            One array for each output, over all logs.
         """
         errors = np.concatenate(self.residuals(theta), axis=1) * self.noise[:, None]
         seen = ~np.isnan(np.concatenate([part.measured for part in self.parts], axis=1))
@@ -222,12 +222,12 @@ class Problem:
         Returns
         -------
         ndarray, shape (residuals, unknowns)
-            Log after log, output after output; zero where a sample is missing [dimensionless].
+            Log after log, output after output; zero if a sample is missing [dimensionless].
         """
         return np.concatenate([jacobian for _, jacobian in self._rows(theta)])
 
     def at(self, theta: Array) -> Point:
-        """Return the misfit at a point; its cost is infinite where the equations run away.
+        """Return the misfit at a point; its cost is infinite if the equations diverge.
 
         Parameters
         ----------
@@ -321,7 +321,7 @@ def spread(parts: Sequence[Part]) -> Array:
 
 
 def known_noise(equations: Equations, noise: Mapping[str, float]) -> Array:
-    """Return given deviations of the outputs' noise, NaN where none is given.
+    """Return given deviations of the outputs' noise, NaN if not given.
 
     Parameters
     ----------

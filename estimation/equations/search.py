@@ -1,4 +1,4 @@
-"""Steps, starts and noise: how a user's equations are brought to the optimum on their logs."""
+"""Steps, starts and noise: the search for the optimum of a user's equations on their logs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,41 +14,41 @@ from estimation.log_checks.measurement_noise import NORMAL_MAD
 from plant.errors import HydrostateError
 
 MOST_STEPS = 64
-"""Model steps a sample at most."""
+"""Largest number of model steps for each sample."""
 
 STEPPED_WELL = 0.1
-"""Change of the prediction by steps of half the length, over the noise, up to which a search may begin [fraction]."""
+"""Change of the prediction with steps of half the length, over the noise, up to which a search may begin [fraction]."""
 
 SETTLED = 0.05
-"""Change of the solution by steps of half the length, in its own standard deviations, up to which it stands."""
+"""Change of the solution with steps of half the length, in its own standard deviations, up to which it is accepted."""
 
 BALANCED = 0.1
-"""Noise of every output while a search begins, over its spread [fraction]: none of them outweighs the others."""
+"""Noise assumed for every output while a search begins, over its spread [fraction]: no output outweighs the others."""
 
 LEAST_NOISE = 1e-6
-"""Least noise of an output, over its spread [fraction]: a simulation without noise stays solvable."""
+"""Least noise of an output, over its spread [fraction], so that a simulation without noise can be fitted."""
 
 EVALUATIONS, SCREENING = 100, 15
-"""Evaluations that a descent may take, and those that every start is given where there are several."""
+"""Evaluations that a descent may take, and evaluations for every start if there are several."""
 
 PROMISED = 1e-7
-"""Half the sum of squares that a further step must promise at the end: less moves no unknown by a 2000th of its
-deviation."""
+"""Decrease of half the sum of squares predicted for a further step, below which the search ends: less moves no unknown
+by a 2000th of its deviation."""
 
 FINALISTS = 3
-"""Starts that are carried on."""
+"""Number of starts that are continued."""
 
 LENGTHS = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
-"""Beginnings of the logs on which a search is led where it went astray on the whole [fraction]."""
+"""Beginnings of the logs on which a search is guided if it failed on the whole [fraction]."""
 
 ASTRAY = 3.0
-"""Residuals over the noise that the log's own bends show, beyond which it is tried [dimensionless]."""
+"""Residuals over the noise from the log's second differences, above which this is tried [dimensionless]."""
 
 FEWEST_AT_FIRST = 30
 """Samples of the shortest beginning."""
 
 ROUNDS = 6
-"""How often noise is read off the residuals and the fit taken on; it settles within three."""
+"""Number of times that noise is estimated from the residuals and the fit continued; it settles within three."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +58,13 @@ class Solution:
     Parameters
     ----------
     problem : Problem
-        With its steps and the noise that the residuals show.
+        The problem with its steps and the noise estimated from the residuals.
     others : tuple of ndarray, shape (unknowns,)
-        Where other starts ended [dimensionless].
+        Solutions from other starts [dimensionless].
     moved : float
-        By how much steps of half the length would move the solution, in its standard deviations [dimensionless].
+        Shift of the solution with steps of half the length, in its standard deviations [dimensionless].
     evaluations : int
-        Evaluations allowed in a descent, where the last of them did not settle; 0 where it did.
+        Evaluations allowed in a descent, if the last descent did not settle; 0 if it did.
     """
 
     problem: Problem
@@ -77,20 +77,20 @@ class Solution:
 def searched(
     equations: Equations, parts: Sequence[Part], noise: Array, *, robust: bool, starts: int, seed: int
 ) -> Solution:
-    """Return the best fit that is found.
+    """Return the best fit found.
 
     Parameters
     ----------
     parts : sequence of Part
         The logs.
     noise : ndarray, shape (outputs,)
-        Standard deviation of each output's noise [its unit]; NaN where it is to be read off the residuals.
+        Standard deviation of each output's noise [its unit]; NaN to estimate it from the residuals.
     robust : bool
         Whether outliers count linearly.
     starts : int
-        Starts: the parameters' own, the others drawn within their bounds.
+        Number of starts: the parameters' own, the others drawn within their bounds.
     seed : int
-        Of what is drawn.
+        Seed of the random starts.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def searched(
 
 
 def noise_of(parts: Sequence[Part]) -> Array:
-    """Return the standard deviation of each output's noise by its second differences, which hold nothing smooth.
+    """Return the standard deviation of each output's noise by its second differences, free of smooth signals.
 
     Returns
     -------
@@ -144,12 +144,12 @@ def _guesses(problem: Problem, starts: int, seed: int) -> list[Array]:
 
 
 def stepped(problem: Problem, theta: Array) -> Problem:
-    """Return the problem with the fewest steps that predict well: explicit ones, or implicit where they are stiff.
+    """Return the problem with the fewest steps that predict well: explicit, or implicit if the equations are stiff.
 
     Parameters
     ----------
     theta : ndarray, shape (unknowns,)
-        Where [dimensionless].
+        Point of evaluation [dimensionless].
 
     Raises
     ------
@@ -177,7 +177,7 @@ def stepped(problem: Problem, theta: Array) -> Problem:
 
 
 def _whole(problem: Problem, theta: Array) -> Array | None:
-    """Return all residuals, or None where they are not finite."""
+    """Return all residuals, or None if they are not finite."""
     errors = np.concatenate([one.ravel() for one in problem.residuals(theta)])
     return errors if np.isfinite(errors).all() else None
 
@@ -202,7 +202,7 @@ def _explained(problem: Problem, theta: Array, noise: Array) -> bool:
 
 
 def _lengthened(problem: Problem, guess: Array) -> Point:
-    """Return the end of a search along ever longer beginnings, which keeps an oscillation in phase."""
+    """Return the result of a search along ever longer beginnings, which keeps an oscillation in phase."""
     theta = guess
     for share in LENGTHS:
         counts = [max(round(share * part.measured.shape[1]), FEWEST_AT_FIRST) for part in problem.parts]
@@ -216,7 +216,7 @@ def _lengthened(problem: Problem, guess: Array) -> Point:
 
 
 def _refined(problem: Problem, point: Point, noise: Array, typical: Array) -> Solution:
-    """Return the fit taken on until noise and unknowns agree, and how far it depends on the steps' length."""
+    """Return the fit continued until noise and unknowns agree, and how far it depends on the steps' length."""
     left = 0
     for _ in range(ROUNDS):
         deviations = np.where(np.isnan(noise), _shown(problem, point.theta, typical), noise)
@@ -241,7 +241,7 @@ def _finished(problem: Problem, theta: Array) -> tuple[Point, int]:
 
 
 def _shown(problem: Problem, theta: Array, typical: Array) -> Array:
-    """Return the deviation of each output's residuals, degrees of freedom shared by samples [its unit]."""
+    """Return the deviation of each output's residuals; degrees of freedom are shared in proportion to samples."""
     errors = problem.errors(theta)
     free = max(1.0 - len(theta) / sum(map(len, errors)), 0.1)
     if problem.robust:
@@ -252,7 +252,7 @@ def _shown(problem: Problem, theta: Array, typical: Array) -> Array:
 
 
 def _moved(problem: Problem, point: Point) -> float:
-    """Return the shift of the solution under steps of half the length, in standard deviations: ``|Q'e|``."""
+    """Return the shift of the solution with steps of half the length, in standard deviations: ``|Q'e|``."""
     finer = _whole(replace(problem, substeps=2 * problem.substeps), point.theta)
     coarse = _whole(problem, point.theta)
     if finer is None or coarse is None:

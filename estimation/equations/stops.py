@@ -1,4 +1,4 @@
-"""Channels that stand at an end of their range: end stops, saturation, clipped sensors."""
+"""Channels that stay at an end of their range: end stops, saturation, clipped sensors."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,41 +9,41 @@ from estimation.arrays import Array, BoolArray
 from estimation.stretches import in_long_stretches
 
 RUN = 3
-"""Samples in a row from which a channel is said to stand."""
+"""Consecutive samples from which a channel counts as staying."""
 
 OFTEN = 0.01
-"""Share of the samples from which it counts [fraction]."""
+"""Share of the samples above which staying counts [fraction]."""
 
 NEAR = 3.0
-"""How near the end counts, in standard deviations of the noise."""
+"""Distance from the end that counts as at the end, in standard deviations of the noise."""
 
 CROWDED = 5.0
-"""Samples at the end over those as far before it [dimensionless]; a sine has 2.4."""
+"""Samples at the end over those the same distance before it [dimensionless]; a sine has 2.4."""
 
 BLURRED = 0.1
-"""Reach over the channel's range, beyond which noise hides where it ends [fraction]."""
+"""Width of the end region over the channel's range, above which noise hides the end [fraction]."""
 
 TWICE, LONG = 2, 0.1
-"""Times that a channel has come there, or else share of the samples [fraction], from which it counts."""
+"""Number of visits to the end, or else share of the samples [fraction], above which it counts."""
 
 LEVELS = 20
-"""A channel of fewer values is one of levels, and has no ends."""
+"""A channel with fewer distinct values is one of levels, and has no ends."""
 
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A channel that stands at an end of its range.
+    """A channel that stays at an end of its range.
 
     Parameters
     ----------
     end : str
         ``"least"`` or ``"largest"``.
     value : float
-        Where it stands [its unit].
+        Value at which it stays [its unit].
     share : float
-        Of the samples [fraction].
+        Share of the samples [fraction].
     where : sequence of ndarray of bool, shape (n,)
-        Which samples, one array a log.
+        Which samples these are, one array for each log.
     """
 
     end: str
@@ -53,11 +53,11 @@ class Standing:
 
 
 def standing(channels: Sequence[Array], noise: float) -> Iterator[Standing]:
-    """Yield the ends of its range at which a channel stands.
+    """Yield the ends of its range at which a channel stays.
 
-    A channel that stops there stays for several samples, again and again or for long, and much more often than a smooth
-    signal lingers at its turning points; one of few levels, such as a square wave, only jumps between them and is
-    left out.
+    A channel at a stop stays there for several samples, repeatedly or for long, and much more often than a smooth
+    signal lingers at its turning points. A channel with few levels, such as a square wave, only jumps between them and
+    is left out.
 
     Parameters
     ----------

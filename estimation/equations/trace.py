@@ -1,4 +1,4 @@
-"""Calls a user's functions with symbols, and says what is wrong with them where that fails."""
+"""Calls a user's functions with symbols, and explains what is wrong with them if that fails."""
 
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
@@ -33,14 +33,14 @@ class Named:
 
 
 def grouped(kind: str, names: Sequence[str], values: Sequence[Any]) -> Any:
-    """Return values as a tuple whose parts have names too.
+    """Return values as a tuple whose elements also have names.
 
     Parameters
     ----------
     kind : str
-        What they are, for messages.
+        Kind of values, for messages.
     names, values : sequence
-        One name a value.
+        One name for each value.
 
     Examples
     --------
@@ -63,9 +63,9 @@ def traced(
     Parameters
     ----------
     what : str
-        Which function it is: ``"derivative"``.
+        Name of the function: ``"derivative"``.
     wanted : sequence of str
-        Names of what it returns.
+        Names of the values it returns.
 
     Raises
     ------

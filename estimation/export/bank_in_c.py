@@ -1,4 +1,4 @@
-"""A bank of interacting models as C: the loops of `estimation.filters.imm_loops`, translated for its sizes."""
+"""A bank of interacting models in C: the loops of `estimation.filters.imm_loops`, translated for its sizes."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ class BankInC:
     text : str
         Definitions of ``PREFIX_step_bank``, ``PREFIX_combine`` and what they call.
     operations : Counter
-        What a step takes at most [operations].
+        Largest number of operations in a step [operations].
     """
 
     text: str
@@ -36,16 +36,16 @@ def bank_in_c(
     precision: Precision,
     prefix: str,
 ) -> BankInC:
-    """Write the step of a bank, and what combines its modes, as C.
+    """Write the step of a bank, and the function that combines its modes, in C.
 
     Parameters
     ----------
     rule : RuleInC
         The filter that each mode runs.
     channels, modes, substeps : int
-        Counts of measured channels, of modes, and of the model's steps a sample.
+        Numbers of measured channels, of modes, and of the model's steps for each sample.
     prefix : str
-        What the functions' names begin with.
+        Prefix of the functions' names.
     """
     belief = model.width + model.width * (model.width + 1) // 2
     outside = {

@@ -1,7 +1,7 @@
-"""A filter, or a bank of interacting ones, as C99 for a controller: from the rule and the model that Python runs.
+"""A filter, or a bank of interacting ones, in C99 for a controller: from the rule and the model that Python runs.
 
 One header and one source, an example and a Makefile. Nothing is allocated, every loop is bounded, and a step takes at
-most as many operations as the header says.
+most the number of operations stated in the header.
 """
 
 from collections import Counter
@@ -33,11 +33,11 @@ EXPORTED = (*RULES, "imm")
 """Methods that can be exported."""
 
 ROUNDED_TWICE = (("acceleration", "ekf"), ("pressure", "ekf"), ("pressure", "imm"))
-"""Forms and methods that stay within 1e-12 of Python where products and sums are rounded twice, measured over 100,000
-steps in nine conditions (`python -m benchmarks export_c`); all others have the library fuse them."""
+"""Forms and methods that stay within 1e-12 of Python with separate rounding of products and sums, measured over 100,000
+steps in nine conditions (`python -m benchmarks export_c`); all others use the library's fused multiply-add."""
 
 LARGE_PRODUCT = {"double": LARGE, "float": 1e15}
-"""A product of innovation variances beyond this goes into the logarithm [dimensionless]."""
+"""If the product of innovation variances exceeds this, its logarithm is added to the sum [dimensionless]."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,14 @@ class Numbers:
     Parameters
     ----------
     rows : ndarray, shape (modes, rows)
-        Parameters [SI], process noise [dimensionless a second], variances [SI squared], settings, step [s], its share.
+        Parameters [SI], process noise [dimensionless per second], variances [SI squared], settings, step [s], its
+        share.
     mean : ndarray, shape (states,)
         Belief before the first sample, in the filter's units [dimensionless].
     covariance : ndarray, shape (states (states + 1) / 2,)
         Its upper triangle, row by row, in the filter's units [dimensionless].
     transitions : ndarray, shape (modes, modes)
-        Logarithms of the probabilities that a mode is followed by another [dimensionless].
+        Logarithms of the transition probabilities between modes [dimensionless].
     """
 
     rows: Array
@@ -68,11 +69,11 @@ def filter_in_c(problem: FilterProblem, method: str = "ekf", *, name: str, preci
     Parameters
     ----------
     problem : FilterProblem
-        The task whose model, channels, numbers and sampling it has; its log plays no part.
+        The task, for its model, channels, numbers and sampling; its log is not used.
     method : str
         One of `EXPORTED`.
     name : str
-        What its files, types and functions are called: a name of C.
+        Name of its files, types and functions: a valid name in C.
     precision : str
         ``double`` or ``float``.
 
@@ -162,7 +163,7 @@ def numbers_of(problem: FilterProblem, method: str) -> Array:
 
 
 def row_notes(problem: FilterProblem, method: str) -> list[tuple[str, str, str]]:
-    """Return name, unit and meaning of what a filter is told and never changes, in its order.
+    """Return name, unit and meaning of the constants of a filter, in their order.
 
     Parameters
     ----------
@@ -172,7 +173,7 @@ def row_notes(problem: FilterProblem, method: str) -> list[tuple[str, str, str]]
     Returns
     -------
     list of (str, str, str)
-        One a row of `numbers_of`.
+        One for each row of `numbers_of`.
     """
     model, settings = problem.model, _chosen(problem, method)[1]
     told = [(name, note.unit, note.meaning) for name, note in notes(model.parameters).items()]
@@ -190,7 +191,7 @@ def _squared(unit: str) -> str:
 
 
 def _names(problem: FilterProblem, method: str) -> dict[str, object]:
-    """Return every name with what stands beside it in a comment."""
+    """Return every name with the text of its comment."""
     return {
         "row_names": [(name, f"{unit}, {meaning}") for name, unit, meaning in row_notes(problem, method)],
         "state_names": [(state.name, _state_note(problem, i)) for i, state in enumerate(problem.model.states)],

@@ -1,4 +1,4 @@
-"""An identified linear model as C99: a difference equation from its inputs to its output."""
+"""An identified linear model in C99: a difference equation from its inputs to its output."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from plant.compiled.c99.precision import precision_of
 from plant.errors import HydrostateError
 
 NO_LEVEL = 1e-9
-"""Sum of a denominator's coefficients, over that of their sizes, below which the model integrates [fraction]."""
+"""Sum of a denominator's coefficients, over that of their magnitudes, below which the model integrates [fraction]."""
 
 
 def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> dict[str, str]:
@@ -19,9 +19,9 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
     Parameters
     ----------
     model : FreeRunModel
-        A linear one, of one input or several.
+        A linear model with one input or several.
     name : str
-        What its files, types and functions are called: a name of C.
+        Name of its files, types and functions: a valid name in C.
     precision : str
         ``double`` or ``float``.
 
@@ -63,7 +63,7 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
 
 
 def require_no_limits(model: FreeRunModel) -> None:
-    """Refuse a model whose output has limits: a transfer function alone goes on behind them.
+    """Refuse a model whose output has limits, since a transfer function alone would exceed them.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""The flow form as one filter for a controller: seven states, begun near the rig's own values.
+"""The flow form as one filter for a controller: seven states, started near the rig's own values.
 
-On a controller there is no room for a bank that reads a log again (`estimation.eha.by_flow_filter`), so drain and the
-make-up valves' opening are taken as known, and the filter is as good as its first belief.
+A controller has no room for a bank that reads a log again (`estimation.eha.by_flow_filter`). So drain and the make-up
+valves' opening are taken as known, and the filter is only as good as its first belief.
 """
 
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ STATES = (
     logarithm_of("makeup_conductance", "m^3/(s Pa)", 1e-9),
     logarithm_of("speed_lead", "s", 1e-5),
 )
-"""Chamber pressures with the process noise that measured speed brings, and constants."""
+"""Chamber pressures with the process noise from measured speed, and constants."""
 
 
 def flow_filter_step(state: tuple[Scalar, ...], drives: Any, p: Any, h: Scalar) -> tuple[Scalar, ...]:
@@ -73,4 +73,4 @@ def flow_filter_step(state: tuple[Scalar, ...], drives: Any, p: Any, h: Scalar) 
 
 
 FLOW_FILTER = replace(CHAMBERS, name="flow_filter", states=STATES, step=flow_filter_step)
-"""The flow form as a process model: driven by what is measured, so friction plays no part."""
+"""The flow form as a process model: driven by measurements, so friction has no part in it."""

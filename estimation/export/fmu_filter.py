@@ -13,7 +13,7 @@ def filter_fmu(problem: FilterProblem, method: str, fmi: str, *, name: str) -> b
     Parameters
     ----------
     problem : FilterProblem
-        The task whose model, channels, numbers and sampling it has.
+        The task, for its model, channels, numbers and sampling.
     method : str
         One of `estimation.export.c_filter.EXPORTED`.
     fmi : str

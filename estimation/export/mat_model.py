@@ -13,8 +13,8 @@ from plant.compiled.c99.files import checked_name
 def model_in_mat(model: FreeRunModel, *, name: str) -> dict[str, bytes]:
     """Return the MAT file of a linear model, whose variables are those of a transfer function of MATLAB.
 
-    ``numerator`` and ``denominator`` are in powers of the delay operator, an input a row; the output is that of the
-    transfer functions of the inputs less ``input_mean``, and ``output_level``.
+    ``numerator`` and ``denominator`` are in powers of the delay operator, one row for each input. The output is that of
+    the transfer functions driven by the inputs minus ``input_mean``, plus ``output_level``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A rule on a model as functions of C: what is computed once, at each step of the model, at each sample."""
+"""A rule on a model as functions of C: one computed once, one at each step of the model, one at each sample."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ ARGUMENTS: Mapping[str, tuple[str, ...]] = {
         "{real} *restrict seen",
     ),
 }
-"""What each function takes; ``before`` and ``after`` are drives, ``j`` counts steps of the model since the sample."""
+"""Arguments of each function; ``before`` and ``after`` are drives, ``j`` counts steps of the model since the sample."""
 
 ABOUT: Mapping[str, str] = {
     "prepare": "Compute what stays the same from sample to sample.",
@@ -48,9 +48,9 @@ class RuleInC:
     constants : int
         Length of ``constants``.
     carried, rows : tuple of str
-        What ``state`` and ``rows`` hold, by name.
+        Contents of ``state`` and ``rows``, by name.
     operations : Mapping[str, Counter]
-        What a call of each function takes at most [operations].
+        Largest number of operations in a call of each function [operations].
     """
 
     text: str
@@ -70,7 +70,7 @@ def rule_in_c(
     channels : tuple of str
         Measured channels.
     prefix : str
-        What their names begin with.
+        Prefix of their names.
     scored : bool
         Whether sums by which the filter is judged are carried along with the belief.
     """

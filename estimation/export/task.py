@@ -1,4 +1,4 @@
-"""The filtering task that a controller gets: model, first belief and noise, from a rig and a log."""
+"""The filtering task of a controller: model, first belief and noise, from a rig and a log."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -20,14 +20,14 @@ from plant.errors import LogError, require_known
 from plant.log.record import Record
 
 CHAMBER_FORMS = {model.name: (model, makeup) for model, makeup in CHAMBERS}
-"""Forms of the modelled chambers, each with its first guess of the make-up conductance [m^3/(s Pa)]."""
+"""Forms with modelled chambers, each with its first guess of the make-up conductance [m^3/(s Pa)]."""
 
 EXPORTED_FORMS: Mapping[str, ProcessModel] = {
     **FORMS,
     "flow": FLOW_FILTER,
     **{name: model for name, (model, _) in CHAMBER_FORMS.items()},
 }
-"""Process models that a filter can be exported with, by name."""
+"""Process models of which a filter can be exported, by name."""
 
 
 def filter_task(
@@ -39,20 +39,20 @@ def filter_task(
     states: tuple[str, ...] = (),
     tuned: bool = False,
 ) -> FilterProblem:
-    """Return the task of a filter that shall run elsewhere.
+    """Return the task of a filter that will run elsewhere.
 
     Parameters
     ----------
     record : Record
-        A log of the bench: its rate, channels and sensor noise are those that the filter will meet.
+        A log of the bench, with the sample rate, channels and sensor noise that the filter will have.
     form : str
         One of `EXPORTED_FORMS`.
     start : float, optional
-        First guess of bulk modulus [Pa]; the actuator's if not given.
+        First guess of bulk modulus [Pa]; by default the actuator's.
     states : tuple of str
-        What is estimated beside bulk modulus, of `estimation.models.augment.AUGMENTABLE`.
+        Quantities to estimate besides bulk modulus, from `estimation.models.augment.AUGMENTABLE`.
     tuned : bool
-        Whether the noise levels are those of greatest likelihood on the log.
+        Whether the noise levels are those of maximum likelihood on the log.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def filter_task(
 
 
 def _by_flow(record: Record, parameters: EhaParameters, form: str, guess: float) -> FilterProblem:
-    """Return the task of a filter that is driven by measured flows and sees differential pressure alone."""
+    """Return the task of a filter that is driven by measured flows and measures only differential pressure."""
     if PRESSURE not in record:
         raise LogError(f"the {form} form needs {PRESSURE}, the record has {', '.join(record)}")
     load, model = first_load(record), EXPORTED_FORMS[form]

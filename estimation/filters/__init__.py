@@ -1,1 +1,1 @@
-"""One filter or smoother a file, its loop beside it."""
+"""Filters and smoothers, one in each file, with their loops in files beside them."""

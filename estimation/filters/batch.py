@@ -1,7 +1,7 @@
 """`filter_batch(rule, problems) -> traces`: thousands of filters, 32 side by side, blocks of them on every core.
 
-Every filter has its own prior, parameters, noise and measurements; what they share is the model, the channels and the
-sampling. A filter gives the same bits here and alone (`estimation.engine.runner.run_rule`).
+Every filter has its own prior, parameters, noise and measurements; they share the model, the channels and the sampling.
+A filter gives the same bits here and alone (`estimation.engine.runner.run_rule`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -22,7 +22,8 @@ from plant.compiled.source import ROWS
 from plant.errors import HydrostateError
 
 FEWEST_IN_LANES = 8
-"""A block of fewer filters is run one after the other: empty lanes cost as much as full ones."""
+"""Smallest block that is run side by side; in smaller ones filters run in turn, since empty lanes cost as much as full
+ones."""
 
 
 def filter_batch(
@@ -37,16 +38,16 @@ def filter_batch(
     Parameters
     ----------
     problems : iterable of FilterProblem
-        The tasks, in any number; a block is drawn when it is its turn, so they need not fit in memory together.
+        The tasks, in any number; they are drawn one block at a time, so they need not fit in memory together.
     workers : int
         Threads, each running one block at a time.
     lanes : int
-        Tasks in a block, side by side: empty lanes cost as much as full ones, and each width is compiled by itself.
+        Tasks in a block, side by side: empty lanes cost as much as full ones, and each width is compiled separately.
 
     Yields
     ------
     Trace
-        One a task, in the tasks' order; innovations are not kept.
+        One for each task, in the tasks' order; innovations are not kept.
 
     Raises
     ------
@@ -99,7 +100,7 @@ def _places(arrays: Sequence[Array]) -> IntArray:
 
 
 ALIKE = ("channels", "sample_time", "substeps", "every", "robust", "settings")
-"""What the filters of a block share beside the model."""
+"""Properties that the filters of a block share besides the model."""
 
 
 def _require_alike(first: FilterProblem, problem: FilterProblem) -> None:

@@ -1,7 +1,7 @@
 """The cubature Kalman filter: 2n equally weighted points at ``sqrt(n)`` standard deviations, compiled.
 
-Source: Arasaratnam and Haykin (2009), the third-degree rule and the algorithm of appendix A, with the
-points of each channel drawn anew. It is the scaled transform with alpha 1, beta 0 and kappa 0, and has nothing to set.
+Source: Arasaratnam and Haykin (2009), the third-degree rule and the algorithm of appendix A, with new points for each
+channel. It is the scaled transform with alpha 1, beta 0 and kappa 0, and has no settings.
 """
 
 from functools import partial
@@ -19,7 +19,7 @@ def cubature_spread(n: int) -> Spread:
     Returns
     -------
     Spread
-        Reach ``sqrt(n)``; the shift of the mean has no weight of its own.
+        Reach ``sqrt(n)``; the shift of the mean has no extra weight.
     """
     return Spread(constant(sqrt(n)), ZERO)
 

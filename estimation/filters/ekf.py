@@ -1,7 +1,7 @@
 """The extended Kalman filter: analytic Jacobian, sequential scalar updates, compiled.
 
-Equations: predict and update as in Gadsden (2011), whose notation the EHA paper follows; the measurement noise is
-diagonal, so processing one channel at a time equals the joint update and inverts nothing.
+Equations: predict and update as in Gadsden (2011), whose notation the EHA paper follows. The measurement noise is
+diagonal, so processing one channel at a time equals the joint update and needs no matrix inverse.
 """
 
 from collections.abc import Sequence
@@ -71,7 +71,7 @@ def ekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "none
     channels : sequence of str
         Measured channels, in the order of processing.
     robust : str
-        How innovations that are too large count, see `estimation.engine.robust`.
+        How too large innovations count, see `estimation.engine.robust`.
 
     Returns
     -------
@@ -91,14 +91,14 @@ class Update:
     Parameters
     ----------
     mean, covariance : list of Expression, dict
-        The belief; the mean not yet held to its bounds.
+        The belief; the mean is not yet held to its bounds.
     seen : dict[str, Expression]
         Innovations ``e`` and their variances ``s``; of every second channel ``w``, one over ``s``.
     noise : list of Expression
-        Measurement variances as outliers inflated them [SI squared].
+        Measurement variances, inflated for outliers [SI squared].
     gains : list of (row, gain, weight, innovation)
-        What each channel did, in units of its own; weight is one over the innovation's variance, nothing where the
-        sample is missing.
+        Effect of each channel, in its own units; weight is one over the innovation's variance, zero if the sample is
+        missing.
     """
 
     mean: list[Expression]
@@ -122,18 +122,18 @@ def noise_symbols(channels: Sequence[str]) -> list[Expression]:
 def linearised_update(
     model: ProcessModel, channels: Sequence[str], point: Mean, noise: Sequence[Expression], robust: str = "none"
 ) -> Update:
-    """Update the prior by each channel in turn, the model linearised at a point.
+    """Update the prior by each channel in turn, with the model linearised at a point.
 
     Parameters
     ----------
     channels : sequence of str
         Measured channels, in the order of processing.
     point : sequence of Expression
-        Where the model is linearised, in the filter's units: at the prior's mean, or nearer to the truth.
+        Point of linearisation, in the filter's units: the prior's mean, or a point nearer to the truth.
     noise : sequence of Expression
         Measurement variances [SI squared].
     robust : str
-        How innovations that are too large count, see `estimation.engine.robust`.
+        How too large innovations count, see `estimation.engine.robust`.
     """
     mean, covariance = belief_symbols(model)
     seen, inflated, earlier = Outputs(), list[Expression](), None
@@ -161,7 +161,7 @@ def linearised_update(
 
 
 class _Earlier(NamedTuple):
-    """The first of two channels: whether it was seen, the covariance before it, ``P H'``, and its variance."""
+    """The first of two channels: whether it is present, the covariance before it, ``P H'``, and its variance."""
 
     present: Expression
     covariance: Covariance
@@ -170,7 +170,7 @@ class _Earlier(NamedTuple):
 
 
 def _second_inverse(earlier: _Earlier, H: Sequence[Expression], r: Expression) -> Expression:
-    """Return one over the second channel's variance, which does not wait for one over the first's.
+    """Return one over the second channel's variance, without waiting for one over the first's.
 
     The variances of two channels in turn have the product ``S00 S11 - S01^2``, of variances before both.
     """
@@ -181,13 +181,13 @@ def _second_inverse(earlier: _Earlier, H: Sequence[Expression], r: Expression) -
 
 
 def _unit(row: Sequence[Expression]) -> Expression:
-    """Return the constant slope of a channel that shows one state alone, as the unit of its update; else one."""
+    """Return the constant slope of a channel that observes a single state, as the unit of its update; else one."""
     seen = [slope for slope in row if slope is not ZERO]
     return seen[0] if len(seen) == 1 and seen[0].operation == "constant" else ONE
 
 
 def _linearised(model: ProcessModel, point: Mean, mean: Mean, channels: Sequence[str], c: int) -> Expression:
-    """Return the prediction of a channel from a mean, by the model linearised about a point."""
+    """Return the prediction of a channel from a mean, with the model linearised about a point."""
     predicted = observed(model, point, channels)[c]
     row = jacobian([predicted], point)[0]
     if all(slope.operation == "constant" for slope in row):  # it is linear

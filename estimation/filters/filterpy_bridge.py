@@ -1,8 +1,8 @@
-"""filterpy's extended Kalman filter as a second engine, and as the oracle that ours is held to.
+"""filterpy's extended Kalman filter as a second engine, and as the reference for this project's filter.
 
-filterpy's filter has no nonlinear process function, and its `predict_update` linearises too early; so the prediction
-is overridden here, the Jacobian is set before each `predict`, and one update takes all channels that are present.
-filterpy drags in scipy.stats and takes longer to import than a log to filter, so only this filter's first run does so.
+filterpy's filter has no nonlinear process function, and its `predict_update` linearises too early. So the prediction is
+overridden here, the Jacobian is set before each `predict`, and one update takes all channels that are present. filterpy
+imports scipy.stats, which takes longer than filtering a log, so it is imported only when this filter first runs.
 """
 
 import math
@@ -26,8 +26,8 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
     Returns
     -------
     Trace
-        Its result, NaN from where it diverges. The joint innovations are given as the sequential ones that they are
-        equal to, channel by channel; where a sample is missing, residual and variance are NaN.
+        Its result, NaN from the sample at which it diverges. The joint innovations are converted to the equivalent
+        sequential ones, channel by channel; if a sample is missing, residual and variance are NaN.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
 
 
 def _filter(problem: FilterProblem) -> Any:
-    """Return filterpy's filter before the first sample; `_predict` moves its mean, so its own prediction leaves it."""
+    """Return filterpy's filter before the first sample; `_predict` moves its mean, so its own prediction does not."""
     from filterpy.kalman import ExtendedKalmanFilter
 
     kalman: Any = ExtendedKalmanFilter(dim_x=problem.model.width, dim_z=len(problem.channels))
@@ -117,10 +117,10 @@ def _predict(kalman: Any, problem: FilterProblem, k: int) -> None:
 
 
 def _update(kalman: Any, y: Array, rows: Array, variances: Array) -> tuple[Array, Array]:
-    """Update with all channels at once; return what updating with one after the other would have seen.
+    """Update with all channels at once; return the innovations that sequential updates would have had.
 
-    Channels are counted in their own standard deviations, since filterpy inverts the innovations' covariance. With
-    ``S = L L'``, the sequential innovations are ``diag(L) * solve(L, residual)`` and their variances ``diag(L)**2``.
+    Channels are scaled by their standard deviations, since filterpy inverts the innovations' covariance. With ``S = L
+    L'``, the sequential innovations are ``diag(L) * solve(L, residual)`` and their variances ``diag(L)**2``.
     """
     unit = np.sqrt(variances)
     H = rows / unit[:, None]

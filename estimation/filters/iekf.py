@@ -1,15 +1,15 @@
 """The iterated extended Kalman filter: the update linearised again at its own result, compiled.
 
 Source: Bell and Cathey (1993), the iterated update as Gauss-Newton: with the prediction z, its covariance P and the
-point x_i reached so far, where ``h`` has the Jacobian ``H_i``::
+current point x_i, where ``h`` has the Jacobian ``H_i``::
 
-    x_{i+1} = z + P H_i' (H_i P H_i' + R)^-1 (y - h(x_i) - H_i (z - x_i))
+x_{i+1} = z + P H_i' (H_i P H_i' + R)^-1 (y - h(x_i) - H_i (z - x_i))
 
-A fixed count of passes is unrolled. Nothing is linearised again but the observation: the step of the model is short,
-and is left as the extended Kalman filter has it.
+A fixed number of passes is unrolled. Only the observation is linearised again: the step of the model is short, and is
+treated as in the extended Kalman filter.
 
-Every model of `estimation.models.eha_forms` observes linearly in its states, and there the first pass is the last: on
-those the filter *is* the extended Kalman filter, to the last bit. It differs where ``observe`` bends or a measured
+Every model of `estimation.models.eha_forms` observes linearly in its states, so the first pass is already final: on
+those this filter *is* the extended Kalman filter, to the last bit. It differs if ``observe`` is nonlinear or a measured
 state is logarithmic.
 """
 
@@ -24,7 +24,7 @@ from estimation.filters.sigma_points import all_affine
 from estimation.models.model import ProcessModel
 
 PASSES = 4
-"""Linearisations a sample: Gauss-Newton squares its error at each, near the end."""
+"""Linearisations at each sample: near the result, each Gauss-Newton pass squares the error."""
 
 
 def iekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "none") -> Outputs:
@@ -35,7 +35,7 @@ def iekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "non
     channels : sequence of str
         Measured channels, in the order of processing.
     robust : str
-        How innovations that are too large count, see `estimation.engine.robust.inflation`; judged in the first pass.
+        How too large innovations count, see `estimation.engine.robust.inflation`; judged in the first pass.
 
     Returns
     -------

@@ -1,13 +1,13 @@
 """The interacting multiple model filter: several beliefs about how the plant behaves, mixed at every sample.
 
 Source: Blom and Bar-Shalom (1988); Bar-Shalom, Li and Kirubarajan (2001), section 11.6.6, steps 1 to 5, which
-`estimation.filters.imm_loops` takes in turn: mix, step every mode, weigh, combine. A mode is any `Rule` on any task, as
-long as the states are the same ones. Probabilities are logarithms from end to end and are summed by their largest:
-nothing underflows, and nothing is floored. A mode that stops being finite has no probability, and starts again from the
-others at the next sample.
+`estimation.filters.imm_loops` takes in turn: mix, step every mode, weight, combine. A mode is any `Rule` on any task,
+as long as all modes have the same states. Probabilities are logarithms throughout and are summed relative to the
+largest: nothing underflows, and nothing is floored. A mode that stops being finite has no probability, and starts again
+from the others at the next sample.
 
-`imm` runs a bank of extended Kalman filters that differ in the leakage and the friction that they are told, so that a
-log's own need not be known; `interacting` runs any bank.
+`imm` runs a bank of extended Kalman filters that assume different leakage and friction, so that those of the log need
+not be known; `interacting` runs any bank.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,26 +30,27 @@ LEAKAGE: Mapping[str, tuple[float, ...]] = {
     "leakage_coefficient": (1.0, 5.3, 12.6),
     "flow_bias": (1.0, 5.7, 6.1),
 }
-"""Levels of leakage in the bank, as multiples of what the filter is told: the rows of Table 3 over its first."""
+"""Levels of leakage in the bank, as multiples of the filter's given value: the rows of Table 3 relative to its
+first."""
 
 FRICTION: Mapping[str, tuple[float, ...]] = {
     "friction_quadratic": (1.0, 17.6, 67.7),
     "friction_linear": (1.0, -3.47, 8.69),
     "friction_coulomb": (1.0, 1.15, 1.26),
 }
-"""Levels of friction: the rows of Table 4 over its first; a_2 dips (errata E12)."""
+"""Levels of friction: the rows of Table 4 relative to its first; a_2 dips (errata E12)."""
 
 IMM_SETTINGS = (positive("dwell_time", 10.0),)
-"""Mean time that a mode lasts [s]: long beside the samples, so that a probability is earned by many of them."""
+"""Mean time that a mode lasts [s]: long compared with the sample time, so that a probability rests on many samples."""
 
 
 def imm(problem: FilterProblem) -> Trace:
-    """Run extended Kalman filters that take turns, told each level of leakage with each of friction.
+    """Run interacting extended Kalman filters, one for each combination of a leakage and a friction level.
 
     Parameters
     ----------
     problem : FilterProblem
-        The task; it may set ``dwell_time`` [s]. What the model estimates itself is not varied.
+        The task; it may set ``dwell_time`` [s]. Quantities that the model estimates itself are not varied.
 
     Raises
     ------
@@ -69,7 +70,7 @@ def bank_parameters(problem: FilterProblem) -> list[Array]:
     Returns
     -------
     list of ndarray, each shape (parameters,)
-        One a mode, that of the task itself first [SI].
+        One for each mode, that of the task itself first [SI].
     """
     names = [field.name for field in fields(problem.model.parameters)]
     estimated = {state.name for state in problem.model.states}
@@ -87,16 +88,18 @@ def bank_parameters(problem: FilterProblem) -> list[Array]:
 def interacting(
     bank: Sequence[tuple[Rule, FilterProblem]], transitions: Array, log_probability: Array
 ) -> tuple[Trace, Array]:
-    """Run the filters of a bank, mixed before every sample as they may have taken turns.
+    """Run the filters of a bank, mixed before every sample because the mode may have changed.
 
     Parameters
     ----------
     bank : sequence of (Rule, FilterProblem)
-        The modes. They share prior, log and sampling, of which the first one's count, and whether innovations are kept.
+        The modes. They share prior, log and sampling, which are taken from the first one, and whether innovations are
+        kept.
     transitions : ndarray, shape (modes, modes)
         Logarithm of the probability that a mode is followed by another, from row to column [dimensionless].
     log_probability : ndarray, shape (modes,)
-        Logarithm of each mode's probability before the first sample [dimensionless]; it receives the last one's.
+        Logarithm of each mode's probability before the first sample [dimensionless]; overwritten with the value after
+        the last sample.
 
     Returns
     -------
@@ -124,12 +127,12 @@ def interacting(
 def log_transitions(dwell_times: Sequence[float], sample_time: float) -> Array:
     """Return the log of a transition matrix in which each mode lasts some time on average and leads to all others.
 
-    A mode's stay is geometric: it ends at a sample with probability ``sample_time / dwell_time``.
+    The duration of a mode is geometric: it ends at a sample with probability ``sample_time / dwell_time``.
 
     Parameters
     ----------
     dwell_times : sequence of float
-        Mean time that each mode lasts [s]; infinite for one that never ends.
+        Mean time that each mode lasts [s]; infinite for a mode that never ends.
     sample_time : float
         Time between samples [s].
 

@@ -1,4 +1,4 @@
-"""The compiled loop of the interacting multiple model filter: mix, step every mode, weigh, combine."""
+"""The compiled loop of the interacting multiple model filter: mix, step every mode, weight, combine."""
 
 import math
 from collections.abc import Callable
@@ -18,15 +18,15 @@ from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
 
 Kind = tuple[Rule, ProcessModel]
-"""What modes share: a filter on a model; they differ in parameters."""
+"""A filter on a model, shared by modes that differ only in parameters."""
 
 
 Room: TypeAlias = tuple[Array, Array, Array, Array]
-"""What `mix` works in: states, terms and weights of the modes, and a belief."""
+"""Workspace of `mix`: states, terms and weights of the modes, and a belief."""
 
 Work: TypeAlias = tuple[Array, Array, Array, Array, Array, Room]
-"""What `step_bank` works in: predicted log probabilities (modes,), which before the first sample are the prior's;
-innovations and their variances (modes, 2, channels); terms, weights and shares (modes,); and what `mix` works in."""
+"""Workspace of `step_bank`: predicted log probabilities (modes,), which before the first sample are the prior's;
+innovations and their variances (modes, 2, channels); terms, weights and shares (modes,); and the workspace of `mix`."""
 
 Chain: TypeAlias = tuple[Array, Array]
 """Logarithms of transitions (modes, modes) and of each mode's probability (modes,)."""
@@ -38,11 +38,11 @@ with their variances (2, channels)."""
 PrepareMode: TypeAlias = Callable[[int, Array, Array], None]
 PredictMode: TypeAlias = Callable[[int, Array, Array, Array, Array, float], None]
 UpdateMode: TypeAlias = Callable[[int, Array, Array, Array, Array], None]
-"""As `estimation.engine.parts` has them, of the kind that comes first."""
+"""As in `estimation.engine.parts`, with the kind as first argument."""
 
 
 def log_sum(terms: Array, shares: Array) -> float:
-    """Return the logarithm of a sum of exponentials, and put the share of each in it."""
+    """Return the logarithm of a sum of exponentials, and fill in the share of each."""
     largest = -np.inf
     for term in terms:
         if term > largest:
@@ -60,7 +60,7 @@ def log_sum(terms: Array, shares: Array) -> float:
 
 
 def blend(states: Array, weights: Array, shift: Array, result: Array, *, WIDTH: int, BELIEF: int) -> None:
-    """Set the moments of a mixture, about its heaviest part: equal parts stay what they are, to the last bit."""
+    """Set the moments of a mixture, relative to its heaviest part: equal parts stay unchanged to the last bit."""
     best = 0
     for i in range(weights.shape[0]):
         if weights[i] > weights[best]:
@@ -86,7 +86,7 @@ def blend(states: Array, weights: Array, shift: Array, result: Array, *, WIDTH: 
 def mix(
     states: Array, transitions: Array, log_probability: Array, predicted: Array, room: Room, *, WIDTH: int, BELIEF: int
 ) -> None:
-    """Start each mode from what it would be had it just come from the others: their mixture, as likely as each is."""
+    """Start each mode from the mixture of all modes, each weighted by the probability that it came before."""
     mixed, terms, weights, shift = room
     modes = states.shape[0]
     for i in range(modes):
@@ -103,7 +103,7 @@ def mix(
 
 
 def log_density(sample: Array, seen: Array, state: Array, *, BELIEF: int) -> float:
-    """Return the log density of a sample under a mode's innovations; none where the mode is not finite any more."""
+    """Return the log density of a sample under a mode's innovations; minus infinity if the mode is no longer finite."""
     score = 0.0
     for c in range(sample.shape[0]):
         if sample[c] == sample[c]:
@@ -116,7 +116,7 @@ def log_density(sample: Array, seen: Array, state: Array, *, BELIEF: int) -> flo
 
 
 def innovate(c: int, y: float, seen: Array, shares: Array, believed: float) -> tuple[float, float]:
-    """Return the mixture's innovation of a channel and its variance; not a number where nothing is measured."""
+    """Return the mixture's innovation of a channel and its variance; NaN if nothing is measured."""
     e = s = np.nan
     if y == y and believed > 0.0:
         e = s = 0.0
@@ -130,7 +130,7 @@ def innovate(c: int, y: float, seen: Array, shares: Array, believed: float) -> t
 
 
 def unpack(belief: Array, mean: Array, covariance: Array, *, WIDTH: int) -> None:
-    """Read a mean and a covariance off a belief."""
+    """Read a mean and a covariance from a belief."""
     place = WIDTH
     for a in range(WIDTH):
         mean[a] = belief[a]
@@ -140,7 +140,7 @@ def unpack(belief: Array, mean: Array, covariance: Array, *, WIDTH: int) -> None
 
 
 def judge(sample: Array, seen: Array, predicted: Array, terms: Array, shares: Array, judged: Judged) -> None:
-    """Score the innovations of the mixture, a mode without probability left out."""
+    """Score the mixture's innovations; a mode without probability is left out."""
     nis, count, innovations = judged
     believed = 0.0
     for i in range(shares.shape[0]):
@@ -173,7 +173,7 @@ def step_bank(
     predict: PredictMode,
     update: UpdateMode,
 ) -> float:
-    """Mix, step every mode, weigh and judge by one sample; return the logarithm of its density."""
+    """Mix, step every mode, weight and judge by one sample; return the logarithm of its density."""
     transitions, log_probability = chain
     predicted, seen, terms, weights, shares, room = work
     modes = states.shape[0]
@@ -195,7 +195,7 @@ def step_bank(
 def combine(
     density: float, states: Array, weights: Array, shift: Array, overall: Array, *, WIDTH: int, BELIEF: int
 ) -> None:
-    """Set the moments of the bank after a sample; not numbers where no mode is finite any more."""
+    """Set the moments of the bank after a sample; NaN if no mode is finite any more."""
     if density == -np.inf:
         overall[:] = np.nan
     else:
@@ -219,20 +219,20 @@ def run(
     predict: PredictMode,
     update: UpdateMode,
 ) -> float:
-    """Mix, step every mode, weigh and combine, at every sample; return the log-likelihood.
+    """Mix, step every mode, weight and combine, at every sample; return the log-likelihood.
 
     Parameters
     ----------
     states : ndarray, shape (modes, carried)
-        What each mode carries.
+        Carried values of each mode.
     rows : ndarray, shape (modes, constants)
         Constants of each mode's filter.
     kinds : ndarray of int, shape (modes,)
-        Which filter and model each mode is.
+        Index of each mode's filter and model.
     transitions : ndarray, shape (modes, modes)
         Logarithms of the transitions.
     log_probability : ndarray, shape (modes,)
-        Of the modes, before and after.
+        Log probabilities of the modes, before the first and after the last sample.
     history : ndarray, shape (rows, modes)
         Logarithms of the probabilities along the track.
     """
@@ -281,7 +281,7 @@ def run(
 
 
 STEP = (log_sum, blend, mix, log_density, innovate, judge, step_bank, combine)
-"""All that a bank's step calls, and what combines its modes."""
+"""Functions that a bank's step calls, and the one that combines its modes."""
 
 
 @dataclass(frozen=True)
@@ -293,7 +293,7 @@ class ImmKernel:
     run : callable
         The generated loop; `estimation.filters.imm` calls it.
     carried : int
-        How much each mode carries from sample to sample.
+        Number of values that each mode carries from sample to sample.
     """
 
     run: Callable[..., float]
@@ -301,7 +301,7 @@ class ImmKernel:
 
 
 def _dispatch(name: str, arguments: str, kinds: int) -> str:
-    """Write the choice among the functions of the modes' kinds."""
+    """Write the code that selects the functions of a mode's kind."""
     choices = [(f"    if kind == {kind}:", f"        {name}_{kind}({arguments})") for kind in range(kinds)]
     head = f"def {name}(kind, {arguments}):"
     return "\n".join([head, *(line for choice in choices for line in choice)])
@@ -314,7 +314,7 @@ def compile_imm(kinds: tuple[Kind, ...], channels: tuple[str, ...]) -> ImmKernel
     Parameters
     ----------
     kinds : tuple of (Rule, ProcessModel)
-        The different filters and models in it, of equal states.
+        The distinct filters and models in it, all with the same states.
     """
     rules = [rule_functions(rule, model, channels, f"_{i}") for i, (rule, model) in enumerate(kinds)]
     width = kinds[0][1].width

@@ -1,15 +1,15 @@
-"""The iterated extended Kalman smoother: the likeliest trajectory of the whole log, by Gauss and Newton.
+"""The iterated extended Kalman smoother: the most likely trajectory of the whole log, by the Gauss-Newton method.
 
-A filter linearises where it is before it has seen what comes; where the piston sticks, that is often on the wrong side
-of breaking loose, and what was believed wrongly there is never taken back. Here the model is linearised along a
-trajectory of the whole log, a filter and an adjoint (Bierman 1973, as in `estimation.filters.smoother`) find the best
-correction of it, the model is run again under the corrected noise, and so on until the sum of squares rests. Bell
-(1994) shows that this is the Gauss-Newton method for the likeliest trajectory; the step is shortened until the sum
-falls, so that it ends in a minimum.
+A filter linearises before it has seen the later samples. If the piston sticks, its linearisation is often on the wrong
+side of breaking loose, and the resulting error is never corrected. Here the model is linearised along a trajectory of
+the whole log, a filter and an adjoint (Bierman 1973, as in `estimation.filters.smoother`) find its best correction, the
+model is run again with the corrected noise, and so on until the sum of squares settles. Bell (1994) shows that this is
+the Gauss-Newton method for the most likely trajectory; the step is shortened until the sum falls, so that it ends in a
+minimum.
 
-A constant such as bulk modulus is a state without noise, and its covariance that of the linearised model at the end:
-with Gaussian noise it attains the Cramér-Rao bound as long as the trajectory is known well enough for the model to be
-linear about it. Outliers are weighed by their residuals from the trajectory, again and again (Holland and Welsch 1977).
+A constant such as bulk modulus is a state without noise, and its covariance is that of the linearised model at the end:
+with Gaussian noise it attains the Cramér-Rao bound if the trajectory is known well enough for the model to be linear
+about it. Outliers are weighted by their residuals from the trajectory, repeatedly (Holland and Welsch 1977).
 """
 
 from dataclasses import dataclass
@@ -25,10 +25,10 @@ from estimation.filters.trajectory_loops import compile_trajectory
 from plant.errors import HydrostateError
 
 ITERATIONS = 50
-"""Corrections at most."""
+"""Largest number of corrections."""
 
 AT_REST = 1e-3
-"""Fall of the sum of squares below which it rests: a thirtieth of a standard deviation [dimensionless]."""
+"""Decrease of the sum of squares below which it has settled: a thirtieth of a standard deviation [dimensionless]."""
 
 SHORTENED = 0.4
 """Factor on a step that does not lower the sum of squares."""
@@ -37,15 +37,15 @@ SHORTEST = 1e-4
 """Share of a correction below which the search ends."""
 
 WEIGHINGS = 10
-"""Times that outliers are weighed again at most."""
+"""Largest number of times that outliers are weighted again."""
 
 LONGEST = 1_000_000
-"""Samples at most: the whole linearised log is held in memory, some 300 bytes a sample."""
+"""Largest number of samples: the whole linearised log is held in memory, some 300 bytes for each sample."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Trajectory:
-    """A run of the model: its adjoint, the states under it, and the sum of squares."""
+    """A run of the model: its adjoint, the states that follow from it, and the sum of squares."""
 
     adjoint: Array
     states: Array
@@ -53,7 +53,7 @@ class _Trajectory:
 
 
 class _Search:
-    """One log, the kernel for it, and what does not change while the trajectory does."""
+    """One log, its kernel, and all that stays constant while the trajectory changes."""
 
     def __init__(self, problem: FilterProblem) -> None:
         n, (samples, channels) = problem.model.width, problem.measured.shape
@@ -74,14 +74,14 @@ class _Search:
         self.lines = Lines(*(np.empty(shape) for shape in shapes))
 
     def run(self, adjoint: Array) -> _Trajectory:
-        """Return the model's run under an adjoint."""
+        """Return the model's run for an adjoint."""
         states, known = np.empty_like(adjoint), self.problem.covariance @ adjoint[0]
         start = self.problem.mean + known
         cost = self.kernel.roll(start, adjoint, self.opened, self.bounds, self.log, states)
         return _Trajectory(adjoint, states, float(cost + adjoint[0] @ known))
 
     def begin(self) -> _Trajectory:
-        """Return the best of a few runs: from the prior's mean, and with each constant a standard deviation off."""
+        """Return the best of a few runs: from the prior's mean, and with each constant moved by one deviation."""
         samples, n = self.problem.measured.shape[0], self.problem.model.width
         tried = [self.run(np.zeros((samples, n)))]
         for i in np.flatnonzero((self.problem.noise == 0.0) & (np.diag(self.problem.covariance) > 0.0)):
@@ -99,7 +99,7 @@ class _Search:
         return P
 
     def corrected(self, at: _Trajectory) -> _Trajectory | None:
-        """Return a trajectory with a smaller sum of squares, or None where there is none on the way to the best."""
+        """Return a trajectory with a smaller sum of squares; None if none lies towards the best linear correction."""
         self.linearise(at)
         wanted = np.empty_like(at.adjoint)
         self.kernel.backward(self.lines, wanted)
@@ -112,7 +112,7 @@ class _Search:
         return None
 
     def descend(self, at: _Trajectory) -> _Trajectory:
-        """Correct a trajectory until its sum of squares rests."""
+        """Correct a trajectory until its sum of squares settles."""
         for _ in range(ITERATIONS):
             better = self.corrected(at)
             if better is None:
@@ -123,19 +123,19 @@ class _Search:
         return at
 
     def reweigh(self, at: _Trajectory) -> _Trajectory:
-        """Weigh every sample by its residual, and return the same trajectory with its new sum of squares."""
+        """Weight every sample by its residual, and return the same trajectory with its new sum of squares."""
         self.kernel.reweigh(at.states, self.log, self.problem.variances)
         return self.run(at.adjoint)
 
 
 def iterated_smoother(problem: FilterProblem) -> Trace:
-    """Find the likeliest trajectory of a log, and the covariance along it.
+    """Find the most likely trajectory of a log, and the covariance along it.
 
     Returns
     -------
     Trace
-        Belief at the end, smoothed track with its variance, and the innovations of the filter that is linearised along
-        the trajectory found; not a number where the model's own run from the prior diverges.
+        Final belief, smoothed track with its variance, and the innovations of the filter that is linearised along the
+        trajectory; NaN if the model's own run from the prior diverges.
 
     Raises
     ------

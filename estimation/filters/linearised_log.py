@@ -15,9 +15,9 @@ class Lines(NamedTuple):
     gain, slope : ndarray, shape (samples, channels, n)
         The filter's gain, and the derivative of each channel.
     residual, variance : ndarray, shape (samples, channels)
-        Innovations and their variances, NaN where nothing is measured.
+        Innovations and their variances, NaN if nothing is measured.
     kept : ndarray, shape (rows, n, n)
-        Covariance at every so many samples.
+        Covariance at regular intervals of samples.
     """
 
     F: Array
@@ -29,7 +29,7 @@ class Lines(NamedTuple):
 
 
 class Log(NamedTuple):
-    """A log and a model's constants; the loops change the spread alone, to weigh outliers.
+    """A log and a model's constants; the loops change only the spread, to weight outliers.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Log(NamedTuple):
     spread : ndarray, shape (samples, channels)
         Variances of the samples [SI squared].
     substeps : int
-        Steps a sample.
+        Steps for each sample.
     """
 
     rows: Array

@@ -1,4 +1,4 @@
-"""The filters, by the names that `--method` takes; a log that is fitted imports none of them."""
+"""The filters, by the names that `--method` takes; fitting a log imports none of them."""
 
 from collections.abc import Mapping
 

@@ -1,7 +1,7 @@
-"""A filter whose samples come a block at a time: the kernel that filters a log, its memory kept between blocks.
+"""A filter for a stream of samples in blocks: the kernel that filters a log, with its memory kept between blocks.
 
-What comes of a stream does not depend on how it is cut, and all that the filter remembers is arrays: it is saved and
-continues to the last bit.
+The result does not depend on how the stream is cut into blocks. The filter's state consists of arrays: it can be saved
+and continues exactly.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ RULES: Mapping[str, Rule] = {rule.name: rule for rule in (EKF, IEKF, UKF, CKF, S
 """Filters that predict, then update, by name: those that can filter a stream."""
 
 NEVER = 1 << 62
-"""So many samples between rows of a track that only the first is kept [samples]."""
+"""Interval between rows of a track so long that only the first row is kept [samples]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class CurrentBelief:
     nis, count : ndarray, shape (channels,)
         Sums of squared normalised innovations, and samples present [dimensionless].
     log_likelihood : float
-        Of all samples [dimensionless].
+        Log-likelihood of all samples [dimensionless].
     """
 
     values: Array
@@ -50,12 +50,12 @@ class CurrentBelief:
 
 
 class OnlineFilter:
-    """A filter of a stream; its memory does not grow.
+    """Filter a stream; the memory it needs does not grow.
 
     Parameters
     ----------
     problem : FilterProblem
-        The task; its log plays no part.
+        The task; its log is not used.
     method : str
         One of `RULES`.
 
@@ -82,7 +82,8 @@ class OnlineFilter:
         Parameters
         ----------
         drives : ndarray, shape (n, drives)
-            What drives the model [SI]; a missing one (NaN) is held at the last, and so is the belief's trust in it.
+            Drives of the model [SI]; a missing one (NaN) is held at its last value, and its assumed accuracy stays the
+            same.
         measured : ndarray, shape (n, channels)
             Measurements [SI]; NaN is missing.
 
@@ -107,7 +108,7 @@ class OnlineFilter:
         self._drive = held[-1].copy()
 
     def _held(self, drives: Array) -> Array:
-        """Return the drives with missing ones held at the last."""
+        """Return the drives, with missing ones held at the last value."""
         rows = np.vstack([self._drive, drives])
         known = np.isfinite(rows)
         last = np.maximum.accumulate(np.where(known, np.arange(len(rows))[:, None], 0), axis=0)
@@ -125,7 +126,7 @@ class OnlineFilter:
         return CurrentBelief(values, deviations, trace.nis, trace.count, trace.log_likelihood)
 
     def remembered(self) -> dict[str, Array]:
-        """Return all that the filter remembers, for `resume`.
+        """Return the full state of the filter, for `resume`.
 
         Returns
         -------
@@ -140,12 +141,12 @@ class OnlineFilter:
         }
 
     def resume(self, kept: Mapping[str, Array]) -> None:
-        """Continue where another filter of the same task was: to the last bit.
+        """Continue exactly from where another filter of the same task stopped.
 
         Parameters
         ----------
         kept : Mapping[str, ndarray], each of its own shape
-            What it remembered [any unit].
+            Its state, from `remembered` [any unit].
 
         Raises
         ------

@@ -1,13 +1,13 @@
-"""A bootstrap particle filter: slow truth for beliefs that are not Gaussian.
+"""A bootstrap particle filter: a slow reference for beliefs that are not Gaussian.
 
 Source: Gordon, Salmond and Smith (1993), with the systematic resampling of Kitagawa (1996), at every sample in which
-something is measured. Weights are logarithms. It converges to the exact posterior as particles are added, and that is
-all that it is for: a state without process noise keeps only the values that were drawn at first, so give it noise, and
-a sensor much sharper than the belief needs as many particles as the belief is wider, at least.
+something is measured. Weights are logarithms. It converges to the exact posterior as particles are added, and this is
+its only purpose. A state without process noise keeps only the values that were drawn at first, so give it noise. If a
+sensor is much sharper than the belief, at least as many particles are needed as the belief is wider.
 
-As a method of `estimation.filters.methods.METHODS` it draws from a seed that is one of its settings, so that it repeats
-itself, and lets constants walk: bulk modulus is then found to a few percent where pressure is logged. Position and
-velocity alone are so sharp that a thousand particles all miss them, and the consistency gate says so.
+As a method of `estimation.filters.methods.METHODS` it draws from a seed that is one of its settings, so that its
+results are repeatable, and it lets constants walk: bulk modulus is then found to a few percent if pressure is logged.
+Position and velocity alone are so sharp that a thousand particles all miss them, and the consistency gate reports it.
 """
 
 import math
@@ -37,14 +37,14 @@ Move: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
 """``move(state, rows, before, after, j)``: take sub-step j of the model between samples of the drives."""
 
 Observe: TypeAlias = Callable[[Array, Array, Array], None]
-"""``observe(state, rows, seen)``: what the model predicts of each channel."""
+"""``observe(state, rows, seen)``: the model's prediction of each channel."""
 
 Spread: TypeAlias = Callable[[Array, Array, Array], None]
 """``spread(rows, after, deviations)``: standard deviation that the noise of a sub-step gives each state."""
 
 
 DRAWN = 1_000_000
-"""Random numbers that are drawn at a time, at most but for those of one sample [count]."""
+"""Largest number of random numbers drawn at a time, or those of one sample if they are more [count]."""
 
 
 def run(
@@ -68,7 +68,7 @@ def run(
     Parameters
     ----------
     first : int
-        Of the samples.
+        Index of the first sample.
     normal : ndarray, shape (taken, particles, substeps, n)
         Standard normal numbers [dimensionless].
     places : ndarray, shape (taken,)
@@ -80,7 +80,7 @@ def run(
     limits : ndarray, shape (2, n)
         Bounds of the states [scaled].
     variances : ndarray, shape (channels,)
-        Of the sensors [SI squared].
+        Variances of the sensors [SI squared].
 
     Returns
     -------
@@ -135,7 +135,7 @@ def is_logged(sample: Array) -> bool:
 
 
 def predicted(weights: Array, seen: Array, r: float) -> tuple[float, float]:
-    """Return the mean and variance of a channel predicted by the cloud, the sensor's variance included."""
+    """Return the mean and variance of a channel predicted by the particles, including the sensor's variance."""
     middle, s = 0.0, r
     for i in range(weights.shape[0]):
         middle += weights[i] * seen[i]
@@ -145,7 +145,7 @@ def predicted(weights: Array, seen: Array, r: float) -> tuple[float, float]:
 
 
 def weigh(weights: Array, seen: Array, y: float, r: float) -> float:
-    """Weigh each particle by how likely a sample is under it; return the logarithm of the sample's likelihood."""
+    """Weight each particle by the likelihood of a sample under it; return the sample's log-likelihood."""
     largest, total = -np.inf, 0.0
     for i in range(weights.shape[0]):
         weights[i] = math.log(weights[i]) - 0.5 * ((y - seen[i]) ** 2 / r + math.log(2.0 * math.pi * r))
@@ -159,7 +159,7 @@ def weigh(weights: Array, seen: Array, y: float, r: float) -> float:
 
 
 def gather(particles: Array, weights: Array, mean: Array, covariance: Array, *, WIDTH: int) -> None:
-    """Set the cloud's mean and covariance."""
+    """Set the particles' mean and covariance."""
     for a in range(WIDTH):
         mean[a] = 0.0
         for i in range(weights.shape[0]):
@@ -173,7 +173,7 @@ def gather(particles: Array, weights: Array, mean: Array, covariance: Array, *, 
 
 
 def resample(place: float, particles: Array, weights: Array, others: Array) -> None:
-    """Draw particles anew by their weights, at even distances from one random place (Kitagawa 1996)."""
+    """Draw new particles by their weights, at even distances from one random place (Kitagawa 1996)."""
     size = weights.shape[0]
     place /= size
     reached, i = weights[0], 0
@@ -194,8 +194,8 @@ PARTICLE_SETTINGS = (
     Setting("seed", 0.0, "a whole number, 0 or more", lambda value, _: value >= 0.0 and value.is_integer()),
     Setting("walk", 0.1, "0 or more", lambda value, _: value >= 0.0),
 )
-"""How many particles are carried, and the seed of all that is drawn [dimensionless]; the random walk of what the model
-takes to be constant, in first standard deviations [1/s^(1/2)], without which all particles soon are copies of one."""
+"""Number of particles, and the seed of the random numbers [dimensionless]; the random walk of quantities that the model
+takes as constant, in first standard deviations [1/s^(1/2)], without which all particles soon are copies of one."""
 
 
 @cache
@@ -205,7 +205,7 @@ def compile_particles(model: ProcessModel, channels: tuple[str, ...]) -> Callabl
     Returns
     -------
     callable
-        Its ``run``.
+        The kernel's ``run``.
     """
     mean, _ = belief_symbols(model)
     state = {f"z{i}": f"state[{i}]" for i in range(model.width)}
@@ -236,7 +236,7 @@ def particle(problem: FilterProblem) -> Trace:
     Returns
     -------
     Trace
-        As `particle_filter` returns it.
+        As from `particle_filter`.
 
     Raises
     ------
@@ -255,7 +255,7 @@ def particle_filter(problem: FilterProblem, particles: int, rng: np.random.Gener
     Returns
     -------
     Trace
-        Mean and covariance of the weighted particles; innovations and their variances are those of the cloud.
+        Mean and covariance of the weighted particles; innovations and their variances are those of the particles.
 
     Raises
     ------

@@ -1,10 +1,10 @@
-"""The extended Kalman filter linearised anew: it filters the log again from its last result.
+"""The relinearised extended Kalman filter: it filters the log again from its last result.
 
-One pass linearises the first samples about a guess that may be far off, counts them as if that had been right, and
-ends too sure of a value beside the truth. The next pass begins at the constants that the last one ended with and is
-unsure of them by several of their deviations, correlated as they are, so that every linearisation is near its end.
-It is the Gauss-Newton iteration of a maximum-likelihood fit with the filter as its model (Bell and Cathey 1993, *The
-iterated Kalman filter update as a Gauss-Newton method*, for one update).
+One pass linearises the first samples about a guess that may be far off, treats them as if the linearisation had been
+right, and ends overconfident in a wrong value. The next pass begins at the last pass's constants, with several times
+their deviations and the same correlations, so that every linearisation is near its result. It is the Gauss-Newton
+iteration of a maximum-likelihood fit with the filter as its model (Bell and Cathey 1993, *The iterated Kalman filter
+update as a Gauss-Newton method*, for one update).
 """
 
 from dataclasses import replace
@@ -16,32 +16,32 @@ from estimation.engine.contract import FilterProblem, Trace
 from estimation.filters.ekf import ekf
 
 INFLATION = 3.0
-"""How much wider than a pass ended with its constants the next one begins [fraction]. The prior thus counts the log by
-a ninth too often, which the covariance that is returned makes up for."""
+"""Factor on the final deviations of a pass's constants with which the next one begins [fraction]. The prior thus counts
+the log a ninth too often, for which the returned covariance is corrected."""
 
 MOST_PASSES = 10
-"""Most passes over the same samples."""
+"""Largest number of passes over the same samples."""
 
 SAME = 0.3
-"""Gain in log-likelihood below which another pass is not worth its time [dimensionless]."""
+"""Gain in log-likelihood below which no further pass is made [dimensionless]."""
 
 
 def relinearised(problem: FilterProblem, mean: Array, covariance: Array, most: int = MOST_PASSES) -> Trace:
-    """Filter a log again until linearising it anew changes nothing.
+    """Filter a log repeatedly until linearising it again changes nothing.
 
     Parameters
     ----------
     problem : FilterProblem
         The task, with its prior.
     mean, covariance : ndarray, shapes (n,) and (n, n)
-        What an earlier pass ended with, scaled; of it the constants count, which are states without process noise.
+        Final belief of an earlier pass, scaled; only its constants are used, which are states without process noise.
     most : int
-        Most passes.
+        Largest number of passes.
 
     Returns
     -------
     Trace
-        The likeliest pass, surer of the constants by no more than the log allows; NaN where all diverged.
+        The most likely pass, its covariance of the constants no smaller than the log allows; NaN if all diverged.
     """
     best = ekf(_begun_again(problem, mean, covariance))
     found = best

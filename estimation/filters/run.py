@@ -1,4 +1,4 @@
-"""`run_filter(method, model, prior, record, parameters) -> Estimate`: one verb over methods and models."""
+"""`run_filter(method, model, prior, record, parameters) -> Estimate`: one function for all methods and models."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,10 +18,10 @@ from plant.log.record import Record
 from plant.solvers.steps import Parameters, parameter_row, parameter_symbols
 
 ROBUST = ("none", "huber", "student-t")
-"""How gross outliers may count."""
+"""Ways in which gross outliers may count."""
 
 TRACK_ROWS = 20_000
-"""About how many points of the state's history are kept."""
+"""Approximate number of points of the states' history that are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +35,10 @@ class Estimate:
     mean, variance : ndarray, shape (rows, n)
         Mean and variance of every state along the track.
     belief : Gaussian or None
-        Belief after the last sample; None where the filter diverged.
+        Belief after the last sample; None if the filter diverged.
     nis : Mapping[str, float]
-        Mean normalised innovation squared of each channel [dimensionless]; 1 where the filter believes what the log
-        shows, NaN where the channel was never present.
+        Mean normalised innovation squared of each channel [dimensionless]; 1 if the filter is consistent with the log,
+        NaN if the channel was never present.
     log_likelihood : float
         Log-likelihood of the log [dimensionless].
     residuals, residual_variances : ndarray, shape (samples or 0, channels)
@@ -114,13 +114,13 @@ def run_filter(
     channels : tuple of str, optional
         Channels to use; by default all that the model predicts and the record has.
     variances : Mapping[str, float], optional
-        Measurement variances [SI squared]; by default read off the log (`measurement_variances`).
+        Measurement variances [SI squared]; by default estimated from the log (`measurement_variances`).
     noise : Mapping[str, float], optional
-        Process-noise densities [SI squared a second] that replace the model's, by state name.
+        Process-noise densities [SI squared per second] that replace the model's, by state name.
     robust : str
         How gross outliers count: one of `ROBUST`.
     settings : Mapping[str, float], optional
-        What the method lets its user set [each in its own unit].
+        The user's settings of the method [each in its own unit].
 
     Raises
     ------
@@ -143,7 +143,7 @@ def filter_problem(
     variances: Mapping[str, float] | None = None,
     noise: Mapping[str, float] | None = None,
 ) -> FilterProblem:
-    """Put a record in the form that a method takes.
+    """Convert a record to the form that a method takes.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def filter_problem(
     variances : Mapping[str, float], optional
         Measurement variances [SI squared].
     noise : Mapping[str, float], optional
-        Process-noise densities [SI squared a second]; of a logarithmic state, those of the logarithm [1/s].
+        Process-noise densities [SI squared per second]; for a logarithmic state, those of the logarithm [1/s].
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """The sliding innovation filter, in its extended form, compiled.
 
-Source: Gadsden and Al-Shabi (2020), for linear and, as here, for nonlinear plants: the gain is
-``C+ sat(|e| / layer)`` with the innovation e, the covariance that of any gain. How the unmeasured states follow is
-said in `estimation.filters.sliding_mode`; prediction is the extended Kalman filter's.
+Source: Gadsden and Al-Shabi (2020), for linear and, as here, for nonlinear plants: the gain is ``C+ sat(|e| / layer)``
+with the innovation e; the covariance is that of any gain. `estimation.filters.sliding_mode` explains how the unmeasured
+states follow; prediction is the extended Kalman filter's.
 """
 
 from functools import partial
@@ -14,8 +14,8 @@ from estimation.filters.sliding_mode import Innovation, sliding_update
 from plant.compiled.expression import ONE, Expression, select, symbol, unary
 
 SIF_SETTINGS = (positive("boundary_layer", 100.0),)
-"""Width of the boundary layer, in standard deviations of the channel's sensor [dimensionless]: the innovation that is
-believed whole. Ten follow the noise, ten thousand take seconds to converge."""
+"""Width of the boundary layer, in standard deviations of the channel's sensor [dimensionless]: an innovation of this
+size is applied in full. Ten follow the noise, ten thousand take seconds to converge."""
 
 
 def sif_share(innovation: Innovation) -> Expression:

@@ -1,17 +1,16 @@
 """Sigma points as expressions: mean and covariance through a function, without its derivative.
 
-The scaled transform of Julier (2002) with points ``z ± c L_i``, where ``P = L L'`` and
-``c^2 = alpha^2 (n + kappa)``. Its sums are rewritten so that nothing large cancels. With ``A_i`` and ``S_i`` half the
-difference and half the second difference of the function over the points of pair i, over c, and ``d`` the shift of
-the mean from the centre's image::
+The scaled transform of Julier (2002) with points ``z ± c L_i``, where ``P = L L'`` and ``c^2 = alpha^2 (n + kappa)``.
+Its sums are rewritten to avoid cancellation of large terms. ``A_i`` and ``S_i`` are half the difference and half the
+second difference of the function over the points of pair i, over c, and ``d`` is the shift of the mean from the
+centre's image::
 
-    d = sum_i S_i / c
-    P = sum_i A_i A_i' + sum_i (S_i - c d / n)(S_i - c d / n)' + (beta + alpha^2 kappa / n) d d'
+d = sum_i S_i / c P = sum_i A_i A_i' + sum_i (S_i - c d / n)(S_i - c d / n)' + (beta + alpha^2 kappa / n) d d'
 
-This is the published sum term by term with no negative weight left: a covariance for every alpha, wherever ``beta +
-alpha^2 kappa / n`` is not negative. What is affine in the state needs no points and gets none: its ``A_i`` is exact and
-its ``S_i`` nothing, so on a linear model the transform is the Kalman filter's, and the rounding of ``f(z + c L) - f(z -
-c L)`` stays out where a belief is a millionth of its mean.
+This equals the published sum term by term, without a negative weight: it is a covariance for every alpha if ``beta +
+alpha^2 kappa / n`` is not negative. Parts that are affine in the state need no points: their ``A_i`` is exact and their
+``S_i`` is zero. So on a linear model the transform equals the Kalman filter, and there is no rounding of ``f(z + c L) -
+f(z - c L)`` when a standard deviation is a millionth of the mean.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,7 +41,7 @@ Vector: TypeAlias = list[Expression]
 Matrix: TypeAlias = list[Vector]
 
 SMALLEST_PIVOT = 1e-14
-"""Share of its variance below which what is left of a state, given those before it, is rounding [fraction]."""
+"""Share of a state's variance below which its variance given the previous states counts as rounding [fraction]."""
 
 
 @dataclass(frozen=True)
@@ -62,19 +61,19 @@ class Spread:
 
 
 SpreadOf: TypeAlias = Callable[[int], Spread]
-"""From the count of states to the spread of the points."""
+"""Maps the number of states to the spread of the points."""
 
 
 @dataclass(frozen=True)
 class Image:
-    """A function over a belief.
+    """The image of a belief under a function.
 
     Parameters
     ----------
     mean : list of Expression
-        Mean of each of its components.
+        Mean of each component.
     slopes, bends : list of list of Expression
-        ``A`` and ``S - c d / n``: one row a component, one column a pair of points.
+        ``A`` and ``S - c d / n``: one row for each component, one column for each pair of points.
     shift : list of Expression
         ``d``.
     """
@@ -86,7 +85,7 @@ class Image:
 
 
 def root(P: Covariance, n: int) -> Matrix:
-    """Return the Cholesky root of a covariance; a state that those before it determine has a column of zeros.
+    """Return the Cholesky root of a covariance; a state determined by the previous ones has a column of zeros.
 
     Parameters
     ----------
@@ -115,7 +114,7 @@ def is_affine(item: Expression, mean: Sequence[Expression]) -> bool:
     Returns
     -------
     bool
-        Whether it is; a sign or a choice that depends on a state makes it not so.
+        Whether it is; an expression with a sign or a choice that depends on a state is not.
     """
     states = {id(z) for z in mean}
     degree: dict[int, int] = {}
@@ -141,7 +140,7 @@ def all_affine(model: ProcessModel, channels: Sequence[str]) -> bool:
     Returns
     -------
     bool
-        Whether it does; one pass of the Kalman filter's update is then exact.
+        Whether they are; one pass of the Kalman filter's update is then exact.
     """
     at, _ = belief_symbols(model)
     return all(is_affine(value, at) for value in observed(model, at, channels))
@@ -153,13 +152,13 @@ def image(function: Callable[[Vector], Vector], at: Vector, mean: Vector, L: Mat
     Parameters
     ----------
     function : callable
-        From a state to components.
+        Maps a state to components.
     at : list of Expression
-        Symbols of the states, by which the function's structure is read.
+        Symbols of the states, from which the function's structure is read.
     mean : list of Expression
         The belief's mean, in terms of any symbols.
     L : list of list of Expression
-        Root of its covariance.
+        Root of the belief's covariance.
     """
     n, c = len(mean), spread.reach
     traced = function(at)
@@ -194,8 +193,8 @@ def covariance_of(found: Image, i: int, j: int, spread: Spread) -> Expression:
 def sigma_predict(model: ProcessModel, spread_of: SpreadOf) -> Outputs:
     """Return a sigma-point filter's predict step, with additive process noise.
 
-    The model is asked about states within their physical bounds only: a point beyond them is projected onto them
-    (Kandepu, Foss and Imsland 2008, section 3), while a state that the step hands through keeps its own points.
+    The model is evaluated only at states within their physical bounds: a point beyond them is projected onto them
+    (Kandepu, Foss and Imsland 2008, section 3). A state that the step leaves unchanged keeps its own points.
     """
     n = model.width
     mean, P = belief_symbols(model)
@@ -214,17 +213,17 @@ def _moved_within(model: ProcessModel, point: Vector) -> Vector:
 
 
 def sigma_update(model: ProcessModel, channels: Sequence[str], spread_of: SpreadOf, robust: str = "none") -> Outputs:
-    """Return a sigma-point filter's update by each channel in turn, its points drawn anew for each.
+    """Return a sigma-point filter's update by each channel in turn, with new points for each channel.
 
-    Channels that are all affine in the state, as every model here has them, are updated by the extended Kalman
-    filter's expressions, which the transform then equals.
+    Channels that are all affine in the state, as in every model here, are updated by the extended Kalman filter's
+    expressions, to which the transform is then equal.
 
     Parameters
     ----------
     channels : sequence of str
         Measured channels, in the order of processing.
     robust : str
-        How innovations that are too large count, see `estimation.engine.robust.inflation`.
+        How too large innovations count, see `estimation.engine.robust.inflation`.
 
     Returns
     -------

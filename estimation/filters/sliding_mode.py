@@ -1,15 +1,15 @@
 """Common parts of the sliding-mode filters: an update by a share of the innovation, with a valid covariance.
 
-The published gains invert the observation matrix, ``K = C+ diag(share)``: all states measured, or the Moore-Penrose
-inverse, by which an unmeasured state never moves. Neither serves here, where acceleration or pressure and bulk modulus
-are unmeasured, and the reduced form of Habibi (2007) divides by the coupling of unmeasured to measured
-states, which vanishes at rest. As in the filters combined with the Kalman filter's covariance (Gadsden 2011;
-Gadsden, Habibi and Kirubarajan 2014) the belief is at hand, and so the inverse is the one weighted by it::
+The published gains invert the observation matrix, ``K = C+ diag(share)``: this needs all states measured, or uses the
+Moore-Penrose inverse, by which an unmeasured state never moves. Neither is useful here, where acceleration or pressure
+and bulk modulus are unmeasured. The reduced form of Habibi (2007) divides by the coupling of unmeasured to measured
+states, which vanishes at rest. As in the filters combined with the Kalman filter's covariance (Gadsden 2011; Gadsden,
+Habibi and Kirubarajan 2014) the belief is available, and so the inverse is weighted by it::
 
-    C+ = P C' (C P C')^-1,        K = P C' (C P C')^-1 share
+C+ = P C' (C P C')^-1, K = P C' (C P C')^-1 share
 
-An unmeasured state moves by its regression on what is measured, and with the share ``C P C' / S`` the gain is Kalman's.
-The covariance is the one of any gain (Gadsden and Habibi 2010): ``(I - K C) P (I - K C)' + K R K'``.
+An unmeasured state moves by its regression on the measured ones, and with the share ``C P C' / S`` the gain is
+Kalman's. The covariance is that of any gain (Gadsden and Habibi 2010): ``(I - K C) P (I - K C)' + K R K'``.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +28,7 @@ class Innovation:
     Parameters
     ----------
     value : Expression
-        Measured less predicted [SI].
+        Measured minus predicted [SI].
     noise : Expression
         The sensor's variance [SI squared].
     spread : Expression
@@ -47,7 +47,7 @@ class Innovation:
 
 
 Share: TypeAlias = Callable[[Innovation], Expression]
-"""By which share of its innovation a prediction is corrected [fraction]."""
+"""Share of its innovation by which a prediction is corrected [fraction]."""
 
 
 def sliding_update(model: ProcessModel, channels: Sequence[str], share: Share) -> Outputs:

@@ -1,20 +1,19 @@
-"""The Rauch-Tung-Striebel smoother over the extended Kalman filter: what the whole log says of every sample.
+"""The Rauch-Tung-Striebel smoother over the extended Kalman filter: the belief at every sample given the whole log.
 
 Source: Rauch, Tung and Striebel (1965), in the form that Bierman (1973) calls modified Bryson-Frazier: same means and
-covariances, no matrix inverted. Backwards run an adjoint ``u`` and its information ``U``; at a channel with the row H,
+covariances, no matrix inverted. An adjoint ``u`` and its information ``U`` run backwards; at a channel with the row H,
 the gain K, the innovation e and its variance S, and across a step of the model with the Jacobian F::
 
-    u <- (I - K H)' u + H' e / S        U <- (I - K H)' U (I - K H) + H' H / S
-    u <- F' u                           U <- F' U F
-    x_smoothed = x + P u                P_smoothed = P - P U P
+u <- (I - K H)' u + H' e / S U <- (I - K H)' U (I - K H) + H' H / S u <- F' u U <- F' U F x_smoothed = x + P u
+P_smoothed = P - P U P
 
 U is a sum of squares, and so the smoothed covariance is never above the filter's. Derivatives are those that the filter
-took; sub-steps are smoothed one by one. Where the filter's update ran into a physical bound and was held there, u takes
-``P^-1 (held - found)`` on the way, as in the usual form, which starts from what the filter said.
+used; sub-steps are smoothed one by one. If the filter's update was held at a physical bound, u gains ``P^-1 (held -
+found)``, as in the usual form, which starts from the filter's result.
 
-Memory: the filter runs over the log once and keeps its belief at the beginning of each chunk, the square root of the
-log long; then each chunk, the last one first, is run again and smoothed. A million samples need a few hundred
-kilobytes beside the track.
+Memory: the filter runs over the log once and keeps its belief at the beginning of each chunk; a chunk is as long as the
+square root of the log. Then each chunk, the last one first, is run again and smoothed. A million samples need a few
+hundred kilobytes besides the track.
 """
 
 from collections.abc import Iterator
@@ -55,7 +54,7 @@ def smoother(problem: FilterProblem) -> Trace:
 
 
 def _chunks(problem: FilterProblem) -> Iterator[tuple[int, Array, Array]]:
-    """Yield first sample, filtered and smoothed beliefs of each chunk, the last chunk first; the arrays are reused."""
+    """Yield first sample, filtered and smoothed beliefs of each chunk, last chunk first; the arrays are reused."""
     n, samples = problem.model.width, len(problem.measured)
     kernel = compile_smoother(problem.model, problem.channels, problem.robust)
     log = Log(constant_row(problem, {}), problem.drives, problem.measured, problem.substeps)

@@ -1,4 +1,4 @@
-"""The smoother's algebra backwards, and its compiled loops; `estimation.filters.smoother` says what it computes."""
+"""The smoother's backward algebra, and its compiled loops; `estimation.filters.smoother` explains what it computes."""
 
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -36,10 +36,10 @@ BackUpdate: TypeAlias = Callable[[Array, Array, Array, Array], None]
 """``back_update(state, adjoint, rows, sample)``: take the adjoint back over a sample's update of a belief."""
 
 Hold: TypeAlias = Callable[[Array, Array, Array, Array], None]
-"""``hold(state, rows, sample, shift)``: by how much the update of a belief was moved to keep within its bounds."""
+"""``hold(state, rows, sample, shift)``: by how much the update of a belief was shifted to keep it within its bounds."""
 
 OnBelief: TypeAlias = Callable[[Array, Array, Array], None]
-"""``smooth(state, adjoint, smoothed)`` smooths a belief; ``lift(state, shift, adjoint)`` adds what a shift means."""
+"""``smooth(state, adjoint, smoothed)`` smooths a belief; ``lift(state, shift, adjoint)`` adds the effect of a shift."""
 
 
 class Log(NamedTuple):
@@ -52,7 +52,7 @@ class Log(NamedTuple):
     drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
         The log [SI].
     substeps : int
-        Steps a sample.
+        Steps for each sample.
     """
 
     rows: Array
@@ -62,7 +62,7 @@ class Log(NamedTuple):
 
 
 class Beliefs(NamedTuple):
-    """Room for a chunk of the log, or none.
+    """Workspace for a chunk of the log, or empty.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ def forward(
     predict: Predict,
     update: RuleUpdate,
 ) -> None:
-    """Filter a chunk; keep the states before sub-steps and the beliefs about each sample, unless there is no room.
+    """Filter a chunk; keep the states before sub-steps and the beliefs at each sample, unless the workspace is empty.
 
     Parameters
     ----------
     state : ndarray, shape (belief,)
-        Belief before the chunk, and after it afterwards [scaled].
+        Belief before the chunk; on return, after it [scaled].
     """
     rows, drives, measured, substeps = log
     starts, priors, posteriors = beliefs
@@ -137,9 +137,9 @@ def backward(
     Parameters
     ----------
     adjoint : ndarray, shape (belief,)
-        After the chunk, and before it afterwards [1/scaled].
+        Adjoint after the chunk; on return, before it [1/scaled].
     smoothed : ndarray, shape (length, belief)
-        Room for the smoothed beliefs [scaled].
+        Output for the smoothed beliefs [scaled].
     """
     rows, drives, measured, substeps = log
     starts, priors, posteriors = beliefs
@@ -178,12 +178,12 @@ def _filtered(model: ProcessModel, channels: Sequence[str], robust: str) -> Upda
 
 
 def back_predict_expressions(model: ProcessModel) -> Outputs:
-    """Return the adjoint before a step of the model from the one after it (Bierman 1973).
+    """Return the adjoint before a step of the model, from the adjoint after it (Bierman 1973).
 
     Returns
     -------
     dict[str, Expression]
-        New ``u`` and ``U``, in the symbols of both and of the state before the step.
+        New ``u`` and ``U``, in the symbols of the adjoint and of the state before the step.
     """
     n = model.width
     u, U = _adjoint(n)
@@ -196,19 +196,19 @@ def back_predict_expressions(model: ProcessModel) -> Outputs:
 
 
 def back_update_expressions(model: ProcessModel, channels: Sequence[str], robust: str) -> Outputs:
-    """Return the adjoint before a sample's update from the one after it, the last channel first (Bierman 1973).
+    """Return the adjoint before a sample's update, from the adjoint after it, last channel first (Bierman 1973).
 
     Parameters
     ----------
     channels : sequence of str
         Measured channels, in the order of processing.
     robust : str
-        How innovations that are too large count, see `estimation.engine.robust.inflation`.
+        How too large innovations count, see `estimation.engine.robust.inflation`.
 
     Returns
     -------
     dict[str, Expression]
-        New ``u`` and ``U``, in the symbols of both and of the belief before the update.
+        New ``u`` and ``U``, in the symbols of the adjoint and of the belief before the update.
     """
     n = model.width
     u, U = _adjoint(n)
@@ -229,7 +229,7 @@ def hold_expressions(model: ProcessModel, channels: Sequence[str], robust: str) 
     channels : sequence of str
         Measured channels, in the order of processing.
     robust : str
-        How innovations that are too large count.
+        How too large innovations count.
 
     Returns
     -------
@@ -242,7 +242,7 @@ def hold_expressions(model: ProcessModel, channels: Sequence[str], robust: str) 
 
 
 def lift_expressions(model: ProcessModel) -> Outputs:
-    """Return the adjoint of a mean that was moved by ``w``: ``u + P^-1 w``.
+    """Return the adjoint of a mean that was shifted by ``w``: ``u + P^-1 w``.
 
     Returns
     -------
@@ -289,7 +289,7 @@ def compile_smoother(model: ProcessModel, channels: tuple[str, ...], robust: str
     Parameters
     ----------
     robust : str
-        How innovations that are too large count.
+        How too large innovations count.
 
     Returns
     -------

@@ -1,11 +1,11 @@
 """The smooth variable structure filter with its covariance and optimal boundary layer, compiled.
 
-Sources: Habibi (2007), the gain with the magnitude ``A = |e_k| + gamma |e_k-1|`` of innovation and
-last a-posteriori error; Gadsden and Habibi (2010), the covariance; Gadsden and Habibi (2013) and Gadsden
-(2011), the layer that minimises it and the filter that it makes with the Kalman gain. For one channel at a
-time the optimal layer is ``A S / (C P C')``. Where it is thinner than the limit, the gain is the optimal one, Kalman's;
-where it is thicker, the model has left its uncertainty and the gain is the robust one, ``A sat(e / limit) / e``. How
-the unmeasured states follow is said in `estimation.filters.sliding_mode`; prediction is the extended Kalman filter's.
+Sources: Habibi (2007), the gain with the magnitude ``A = |e_k| + gamma |e_k-1|`` of innovation and last a-posteriori
+error; Gadsden and Habibi (2010), the covariance; Gadsden and Habibi (2013) and Gadsden (2011), the layer that minimises
+it and the resulting combination with the Kalman gain. For one channel at a time the optimal layer is ``A S / (C P
+C')``. If it is thinner than the limit, the gain is the optimal one, Kalman's; if it is thicker, the model is outside
+its uncertainty and the gain is the robust one, ``A sat(e / limit) / e``. `estimation.filters.sliding_mode` explains how
+the unmeasured states follow; prediction is the extended Kalman filter's.
 """
 
 from collections.abc import Sequence
@@ -26,8 +26,8 @@ SVSF_SETTINGS = (
 """Memory of the last a-posteriori error, 0 or more and below 1 (Habibi 2007) [fraction]; limit of the boundary layer,
 in standard deviations of the channel's sensor [dimensionless].
 
-A filter that averages thousands of samples has an optimal layer of hundreds of deviations; a limit far below that
-makes it follow the noise, one far above leaves Kalman's gain alone.
+A filter that averages thousands of samples has an optimal layer of hundreds of deviations. A limit far below that makes
+it follow the noise; a limit far above leaves only Kalman's gain.
 """
 
 
@@ -48,7 +48,7 @@ def svsf_share(innovation: Innovation) -> Expression:
 
 
 def svsf_update(model: ProcessModel, channels: Sequence[str]) -> Outputs:
-    """Return the filter's update by each channel in turn, and the a-posteriori errors that the next one reads.
+    """Return the filter's update by each channel in turn, and the a-posteriori errors for the next update.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Compiled loops over a whole trajectory: the model's run under pushes, and the best linear correction of it.
+"""Compiled loops over a whole trajectory: the model's run with corrections, and the best linear correction of it.
 
-A trajectory is ``s_0 = prior + P_0 u_0`` and ``s_k = f(s_{k-1}) + Q_k u_k``: so written, with an adjoint ``u`` in the
-place of the noise, a state that no noise moves and a start that is known exactly need no inverse of a zero variance.
-`estimation.filters.iterated_smoother` says what is done with it.
+A trajectory is ``s_0 = prior + P_0 u_0`` and ``s_k = f(s_{k-1}) + Q_k u_k``. In this form, with an adjoint ``u`` in
+place of the noise, a state without noise and an exactly known start need no inverse of a zero variance.
+`estimation.filters.iterated_smoother` explains how it is used.
 """
 
 import math
@@ -32,7 +32,7 @@ Differentiate: TypeAlias = Callable[[Array, Array, Array, Array, float, Array], 
 """``differentiate(state, rows, before, after, j, jacobian)``: the same, with the step's Jacobian."""
 
 See: TypeAlias = Callable[[Array, Array, Array, Array], None]
-"""``see(state, rows, seen, slope)``: what the model predicts of each channel, and its derivative by the state."""
+"""``see(state, rows, seen, slope)``: the model's prediction of each channel, and its derivative by the state."""
 
 
 def roll(
@@ -48,20 +48,20 @@ def roll(
     advance: Advance,
     see: See,
 ) -> float:
-    """Run the model under its pushes, held to the states' bounds, and return the sum of squares.
+    """Run the model with its corrections, held to the states' bounds, and return the sum of squares.
 
-    It is infinite where the run diverges, or begins out of bounds.
+    It is infinite if the run diverges, or begins out of bounds.
 
     Parameters
     ----------
     start : ndarray, shape (n,)
         First state [scaled].
     adjoint, opened : ndarray, shape (samples, n)
-        Pushes, and the variance that each stands for [scaled].
+        Adjoint, and the variance that it is multiplied by at each sample [scaled].
     bounds : ndarray, shape (n, 2)
-        Of the states [scaled].
+        Bounds of the states [scaled].
     trajectory : ndarray, shape (samples, n)
-        Room for the states [scaled].
+        Output for the states [scaled].
     """
     rows, drives, measured, spread, substeps = log
     state, seen, slope = start.copy(), np.empty(CHANNELS), np.empty((CHANNELS, WIDTH))
@@ -103,18 +103,18 @@ def forward(
     differentiate: Differentiate,
     see: See,
 ) -> None:
-    """Filter deviations from the trajectory; leave the filter's last covariance in P, and some on the way in kept.
+    """Filter deviations from the trajectory; leave the last covariance in P, and store some others in kept.
 
     Parameters
     ----------
     prior : ndarray, shape (n,)
-        First state as it is believed [scaled].
+        Prior mean of the first state [scaled].
     P : ndarray, shape (n, n)
         Its covariance [scaled].
     trajectory, adjoint, opened : ndarray, shape (samples, n)
-        States, pushes and their variances [scaled].
+        States, adjoint and the variances it is multiplied by [scaled].
     every : int
-        Samples a row of the track.
+        Samples for each row of the track.
     """
     rows, drives, measured, spread, substeps = log
     F, _, slope, residual, variance, kept = lines
@@ -157,7 +157,7 @@ def forward(
 
 
 def update(k: int, c: int, m: Array, P: Array, PH: Array, lines: Lines, *, WIDTH: int) -> None:
-    """Update a deviation and its covariance by channel c of sample k, and finish its residual and variance."""
+    """Update a deviation and its covariance by channel c of sample k, and complete its residual and variance."""
     _, gain, slope, residual, variance, _ = lines
     e, s = residual[k, c], variance[k, c]
     for i in range(WIDTH):
@@ -177,7 +177,7 @@ def update(k: int, c: int, m: Array, P: Array, PH: Array, lines: Lines, *, WIDTH
 
 
 def multiply(a: Array, b: Array, product: Array, *, WIDTH: int) -> None:
-    """Multiply two matrices into a third."""
+    """Multiply two matrices and store the product in a third."""
     for i in range(WIDTH):
         for j in range(WIDTH):
             total = 0.0
@@ -194,12 +194,12 @@ def copy(a: Array, b: Array, *, WIDTH: int) -> None:
 
 
 def backward(lines: Lines, wanted: Array, *, WIDTH: int, CHANNELS: int) -> None:
-    """Carry the adjoint back over the log: what pushes the trajectory to where it fits best.
+    """Carry the adjoint back over the log: it moves the trajectory to its best fit.
 
     Parameters
     ----------
     wanted : ndarray, shape (samples, n)
-        Room for it.
+        Output for the adjoint.
     """
     F, gain, slope, residual, variance, _ = lines
     u, earlier = np.zeros(WIDTH), np.empty(WIDTH)
@@ -221,12 +221,12 @@ def backward(lines: Lines, wanted: Array, *, WIDTH: int, CHANNELS: int) -> None:
 
 
 def spread_back(lines: Lines, every: int, *, WIDTH: int, CHANNELS: int) -> None:
-    """Turn the covariances kept on the way, which knew the log up to there, into those that know all of it.
+    """Convert the stored filter covariances into smoothed ones, which use the whole log.
 
     Parameters
     ----------
     every : int
-        Samples a row of the track.
+        Samples for each row of the track.
     """
     F, gain, slope, residual, variance, kept = lines
     U, half, PU = np.zeros((WIDTH, WIDTH)), np.empty((WIDTH, WIDTH)), np.empty((WIDTH, WIDTH))
@@ -269,14 +269,14 @@ def reweigh(
     see: See,
     doubt: Callable[[Array], None],
 ) -> None:
-    """Set the variances of all samples by how far they lie from the trajectory; ``doubt`` makes a factor of a ratio.
+    """Set the variances of all samples by their distance from the trajectory; ``doubt`` converts a ratio to a factor.
 
     Parameters
     ----------
     trajectory : ndarray, shape (samples, n)
         States [scaled].
     variances : ndarray, shape (channels,)
-        Of the sensors [SI squared].
+        Variances of the sensors [SI squared].
     """
     rows, _, measured, spread, _ = log
     seen, slope, ratio = np.empty(CHANNELS), np.empty((CHANNELS, WIDTH)), np.empty(1)
@@ -295,12 +295,12 @@ def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: s
     Parameters
     ----------
     robust : str
-        How residuals that are too large count, see `estimation.engine.robust.inflation`.
+        How too large residuals count, see `estimation.engine.robust.inflation`.
 
     Returns
     -------
     NativeKernel
-        ``roll``, ``forward``, ``backward`` and ``spread_back``; ``reweigh`` where outliers count for less.
+        ``roll``, ``forward``, ``backward`` and ``spread_back``; also ``reweigh`` if outliers are down-weighted.
     """
     n, names = model.width, layout(EKF, model, channels).rows
     mean, _ = belief_symbols(model)

@@ -1,7 +1,7 @@
 """The unscented Kalman filter: scaled sigma points, additive noise, compiled.
 
-Sources: Julier and Uhlmann (2004), the transform; Julier (2002), its scaling; van der Merwe (2004), chapter 3,
-the filter with additive noise. Points are drawn anew at every step of the model and before every channel.
+Sources: Julier and Uhlmann (2004), the transform; Julier (2002), its scaling; van der Merwe (2004), chapter 3, the
+filter with additive noise. New points are drawn at every step of the model and before every channel.
 """
 
 from functools import partial
@@ -20,8 +20,8 @@ UKF_SETTINGS = (
 )
 """Spread of the points, weight of the shift, and secondary spread [dimensionless].
 
-The usual alpha of 1e-3 differences the model over a thousandth of a standard deviation; here a belief is often a
-millionth of its mean, and that difference would be rounding.
+The usual alpha of 1e-3 takes differences of the model over a thousandth of a standard deviation. Here a standard
+deviation is often a millionth of the mean, and that difference would be rounding.
 """
 
 

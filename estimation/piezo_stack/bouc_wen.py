@@ -1,4 +1,4 @@
-"""Bouc-Wen parameters from measured loops, by least squares on simulated ones with exact sensitivities.
+"""Bouc-Wen parameters from measured loops, by least squares on simulated loops with exact sensitivities.
 
 The paper's own procedure is in `estimation.piezo_stack.bouc_wen_printed`; it cannot work (errata P14).
 """
@@ -19,13 +19,13 @@ from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.solvers.trajectory import compile_trajectory
 
 SHAPE = ("hysteresis", "hysteresis_phi_1", "hysteresis_phi_2", "hysteresis_phi_3", "hysteresis_gamma")
-"""The parameters of the loop's shape, equation 1."""
+"""Parameters of the loop's shape, equation 1."""
 
 LOOP = ("free_stroke_a_volt", *SHAPE)
-"""What a loop tells of a stack."""
+"""Parameters of a stack that a loop determines."""
 
 CYCLES = 3
-"""Cycles after which a loop has closed."""
+"""Number of cycles after which a loop has closed."""
 
 _FEWEST = 50
 _ENOUGH = 5000
@@ -35,7 +35,7 @@ _TOUCHED = 1e-3
 
 @dataclass(frozen=True)
 class HysteresisFit:
-    """Parameters found, with what is known of their errors.
+    """Parameters found, with estimates of their errors.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class HysteresisFit:
     error : float
         Root mean square of the residuals [m].
     condition : float
-        Condition number of the scaled Jacobian [dimensionless]; large where parameters cannot be told apart.
+        Condition number of the scaled Jacobian [dimensionless]; large if parameters cannot be told apart.
     """
 
     values: Mapping[str, float]
@@ -67,27 +67,27 @@ class HysteresisFit:
 
 
 def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = True) -> HysteresisFit:
-    """Fit a stack's free stroke a volt and its hysteresis to one slow loop (equation 27 with errata P2, P14).
+    """Fit a stack's free stroke per volt and its hysteresis to one slow loop (equation 27 with errata P2, P14).
 
-    One loop that has been gone round before shows all four signs of rate and hysteresis, and what it tells grows with
-    its samples (`loop_bounds`). Three cycles from rest, the first rise among them, tell several times more; one cycle
-    from rest alone does not do: on it voltage never rises while hysteresis is negative, so four parameters act as
-    three.
+    One loop that has been run through before shows all four sign combinations of rate and hysteresis, and its
+    information grows with its samples (`loop_bounds`). Three cycles from rest, including the first rise, give several
+    times more. One cycle from rest alone is not enough: in it voltage never rises while hysteresis is negative, so four
+    parameters act as three.
 
     Parameters
     ----------
     voltage : ndarray, shape (n,)
         Whole cycles, from trough to trough [V].
     displacement : ndarray, shape (n,)
-        Over those cycles [m]; its zero may lie anywhere.
+        Displacement over those cycles [m]; its zero is arbitrary.
     from_rest : bool
-        Whether the stack was without hysteresis at the first sample; else the loop has been gone round before.
+        Whether the stack had no hysteresis at the first sample; otherwise the loop has been run through before.
 
     Returns
     -------
     HysteresisFit
-        ``free_stroke_a_volt``, the five of `SHAPE`, the displacement's ``offset``, and ``lag``, what the
-        stack's lag takes from the displacement a volt a sample [m/V]: a nanometre that would bias the rest.
+        ``free_stroke_a_volt``, the five of `SHAPE`, the displacement's ``offset``, and ``lag``, the displacement that
+        the stack's lag removes for each volt per sample [m/V]: a nanometre that would bias the others.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = Tru
 def loop_bounds(
     parameters: PiezoStackParameters, voltage: Array, noise: float, *, from_rest: bool = True
 ) -> Mapping[str, float]:
-    """Return Cramér-Rao bounds of what `fit_stack_loop` fits to a loop, all unknown together.
+    """Return Cramér-Rao bounds of the parameters that `fit_stack_loop` fits to a loop, all unknown together.
 
     Parameters
     ----------
@@ -123,7 +123,8 @@ def loop_bounds(
     Returns
     -------
     Mapping[str, float]
-        Standard deviation by name, over the parameter's size [dimensionless]; infinite where the loop cannot tell.
+        Standard deviation by name, over the parameter's size [dimensionless]; infinite if the loop does not determine
+        it.
 
     Examples
     --------
@@ -144,7 +145,7 @@ def loop_bounds(
 
 
 def _loop_model(u: Array, from_rest: bool) -> Callable[[Array], tuple[Array, Array]]:
-    """Return a slow loop's displacement, and its slopes, as a function of what is fitted."""
+    """Return a slow loop's displacement, and its slopes, as a function of the fitted parameters."""
     step = sensitivity_step(slow_stack_step, 1, SHAPE)
     run = compile_trajectory("slow_stack", step, 1 + len(SHAPE), PiezoStackParameters)
     columns = [field.name for field in fields(PiezoStackParameters)]
@@ -162,7 +163,7 @@ def _loop_model(u: Array, from_rest: bool) -> Callable[[Array], tuple[Array, Arr
 
 
 def _averaged(values: Array) -> Array:
-    """Average a closed loop over as many neighbours as leave `_ENOUGH` samples: the fit then takes a fraction."""
+    """Average a closed loop over neighbours until `_ENOUGH` samples remain: the fit is then many times faster."""
     many = max(1, (len(values) - 1) // _ENOUGH)
     count = (len(values) - 1) // many * many
     means = values[:count].reshape(-1, many).mean(axis=1)
@@ -188,12 +189,12 @@ def fitted(
     scale: Array,
     names: Sequence[str],
 ) -> HysteresisFit:
-    """Fit a simulated displacement to a measured one by Levenberg and Marquardt (errata P14).
+    """Fit a simulated displacement to a measured one by the Levenberg-Marquardt method (errata P14).
 
     Parameters
     ----------
     simulate : callable
-        From the parameters to the displacement [m], shape (n,), and its slopes by them.
+        Maps the parameters to the displacement [m], shape (n,), and its slopes by them.
     measured : ndarray, shape (n,)
         Displacement [m].
     start, scale : ndarray, shape (parameters,)

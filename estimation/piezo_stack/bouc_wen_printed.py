@@ -1,7 +1,7 @@
-"""The piezo-stack paper's own identification, equations 23 to 33 as printed, to show what comes of it (errata P14).
+"""The piezo-stack paper's own identification, equations 23 to 33 as printed, to show its result (errata P14).
 
 A small step gives k_u/k, a small sine alpha, a large loop the four shape parameters from four sign regions. But at
-small amplitude the stack moves by (k_u/k + alpha) u, so step and sine measure one sum, and a loop with a wrong k_u
+small amplitude the stack moves by (k_u/k + alpha) u, so step and sine measure the same sum, and a loop with a wrong k_u
 hardly enters one of the regions.
 """
 
@@ -23,7 +23,8 @@ class PrintedFit:
     Parameters
     ----------
     values : Mapping[str, float]
-        By the names of `plant.piezo_stack.parameters` [SI], in equation 1's signs; NaN where a region held nothing.
+        Values by the names of `plant.piezo_stack.parameters` [SI], in equation 1's signs; NaN if a region held no
+        samples.
     samples : tuple of int
         Samples in the four regions of `REGIONS`.
     """
@@ -38,7 +39,7 @@ def printed_fit(step: tuple[float, float], sine: tuple[Array, Array], loop: tupl
     Parameters
     ----------
     step : tuple of float
-        A small voltage step [V], and the displacement that it settles at [m].
+        A small voltage step [V], and the displacement at which it settles [m].
     sine : tuple of ndarray, shape (n,)
         Voltage [V] and displacement [m] of a small slow sine.
     loop : tuple of ndarray, shape (m,)

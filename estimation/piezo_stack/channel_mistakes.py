@@ -1,4 +1,4 @@
-"""Channels of a piezo-stack log with another sign, unit or name, by the runs of likely actuators."""
+"""Channels of a piezo-stack log with a wrong sign, unit or name, found by comparison with runs of likely actuators."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
@@ -8,25 +8,25 @@ from estimation.arrays import Array
 from plant.log.columns import UNITS
 
 ALIKE = 0.9
-"""Correlation with a run from which a channel has that run's course [dimensionless]. Each fault that is a first guess
-has over 0.99 with its own run."""
+"""Correlation with a run above which a channel follows that run [dimensionless]. Each fault that is a first guess has
+over 0.99 with its own run."""
 
 NEAR = 2.0
-"""A channel's size may be off by this factor, for its faults and for a unit's slip to be told from one [dimensionless].
-The nearest slips of a unit are ten times apart."""
+"""Factor by which a channel's size may be off because of a fault; more is a wrong unit [dimensionless]. The nearest
+wrong units are ten times apart."""
 
 SLIPS: Mapping[str, Mapping[float, str]] = {
     "m": {1e3: "mm", 1e6: "um"},
     "N": {1e-3: "kN"},
     "Pa": {1e-5: "bar", 1e-6: "MPa", 1e-3: "kPa"},
 }
-"""Numbers for one SI unit [1], by what they are when given in another unit."""
+"""For each SI unit, the factor by which numbers in another unit differ, and that unit [dimensionless]."""
 
 
 def channel_mistakes(measured: Mapping[str, Array], runs: Sequence[Mapping[str, Array]]) -> tuple[str, ...]:
-    """Return what is wrong with the sign, unit or name of channels, a clause each.
+    """Return what is wrong with the sign, unit or name of channels, one clause each.
 
-    Every channel follows the drive, so a run of almost any actuator has its course.
+    Every channel follows the drive, so a run of almost any actuator resembles it.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def channel_mistakes(measured: Mapping[str, Array], runs: Sequence[Mapping[str, 
     Returns
     -------
     tuple of str
-        Empty where each channel is as one of the actuators would have it.
+        Empty if each channel agrees with one of the actuators.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def _by_themselves(measured: Mapping[str, Array], runs: Sequence[Mapping[str, Ar
 
 
 def _share(values: Array, runs: Sequence[Mapping[str, Array]], name: str) -> float:
-    """Return a channel over that of the run whose course is most like it [dimensionless]; 0 where none is alike."""
+    """Return a channel relative to that of the run most like it [dimensionless]; 0 if no run is alike."""
     best, share = ALIKE, 0.0
     mine = values - values.mean()
     for run in runs:

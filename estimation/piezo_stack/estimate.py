@@ -1,6 +1,6 @@
 """Faults inside a piezo-stack actuator from a log of its bench: output error by least squares.
 
-The drive is known, so the whole run is simulated and fitted to every channel at once, each weighed by its noise. The
+The drive is known, so the whole run is simulated and fitted to all channels at once, each weighted by its noise. The
 run must begin at rest at the bias pressure.
 """
 
@@ -33,13 +33,13 @@ class StackEstimate:
     values : Mapping[str, float]
         Estimates by name [SI]; polarisation as a factor.
     deviations : Mapping[str, float]
-        Standard deviations by name [SI], wider where the residuals are larger than the noise.
+        Standard deviations by name [SI], widened if the residuals are larger than the noise.
     correlations : ndarray, shape (unknowns, unknowns)
-        Between the scaled estimates.
+        Correlations of the scaled estimates.
     misfit : Mapping[str, float]
         Root mean square of each channel's residual over its noise; 1 for the right model [dimensionless].
     parameters : PiezoStackParameters or namespace
-        The actuator with the estimates in it.
+        The actuator with the estimates.
     samples : int
         Samples of each channel [count].
     """
@@ -71,18 +71,18 @@ def estimate_stack(
     channels: Collection[str] = STACK_CHANNELS,
     starts: Sequence[Mapping[str, float]] = STARTS,
 ) -> StackEstimate:
-    """Estimate what is wrong inside the actuator from a run that began at rest.
+    """Estimate the faults inside the actuator from a run that began at rest.
 
     Parameters
     ----------
     record : Record
         ``drive_voltage_v`` and one or more of `STACK_CHANNELS`.
     healthy : PiezoStackParameters
-        The actuator as it should be, at the run's bias pressure and load.
+        The healthy actuator, at the run's bias pressure and load.
     unknowns : collection of str
-        What is estimated, of `UNKNOWNS`.
+        Quantities to estimate, from `UNKNOWNS`.
     channels : collection of str
-        What is used of what is logged.
+        Channels to use, of those that are logged.
     starts : sequence of Mapping[str, float]
         First guesses, scaled as in `UNKNOWNS` [dimensionless].
 
@@ -111,7 +111,7 @@ def estimate_stack(
 
 
 def _first_guesses(runs: StackRuns, starts: Sequence[Mapping[str, float]]) -> list[Array]:
-    """Return the first guesses, the one that fits best first; refuse channels of another sign, unit or name."""
+    """Return the first guesses, best fit first; refuse channels whose sign, unit or name is wrong."""
     guesses, found = runs.first(starts)
     mistakes = channel_mistakes(runs.channels(runs.measured), [runs.channels(row) for row in found])
     if mistakes:
@@ -126,12 +126,12 @@ def covariance(slopes: Array) -> Array:
     Parameters
     ----------
     slopes : ndarray, shape (n, unknowns)
-        Slopes of channels over noise.
+        Slopes of the channels relative to their noise.
 
     Returns
     -------
     ndarray, shape (unknowns, unknowns)
-        Covariance [dimensionless]; very large where nothing is known.
+        Covariance [dimensionless]; very large for directions that are not determined.
     """
     normal, sizes = _normalised(slopes)
     known, axes = np.linalg.eigh(normal)
@@ -139,13 +139,13 @@ def covariance(slopes: Array) -> Array:
 
 
 def _shown(slopes: Array) -> Array:
-    """Return the same along what the channels show, and nothing along all else: no step leads there."""
+    """Return the same in the directions that the channels determine, and zero in all others: no step leads there."""
     normal, sizes = _normalised(slopes)
     return np.linalg.pinv(normal, rcond=_LEAST_KNOWN) / sizes
 
 
 def _normalised(slopes: Array) -> tuple[Array, Array]:
-    """Return the normal equations with each column of slopes brought to one, and by what they were divided."""
+    """Return the normal equations with each column of slopes scaled to one, and the scale factors."""
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
     return (slopes / size).T @ (slopes / size), np.outer(size, size)
 
@@ -158,7 +158,7 @@ def stack_bounds(
     unknowns: Collection[str] = DEFAULT_UNKNOWNS,
     channels: Collection[str] = STACK_CHANNELS,
 ) -> Mapping[str, float]:
-    """Return Cramér-Rao bounds of an experiment on each quantity, all unknown together.
+    """Return the Cramér-Rao bounds of an experiment on each quantity, with all of them unknown together.
 
     Parameters
     ----------
@@ -167,12 +167,12 @@ def stack_bounds(
     sample_time : float
         Seconds between samples [s].
     unknowns : collection of str
-        What is unknown, of `UNKNOWNS`.
+        The unknown quantities, from `UNKNOWNS`.
 
     Returns
     -------
     Mapping[str, float]
-        Standard deviation by name [SI]; of factors, relative.
+        Standard deviation by name [SI]; relative for factors.
     """
     noise = {name: value for name, value in asdict(BENCH_SENSORS).items() if name in channels}
     runs = StackRuns(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise, np.zeros(0))
@@ -184,7 +184,7 @@ def stack_bounds(
 
 
 class _Optimum(NamedTuple):
-    """Where a descent ended: unknowns, residuals over noise, and their slopes."""
+    """End point of a descent: unknowns, residuals over noise, and their slopes."""
 
     theta: Array
     residuals: Array
@@ -205,9 +205,9 @@ def _cost(one: _Optimum) -> float:
 
 
 def _descended(runs: StackRuns, theta: Array) -> _Optimum:
-    """Descend by Gauss and Newton in exact runs.
+    """Descend by the Gauss-Newton method in exact runs.
 
-    It ends where a step is a tenth of the standard deviations, which no reader could tell from none.
+    It ends when a step is a tenth of the standard deviations, which makes no practical difference.
     """
     found, slopes = runs.around(theta, LONGEST_STEP)
     known, shown = covariance(slopes), _shown(slopes)
@@ -224,7 +224,7 @@ def _descended(runs: StackRuns, theta: Array) -> _Optimum:
 
 
 def _coarsely_descended(runs: StackRuns, start: Array) -> tuple[Array, float]:
-    """Descend by Levenberg and Marquardt in coarse runs, several dampings side by side; return what is left too."""
+    """Descend by the Levenberg-Marquardt method in coarse runs, several dampings at a time; also return the misfit."""
     theta = start
     found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
     residuals = found - runs.measured
@@ -248,14 +248,14 @@ def _coarsely_descended(runs: StackRuns, start: Array) -> tuple[Array, float]:
 
 
 def _best(runs: StackRuns, theta: Array, changes: NDArray[Any], step: float) -> tuple[Array, Array]:
-    """Return the change, of several run side by side, that leaves the least, and what it leaves."""
+    """Return the change, of several run side by side, with the smallest misfit, and this misfit."""
     tried = runs.scaled([*(theta + changes)], step) - runs.measured
     best = int(np.argmin(np.sum(tried**2, axis=1)))
     return changes[best], tried[best]
 
 
 def _share(change: NDArray[Any], known: Array) -> float:
-    """Return the largest change over its standard deviation."""
+    """Return the largest change relative to its standard deviation."""
     return float(np.max(np.abs(change) / np.sqrt(np.diag(known))))
 
 
@@ -263,12 +263,13 @@ _LEAST_KNOWN = 1e-14
 """Least information along a combination of unknowns, over the largest, that is more than rounding [dimensionless]."""
 
 _COARSE_SECONDS, _COARSE_SHARE = 0.04, 0.25
-"""Coarse descents look at the beginning of a log, eleven cycles of 275 Hz or more [s], and at least at this share."""
+"""Part of a log that coarse descents use: its beginning, eleven cycles of 275 Hz or more [s], and at least this
+share."""
 
 _MOST_STEPS = 30
 _LEAST_SHARE, _HOPELESS = 0.01, 10.0
-"""Share of the misfit that a step must take off where the mean square is so many times the noise's: no actuator of
-these explains the log [dimensionless]."""
+"""Least share of the misfit that a step must remove if the mean square exceeds the noise's by this factor: otherwise no
+such actuator explains the log [dimensionless]."""
 
 _NEAR = 3.0
 _DONE = 0.1

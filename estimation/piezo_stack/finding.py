@@ -1,4 +1,4 @@
-"""`stack_finding(record, healthy) -> Finding`: what a log of the piezo-stack actuator says, and what it does not."""
+"""`stack_finding(record, healthy) -> Finding`: what a log of the piezo-stack actuator determines, and what not."""
 
 from collections.abc import Collection, Mapping
 from math import sqrt
@@ -16,17 +16,17 @@ from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.trajectory import NAME
 
 MOST_MISFIT = 1.05
-"""Residual over noise above which the model does not describe a log, beside what chance leaves [dimensionless]."""
+"""Residual over noise above which the model does not describe a log, chance apart [dimensionless]."""
 
 BY_CHANCE = 4.0
-"""What chance leaves, over one by the root of the samples: three deviations of noise that was read off the log, which
-scatters by 1.3 of that [dimensionless]."""
+"""Allowance for chance, over the root of the number of samples: three deviations of noise that was estimated from the
+log, which scatters by 1.3 of that [dimensionless]."""
 
 MOST_DEVIATION = 0.30
-"""Standard deviation over the healthy value, or over a small fault's, above which no number is given."""
+"""Standard deviation, over the healthy value or over the size of a small fault, above which no number is given."""
 
 SMALLEST_FAULT: Mapping[str, float] = {"chamber_leakage": 5e-12, "crossport_leakage": 5e-12, "coulomb_friction": 100.0}
-"""Sizes that leaks and friction are judged by, which are nothing or little when healthy [SI]."""
+"""Reference sizes of leaks and friction, which are zero or small in a healthy actuator [SI]."""
 
 
 class StackCode(Code):
@@ -47,9 +47,9 @@ def stack_finding(
     Parameters
     ----------
     healthy : PiezoStackParameters
-        The actuator as it should be, at the run's bias pressure and load.
+        The healthy actuator, at the run's bias pressure and load.
     channels : tuple of str
-        What is used of what is logged.
+        Channels to use, of those that are logged.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def stack_prospect(
     *,
     channels: tuple[str, ...] = STACK_CHANNELS,
 ) -> Finding:
-    """Say what a run would tell, before it is made: Cramér-Rao bounds, all unknown together.
+    """Return what a run would determine, before it is made: Cramér-Rao bounds, all unknown together.
 
     Parameters
     ----------
@@ -124,22 +124,22 @@ def missed(found: StackEstimate) -> Mapping[str, float]:
 
 
 def channel_disagrees(record: Record, healthy: PiezoStackParameters, channels: Collection[str]) -> tuple[Note, ...]:
-    """Return which channel of a log that the model misses is alone to blame.
+    """Return the one channel that is to blame for a log that the model does not describe.
 
     Parameters
     ----------
     record : Record
-        A run that began at rest, and that the model misses.
+        A run that began at rest, and that the model does not describe.
     healthy : PiezoStackParameters
-        The actuator as it should be, at the run's bias pressure and load.
+        The healthy actuator, at the run's bias pressure and load.
     channels : collection of str
-        What was used of what is logged.
+        Channels that were used.
 
     Returns
     -------
     tuple of Note
-        None where the model misses the log without any one of them, or explains it without this one or that one, or
-        fewer than two would be left.
+        Empty if leaving out no single channel helps, if leaving out either of two channels helps, or if fewer than two
+        would be left.
     """
     others = [tuple(name for name in channels if name != left) for left in channels] if len(channels) > 2 else []
     explained = [not missed(estimate_stack(record, healthy, channels=some)) for some in others]
@@ -149,7 +149,7 @@ def channel_disagrees(record: Record, healthy: PiezoStackParameters, channels: C
 
 
 def stack_quantities(found: StackEstimate, healthy: PiezoStackParameters) -> dict[str, Quantity]:
-    """Return every quantity with its interval; without a number where the sensors hold too little."""
+    """Return every quantity with its interval; without a number if the sensors contain too little information."""
     quantities: dict[str, Quantity] = {}
     for name, value in found.values.items():
         size = 1.0 if name == "polarisation" else SMALLEST_FAULT.get(name) or getattr(healthy, name) or 1e-4

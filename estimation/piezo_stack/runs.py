@@ -21,31 +21,31 @@ DRIVE = "drive_voltage_v"
 """The channel of the drive."""
 
 STACK_CHANNELS = tuple(asdict(BENCH_SENSORS))
-"""Channels that a bench may log beside the drive."""
+"""Channels that a bench may log besides the drive."""
 
 ANY_ZERO = ("stack_displacement_m", "stack_force_n", "position_m")
-"""Channels that are compared about their means: a bench sets the zero of each as it likes. Pressure is not, for air and
-reeds feel how high it is."""
+"""Channels that are compared about their means, since each bench sets their zeros as it likes. Pressure is not among
+them, since air and reeds depend on its absolute value."""
 
 OVERSHOOT = 0.02
-"""What a measured drive may leave the stack's range by, for its own noise and zero [fraction of the rated voltage]
-(judged)."""
+"""Limit by which a measured drive may exceed the stack's range, for its noise and zero offset [fraction of the rated
+voltage] (judged)."""
 
 COARSE_STEP = 5e-6
-"""Longest step of the runs that slopes and starts are taken from [s]."""
+"""Longest step of the runs from which slopes and starts are taken [s]."""
 
 SLOPE_STEP = 1e-3
-"""Change of a scaled parameter for a slope [dimensionless]."""
+"""Change of a scaled parameter in a difference quotient [dimensionless]."""
 
 COARSE_SLOPE_STEP = 2e-2
-"""The same far from the answer, where bouncing reeds roughen the misfit [dimensionless]."""
+"""The same far from the solution, where bouncing reeds roughen the misfit [dimensionless]."""
 
 _HOPELESS = 1e6
 
 
 @dataclass
 class StackRuns:
-    """The log that runs are compared with, and how many there were.
+    """The log that runs are compared with, and the number of runs made.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class StackRuns:
     noise : Mapping[str, float]
         Standard deviation of each channel's noise [SI].
     measured : ndarray, shape (channels * n,)
-        The log's channels over their noise, one after the other; empty where a run is planned.
+        The log's channels over their noise, one after the other; empty if a run is only planned.
     """
 
     voltage: Array
@@ -73,7 +73,7 @@ class StackRuns:
         Parameters
         ----------
         samples : int
-            How many [count].
+            Number of samples [count].
         """
         channels = {name: values[:samples] for name, values in self.channels(self.measured).items()}
         return replace(self, voltage=self.voltage[:samples], measured=over_noise(channels, self.noise), count=0)
@@ -84,7 +84,7 @@ class StackRuns:
         Parameters
         ----------
         theta : ndarray, shape (unknowns,)
-            Scaled as in `UNKNOWNS` [dimensionless].
+            The guess, scaled as in `UNKNOWNS` [dimensionless].
         """
         return changed(self.healthy, dict(zip(self.names, theta.tolist(), strict=True)))
 
@@ -101,7 +101,7 @@ class StackRuns:
         Returns
         -------
         ndarray, shape (guesses, channels * n)
-            Very large where a guess strays to where no actuator is.
+            Very large if a guess is not a possible actuator.
         """
         self.count += len(thetas)
         actuators = [self.actuator(theta) for theta in thetas]
@@ -123,7 +123,7 @@ class StackRuns:
         longest_step : float
             Longest step of the runs [s].
         slope_step : float
-            Change of an unknown for a slope [dimensionless].
+            Change of an unknown in a difference quotient [dimensionless].
 
         Returns
         -------
@@ -134,7 +134,7 @@ class StackRuns:
         return base, np.column_stack([row - base for row in moved]) / slope_step
 
     def first(self, starts: Sequence[Mapping[str, float]]) -> tuple[list[Array], Array]:
-        """Return the first guesses that are made of the unknowns, and their channels.
+        """Return the first guesses that concern only the unknowns, and their channels.
 
         Parameters
         ----------
@@ -159,7 +159,7 @@ class StackRuns:
         return guesses, self.scaled(guesses, COARSE_STEP)
 
     def channels(self, scaled: Array) -> Mapping[str, Array]:
-        """Return channels by name from what was scaled.
+        """Return channels by name from scaled ones.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class StackRuns:
         Returns
         -------
         Mapping[str, ndarray of shape (n,)]
-            The channels, those of `ANY_ZERO` about their means [SI].
+            The channels [SI]; those of `ANY_ZERO` are about their means.
         """
         parts = np.split(scaled, len(self.noise))
         return {name: deviation * part for (name, deviation), part in zip(self.noise.items(), parts, strict=True)}
@@ -183,7 +183,7 @@ def over_noise(channels: Mapping[str, Array], noise: Mapping[str, float]) -> Arr
     channels : Mapping[str, ndarray of shape (n,)]
         The channels [SI].
     noise : Mapping[str, float]
-        Standard deviation of the noise of those that are wanted [SI].
+        Standard deviation of the noise of the channels to return [SI].
 
     Returns
     -------
@@ -197,19 +197,19 @@ def over_noise(channels: Mapping[str, Array], noise: Mapping[str, float]) -> Arr
 def prepared(
     record: Record, healthy: PiezoStackParameters, names: tuple[str, ...], channels: Collection[str]
 ) -> StackRuns:
-    """Check a log and return what its runs are compared with.
+    """Check a log and return the data with which its runs are compared.
 
-    The noise of each channel is read off the log: sixth differences hold less than a fifth of what the pump does at 275
-    Hz and 20 kHz beside the noise of the paper's sensors.
+    The noise of each channel is estimated from the log by sixth differences. At 275 Hz and 20 kHz, with the noise of
+    the paper's sensors, the pump's motion contributes less than a fifth to them.
 
     Parameters
     ----------
     record : Record
         ``drive_voltage_v`` and one or more of `STACK_CHANNELS`.
     names : tuple of str
-        What is estimated, of `UNKNOWNS`.
+        Quantities to estimate, from `UNKNOWNS`.
     channels : collection of str
-        What is used of what is logged.
+        Channels to use, of those that are logged.
 
     Raises
     ------

@@ -10,12 +10,12 @@ from plant.piezo_stack.parameters import PiezoStackParameters
 
 @dataclass(frozen=True)
 class Unknown:
-    """A quantity that may be wrong.
+    """A quantity that a fault may change.
 
     Parameters
     ----------
     scale : float
-        Unit of its change in SI; 0 where it acts as a factor, whose logarithm is fitted.
+        Unit of its change in SI; 0 if it acts as a factor, whose logarithm is fitted.
     """
 
     names: tuple[str, ...]
@@ -38,10 +38,10 @@ UNKNOWNS: Mapping[str, Unknown] = {
     "delivery_length": Unknown(("delivery_length", "return_length", "intake_length")),
     "discharge_coefficient": Unknown(("discharge_coefficient",)),
 }
-"""What can be estimated, by name; the last three calibrate a healthy actuator."""
+"""Quantities that can be estimated, by name; the last three calibrate a healthy actuator."""
 
 DEFAULT_UNKNOWNS = tuple(UNKNOWNS)[:7]
-"""What is estimated unless asked otherwise."""
+"""Quantities that are estimated by default."""
 
 STARTS: Sequence[Mapping[str, float]] = (
     {},
@@ -61,7 +61,7 @@ STARTS: Sequence[Mapping[str, float]] = (
     {"outlet_reed_stiffness": log(100.0)},
     {"inlet_reed_stiffness": log(100.0)},
 )
-"""First guesses, scaled; the one that fits best is descended from."""
+"""First guesses, scaled; the descent begins at the one that fits best."""
 
 
 def changed(healthy: PiezoStackParameters, changes: Mapping[str, float]) -> SimpleNamespace:
@@ -70,14 +70,14 @@ def changed(healthy: PiezoStackParameters, changes: Mapping[str, float]) -> Simp
     Parameters
     ----------
     healthy : PiezoStackParameters
-        The actuator before.
+        The actuator before the changes.
     changes : Mapping[str, float]
         Scaled changes [dimensionless], by names of `UNKNOWNS`.
 
     Returns
     -------
     namespace
-        Its parameters; not checked, so that an estimate may stray.
+        Its parameters; not checked, so that an estimate may leave their ranges.
 
     Examples
     --------
@@ -96,19 +96,19 @@ def changed(healthy: PiezoStackParameters, changes: Mapping[str, float]) -> Simp
 
 
 def told(actuator: SimpleNamespace, healthy: PiezoStackParameters, name: str, deviation: float) -> tuple[float, float]:
-    """Return a quantity as it is told, a factor where it scales several parameters, with its standard deviation.
+    """Return the value to report for a quantity and its deviation; a factor if it scales several parameters.
 
     Parameters
     ----------
     name : str
-        Of `UNKNOWNS`.
+        A name of `UNKNOWNS`.
     deviation : float
-        Of the scaled unknown [dimensionless].
+        Standard deviation of the scaled unknown [dimensionless].
 
     Returns
     -------
     tuple of float
-        Value and deviation [SI, or of a factor dimensionless].
+        Value and deviation [SI; dimensionless for a factor].
     """
     unknown = UNKNOWNS[name]
     value = getattr(actuator, unknown.names[0])

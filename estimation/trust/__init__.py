@@ -1,1 +1,1 @@
-"""May the number be believed: bounds, consistency, whiteness, identifiability."""
+"""Whether an estimate can be believed: bounds, consistency, whiteness, identifiability."""

@@ -26,7 +26,7 @@ from plant.log.record import Record
 from plant.solvers.steps import Parameters, parameter_row
 
 FINEST_STEP = 1e-4
-"""Step of the model along the trajectory, or less where the log is sampled faster [s]."""
+"""Step of the model along the trajectory; shorter if the log is sampled faster [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +40,9 @@ class Bound:
     mean : ndarray, shape (rows, n)
         The trajectory along which the bound was taken [SI].
     std : ndarray, shape (rows, n)
-        Least standard deviation of every state [SI]; infinite where the model's own run does not stay finite.
+        Least standard deviation of every state [SI]; infinite if the model's own run diverges.
     belief : Gaussian or None
-        Trajectory's end and least covariance there [SI]; None where the run does not stay finite.
+        Trajectory's end and least covariance there [SI]; None if the run diverges.
     """
 
     model: ProcessModel
@@ -71,24 +71,24 @@ def posterior_bound(
     variances: Mapping[str, float],
     noise: Mapping[str, float] | None = None,
 ) -> Bound:
-    """Return the least covariance with which the states can be known, from this drive and these sensors.
+    """Return the least covariance with which this drive and these sensors can determine the states.
 
     The bound's recursion (Tichavský, Muravchik and Nehorai 1998, equation 21) is that of the extended Kalman filter's
-    covariance, taken along the true trajectory: here what the model itself does, noiseless, from the prior's mean under
-    the record's drive. A parameter that is a state, of `estimation.models.augment` or of the user's own, has its bound
-    too. While the piston sticks, position and velocity hold nothing about bulk modulus (errata E13).
+    covariance, taken along the true trajectory: here the model's own noiseless run from the prior's mean under the
+    record's drive. A parameter that is a state, of `estimation.models.augment` or user-defined, has its bound too.
+    While the piston sticks, position and velocity contain nothing about bulk modulus (errata E13).
 
     Parameters
     ----------
     prior : Gaussian
-        Truth at the first sample, and how well it is known then [SI]; a variance of 0 is exact knowledge.
+        True state at the first sample, and how well it is known then [SI]; a variance of 0 is exact knowledge.
     record : Record
-        The drive, on its clock; what it measured plays no part.
+        The drive, on its clock; its measurements are not used.
     variances : Mapping[str, float]
         Variance of each channel measured [SI squared].
     noise : Mapping[str, float], optional
-        Process-noise densities that replace the model's, by state name [SI squared a second]; of a logarithmic state,
-        those of the logarithm [1/s].
+        Process-noise densities that replace the model's, by state name [SI squared per second]; for a logarithmic
+        state, those of the logarithm [1/s].
 
     Raises
     ------
@@ -125,8 +125,8 @@ def posterior_bound(
 
 
 Move: TypeAlias = Callable[[Array, Array, Array, Array, float, float, float, Array], None]
-"""``move(state, parameters, before, after, j, h, share, F)``: take sub-step j, and put in F what is not zero of its
-Jacobian."""
+"""``move(state, parameters, before, after, j, h, share, F)``: take sub-step j, and store the nonzero entries of its
+Jacobian in F."""
 
 Times: TypeAlias = Callable[[Array, Array, Array, int], None]
 """``left(F, P, FP, c)`` and ``right(F, FP, P, c)``: column c of ``F P``, and row c of ``FP F'``."""
@@ -143,11 +143,11 @@ class Course(NamedTuple):
     drives : ndarray, shape (n, drives)
         Drives at the samples [SI].
     parameters : ndarray, shape (parameters,)
-        The actuator's row.
+        The actuator's parameter row.
     h : float
         Length of a step [s].
     substeps, every : int
-        Steps a sample, and samples a row of the track.
+        Steps for each sample, and samples for each row of the track.
     """
 
     drives: Array
@@ -173,20 +173,20 @@ def run(
     right: Times,
     look: Look,
 ) -> Array:
-    """Carry a covariance along the model's own run: through each step, then by what each channel tells.
+    """Carry a covariance along the model's own run: through each step, then through the update by each channel.
 
     Parameters
     ----------
     state : ndarray, shape (states,)
-        The model's start, in its scaled units.
+        Initial state of the model, in its scaled units.
     P : ndarray, shape (states, states)
-        Its covariance, which is carried in place.
+        Its covariance, updated in place.
     noise : ndarray, shape (states,)
         Variance that process noise adds in a step.
     variances : ndarray, shape (channels,)
-        Of the channels [SI squared].
+        Variances of the channels [SI squared].
     track, deviations : ndarray, shape (rows, states)
-        Filled with the states and their deviations.
+        Output for the states and their deviations.
     """
     drives, parameters, h, substeps, every = course
     F, FP, H, PH = np.empty(SLOPES), np.empty((WIDTH, WIDTH)), np.zeros((len(variances), WIDTH)), np.empty(WIDTH)
@@ -211,7 +211,7 @@ def run(
 
 
 def inform(P: Array, H: Array, variance: float, PH: Array, *, WIDTH: int) -> None:
-    """Reduce a covariance by what a channel tells of the state, as a Kalman filter does."""
+    """Reduce a covariance by the information of a channel, as a Kalman filter does."""
     shown = 0.0
     for c in range(WIDTH):
         PH[c] = 0.0
@@ -228,9 +228,9 @@ def inform(P: Array, H: Array, variance: float, PH: Array, *, WIDTH: int) -> Non
 
 @cache
 def _compile(model: ProcessModel, channels: tuple[str, ...]) -> NativeKernel:
-    """Generate the recursion: the step and its Jacobian written out, the covariance in loops over what is not zero.
+    """Generate the recursion: the step and its Jacobian unrolled, the covariance in loops over nonzero entries.
 
-    Written out whole, as the filters are, thirteen states take a compiler a minute.
+    Unrolled as a whole, as the filters are, thirteen states take a compiler a minute.
     """
     n, every = model.width, range(model.width)
     mean, _ = belief_symbols(model)
@@ -278,7 +278,7 @@ def bulk_modulus_bound(
     variances: Mapping[str, float],
     noise: Mapping[str, float] | None = None,
 ) -> float:
-    """Return the least standard deviation that bulk modulus can be known to from this drive and these sensors.
+    """Return the least standard deviation with which this drive and these sensors can determine bulk modulus.
 
     Parameters
     ----------
@@ -287,16 +287,16 @@ def bulk_modulus_bound(
     prior : Gaussian
         Belief before the log, in SI; its bulk modulus is replaced by the parameters'.
     parameters : EhaParameters
-        The actuator, at the bulk modulus for which the bound is wanted.
+        The actuator, with the bulk modulus for which the bound is wanted.
     variances : Mapping[str, float]
         Their variances [SI squared].
     noise : Mapping[str, float], optional
-        Process-noise densities that replace the model's [SI squared a second].
+        Process-noise densities that replace the model's [SI squared per second].
 
     Returns
     -------
     float
-        Standard deviation [Pa], see `posterior_bound`; infinite where the model's own run does not stay finite.
+        Standard deviation [Pa], see `posterior_bound`; infinite if the model's own run diverges.
     """
     start = prior.mean.copy()
     start[model.index(BULK_MODULUS)] = parameters.bulk_modulus
@@ -306,7 +306,7 @@ def bulk_modulus_bound(
 
 
 def at_bulk_modulus(parameters: EhaParameters, bulk_modulus: float) -> EhaParameters:
-    """Return the actuator's parameters for a process model, at another bulk modulus.
+    """Return the actuator's parameters for a process model, with another bulk modulus.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ def at_bulk_modulus(parameters: EhaParameters, bulk_modulus: float) -> EhaParame
     Returns
     -------
     EhaParameters
-        A copy of the parameters that every actuator has; a circuit's further ones play no part in a bound.
+        A copy of the parameters that every actuator has; the additional ones of a circuit do not affect a bound.
     """
     known = {field.name: getattr(parameters, field.name) for field in fields(EhaParameters)}
     return EhaParameters(**{**known, "bulk_modulus": bulk_modulus})

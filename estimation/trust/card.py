@@ -1,4 +1,4 @@
-"""The identifiability card: what a drive and its sensors would tell, in numbers and in sentences."""
+"""The identifiability card: what a drive and its sensors would determine, in numbers and in sentences."""
 
 import math
 from collections.abc import Mapping
@@ -13,11 +13,11 @@ OBSERVABLE = 0.03
 """Relative standard deviation above which a parameter is called not observable (errata E13) [fraction]."""
 
 INSEPARABLE = 0.95
-"""Correlation of two estimates from which they are said to be hard to tell apart [dimensionless]."""
+"""Correlation of two estimates above which they are called hard to tell apart [dimensionless]."""
 
 
 MOST_PAIRS = 3
-"""Most pairs of parameters that a card names as hard to tell apart [count]."""
+"""Largest number of pairs of parameters that a card names as hard to tell apart [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,21 +27,21 @@ class Card:
     Parameters
     ----------
     relative_std : Mapping[str, float]
-        Least relative standard deviation of each [fraction]; 1 is nothing learnt.
+        Least relative standard deviation of each unknown [fraction]; 1 means that nothing is learnt.
     known_exactly : Mapping[str, float]
         The same if the rig file's uncertain parameters were known exactly [fraction].
     correlation : ndarray, shape (unknowns, unknowns)
         Correlation of the estimates.
     friction_force : float
-        Least relative standard deviation of the friction force at the speed that the piston reached [fraction].
+        Least relative standard deviation of the friction force at the highest speed of the piston [fraction].
     weakest : Mapping[str, float]
-        Weights of the combination of logarithms that is known worst [dimensionless].
+        Weights of the least determined combination of logarithms [dimensionless].
     weakest_std : float
         Its standard deviation [fraction].
     stuck : float
         Share of the run during which the piston sticks [fraction].
     uncertainties : Mapping[str, float]
-        Relative standard deviations of what was taken as known [fraction].
+        Relative standard deviations of the parameters taken as known [fraction].
     """
 
     channels: tuple[str, ...]
@@ -62,14 +62,14 @@ class Card:
 
 
 def rank_drives(cards: Mapping[str, Card], parameter: str | None = None) -> list[str]:
-    """Return drives by how much they tell, the best first.
+    """Return drives by how much they determine, the best first.
 
     Parameters
     ----------
     cards : Mapping[str, Card]
         The card of each drive, by its name.
     parameter : str, optional
-        The parameter that counts; by default all unknowns alike, by the geometric mean of their bounds.
+        The parameter that counts; by default all unknowns equally, by the geometric mean of their bounds.
     """
     return sorted(
         cards, key=lambda name: cards[name].overall if parameter is None else cards[name].relative_std[parameter]
@@ -81,7 +81,7 @@ def _words(name: str) -> str:
 
 
 def percent(value: float) -> str:
-    """Return a fraction as a percentage of two digits.
+    """Return a fraction as a percentage with two digits.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def percent(value: float) -> str:
 
 
 def sentences(card: Card) -> tuple[str, ...]:
-    """Say what a card means."""
+    """Return the meaning of a card in sentences."""
     said: list[str] = []
     lost = [name for name, std in card.relative_std.items() if std > OBSERVABLE]
     if lost:
@@ -127,7 +127,7 @@ def sentences(card: Card) -> tuple[str, ...]:
 
 
 def _inseparable(card: Card) -> list[str]:
-    """Return a sentence on each of the pairs that are hardest to tell apart, where that matters."""
+    """Return a sentence on each of the pairs that are hardest to tell apart, if it matters."""
     pairs: list[tuple[float, str]] = []
     for i, first in enumerate(card.unknowns):
         for j, second in enumerate(card.unknowns[:i]):

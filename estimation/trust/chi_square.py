@@ -1,4 +1,4 @@
-"""Tail and quantiles of the chi-square distribution; scipy.special takes longer to import than a log to fit."""
+"""Tail and quantiles of the chi-square distribution; importing scipy.special takes longer than fitting a log."""
 
 import math
 
@@ -18,7 +18,7 @@ def chi_square_tail(statistic: float, freedom: int) -> float:
     Returns
     -------
     float
-        Probability; not a number where the statistic is none.
+        Probability; NaN if the statistic is NaN.
 
     Examples
     --------
@@ -40,7 +40,7 @@ def chi_square_tail(statistic: float, freedom: int) -> float:
 
 
 def chi_square_quantile(probability: float, freedom: int) -> float:
-    """Return the chi-square statistic that is not exceeded with a probability.
+    """Return the value that a chi-square statistic does not exceed with a given probability.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Can an estimate be believed? NEES and NIS with their chi-square bounds, and the gate that every estimate passes.
 
 Source of the tests: Bar-Shalom, Li and Kirubarajan (2001), section 5.4. The gate asks three questions: are innovations
-as large as predicted (NIS), are they without structure where the drive is (`estimation.trust.whiteness`), and does the
-estimate move from stretch to stretch no more than its own shrinking interval allows.
+as large as predicted (NIS), are they white where the drive has power (`estimation.trust.whiteness`), and does the
+estimate move from stretch to stretch by no more than its own shrinking interval allows.
 """
 
 import numpy as np
@@ -19,17 +19,17 @@ LARGEST_NIS = 2.0
 """Mean NIS of a channel above which the filter is called overconfident; 1 is expected [dimensionless]."""
 
 MISMATCH_NIS = 100.0
-"""Mean NIS of a channel from which the model is said not to describe the log at all [dimensionless]."""
+"""Mean NIS of a channel above which the model does not describe the log at all [dimensionless]."""
 
 LARGEST_DRIFT = 0.03
 """Relative change of the estimate over the last fifths of a run above which it is called unsettled [fraction]."""
 
 LARGEST_WANDER = 9.0
-"""Mean square of the estimate's moves over what its interval allows, above which they are called too large: an interval
-three times too narrow [dimensionless]."""
+"""Mean square of the estimate's moves, relative to what its interval allows, above which they are too large: the
+interval is three times too narrow [dimensionless]."""
 
 STRETCHES = 20
-"""Stretches of a log between which an estimate's moves are judged."""
+"""Number of stretches of a log between which an estimate's moves are judged."""
 
 
 def nees(errors: Array, covariances: Array) -> Array:
@@ -40,12 +40,12 @@ def nees(errors: Array, covariances: Array) -> Array:
     errors : ndarray, shape (runs, n)
         Estimate minus truth, in the belief's units.
     covariances : ndarray, shape (runs, n, n)
-        Covariances believed.
+        Covariances of the belief.
 
     Returns
     -------
     ndarray, shape (runs,)
-        Chi-square with n degrees of freedom where the filter is consistent.
+        Chi-square with n degrees of freedom if the filter is consistent.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def nees(errors: Array, covariances: Array) -> Array:
 
 
 def mean_chi_square_bounds(degrees: int, count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Return the interval in which the mean of chi-square statistics falls.
+    """Return the interval in which the mean of several chi-square statistics falls.
 
     Parameters
     ----------
@@ -89,11 +89,11 @@ def consistency_gate(estimate: Estimate, state: str, record: Record | None = Non
     Parameters
     ----------
     estimate : Estimate
-        The filtered log; with its innovations kept, their structure counts too.
+        The filtered log; if its innovations were kept, their whiteness is tested too.
     state : str
         The state in question, constant in time.
     record : Record, optional
-        The log that was filtered; without it innovations are judged by their size alone.
+        The log that was filtered; without it innovations are judged only by their size.
     """
     channels = () if record is None else whiteness(estimate, record)
     moves = wander(estimate, state)
@@ -108,16 +108,16 @@ def consistency_gate(estimate: Estimate, state: str, record: Record | None = Non
 
 
 def wander(estimate: Estimate, state: str) -> float:
-    """Return the squared moves of a constant state between stretches of a log, over what its variance allows.
+    """Return the squared moves of a constant state between stretches of a log, relative to what its variance allows.
 
-    The estimate of a constant is a martingale under its own model: each stretch moves it with the variance by which
-    the stretch reduces its own. Only what comes after settling counts.
+    The estimate of a constant is a martingale under its own model: each stretch moves it with the variance by which the
+    stretch reduces its own. Only stretches after settling count.
 
     Returns
     -------
     float
-        Sum of the squared moves over the reduction of the variance [dimensionless]: 1 on average where the filter is
-        consistent, 0 where the variance was not reduced.
+        Sum of the squared moves over the reduction of the variance [dimensionless]: 1 on average if the filter is
+        consistent, 0 if the variance was not reduced.
     """
     mean, std = estimate.track(state)
     marks = np.linspace(SETTLING * (len(mean) - 1), len(mean) - 1, STRETCHES + 1).astype(int)
@@ -128,12 +128,12 @@ def wander(estimate: Estimate, state: str) -> float:
 
 
 def describes(estimate: Estimate, state: str) -> bool:
-    """Return whether the model describes the log at all, however roughly.
+    """Return whether the model describes the log at least roughly.
 
     Returns
     -------
     bool
-        False where a channel's residuals are ten times larger than expected, or the state sits at a physical bound.
+        False if a channel's residuals are ten times larger than expected, or the state is at a physical bound.
     """
     return not _at_a_bound(estimate, state) and all(nis < MISMATCH_NIS for nis in estimate.nis.values())
 

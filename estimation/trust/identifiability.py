@@ -1,9 +1,9 @@
 """Identifiability before any experiment: the card of a sensor set and a drive.
 
 The bound of every unknown is the posterior Cramér-Rao bound along a noiseless run of the lumped plant, with the
-sensors' noise, from nothing known but the order of magnitude (`estimation.trust.bounds`). Parameters that are taken as
-known move with their uncertainty from the rig file, and so widen it: bulk modulus enters only as chamber volume over
-bulk modulus, so no experiment knows it better than the volume is known.
+sensors' noise and a prior of only the order of magnitude (`estimation.trust.bounds`). Parameters that are taken as
+known vary with their uncertainty from the rig file, and so widen it: bulk modulus enters only as chamber volume over
+bulk modulus, so no experiment determines it better than the volume is known.
 """
 
 import math
@@ -35,16 +35,16 @@ UNKNOWN = (
     "friction_linear",
     "friction_coulomb",
 )
-"""What an experiment is asked for, unless it is said otherwise."""
+"""Default unknowns of an experiment."""
 
 TAKEN_AS_KNOWN = ("chamber_volume", "pump_displacement", "piston_area", "moving_mass")
-"""What is read off a drawing, and as uncertain as the rig file says."""
+"""Parameters that are read from a drawing, with the uncertainty of the rig file."""
 
 SENSED = ("position_m", "velocity_m_s", "differential_pressure_pa")
 """Channels that a card can have."""
 
 IGNORANCE = 1.0
-"""Standard deviation of an unknown's logarithm before the experiment: a factor of e either way."""
+"""Standard deviation of an unknown's logarithm before the experiment: a factor of e in either direction."""
 
 
 def identifiability_card(
@@ -57,29 +57,29 @@ def identifiability_card(
     unknowns: Sequence[str] = UNKNOWN,
     uncertainties: Mapping[str, float] | None = None,
 ) -> Card:
-    """Say how well an experiment could know an actuator's parameters.
+    """Return how well an experiment can determine an actuator's parameters.
 
     Parameters
     ----------
     parameters : EhaParameters
-        The actuator as it is thought to be.
+        The actuator as assumed.
     speed : ndarray, shape (samples,)
         Motor speed that would drive it from rest [rad/s].
     sample_time : float
         Time between samples [s].
     channels : sequence of str
-        Channels that would be logged beside motor speed, from `SENSED`.
+        Channels that would be logged besides motor speed, from `SENSED`.
     sensors : Sensors
-        Their noise; that of motor speed drives the plant unseen.
+        Their noise; that of motor speed drives the plant without being seen.
     unknowns : sequence of str
-        Parameters asked for; the others are known as well as `uncertainties` says.
+        Parameters to determine; the others are known as well as `uncertainties` says.
     uncertainties : Mapping[str, float], optional
         Relative standard deviation of parameters taken as known, as in a rig file [fraction].
 
     Returns
     -------
     Card
-        Bounds, and what cannot be told apart; `estimation.trust.card.sentences` puts it in words.
+        Bounds, and parameters that cannot be told apart; `estimation.trust.card.sentences` puts it in words.
 
     Raises
     ------
@@ -148,7 +148,7 @@ CARD_FORM = replace(
     step=_card_step,
     observe=_observe,
 )
-"""The lumped plant with every parameter that a card speaks of as a state; what is known has no variance."""
+"""The lumped plant with every parameter of a card as a state; known ones have no variance."""
 
 
 def _check(what: str, given: Sequence[str], known: Sequence[str]) -> None:
@@ -158,7 +158,7 @@ def _check(what: str, given: Sequence[str], known: Sequence[str]) -> None:
 
 
 def _variances(sensors: Sensors, channels: Sequence[str]) -> Mapping[str, float]:
-    """Return every channel's variance, infinite where it is not logged: one kernel serves every sensor set."""
+    """Return every channel's variance, infinite if it is not logged: one kernel serves every sensor set."""
     noise = noise_variances(sensors)
     for channel in channels:
         if not noise.get(channel, 0.0) > 0.0:
@@ -167,13 +167,13 @@ def _variances(sensors: Sensors, channels: Sequence[str]) -> Mapping[str, float]
 
 
 def _speed_noise(p: EhaParameters, sensors: Sensors, sample_time: float) -> Mapping[str, float]:
-    """Return the noise of measured speed as flow that the model believes and the plant does not have."""
+    """Return the noise of measured speed as a flow that the model assumes and the plant does not have."""
     flow = p.pump_displacement**2 * sensors.speed_noise**2 * sample_time
     return {"differential_pressure_pa": flow * (p.bulk_modulus / p.chamber_volume) ** 2}
 
 
 def _sizes(p: EhaParameters) -> Array:
-    """Return the sizes that a covariance is relative to; for linear friction, which may be near 0, all friction."""
+    """Return the reference sizes of a covariance; for linear friction, which may be near 0, that of all friction."""
     values = [abs(float(getattr(p, name))) for name in (*UNKNOWN, *TAKEN_AS_KNOWN)]
     values[UNKNOWN.index("friction_linear")] = _linear_size(p)
     return np.array([1.0, 1.0, 1.0, *values])
@@ -185,7 +185,7 @@ def _linear_size(p: EhaParameters) -> float:
 
 
 def _prior(p: EhaParameters, spreads: Mapping[str, float]) -> Gaussian:
-    """Return rest at a position known to 10 um, and parameters in SI with their relative deviations."""
+    """Return the prior: rest at a position known to 10 um, and parameters in SI with their relative deviations."""
     values: list[float] = []
     for name in (*UNKNOWN, *TAKEN_AS_KNOWN):
         value = float(getattr(p, name))

@@ -1,10 +1,10 @@
 """Whiteness of a filter's innovations as a test of its model: alone, against each other, against the drive.
 
 With 1e5 samples every test of whiteness rejects every model, so significance is not the question. What counts is by how
-much an interval is too narrow. A parameter is learnt where the drive has its power; innovations that hold r times the
-power of white noise there make its standard deviation too small by up to the root of r, as the sandwich covariance
-has it for a sensitivity in that band (White 1982, theorem 3.2). Less power than white noise means that the filter is
-cautious, and is no objection. All of it is a few Fourier transforms of the kept innovations.
+much an interval is too narrow. A parameter is learnt at frequencies at which the drive has its power. If innovations
+have r times the power of white noise there, its standard deviation is too small by up to the root of r, according to
+the sandwich covariance for a sensitivity in that band (White 1982, theorem 3.2). Less power than white noise means that
+the filter is cautious, and is no objection. The test takes a few Fourier transforms of the kept innovations.
 """
 
 from dataclasses import dataclass
@@ -17,30 +17,31 @@ from estimation.log_checks.bridging import bridged
 from plant.log.record import Record
 
 SEGMENTS = 8
-"""Stretches whose spectra are averaged: few, so that a line of the drive stands out; enough for a sharp threshold."""
+"""Number of segments whose spectra are averaged: few, so that a line of the drive stands out; enough for a sharp
+threshold."""
 
 SETTLING = 0.2
-"""Share of the log that a filter is given to settle, before its innovations count [fraction]."""
+"""Initial share of the log in which a filter settles and its innovations do not count [fraction]."""
 
 LAGS = 20
 """Lags of the Ljung-Box statistic."""
 
 FALSE_ALARMS = 1e-3
-"""Probability with which white innovations of a whole log exceed the threshold [probability]."""
+"""Probability that white innovations of a whole log exceed the threshold [probability]."""
 
 FEWEST = 32 * SEGMENTS
-"""Fewest samples from which anything is said of whiteness."""
+"""Fewest samples for a verdict on whiteness."""
 
 DRIVEN_SHARE, DRIVEN_REACH = 0.95, 10.0
-"""The band that counts reaches so many times higher than the frequency below which this share of the drive's power
-lies: friction answers a drive with harmonics, and what is learnt is learnt there."""
+"""The band that counts: up to this multiple of the frequency below which this share of the drive's power lies. Friction
+answers a drive with harmonics, and parameters are learnt at their frequencies."""
 
 
 MOSTLY = 0.5
-"""Share of a channel's predicted variance from which its noise is mostly rounding [fraction]."""
+"""Share of rounding in a channel's predicted variance above which its noise is mostly rounding [fraction]."""
 
 OFTEN = 1e-3
-"""A channel that repeats itself in this share of its samples or more is quantised [fraction]."""
+"""A channel that repeats its value in at least this share of its samples is quantised [fraction]."""
 
 
 @dataclass(frozen=True)
@@ -52,20 +53,20 @@ class Whiteness:
     count : int
         Samples present after settling.
     excess : float
-        Largest power of the innovations within the band that counts, over that of white noise of the predicted
-        variance, less what the channel's quantum can explain [dimensionless]; 1 on average where the filter is
-        consistent. Beside the drive, an encoder's innovations of less than half a step do not count: at a constant
+        Largest power of the innovations in the band that counts, over that of white noise of the predicted variance,
+        less what the channel's quantum can explain [dimensionless]; 1 on average if the filter is consistent. Apart
+        from the drive's frequencies, an encoder's innovations of less than half a step do not count: at a constant
         speed its rounding beats with the clock.
     threshold : float
-        Excess that white innovations stay below but with probability `FALSE_ALARMS` [dimensionless].
+        Excess that white innovations exceed only with probability `FALSE_ALARMS` [dimensionless].
     frequency : float
-        Where the largest power is [Hz]; 0 for a drift slower than can be told.
+        Frequency of the largest power [Hz]; 0 for a drift too slow to resolve.
     resolution : float
-        How far apart frequencies can be told [Hz].
+        Frequency resolution [Hz].
     driven : bool
-        Whether the drive has at least a tenth of its strongest power there.
+        Whether the drive has at least a tenth of its largest power there.
     ljung_box : float
-        Probability of autocorrelations as large as these in white noise (Ljung and Box 1978, equation 3)
+        Probability that white noise has autocorrelations at least as large (Ljung and Box 1978, equation 3)
         [probability].
     autocorrelation : float
         Largest autocorrelation over `LAGS` lags [dimensionless].
@@ -89,22 +90,22 @@ class Whiteness:
 
     @property
     def exceeded(self) -> bool:
-        """Whether the excess is more than white innovations have."""
+        """Whether the excess is larger than that of white innovations."""
         return self.excess > self.threshold
 
 
 def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
-    """Judge the innovations that a filter kept.
+    """Test the whiteness of a filter's stored innovations.
 
     Parameters
     ----------
     record : Record
-        The log, for its drive and for what its sensors resolve.
+        The log, for its drive and for the resolution of its sensors.
 
     Returns
     -------
     tuple of Whiteness
-        One a channel that has samples; none where innovations were not kept or are too few, or the filter diverged.
+        One for each channel that has samples; none if innovations were not kept or are too few, or the filter diverged.
     """
     from scipy.special import chdtri
 
@@ -155,7 +156,7 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
 
 
 def _normalised(estimate: Estimate, first: int) -> tuple[Array, BoolArray]:
-    """Return innovations over their deviations after settling, 0 where a sample is missing; and which are present."""
+    """Return innovations over their deviations after settling, 0 if a sample is missing; and which are present."""
     residuals, variances = estimate.residuals[first:], estimate.residual_variances[first:]
     present = ~np.isnan(residuals)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # a filter that diverged gives no numbers
@@ -176,7 +177,7 @@ def _spectra(values: Array, length: int) -> Array:
 
 
 def _band(drive: Array) -> int:
-    """Return the number of frequencies that count, from 0 on; a tenth of them without a drive."""
+    """Return the number of frequencies that count, from 0 upwards; a tenth of them without a drive."""
     total = np.cumsum(drive)
     if not total[-1] > 0.0:
         return max(2, len(drive) // 10)
@@ -185,7 +186,7 @@ def _band(drive: Array) -> int:
 
 
 def _quantisation(values: Array) -> float:
-    """Return the variance of quantisation while a channel repeats itself: a pattern like the drive's, no noise."""
+    """Return the variance of quantisation while a channel repeats itself: a pattern like the drive's, not noise."""
     return float(np.mean(np.diff(values) == 0.0)) * quantum(values) ** 2 / 12.0
 
 
@@ -200,7 +201,7 @@ def quantum(values: Array) -> float:
     Returns
     -------
     float
-        The quantum [unit of the channel]; 0 where none shows, infinite where the channel never moved.
+        The quantum [unit of the channel]; 0 if there is none, infinite if the channel never moved.
 
     Examples
     --------
@@ -236,7 +237,7 @@ def _correlation(a: Array, b: Array) -> float:
 
 
 def _explained(values: Array, push: Array, length: int) -> float:
-    """Return the share of variance coherent with the drive, less what chance explains in so few segments."""
+    """Return the share of variance coherent with the drive, less the share expected by chance in so few segments."""
     ours, theirs = _spectra(values, length), _spectra(push, length)
     drive, power = np.mean(np.abs(theirs) ** 2, axis=0), np.mean(np.abs(ours) ** 2, axis=0)
     driven = drive > 1e-6 * np.max(drive)

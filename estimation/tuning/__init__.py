@@ -1,1 +1,1 @@
-"""Noise levels by likelihood."""
+"""Tuning of noise levels by likelihood."""

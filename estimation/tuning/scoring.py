@@ -1,4 +1,4 @@
-"""Maximises the innovations likelihood over what a filter assumes: parameters and noise levels, by Fisher scoring."""
+"""Maximises the innovations' likelihood over a filter's assumptions, parameters and noise levels, by Fisher scoring."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,28 +11,28 @@ from estimation.engine.runner import constant_row
 from estimation.tuning.sensitivity import Sensitivity, innovation_sensitivity
 
 AT_REST = 1e-3
-"""The optimiser stops where a further step would gain less than this in log-likelihood [dimensionless]."""
+"""The optimiser stops if a further step would gain less than this in log-likelihood [dimensionless]."""
 
 FARTHEST = 5.0
-"""Farthest that a coordinate moves from its guess in one run of the optimiser [dimensionless]."""
+"""Largest move of a coordinate from its guess in one run of the optimiser [dimensionless]."""
 
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One number that a filter assumes, as a coordinate of the search.
+    """One assumption of a filter, as a coordinate of the search.
 
     Parameters
     ----------
     name : str
         Name in the kernel's row of constants: a parameter, ``q0`` or ``r0`` and so on.
     guess : float
-        Its value where the coordinate is 0 [unit of the row's entry].
+        Its value at coordinate 0 [unit of the row's entry].
     scale : float, optional
-        Change by one unit of the coordinate [unit of the row's entry]; by default the coordinate is a logarithm.
+        Change per unit of the coordinate [unit of the row's entry]; by default the coordinate is a logarithm.
     floor : float
-        What a logarithmic entry stays above [unit of the row's entry].
+        Lower limit of a logarithmic entry [unit of the row's entry].
     spread : float
-        Standard deviation of what is presumed of the coordinate [dimensionless]; infinite if nothing is.
+        Prior standard deviation of the coordinate [dimensionless]; infinite if there is no prior.
     """
 
     name: str
@@ -73,11 +73,11 @@ class Maximum:
     Parameters
     ----------
     coordinates : tuple of Coordinate
-        The coordinates, their guesses at the maximum.
+        The coordinates, with their guesses moved to the maximum.
     objective : float
-        Log-likelihood and what was presumed, relative to the guesses given [dimensionless].
+        Log-likelihood plus log prior, relative to the given guesses [dimensionless].
     information : ndarray, shape (coordinates, coordinates)
-        Fisher information of the log and of what was presumed [dimensionless].
+        Fisher information of the log plus that of the prior [dimensionless].
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -88,10 +88,10 @@ class Maximum:
 
 
 def maximise(problem: FilterProblem, coordinates: Sequence[Coordinate], iterations: int = 60) -> Maximum:
-    """Search for the greatest innovations likelihood.
+    """Search for the maximum of the innovations' likelihood.
 
-    The Fisher information stands for the Hessian (scoring), within a trust region (Conn, Gould and Toint 2000,
-    algorithm 7.3.4, as scipy has it).
+    The Fisher information replaces the Hessian (scoring), within a trust region (Conn, Gould and Toint 2000, algorithm
+    7.3.4, as in scipy).
     """
     from scipy.optimize import OptimizeResult, minimize
 
@@ -126,7 +126,7 @@ class _Point:
 
 
 class _Search:
-    """Evaluates value, slope and curvature at once, and remembers the last two points that were asked for."""
+    """Evaluates value, slope and curvature at once, and caches the last two points."""
 
     def __init__(self, problem: FilterProblem, coordinates: tuple[Coordinate, ...]) -> None:
         self._problem, self._coordinates = problem, coordinates

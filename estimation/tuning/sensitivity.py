@@ -1,8 +1,8 @@
 """Sensitivity of a filter's innovations to its assumptions: exact derivatives, propagated by the filter itself.
 
-Predict and update are functions of belief, parameters, process noise and sensor noise. Moving all of these along a
-direction by a symbol and differentiating by it gives the belief's own derivative one step later, covariance included;
-signs and choices are held constant. One kernel does so for any number of directions side by side.
+Predict and update are functions of belief, parameters, process noise and sensor noise. All of these are moved along a
+direction by a symbol; differentiating by it gives the belief's derivative one step later, including the covariance's.
+Signs and choices are held constant. One kernel does so for any number of directions side by side.
 """
 
 import math
@@ -28,14 +28,14 @@ from plant.compiled.paste import kernel_text, pasted
 
 
 def rewritten(outputs: Outputs, replacement: Mapping[str, Expression]) -> Outputs:
-    """Return expressions with other expressions in the place of some symbols.
+    """Return expressions in which other expressions replace some symbols.
 
     Parameters
     ----------
     outputs : dict[str, Expression]
         The expressions.
     replacement : Mapping[str, Expression]
-        What stands for a symbol, by its name.
+        Replacement of each symbol, by its name.
 
     Examples
     --------
@@ -72,7 +72,7 @@ def directional(outputs: Outputs, moving: Mapping[str, Expression]) -> Outputs:
     outputs : dict[str, Expression]
         The expressions.
     moving : Mapping[str, Expression]
-        By how much each symbol moves, by its name.
+        Derivative of each symbol along the direction, by its name.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class Sensitivity(NamedTuple):
     Parameters
     ----------
     residuals, variances : ndarray, shape (samples, channels)
-        Innovations and the variances predicted for them [SI].
+        Innovations and their predicted variances [SI].
     residual_slopes, variance_slopes : ndarray, shape (samples, channels, directions)
         Their derivatives [SI over the direction's unit].
     """
@@ -138,7 +138,7 @@ class Sensitivity(NamedTuple):
 
 
 def innovation_sensitivity(problem: FilterProblem, directions: Array, belief: Array | None = None) -> Sensitivity:
-    """Filter a log by an EKF, and carry along how the innovations move with what the filter assumes.
+    """Filter a log by an EKF, together with the derivatives of the innovations by the filter's assumptions.
 
     Parameters
     ----------
@@ -162,15 +162,17 @@ def innovation_sensitivity(problem: FilterProblem, directions: Array, belief: Ar
 
 
 Fix: TypeAlias = Callable[[Array, Array, Array, Array, Array, float], tuple[float, ...]]
-"""``fix(belief, rows, before, after, sample, j)``: of the derivatives a step later, what all directions share."""
+"""``fix(belief, rows, before, after, sample, j)``: the part of the next step's derivatives that all directions
+share."""
 
 Vary: TypeAlias = Callable[
     [Array, Array, Array, Array, Array, float, tuple[float, ...], int, Array, Array, Array, Array], None
 ]
-"""``vary(belief, ..., j, fixed, i, directions, slopes, moved, spread)``: derivatives along direction i, likewise."""
+"""``vary(belief, ..., j, fixed, i, directions, slopes, moved, spread)``: the next step's derivatives along direction
+i."""
 
 Act: TypeAlias = Callable[[Array, Array, Array, Array, Array, float, Array, Array], None]
-"""``act(belief, ..., j, residual, variance)``: belief, innovations and their variances, a step later."""
+"""``act(belief, ..., j, residual, variance)``: belief, innovations and their variances, one step later."""
 
 
 def run(
@@ -190,7 +192,7 @@ def run(
     vary_update: Vary,
     update: Act,
 ) -> None:
-    """Filter; carry the belief's derivatives along before each half of a step moves the belief itself.
+    """Filter; each half of a step first propagates the belief's derivatives, then the belief itself.
 
     Parameters
     ----------
@@ -205,7 +207,7 @@ def run(
     drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
         The log [SI].
     substeps : int
-        Steps a sample.
+        Steps for each sample.
     """
     residuals, variances, moved, spread = found
     for k in range(measured.shape[0]):

@@ -1,4 +1,4 @@
-"""Exact sensitivities of a run to parameters: the step function, differentiated, carries them along as states."""
+"""Exact sensitivities of a run to parameters: the differentiated step function carries them along as states."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,9 +9,10 @@ from plant.solvers.steps import StepFunction
 
 
 def sensitivity_step(step: StepFunction, width: int, names: Sequence[str]) -> StepFunction:
-    """Return a step whose state is the plant's and its derivatives by some parameters, one after the other.
+    """Return a step whose state is the plant's state and its derivatives by some parameters, one after the other.
 
-    They are those of the discrete run, not of the equations it approximates: a least-squares fit's Jacobian is exact.
+    The derivatives are those of the discrete run, not of the continuous equations, so a least-squares fit's Jacobian is
+    exact.
 
     Parameters
     ----------
@@ -21,7 +22,7 @@ def sensitivity_step(step: StepFunction, width: int, names: Sequence[str]) -> St
     Returns
     -------
     callable
-        A step on ``width * (1 + len(names))`` states: the plant's, then for each parameter their derivatives by it.
+        A step on ``width * (1 + len(names))`` states: the plant's, then their derivatives by each parameter.
     """
 
     def carried(state: Sequence[Scalar], drives: tuple[Scalar, Scalar], p: Any, h: Scalar) -> tuple[Scalar, ...]:

@@ -1,8 +1,8 @@
-"""Noise levels read off the log: process and sensor covariances of greatest likelihood, the published ones beside.
+"""Noise levels from the log: process and sensor covariances of maximum likelihood, compared with the published ones.
 
-A filter's interval is as good as its Q and R. Both are fitted here by the likelihood of the innovations (Mehra 1970
-asks for the same by their whiteness), each presumed within a factor of twenty of what the model brings, so that a log
-that says nothing about one of them leaves it where it was.
+A filter's interval is only as good as its Q and R. Both are fitted here by the likelihood of the innovations (Mehra
+1970 demands the same by their whiteness), each with a prior of a factor of twenty about the model's value, so that a
+log without information on one of them leaves it unchanged.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,10 +26,10 @@ from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
 NOISE_SPREAD = 3.0
-"""Standard deviation of what is presumed of the logarithm of a noise level: a factor of twenty either way."""
+"""Prior standard deviation of the logarithm of a noise level: a factor of twenty in either direction."""
 
 LEAST_SHARE = 0.25
-"""Of the noise of measured motor speed, so much at least is taken to be the sensor's, and unseen by the plant."""
+"""Least share of the noise of measured motor speed that is attributed to the sensor, and does not act on the plant."""
 
 PUBLISHED_STEP = 1e-4
 """Step for which equation 7.6 gives covariances [s]."""
@@ -40,38 +40,38 @@ PUBLISHED_NOISE: Mapping[str, float] = {
     "acceleration_m_s2": 1e-6 / PUBLISHED_STEP,
     "bulk_modulus_pa": 1e-12 / PUBLISHED_STEP,
 }
-"""Q of equation 7.6 as densities, by state name [SI squared a second]; far too small on bulk modulus (errata E10)."""
+"""Q of equation 7.6 as densities, by state name [SI squared per second]; far too small on bulk modulus (errata E10)."""
 
 PUBLISHED_VARIANCES: Mapping[str, float] = {"position_m": 1e-12, "velocity_m_s": 1e-4}
 """R of equation 7.7, by channel [SI squared] (errata E11)."""
 
 SCREENED = ((1e3, 1.0), (1.0, 1.0), (1e-1, 1.0), (1e-2, 1.0), (1e-3, 1.0), (1.0, 1e-2), (1e-3, 1e-2))
-"""Factors on all process noise and on all sensor noise between which the search's start is chosen, in this order."""
+"""Factors on all process noise and on all sensor noise from which the search's start is chosen, in this order."""
 
 SCREENED_SAMPLES = 20_000
-"""Beginning of a longer log on which the starts are compared."""
+"""Number of initial samples of a longer log on which the starts are compared."""
 
 ROUNDS = 3
-"""How often at most the levels are tuned again, each time from where the constants were found."""
+"""Largest number of times that the levels are tuned again, each time starting at the constants found."""
 
 MOVED = 1.0
-"""Move of a constant from one round to the next above which there is another [standard deviations]."""
+"""Change of a constant from one round to the next above which another round follows [standard deviations]."""
 
 
 @dataclass(frozen=True)
 class NoiseSetting:
-    """Noise levels, and how they fare on a log.
+    """Noise levels, and their results on a log.
 
     Parameters
     ----------
     noise : Mapping[str, float]
-        Process-noise densities by state name [SI squared a second]; of a logarithmic state, those of its logarithm.
+        Process-noise densities by state name [SI squared per second]; for a logarithmic state, those of its logarithm.
     variances : Mapping[str, float]
         Sensor variances by channel [SI squared].
     log_likelihood : float
         Log-likelihood of the log [dimensionless].
     nis : Mapping[str, float]
-        Mean normalised innovation squared by channel [dimensionless]; 1 where the filter believes what the log shows.
+        Mean normalised innovation squared by channel [dimensionless]; 1 if the filter is consistent with the log.
     """
 
     noise: Mapping[str, float]
@@ -82,23 +82,23 @@ class NoiseSetting:
 
 @dataclass(frozen=True)
 class Tuning:
-    """Noise levels of greatest likelihood, beside those that were there before and those of the paper.
+    """Noise levels of maximum likelihood, with the given ones and those of the paper for comparison.
 
     Parameters
     ----------
     tuned : NoiseSetting
-        Of greatest likelihood, in the form that `estimation.filters.run.run_filter` takes as ``noise`` and
+        Levels of maximum likelihood, in the form that `estimation.filters.run.run_filter` takes as ``noise`` and
         ``variances``.
     given : NoiseSetting
-        What the model brings, and the sensors' noise as read off the log.
+        The model's process noise, and the sensors' noise as estimated from the log.
     published : NoiseSetting
-        Equations 7.6 and 7.7; what they say nothing about stays as given.
+        Equations 7.6 and 7.7; levels that they do not give stay as given.
     spread : Mapping[str, float]
-        Standard deviation of each tuned level's logarithm, by state name and by channel [dimensionless]: 3 is what was
-        presumed, so a level near it is one of which the log says nothing.
+        Standard deviation of each tuned level's logarithm, by state name and by channel [dimensionless]. The prior has
+        3, so the log contains no information on a level near 3.
     prior : Gaussian
-        The belief before the first sample from which all three fared as they did [SI]: as wide as the one given, its
-        constants where they were found.
+        The belief before the first sample from which all three results were obtained [SI]: as wide as the given one,
+        with constants at the values found.
     """
 
     tuned: NoiseSetting
@@ -123,8 +123,8 @@ def tune(
     """Tune a filter's noise levels on a log.
 
     A state without process noise, such as a constant bulk modulus, stays without. A filter that is certain of its
-    motion and far from the answer locks onto a wrong one and finds that likely, so certainty grows by degrees, and
-    each filter begins where the likeliest before it found the constants.
+    motion and far from the solution locks onto a wrong one and finds it likely. So certainty is increased in steps, and
+    each filter begins at the constants of the most likely one before it.
 
     Parameters
     ----------
@@ -133,12 +133,12 @@ def tune(
     channels : tuple of str, optional
         Channels to use, as in `estimation.filters.run.run_filter`.
     variances : Mapping[str, float], optional
-        Sensor variances to begin from, and that of motor speed [SI squared]; by default read off the log.
+        Initial sensor variances, and that of motor speed [SI squared]; by default estimated from the log.
     noise : Mapping[str, float], optional
-        Process-noise densities to begin from that replace the model's [SI squared a second].
+        Initial process-noise densities that replace the model's [SI squared per second].
     told : Record, optional
-        What the filter is told of the log, as `estimation.log_checks.told_once` has it; all of it if not given. What
-        the sensors resolve is read off the log itself.
+        The part of the log that the filter receives, as in `estimation.log_checks.told_once`; by default all of it. The
+        sensors' resolution is estimated from the log itself.
 
     Raises
     ------
@@ -174,17 +174,17 @@ def tune(
 def noise_coordinates(
     problem: FilterProblem, record: Record, parameters: EhaParameters, speed_variance: float | None = None
 ) -> list[Coordinate]:
-    """Return the logarithms of process and sensor noise as coordinates, presumed within a factor of the given.
+    """Return the logarithms of process and sensor noise as coordinates, with a prior of a factor about the given.
 
     Parameters
     ----------
     problem : FilterProblem
-        The task; a process noise of 0 stays so.
+        The task; a process noise of 0 stays 0.
     record : Record
         The log; a sensor's variance stays above that of its quantum, and the noise of differential pressure above a
-        quarter of what the noise of measured motor speed makes it.
+        quarter of the value that the noise of measured motor speed causes.
     speed_variance : float, optional
-        Measurement variance of motor speed [rad^2/s^2]; read off the log if not given.
+        Measurement variance of motor speed [rad^2/s^2]; estimated from the log if not given.
     """
     names = layout(EKF, problem.model, problem.channels).rows
     unseen = speed_noise(record, parameters, speed_variance)
@@ -205,12 +205,12 @@ def noise_coordinates(
 
 
 def speed_noise(record: Record, p: EhaParameters, variance: float | None = None) -> float:
-    """Return the noise density of differential pressure that comes of the noise of measured speed.
+    """Return the noise density of differential pressure that the noise of measured speed causes.
 
     Parameters
     ----------
     variance : float, optional
-        Of measured speed [rad^2/s^2]; read off the log if not given.
+        Variance of measured speed [rad^2/s^2]; estimated from the log if not given.
 
     Returns
     -------
@@ -229,7 +229,7 @@ def _tuned(problem: FilterProblem, found: Maximum) -> FilterProblem:
 
 
 def _continued(problem: FilterProblem, trace: Trace) -> tuple[FilterProblem, float]:
-    """Return the task with its constants where a filter found them, and their greatest move in standard deviations."""
+    """Return the task with its constants moved to those that a filter found, and the largest move in deviations."""
     constant = problem.noise == 0.0
     if not constant.any() or not np.all(np.isfinite(trace.mean)):
         return problem, 0.0
@@ -241,7 +241,7 @@ def _continued(problem: FilterProblem, trace: Trace) -> tuple[FilterProblem, flo
 def _likeliest_start(
     problem: FilterProblem, coordinates: Sequence[Coordinate]
 ) -> tuple[FilterProblem, list[Coordinate]]:
-    """Return the task and the coordinates with the guesses, among a few, that explain the beginning of the log best."""
+    """Return the task and the coordinates whose guesses, among a few, explain the beginning of the log best."""
     short = replace(problem, measured=problem.measured[:SCREENED_SAMPLES], drives=problem.drives[:SCREENED_SAMPLES])
     best, process, sensor = -np.inf, 1.0, 1.0
     for on_process, on_sensor in SCREENED:

@@ -1,1 +1,1 @@
-"""Batch studies: thousands of cases from one study file, in a store that survives whatever stops them."""
+"""Batch studies: thousands of cases from one study file, in a store that survives any interruption."""

@@ -1,4 +1,4 @@
-"""The cases of a study: series and what is done with them, each case under a key that hashes its content."""
+"""The cases of a study: each series and the methods applied to it. The key of a case is a hash of its content."""
 
 import hashlib
 import json
@@ -21,25 +21,26 @@ from faults.conditions import CONDITIONS, LEVELS
 from plant.eha.rig import Rig
 
 Hash: TypeAlias = Any
-"""A hash that has begun; the standard library does not name its type."""
+"""A hash object in progress; the standard library does not name its type."""
 
 RESULTS_VERSION = 2
-"""Rises when a case's result changes for a reason that its content does not show; rows made before are then remade."""
+"""Increase this when results change for a reason that the content of a case does not show; older rows are then
+remade."""
 
 TASK_SECONDS = 2.0
-"""About how long a worker is given work for at a time [s]: what a crash can cost, and what a part holds."""
+"""Approximate duration of one worker task [s]: the most work that a crash can lose, and the size of a part."""
 
 MOST_SERIES = 1_000_000
-"""Series of one `[[runs]]`, all of which are listed before the first is run [count]."""
+"""Maximum number of series in one `[[runs]]` [count]; all are listed before the first is run."""
 
 MOST_CASES = 2048
-"""Cases of a task at most, however short they are [count]; judged."""
+"""Maximum number of cases in a task, however short they are [count]; chosen by judgement."""
 
 COSTS: Mapping[str, tuple[float, float]] = {"filter": (0.0, 2.5e-8), "estimate": (0.3, 2e-5), "diagnose": (0.05, 1e-6)}
-"""About what a case costs on one core, by verb: by itself, and for each tenth of a millisecond of its series [s]."""
+"""Approximate cost of a case on one core, by verb: fixed, and for each tenth of a millisecond of its series [s]."""
 
 SERIES_COST = 4e-7
-"""About what it costs to simulate or read a tenth of a millisecond of a series, once [s]."""
+"""Approximate one-off cost of simulating or reading a tenth of a millisecond of a series [s]."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +69,11 @@ class Plan:
     Parameters
     ----------
     blocks : tuple
-        Series, and what is done with each of them, a block at a time.
+        Blocks of series, each with the works to do on every series in it.
     rigs : Mapping[str, Rig]
-        Of the folders that have one of their own.
+        Rigs of the folders that have their own.
     links : Mapping[str, str]
-        Names that lead to a log which counts under another name, and that name.
+        Alternative names of logs, each with the name under which the log is counted.
     """
 
     study: Study
@@ -86,7 +87,7 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """About how long all cases take on one core [s]."""
+        """Approximate time for all cases on one core [s]."""
         return sum(_seconds(sum(map(_steps, series)), len(series), works) for series, works in self.blocks)
 
     @cached_property
@@ -109,7 +110,7 @@ class Plan:
         return list(dict.fromkeys(key for group in self.groups for key in group.keys))
 
     def tasks(self, done: Collection[str], workers: int) -> Iterator[Task]:
-        """Yield what is left to do, in pieces that take about `TASK_SECONDS`, less where workers would be idle.
+        """Yield the remaining work in pieces of about `TASK_SECONDS`, or less if workers would otherwise be idle.
 
         Parameters
         ----------
@@ -152,9 +153,10 @@ def _left(group: Group, done: Collection[str]) -> Group:
 
 @dataclass(eq=False)
 class _Gathered:
-    """Cases gathered for a task of a wanted duration; it ends where a cut costs least.
+    """Cases gathered for a task of about a given duration; the task ends where a cut costs least.
 
-    That is where the lanes of filters are full, or where a simulated motion ends that would be simulated again.
+    A cut costs least when the lanes of the filters are full, or between two simulated motions, so that none is
+    simulated twice.
     """
 
     budget: float
@@ -215,12 +217,12 @@ def package_version(name: str) -> str:
 
 
 def config_hash(study: Study, rig: Rig[Any], rigs: Mapping[str, Rig[Any]]) -> str:
-    """Return a hash of a study's content, and of its rigs'.
+    """Return a hash of a study's content and of its rigs.
 
     Parameters
     ----------
     rigs : Mapping[str, Rig]
-        Of folders that have one of their own.
+        Rigs of the folders that have their own.
 
     Returns
     -------
@@ -232,7 +234,7 @@ def config_hash(study: Study, rig: Rig[Any], rigs: Mapping[str, Rig[Any]]) -> st
 
 
 def _simulated(runs: Runs) -> Iterator[Simulated]:
-    """Yield the series, seeds innermost: what seeds share is then computed once."""
+    """Yield the series with seeds in the innermost loop, so that what seeds share is computed once."""
     names = runs.conditions if runs.conditions is not None else (() if runs.severities else tuple(CONDITIONS))
     found = [CONDITIONS[name] for name in names]
     places = [(one.name, float(LEVELS.index(one.leakage)), float(LEVELS.index(one.friction))) for one in found]
@@ -263,19 +265,19 @@ def _numbers(rig: Rig[Any]) -> list[Any]:
 
 
 def _motion(series: Series) -> Series | None:
-    """Return the key that series of one motion share; logs have none."""
+    """Return the key that all series with the same motion share; None for logs."""
     return replace(series, condition=None, seed=0, sensors="") if isinstance(series, Simulated) else None
 
 
 def _steps(series: Series) -> float:
-    """Return about how many tenths of a millisecond a series is worth, a sample at the least."""
+    """Return the approximate length of a series in tenths of a millisecond, at least one for each sample."""
     if isinstance(series, Simulated):
         return series.samples * max(1.0, series.sample_time_s / 1e-4)
     return float(series.samples)
 
 
 def _seconds(steps: float, series: int, works: Collection[Work]) -> float:
-    """Return roughly how long a number of series takes together on one core [s]."""
+    """Return the approximate total time of a number of series on one core [s]."""
     each = [COSTS[work.verb] for work in works]
     return steps * (SERIES_COST + sum(step for _, step in each)) + series * sum(alone for alone, _ in each)
 

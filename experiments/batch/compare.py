@@ -1,4 +1,4 @@
-"""Two studies, case by case: what got better, what worse, and whether chance explains it."""
+"""Compares two studies case by case: what improved, what got worse, and whether chance explains the difference."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ import pandas as pd
 from plant.errors import HydrostateError
 
 SERIES = ["plant", "file", "drive", "sensors", "condition", "seed", "duration_s", "sample_time_s"]
-"""What a series is. Cases of one series share its noise, so a series is drawn whole."""
+"""Columns that identify a series. Cases of one series share its noise, so the bootstrap draws whole series."""
 
 DOING = ["form", "method", "pressure", "told", "start_pa", "start_std_pa"]
 
@@ -16,22 +16,22 @@ RESAMPLES = 2000
 """Bootstrap draws of series for an interval [count]: fifty of them lie beyond each end of a 95 % interval."""
 
 BLOCK = 200
-"""Draws that are held in memory at a time [count]."""
+"""Number of draws held in memory at a time [count]."""
 
 MEASURES = (
     ("error of bulk modulus", "%", "size_percent", -1.0),
     ("right class", "%", "right_percent", 1.0),
     ("cases with an answer", "%", "answered_percent", 1.0),
 )
-"""What is compared: words, unit, column, and whether more of it is better."""
+"""The measures to compare: name, unit, column, and the sign: 1 if more is better, -1 if less is better."""
 
 
 def compare_studies(first: pd.DataFrame, second: pd.DataFrame, seed: int = 2024) -> pd.DataFrame:
     """Compare the cases that two studies have in common.
 
-    Where each study does it in one way, and the ways differ (one filter in the one, another in the other), that is what
-    is compared, and the rest must agree. Cases are paired, so that what they share cancels; intervals are percentiles
-    of a bootstrap that draws whole series (Efron and Tibshirani 1993, chapter 13).
+    If each study uses a single method and the two methods differ (for example two filters), the methods are compared
+    and all other settings must agree. Cases are paired, so that what they share cancels; intervals are percentiles of a
+    bootstrap that draws whole series (Efron and Tibshirani 1993, chapter 13).
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ def compare_studies(first: pd.DataFrame, second: pd.DataFrame, seed: int = 2024)
     Returns
     -------
     pandas.DataFrame
-        One row a verb, measure and condition, with ``all`` for all conditions together: pairs, series, the two means
-        [%], their difference second less first with its 95 % interval [%], and ``better``, ``worse`` or ``no
+        One row for each verb, measure and condition, with ``all`` for all conditions together: pairs, series, the two
+        means [%], their difference (second minus first) with its 95 % interval [%], and ``better``, ``worse`` or ``no
         difference shown``.
 
     Raises
@@ -69,7 +69,7 @@ def compare_studies(first: pd.DataFrame, second: pd.DataFrame, seed: int = 2024)
 
 
 def _paired(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, str]:
-    """Return cases side by side, and in words what was changed between the studies."""
+    """Return cases side by side, and a description of what changed between the studies."""
     changed: list[str] = []
     on = list(SERIES)
     for name in (*DOING, *SERIES[:1], "drive", "sensors"):
@@ -85,7 +85,7 @@ def _paired(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, st
 
 
 def _matchable(frame: pd.DataFrame, on: list[str]) -> pd.DataFrame:
-    """Return cases without gaps in the columns that match them: an entry that both lack counts as equal."""
+    """Return cases with gaps filled in the matching columns, so that an entry missing from both counts as equal."""
     filled = {name: frame[name].astype(object).where(frame[name].notna(), "") for name in on}
     return frame.assign(**filled).drop_duplicates(on)
 
@@ -121,7 +121,7 @@ def _difference(pairs: pd.DataFrame, column: str, better: float, rng: np.random.
 
 
 def _interval(sums: np.ndarray, counts: np.ndarray, rng: np.random.Generator) -> tuple[float | None, float | None]:
-    """Return the 95 % interval of a mean, series drawn with replacement; none from fewer than five series."""
+    """Return the 95 % bootstrap interval of a mean, drawing whole series; no interval for fewer than five series."""
     n = len(sums)
     if n < FEWEST_SERIES:
         return None, None
@@ -134,23 +134,23 @@ def _interval(sums: np.ndarray, counts: np.ndarray, rng: np.random.Generator) ->
 
 
 FEWEST_SERIES = 5
-"""From fewer series no interval is given: a bootstrap of so few says too little."""
+"""Minimum number of series for an interval: a bootstrap of fewer is not informative."""
 
 
 def in_sentences(table: pd.DataFrame, names: Sequence[str]) -> list[str]:
-    """Say what got better and what worse.
+    """Describe what improved and what got worse.
 
     Parameters
     ----------
     table : pandas.DataFrame
         From `compare_studies`.
     names : sequence of str
-        What the first and the second study are called.
+        Names of the first and the second study.
 
     Returns
     -------
     list of str
-        One sentence a verb and measure, over all conditions.
+        One sentence for each verb and measure, over all conditions.
     """
     sentences: list[str] = []
     for row in table[table["condition"] == "all"].to_dict("records"):

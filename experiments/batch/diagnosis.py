@@ -1,4 +1,4 @@
-"""The class of a log, as a batch asks for it: the one place that knows how a log is diagnosed."""
+"""Diagnosis of a log for a batch study. No other module of the batch runs a diagnosis."""
 
 import json
 import math
@@ -19,7 +19,7 @@ from plant.errors import LogWarning
 from plant.log.record import Record
 
 TOLD_APART = 1.001
-"""Least ratio of the best class's probability to the runner-up's at which a class is named [dimensionless]."""
+"""Minimum ratio of the best class's probability to the runner-up's at which a class is named [dimensionless]."""
 
 WHY_NONE = {
     ClassCode.CHANNEL_ZERO,
@@ -32,13 +32,13 @@ WHY_NONE = {
 
 
 def diagnosed(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEstimate] | None = None) -> dict[str, Any]:
-    """Say which of the nine conditions a log was taken in, or that it is in none; see `diagnose_log`.
+    """Diagnose which of the nine conditions a log was taken in, or that it fits none; see `diagnose_log`.
 
     Returns
     -------
     dict[str, Any]
-        Entries of a row: outcome, reason, severities, and where there is a class, it, its runner-up and the ratio of
-        their probabilities. A log that is in none of the nine is a mismatch without a class.
+        Entries of a row: outcome, reason, severities and, if there is a class, the class, its runner-up and the ratio
+        of their probabilities. A log that fits none of the nine is a mismatch without a class.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def class_row(found: Finding) -> dict[str, Any]:
 
 
 def _why_unknown(found: Finding) -> str:
-    """Return what speaks against the nine conditions: sensors and columns alone if they are wrong."""
+    """Return the evidence against the nine conditions; if sensors or columns are wrong, return only that evidence."""
     wrong = [one for one in found.against if one.code in WRONG_INPUT]
     more = [one for one in found.against if one.code != AgainstCode.OUTSIDE_CONDITIONS]
     return "; ".join(map(str, wrong or more or found.against))
@@ -99,7 +99,7 @@ def _severities(found: Finding) -> dict[str, Any]:
 
 
 def _without_class(found: Finding) -> dict[str, Any]:
-    """Return the entries of a log for which there are no probabilities: it holds too little, or no circuit fits."""
+    """Return the entries of a log that has no probabilities, because it holds too little or no circuit fits."""
     said = "; ".join(str(note) for note in (*found.notes, *found.against) if note.code in WHY_NONE)
     outcome = Outcome.FAILED if found.outcome is Outcome.OK else found.outcome
     return {"outcome": outcome.value, "reason": said, "trusted": False}

@@ -34,7 +34,7 @@ ROW_INCHES = 0.34
 """Height of a condition's row in a figure [inch]."""
 
 FARTHEST_PERCENT = 30.0
-"""Errors beyond this stand at the edge [%]: a method that fails should not hide those that do not."""
+"""Errors beyond this are drawn at the edge [%], so that a method that fails does not hide the others."""
 
 
 def way_in_words(row: Mapping[Any, Any]) -> str:
@@ -43,7 +43,7 @@ def way_in_words(row: Mapping[Any, Any]) -> str:
     Parameters
     ----------
     row : Mapping[str, Any]
-        Its plant, drive, sensors, verb, form, method and pressure.
+        The method's plant, drive, sensors, verb, form, method and pressure.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def way_in_words(row: Mapping[Any, Any]) -> str:
 def _draw_errors(table: pd.DataFrame) -> Figure:
     """Draw the error of bulk modulus of every method in every condition.
 
-    The median and the range from the 5th to the 95th percentile [%], a row a condition.
+    Each condition has one row, with the median and the range from the 5th to the 95th percentile [%].
     """
     shown = table[table["median_percent"].notna()]
     count = shown["condition"].nunique()
@@ -87,7 +87,7 @@ def _draw_errors(table: pd.DataFrame) -> Figure:
 
 
 def draw_classes(table: pd.DataFrame) -> Figure:
-    """Draw how many logs belong to which class."""
+    """Draw the number of logs in each class."""
     margins = Margins(left=2.3, top=0.45)
     figure, (axis,) = panels("Logs by the class that was found", 1, 1, 1.0 + ROW_INCHES * len(table), margins)
     shown = table.iloc[::-1]

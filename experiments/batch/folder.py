@@ -1,4 +1,4 @@
-"""Folder of a store: local, or any place that fsspec reaches; files are written whole or not at all."""
+"""Folder of a store: local, or any place that fsspec reaches; a file is written completely or not at all."""
 
 import os
 import re
@@ -12,16 +12,16 @@ from plant.atomic import replacing
 from plant.errors import HydrostateError
 
 TEMPORARY = ".tmp"
-"""How the name of a file ends that is not whole yet."""
+"""Suffix of a file that is not yet complete."""
 
 LOCK = "lock"
 
 
 class Folder:
-    """A folder on a disk, made when it is first written to; a subclass keeps its files elsewhere."""
+    """A folder on a disk, created at the first write; a subclass keeps its files elsewhere."""
 
     locks = True
-    """Whether the place grants the right to write to one process alone."""
+    """Whether the place can restrict writing to one process."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -50,24 +50,24 @@ class Folder:
             temporary.write(content)
 
     def files(self, below: str = "") -> list[str]:
-        """Return the files directly in a sub-folder, by name and in order; temporary ones too."""
+        """Return the names of the files directly in a sub-folder, sorted and including temporary files."""
         place = Path(self.name, below)
         return sorted(one.name for one in place.iterdir() if one.is_file()) if place.is_dir() else []
 
     def move(self, file: str, to: str) -> None:
-        """Rename a file; one that has gone meanwhile is none."""
+        """Rename a file; do nothing if it no longer exists."""
         target = Path(self.name, to)
         target.parent.mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
             Path(self.name, file).replace(target)
 
     def remove(self, file: str) -> None:
-        """Remove a file; one that has gone meanwhile is none."""
+        """Remove a file; do nothing if it no longer exists."""
         Path(self.name, file).unlink(missing_ok=True)
 
     @contextmanager
     def writer(self) -> Generator[None]:
-        """Hold the right to write, where the place can grant it to one process alone.
+        """Hold the right to write, if the place can restrict it to one process.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class Folder:
 
 
 def _lock(number: int) -> None:
-    """Take a lock that the system drops when the process ends."""
+    """Take a lock that the system releases when the process ends."""
     if os.name == "nt":  # pragma: no cover -- the other system's way
         import msvcrt
 
@@ -98,7 +98,7 @@ def _lock(number: int) -> None:
 
 
 class _RemoteFolder(Folder):
-    """A place that fsspec reaches. No lock can be had there: two writers write the same parts under the same names."""
+    """A place that fsspec reaches. It has no lock: two writers write the same parts under the same names."""
 
     locks = False
 
@@ -162,7 +162,7 @@ def open_folder(place: str | Path) -> Folder:
     Returns
     -------
     Folder
-        The folder; nothing is made yet.
+        The folder; nothing is created yet.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Filters side by side: cases wait until the lanes of a kernel are full, and what comes of them goes to their rows."""
+"""Filters side by side: cases wait until the lanes of a kernel are full, and the results are written to their rows."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -21,7 +21,7 @@ class Waiting(NamedTuple):
     Parameters
     ----------
     truth : float or None
-        The true bulk modulus, where that is known [Pa].
+        The true bulk modulus, if known [Pa].
     """
 
     place: int
@@ -30,14 +30,14 @@ class Waiting(NamedTuple):
 
 
 class Lanes:
-    """Filters that wait for others like them, until the lanes of a kernel are full."""
+    """Filters that wait for others of the same kind, until the lanes of a kernel are full."""
 
     def __init__(self, rows: Rows) -> None:
         self._rows = rows
         self._waiting: dict[tuple[object, ...], list[Waiting]] = {}
 
     def add(self, one: Waiting) -> None:
-        """Let a filter wait; those that fill the lanes of a kernel are run."""
+        """Add a filter to those that wait; run them when they fill the lanes of a kernel."""
         problem = one.problem
         alike = (id(problem.model), problem.channels, problem.sample_time, problem.measured.shape)
         waiting = self._waiting.setdefault(alike, [])
@@ -46,7 +46,7 @@ class Lanes:
             self._run(self._waiting.pop(alike))
 
     def finish(self) -> None:
-        """Run all that wait, whether their lanes are full or not."""
+        """Run all waiting filters, even if their lanes are not full."""
         for waiting in self._waiting.values():
             self._run(waiting)
         self._waiting.clear()
@@ -61,12 +61,12 @@ class Lanes:
 
 
 def write_filtered(rows: Rows, ran: Sequence[Waiting], traces: Sequence[Trace]) -> None:
-    """Write the results of filters of one model and length.
+    """Write the results of filters that share one model and length.
 
     Parameters
     ----------
     traces : sequence of Trace
-        What each of them returned.
+        The result of each filter.
     """
     problem = ran[0].problem
     model, state = problem.model, problem.model.index(BULK_MODULUS)

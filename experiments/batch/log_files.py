@@ -1,4 +1,4 @@
-"""Files that a pattern matches, where a folder is entered once whatever links lead to it."""
+"""Files that a pattern matches. Each folder is entered once, however many links lead to it."""
 
 from collections.abc import Iterator
 from glob import escape, glob
@@ -13,13 +13,13 @@ def matching(pattern: str) -> list[str]:
     Parameters
     ----------
     pattern : str
-        As `glob.glob` takes it; ``**`` stands for a folder and all below it.
+        A pattern for `glob.glob`; ``**`` stands for a folder and all folders below it.
 
     Returns
     -------
     list of str
-        Paths of regular files, and of links to them. ``**`` enters each folder once: links in a circle have an end,
-        and a link to a folder that holds the search is not followed. The store of a study holds results and no logs,
+        Paths of regular files, and of links to them. ``**`` enters each folder once, so circular links are harmless,
+        and a link to a folder that contains the search is not followed. The store of a study holds results and no logs,
         so it is not entered.
 
     Examples
@@ -43,7 +43,7 @@ def _matches(pattern: str) -> Iterator[str]:
 
 
 def _folders(top: str) -> Iterator[str]:
-    """Yield a folder and all below it, each once, those behind links last; hidden ones are left out, as glob does."""
+    """Yield a folder and all folders below it once each, linked ones last; hidden ones are skipped, as in glob."""
     top_itself = Path(top).resolve()
     seen: set[Path] = set()
     own, linked = [Path(top)], list[Path]()

@@ -1,4 +1,4 @@
-"""Pages of the worst logs of a batch study, to which its report leads."""
+"""Pages of the worst logs of a batch study, linked from its report."""
 
 from collections.abc import Collection
 
@@ -16,7 +16,7 @@ from experiments.running.refusal import refused
 from plant.errors import HydrostateError
 
 PAGES = "pages"
-"""Sub-folder of a store that holds them."""
+"""Sub-folder of a store that holds the pages."""
 
 
 def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
@@ -27,14 +27,14 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
     plan : Plan
         The study.
     store : PartStore
-        Its rows; the pages are written into its folder.
+        Store with the study's rows; the pages are written into its folder.
     most : int
-        Pages at most [count].
+        Maximum number of pages [count].
 
     Returns
     -------
     list of str
-        Why a page could not be written, a sentence a log.
+        One sentence for each log whose page could not be written, with the reason.
     """
     logs = {
         one.series.file: (one.series, work)
@@ -65,12 +65,12 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
 
 
 def pages_in(folder: Folder, files: Collection[str]) -> dict[str, str]:
-    """Return the pages of logs that a folder has.
+    """Return the pages of logs in a folder.
 
     Returns
     -------
     dict[str, str]
-        Path from the report, by log.
+        Path of each log's page, relative to the report.
     """
     there = set(folder.files(f"{PAGES}/"))
     named = {file: file_name(file) for file in files}

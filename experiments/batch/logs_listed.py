@@ -1,4 +1,4 @@
-"""The logs that a study names, each once whatever names lead to it."""
+"""The logs that a study names, each counted once even if several names lead to it."""
 
 import os
 from collections.abc import Collection, Mapping
@@ -21,7 +21,7 @@ class Listed(NamedTuple):
     Parameters
     ----------
     links : Mapping[str, str]
-        Names that lead to a log which counts under another name, and that name.
+        Alternative names of logs, each with the name under which the log is counted.
     """
 
     logs: tuple[Log, ...]
@@ -29,22 +29,22 @@ class Listed(NamedTuple):
 
 
 def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any]]) -> Listed:
-    """List the logs that a pattern finds; they are hashed.
+    """List the logs that a pattern finds, and hash them.
 
     Parameters
     ----------
     place : int
-        Of the `[[logs]]` in the study, for the error.
+        Index of the `[[logs]]` in the study, for the error message.
     folder : Path
-        From which the pattern begins.
+        Folder in which the pattern starts.
     rigs : Mapping[str, Rig]
-        Of folders that have one of their own.
+        Rigs of the folders that have their own.
 
     Returns
     -------
     Listed
-        The logs. Of several names of one file, the file's own counts, else the first; where their folders have other
-        rig files, each counts.
+        The logs. If a file has several names, its own name counts, else the first; names whose folders have different
+        rig files all count.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def _log(path: Path, folder: Path, logs: Logs, rigs: Mapping[str, Rig[Any]]) -> 
 
 
 def _identity(path: str) -> object:
-    """Return the identity of a file, whatever its name."""
+    """Return the identity of a file, which does not depend on its name."""
     try:
         found = Path(path).stat()
     except OSError:
@@ -91,12 +91,12 @@ def _identity(path: str) -> object:
 
 
 def nearest_folder(file: str, folders: Collection[str]) -> str:
-    """Return which of several folders is the nearest above a file; empty where none is.
+    """Return which of several folders is the nearest above a file, or an empty text if none is.
 
     Parameters
     ----------
     file : str
-        Path with slashes, as those of the folders.
+        Path with slashes, like the folders.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def nearest_folder(file: str, folders: Collection[str]) -> str:
 
 
 def read_listed(log: Log, rig: Rig[Any], required: Collection[str]) -> Record:
-    """Return the run that a listed log holds, as its study says that it is read.
+    """Return the run in a listed log, read with the settings of its study.
 
     Parameters
     ----------

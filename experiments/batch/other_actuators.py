@@ -1,4 +1,4 @@
-"""Cases of a study whose actuator is not the gear-pump one: simulated and found by what its kind registers."""
+"""Cases of a study whose actuator is not the gear-pump one: its registered kind simulates and analyses them."""
 
 import json
 from collections.abc import Iterator
@@ -42,7 +42,7 @@ def simulated_run(kind: ActuatorKind, series: Simulated, rig: Rig) -> Record:
     Parameters
     ----------
     series : Simulated
-        One of `simulated_of`.
+        A series from `simulated_of`.
     """
     simulation = offered(kind, "simulate")
     asked = {
@@ -56,12 +56,12 @@ def simulated_run(kind: ActuatorKind, series: Simulated, rig: Rig) -> Record:
 
 
 def found_of(kind: ActuatorKind, verb: str, record: Record, rig: Rig) -> Row:
-    """Estimate or diagnose a log, and return what was found as entries of a row.
+    """Estimate or diagnose a log, and return the findings as entries of a row.
 
     Returns
     -------
     Row
-        Outcome and reason; the condition, where one is named; every quantity.
+        Outcome, reason, the condition if one is named, and every quantity.
     """
     asked: LogVerb = offered(kind, verb)
     return row_of(asked.run(record, *asked.prepare(rig, {**asked.options, "seed": 0})))

@@ -1,4 +1,4 @@
-"""Pages of a batch study and of two beside each other: one HTML file each, from stored rows alone."""
+"""HTML pages of a batch study and of a comparison of two: one file each, from stored rows alone."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ from experiments.page.tables import Cell, Column, Row, decimals, right, spaced
 from experiments.page.words import in_words
 
 MOST_TIMES = 1000.0
-"""Ratio of two probabilities beyond which its digits mean nothing [dimensionless]."""
+"""Ratio of two probabilities beyond which its digits are meaningless [dimensionless]."""
 
 
 def _or_dash(value: Any) -> str:
@@ -31,7 +31,7 @@ def _or_dash(value: Any) -> str:
 
 
 def _quantities(text: Any) -> str:
-    """Return what was found: severities of a log without their intervals, which the CSV file has, others with them."""
+    """Return the findings; severities of a log without their intervals, which are in the CSV file, others with them."""
     if pd.isna(text):
         return MISSING
     told = {name: one for name, one in json.loads(text).items() if one["value"] is not None}
@@ -48,13 +48,13 @@ def _amount(one: Mapping[str, Any]) -> str:
 
 
 def _log(row: Row) -> Cell:
-    """Return the name of a log, which leads to its page where there is one."""
+    """Return the name of a log, linked to its page if there is one."""
     name = _or_dash(row["file"])
     return Cell(Markup('<a href="{}">{}</a>').format(row["page"], name) if row["page"] else name, "name")
 
 
 def _state(name: Any) -> Cell:
-    """Return how near a log is to a limit, in the fleet's words."""
+    """Return how near a log is to a limit, in the words of the fleet report."""
     return Cell(MISSING) if pd.isna(name) else Cell(STATES[name], f"fleet-{name}")
 
 
@@ -115,7 +115,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
 }
 
 LISTED = ("logs", "failures")
-"""Tables of cases one by one."""
+"""Tables that list cases one by one."""
 
 VERDICT_TONES: Mapping[str, str] = {"better": "good", "worse": "bad"}
 
@@ -133,17 +133,17 @@ def render_batch_report(
     Parameters
     ----------
     manifest : Mapping[str, Any]
-        Of its store.
+        Manifest of the study's store.
     tables : Mapping[str, pandas.DataFrame]
         From `experiments.batch.summary.summary_tables`.
     files : Mapping[str, bytes]
-        Its figures, by path.
+        Figures of the study, by path.
     done : int
-        Cases that are done [count].
+        Number of finished cases [count].
     pages : Mapping[str, str]
-        Path of a log's own page from the report, by log.
+        Path of each log's own page, relative to the report.
     worst : sequence of LogRow
-        Logs that were diagnosed, the worst first, from `experiments.batch.standing.standing_of`.
+        Diagnosed logs, the worst first, from `experiments.batch.standing.standing_of`.
 
     Returns
     -------
@@ -179,7 +179,7 @@ def render_batch_report(
 
 
 def _without_repetition(logs: pd.DataFrame) -> pd.DataFrame:
-    """Return the table of logs without what every row says, and what severities say beside it; the CSV file has all."""
+    """Return the table of logs without a constant verb or what the severities replace; the CSV file has all."""
     empty: dict[str, None] = {"verb": None} if logs["verb"].nunique() == 1 else {}
     if logs["quantities"].notna().any():
         empty |= dict.fromkeys(("runner_up", "margin", "bulk_modulus_pa", "bulk_modulus_std_pa"))
@@ -193,17 +193,18 @@ def _classes_in_words(classes: pd.DataFrame) -> str:
 
 
 def one_row_a_log(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table in which a log that several verbs were asked about has one row, in the order of the first ones.
+    """Return a table with one row for each log, even if several verbs analysed it, in the order of first appearance.
 
     Parameters
     ----------
     table : pandas.DataFrame
-        With ``file`` and ``verb``; a log that a verb was asked about twice keeps its rows, as do cases without a file.
+        Table with ``file`` and ``verb``; a log that the same verb analysed twice keeps its rows, as do cases without a
+        file.
 
     Returns
     -------
     pandas.DataFrame
-        Each cell has what all verbs say, or what each says.
+        Each cell has the value that all verbs share, or the value of each verb.
     """
     if not {"file", "verb"} <= set(table) or not len(table):
         return table
@@ -217,11 +218,11 @@ def one_row_a_log(table: pd.DataFrame) -> pd.DataFrame:
 
 
 class _Several:
-    """Numbers that cannot stand in one cell."""
+    """Marks numbers that differ between verbs and so do not fit in one cell."""
 
 
 def _told_once(name: str, rows: Sequence[Mapping[Any, Any]]) -> Any:
-    """Return the text of a column: once, or per verb if verbs differ."""
+    """Return the text of a column: once, or for each verb if verbs differ."""
     told = {row["verb"]: row[name] for row in rows if not pd.isna(row[name])}
     distinct = list(dict.fromkeys(told.values()))
     if name == "verb":
@@ -236,7 +237,7 @@ def _told_once(name: str, rows: Sequence[Mapping[Any, Any]]) -> Any:
 
 
 def _shown(table: pd.DataFrame, pages: Mapping[str, str]) -> pd.DataFrame:
-    """Return the rows that the page lists, each with its method in words, and a log with the path of its page."""
+    """Return the rows listed on the page, with the method in words and the path of each log's page."""
     head = table.head(MOST_LISTED)
     if "file" in head:
         files = head["file"].tolist()
@@ -245,7 +246,7 @@ def _shown(table: pd.DataFrame, pages: Mapping[str, str]) -> pd.DataFrame:
 
 
 def below_one_folder(files: Sequence[Any]) -> list[Any]:
-    """Return paths without the folder that they share, which is of one machine; what is no path stays.
+    """Return paths without their common folder, which is specific to one machine; keep entries that are not paths.
 
     Examples
     --------
@@ -267,7 +268,7 @@ def render_comparison(table: pd.DataFrame, names: Sequence[str]) -> str:
     table : pandas.DataFrame
         From `experiments.batch.compare.compare_studies`.
     names : sequence of str
-        What the first and the second study are called.
+        Names of the first and the second study.
 
     Returns
     -------

@@ -1,12 +1,11 @@
-"""A store of rows that grows: Parquet parts, each whole or not there, a manifest, and the study's cases in order.
+"""A growing store of rows: Parquet parts, each complete or absent, a manifest, and the study's cases in order.
 
-    manifest.json          the study, its hash, versions, commit, seeds
-    cases.parquet          the keys of the study's cases, in order
-    parts/<hash>.parquet   rows; named by the keys that they hold, so that a part written twice is one part
-    set-aside/             parts that could not be read, whose cases are run again
+manifest.json the study, its hash, versions, commit, seeds cases.parquet the keys of the study's cases, in order
+parts/<hash>.parquet rows; named by the keys that they hold, so that a part written twice is one part set-aside/ parts
+that could not be read, whose cases are run again
 
-A part is never changed. Rows of cases that an earlier version of the study had stay, and are used again if it has them
-again. The store can be read while it is written.
+A part is never changed. Rows from cases of an earlier version of the study are kept, and are used again if those cases
+return. The store can be read while it is being written.
 """
 
 import hashlib
@@ -41,12 +40,12 @@ class PartStore:
 
     @property
     def name(self) -> str:
-        """The place, as the user gave it."""
+        """The place as the user gave it."""
         return self.folder.name
 
     @contextmanager
     def writing(self) -> Generator[None]:
-        """Hold the right to write; leftovers of a writer that was killed are removed first.
+        """Hold the right to write; first remove files that a killed writer left behind.
 
         Raises
         ------
@@ -66,7 +65,7 @@ class PartStore:
                 self.folder.remove(f"{PARTS}/{name}")
 
     def _tidy(self) -> None:
-        """Remove what a writer left that was killed; where no lock can be had, another may be at it."""
+        """Remove files that a killed writer left; without a lock keep them, as another writer may be using them."""
         if self.folder.locks:
             for below in ("", f"{PARTS}/"):
                 for name in self.folder.files(below):
@@ -74,14 +73,14 @@ class PartStore:
                         self.folder.remove(below + name)
 
     def describe(self, manifest: Mapping[str, Any], keys: Sequence[str]) -> None:
-        """Write what the store is for: the manifest, and the study's cases.
+        """Write the manifest and the study's cases.
 
         Parameters
         ----------
         manifest : Mapping[str, Any]
-            The study and what it takes to run it again.
+            The study, and everything needed to run it again.
         keys : sequence of str
-            Keys of its cases, in order.
+            Keys of the study's cases, in order.
 
         Raises
         ------
@@ -106,7 +105,7 @@ class PartStore:
             self.folder.write(f"{PARTS}/{digest}.parquet", part)
 
     def manifest(self) -> Mapping[str, Any] | None:
-        """Return the last written manifest of the study; None if there is none.
+        """Return the last written manifest of the study, or None if there is none.
 
         Raises
         ------
@@ -128,12 +127,12 @@ class PartStore:
         return content
 
     def done(self, *, again: bool = False) -> tuple[set[str], list[str]]:
-        """Return the keys that the store holds; parts that cannot be read are set aside.
+        """Return the keys in the store; parts that cannot be read are set aside.
 
         Parameters
         ----------
         again : bool
-            Whether cases that failed count as not done.
+            Whether failed cases count as not done.
 
         Returns
         -------
@@ -158,7 +157,7 @@ class PartStore:
         return keys, broken
 
     def rows(self, columns: Sequence[str] | None = None) -> pa.Table:
-        """Return the rows of the study's cases that are done, in the study's order, one a case.
+        """Return the rows of the study's finished cases, in the study's order, one row for each case.
 
         Parameters
         ----------
@@ -168,7 +167,7 @@ class PartStore:
         Returns
         -------
         pyarrow.Table
-            The rows. A part that cannot be read counts as not there.
+            The rows. A part that cannot be read counts as absent.
 
         Raises
         ------
@@ -205,7 +204,7 @@ class PartStore:
         return [name for name in self.folder.files(PARTS) if name.endswith(".parquet")]
 
     def _check(self) -> None:
-        """Refuse a folder that holds other work; a store whose manifest was deleted is known by its cases and parts."""
+        """Refuse a folder with other content; a store without a manifest is recognised by its cases and parts."""
         if self.manifest() is not None or (CASES in self.folder.files() and self._parts()):
             return
         strangers = [
@@ -220,7 +219,7 @@ class PartStore:
 
 
 def open_store(place: str | Path) -> PartStore:
-    """Return the store at a path or a URL; nothing is made yet.
+    """Return the store at a path or a URL; nothing is created yet.
 
     Parameters
     ----------
@@ -242,7 +241,7 @@ def _parquet(table: pa.Table) -> bytes:
 
 
 def _placed(table: pa.Table, place: Mapping[str, int]) -> pa.Table:
-    """Return the rows of a part that are the study's, with their place in it."""
+    """Return the rows of a part that belong to the study, with their place in it."""
     places = pa.array([place.get(key) for key in _listed(table, "key")], pa.int64())
     table = table.append_column("place", places).append_column("failed", _failed(table))
     return table.filter(pc.is_valid(table["place"]))

@@ -17,12 +17,12 @@ REPORT = "report.html"
 
 
 def write_report(store: PartStore, folder: Folder) -> str:
-    """Write a study's report, its figures and its tables; it leads to pages of logs that are in the folder.
+    """Write a study's report, figures and tables; the report links to pages of logs that are in the folder.
 
     Parameters
     ----------
     store : PartStore
-        The store; it may be growing.
+        The store; it may still be growing.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""One row a case: its settings and its result. Nothing in it depends on when or where it was run.
+"""One row for each case: its settings and its result. Nothing in it depends on when or where it was run.
 
-A task's rows are kept column by column. What a case is stands once a series and once a work, and is laid out over the
-rows at the end; what came of a case is written to its place.
+The rows of a task are kept column by column. The settings are stored once for each series and each work, and are copied
+to the rows at the end; each result is written directly to its case's place.
 """
 
 from collections.abc import Mapping, Sequence
@@ -50,15 +50,15 @@ SCHEMA = pa.schema(
         **dict.fromkeys(("quantities", "against"), TEXT),
     }
 )
-"""Columns of the store. ``outcome`` is ok, not_observable, mismatch, diverged or failed, and ``reason`` says why;
-``plant`` is ``log`` for a log, whose ``condition`` is known only if whoever made the log wrote it down; of a kind of
-actuator that is not the gear-pump one it is the kind, and ``quantities`` holds what was found, as JSON; ``against``,
-as JSON too, is a list of what speaks against every class, each a note's code and data."""
+"""Columns of the store. ``outcome`` is ok, not_observable, mismatch, diverged or failed, and ``reason`` says why.
+``plant`` is ``log`` for a log, whose ``condition`` is known only if it was written down when the log was made; for
+other kinds of actuator than the gear-pump one, ``plant`` is the kind, and ``quantities`` holds the findings as JSON.
+``against`` (JSON) lists the evidence against every class, each item a note's code and data."""
 
 Row: TypeAlias = dict[str, Any]
 
 FOUND = tuple(name for name in SCHEMA.names[SCHEMA.names.index("outcome") :] if name != TRUTH)
-"""Columns of the result of a case; the columns before them, and the truth, describe the case."""
+"""Columns of a case's result; the columns before them, and the truth, describe the case."""
 
 
 class Failure(NamedTuple):
@@ -67,7 +67,7 @@ class Failure(NamedTuple):
     Parameters
     ----------
     series, verb, reason : str
-        The log's file, or what was simulated; what was asked of it; and why it failed.
+        The log's file or a name for the simulated run; the analysis; and why it failed.
     """
 
     series: str
@@ -76,7 +76,7 @@ class Failure(NamedTuple):
 
 
 class Rows:
-    """The rows of a task while its cases are run, each known by its place in the task."""
+    """The rows of a task while its cases are run, each identified by its place in the task."""
 
     def __init__(self, groups: Sequence[Group]) -> None:
         self._keys = [key for group in groups for key in group.keys]
@@ -86,12 +86,12 @@ class Rows:
         self._found: dict[str, list[Any]] = {name: [None] * len(self._keys) for name in FOUND}
 
     def describe(self, series: int, entries: Mapping[str, Any]) -> None:
-        """Note what was learnt of a series when it was read.
+        """Record what was learnt about a series when it was read.
 
         Parameters
         ----------
         entries : Mapping[str, Any]
-            Entries by column, of those that say what a case is.
+            Entries by column, for the columns that describe a case.
         """
         self._series[series] |= entries
 
@@ -101,7 +101,7 @@ class Rows:
         Parameters
         ----------
         columns : Mapping[str, sequence]
-            A value for each of them, by column of `FOUND`.
+            A value for each case, by column of `FOUND`.
         """
         for name, values in columns.items():
             column = self._found[name]
@@ -109,12 +109,12 @@ class Rows:
                 column[place] = value
 
     def fail(self, places: Sequence[int], reason: str | Exception) -> None:
-        """Note that cases could not be run."""
+        """Record that cases could not be run."""
         told = spelt(" ".join(_said(reason).split()))
         self.put(places, {"outcome": ["failed"] * len(places), "reason": [told] * len(places)})
 
     def failures(self) -> tuple[Failure, ...]:
-        """Return each case that failed."""
+        """Return all cases that failed."""
         outcomes, reasons = self._found["outcome"], self._found["reason"]
         places = (place for place, outcome in enumerate(outcomes) if outcome == "failed")
         return tuple(Failure(self._in_words(one), self._works[one].verb, str(reasons[one])) for one in places)
@@ -125,7 +125,7 @@ class Rows:
         Returns
         -------
         pyarrow.Table
-            The table, with `SCHEMA`; what is not known is null.
+            The table, with `SCHEMA`; unknown values are null.
         """
         works = {work: number for number, work in enumerate(dict.fromkeys(self._works))}
         work_of = pa.array([works[work] for work in self._works], pa.int32())
@@ -155,12 +155,12 @@ def error_percent(value: float | None, truth: float | None) -> float | None:
     Parameters
     ----------
     value, truth : float or None
-        Estimate and truth, in one unit.
+        Estimate and truth, in the same unit.
 
     Returns
     -------
     float or None
-        The error; None where either is not known.
+        The error; None if either is unknown.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A plan run into its store, with progress, failures and interruptions told on standard error."""
+"""Runs a plan into its store, and reports progress, failures and interruptions on standard error."""
 
 import signal
 import time
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from experiments.batch.work import Part
 
 QUIET_SECONDS = 30.0
-"""Time between lines of progress where standard error is no terminal [s]."""
+"""Time between lines of progress if standard error is not a terminal [s]."""
 
 MOST_NAMED = 20
-"""So many failed cases are named as they come; the store and the report name all."""
+"""Number of failed cases that are named as they occur; the store and the report name all."""
 
 ENDINGS = (signal.SIGINT, signal.SIGTERM)
-"""Signals that ask a batch to end: Ctrl-C, and that of a system that shuts down."""
+"""Signals that ask a batch to end: Ctrl-C, and the signal that the system sends when it shuts down."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,15 +35,15 @@ class RunSettings:
     Parameters
     ----------
     workers : int
-        Processes on this machine.
+        Number of processes on this machine.
     cluster : str or None
-        Scheduler of a Dask cluster, instead of them.
+        Scheduler of a Dask cluster, used instead of local workers.
     max_failures : int or None
-        The run stops once more cases have failed.
+        The run stops if more cases than this have failed.
     resume : bool
-        Whether cases that the store has are kept.
+        Whether cases that the store already has are kept.
     retry_failed : bool
-        Whether failed ones run again.
+        Whether failed cases run again.
     """
 
     workers: int
@@ -54,19 +54,19 @@ class RunSettings:
 
 
 def run_plan(plan: "Plan", store: "PartStore", source: str, settings: RunSettings) -> "tuple[Tally, int]":
-    """Run what a store does not have yet, with progress on standard error.
+    """Run what the store does not have yet, with progress on standard error.
 
     Parameters
     ----------
     source : str
-        What the study is called in the manifest.
+        Name of the study in the manifest.
     settings : RunSettings
-        Where it runs, and when it stops.
+        Where the study runs, and when it stops.
 
     Returns
     -------
     tuple of Tally and int
-        What was run, and how many cases the store had before.
+        Counts of the run, and how many cases the store had before.
     """
     from experiments.batch.runner import manifest_of, run_batch
     from experiments.running.executors import open_executor
@@ -97,7 +97,7 @@ def run_plan(plan: "Plan", store: "PartStore", source: str, settings: RunSetting
 
 
 def _say_differences(old: Any, new: Any) -> None:
-    """Say where kept rows were made by other software than what is to be made now."""
+    """Warn if kept rows were made by different software than the new rows."""
     from experiments.batch.runner import METHODS
 
     if old is None:
@@ -114,7 +114,7 @@ def _say_differences(old: Any, new: Any) -> None:
 
 @contextmanager
 def _interruptible() -> Generator[Event]:
-    """Turn the first Ctrl-C, or the system's request to end, into a wish to stop; a second one stops at once."""
+    """Set the stop event at the first Ctrl-C or request of the system to end; stop immediately at the second one."""
     stop = Event()
 
     def wish(number: int, frame: object) -> None:
@@ -134,7 +134,7 @@ def _interruptible() -> Generator[Event]:
 
 @contextmanager
 def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
-    """Show cases done, their rate and the time left; failures are named as they come."""
+    """Show the number of finished cases, their rate and the time left; name failures as they occur."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -164,7 +164,7 @@ def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
 
 
 def in_sentences(failures: "Sequence[Failure]") -> list[str]:
-    """Return a sentence per failure: a log that failed for one reason is named once, with all its verbs.
+    """Return one sentence for each failure: a log that failed for one reason is named once, with all its verbs.
 
     Examples
     --------
@@ -186,7 +186,7 @@ class Pace:
 
     @property
     def rate(self) -> float:
-        """Cases a second since the beginning [1/s]."""
+        """Cases per second since the beginning [1/s]."""
         return (self.done - self._before) / max(time.monotonic() - self._begin, 1e-9)
 
     def __str__(self) -> str:
@@ -197,7 +197,7 @@ class Pace:
 
 
 def duration(seconds: float) -> str:
-    """Return a length of time as a person says it.
+    """Return a duration in everyday units.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`run_batch(plan, store, ...)`: every case that the store lacks is run, and kept as soon as its task is done."""
+"""`run_batch(plan, store, ...)`: runs every case that the store lacks, and stores each task when it is done."""
 
 import hashlib
 import platform
@@ -22,7 +22,7 @@ from plant.errors import HydrostateError
 ROOT = Path(__file__).resolve().parents[2]
 
 METHODS = ("plant", "estimation", "faults")
-"""Packages whose code makes the numbers of a row."""
+"""Packages whose code computes the numbers of a row."""
 
 WORKER_ENDED = "the worker process ended while it ran this case, as when memory runs out"
 
@@ -37,7 +37,7 @@ class Tally:
     Parameters
     ----------
     stopped : str
-        Why no more were begun; empty where all were.
+        Why tasks were left unstarted; empty if all were started.
     """
 
     done: int = 0
@@ -54,7 +54,7 @@ class _Batch:
     max_failures: int | None
     tally: Tally = field(default_factory=Tally)
     suspects: deque[Task] = field(default_factory=deque[Task])
-    """Tasks that were in flight when a worker ended; they are run alone until it is clear which of them ends it."""
+    """Tasks that were in flight when a worker died; they are run alone to find out which of them kills it."""
 
     def next_task(self) -> Task | None:
         if self.stop.is_set() or self.tally.stopped:
@@ -62,7 +62,7 @@ class _Batch:
         return self.suspects.popleft() if self.suspects else next(self.tasks, None)
 
     def left(self) -> bool:
-        """Return whether a task was not begun; an interruption after the last one stops nothing."""
+        """Return whether a task was not started; an interruption after the last task stops nothing."""
         return bool(self.suspects) or next(self.tasks, None) is not None
 
     def keep(self, task: Task, part: Part) -> None:
@@ -74,7 +74,7 @@ class _Batch:
             self.tally.stopped = f"{self.tally.failed} cases failed, --max-failures is {self.max_failures}"
 
     def suspect(self, task: Task, *, alone: bool) -> None:
-        """Remember a task whose worker ended; what ended it alone is halved, and a single case is given up."""
+        """Record a task whose worker died. A task that killed it alone is halved; a single case is given up."""
         if not alone:
             self.suspects.append(task)
         elif len(task.keys) == 1:
@@ -95,22 +95,23 @@ def run_batch(
 ) -> Tally:
     """Run the cases of a study that are not done.
 
-    A part is written when its task is done, so whatever ends this process costs the tasks in flight and no more.
+    A part is written when its task is done, so if this process ends for any reason, only the tasks in flight are lost.
 
     Parameters
     ----------
     store : PartStore
-        Where rows go; its right to write is held by the caller.
+        Where rows go; the caller holds the right to write to it.
     done : collection of str
         Keys of cases that need not be run.
     opener : callable
-        Opens an executor and says how many tasks it runs at a time, see `experiments.running.executors.open_executor`.
+        Opens an executor and returns how many tasks it runs at a time, see
+        `experiments.running.executors.open_executor`.
     stop : Event
-        When it is set no task is begun; those in flight are finished and kept.
+        When it is set, no new task is started; those in flight are finished and kept.
     on_part : callable
-        Called with the count of cases and the part, when it has been kept.
+        Called with the number of cases and the part, after the part has been stored.
     max_failures : int, optional
-        No task is begun once more cases than this have failed.
+        No new task is started once more cases than this have failed.
 
     Raises
     ------
@@ -130,7 +131,7 @@ def run_batch(
 
 
 def _drained(batch: _Batch, executor: Executor, width: int) -> bool:
-    """Run tasks until none is left; False where the executor broke and must be opened anew."""
+    """Run tasks until none is left; return False if the executor broke and must be reopened."""
     flying: dict[Future[Part], Task] = {}
     while True:
         alone = bool(batch.suspects)
@@ -159,7 +160,7 @@ def _drained(batch: _Batch, executor: Executor, width: int) -> bool:
 
 
 def _launch(batch: _Batch, executor: Executor, flying: dict[Future[Part], Task], most: int) -> bool:
-    """Submit tasks until a number are in flight; False where the executor is broken."""
+    """Submit tasks until a number are in flight; return False if the executor is broken."""
     while len(flying) < most:
         task = batch.next_task()
         if task is None:
@@ -179,7 +180,7 @@ def _halves(task: Task) -> list[Task]:
 
 
 def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:
-    """Return the manifest that reproduces a study.
+    """Return the manifest needed to reproduce a study.
 
     Returns
     -------
@@ -205,7 +206,7 @@ def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:
 
 
 def _commit() -> str | None:
-    """Return the commit of the sources, None where they are not a git checkout."""
+    """Return the commit of the sources, or None if they are not a git checkout."""
     git = shutil.which("git")
     if git is None or not (ROOT / ".git").exists():
         return None
@@ -215,7 +216,7 @@ def _commit() -> str | None:
 
 
 def sources(root: Path) -> str:
-    """Return a hash of the code that makes numbers, and of the numbers that ship with it: an edit changes no version.
+    """Return a hash of the code and data that affect the results, because an edit does not change the version.
 
     Returns
     -------

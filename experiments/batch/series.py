@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 from plant.log.files import sidecar
 
 BYTES_A_SAMPLE = 50
-"""About how much of a log's file a sample takes [byte]."""
+"""Approximate size of one sample in a log's file [byte]."""
 
 
 @dataclass(frozen=True)
@@ -18,15 +18,15 @@ class Simulated:
     Parameters
     ----------
     plant, drive, sensors : str
-        Names, as `hydrostate simulate` knows them.
+        Names accepted by `hydrostate simulate`.
     condition : str or None
-        The condition; None where severities are free.
+        The condition; None if the severities are given instead.
     leakage_severity, friction_severity : float
         Severities [dimensionless].
     seed : int
-        Seed of the drive and of the sensors' noise.
+        Seed of the drive and of the sensor noise.
     duration_s, sample_time_s : float
-        Length and time between samples [s].
+        Duration and sample time [s].
     """
 
     plant: str
@@ -41,7 +41,7 @@ class Simulated:
 
     @property
     def samples(self) -> int:
-        """Count of samples."""
+        """Number of samples."""
         return round(self.duration_s / self.sample_time_s)
 
 
@@ -54,11 +54,11 @@ class Log:
     content : str
         Hash of its bytes, see `content_of`.
     size : int
-        Its length [byte].
+        File size [byte].
     sample_time_s : float or None
-        Time between rows [s] where times do not tell it.
+        Sample time [s] if the log's times do not give it.
     folder : str
-        The folder whose rig file is the log's, as the study names it; empty for the study's own rig file.
+        Folder whose rig file applies to the log, named as in the study; empty for the study's own rig file.
     """
 
     file: str
@@ -71,7 +71,7 @@ class Log:
 
     @property
     def samples(self) -> int:
-        """About how many samples it holds."""
+        """Approximate number of samples."""
         return max(self.size // BYTES_A_SAMPLE, 1)
 
 
@@ -87,9 +87,9 @@ class Work:
     verb, form, method : str
         As in `experiments.batch.study_file.Method`.
     start_pa : float or None
-        First guess of bulk modulus [Pa]; None for the rig's own, or where there is none to make.
+        First guess of bulk modulus [Pa]; None for the rig's own, or if the method needs none.
     start_std_pa : float
-        Its standard deviation [Pa].
+        Standard deviation of the first guess [Pa].
     """
 
     verb: str
@@ -109,7 +109,7 @@ class Group(NamedTuple):
     keys : tuple of str
         The key of each case.
     works : tuple of Work
-        What is done in each.
+        The analysis of each case.
     """
 
     series: Series
@@ -118,12 +118,12 @@ class Group(NamedTuple):
 
 
 def content_of(path: Path) -> str:
-    """Return a hash of a log's bytes, and of the notes that stand beside a CSV.
+    """Return a hash of a log's bytes, and of the notes beside a CSV.
 
     Returns
     -------
     str
-        32 hexadecimal digits; empty where it cannot be read, which becomes a failed case and not the end of a study.
+        32 hexadecimal digits; empty if the log cannot be read, so that the case fails but the study continues.
     """
     digest = hashlib.sha256()
     try:

@@ -1,4 +1,4 @@
-"""Which logs of a batch study come first: how far each is towards a limit, in one sentence and in two columns."""
+"""Ranks the logs of a batch study by how near each is to a limit, in one sentence and in two columns."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -12,10 +12,10 @@ from experiments.fleet.page import worst_in
 from experiments.fleet.rows import LogRow, log_rows
 
 READ = ("file", "verb", "outcome", "found_condition", "reason", "quantities", "against")
-"""Columns of a store that say how bad a log is."""
+"""Columns of a store that show how bad a log is."""
 
 SICK = ("over", "likely")
-"""States of a log whose actuator needs work."""
+"""States of a log whose actuator needs maintenance."""
 
 OTHERS: Mapping[str, str] = {
     "likely": "{} probably past one",
@@ -24,19 +24,19 @@ OTHERS: Mapping[str, str] = {
     "within": "{} within limits",
     "failed": "{} could not be read",
 }
-"""How many logs are in which other state."""
+"""Phrases for the number of logs in each other state."""
 
 MOST_NAMED = 5
-"""Logs that are named [count]."""
+"""Maximum number of logs to name [count]."""
 
 
 def standing_of(rows: pa.Table) -> list[LogRow]:
-    """Return the logs that were diagnosed, the worst first; a log that was diagnosed twice counts as its worse row.
+    """Return the diagnosed logs, the worst first; a log that was diagnosed twice counts with its worse row.
 
     Parameters
     ----------
     rows : pyarrow.Table
-        Of a batch store.
+        Rows of a batch store.
     """
     found = sorted(log_rows(rows.select(list(READ)).to_pylist(), {}, {}), key=lambda one: one.order)
     first: dict[str, LogRow] = {}
@@ -46,7 +46,7 @@ def standing_of(rows: pa.Table) -> list[LogRow]:
 
 
 def standing_in_words(logs: Sequence[LogRow]) -> tuple[str, str]:
-    """Return how many logs are past a limit, and with which to begin; empty where there are none."""
+    """Return how many logs are past a limit and which to inspect first; empty if there are no logs."""
     if not logs:
         return "", ""
     counts = Counter(one.state for one in logs)
@@ -63,14 +63,14 @@ def with_standing(table: pd.DataFrame, logs: Sequence[LogRow]) -> pd.DataFrame:
     Parameters
     ----------
     table : pandas.DataFrame
-        With ``file``.
+        Table with ``file``.
     logs : sequence of LogRow
-        Of `standing_of`.
+        Logs from `standing_of`.
 
     Returns
     -------
     pandas.DataFrame
-        With ``state`` and ``worst`` too; logs that were not diagnosed stand below, in the order they had.
+        The table with ``state`` and ``worst``; logs that were not diagnosed come last, in their original order.
     """
     known: Mapping[str, LogRow] = {one.file: one for one in logs}
     places = {one.file: place for place, one in enumerate(logs)}
@@ -85,7 +85,7 @@ def with_standing(table: pd.DataFrame, logs: Sequence[LogRow]) -> pd.DataFrame:
 
 
 def _worst(log: LogRow | None) -> str:
-    """Return the severity that is nearest to its limit or farthest beyond, and how far towards it that is."""
+    """Return the severity nearest to or farthest beyond its limit, and its percentage of the limit."""
     if log is None or log.worst is None or not log.told:
         return ""
     return f"{worst_in(log)}, {100.0 * log.worst.share:.0f} % of the limit"

@@ -29,7 +29,7 @@ Severity = Annotated[float, Field(ge=0.0, le=HIGHEST_SEVERITY)]
 
 
 MOST_SEEDS = 1_000_000
-"""Seeds of one `[[runs]]` [count]."""
+"""Maximum number of seeds in one `[[runs]]` [count]."""
 
 
 class StudyError(HydrostateError):
@@ -41,11 +41,11 @@ class _Table(BaseModel):
 
 
 NAME = r"^[^./\\\x00-\x1f\x7f][^/\\\x00-\x1f\x7f]*$"
-"""A study's name, which is a folder's too: without slashes and control characters, and no dot in front."""
+"""Pattern of a study's name, which also names a folder: no slashes, no control characters and no leading dot."""
 
 
 def _other_kind(info: ValidationInfo) -> ActuatorKind | None:
-    """Return the study's kind of actuator; None for the gear-pump actuator."""
+    """Return the study's kind of actuator, or None for the gear-pump actuator."""
     kind: ActuatorKind | None = (info.context or {}).get("kind")
     return None if kind is None or kind.name == DEFAULT else kind
 
@@ -64,16 +64,16 @@ class Method(_Table):
     Parameters
     ----------
     verb : {"filter", "estimate", "diagnose"}
-        ``filter`` runs one filter, compiled and 32 side by side where it is the ``ekf``; ``estimate`` gives the number
-        and verdict of `hydrostate estimate`; ``diagnose`` names one of the nine conditions.
+        ``filter`` runs one filter, compiled and 32 side by side for the ``ekf``; ``estimate`` gives the value and
+        verdict of `hydrostate estimate`; ``diagnose`` names one of the nine conditions.
     form : str
-        The process model; ``auto`` for ``estimate`` alone.
+        The process model; ``auto`` only for ``estimate``.
     method : str
-        The filter; ``auto`` for ``estimate`` alone.
+        The filter; ``auto`` only for ``estimate``.
     pressure : bool
-        Whether differential pressure is used where it is logged.
+        Whether differential pressure is used if it is logged.
     told : {"condition", "healthy"}
-        Whose leakage and friction the method is told: the simulated condition's, or the healthy rig's.
+        Source of the leakage and friction given to the method: the simulated condition, or the healthy rig.
     start_std_pa : float
         Standard deviation of the first guess [Pa].
     """
@@ -96,22 +96,22 @@ class Method(_Table):
 
 
 class Runs(_Table):
-    """Simulated cases: every combination of what is listed.
+    """Simulated cases: every combination of the listed values.
 
     Parameters
     ----------
     plants, drives, sensors : tuple of str
-        Names, as `hydrostate simulate` knows them; plants and drives of the gear-pump actuator alone.
+        Names accepted by `hydrostate simulate`; plants and drives only for the gear-pump actuator.
     conditions : tuple of str
-        Conditions by name; all of them by default, none where severities are given.
+        Conditions by name; by default all of them, or none if severities are given.
     severities : tuple of pairs of float
-        Leakage and friction severity, beside the conditions [dimensionless].
+        Pairs of leakage and friction severity, in addition to the conditions [dimensionless].
     seeds : int or tuple of int
-        So many seeds, from 0 on, or these.
+        A number of seeds counted from 0, or a list of seeds.
     starts_pa : tuple of float
-        First guesses of bulk modulus [Pa]; the rig's own where there are none.
+        First guesses of bulk modulus [Pa]; the rig's own if none are given.
     duration_s, sample_time_s : float
-        Length of a run and time between its samples [s].
+        Duration and sample time of a run [s].
     """
 
     plants: tuple[str, ...] = ("lumped",)
@@ -161,13 +161,13 @@ class Logs(_Table):
     Parameters
     ----------
     glob : str
-        Which files, relative to the study file unless absolute; ``**`` reaches into folders.
+        Pattern of the files, relative to the study file unless absolute; ``**`` includes sub-folders.
     columns : dict[str, str]
-        Foreign column by channel, beside the rig's: ``{ position_m = "POS_MM:mm" }``.
+        Column name in the file for each channel, in addition to the rig's: ``{ position_m = "POS_MM:mm" }``.
     starts_pa : tuple of float
-        First guesses of bulk modulus [Pa]; the rig's own where there are none.
+        First guesses of bulk modulus [Pa]; the rig's own if none are given.
     sample_time_s : float or None
-        Time between rows [s] of logs without time, or with times that do not increase.
+        Sample time [s] of logs without time, or with times that do not increase.
     """
 
     glob: Annotated[str, Field(min_length=1)]
@@ -183,11 +183,11 @@ class Study(_Table):
     Parameters
     ----------
     plant : str
-        The kind of actuator that its runs and logs are of.
+        The kind of actuator of its runs and logs.
     rig : str
-        The healthy actuator's rig file, relative to the study file; empty for the paper's.
+        The healthy actuator's rig file, relative to the study file; empty for the actuator of the paper.
     rigs : dict[str, str]
-        Rig files of folders, both relative to the study file; a log takes that of the nearest folder above it.
+        Rig files of folders, both relative to the study file; a log uses that of the nearest folder above it.
     """
 
     name: Annotated[str, Field(min_length=1, max_length=100, pattern=NAME)]
@@ -286,7 +286,7 @@ def shipped_studies() -> tuple[str, ...]:
 
 
 def _sentence(error: Any) -> str:
-    """Say which field is wrong, what was wanted, and what was given."""
+    """Return which field is wrong, what was expected, and what was given."""
     where = ""
     for part in error["loc"]:
         if isinstance(part, int):

@@ -12,33 +12,33 @@ from faults.conditions import CONDITIONS
 from faults.scores import confusion_matrix
 
 METHOD = ["plant", "drive", "sensors", "verb", "form", "method", "pressure"]
-"""Columns that tell one method from another."""
+"""Columns that distinguish methods."""
 
 LOG_COLUMNS = [
     *("file", "verb", "outcome", "found_condition", "runner_up", "margin", "bulk_modulus_pa", "bulk_modulus_std_pa"),
     *("quantities", "trusted", "reason", "warnings"),
 ]
 FAILURE_COLUMNS = ["plant", "file", "drive", "condition", "seed", "verb", "form", "method", "start_pa", "reason", "key"]
-"""Of the tables that list logs, and cases that failed."""
+"""Columns of the tables that list logs and failed cases."""
 
 OUTCOME_NAMES = ("ok", "not_observable", "mismatch", "diverged", "failed")
 
 NEAR_PERCENT = 3.0
-"""An estimate within this of the truth counts as near [%]."""
+"""Maximum error of an estimate that counts as near the truth [%]."""
 
 
 MOST_LISTED = 200
-"""Most rows of a table that lists cases one by one on a page; its CSV holds all."""
+"""Maximum number of rows in a table on a page that lists cases one by one; its CSV holds all."""
 
 
 def frame_of(rows: pa.Table) -> pd.DataFrame:
-    """Return a store's rows as a data frame whose conditions have a name throughout.
+    """Return a store's rows as a data frame in which every condition has a name.
 
     Returns
     -------
     pandas.DataFrame
-        One row a case. A condition is its name, its severities where it has no name, or ``unknown``; ``known`` where it
-        is one that a diagnosis can name.
+        One row for each case. A condition is given by its name, by its severities if it has no name, or as ``unknown``;
+        ``known`` tells whether a diagnosis can name it.
     """
     frame = rows.to_pandas()
     free = frame["condition"].isna() & frame["leakage_severity"].notna()
@@ -57,7 +57,7 @@ def summary_tables(frame: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
     Returns
     -------
     Mapping[str, pandas.DataFrame]
-        By name, those that the rows have something for: ``outcomes``, ``bulk modulus``, ``diagnosis``, ``confusion``,
+        Tables by name, if the rows have content for them: ``outcomes``, ``bulk modulus``, ``diagnosis``, ``confusion``,
         ``classes``, ``logs``, ``failures``.
     """
     tables = {
@@ -73,7 +73,7 @@ def summary_tables(frame: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
 
 
 def _outcome_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """Count outcomes. One row a method: counts of cases, and of each outcome."""
+    """Count outcomes. One row for each method: number of cases, and of each outcome."""
 
     def entries(group: pd.DataFrame) -> dict[str, object]:
         counts = group["outcome"].value_counts()
@@ -88,8 +88,8 @@ def bulk_modulus_table(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row a method and condition: count of cases and of estimates, errors [%], share within
-        `NEAR_PERCENT` and share of 95 % intervals that cover the truth [%].
+        One row for each method and condition: number of cases and of estimates, errors [%], share within `NEAR_PERCENT`
+        and share of 95 % intervals that cover the truth [%].
     """
     known = frame[frame["verb"].isin(["filter", "estimate"]) & frame["true_bulk_modulus_pa"].notna()]
     return _each(known, [*METHOD, "condition"], _errors)
@@ -110,7 +110,7 @@ def _errors(group: pd.DataFrame) -> dict[str, object]:
 
 
 def _each(frame: pd.DataFrame, by: list[str], entries: Callable[[pd.DataFrame], dict[str, object]]) -> pd.DataFrame:
-    """Return a row a group, each method in one block, in the order of first appearance."""
+    """Return one row for each group, with each method in one block, in the order of first appearance."""
     groups = frame.groupby(by, sort=False)
     rows = [{**dict(zip(by, cast(tuple[object, ...], keys), strict=True)), **entries(group)} for keys, group in groups]
     first: dict[tuple[object, ...], int] = {}
@@ -118,10 +118,10 @@ def _each(frame: pd.DataFrame, by: list[str], entries: Callable[[pd.DataFrame], 
 
 
 def _diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the share of right classes, where the true class is known.
+    """Return the share of right classes, if the true class is known.
 
-    One row a method and condition: counts, share that is right [%], and the ratio of the best probability to
-    the runner-up's, at the median [dimensionless].
+    One row for each method and condition: counts, share of right classes [%], and the median ratio of the best
+    probability to the runner-up's [dimensionless].
     """
 
     def entries(group: pd.DataFrame) -> dict[str, object]:
@@ -133,9 +133,9 @@ def _diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """Count which class was found for which, over all methods.
+    """Count which class was found for which true class, over all methods.
 
-    A row for each true condition, a column for each found one [count]; empty where no class is known.
+    One row for each true condition, one column for each found condition [count]; empty if no true class is known.
     """
     known = _classified(frame)
     known = known[known["found_condition"].notna()]
@@ -153,7 +153,7 @@ def _classified(frame: pd.DataFrame) -> pd.DataFrame:
 def _class_table(frame: pd.DataFrame) -> pd.DataFrame:
     """Count the classes that were found in logs.
 
-    One row a condition that was found, or ``none``: count of logs, and share [%].
+    One row for each condition that was found, or ``none``: number of logs, and share [%].
     """
     logs = frame[frame["file"].notna() & (frame["verb"] == "diagnose")]
     counts = logs["found_condition"].fillna("none").value_counts()

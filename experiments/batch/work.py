@@ -1,7 +1,7 @@
-"""`run_task(task) -> part`: the cases of one task, each with the same bits in whatever company it is run.
+"""`run_task(task) -> part`: runs the cases of one task. A case gives the same bits whatever other cases run with it.
 
-A series is made once for all that is done with it. Its noise comes from a stream of its own; its filters run in lanes
-of one kernel, 32 side by side and never fewer than a kernel of lanes takes.
+A series is made once for all its analyses. Its noise has a random stream of its own; its filters run in the lanes of
+one kernel, 32 side by side, padded to the smallest number that the kernel takes.
 """
 
 import gc
@@ -53,16 +53,16 @@ from plant.sensors.sensors import SENSORS, measure, noise_variances
 PRESSURE = "differential_pressure_pa"
 
 DRAWN_ONCE = ("sine", "chirp")
-"""Drives that hold nothing random: seeds share the simulated motion, and differ in the sensors' noise."""
+"""Drives without randomness: seeds share the simulated motion, and differ only in the sensor noise."""
 
 TRACK_ROWS = 200
-"""About how many points of a filter's history are kept until its mean over the last `SETTLED` is taken."""
+"""Approximate number of points of a filter's history that are kept to take the mean over the last `SETTLED`."""
 
 Seen: TypeAlias = tuple[CleanLog, BulkModulusEstimate]
-"""A log that was looked at, and its estimate."""
+"""A log after a first analysis, and its estimate."""
 
 _one_at_a_time = threading.Lock()
-"""Warnings are caught for a whole process, so that threads of one worker take turns where they are."""
+"""Lock for catching warnings: Python catches them for a whole process, so the threads of one worker must take turns."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Part:
     content : bytes
         A Parquet file with one row a case, in the task's order.
     failures : tuple of Failure
-        Of each case that failed.
+        All cases that failed.
     """
 
     content: bytes
@@ -114,7 +114,7 @@ def run_task(task: Task) -> Part:
 
 
 def _told_of(series: Series, error: Exception) -> str | Exception:
-    """Return why a series failed, without the path of its log: the row names the log already."""
+    """Return why a series failed, without the path of its log, which the row already has."""
     if isinstance(series, Log) and isinstance(error, HydrostateError) and error.source == series.path:
         return error.message
     return error
@@ -122,7 +122,7 @@ def _told_of(series: Series, error: Exception) -> str | Exception:
 
 @cache
 def _freeze_loaded() -> None:
-    """Let garbage collection of a worker pass over all that its first task loaded: it takes a thirtieth of its time."""
+    """Exclude what the first task loaded from garbage collection, which takes a thirtieth of a worker's time."""
     if multiprocessing.parent_process() is not None:
         gc.collect()
         gc.freeze()
@@ -143,7 +143,7 @@ def _as_part(rows: Rows) -> Part:
 
 @dataclass(frozen=True, eq=False)
 class _Prepared:
-    """A series with what a method may be told of it, and the entries that it adds to its cases' rows."""
+    """A series with the data that a method may use, and the entries that it adds to its cases' rows."""
 
     record: Record
     rig: Rig[Any]
@@ -154,11 +154,11 @@ class _Prepared:
     other: ActuatorKind | None = None
     problems: dict[tuple[object, ...], FilterProblem] = field(default_factory=dict[tuple[object, ...], FilterProblem])
     usual: int = 0
-    """Cases that rest on the same estimate of bulk modulus, that of the log as it is with all automatic [count]."""
+    """Number of cases that use the estimate of bulk modulus from the unchanged log with default options [count]."""
 
     @property
     def truth(self) -> float | None:
-        """Bulk modulus that was simulated [Pa]."""
+        """The simulated bulk modulus [Pa]."""
         return self.entries.get(TRUTH)
 
     @cached_property
@@ -168,7 +168,7 @@ class _Prepared:
         return *found, tuple(said)
 
     def shared(self, record: Record, parameters: EhaParameters, work: Work) -> Seen | None:
-        """Return the estimate that cases share, and say again what was said of it; None where a case is alone."""
+        """Return the estimate that cases share and repeat its warnings; None if only one case needs it."""
         if self.usual < 2 or not _is_usual(work) or record is not self.record or parameters != self.rig.parameters:
             return None
         log, found, said = self._found
@@ -217,7 +217,7 @@ def _motion(series: Simulated, healthy: EhaParameters) -> tuple[Record, EhaParam
 
 
 def _run(place: int, prepared: _Prepared, work: Work, rows: Rows, lanes: Lanes) -> None:
-    """Write what comes of a case to its place, or let it wait for its lanes to fill."""
+    """Write the result of a case to its place, or queue the case until its lanes are full."""
     record, parameters = _told(prepared, work)
     if work.verb == "filter":
         problem = _problem(record, parameters, work, prepared)
@@ -263,7 +263,7 @@ def _estimated(record: Record, parameters: EhaParameters, work: Work, prepared: 
 
 
 def _is_usual(work: Work) -> bool:
-    """Return whether a case rests on the estimate of bulk modulus with all automatic."""
+    """Return whether a case uses the estimate of bulk modulus with default options."""
     return work.pressure and (
         work.verb == "diagnose" or (work.verb == "estimate" and _options(work) == DEFAULT_OPTIONS)
     )
@@ -274,7 +274,7 @@ def _options(work: Work) -> EstimateOptions:
 
 
 def _problem(record: Record, parameters: EhaParameters, work: Work, prepared: _Prepared) -> FilterProblem:
-    """Return the filtering task; what its first guesses share is made once a series."""
+    """Return the filtering task; data shared by its first guesses are computed once for each series."""
     place = FORMS[work.form].index(BULK_MODULUS)
     alike = (work.form, work.pressure, work.told, work.start_std_pa)
     if alike not in prepared.problems:
@@ -288,7 +288,7 @@ def _problem(record: Record, parameters: EhaParameters, work: Work, prepared: _P
 
 
 def _first_problem(record: Record, parameters: EhaParameters, work: Work, sensors: str | None) -> FilterProblem:
-    """Return the task from the rig's own guess; of a simulated run the filter knows the sensors' noise."""
+    """Return the task for the rig's own guess; for a simulated run the filter knows the sensor noise."""
     model = FORMS[work.form]
     channels = tuple(channel for channel in _predicted(work.form) if channel in record)
     if sensors is None:

@@ -15,14 +15,15 @@ WIDTHS: Mapping[str, float] = {
     "leakage_coefficient": 0.1,
     "bulk_modulus": 0.2,
 }
-"""How far values that no rig file doubts differ between actuators: half-widths of `faults.eha.inject.spread`."""
+"""Variation between actuators of values without uncertainty in a rig file: half-widths of
+`faults.eha.inject.spread`."""
 
 GEOMETRY = ("pump_displacement", "piston_area", "chamber_volume", "moving_mass")
-"""Entries that a rig file doubts, taken to the ends of their 95 % interval."""
+"""Entries with uncertainty in a rig file, set to the ends of their 95 % interval."""
 
 
 def _corners(rig: EhaParameters) -> Iterator[EhaParameters]:
-    """Yield actuators with every value at one end of what is not known of it."""
+    """Yield actuators with every uncertain value at one end of its range."""
     ends = {name: (1.0 - width, 1.0 + width) for name, width in WIDTHS.items()}
     for name in GEOMETRY:
         doubt = DOUBTS[name].usual
@@ -44,7 +45,7 @@ def doubted_breaks(rig: EhaParameters, low_v: float, high_v: float) -> tuple[flo
     highest : float
         Largest break frequency at the high mean [Hz].
     least_ratio : float
-        Least ratio of the break frequency at the low mean to that at the high one, of one and the same actuator.
+        Smallest ratio of the break frequency at the low mean to that at the high one, for the same actuator.
     """
     low, high = low_v * rig.motor_speed_per_volt, high_v * rig.motor_speed_per_volt
     pairs = [(break_frequency_about(low, p), break_frequency_about(high, p)) for p in _corners(rig)]

@@ -1,7 +1,7 @@
 """The paper's dynamic experiments on the circuit plant: Figures 5 to 7, 10 and 11, as tables.
 
-Around a mean a test is a train of passes, see `experiments.circuit.passes`, of up to 0.6 of the stroke each. Without a
-mean the signal itself comes back, see `plant.eha.drives.prbs`.
+A test around a mean is a train of passes, see `experiments.circuit.passes`, each over up to 0.6 of the stroke. Without
+a mean the signal itself returns the piston, see `plant.eha.drives.prbs`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -35,16 +35,16 @@ AMPLITUDE_INPUTS = tuple((0.0, amplitude) for amplitude in (0.5, 1.0, 2.0, 3.0, 
 """Means and amplitudes of Figure 6 [V]."""
 
 HOLD_TIME = 0.02
-"""Time between chances to switch [s]; the signal has no power at 50 Hz."""
+"""Time between possible switches [s]; the signal has no power at 50 Hz."""
 
 LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 1e-9, 40.0
-"""Ends of the response curves [Hz]: above the mean, below where the signal has no power."""
+"""Ends of the response curves [Hz]: they exclude the mean and the frequencies at which the signal has no power."""
 
 TEST_TIME = 24.0
-"""Least length of a test [s], all passes together."""
+"""Minimum total duration of all passes of a test [s]."""
 
 LAG_TIME = 0.5
-"""Longest lag of the correlations that responses are taken from [s]."""
+"""Longest lag of the correlations used to compute the responses [s]."""
 
 CIRCUIT_FORMS = (
     Experiment("circuit", "flow", "steps", True),
@@ -74,12 +74,12 @@ def prbs_around(
     mean_v, amplitude_v : float
         Mean, not negative, and amplitude of the input [V].
     duration : float
-        Least length of all passes together [s].
+        Minimum total duration of all passes [s].
 
     Returns
     -------
     Record
-        ``motor_speed_rad_s`` and ``velocity_m_s``, the passes one after the other.
+        ``motor_speed_rad_s`` and ``velocity_m_s``, with the passes concatenated.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def frequency_responses(
     Parameters
     ----------
     inputs : iterable of tuple of float
-        Mean and amplitude of each input [V], as `MEAN_INPUTS` and `AMPLITUDE_INPUTS`.
+        Mean and amplitude of each input [V], such as `MEAN_INPUTS` and `AMPLITUDE_INPUTS`.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def low_frequency_gains(responses: pd.DataFrame, by: str) -> pd.Series:
     Parameters
     ----------
     responses : pandas.DataFrame
-        Of `frequency_responses`.
+        Table from `frequency_responses`.
     by : str
         ``mean_v`` or ``amplitude_v``.
 
@@ -142,20 +142,20 @@ def low_frequency_gains(responses: pd.DataFrame, by: str) -> pd.Series:
 def order_study(rig: CircuitParameters, seed: int) -> pd.DataFrame:
     """Return the singular values of the circuit's normal condition with their noise floor: Figure 7.
 
-    The mean is 2 V: moving, the piston does not stick; from 4 V on, quadratic friction damps so much that one value
-    alone stands above the floor.
+    The mean is 2 V, at which the piston moves and so does not stick. From 4 V on, quadratic friction damps so much that
+    only one singular value is above the floor.
 
     Returns
     -------
     pandas.DataFrame
-        As `experiments.nine_conditions.transfer_functions.order_table`.
+        Table like that of `experiments.nine_conditions.transfer_functions.order_table`.
     """
     rng = stream(seed, "circuit order")
     return order_table(prbs_around(rig, 2.0, AMPLITUDE_V, rng), rng)
 
 
 def validation_input(rig: CircuitParameters, settings: StudySettings) -> pd.DataFrame:
-    """Return the nine steps of section 6, the drive alone: Figure 10."""
+    """Return only the drive of section 6's nine steps: Figure 10."""
     T = settings.classification_sample_time
     speed = make_drive("steps", settings.duration, T, rig, stream(settings.seed, "circuit validation"))
     volts = speed / rig.motor_speed_per_volt
@@ -167,8 +167,8 @@ def bulk_modulus_on_circuit(
 ) -> pd.DataFrame:
     """Estimate bulk modulus on the circuit by three forms, in nine conditions, from every first guess: Figure 11.
 
-    The forms believe the lumped actuator. The flow form follows chambers and make-up of its own and finds the truth;
-    the pressure form, whose chambers keep their volume, reads a few percent low.
+    The forms assume the lumped actuator. The flow form models chambers and make-up itself and finds the true value; the
+    pressure form, which assumes constant chamber volumes, reads a few percent low.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def bulk_modulus_on_circuit(
     Returns
     -------
     pandas.DataFrame
-        One row an estimate: outcome, value, interval, error, whether the interval covers the truth, gate.
+        One row for each estimate: outcome, value, interval, error, whether the interval covers the truth, gate.
     """
     truth = rig.bulk_modulus
 

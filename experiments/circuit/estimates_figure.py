@@ -30,7 +30,7 @@ def draw_bulk_modulus(tables: Mapping[str, pd.DataFrame]) -> Figure:
     Returns
     -------
     Figure
-        One panel a form, one row a condition, one dot a first guess.
+        One panel for each form, one row for each condition, one dot for each first guess.
     """
     estimates = tables["figure 11 bulk modulus"]
     title = "Estimates of bulk modulus on the circuit plant, which no form here assumes"

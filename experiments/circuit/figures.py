@@ -1,6 +1,6 @@
 """The paper's Figures 3 to 11 as the circuit plant reproduces them. They read tables, and compute nothing.
 
-The tables go by the names that `hydrostate circuit` writes them under.
+The tables have the names under which `hydrostate circuit` writes them.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ MARKERS = {"none": "o", "minor": "s", "major": "^"}
 
 
 def _draw_throttles(tables: Tables) -> Figure:
-    """Draw what settles against the throttles' voltages, as Figures 3 and 4 do.
+    """Draw steady values against the throttles' voltages, as Figures 3 and 4 do.
 
     Velocity on the left, differential pressure on the right, both in percent of normal.
     """

@@ -1,4 +1,4 @@
-"""Section 4's first tests on the circuit plant: what a user of the rig would ask of it first."""
+"""Section 4's first tests on the circuit plant: the first measurements that a user of the rig would make."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -28,13 +28,13 @@ LEVELS_V = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Input levels of the steady-state gain [V]."""
 
 BREAK_MEANS_V = (2.0, 4.0, 7.0)
-"""Input means at which the break frequency is looked for [V]."""
+"""Input means at which the break frequency is determined [V]."""
 
 WITHIN_DOUBTS = "break frequency within the parameters' uncertainty"
-"""What the two rows of `doubted_breaks` are called."""
+"""Name of the two rows from `doubted_breaks`."""
 
 ROOMY_STROKE = 2.0
-"""Stroke in which the piston settles at 8 V [m], as that of `experiments.circuit.steady_experiments` at 4 V."""
+"""Stroke long enough for the piston to settle at 8 V [m]; `experiments.circuit.steady_experiments` has that for 4 V."""
 
 _COUNTS = 5.0
 _MOVED = 5.0
@@ -46,10 +46,11 @@ _STEP_SAMPLE_TIME = 1e-4
 def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = LEVELS_V) -> Rows:
     """Return section 4's first tests: dead time, steady gain, break frequency, linearity, dead zone.
 
-    Dead time is until the encoder leaves its line by five counts, at a step of 4 V from rest, where the pressure that
-    breaks the seals loose has to build up, and from 2 V to 4 V in motion. The break frequency is where the empirical
-    gain is 3 dB below that at its lowest frequency; what parameters within their uncertainty could make of it comes
-    from the linearised equations. Linearity is the largest low-frequency gain over the smallest.
+    Dead time ends when the encoder departs from its extrapolated line by five counts. It is measured for a step of 4 V
+    from rest, where the breakaway pressure of the seals must first build up, and for a step from 2 V to 4 V in motion.
+    The break frequency is where the empirical gain is 3 dB below that at its lowest frequency; its range for parameters
+    within their uncertainty comes from the linearised equations. Linearity is the ratio of the largest low-frequency
+    gain to the smallest.
 
     Parameters
     ----------
@@ -59,8 +60,8 @@ def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = L
     Returns
     -------
     pandas.DataFrame
-        Columns test, at, value, unit, expected, published: expected is what Tables 2 to 4 imply (errata E8 for the
-        dead zone), published what the paper prints; either is NaN where there is none.
+        Columns test, at, value, unit, expected, published: expected is the value that Tables 2 to 4 imply (errata E8
+        for the dead zone), published is the value in the paper; either is NaN if there is none.
     """
     rng = stream(seed, "circuit first tests")
     for low in (0.0, 2.0):
@@ -96,7 +97,7 @@ def break_frequency(response: pd.DataFrame) -> float:
     Returns
     -------
     float
-        Frequency, by a straight line between its neighbours [Hz]; NaN if the gain stays above.
+        Linearly interpolated frequency [Hz]; NaN if the gain stays above.
 
     Examples
     --------
@@ -114,15 +115,15 @@ def break_frequency(response: pd.DataFrame) -> float:
 
 
 def dead_zone(p: CircuitParameters, rng: np.random.Generator, highest_v: float = 4.0) -> float:
-    """Return the smallest voltage that moves the piston from rest, by halving.
+    """Return the smallest voltage that moves the piston from rest, by bisection.
 
-    It moves if, held as long as `experiments.circuit.steady_experiments.steady_runs` does, the encoder shows several
-    times the deflection at which the seals break loose.
+    The piston counts as moved if the encoder shows several times the breakaway deflection of the seals after the
+    voltage has been held as long as in `experiments.circuit.steady_experiments.steady_runs`.
 
     Parameters
     ----------
     highest_v : float
-        A voltage that does move it [V].
+        A voltage that moves the piston [V].
 
     Returns
     -------
@@ -149,7 +150,7 @@ def dead_zone(p: CircuitParameters, rng: np.random.Generator, highest_v: float =
 
 
 def dead_time(p: CircuitParameters, from_v: float, to_v: float, rng: np.random.Generator) -> float:
-    """Return the time after a step at which the encoder leaves its line by five counts.
+    """Return the time after a step at which the encoder departs from its extrapolated line by five counts.
 
     Parameters
     ----------

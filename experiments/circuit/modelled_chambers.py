@@ -15,7 +15,7 @@ from plant.eha.simulate import CIRCUIT, simulate
 from plant.sensors.sensors import BENCH
 
 SAMPLE_TIME = 1e-3
-"""Of the logs [s]."""
+"""Sample time of the logs [s]."""
 
 
 @tabled
@@ -29,12 +29,12 @@ def modelled_chambers(
     rig : CircuitParameters
         The healthy circuit; its `bulk_modulus` is the truth.
     duration : float
-        Length of each log [s].
+        Duration of each log [s].
 
     Returns
     -------
     pandas.DataFrame
-        One row a condition: value_pa, std_pa, error_percent, z (error over deviation) and gate_passed.
+        One row for each condition: value_pa, std_pa, error_percent, z (error over standard deviation) and gate_passed.
     """
 
     def found(condition: str) -> dict[str, object]:

@@ -1,8 +1,8 @@
-"""Tests of the circuit plant around an input mean, in passes: a piston driven around a mean runs out of stroke.
+"""Tests of the circuit plant around an input mean, in passes, because a piston driven around a mean runs out of stroke.
 
-After a lead-in that carries the piston towards one end, every pass covers a part of the stroke, and the mean turns
-round from pass to pass. What follows a turn is left out, passes backward are counted with the other sign, and each pass
-has its own mean removed.
+After a lead-in that moves the piston towards one end, every pass covers part of the stroke, and the mean changes sign
+from pass to pass. The time after each reversal is omitted, backward passes are taken with reversed sign, and the mean
+of each pass is removed.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from plant.sensors.sensors import BENCH
 CHANNELS = ("motor_speed_rad_s", "velocity_m_s")
 
 SAMPLE_TIME = 1e-3
-"""Of the tests [s]."""
+"""Sample time of the tests [s]."""
 
 
 def in_condition(rig: CircuitParameters, condition: str) -> CircuitParameters:
@@ -43,11 +43,11 @@ class Passes:
     mean_v, amplitude_v : float
         Mean, not negative, and amplitude of the input [V].
     pass_time : float
-        Length of a pass [s].
+        Duration of a pass [s].
     hold_time : float
-        Time between chances to switch [s].
+        Time between possible switches [s].
     settling : float
-        What is left out after a turn [s].
+        Time omitted after a reversal [s].
     """
 
     mean_v: float
@@ -59,7 +59,7 @@ class Passes:
 
 
 def run_passes(p: CircuitParameters, test: Passes, rng: np.random.Generator) -> list[NDArray[np.float64]]:
-    """Run a test and return what the bench's sensors see of it, pass by pass, about the mean of each.
+    """Run a test and return the bench's sensor readings, pass by pass, with each pass's mean removed.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """The paper's steady-state experiments on the circuit plant: Figures 3, 4, 8 and 9, as tables.
 
 Every point is a run from rest at constant speed until it settles. The cylinder is given a stroke that is long enough
-for that; on the rig the same takes several strokes.
+for that; on the rig the same test takes several strokes.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,10 +24,10 @@ SAMPLE_TIME = 1e-3
 """Sample time of the steady-state runs [s]."""
 
 HOLD = 8.0
-"""Time at each constant speed [s]: ten times the slowest settling, of a stiff load without leakage."""
+"""Time at each constant speed [s]: ten times the slowest settling time, that of a stiff load without leakage."""
 
 LONG_STROKE = 1.2
-"""Stroke in which the piston settles at 4 V [m]."""
+"""Stroke long enough for the piston to settle at 4 V [m]."""
 
 FIGURE_8_VOLTS = (0.0, 2.0, 2.2, 2.3, 2.4)
 FIGURE_9_VOLTS = (0.5, 0.7, 1.0, 1.3, 1.6, 1.9, 2.2, 2.5, 2.8, 3.1, 3.5)
@@ -53,7 +53,7 @@ def steady_runs(
     Returns
     -------
     list of Record
-        `HOLD` seconds of each.
+        Runs of duration `HOLD`.
     """
     roomy = [replace(p, stroke=max(p.stroke, LONG_STROKE)) for p in circuits]
     drive = np.full(round(HOLD / SAMPLE_TIME), speed)
@@ -63,16 +63,16 @@ def steady_runs(
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep of one throttle at 4 V of motor, the other throttle at rest.
+    """A sweep of one throttle at 4 V motor voltage, with the other throttle unchanged.
 
     Parameters
     ----------
     volts : tuple of float
         The throttle's voltages [V].
     circuit : callable
-        From the healthy circuit and a voltage [V] to the circuit.
+        Function from the healthy circuit and a voltage [V] to the circuit.
     defined : Mapping[float, float]
-        Published share of normal [%] at the voltages where the paper defines a level (errata E6, E7).
+        Published share of normal [%] at the voltages at which the paper defines a level (errata E6, E7).
     """
 
     axis: str
@@ -112,7 +112,7 @@ def throttle_curve(rig: CircuitParameters, sweep: Sweep) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row a voltage; the published share of normal where the paper defines a level there.
+        One row for each voltage, with the published share of normal if the paper defines a level there.
     """
     circuits = [rig, *(sweep.circuit(rig, volts) for volts in sweep.volts)]
     settled = round(1.0 / SAMPLE_TIME)
@@ -129,14 +129,14 @@ def throttle_curve(rig: CircuitParameters, sweep: Sweep) -> pd.DataFrame:
 
 
 def leakage_points(rig: CircuitParameters, level: Level, rng: np.random.Generator) -> SteadyPoints:
-    """Return steady points at one leakage level, 4 V of motor and several loads by throttle B: Figure 8.
+    """Return steady points at one leakage level, 4 V motor voltage and several loads set by throttle B: Figure 8.
 
-    Loads stay below the relief setting: what the relief valve passes is no leakage.
+    Loads stay below the relief setting, because flow through the relief valve is not leakage.
 
     Parameters
     ----------
     level : {"none", "minor", "major"}
-        Leakage level, by throttle A.
+        Leakage level, set by throttle A.
     """
     a_volts = VOLTS_A[LEVELS.index(level)]
     return steady_points(steady_runs([throttled(rig, a_volts, v) for v in FIGURE_8_VOLTS], rig.rated_speed, BENCH, rng))
@@ -148,7 +148,7 @@ def friction_points(rig: CircuitParameters, level: Level, rng: np.random.Generat
     Parameters
     ----------
     level : {"none", "minor", "major"}
-        Friction level, by throttle B.
+        Friction level, set by throttle B.
     """
     p = throttled(rig, 10.0, VOLTS_B[LEVELS.index(level)])
     runs = (steady_runs([p], v * rig.motor_speed_per_volt, BENCH, rng) for v in FIGURE_9_VOLTS)
@@ -166,14 +166,14 @@ def points_table(
     Parameters
     ----------
     rng : numpy.random.Generator
-        Source of sensor noise, as that of the refit.
+        Source of sensor noise, the same as that of the refit.
     points : callable
         `leakage_points` or `friction_points`.
 
     Returns
     -------
     pandas.DataFrame
-        One row a point: level, velocity, differential pressure, flow that is lost and force that friction takes.
+        One row for each point: level, velocity, differential pressure, lost flow and friction force.
     """
     for level in LEVELS:
         found = points(rig, level, rng)
@@ -191,7 +191,7 @@ def points_table(
 def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
     """Return Table 3 refitted from steady points by equations 5.7 and 5.8, beside the plant's and the published values.
 
-    What went in is the circuit's settled leakage: with make-up open the drain counts whole (errata E17).
+    The plant's value is the circuit's settled leakage: with make-up open, the drain counts in full (errata E17).
     """
     published = load("leakage").set_index("leakage")
     for level in LEVELS:

@@ -43,7 +43,7 @@ def circuit_studies(
     Parameters
     ----------
     settings : StudySettings, optional
-        First guesses and length of the runs of Figures 10 and 11; the paper's unless told.
+        First guesses and duration of the runs of Figures 10 and 11; by default the paper's.
 
     Returns
     -------
@@ -96,7 +96,7 @@ _IN_FULL: Mapping[str, str] = {
     "amplitudes from 0.5 V": "amplitudes from 0.5 V up",
     "mean 2 V over mean 7 V, least": "that at mean 2 V over that at 7 V, least",
 }
-"""Names of first tests that a reader outside the table would not understand."""
+"""Full names of first tests whose short names are unclear outside the table."""
 
 
 def _in_full(name: str) -> str:

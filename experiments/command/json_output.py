@@ -1,7 +1,7 @@
-"""Results as one JSON document and one table, the contract that other programs read.
+"""Results as one JSON document and one table: the contract for other programs.
 
-Every command prints a list, one object a log, in which an unknown number is null: later versions add entries and
-rename none.
+Every command prints a list with one object per log, in which an unknown number is null. Later versions add entries and
+never rename them.
 """
 
 import csv
@@ -20,11 +20,11 @@ from plant.atomic import replacing
 from plant.errors import HydrostateError
 
 Result: TypeAlias = Mapping[str, Any]
-"""What one log gave, by entry of the JSON contract."""
+"""Results of one log, by entry of the JSON contract."""
 
 
 def plain(value: object) -> Any:
-    """Return a value as JSON knows it; a number that is not finite becomes None.
+    """Return a value as a JSON value; a number that is not finite becomes None.
 
     Returns
     -------
@@ -52,12 +52,12 @@ def plain(value: object) -> Any:
 
 
 def json_text(results: Sequence[Result]) -> str:
-    """Return results as one JSON document, in ASCII so that any terminal or pipe carries it."""
+    """Return results as one JSON document, in ASCII so that any terminal or pipe can carry it."""
     return json.dumps(plain(list(results)), indent=2, allow_nan=False)
 
 
 def flat(result: Result, prefix: str = "") -> dict[str, Any]:
-    """Return nested entries as one row of a table, ``bulk_modulus_pa.value`` for a value within another.
+    """Return nested entries as one row of a table; a nested value is named like ``bulk_modulus_pa.value``.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def flat(result: Result, prefix: str = "") -> dict[str, Any]:
 
 
 def csv_text(results: Iterable[Result]) -> str:
-    """Return results as a CSV table, one row a log.
+    """Return results as a CSV table, one row per log.
 
     Returns
     -------
@@ -96,28 +96,28 @@ def csv_text(results: Iterable[Result]) -> str:
 
 
 def _harmless(value: Any) -> Any:
-    """Return a cell that no spreadsheet takes for a formula: text that begins like one gets an apostrophe."""
+    """Return a cell that no spreadsheet interprets as a formula: text that starts like one gets an apostrophe."""
     return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
 _IN_FOLDER = ("results.json", "results.csv")
-"""What is written into a folder."""
+"""Files written into a results folder."""
 
 
 def prepare_output(out: Path | None, logs: Iterable[Path] = ()) -> None:
-    """Make the folder that results will be written to, before any work is done for them.
+    """Create the folder for the results before any work is done.
 
     Parameters
     ----------
     out : Path or None
         A folder, or a file that ends in ``.json``; None writes nothing.
     logs : iterable of Path
-        What is read, and must not be overwritten.
+        Files to read, which must not be overwritten.
 
     Raises
     ------
     HydrostateError
-        If the name is that of another file or of a log, or the folder cannot be made or written.
+        If the name belongs to another file or to a log, or the folder cannot be created or written.
     """
     if out is None:
         return
@@ -134,12 +134,12 @@ def prepare_output(out: Path | None, logs: Iterable[Path] = ()) -> None:
 
 
 def write_results(results: Sequence[Result], out: Path) -> list[Path]:
-    """Write results; a reader sees the old file or the whole new one, never a part.
+    """Write results; a reader sees the old file or the complete new one, never a part.
 
     Parameters
     ----------
     out : Path
-        A folder, which gets ``results.json`` and ``results.csv``; or a file that ends in ``.json``.
+        A folder, which receives ``results.json`` and ``results.csv``; or a file that ends in ``.json``.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def write_results(results: Sequence[Result], out: Path) -> list[Path]:
 
 
 def write_whole(path: Path, text: str, option: str = "", *, parents: bool = False) -> None:
-    """Write a file, whole or not at all.
+    """Write a file; no partial file is left behind.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The body of `estimate` and `diagnose`, the same for every kind of actuator."""
+"""The common part of `estimate` and `diagnose` for all kinds of actuator."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", "as_json", "sample_time", "beside"})
-"""Options of every kind of actuator."""
+"""Options that apply to every kind of actuator."""
 
 ASSUMED = (
     "no --rig: the paper's actuator is assumed; if yours is another one, `hydrostate rig init rig.toml{plant}` writes "
@@ -37,18 +37,18 @@ UNFILLED = "{rig}: its parameters are those of the paper's actuator; if yours is
 
 @dataclass(frozen=True)
 class _Question:
-    """A verb as it is asked of the logs of one kind of actuator.
+    """A verb, applied to the logs of one kind of actuator.
 
     Parameters
     ----------
     options : Mapping[str, Any]
-        Options as the kind understands them.
+        Options in the form used by the kind.
     rig, prepared : Rig, Any
-        What the kind made of its rig and of these options.
+        The kind's prepared rig and options.
     about : Mapping[str, Any]
-        Entries that all logs have.
+        Entries common to all logs.
     of_the_paper : bool
-        Whether nothing was told of the actuator, by a rig file or in it.
+        Whether no details of the actuator were given, neither a rig file nor its contents.
     """
 
     chosen: "LogVerb"
@@ -61,7 +61,7 @@ class _Question:
 
     @classmethod
     def of(cls, context: typer.Context, verb: str, asked: Mapping[str, Any], plant: str | None) -> "_Question":
-        """Return the question for a kind of actuator; raises a HydrostateError if an option does not go with it."""
+        """Return the verb for a kind of actuator; raises a HydrostateError if an option does not apply to it."""
         diagnosing = verb == "diagnose"
         kind, bench = load_actuator(plant, asked["rig"])
         options = understood(context, asked, kind, verb, COMMON | ({"condition"} if diagnosing else set()))
@@ -84,12 +84,12 @@ class _Question:
 
 
 def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[str, Any]) -> NoReturn:
-    """Find what logs say, print it, and leave with the exit code.
+    """Run the verb on the logs, print the results, and exit with the exit code.
 
     Raises
     ------
     HydrostateError
-        If an option is unknown, does not go with the kind of actuator, or is not usable.
+        If an option is unknown, does not apply to the kind of actuator, or is not usable.
     """
     question = _Question.of(context, verb, asked, asked["plant"])
     logs, beside = asked["logs"], asked.get("beside") or ()
@@ -154,14 +154,14 @@ def _untold(rig: "Path | None", plant: str) -> str:
 
 
 def _agreement(result: Result, found: "Finding") -> list[str]:
-    """Return whether the condition is the one that was expected, where one was."""
+    """Return whether the condition is the expected one, if one was given."""
     if result["expected"] is None or result["condition"] is None:
         return []
     return ["as expected" if result["expected"] in found.named else f"{result['expected']} was expected"]
 
 
 def page_of(chosen: "LogVerb", result: Result, found: "Finding", record: "Record") -> str:
-    """Return the page of a log: that of its kind of actuator, or the one that all have.
+    """Return the page of a log: that of its kind of actuator, or the common one.
 
     Parameters
     ----------

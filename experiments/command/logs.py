@@ -1,4 +1,4 @@
-"""Several logs, one after the other: one that fails is named and the rest are done."""
+"""Several logs, one after the other. A log that fails is reported, and the others are still processed."""
 
 import contextlib
 import inspect
@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 OURS = re.compile(re.escape(str(Path(__file__).parents[2])) + r"[/\\](plant|experiments|hydrostate\.py)")
-"""Files between a log and who reads it."""
+"""Files of this project in the call stack between the log reader and the caller."""
 
 CONTEXTS = contextlib.__file__
-"""What runs a block of a context."""
+"""File of the standard library that runs context managers."""
 
 Work: TypeAlias = Callable[[Path], Result]
-"""What a command does with one log."""
+"""Processing of one log by a command."""
 
 Screen: TypeAlias = Callable[[Sequence[Result]], Iterable["RenderableType"]]
-"""What a command shows of the logs that did not fail."""
+"""Terminal output of a command for the logs that did not fail."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Batch:
 
     @property
     def exit_code(self) -> int:
-        """0 all done, 1 some failed or diverged, 2 nothing could be done, 130 interrupted."""
+        """0 if all are done, 1 if some failed or diverged, 2 if nothing could be done, 130 if interrupted."""
         if len(self.results) < self.total:
             return INTERRUPTED
         if not self.done:
@@ -64,9 +64,9 @@ class Batch:
 
 
 def run_logs(logs: Sequence[Path], work: Work, blank: Result, what: str) -> Batch:
-    """Do the work on every log, until interrupted.
+    """Process every log, until interrupted.
 
-    Failures and warnings go to standard error as they come, after the log's name.
+    Failures and warnings go to standard error as they occur, after the log's name.
     """
     results: list[Result] = []
     try:
@@ -81,7 +81,7 @@ def run_logs(logs: Sequence[Path], work: Work, blank: Result, what: str) -> Batc
 
 @contextmanager
 def caught() -> Generator[list[LogWarning]]:
-    """Catch what is said of a log; the list holds it once the block has ended."""
+    """Catch warnings about a log; the list contains them after the block has ended."""
     said: list[LogWarning] = []
     with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("ignore")
@@ -94,7 +94,7 @@ def caught() -> Generator[list[LogWarning]]:
 
 @contextmanager
 def overheard() -> Generator[list[LogWarning]]:
-    """Catch what is said of a log, as `caught` does, and say it again to whoever listens outside."""
+    """Catch warnings about a log as `caught` does, and issue them again for listeners outside."""
     said: list[LogWarning] = []
     try:
         with caught() as said:
@@ -105,7 +105,7 @@ def overheard() -> Generator[list[LogWarning]]:
 
 
 def _level_of_the_reader() -> int:
-    """Return the number of calls between a warning here and the line that asked for the log."""
+    """Return the stack level from a warning here to the line of code that read the log."""
     frame, level = inspect.currentframe(), 0
     while frame is not None and (OURS.match(frame.f_code.co_filename) or frame.f_code.co_filename == CONTEXTS):
         frame, level = frame.f_back, level + 1
@@ -122,14 +122,14 @@ def noted(source: str, read: Callable[[], T]) -> T:
 
 
 def with_remarks(result: Result, said: Iterable[LogWarning]) -> dict[str, Any]:
-    """Return the entries of a log with what reading it brought up, in front of its other warnings and notes.
+    """Return the entries of a log, with the remarks from reading it before its other warnings and notes.
 
     Parameters
     ----------
     result : Mapping
         Entries, with ``warnings`` and ``notes`` or without.
     said : iterable of LogWarning
-        What was said; each remark counts once.
+        Warnings from reading; duplicates count once.
     """
     raised = distinct(one.note for one in said)
     told = list(dict.fromkeys([*map(str, raised), *result.get("warnings", ())]))
@@ -159,14 +159,14 @@ def _failure(blank: Result, message: str) -> dict[str, Any]:
 
 
 def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None, lost: bool = False) -> NoReturn:
-    """Print what was found, write it if wanted, and leave with the exit code.
+    """Print the results, write them if requested, and exit with the exit code.
 
     Parameters
     ----------
     out : Path or None
-        Where results are written too, if there are any.
+        Path to which results are also written, if there are any.
     lost : bool
-        Whether something else that was asked for could not be written: then not all is done.
+        Whether another requested file could not be written, which counts as a failure.
 
     Raises
     ------
@@ -197,23 +197,23 @@ def read_log(
     beside: Sequence[Path] = (),
     most_missing: float | None = None,
 ) -> "Record":
-    """Read a log by a rig's column names and the command line's, which go first.
+    """Read a log by the column names of a rig and of the command line, which take precedence.
 
-    A rig names the columns of a bench, not of every log: one that a log lacks is looked for under the channel's own
-    name, with a warning. A column of the command line must be there.
+    A rig names the columns of a test bench, not of every log. If a log lacks a rig's column, the channel is looked for
+    under its own name, with a warning. A column given on the command line must exist.
 
     Parameters
     ----------
     path : Path, Table or tuple of Table
-        The log's file, or a log that is open.
+        The log's file, or an open log.
     rig_columns, columns : Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.
     required : collection of str, optional
-        Channels that must be there; those of the gear-pump actuator if not given.
+        Channels that must exist; those of the gear-pump actuator if not given.
     sample_time : float, optional
-        Time between rows [s] of a log that has no time, or times that do not increase.
+        Time between rows [s], for a log without a time column or with times that do not increase.
     beside : sequence of Path
-        Files of other loggers of the same test.
+        Files from other loggers in the same test.
     most_missing : float, optional
         Share of the samples that may be missing [fraction]; 5 % if not given.
 
@@ -225,7 +225,7 @@ def read_log(
     Warns
     -----
     LogWarning
-        If a column of the rig's is not in the log.
+        If a column of the rig is not in the log.
     """
     from plant.log.checks import REQUIRED
     from plant.log.files import read_record, source_of
@@ -247,24 +247,24 @@ def read_log(
 def with_rig_columns(
     read: Callable[[Mapping[str, str]], T], rig_columns: Mapping[str, str], columns: Mapping[str, str]
 ) -> T:
-    """Read by a rig's columns and the command line's, leaving out those of the rig's that are not there.
+    """Read by the columns of a rig and of the command line, leaving out columns of the rig that do not exist.
 
     Parameters
     ----------
     read : callable
-        Reads by a mapping of channels to foreign columns.
+        Reads by a mapping from channels to foreign columns.
     rig_columns, columns : Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.
 
     Raises
     ------
     LogError
-        If a column of the command line's is absent, or for any other reason of `read`'s.
+        If a column given on the command line is absent, or `read` fails for any other reason.
 
     Warns
     -----
     LogWarning
-        If a column of the rig's is absent.
+        If a column of the rig is absent.
     """
     absent: list[str] = []
     try:

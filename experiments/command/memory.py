@@ -1,25 +1,25 @@
-"""Memory of a process that answers for one log: what is freed stays with it, ready to be used again."""
+"""Memory of a process for one log: freed memory is kept for reuse."""
 
 import ctypes
 
 TRIM, MMAP, ARENAS = -1, -3, -8
-"""Numbers of the options of `mallopt` (malloc.h of the GNU C library)."""
+"""Option numbers of `mallopt` (malloc.h of the GNU C library)."""
 
 LARGEST_KEPT, MOST_KEPT = 32 << 20, 1 << 30
-"""Largest block that is not given back at once, and how much free memory at the end is kept [bytes]; the first is the
-most that the library takes."""
+"""Largest block that is kept when freed, and how much free memory is kept at the end [bytes]; the first is the largest
+value that the library accepts."""
 
 
 def keep_freed_memory() -> bool:
-    """Let the C library keep what is freed, in one pool for all threads.
+    """Let the C library keep freed memory, in one pool for all threads.
 
-    By default each array of over 128 kB gets pages of its own from the system, which clears them: with 200,000 rows
-    that is half of a second's page faults.
+    By default, each array over 128 kB gets its own pages from the system, which clears them. With 200,000 rows this
+    costs half a second of page faults.
 
     Returns
     -------
     bool
-        Whether the library took it; others than GNU's have no such options.
+        Whether the library accepted it; libraries other than GNU's have no such options.
     """
     try:
         mallopt = ctypes.CDLL(None).mallopt

@@ -1,4 +1,4 @@
-"""Tables on a terminal that is too narrow for them: each row as lines, so that no number and no verdict is cut off."""
+"""Tables on a terminal that is too narrow: each row becomes several lines, so that no number or verdict is cut off."""
 
 from typing import TYPE_CHECKING
 
@@ -6,26 +6,26 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 MOST_WORD = 20
-"""Longest word that is kept whole in a column of words [characters], judged: longer names of files are folded."""
+"""Longest word that stays whole in a text column [characters], judged: longer file names are folded."""
 
 FRAME = 3
-"""What a column takes beside its cells: a blank on each side and the line to the next [characters]."""
+"""Width that a column needs in addition to its cells: a space on each side and the border [characters]."""
 
 
 def narrowed(shown: "Table", width: int) -> "Table | None":
-    """Return a table that a terminal is wide enough for: headings of numbers stand in several lines where they must.
+    """Return a table that fits the width of the terminal; headings of number columns are folded if necessary.
 
     Parameters
     ----------
     shown : rich.table.Table
-        The table; a column of numbers is one that may not wrap.
+        The table; number columns are those that may not wrap.
     width : int
-        Of the terminal [characters].
+        Width of the terminal [characters].
 
     Returns
     -------
     rich.table.Table or None
-        The table; None where numbers would be cut off, or words folded other than between words.
+        The table; None if numbers would be cut off, or words would be broken.
     """
     if not _fits(shown, width):
         for column, (cells, whole) in zip(shown.columns, _columns(shown), strict=True):
@@ -35,12 +35,12 @@ def narrowed(shown: "Table", width: int) -> "Table | None":
 
 
 def as_lines(shown: "Table") -> str:
-    """Return a table as lines: the first cell of a row, and below it a line for each other cell with its heading.
+    """Return a table as lines: the first cell of each row, and below it one line per further cell with its heading.
 
     Returns
     -------
     str
-        Lines of any length, with a blank one after each row; empty cells are left out.
+        Lines of any length, with an empty line after each row; empty cells are left out.
 
     Examples
     --------
@@ -69,12 +69,12 @@ def _fits(shown: "Table", width: int) -> bool:
 
 
 def _columns(shown: "Table") -> list[tuple[list[str], bool]]:
-    """Return heading and cells of each column, and whether they must stay whole."""
+    """Return heading and cells of each column, and whether its cells must stay whole."""
     return [([str(column.header), *map(str, column.cells)], column.no_wrap) for column in shown.columns]
 
 
 def _least(cells: list[str], whole: bool) -> int:
-    """Return the least width of a column [characters]."""
+    """Return the smallest width of a column [characters]."""
     if whole:
         return max(map(_width, cells))
     return max((min(_width(word), MOST_WORD) for cell in cells for word in cell.split()), default=0)
@@ -87,7 +87,7 @@ def _width(text: str) -> int:
 
 
 def _in_lines(heading: str, width: int) -> str:
-    """Return a heading in lines as wide as the cells below it, or as its longest word."""
+    """Return a heading folded to the width of the cells below it, or of its longest word."""
     import textwrap
 
     return "\n".join(textwrap.wrap(heading, max([width, *map(len, heading.split())]), break_on_hyphens=False))

@@ -1,4 +1,4 @@
-"""Options that several commands share, each written once."""
+"""Options shared by several commands, each defined once."""
 
 import math
 import re
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 
 def option(metavar: str, said: str, *names: str, **more: Any) -> Any:
-    """Return an option of the command line that takes a value, with what its help says."""
+    """Return a command line option that takes a value, with its help text."""
     return typer.Option(*names, metavar=metavar, help=said, **more)
 
 
 def flag(names: str, said: str) -> Any:
-    """Return an option of the command line that is given or not, with what its help says."""
+    """Return a command line flag, with its help text."""
     return typer.Option(names, help=said)
 
 
 def argument(metavar: str, said: str) -> Any:
-    """Return an argument of the command line, with what its help says."""
+    """Return a command line argument, with its help text."""
     return typer.Argument(metavar=metavar, help=said, show_default=False)
 
 
@@ -144,7 +144,7 @@ SEED = 2024
 
 
 def load_rig(path: Path | None) -> "Rig":
-    """Return the rig of a file, the paper's where there is none.
+    """Return the rig from a file; without a file, the paper's rig.
 
     Raises
     ------
@@ -157,12 +157,12 @@ def load_rig(path: Path | None) -> "Rig":
 
 
 def load_columns(texts: Sequence[str] | None) -> dict[str, str]:
-    """Return ``--columns`` as a mapping of channels to foreign columns.
+    """Return ``--columns`` as a mapping from channels to foreign columns.
 
     Parameters
     ----------
     texts : sequence of str or None
-        ``CHANNEL=NAME:UNIT``, one or several with commas between.
+        ``CHANNEL=NAME:UNIT``, one or several separated by commas.
 
     Returns
     -------
@@ -185,12 +185,12 @@ def load_columns(texts: Sequence[str] | None) -> dict[str, str]:
 
 
 def listed(*texts: str) -> tuple[str, ...]:
-    """Return the names in texts that separate them by commas.
+    """Return the names in comma-separated texts.
 
     Parameters
     ----------
     *texts : str
-        As an option has them, which may be given several times.
+        Values of an option, which may be given several times.
 
     Examples
     --------
@@ -201,17 +201,17 @@ def listed(*texts: str) -> tuple[str, ...]:
 
 
 def require_positive(option: str, value: float | None, unit: str) -> None:
-    """Refuse an option whose number is not positive and finite; None, not given, passes.
+    """Raise an error if an option's number is not positive and finite; None, not given, passes.
 
     Parameters
     ----------
     value : float or None
-        Its value [in that unit].
+        Value of the option [in that unit].
 
     Raises
     ------
     HydrostateError
-        If it is no number, or not positive and finite.
+        If it is not a number, or not positive and finite.
     """
     if not isinstance(value, Real | None):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         raise HydrostateError(f"{option} must be a number [{unit}], got {value!r}")
@@ -220,12 +220,12 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
 
 
 def refuse_given(options: Mapping[str, object], why: str) -> None:
-    """Refuse options that would change nothing, rather than ignore them.
+    """Raise an error for options that would have no effect, rather than ignore them.
 
     Parameters
     ----------
     options : mapping of str to object
-        What was given to each; None or empty where it was not given.
+        Value of each option; None or empty if it was not given.
     why : str
         Rest of the sentence, after the name of the option.
 
@@ -245,7 +245,8 @@ def load_actuator(plant: str | None, path: Path | None) -> "tuple[ActuatorKind, 
     Parameters
     ----------
     plant : str or None
-        As ``--plant`` names it; the rig file's if not given, and the gear-pump actuator where that names none.
+        As in ``--plant``. If not given, it is taken from the rig file; if that names none, it is the gear-pump
+        actuator.
     path : Path or None
         The rig file.
 
@@ -267,19 +268,19 @@ def load_actuator(plant: str | None, path: Path | None) -> "tuple[ActuatorKind, 
 def understood(
     context: typer.Context, asked: Mapping[str, Any], kind: "ActuatorKind", verb: str, common: Collection[str]
 ) -> dict[str, Any]:
-    """Return the options of a command line that a kind of actuator understands, at its defaults where not given.
+    """Return the command line options that apply to a kind of actuator, with defaults for those not given.
 
     Parameters
     ----------
     asked : Mapping[str, Any]
-        Its arguments by name.
+        Arguments by name.
     common : collection of str
-        Options of all kinds, which the verb itself sees to.
+        Options of all kinds, which the verb itself handles.
 
     Raises
     ------
     HydrostateError
-        If an option is given that the kind does not understand, or the kind lacks the verb.
+        If an option does not apply to the kind, or the kind lacks the verb.
     """
     from experiments.actuators import actuators, offered
 

@@ -1,4 +1,4 @@
-"""Files that a command writes beside its results: refused before the work, and one of its own for each log."""
+"""Files that a command writes in addition to its results: checked before the work, with one file for each log."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -8,29 +8,29 @@ from typing import TypeVar
 from plant.errors import HydrostateError
 
 PAGES = (".html", ".htm", "")
-"""What the name of a page ends in."""
+"""Allowed endings of a page's file name."""
 
 OF_FILES = (".csv", ".txt", ".xml", ".xlsx", ".html", ".htm", ".png", ".pdf", ".toml", ".parquet", ".mat", ".c", ".h")
-"""Endings of files: a folder of such a name would be a slip."""
+"""Endings of files: a folder with such a name would be a mistake."""
 
 Owner = TypeVar("Owner", Path, str)
 
 
 def own_paths(target: Path | None, owners: Sequence[Owner]) -> dict[Owner, Path]:
-    """Return the file of each log or output; with several, the name of each goes into that of its file.
+    """Return the file for each log or output; if there are several, each file name contains the name of its owner.
 
     Parameters
     ----------
     target : Path or None
-        As given to an option such as ``--figure``; None where nothing is to be written.
+        As given to an option such as ``--figure``; None if nothing is written.
     owners : sequence of Path or of str
         Logs, or names of outputs.
 
     Returns
     -------
     dict
-        File by log or output; empty where nothing is to be written. Logs of one name in two folders have the folders
-        in the names of their files.
+        File by log or output; empty if nothing is written. If logs in two folders have the same name, their folders are
+        included in the file names.
 
     Examples
     --------
@@ -47,16 +47,16 @@ def own_paths(target: Path | None, owners: Sequence[Owner]) -> dict[Owner, Path]
 
 
 def require_no_log(option: str, places: Iterable[Path], logs: Iterable[Path]) -> None:
-    """Refuse to write over a log, or over what `plant.log.files.write_record` left beside it.
+    """Raise an error if a log, or a file that `plant.log.files.write_record` put beside it, would be overwritten.
 
     Parameters
     ----------
     option : str
-        As the command line has it.
+        Name of the option on the command line.
     places : iterable of Path
-        What would be written.
+        Files to write.
     logs : iterable of Path
-        What is read.
+        Files to read.
 
     Raises
     ------
@@ -73,23 +73,23 @@ def require_no_log(option: str, places: Iterable[Path], logs: Iterable[Path]) ->
 
 
 def require_place(option: str, path: Path | None, ending: str = "", logs: Iterable[Path] = ()) -> None:
-    """Refuse a file that cannot be written, or not under this name, before the work and not after it.
+    """Raise an error before the work if a file cannot be written, or not under this name.
 
     Parameters
     ----------
     option : str
-        As the command line has it.
+        Name of the option on the command line.
     path : Path or None
-        Where the file goes; None, not given, passes.
+        The file to write; None, not given, passes.
     ending : str
-        How its name must end, such as ``.png``; any ending if empty.
+        Required ending of its name, such as ``.png``; any ending if empty.
     logs : iterable of Path
-        What is read, and must not be overwritten.
+        Files to read, which must not be overwritten.
 
     Raises
     ------
     HydrostateError
-        If it names a folder, a file in a folder that is not there, another kind of file, or a log.
+        If it names a folder, a file in a missing folder, another kind of file, or a log.
     """
     if path is None:
         return
@@ -103,17 +103,17 @@ def require_place(option: str, path: Path | None, ending: str = "", logs: Iterab
 
 
 def require_folder(folder: Path | None) -> None:
-    """Refuse a folder of ``--out`` that is a file, or has the name of one, before the work and not after it.
+    """Raise an error before the work if the folder of ``--out`` is a file, or is named like one.
 
     Parameters
     ----------
     folder : Path or None
-        Where files go; None, not given, passes.
+        Folder for the files; None, not given, passes.
 
     Raises
     ------
     HydrostateError
-        If it is a file, or is not there and has an ending of files.
+        If it is a file, or does not exist and has the ending of a file.
     """
     if folder is None or folder.is_dir():
         return
@@ -124,17 +124,17 @@ def require_folder(folder: Path | None) -> None:
 
 
 def page_place(report: Path | None) -> Path | None:
-    """Return the path of the page of ``--report``, with the ending ``.html`` whatever is given.
+    """Return the path of the page of ``--report``; the ending ``.html`` is added if it is missing.
 
     Parameters
     ----------
     report : Path or None
-        As the command line has it; None, not given, stays None.
+        As given on the command line; None, not given, stays None.
 
     Raises
     ------
     HydrostateError
-        If it names a folder, a file in a folder that is not there, or another kind of file.
+        If it names a folder, a file in a missing folder, or another kind of file.
     """
     require_place("--report", report)
     if report is None:
@@ -143,17 +143,17 @@ def page_place(report: Path | None) -> Path | None:
 
 
 def with_page_ending(what: str, page: Path) -> Path:
-    """Return the name of a page with the ending ``.html``, whatever is given.
+    """Return the name of a page; the ending ``.html`` is added if it is missing.
 
     Parameters
     ----------
     what : str
-        What the reader called it, such as ``--report``.
+        The user's name for it, such as ``--report``.
 
     Raises
     ------
     HydrostateError
-        If it ends as no page does, or is a folder.
+        If it does not have the ending of a page, or is a folder.
     """
     if page.is_dir():
         raise HydrostateError(f"{what} must be a file, got the folder {str(page)!r}")
@@ -179,7 +179,7 @@ def pages_sentence(written: Sequence[Path]) -> str:
 
 
 def _labels(owners: Sequence[Owner]) -> list[str]:
-    """Return a name for each, as short as tells them apart where letters have no case."""
+    """Return a name for each, as short as possible, but unique without regard to case."""
     labels: list[str] = []
     for labels in _candidates(owners):
         if len({label.casefold() for label in labels}) == len(labels):
@@ -193,7 +193,7 @@ def _labels(owners: Sequence[Owner]) -> list[str]:
 
 
 def _candidates(owners: Sequence[Owner]) -> Iterator[list[str]]:
-    """Yield names for all: of logs the last part of the path without and with its ending, then more of the path."""
+    """Yield names for all: for logs the last part of the path without and with its ending, then more of the path."""
     paths = [one.absolute() for one in owners if isinstance(one, Path)]
     if len(paths) < len(owners):
         yield [re.sub(r"[^\w.+-]+", "_", str(one)).strip("_") or "output" for one in owners]

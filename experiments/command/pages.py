@@ -1,4 +1,4 @@
-"""Pages of logs, or of models: where each goes, which are written, and why others are not."""
+"""Pages of logs or models: where each is written, and why some are missing."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,12 +13,12 @@ Owner = TypeVar("Owner", Path, str)
 
 
 class Pages(Generic[Owner]):
-    """Pages that a command writes beside its answer.
+    """Pages that a command writes in addition to its answer.
 
     Parameters
     ----------
     places : Mapping[Path or str, Path]
-        File of the page, by log or by output of a model.
+        Path of the page, by log or by output of a model.
     """
 
     def __init__(self, places: Mapping[Owner, Path]) -> None:
@@ -27,7 +27,7 @@ class Pages(Generic[Owner]):
         self.unwritten: list[str] = []
 
     def write(self, owner: Owner, page: str) -> None:
-        """Write a page; what cannot be written is told in the end, for the answer is shown all the same."""
+        """Write a page; if this fails, the error is reported at the end, and the answer is still shown."""
         try:
             write_whole(self.places[owner], page, "--report")
             self.written.append(self.places[owner])
@@ -35,6 +35,6 @@ class Pages(Generic[Owner]):
             self.unwritten.append(str(error))
 
     def tell(self) -> None:
-        """Say where pages are, then why each that is missing could not be written."""
+        """Print where the pages are, then why any missing one could not be written."""
         for said in [*([pages_sentence(self.written)] if self.written else []), *self.unwritten]:
             note(said)

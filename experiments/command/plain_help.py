@@ -1,7 +1,7 @@
-"""The help of a verb as plain lines: an option in one line and what it does beside or below it.
+"""The help of a verb as plain lines: each option on one line, with its description beside or below it.
 
-Typer's panels have a column each for long names, short names, names that say no, and values. Where a verb has one long
-name, what an option does is left with 18 characters on a terminal of 80, and names of channels are cut.
+Typer's panels have separate columns for long names, short names, negated names, and values. If one option has a long
+name, descriptions have only 18 of 80 characters on a terminal, and names of channels are cut.
 """
 
 from collections.abc import Iterable
@@ -18,13 +18,13 @@ def read_plainly(command: Any) -> None:
 
 
 def hide_bool(parameters: Iterable[Any]) -> None:
-    """Change parameters so that panels show no type beside flags."""
+    """Change parameters so that help panels show no type for flags."""
     for parameter in parameters:
         if getattr(parameter, "is_flag", False):
             parameter.metavar = ""
 
 
 def _no_type(ctx: Any) -> str:
-    """Return an empty type for an argument whose name says enough."""
+    """Return an empty type for an argument whose name is clear enough."""
     del ctx
     return ""

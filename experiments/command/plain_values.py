@@ -1,7 +1,7 @@
-"""Values of the command line that need no validator, taken as they are.
+"""Command line values that need no validator, taken unchanged.
 
-Typer hands every value to pydantic, whose import and adapters are a tenth of a short run. A text, a path, and a number
-that is a default need none of it. How Typer does so is its own affair and may change: then all goes its usual way.
+Typer passes every value to pydantic, whose import and adapters take a tenth of a short run. Text, paths, and default
+numbers do not need it. This relies on Typer's internals, which may change; then every value is validated as usual.
 """
 
 from collections.abc import Iterable
@@ -10,25 +10,25 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 NO_PLAIN = object()
-"""What is given back for a value that a validator has to see."""
+"""Returned for a value that needs a validator."""
 
 UNPARSED = "unable to parse string as a"
-"""What pydantic says of a text that is no number, without the text."""
+"""Part of pydantic's message about text that is not a number, without the text."""
 
 OUTSIDE = "Input should be "
-"""How pydantic begins what it says of a number that is out of range, without the number."""
+"""Start of pydantic's message about a number out of range, without the number."""
 
 ITS_PLACE = "_runtime_param"
-"""Where a parameter of Typer keeps what turns values into what a command takes; None until it is asked for."""
+"""Attribute of a Typer parameter that holds its value converter; None until it is first used."""
 
 
 def take_plainly(parameters: Iterable[Any]) -> None:
-    """Let parameters of a command take plain values as they are, and ask pydantic of others alone.
+    """Let parameters of a command accept plain values directly, and use pydantic only for other values.
 
     Parameters
     ----------
     parameters : iterable of click.Parameter
-        They are changed, but for those that Typer treats in another way.
+        These are modified, except those that Typer treats differently.
     """
     with suppress(ImportError):
         from typer._coercion import build_runtime_param  # pyright: ignore[reportPrivateUsage]  there is no other
@@ -65,7 +65,7 @@ class _Taken:
             raise
 
     def _plain(self, value: Any, annotation: Any, param: Any, ctx: Any) -> Any:
-        """Return a value as it is taken, or `NO_PLAIN`."""
+        """Return the value unchanged, or `NO_PLAIN`."""
         asked = param.type_descriptor.parameter_info
         if asked.parser is not None or param.type_descriptor.file_annotation is not None:
             return NO_PLAIN

@@ -1,4 +1,4 @@
-"""A bar on standard error that moves with pieces of work, and with what one of them tries."""
+"""A progress bar on standard error, for several pieces of work and for what one of them is trying."""
 
 import sys
 from collections.abc import Callable, Generator
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 @contextmanager
 def progress(total: int, what: str) -> Generator[Callable[[], None]]:
-    """Show a bar on standard error, if that is a terminal: of several pieces of work, and of what one of them tries.
+    """Show a bar on standard error, if that is a terminal: for pieces of work, and for what one of them is trying.
 
-    A piece tells what it tries by `estimation.progress.tell`; one piece alone has no bar before it does.
+    A piece reports what it tries by `estimation.progress.tell`. A single piece has no bar before it reports.
 
     Yields
     ------
@@ -36,7 +36,7 @@ def progress(total: int, what: str) -> Generator[Callable[[], None]]:
 
 
 class _Bar:
-    """A bar of pieces of work; of one piece alone it moves without an end, since none is known."""
+    """A bar for pieces of work; for a single piece it has no end, since none is known."""
 
     def __init__(self, total: int, what: str) -> None:
         self.total, self.what, self.count = total, what, 0

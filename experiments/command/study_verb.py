@@ -18,7 +18,7 @@ Settings = TypeVar("Settings", bound="DataclassInstance")
 
 
 def _folder(out: Path) -> Path:
-    """Refuse what is no folder before a study is imported, which takes seconds."""
+    """Refuse a path that is not a folder before the study is imported, which takes seconds."""
     require_folder(out)
     return out
 
@@ -27,7 +27,7 @@ Folder: TypeAlias = Annotated[Path, option("DIR", "Folder of the report.", "--ou
 
 
 def finish_study(study: "Study[Settings]", settings: Settings, out: Path, *, as_json: bool) -> None:
-    """Run a study with progress on standard error, and say where its result is.
+    """Run a study with progress on standard error, and print the path of its result.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Output to the terminal: results on standard output, all else on standard error, and no traceback."""
+"""Terminal output: results on standard output, everything else on standard error, and no traceback."""
 
 import io
 import logging
@@ -23,28 +23,28 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 PIPE_WIDTH = 200
-"""Most columns of a table that is not printed on a terminal, where no line should be folded."""
+"""Largest width of a table that is not printed on a terminal, where lines should not be folded."""
 
 USAGE, SOME_FAILED, INTERRUPTED = 2, 1, 130
-"""Exit codes beside 0."""
+"""Exit codes other than 0."""
 
 _BLOCKS, _DIGITS = "\u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588", "_.-=+*%#"
 
 
 def sparkline(values: "Sequence[float]", width: int) -> str:
-    """Return a small plot in one line, from the means of equal parts of the values.
+    """Return a small one-line plot of the means of equal parts of the values.
 
     Parameters
     ----------
     values : sequence of float
         Finite numbers [any unit].
     width : int
-        Characters, at most.
+        Largest number of characters.
 
     Returns
     -------
     str
-        Blocks, or ASCII signs where the terminal has no others; empty where nothing varies.
+        Block characters, or ASCII characters if the terminal has no others; empty if nothing varies.
     """
     count = len(values)
     parts = min(width, count)
@@ -62,7 +62,7 @@ def sparkline(values: "Sequence[float]", width: int) -> str:
 
 
 def emit(text: str, *, err: bool = False) -> None:
-    """Write a line to standard output or error; a reader that has gone away (``| head``) changes nothing else.
+    """Write a line to standard output or error; a closed pipe (``| head``) is ignored.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def table(*headings: str, title: str | None = None) -> "Table":
     Parameters
     ----------
     *headings : str
-        One a column, with its unit; one that ends in ``]`` or ``±`` holds numbers and is set to the right.
+        One for each column, with its unit; one that ends in ``]`` or ``±`` is for numbers, aligned to the right.
     title : str, optional
         Line above.
     """
@@ -141,7 +141,7 @@ def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
     Parameters
     ----------
     results : sequence of Mapping
-        One object a log, with its ``file``.
+        One object for each log, with its ``file``.
     """
     files = [visible_name(result["file"]) for result in results]
     names = [file.replace(os.sep, "/").rsplit("/", 1)[-1] for file in files]
@@ -149,14 +149,14 @@ def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def folded(text: str, width: int) -> str:
-    """Return a text whose lines end between words, what is folded set below the first words, or those after a name.
+    """Return a text folded between words; folded parts are aligned with the first words, or with those after a name.
 
     Parameters
     ----------
     text : str
         Lines, as ``"  oil       bulk modulus 207.0 MPa"``.
     width : int
-        Characters in a line, at most; a longer word stays whole.
+        Largest number of characters in a line; a longer word stays whole.
 
     Examples
     --------
@@ -182,7 +182,7 @@ def rendered(*parts: "RenderableType") -> str:
     Parameters
     ----------
     *parts : str, rich.text.Text or rich.table.Table
-        What is shown, in order; a plain text is shown as it is.
+        Items to show, in order; plain text is shown unchanged.
 
     Returns
     -------
@@ -208,7 +208,7 @@ def rendered(*parts: "RenderableType") -> str:
 
 
 class _KernelNotice(logging.Handler):
-    """Says once that kernels are being compiled, and passes warnings on."""
+    """Reports once that kernels are being compiled, and passes warnings on."""
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)
@@ -238,7 +238,7 @@ def _kernel_notices() -> Generator[None]:
 
 
 def unexpected(error: BaseException) -> str:
-    """Return the sentence for an error that no check foresaw; ``HYDROSTATE_DEBUG=1`` prints where it arose."""
+    """Return the sentence for an unforeseen error; with ``HYDROSTATE_DEBUG=1`` also print where it occurred."""
     if os.environ.get("HYDROSTATE_DEBUG", "") not in {"", "0"}:
         emit("".join(traceback.format_exception(error)).rstrip(), err=True)
     if isinstance(error, MemoryError):
@@ -249,12 +249,12 @@ def unexpected(error: BaseException) -> str:
 
 
 def guarded(run: Callable[[], object]) -> int:
-    """Run the command line; whatever goes wrong becomes one sentence and an exit code.
+    """Run the command line; any error becomes one sentence and an exit code.
 
     Parameters
     ----------
     run : callable
-        Parses arguments and runs a command; returns its exit code, or something else for 0.
+        Parses arguments and runs a command; returns its exit code, or anything else for 0.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -286,7 +286,7 @@ def guarded(run: Callable[[], object]) -> int:
 
 
 def emit_nothing_more() -> None:
-    """Flush standard output now, where a reader that has gone away can still be noticed quietly."""
+    """Flush standard output now, while a closed pipe can still be handled silently."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -294,7 +294,7 @@ def emit_nothing_more() -> None:
 
 
 def _usage_sentence(error: Exception) -> str | None:
-    """Return the parser's sentence on wrong arguments; empty after help was shown; None for other errors."""
+    """Return the parser's sentence about wrong arguments; empty after help was shown; None for other errors."""
     message = getattr(error, "format_message", None)
     if message is None:
         return None
@@ -311,21 +311,21 @@ def _usage_sentence(error: Exception) -> str | None:
 
 
 def _help_last(args: list[str]) -> list[str]:
-    """Return ``help VERB`` as ``VERB --help``."""
+    """Return ``help VERB`` rewritten as ``VERB --help``."""
     return [*args[1:], "--help"] if args[:1] == ["help"] else args
 
 
 class HydrostateGroup(TyperGroup):
-    """The command line, with its errors as sentences and the exit codes that the help promises."""
+    """The command line, with errors as sentences and with the exit codes given in the help."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse what stands before a command; no validator is imported for values that need none."""
+        """Parse the arguments before the command; plain values need no import of a validator."""
         take_plainly(self.get_params(ctx))
         hide_bool(self.get_params(ctx))
         return super().parse_args(ctx, _help_last(args))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command by its name; no validator is imported for its plain values either."""
+        """Return a command by its name; its plain values need no import of a validator either."""
         command = super().get_command(ctx, cmd_name)
         if command is not None:
             take_plainly(command.get_params(ctx))
@@ -333,7 +333,7 @@ class HydrostateGroup(TyperGroup):
         return command
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; an interruption is told here, since Typer ends with its code and without a word."""
+        """Run the command; an interruption is reported here, since Typer would exit silently with its own code."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:

@@ -1,14 +1,14 @@
-"""Text of files and their names, spelt out where it would command a terminal or be shown as another text."""
+"""Text from files and file names, escaped where it could control a terminal or appear as other text."""
 
 import re
 
 _DIRECTIONS = (0x061C, 0x200E, 0x200F, *range(0x2028, 0x202F), *range(0x2066, 0x206A))
-"""Ends of lines, and signs that change the direction of text: with them a name can be shown as another."""
+"""Line ends and characters that change the text direction: these can make a name look like another."""
 
 _NO_TEXT = {code: f"\\u{code:04x}" for code in range(0xD800, 0xE000)} | {
     0xDC00 + byte: f"\\x{byte:02x}" for byte in range(128, 256)
 }
-"""Surrogates that stand alone: signs of Python for bytes that are no UTF-8, and those that stand for nothing."""
+"""Lone surrogates: Python's characters for bytes that are not UTF-8, and those without a meaning."""
 
 _CONTROLS = {
     **{code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))},
@@ -20,12 +20,12 @@ _UNPRINTED = re.compile(f"[{re.escape(''.join(chr(code) for code in _CONTROLS if
 
 
 def spelt(text: str) -> str:
-    """Return a text or a path as text that every format can hold: bytes of a name that are no UTF-8 are spelt out.
+    """Return a text or a path as text valid in every format: bytes that are not UTF-8 are escaped.
 
     Parameters
     ----------
     text : str
-        As Python gives it, with such bytes as lone surrogates.
+        As given by Python, with such bytes as lone surrogates.
 
     Examples
     --------
@@ -36,12 +36,13 @@ def spelt(text: str) -> str:
 
 
 def visible(text: str) -> str:
-    """Return a text of a file's with its control characters spelt out, so that none reaches a terminal.
+    """Return text from a file with its control characters escaped, so that none reaches a terminal.
 
     Parameters
     ----------
     text : str
-        Any text; lines stay lines. Signs that change its direction are spelt out too, and bytes that are no UTF-8.
+        Any text; lines are kept. Characters that change the text direction, and bytes that are not UTF-8, are escaped
+        too.
 
     Examples
     --------
@@ -52,10 +53,10 @@ def visible(text: str) -> str:
 
 
 def visible_name(file: object) -> str:
-    """Return the name of a file as `visible` does, on one line."""
+    """Return a file name, escaped as by `visible`, on one line."""
     return visible(str(file)).replace("\n", "\\x0a")
 
 
 def visible_page(page: str) -> str:
-    """Return a page as `visible` does, its lines and tabs as they are."""
+    """Return a page, escaped as by `visible`, with its lines and tabs unchanged."""
     return _UNPRINTED.sub(lambda found: _CONTROLS[ord(found.group())], page)

@@ -1,4 +1,4 @@
-"""Velocity control of the diaphragm motor: by encoder, by self-sensing, under a load's step, and with a leak unseen."""
+"""Velocity control of the diaphragm motor: by encoder or self-sensing, under a load step, with an undetected leak."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,16 +15,16 @@ from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import RAMP, SAMPLE_TIME, Schedule, run_motor
 
 LEAK = 2e-12
-"""Leakage past the piston that self-sensing is shown not to see [m^3/(s Pa)]."""
+"""Leakage past the piston that self-sensing does not detect [m^3/(s Pa)]."""
 
 LIGHT, HEAVY = 5.0, 15.0
 """Load before and after its step [N]."""
 
 RISE, BURDEN, END = 0.8, 1.6, 2.4
-"""When the wanted velocity rises, when the load does, when the run ends [s]."""
+"""Times at which the demanded velocity rises, the load rises, and the run ends [s]."""
 
 SLOW, FAST = 2e-3, 3.5e-3
-"""Velocities that are wanted [m/s]."""
+"""Demanded velocities [m/s]."""
 
 
 def _wanted(time: float) -> float:
@@ -37,8 +37,8 @@ def control_runs(p: DiaphragmMotorParameters, seed: int) -> tuple[pd.DataFrame, 
     Returns
     -------
     tuple of pandas.DataFrame
-        Courses, with columns run, time_s, wanted_m_s, measured_m_s, velocity_m_s, voltage_v; and a row a run, with
-        columns run, settling_s (start), rise_s, recovery_s, velocity_m_s, measured_m_s at the end.
+        Time series, with columns run, time_s, wanted_m_s, measured_m_s, velocity_m_s, voltage_v; and one row for each
+        run, with columns run, settling_s (start), rise_s, recovery_s, velocity_m_s, measured_m_s at the end.
     """
     maps = motor_maps(p, (PEAK,))
     leaking = replace(p, crossport_leakage=LEAK)
@@ -70,7 +70,7 @@ def averaged_course(p: DiaphragmMotorParameters) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Columns time_s, voltage_v, fast_m_s (mean over the cycle around it), averaged_m_s; every 1 ms.
+        Columns time_s, voltage_v, fast_m_s (mean over the surrounding cycle), averaged_m_s; every 1 ms.
     """
     loaded = replace(p, load_force=LIGHT)
     time = SAMPLE_TIME * np.arange(round(0.3 / SAMPLE_TIME) + 1)
@@ -92,4 +92,4 @@ RUNS: Mapping[str, tuple[bool, Literal["encoder", "self"]]] = {
     "encoder, leak": (True, "encoder"),
     "self-sensing, leak": (True, "self"),
 }
-"""The runs: whether the piston leaks, and where velocity comes from."""
+"""The runs: whether the piston leaks, and the source of the velocity."""

@@ -18,7 +18,7 @@ from experiments.page.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
 MILLI, ML_MIN = 1e3, 6e7
 
 ELECTRODES = {"a1_v": (ORANGE, "-"), "a2_v": (GREY, "--"), "a3_v": (BLUE, "-"), "a4_v": (VERMILION, ":")}
-"""Electrodes that are drawn, and their colours and lines; A5, A6 and A7 lie on A3, A2 and A1."""
+"""Electrodes that are drawn, with colours and lines; A5, A6 and A7 coincide with A3, A2 and A1."""
 
 CYCLE: Sequence[Course] = (
     (
@@ -52,7 +52,7 @@ def _swept(flow: Axes, sensing: Axes, sweep: pd.DataFrame, across: str, label: s
 
 
 def _draw_frequency(tables: Tables) -> Figure:
-    """Draw flow and sensing over frequency, as section 7.1 tells. Flow on the left, electrodes on the right."""
+    """Draw flow and sensing over frequency, as in section 7.1. Flow on the left, electrodes on the right."""
     title = "Pump alone at 200 V peak to peak: flow and sensing peak together"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, across=0.7))
     _swept(left, right, tables["frequency sweep"], "frequency_hz", "frequency [Hz]")
@@ -63,7 +63,7 @@ def _draw_frequency(tables: Tables) -> Figure:
 
 
 def _draw_voltage(tables: Tables) -> Figure:
-    """Draw flow and sensing over voltage, as section 7.1 tells. Flow on the left, electrodes on the right."""
+    """Draw flow and sensing over voltage, as in section 7.1. Flow on the left, electrodes on the right."""
     title = "Pump alone at 480 Hz: flow and sensing rise with voltage"
     figure, (left, right) = panels(title, 1, 2, 3.6, Margins(left=0.65, across=0.7))
     _swept(left, right, tables["voltage sweep"], "voltage_v", "voltage, peak to peak [V]", marker="o", markersize=3.5)
@@ -72,7 +72,7 @@ def _draw_voltage(tables: Tables) -> Figure:
 
 
 def _draw_load(tables: Tables) -> Figure:
-    """Draw velocity over load, and over frequency under load, as equation 18 and section 7.2 tell.
+    """Draw velocity over load, and over frequency under load, as in equation 18 and section 7.2.
 
     Load on the left, frequency on the right.
     """
@@ -95,7 +95,7 @@ def _draw_load(tables: Tables) -> Figure:
 
 
 def _draw_cycle(tables: Tables) -> Figure:
-    """Draw two cycles of the pump: pressures of neighbours, the valves between them, and flows (Figure 3).
+    """Draw two cycles of the pump: pressures of adjacent chambers, the valves between them, and flows (Figure 3).
 
     Three panels over one time axis.
     """

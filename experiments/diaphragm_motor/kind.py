@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 DRIVE, POSITION = "drive_voltage_v", "position_m"
 
 BENCH = {"sensors": "bench", "duration": 0.2, "sample_time": SAMPLE_TIME}
-"""Sensors, length [s], of which the motor takes some hundredths to settle, and time between samples [s]."""
+"""Sensors, duration [s] (the motor settles within some hundredths of a second), and sample time [s]."""
 
 SINE = {"frequency": 480.0, "voltage": 200.0}
-"""The drive where it is not given: frequency [Hz], voltage peak to peak [V]."""
+"""The default drive: frequency [Hz], voltage peak to peak [V]."""
 
 
 class MotorRunCode(Code):
@@ -79,7 +79,7 @@ def _with_fault(motor: DiaphragmMotorParameters, fault: str | None) -> Diaphragm
 
 
 def _loaded(rig: Rig[Any], options: Options) -> Rig[Any]:
-    """Return the rig under the load of its runs."""
+    """Return the rig with the load of its runs."""
     load = options["load"]
     if load is not None and not isfinite(load):
         raise HydrostateError(f"--load must be finite, got {load:g} N")
@@ -87,7 +87,7 @@ def _loaded(rig: Rig[Any], options: Options) -> Rig[Any]:
 
 
 def _prepared(rig: Rig[Any], options: Options) -> tuple[Rig[Any], Signature | None]:
-    """Return the motor under its load, and what a healthy run of it shows, if there is one."""
+    """Return the motor under its load, and the signature of a healthy run, if there is one."""
     healthy = options["healthy"]
     return _loaded(rig, options), None if healthy is None else logged_signature(healthy)
 

@@ -12,7 +12,7 @@ from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import HIGHEST_VOLTAGE
 
 ML_MIN = 1e-6 / 60.0
-"""One millilitre a minute [m^3/s]."""
+"""One millilitre per minute [m^3/s]."""
 
 COLUMNS = ("section", "claim", "published", "ours", "holds")
 
@@ -48,7 +48,7 @@ def load_straightness(loads: pd.DataFrame, share: float) -> Mapping[float, float
     loads : pandas.DataFrame
         The table ``load sweep``.
     share : float
-        Of the blocking force [dimensionless].
+        Share of the blocking force [dimensionless].
 
     Returns
     -------
@@ -66,8 +66,8 @@ def claimed_speeds(p: DiaphragmMotorParameters) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Columns section, frequency_hz, load_n, voltage_v, velocity_m_s (as it comes out, negative where the load wins)
-        and published_mm_s.
+        Columns section, frequency_hz, load_n, voltage_v, velocity_m_s (as simulated, negative if the load drives the
+        piston back) and published_mm_s.
     """
     most = 2.0 * HIGHEST_VOLTAGE
     settings = (
@@ -104,7 +104,7 @@ def root_efficiency(p: DiaphragmMotorParameters, sweep: pd.DataFrame) -> pd.Data
 
 
 def reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Return the claims of sections 7.1 to 7.3 that physics can bear, beside ours.
+    """Return the claims of sections 7.1 to 7.3 that the plant can reproduce, with our results.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def _turned(course: pd.DataFrame) -> str:
 
 
 def not_reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Return the claims that the plant does not bear, with what it gives in their place (errata M17, M25, M26, M31).
+    """Return the claims that the plant does not support, with its own results (errata M17, M25, M26, M31).
 
     Returns
     -------

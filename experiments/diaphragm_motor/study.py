@@ -23,7 +23,7 @@ CLAIMED: Mapping[str, Callable[[DiaphragmMotorParameters], pd.DataFrame]] = {
     "load and frequency": sweeps.best_frequencies,
     "reversal": sweeps.reversal,
 }
-"""What the paper's claims are held against."""
+"""Sweeps and runs with which the paper's claims are compared."""
 
 SWEEPS: Mapping[str, Callable[[DiaphragmMotorParameters], pd.DataFrame]] = {
     **CLAIMED,
@@ -40,17 +40,17 @@ def claim_tables(
     track: Track,
     made_by: Mapping[str, Callable[[DiaphragmMotorParameters], pd.DataFrame]] = CLAIMED,
 ) -> dict[str, pd.DataFrame]:
-    """Return the sweeps and runs that the paper's claims are held against, and what comes of it.
+    """Return the sweeps and runs with which the paper's claims are compared, and the result.
 
     Parameters
     ----------
     made_by : Mapping[str, callable]
-        The sweeps by the name of their table; those that the claims need at least.
+        The sweeps by the name of their table; at least those that the claims need.
 
     Returns
     -------
     dict[str, pandas.DataFrame]
-        The sweeps, control, modes, and the claims that hold and do not.
+        The sweeps, control, modes, and the claims that hold and those that do not.
     """
     tables = {name: sweep(rig) for name, sweep in track(made_by.items(), description="studies")}
     tables["control courses"], tables["control"] = control_runs(rig, seed)
@@ -75,7 +75,7 @@ def _change(value: float) -> str:
 
 
 def _parameters() -> pd.DataFrame:
-    """Return the parameters as text; what each chamber or valve has of its own is the same for all."""
+    """Return the parameters as text; values given for each chamber or valve are the same for all."""
     table = parameter_table(RIG)
     values = [
         f"{as_set(value[0])}, each of {ROWS[name]}" if isinstance(value, tuple) else as_set(value)

@@ -1,6 +1,6 @@
 """The diaphragm motor's sections 7.1 to 7.3 repeated on its plant: flow, sensing, velocity, load, reversal, cycle.
 
-Flow is that of the pump running freely to tank, velocity that of the piston behind its valve (errata M22 and M26).
+Flow is that of the pump running freely to tank; velocity is that of the piston behind its valve (errata M22 and M26).
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ from plant.diaphragm_motor.parameters import DIAPHRAGMS, DiaphragmMotorParameter
 from plant.diaphragm_motor.run import LONGEST_STEP, SAMPLE_TIME, motor_drive, run_motor, simulate_motor
 
 PEAK, SWING = 480.0, 200.0
-"""The published best frequency [Hz], and the voltage peak to peak at which the plant is calibrated [V]."""
+"""The published best frequency [Hz], and the peak-to-peak voltage at which the plant is calibrated [V]."""
 
 PUBLISHED_FLOW = 110.11e-6 / 60.0
 """Peak flow of section 7.1 [m^3/s]."""
@@ -52,7 +52,7 @@ PARTS = {
     "valve_resistance": "laminar resistance",
     "bulk_modulus": "bulk modulus",
 }
-"""What the peak may answer to, in words."""
+"""Parts that may affect the peak, in words."""
 
 
 def _point_row(point: OperatingPoint) -> dict[str, float]:
@@ -61,7 +61,7 @@ def _point_row(point: OperatingPoint) -> dict[str, float]:
 
 
 def sweep_frequency(p: DiaphragmMotorParameters) -> pd.DataFrame:
-    """Return flow of the pump alone and amplitudes of its electrodes over frequency, as section 7.1 tells.
+    """Return flow of the pump alone and amplitudes of its electrodes over frequency, as in section 7.1.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def sweep_frequency(p: DiaphragmMotorParameters) -> pd.DataFrame:
 
 
 def sweep_voltage(p: DiaphragmMotorParameters) -> pd.DataFrame:
-    """Return flow and sensing over voltage at the best frequency, as section 7.1 tells.
+    """Return flow and sensing over voltage at the best frequency, as in section 7.1.
 
     Returns
     -------
@@ -85,19 +85,19 @@ def sweep_voltage(p: DiaphragmMotorParameters) -> pd.DataFrame:
 
 
 def blocking_force(p: DiaphragmMotorParameters, frequency: float, swing: float) -> float:
-    """Return the load at which the piston stands, by regula falsi on its mean velocity (equation 18).
+    """Return the load at which the piston stops, by regula falsi on its mean velocity (equation 18).
 
     Parameters
     ----------
     frequency : float
-        Of the drive [Hz].
+        Frequency of the drive [Hz].
     swing : float
-        Peak to peak [V].
+        Peak-to-peak voltage [V].
 
     Returns
     -------
     float
-        Force [N]; what the friction takes is not part of it.
+        Force [N], without the friction force.
     """
     low, high = 0.0, 20.0
     while operate(replace(p, load_force=high), frequency, swing).velocity > 1e-5:
@@ -127,7 +127,7 @@ def sweep_load(p: DiaphragmMotorParameters) -> Rows:
 
 @tabled
 def best_frequencies(p: DiaphragmMotorParameters) -> Rows:
-    """Return velocity over frequency under several loads, whose best frequency section 7.2 lets rise (errata M31)."""
+    """Return velocity over frequency under several loads; by section 7.2 the best frequency rises (errata M31)."""
     for load in LOADS:
         loaded = replace(p, load_force=load)
         for frequency in np.arange(320.0, 561.0, 10.0).tolist():
@@ -212,7 +212,7 @@ def _peak(p: DiaphragmMotorParameters) -> tuple[float, float]:
 
 @tabled
 def other_sets(p: DiaphragmMotorParameters) -> Rows:
-    """Return three sets of parameters that give the published peak, each of another plate (errata M22).
+    """Return three sets of parameters that give the published peak, each with a different plate (errata M22).
 
     Returns
     -------
@@ -239,7 +239,7 @@ def other_sets(p: DiaphragmMotorParameters) -> Rows:
 
 
 def _calibrated(p: DiaphragmMotorParameters, plate: PlateParameters, lag: float) -> DiaphragmMotorParameters:
-    """Return the motor on another plate, ports and valves chosen for the published peak."""
+    """Return the motor with another plate, with ports and valves chosen for the published peak."""
     found = plate_coefficients(plate)
     motor = replace(
         p,

@@ -1,1 +1,1 @@
-"""The gear-pump actuator as the command line knows it: its options, entries of the JSON contract, words and pages."""
+"""The gear-pump actuator on the command line: its options, entries of the JSON contract, words and pages."""

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 CHANNELS = (("velocity", "mm/s", 1e3), ("pressure", "bar", 1e-5))
-"""What a circuit is fitted to: name, unit shown and factor from SI."""
+"""Channels that a circuit is fitted to: name, unit shown and factor from SI."""
 
 DESCRIBE = "Describe your actuator in a rig file: without one, these numbers are for the paper's actuator."
-"""What to do where no rig file tells whose log it is."""
+"""Advice if there is no rig file for the log."""
 
 LEAST_SHARE = 0.0005
-"""Probability below which a condition is said to have next to none [probability]."""
+"""Probability below which a condition is described as having almost none [probability]."""
 
 
 def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record") -> str:
@@ -84,7 +84,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
 
 
 def _beside(result: Mapping[str, Any]) -> list[str]:
-    """Return the notes below the charts: what the opening does not say."""
+    """Return the notes below the charts, which the opening does not contain."""
     warned = list(result.get("warnings", []))
     if not result["unknown"]:
         return warned
@@ -93,14 +93,14 @@ def _beside(result: Mapping[str, Any]) -> list[str]:
 
 
 def fit_charts(found: "Finding", stem: str) -> Charts:
-    """Return charts of measurement, fitted circuit and residual, in means over 10 ms.
+    """Return charts of measurement, fitted circuit and residual, as means over 10 ms.
 
     Parameters
     ----------
     found : Finding
         Its evidence holds a diagnosis.
     stem : str
-        What a download is named after.
+        File name of a download, without extension.
     """
     board = found.evidence.diagnosis.scoreboard
     blocks, fit = blocks_of(board.window), board.fits.best

@@ -45,10 +45,10 @@ NO_DIAGNOSIS: Mapping[str, Any] = {
 COSTS = frozenset(
     {"pressure_absent", "pressure_unused", "pressure_absent_class", "known_as_the_rig", "healthy_of_the_paper"}
 )
-"""Codes of what an absent channel costs, or a rig that is not well known: of all logs alike, so said once."""
+"""Codes for the cost of an absent channel or an uncertain rig; the same for all logs, so reported once."""
 
 NO_CLASS = frozenset({"channel_zero", "models_alike", "models_diverged"})
-"""Codes of why a log is in no class: said as its message, not beside it."""
+"""Codes for why a log is in no class; they are reported in its message and not repeated beside it."""
 
 
 def estimate_entries(found: "Finding") -> dict[str, Any]:
@@ -57,7 +57,7 @@ def estimate_entries(found: "Finding") -> dict[str, Any]:
     Parameters
     ----------
     found : Finding
-        What was found; its evidence is a `BulkModulusEstimate`.
+        A finding whose evidence is a `BulkModulusEstimate`.
 
     Returns
     -------
@@ -91,13 +91,13 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
     Parameters
     ----------
     found : Finding
-        What was found; its evidence is an `EhaEvidence`.
+        A finding whose evidence is an `EhaEvidence`.
 
     Returns
     -------
     dict[str, Any]
-        The entries of `NO_DIAGNOSIS`, with outcome, message and warnings. Where the condition changed within the log
-        ``since_s``, ``since_ci95_s`` and ``condition_before`` say when; else they are None.
+        The entries of `NO_DIAGNOSIS`, with outcome, message and warnings. If the condition changed within the log,
+        ``since_s``, ``since_ci95_s`` and ``condition_before`` give the time; else they are None.
     """
     from estimation.finding import Outcome
     from experiments.eha.verdict_words import headline, models_sentence
@@ -158,7 +158,7 @@ def _notes(found: "Finding") -> dict[str, Any]:
 
 
 def _no_class_message(found: "Finding") -> str:
-    """Say why a log is in no class: a sensor that is accused comes first, since no other drive mends it."""
+    """Return why a log is in no class; a suspect sensor comes first, because no other drive corrects it."""
     from estimation.log_checks.notes import LoggerCode
     from estimation.notes import SensorCode
 
@@ -167,7 +167,7 @@ def _no_class_message(found: "Finding") -> str:
 
 
 def estimate_message(found: "Finding") -> str:
-    """Return what `estimate` says of a log, as one sentence."""
+    """Return the result of `estimate` for a log as one sentence."""
     from estimation.finding import NOT_OBSERVABLE_WITH_PRESSURE, OUTCOMES, Outcome
     from estimation.log_checks.channel_names import PRESSURE
     from estimation.log_checks.notes import LoggerCode
@@ -220,13 +220,13 @@ def costs(results: Iterable[Mapping[str, Any]]) -> list[str]:
     Parameters
     ----------
     results : iterable of Mapping
-        Entries with ``notes``, one a log.
+        Entries with ``notes``, one for each log.
 
     Returns
     -------
     list[str]
-        A sentence a kind of absence or entry of the rig, with how many of several logs it holds for; its share is that
-        of the first of the logs.
+        One sentence for each kind of absent channel or rig entry, with the number of logs if there are several; its
+        share is that of the first of these logs.
     """
     results = list(results)
     said: dict[tuple[str, str | None], list[str]] = {}

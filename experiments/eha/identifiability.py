@@ -1,4 +1,4 @@
-"""Identifiability of an experiment on the gear-pump actuator, before it is made."""
+"""Identifiability of an experiment on the gear-pump actuator, before it is run."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 CHANNELS: Mapping[str, str] = {"position": "position_m", "velocity": "velocity_m_s", "dp": PRESSURE}
-"""What ``--sensors`` calls the channels."""
+"""Names of the channels in ``--sensors``."""
 
 MOST_SAMPLES = 2_000_000
-"""Longest experiment that is looked at."""
+"""Maximum number of samples in an experiment."""
 
 
 class ExperimentCard(NamedTuple):
@@ -34,9 +34,9 @@ class ExperimentCard(NamedTuple):
     Parameters
     ----------
     rank : int
-        Its place among those that were looked at, from 1.
+        Rank among the examined experiments, from 1.
     about : Mapping[str, Any]
-        What else it is.
+        Further entries on the experiment.
     """
 
     drive: str
@@ -46,12 +46,12 @@ class ExperimentCard(NamedTuple):
 
 
 def cards_of(rig: "Rig[Any]", options: Mapping[str, Any]) -> "list[Finding]":
-    """Look at one experiment, or at all drives, the one that tells most first.
+    """Examine one experiment, or all drives, the most informative first.
 
     Returns
     -------
     list of Finding
-        One an experiment, its evidence a `ExperimentCard`.
+        One finding for each experiment, with an `ExperimentCard` as evidence.
 
     Raises
     ------
@@ -119,14 +119,14 @@ def within_limits(options: Mapping[str, Any], look: Callable[[str], T]) -> dict[
     Parameters
     ----------
     options : Mapping[str, Any]
-        ``drive``, and ``ranked`` for all.
+        ``drive``, and ``ranked`` for all drives.
     look : callable
-        From a drive's name to what is found of it.
+        Function from a drive's name to its result.
 
     Returns
     -------
     dict[str, object]
-        What was found, by drive.
+        Results by drive.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def sensed_channels(listed: str) -> dict[str, str]:
     Parameters
     ----------
     listed : str
-        Names in `CHANNELS`, by commas.
+        Names in `CHANNELS`, separated by commas.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def _card(
 def driven(
     drive: str, parameters: "EhaParameters", about: Mapping[str, Any]
 ) -> "tuple[NDArray[np.float64], float, Sensors]":
-    """Return motor speed [rad/s], shape (n,), the time between its samples [s], and the sensors of an experiment."""
+    """Return motor speed [rad/s], shape (n,), the sample time [s], and the sensors of an experiment."""
     import numpy as np
 
     from plant.eha.drives import make_drive
@@ -217,12 +217,12 @@ def experiment_entries(found: "Finding") -> dict[str, Any]:
 
 
 def experiments_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":
-    """Show what an experiment would tell, or how drives rank.
+    """Show what an experiment can determine, or the ranking of drives.
 
     Parameters
     ----------
     options : Mapping[str, Any]
-        As given to the verb: ``ranked`` asks for the ranking.
+        Options of the verb; ``ranked`` selects the ranking.
     """
     return _ranking(results) if options["ranked"] else _screen(results)
 

@@ -1,4 +1,4 @@
-"""The gear-pump actuator, servo motor, pump and cylinder, as a kind: the options it understands and what they do."""
+"""The gear-pump actuator (servo motor, pump and cylinder) as a kind: its options and what they do."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -49,10 +49,10 @@ EXPERIMENT = {"sensors": ",".join(SENSORS), "noise": "bench", "drive": "steps", 
 def _prepared_estimation(
     rig: "Rig[Any]", options: Options
 ) -> "tuple[Rig[Any], tuple[EstimateOptions, frozenset[str], bool]]":
-    """Return the rig in its condition, how its log is estimated, what channels not to use, and if tuning is open.
+    """Return the rig in its condition, how its log is estimated, the channels not to use, and whether tuning is open.
 
-    Unless told either way, the pressure form is tuned where it has pressure: with noise levels for any rig its interval
-    is several times too wide.
+    By default the pressure form is tuned if pressure is logged: with noise levels that suit any rig, its interval is
+    several times too wide.
     """
     how, unused = _how(options), _unused(options["sensors"], options["no_pressure"])
     open_choice = options["tune"] is None and how.form == "pressure" and how.method in ("auto", "ekf")
@@ -62,7 +62,7 @@ def _prepared_estimation(
 
 
 def _how(options: Options) -> "EstimateOptions":
-    """Check the options, and return them as the estimate takes them."""
+    """Check the options, and return them in the form that the estimate takes."""
     from estimation.eha.bulk_modulus import FITTED, LEAST_SQUARES, EstimateOptions
     from estimation.filters.run import ROBUST
     from estimation.models.eha_forms import FORMS
@@ -91,7 +91,7 @@ def _how(options: Options) -> "EstimateOptions":
 
 
 def _unused(sensors: str, no_pressure: bool) -> frozenset[str]:
-    """Return the channels that are not to be used."""
+    """Return the channels that must not be used."""
     used = listed(sensors)
     for name in used:
         require_known("--sensors", name, list(SENSORS))
@@ -122,7 +122,7 @@ def _estimated(
 
 
 def _seen(record: "Record", rig: "Rig[Any]", kept: "dict[Any, Any]") -> "tuple[CleanLog, BulkModulusEstimate] | None":
-    """Return a log, checked, with its estimate, all automatic: both verbs begin with them. None where none is kept."""
+    """Return a checked log with its default estimate, with which both verbs begin; None if it is not cached."""
     from estimation.log_checks.clean import clean_log
 
     of_rig, (log, estimate) = kept.get(tuple(record), (None, (None, None)))
@@ -153,10 +153,10 @@ def _taken_as_known(results: Sequence[Result]) -> Iterable[str]:
 
 
 def _prepared_diagnosis(rig: "Rig[Any]", options: Options) -> "tuple[Rig[Any], tuple[bool, Linear]]":
-    """Return the rig, whether pressure is unused, and what gives nine transfer functions.
+    """Return the rig, whether pressure is unused, and the source of the nine transfer functions.
 
-    Unless told either way, the library is read where it is this rig's; identifying one takes long, so it has to be
-    asked for.
+    By default the library is read if it belongs to this rig. Identifying a new library takes long, so it must be
+    requested.
     """
     linear = cache(lambda: _identified(rig.parameters, options["seed"]))
     asked = options["transfer_functions"]

@@ -21,10 +21,10 @@ MAJOR = 2.0
 """Size of a fault from which it is treated as major, where 1 is minor [dimensionless]."""
 
 TOLD = 0.5
-"""Probability of all else from which a level of leakage, or of friction, is not told [probability]."""
+"""A level of leakage or friction is not stated if all else has at least this probability [probability]."""
 
 FLATLY = 0.9
-"""Probability of a level below which it is called probable [probability]; judged."""
+"""Probability below which a stated level is called only probable [probability]; chosen by judgement."""
 
 LEAKS: Mapping[str, str] = {
     "minor": "leaks inside more than it should (minor leakage)",
@@ -47,26 +47,26 @@ WORK_ON_FRICTION: Mapping[str, str] = {
     "minor": "Plan a check of seals, guides and alignment of the rod.",
     "major": "Check seals, guides and alignment of the rod now.",
 }
-"""What follows from each level."""
+"""Maintenance advice for each level."""
 
 WRONG_SENSORS = frozenset(
     {SensorCode.SENSOR_FROZE, SensorCode.SENSOR_CONSTANT, SensorCode.SENSOR_NOISE_ONLY, SensorCode.SENSORS_DISAGREE}
 )
-"""Codes of sensors of which nothing can be used."""
+"""Codes of sensors whose readings are unusable."""
 
 HINDRANCES: Mapping[frozenset[str], str] = {
     frozenset(map(str, ChannelCode)): "the sign, unit or name of {} is wrong",
     frozenset(map(str, WRONG_SENSORS)): "the sensor of {} reads wrong",
     frozenset(map(str, LoggerCode)): "the logger left measurements of {} out",
 }
-"""What hinders a verdict, and which channel, by the codes of notes that say so; the first that is found is told."""
+"""What prevents a verdict, with the channel, by the codes of the notes; the first match is reported."""
 
 WRONG_INPUT = WRONG_SENSORS.union(ChannelCode, LoggerCode)
-"""Codes of sensors and columns that are wrong, from which other reasons against a verdict may follow."""
+"""Codes of wrong sensors and columns, which may cause the other reasons against a verdict."""
 
 BESIDE = str(AgainstCode.OUTSIDE_CONDITIONS)
 SIZED = (BESIDE, str(AgainstCode.BETWEEN_CONDITIONS))
-"""Codes of logs that a circuit explains, whose leakage and friction are none of the nine conditions'."""
+"""Codes of logs that a circuit explains, but with leakage and friction that match none of the nine conditions."""
 
 OUTSIDE: Mapping[str, str] = {
     str(RigCode.LEAKAGE_GROWS): "Leakage grows while the actuator runs.",
@@ -137,9 +137,9 @@ def size_in_words(result: Mapping[str, Any]) -> str:
 
 
 def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:
-    """Return the levels of leakage and of friction, None where all else together is likelier.
+    """Return the levels of leakage and of friction; None if everything else together is likelier.
 
-    What the nine conditions leave to a fault that is none of them, as a worn pump, is something else too.
+    Probability left over for faults outside the nine conditions, such as a worn pump, also counts as everything else.
     """
     best = CONDITIONS[result["condition"]]
     levels = {name: getattr(best, name) for name in ("leakage", "friction")}
@@ -147,7 +147,7 @@ def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:
 
 
 def _share(result: Mapping[str, Any], name: str, level: str | None) -> float:
-    """Return the probability of a level of leakage or of friction; 1 where a log has no probabilities."""
+    """Return the probability of a level of leakage or of friction; 1 if a log has no probabilities."""
     shares = result.get("probabilities")
     if not shares:
         return 1.0
@@ -159,12 +159,12 @@ def _soft_oil(result: Mapping[str, Any]) -> bool:
 
 
 def _outside(result: Mapping[str, Any]) -> list[str]:
-    """Return the faults that are named though they are none of the nine conditions."""
+    """Return the named faults that are none of the nine conditions."""
     return [OUTSIDE[one["code"]] for one in result["notes"] if one["code"] in OUTSIDE]
 
 
 def _named(result: Mapping[str, Any]) -> list[str]:
-    """Return the fault outside the nine conditions: by name, else as a size between theirs."""
+    """Return the fault outside the nine conditions by name, or else as a size between theirs."""
     found = _outside(result)
     words = {"leakage": "leaks more inside", "friction": "has more friction"}
     raised = [words[name] for name in _raised(result)] if not found else []
@@ -180,7 +180,7 @@ def _raised(result: Mapping[str, Any]) -> dict[str, float]:
 
 
 def is_doubted(result: Mapping[str, Any]) -> bool:
-    """Return whether no number of a diagnosis is to be relied on: its model does not fit the log."""
+    """Return whether no number of a diagnosis can be relied on, because its model does not fit the log."""
     return bool(result["unknown"]) and not of_another_size(result)
 
 
@@ -209,13 +209,13 @@ def sureness(result: Mapping[str, Any]) -> str:
 
 
 def reasons_apart(result: Mapping[str, Any]) -> list[str]:
-    """Return the reasons against a verdict as sentences, where there are several; one stands in `sureness`."""
+    """Return the reasons against a verdict as sentences if there are several; a single reason is in `sureness`."""
     told = causes(result) if is_doubted(result) else []
     return [sentence(one) for one in told] if len(told) > 1 else []
 
 
 def causes(result: Mapping[str, Any]) -> list[str]:
-    """Return the reasons against a verdict, without those that may follow from a sensor or column that is wrong."""
+    """Return the reasons against a verdict, without those that a wrong sensor or column may cause."""
     first = [one["text"] for one in result["notes"] if one["code"] in WRONG_INPUT and one["text"] in result["reasons"]]
     return first or list(result["reasons"])
 
@@ -266,8 +266,8 @@ def what_to_do(result: Mapping[str, Any]) -> list[str]:
     Returns
     -------
     list[str]
-        Work on the actuator first, then how to read this log, then how to log next; where a sensor with a wrong gain
-        would look alike, work on the actuator last.
+        Work on the actuator first, then how to read this log, then how to log next; if a sensor with a wrong gain would
+        give the same result, work on the actuator last.
     """
     advice = [sentence(one) for one in result["advice"]]
     if of_another_size(result):  # a wrong sensor or rig file would look alike, and is looked for first
@@ -281,7 +281,7 @@ def work_on(result: Mapping[str, Any]) -> list[str]:
     Returns
     -------
     list[str]
-        Empty where the verdict is unknown or leaves leakage or friction open, and where only the oil is soft.
+        Empty if the verdict is unknown or leaves leakage or friction open, or if only the oil is soft.
     """
     if of_another_size(result):
         works = {"leakage": WORK_ON_LEAKAGE, "friction": WORK_ON_FRICTION}

@@ -25,10 +25,10 @@ COLUMNS = {
 """Severities in a table of many logs."""
 
 MOST_MESSAGES = 3
-"""Most logs of which everything that speaks against a result is shown [count]."""
+"""Largest number of logs for which all evidence against a result is shown [count]."""
 
 MOST_TABLES = 3
-"""Most logs of which every condition's score is shown [count]."""
+"""Largest number of logs for which every condition's score is shown [count]."""
 
 
 def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":
@@ -37,9 +37,9 @@ def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
     Parameters
     ----------
     results : sequence of Result
-        One a log, with the entries of `experiments.eha.entries.NO_ESTIMATE`.
+        One result for each log, with the entries of `experiments.eha.entries.NO_ESTIMATE`.
     options : Mapping[str, Any]
-        As given to the verb; none matters here.
+        Options of the verb; none is used here.
     """
     del options
     shown = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "with rig error [MPa]", "bound [%]", "verdict")
@@ -72,14 +72,14 @@ def _span(ends: Sequence[float] | None, decimals: int) -> str:
 
 
 def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":
-    """Show what is wrong with each log, a table of all where they are many.
+    """Show the diagnosis of each log, as one table if there are many logs.
 
     Parameters
     ----------
     results : sequence of Result
-        One a log, with the entries of `experiments.eha.entries.NO_DIAGNOSIS`.
+        One result for each log, with the entries of `experiments.eha.entries.NO_DIAGNOSIS`.
     options : Mapping[str, Any]
-        As given to the verb: ``scores`` and ``transfer_functions`` ask for a table of errors.
+        Options of the verb; ``scores`` and ``transfer_functions`` select a table of errors.
     """
     tables = options["scores"] or options["transfer_functions"]
     detailed = len(results) <= MOST_TABLES
@@ -100,7 +100,7 @@ def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
 
 
 def _agreement(result: Result) -> str:
-    """Return whether the condition is the one that was expected; the lines above say which it is."""
+    """Return whether the condition is the expected one; the lines above name it."""
     agreed = not result["unknown"] and result["condition"] == result["expected"]
     return f"expected  {in_words(result['expected'])}: {'agrees' if agreed else 'does not agree'}"
 
@@ -120,7 +120,7 @@ def _summary(results: Sequence[Result]) -> "RenderableType":
 
 
 def _size(result: Result, severity: str) -> str:
-    """Return a severity without its interval; a dash where the log does not tell it."""
+    """Return a severity without its interval, or a dash if the log does not determine it."""
     value = None if result["severity"] is None else result["severity"][severity]["value"]
     return "-" if value is None or not math.isfinite(value) else f"{value:z.1f}"
 

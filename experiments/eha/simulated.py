@@ -26,12 +26,12 @@ class RunCode(Code):
 
 
 def simulated(rig: "Rig[Any]", options: Options) -> Run:
-    """Run a plant under a drive, in a condition, and return what sensors log.
+    """Run a plant under a drive, in a condition, and return the sensors' log.
 
     Returns
     -------
     Run
-        The log, and what made it.
+        The log, with the settings that produced it.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def _native(
 def _foreign(
     sound: EhaParameters, faulty: EhaParameters, options: Options, speed: "Array", rng: "np.random.Generator"
 ) -> "tuple[str, Record]":
-    """Run an FMU; what a condition changes is set where the FMU has a variable of that name."""
+    """Run an FMU; parameters that a condition changes are set if the FMU has a variable of that name."""
     from plant.foreign_fmu import fmu_variables, simulate_fmu
     from plant.sensors.sensors import SENSORS as NOISE
 
@@ -107,7 +107,7 @@ def start_values(texts: Sequence[str] | None) -> dict[str, float]:
     Parameters
     ----------
     texts : sequence of str or None
-        ``NAME=VALUE``, a name of the FMU's.
+        Texts ``NAME=VALUE``, with a name from the FMU.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def start_values(texts: Sequence[str] | None) -> dict[str, float]:
 
 
 def _faulty(rig: EhaParameters, options: Options) -> tuple[EhaParameters, dict[str, Any]]:
-    """Return the faulty actuator, and what made it so."""
+    """Return the faulty actuator, and the fault that was set."""
     name, leakage, friction = (options[key] for key in ("condition", "leakage_severity", "friction_severity"))
     if leakage is None and friction is None:
         found = find_condition(name or "normal")

@@ -1,4 +1,4 @@
-"""A diagnosis in words, made of its entries: lines for a terminal, clauses for a page."""
+"""A diagnosis in words, made from its entries: lines for a terminal, clauses for a page."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,36 +19,36 @@ SHOWN = {
     "bulk_modulus": "bulk modulus",
     "entrained_air": "entrained air, at most",
 }
-"""What each severity is called."""
+"""Displayed name of each severity."""
 
 MARGINS = ((1.05, "too close to call"), (1.25, "narrow"), (2.0, "clear"), (math.inf, "wide"))
 """Words for the ratio of the runner-up's score to the best, up to each bound [dimensionless]."""
 
 LEVELS_IN_WORDS = {"none": "normal", "minor": "minor", "major": "major"}
-"""What each level of leakage or of friction is called."""
+"""Displayed name of each level of leakage or friction."""
 
 MOST_DECIMALS = 3
-"""Decimals that a severity is given at most [count]."""
+"""Maximum number of decimals of a severity [count]."""
 
 ALIKE = 0.99
-"""Share of the likeliest condition's probability from which another is as likely [fraction]: the log tells nothing that
-would set them apart, and calibrated probabilities are not known better."""
+"""Minimum ratio of a condition's probability to the likeliest's at which both count as equally likely [fraction]: the
+log has no information that separates them, and calibrated probabilities are not known more precisely."""
 
 NEAREST = "UNKNOWN: none of the nine conditions fits; the nearest is "
-"""How a verdict begins that something speaks against."""
+"""Beginning of a verdict with evidence against it."""
 
 OUTSIDE = "none of the nine conditions"
-"""What is left of the probability of all nine: that a fault which the log does not exclude is there."""
+"""Label of the probability left over by all nine conditions, for a fault that the log does not exclude."""
 
 
 def verdict_lines(result: Mapping[str, Any]) -> list[str]:
-    """Return the lines that a reader gets of a log.
+    """Return the lines on a log for a reader.
 
     Returns
     -------
     list[str]
-        What it is, the same for a mechanic, how bad in leakage, in friction and oil, whether it is reliable, what to
-        do next, and what the library of transfer functions says where it says anything.
+        The verdict, the same for a mechanic, the severity of leakage, friction and oil, whether it is reliable, what to
+        do next, and the result of the library of transfer functions if there is one.
     """
     from experiments.eha.plain_verdict import is_doubted, verdict  # here, since an estimate needs nothing of it
 
@@ -76,9 +76,9 @@ def headline(result: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        Condition and probability, or that it is unknown; and since when. Of conditions that the log does not tell
-        apart, what they share, and that the rest cannot be told. A fault outside the nine is named where it is likelier
-        than the second condition.
+        Condition and probability, or unknown; and since when. If the log does not separate some conditions, what they
+        share, and that the rest cannot be determined. A fault outside the nine is named if it is likelier than the
+        second condition.
 
     Examples
     --------
@@ -111,9 +111,9 @@ def ranked_shares(probabilities: Mapping[str, float], *, unknown: bool) -> list[
     Parameters
     ----------
     probabilities : Mapping[str, float]
-        Of each condition [probability].
+        Probability of each condition [probability].
     unknown : bool
-        Whether none of them holds the log: then it is how likely each is if it had to be one of them.
+        Whether none of them explains the log: then each share is the probability given that one of them is true.
 
     Returns
     -------
@@ -125,12 +125,12 @@ def ranked_shares(probabilities: Mapping[str, float], *, unknown: bool) -> list[
 
 
 def equally_likely(result: Mapping[str, Any]) -> list[str]:
-    """Return the conditions that are as likely as the likeliest, which no log tells apart that shows no more.
+    """Return the conditions that are as likely as the likeliest, which this log does not separate.
 
     Returns
     -------
     list[str]
-        In the order of `CONDITIONS`; the likeliest alone where a log tells it from the others.
+        Conditions in the order of `CONDITIONS`; only the likeliest if the log separates it from the others.
     """
     from faults.conditions import CONDITIONS  # here, since an estimate needs nothing of it
 
@@ -161,12 +161,12 @@ def _or(words: Sequence[str]) -> str:
 
 
 def since(result: Mapping[str, Any]) -> str:
-    """Return since when the actuator is in its condition.
+    """Return since when the actuator has been in its condition.
 
     Returns
     -------
     str
-        A clause; empty for a healthy actuator that was so from the beginning.
+        A clause; empty for an actuator that was healthy from the beginning.
 
     Examples
     --------
@@ -186,7 +186,7 @@ def amounts(result: Mapping[str, Any], names: Sequence[str]) -> str:
     Returns
     -------
     str
-        In the units of a shop.
+        Text in workshop units.
     """
     return "; ".join(f"{SHOWN[name]} {amount(result['severity'][name])}" for name in names)
 
@@ -197,7 +197,7 @@ def amount(one: Mapping[str, Any]) -> str:
     Parameters
     ----------
     one : Mapping
-        ``value``, ``unit``, ``ci95`` and, where it is wider, ``ci95_total``.
+        ``value``, ``unit``, ``ci95`` and, if it is wider, ``ci95_total``.
 
     Examples
     --------
@@ -233,7 +233,7 @@ def _interval(low: float, high: float) -> str:
 
 
 def believed(result: Mapping[str, Any]) -> str:
-    """Return whether the verdict may be believed."""
+    """Return whether the verdict may be trusted."""
     from experiments.eha.plain_verdict import causes
 
     if result["unknown"]:
@@ -249,7 +249,7 @@ def believed(result: Mapping[str, Any]) -> str:
 
 
 def refused_oil(result: Mapping[str, Any]) -> list[str]:
-    """Return why not to rely on a bulk modulus that is shown beside a class although its check refused it."""
+    """Return why not to rely on a bulk modulus that is shown beside a class although its check failed."""
     gate, estimated = result["gate"], result["bulk_modulus_pa"]
     if result["unknown"] or gate is None or gate["passed"] or estimated is None or estimated["value"] is None:
         return []
@@ -259,7 +259,7 @@ def refused_oil(result: Mapping[str, Any]) -> list[str]:
 
 
 def next_step(result: Mapping[str, Any]) -> str:
-    """Return what to do next, a sentence a line, the most important first."""
+    """Return what to do next, one sentence per line, the most important first."""
     from experiments.eha.plain_verdict import of_another_size, work_on
 
     work, advice = work_on(result), [sentence(one) for one in result["advice"]]
@@ -272,8 +272,8 @@ def library_sentence(result: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        One sentence; empty where no library was compared, where the log fits none of the nine conditions, and where
-        the condition changed within the log, since one transfer function describes one condition.
+        One sentence; empty if no library was compared, if the log fits none of the nine conditions, or if the condition
+        changed within the log, since one transfer function describes one condition.
 
     Examples
     --------
@@ -308,7 +308,7 @@ def margin_word(margin: float) -> str:
     Parameters
     ----------
     margin : float
-        Ratio of its error to the best [dimensionless].
+        Ratio of the runner-up's error to the best [dimensionless].
 
     Examples
     --------

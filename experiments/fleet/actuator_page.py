@@ -1,4 +1,4 @@
-"""The page of one actuator: how every severity develops over its logs, and when a limit is reached."""
+"""The page of one actuator: the trend of each severity over its logs, and when it reaches a limit."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -26,25 +26,25 @@ from faults.trend.trend import FEWEST, trends
 from plant.arrays import Array
 
 AHEAD, LEAST_AHEAD = 30, 5
-"""Logs for which the course is drawn on, at most and at the least [count]."""
+"""Largest and smallest number of future logs for which trends are drawn [count]."""
 
 LEAST_DAYS = 8.0
-"""Time over which logs must lie for an axis of dates, which has no hours [day]."""
+"""Shortest span of logs that gets an axis of dates, since that axis has no hours [day]."""
 
 NORMAL_90 = 1.645
 """Half-width of a 90 % normal interval, in standard deviations."""
 
 ROUNDING = 0.05
-"""Growth below this share of its standard deviation is shown as none [fraction]."""
+"""Growth below this share of its standard deviation is shown as zero [fraction]."""
 
 ROOM = 0.25
-"""Room above and below the logs, the healthy value and the limit in a chart, as a share of their range [fraction]."""
+"""Margin above and below the logs, the healthy value and the limit in a chart, as a share of their range [fraction]."""
 
 DATE = "date"
-"""Label of an axis of dates."""
+"""Label of a date axis."""
 
 MOST_LOGS = 30
-"""Last logs that are listed [count]."""
+"""Number of latest logs that are listed [count]."""
 
 FORECASTS = (
     "severity",
@@ -70,7 +70,7 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
     Parameters
     ----------
     pages : Mapping[str, str]
-        Path of the page of a log from this one, by its file, of those that have one.
+        Path of each log's page relative to this one, by file, for logs that have a page.
     fleet : str
         Path of the page of all actuators.
     """
@@ -113,7 +113,7 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
 
 
 def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[str]:
-    """Return a sentence for each log at which trends start again."""
+    """Return a sentence for each log at which trends restart."""
     together: dict[str, list[Outlook]] = {}
     for one in outlooks:
         if one.trend.begin > 0:
@@ -158,7 +158,7 @@ def _apart(outlooks: Sequence[Outlook]) -> str:
 
 
 def _forecast(one: Outlook, newest: LogRow) -> dict[str, str]:
-    """Return the cells of a severity; its level has its date where newer logs do not tell it."""
+    """Return the cells of a severity; its level is dated if newer logs do not determine it."""
     scale, unit = shop_unit(one.unit)
     (level, std), (growth, growth_std) = one.trend.level, one.trend.growth
     ends = interval_95(scale * level, scale * std)
@@ -184,14 +184,14 @@ def _as_of(one: Outlook, newest: LogRow) -> str:
 
 
 def _ahead(outlooks: Sequence[Outlook]) -> int:
-    """Return for how many logs courses are drawn on: to where a limit may be reached, if that is within sight."""
+    """Return for how many future logs trends are drawn: until a limit may be reached, if that is within the horizon."""
     ends = [end for one in outlooks for end in one.quantiles or () if end <= AHEAD]
     few = max((len(one.logs) // 4 for one in outlooks), default=0)
     return min(AHEAD, max(LEAST_AHEAD, few, *(math.ceil(end) + 2 for end in ends)))
 
 
 def _charts(outlooks: Sequence[Outlook], name: str) -> list[tuple[str, Charts]]:
-    """Return the course of severities, those over the same logs in one figure, each with its caption."""
+    """Return charts of the severities' trends, each with its caption; severities over the same logs share a figure."""
     ahead = _ahead(outlooks)
     together: dict[tuple[float, ...], list[Outlook]] = {}
     for one in outlooks:
@@ -207,7 +207,7 @@ def _charts(outlooks: Sequence[Outlook], name: str) -> list[tuple[str, Charts]]:
 
 
 def _panel(one: Outlook, x: Array, ahead: int) -> Panel:
-    """Return the logs of a severity, its level with a 90 % band, and the same for logs to come."""
+    """Return a panel with the logs of a severity, its level with a 90 % band, and the forecast of both."""
     scale, unit = shop_unit(one.unit)
     count = len(one.logs)
     measured = np.full(len(x), np.nan)
@@ -227,7 +227,7 @@ def _panel(one: Outlook, x: Array, ahead: int) -> Panel:
 
 
 def _abscissa(one: Outlook, ahead: int) -> tuple[Array, str]:
-    """Return places of the logs and of those to come, with the label of their axis: dates, or else numbers."""
+    """Return the horizontal positions of past and future logs, with the label of their axis: dates, or else numbers."""
     days, count = one.days_apart, len(one.logs)
     times = one.series.times
     if days is None or np.any(np.diff(times) <= 0.0) or np.ptp(times) < LEAST_DAYS:
@@ -240,7 +240,7 @@ def _link(name: str, page: str) -> Markup:
 
 
 def _course(one: Outlook, ahead: int) -> tuple[Array, Array]:
-    """Return level and standard deviation after every log, and as forecast, shape (logs + ahead,) each."""
+    """Return level and standard deviation after each log and in the forecast, shape (logs + ahead,) each."""
     grid, series = settings(), one.series
     past = followed(one)
     coming = [moments(predict(one.trend.belief, float(step), grid), grid) for step in range(1, ahead + 1)]
@@ -250,15 +250,15 @@ def _course(one: Outlook, ahead: int) -> tuple[Array, Array]:
 
 
 def followed(one: Outlook) -> list[tuple[float, float]]:
-    """Return level and standard deviation after each log, among those of its own stretch [the severity's unit].
+    """Return level and standard deviation after each log, from the logs of its own segment [the severity's unit].
 
-    A lasting change is told from an outlier only some logs after it, and the trend follows the level before it until
-    then. Here the last log says where stretches begin.
+    A lasting change can be told from an outlier only some logs later; until then, the trend follows the earlier level.
+    Here the segments are those known after the last log.
 
     Returns
     -------
     list of tuple of float
-        One a log.
+        One for each log.
     """
     series, course = one.series, one.course
     begins = sorted({trend.begin for trend in course})

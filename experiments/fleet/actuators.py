@@ -1,4 +1,4 @@
-"""One row an actuator: its last log, and how its worst severity develops."""
+"""One row per actuator: its last log, and the trend of its worst severity."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ from faults.trend.trend import FEWEST
 
 @dataclass(frozen=True)
 class ActuatorRow:
-    """An actuator with its logs, or a log whose actuator is not known.
+    """An actuator with its logs, or a log of an unknown actuator.
 
     Parameters
     ----------
     name : str
-        Of the actuator, or of the log's file.
+        Name of the actuator, or of the log's file.
     logs : tuple of LogRow
-        By date, the last one last.
+        In order of date, the latest last.
     maintained : tuple of float
-        When it was repaired, as `experiments.fleet.naming.place_of` gives dates [day].
+        Times of repairs, in the form of `experiments.fleet.naming.place_of` [day].
     """
 
     name: str
@@ -30,26 +30,26 @@ class ActuatorRow:
 
     @cached_property
     def last(self) -> LogRow:
-        """The last log that could be read, else the last one."""
+        """The last log that could be read; if none could, the last log."""
         read = [one for one in self.logs if one.state != "failed"]
         return (read or self.logs)[-1]
 
     @cached_property
     def outlook(self) -> Outlook | None:
-        """Outlook of the worst severity of the last log; None for a few logs."""
+        """Outlook for the worst severity of the last log; None if there are too few logs."""
         if self.last.worst is None or len(self.logs) < FEWEST:
             return None
         return outlook_of(self.logs, self.last.worst.name, self.maintained)
 
     @cached_property
     def state(self) -> str:
-        """That of the last log, or an alarm where it is within its limits and will not stay so."""
+        """The state of the last log, or an alarm if it is within its limits but is not expected to stay there."""
         growing = self.last.told and self.outlook is not None and self.outlook.alarm
         return "alarm" if growing and self.last.state in ("open", "within", "unknown") else self.last.state
 
     @property
     def order(self) -> tuple[int, float]:
-        """The sickest first."""
+        """Sort key: the sickest first."""
         return RANKS[self.state], self.last.order[1]
 
 
@@ -61,14 +61,14 @@ def actuator_rows(
     Parameters
     ----------
     logs : sequence of LogRow
-        In any order; logs of one actuator without a date stay in their order.
+        In any order; undated logs of one actuator keep their order.
     maintained : Mapping[str, sequence of float]
-        When actuators were repaired, by name [day].
+        Times of repairs, by actuator name [day].
 
     Returns
     -------
     list of ActuatorRow
-        A log whose actuator is not known stands alone.
+        A log of an unknown actuator has its own row.
     """
     groups: dict[tuple[str, str], list[LogRow]] = {}
     for one in logs:

@@ -1,4 +1,4 @@
-"""Dates of logs: the day-first form, dates that a wrong clock wrote, and how a date to come is told.
+"""Dates of logs: the day-first form, dates from wrong clocks, and the wording of future dates.
 
 See decision 309.
 """
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 DAY_FIRST = re.compile(
     r"(?<![0-9])(?P<day>0[1-9]|[12]\d|3[01])\.(?P<month>0[1-9]|1[0-2])\.(?P<year>(?:19|20)\d\d)(?![0-9])"
 )
-"""A date with dots, such as 22.11.2026: wherever dates are written with dots, the day comes first."""
+"""A date with dots, such as 22.11.2026. Where dates are written with dots, the day comes first."""
 
 MONTHS = (
     *("January", "February", "March", "April", "May", "June"),
@@ -24,23 +24,24 @@ MONTHS = (
 )
 
 APART = 1000.0
-"""Longest time between two logs of a fleet; beyond it, the fewer logs have a wrong date [day]."""
+"""Longest time between two logs of a fleet [day]. If a gap is longer, the smaller group of logs has a wrong date."""
 
 FEW = 0.1
-"""Share of logs that may have a wrong date; if more lie apart, the fleet has a gap and no wrong clock [fraction]."""
+"""Largest share of logs that may have a wrong date [fraction]. If more lie apart, the fleet has a gap, not a wrong
+clock."""
 
 HOURS, DAYS, PARTS = 2.0, 45.0, 730.0
-"""Up to which time ahead a date is told with its hour, with its day, and with the part of its month [day]."""
+"""How far ahead a date is shown with its hour, with its day, and with the part of its month [day]."""
 
 OUT_OF_SIGHT = "not within sight"
-"""What a forecast says of a limit that no future reaches."""
+"""Forecast text if no prediction reaches the limit."""
 
 LAST = datetime(9999, 1, 1, tzinfo=UTC)
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def year_first(text: str) -> str:
-    """Return a text with each date of the day-first form as year, month, day.
+    """Return a text in which each day-first date is rewritten as year, month, day.
 
     Examples
     --------
@@ -51,7 +52,7 @@ def year_first(text: str) -> str:
 
 
 def without_wrong_clocks(named: "Mapping[str, Named]") -> "dict[str, Named]":
-    """Take the date from the few logs whose date lies years before or after those of all others.
+    """Remove the date of the few logs whose date lies years before or after those of all others.
 
     A logger whose clock was never set writes 1970 or 2000. Such a log would be the first or the last of its actuator.
 
@@ -84,14 +85,14 @@ def without_wrong_clocks(named: "Mapping[str, Named]") -> "dict[str, Named]":
 
 
 def told_date(place: float, ahead: float) -> str:
-    """Return a date as precisely as a forecast deserves it.
+    """Return a date as text, as precise as the forecast justifies.
 
     Parameters
     ----------
     place : float
         Days since 1970-01-01 [day].
     ahead : float
-        How far from the last log it is [day].
+        Time from the last log [day].
 
     Examples
     --------
@@ -110,14 +111,14 @@ def told_date(place: float, ahead: float) -> str:
 
 
 def told_dates(places: Iterable[float], ahead: Iterable[float]) -> str:
-    """Return the interval of a date to come in words.
+    """Return the interval of a future date in words.
 
     Parameters
     ----------
     places : iterable of float
-        Its two ends, infinite beyond the horizon [day].
+        Both ends, infinite beyond the horizon [day].
     ahead : iterable of float
-        How far from the last log each is [day].
+        Time from the last log to each end [day].
 
     Examples
     --------

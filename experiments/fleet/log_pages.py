@@ -1,4 +1,4 @@
-"""Pages of the sickest actuators of a fleet and of their logs, under names that hold no folder."""
+"""Pages of the sickest actuators of a fleet and of their logs, with file names that do not reveal folders."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -11,17 +11,17 @@ from experiments.fleet.actuators import ActuatorRow
 
 
 def file_name(name: str) -> str:
-    """Return the name of the page of an actuator or a log.
+    """Return the file name for the page of an actuator or a log.
 
     Parameters
     ----------
     name : str
-        Of the actuator, or the path of the log.
+        Name of the actuator, or path of the log.
 
     Returns
     -------
     str
-        Safe on every system, and different for different names.
+        Safe on every system, and unique for each name.
 
     Examples
     --------
@@ -35,7 +35,7 @@ def file_name(name: str) -> str:
 def write_pages(
     rows: Iterable[ActuatorRow], out: Path, most: int, write: Callable[[str, Path], bool]
 ) -> dict[str, str]:
-    """Write the page of the last log of the sickest actuators, and the course of those with several logs.
+    """Write the page of the last log of the sickest actuators, and a trend page for those with several logs.
 
     Parameters
     ----------
@@ -44,14 +44,14 @@ def write_pages(
     out : Path
         Folder of the fleet's page.
     most : int
-        Pages at most [count].
+        Largest number of pages [count].
     write : callable
-        ``write(file, path)`` writes the page of a log, and returns whether the log was there to be read.
+        ``write(file, path)`` writes the page of a log, and returns whether the log could be read.
 
     Returns
     -------
     dict[str, str]
-        Path from the fleet's page, by actuator.
+        Path relative to the fleet's page, by actuator.
     """
     links: dict[str, str] = {}
     for row in list(rows)[:most]:

@@ -1,4 +1,4 @@
-"""Which actuator a log is of, and when it was taken: by a pattern of file names, by a table, or by dates in names."""
+"""Assigns an actuator and a date to each log: by a file name pattern, by a table, or by dates in file names."""
 
 import csv
 import re
@@ -14,19 +14,19 @@ STAMP = re.compile(
     r"(?P<year>(?:19|20)\d\d)(?P<between>[-_.]?)(?P<month>0[1-9]|1[0-2])(?P=between)(?P<day>0[1-9]|[12]\d|3[01])"
     r"(?:[T _-]?(?P<hour>[01]\d|2[0-3])(?P<in_time>[-_.:]?)(?P<minute>[0-5]\d)(?:(?P=in_time)(?P<second>[0-5]\d))?)?"
 )
-"""A date as loggers write it into file names, with or without a time: 20261122, 2026-11-22_14-30-00."""
+"""A date in the forms that loggers write into file names, with or without a time: 20261122, 2026-11-22_14-30-00."""
 
 CALENDAR = rf"{STAMP.pattern}|\d{{4}}-.*"
-"""A date of the calendar, as `place_of` reads them."""
+"""A calendar date, in the forms that `place_of` reads."""
 
 FIELDS: Mapping[str, str] = {"actuator": r"(?P<actuator>.+)", "date": r"(?P<date>[0-9][0-9T:.+\-Z]*)"}
-"""What a pattern may name, and what stands there."""
+"""Fields allowed in a pattern, and what each matches."""
 
 NO_ACTUATOR = ("bench", "capture", "data", "export", "file", "log", "measurement", "record", "run", "scope", "test")
-"""Words before a date that name no actuator."""
+"""Words before a date that do not name an actuator."""
 
 MATCHING = 0.8
-"""Share of file names that must hold one date each before names are believed [fraction]."""
+"""Smallest share of file names that must contain one date each before names are used [fraction]."""
 
 
 @dataclass(frozen=True)
@@ -36,13 +36,13 @@ class Named:
     Parameters
     ----------
     actuator : str
-        Empty where it is not known.
+        Empty if unknown.
     date : str
-        As it was given; empty where it is not known.
+        As given; empty if unknown.
     place : float or None
-        The date as a number [day, or the unit of numbers that were given]; None where it is not known.
+        The date as a number [day, or the unit of the given numbers]; None if unknown.
     problem : str
-        Why the log cannot be placed among those of its actuator and has a row of its own; empty where it can.
+        Why the log cannot be placed among the logs of its actuator, so that it gets its own row; empty if it can.
     """
 
     actuator: str
@@ -52,7 +52,7 @@ class Named:
 
     @property
     def shown(self) -> str:
-        """The date as a reader wants it: a `STAMP` with hyphens and colons, all else as it was given."""
+        """The date as displayed: a `STAMP` with hyphens and colons, anything else as given."""
         stamp = STAMP.fullmatch(self.date)
         if stamp is None:
             return self.date
@@ -66,7 +66,7 @@ class Named:
 
     @property
     def in_days(self) -> bool:
-        """Whether its place counts days, and no running hours or the like."""
+        """Whether the place counts days, not running hours or the like."""
         return self.place is not None and re.fullmatch(CALENDAR, self.date) is not None
 
 
@@ -79,16 +79,16 @@ def place_of(date: str, source: str) -> float:
     Parameters
     ----------
     date : str
-        ISO 8601, such as 2026-11-22, 20261122 or 2026-11-22T14:30, the same as in file names (20261122_143000,
-        2026-11-22_14-30), with dots and the day first (22.11.2026), a month (2026-11: its first day), or a number such
-        as running hours.
+        ISO 8601, such as 2026-11-22, 20261122 or 2026-11-22T14:30; the same in file names (20261122_143000,
+        2026-11-22_14-30); with dots and the day first (22.11.2026); a month (2026-11 means its first day); or a number
+        such as running hours.
     source : str
-        Where it stands, for the error.
+        Where the date was found, for the error message.
 
     Returns
     -------
     float
-        Days since 1970-01-01 for a date of eight digits or more [day], else the number itself.
+        Days since 1970-01-01 for a date [day], or the number itself.
 
     Raises
     ------
@@ -120,26 +120,26 @@ def place_of(date: str, source: str) -> float:
 
 
 def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
-    """Read actuator and date of logs from the names of their files.
+    """Read the actuator and date of each log from its file name.
 
     Parameters
     ----------
     files : iterable of str
         Paths of logs.
     pattern : str
-        Of the end of the path, such as ``{actuator}/{date}.csv`` or ``{actuator}_{date}*``; ``*`` is anything. Where
-        a name can be split in several ways, the date is a `STAMP`.
+        Pattern for the end of the path, such as ``{actuator}/{date}.csv`` or ``{actuator}_{date}*``; ``*`` matches
+        anything. If a name can be split in several ways, the date is a `STAMP`.
 
     Returns
     -------
     dict[str, Named]
-        By file; those that do not match are `UNNAMED`, and those whose date cannot be read have a ``problem`` instead
-        of an actuator.
+        By file. Files that do not match are `UNNAMED`; files with an unreadable date have a ``problem`` instead of an
+        actuator.
 
     Raises
     ------
     HydrostateError
-        If the pattern names no actuator, or something else, or no date that it finds can be read.
+        If the pattern names no actuator, or an unknown field, or if none of the dates found can be read.
 
     Examples
     --------
@@ -169,7 +169,7 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
 
 
 def _text(part: str, fields: Mapping[str, str]) -> str:
-    """Return the regular expression of a part of a pattern."""
+    """Return the regular expression for one part of a pattern."""
     if part.startswith("{"):
         return fields[part[1:-1]]
     return ".*" if part == "*" else re.escape(part)
@@ -178,20 +178,21 @@ def _text(part: str, fields: Mapping[str, str]) -> str:
 def by_dates(files: Iterable[str], folder: str = "") -> dict[str, Named]:
     """Read actuator and date from file names that hold one date each, such as P-12_20261122_143000.csv.
 
-    The actuator is what the name has beside the date. Where that is nothing, or a word such as "log", it is the folder.
+    The actuator is the rest of the name without the date. If the rest is empty, or a word such as "log", the actuator
+    is the folder's name.
 
     Parameters
     ----------
     files : iterable of str
         Paths of logs.
     folder : str
-        Of all of them; empty where it names no actuator.
+        Common folder of all logs; empty if it does not name an actuator.
 
     Returns
     -------
     dict[str, Named]
-        By file; empty if names do not group the logs: fewer than `MATCHING` of them hold one date and an actuator, or
-        no actuator has two logs.
+        By file. Empty if names do not group the logs: fewer than `MATCHING` of them contain one date and an actuator,
+        or no actuator has two logs.
 
     Examples
     --------
@@ -206,19 +207,19 @@ def by_dates(files: Iterable[str], folder: str = "") -> dict[str, Named]:
 
 
 def actuator_in_name(name: str, pattern: str | None) -> str:
-    """Return the actuator that the name of one log tells: by the pattern, or else by its date.
+    """Return the actuator given by the name of one log: by the pattern, or otherwise by the date in the name.
 
     Parameters
     ----------
     name : str
         Of the file.
     pattern : str or None
-        As `by_pattern` takes it.
+        As in `by_pattern`.
 
     Returns
     -------
     str
-        Empty if the name tells none.
+        Empty if the name gives no actuator.
 
     Examples
     --------
@@ -236,12 +237,12 @@ def actuator_in_name(name: str, pattern: str | None) -> str:
 
 
 def _stem(name: str) -> str:
-    """Return the name of a file without what ends it."""
+    """Return a file name without its ending."""
     return re.sub(r"\.[A-Za-z][A-Za-z0-9]*(?:\.(?:gz|zst))?$", "", name)
 
 
 def _by_date(path: str) -> Named:
-    """Return actuator and date from the name of a file and of its folder."""
+    """Return actuator and date from the names of a file and its folder."""
     *_, folder, name = path.split("/")
     stem = year_first(_stem(name))
     dates = list(re.finditer(rf"(?<![0-9]){STAMP.pattern}(?![0-9])", stem))
@@ -256,7 +257,7 @@ def _by_date(path: str) -> Named:
 
 
 def _require_a_date(found: dict[str, Named]) -> dict[str, Named]:
-    """Refuse names of which none has a date that can be read: the pattern or the form of dates is wrong, no log is."""
+    """Raise an error if no name has a readable date: then the pattern or the date format is wrong, not a log."""
     wrong = [file for file, one in found.items() if one.problem]
     if wrong and not any(one.actuator for one in found.values()):
         raise HydrostateError(f"{wrong[0]}: {found[wrong[0]].problem}")
@@ -264,7 +265,7 @@ def _require_a_date(found: dict[str, Named]) -> dict[str, Named]:
 
 
 def _named(actuator: str, date: str, source: str) -> Named:
-    """Return actuator and date of a log; one bad date must not cost the fleet its page."""
+    """Return actuator and date of a log; one bad date must not stop the page of the whole fleet."""
     try:
         return Named(actuator, year_first(date), place_of(date, source) if date else None)
     except HydrostateError as error:
@@ -279,13 +280,13 @@ def by_table(files: Iterable[str], table: Path) -> dict[str, Named]:
     files : iterable of str
         Paths of logs.
     table : Path
-        CSV with columns ``file`` (name or path), ``actuator``, and ``date`` if there is one.
+        CSV with columns ``file`` (name or path), ``actuator``, and optionally ``date``.
 
     Returns
     -------
     dict[str, Named]
-        By file; those that are not in the table are `UNNAMED`, and those whose date cannot be read have a ``problem``
-        instead of an actuator.
+        By file. Files that are not in the table are `UNNAMED`; files with an unreadable date have a ``problem`` instead
+        of an actuator.
 
     Raises
     ------

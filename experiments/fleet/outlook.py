@@ -1,4 +1,4 @@
-"""Outlook of an actuator's severities over its logs: level, growth, and the time to a limit."""
+"""Outlook for the severities of an actuator over its logs: level, growth, and the time to a limit."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,10 +15,10 @@ from faults.trend.crossing import HORIZON
 from faults.trend.trend import FEWEST, Series, Trend, trends
 
 REACHED = "reached"
-"""What stands in place of a date that is past."""
+"""Shown in place of a date if the limit has already been reached."""
 
 LEAST_STD = 1e-3
-"""Least standard deviation of a log, as a share of the way from healthy to the limit [fraction]."""
+"""Smallest standard deviation of a log, as a share of the distance from healthy to the limit [fraction]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,17 +32,17 @@ class Outlook:
 
     @cached_property
     def course(self) -> list[Trend]:
-        """Belief after each log."""
+        """Estimated trend after each log."""
         return list(trends(self.series))
 
     @property
     def trend(self) -> Trend:
-        """Belief after the last log."""
+        """Estimated trend after the last log."""
         return self.course[-1]
 
     @cached_property
     def quantiles(self) -> tuple[float, ...] | None:
-        """Logs to the limit at `QUANTILES` of the crossing [step]; None where the median is not within sight."""
+        """Logs until the limit is crossed, at `QUANTILES` [step]; None if the median is beyond the horizon."""
         crossing = self.trend.crossing if self.trend.certain else None
         if crossing is None or not math.isfinite(crossing.quantiles[2]):
             return None
@@ -50,7 +50,7 @@ class Outlook:
 
     @property
     def left(self) -> tuple[float, float, float] | None:
-        """Logs to the limit: 5 %, median and 95 % [step]; None where the median is not within sight."""
+        """Logs until the limit is reached: 5 %, median and 95 % [step]; None if the median is beyond the horizon."""
         return None if self.quantiles is None else (self.quantiles[0], self.quantiles[2], self.quantiles[4])
 
     @property
@@ -60,12 +60,12 @@ class Outlook:
 
     @property
     def days_apart(self) -> float | None:
-        """Usual time between two logs [day]; None where their dates are none of the calendar."""
+        """Usual time between two logs [day]; None if they have no calendar dates."""
         return self.series.step if len(self.logs) > 1 and all(one.named.in_days for one in self.logs) else None
 
     @property
     def past(self) -> str:
-        """Since when the severity is past its limit, without a break up to the last log; empty where it is not."""
+        """Since when the severity has been past its limit without a break to the last log; empty if it is not."""
         within = [place for place, one in enumerate(self.logs) if one.amounts[self.name].share <= 1.0]
         first = within[-1] + 1 if within else 0
         count = len(self.logs) - first
@@ -78,19 +78,19 @@ class Outlook:
 
     @property
     def doubt(self) -> str:
-        """What to do where the last logs are past the limit and the trend is not; empty where they agree."""
+        """Advice if the last logs are past the limit but the trend is not; empty if they agree."""
         level = self.trend.level[0] - self.series.healthy
         if not self.past or level / (self.series.limit - self.series.healthy) > 1.0:
             return ""
         return "; its trend is still within it: log again to see whether this lasts"
 
     def when(self, low: int, high: int) -> str:
-        """Return when the limit is reached, between two of `QUANTILES`: as dates where logs have them, else in logs.
+        """Return when the limit is reached, between two of `QUANTILES`: as dates if logs have them, else in logs.
 
         Parameters
         ----------
         low, high : int
-            Places among `QUANTILES` [index].
+            Indices into `QUANTILES` [index].
         """
         if self.trend.crossing is None:
             return ""
@@ -144,14 +144,14 @@ class Outlook:
 
 
 def span_of(low: float, high: float, horizon: float = HORIZON) -> str:
-    """Return the interval of a crossing in words; no future is followed beyond the horizon.
+    """Return the interval of a crossing in words; predictions end at the horizon.
 
     Parameters
     ----------
     low, high : float
-        Its ends, infinite beyond [logs, a count, or a unit of time].
+        Ends of the interval, infinite if beyond the horizon [logs, a count, or a unit of time].
     horizon : float
-        How far futures are followed [the same unit].
+        How far predictions reach [the same unit].
 
     Examples
     --------
@@ -168,14 +168,14 @@ def outlook_of(logs: Sequence[LogRow], name: str, maintained: Sequence[float] = 
     Parameters
     ----------
     logs : sequence of LogRow
-        Of one actuator, by date; without dates they count as evenly spaced.
+        Logs of one actuator, by date; without dates they count as evenly spaced.
     maintained : sequence of float
-        When it was repaired, as `experiments.fleet.naming.place_of` gives dates [day].
+        Times of repairs, in the form of `experiments.fleet.naming.place_of` [day].
 
     Returns
     -------
     Outlook or None
-        None where no log tells the severity with a verdict.
+        None if no log has both a verdict and a value of the severity.
     """
     told = tuple(one for one in logs if name in one.amounts and one.told)
     if not told:
@@ -198,7 +198,7 @@ def outlook_of(logs: Sequence[LogRow], name: str, maintained: Sequence[float] = 
 
 
 def read_maintenance(table: Path | None) -> Mapping[str, list[float]]:
-    """Return when actuators were repaired.
+    """Return the times at which actuators were repaired.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def read_maintenance(table: Path | None) -> Mapping[str, list[float]]:
     Raises
     ------
     HydrostateError
-        If it cannot be read, or a date is none.
+        If it cannot be read, or a date is invalid.
     """
     found: dict[str, list[float]] = {}
     rows: Iterable[Mapping[str, str]] = [] if table is None else table_rows(table, ("actuator", "date"))

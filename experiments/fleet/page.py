@@ -1,4 +1,4 @@
-"""The page of a fleet: one row an actuator, the sick ones on top."""
+"""The page of a fleet: one row per actuator, the sickest at the top."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -17,30 +17,29 @@ from experiments.page.sentences import whole_dates
 from experiments.page.tables import Cell, Column, right
 
 MOST_STILL = 100
-"""Rows of a table where scripts do not run [count]."""
+"""Rows of a table when scripts do not run [count]."""
 
 MOST_OPEN, MOST_LISTED = 25, 10
-"""Rows of the actuators that are not sound on paper, unless more are sick, and of the logs that could not be read or
-have no date there [count]: with what the states mean they fill two sheets. `fleet.html` hides the rest of
-the latter."""
+"""Rows shown on paper [count]: actuators that are not sound (more if more are sick), and logs that could not be read or
+have no date. With the key to the states they fill two sheets. `fleet.html` hides the remaining logs."""
 
 UNREAD = ("log", "actuator", "why")
 """Columns of the table of logs that could not be read."""
 
 IF_RIGHT = ", if the rig file is right"
-"""Behind the levels of a circuit that lies beside the nine conditions."""
+"""Suffix for the leakage and friction levels of a circuit that lies outside the nine conditions."""
 
 MOST_NAMED = 5
-"""Actuators that are named above the table [count]."""
+"""Largest number of actuators named above the table [count]."""
 
 LEAST_OPEN, SHARE_OPEN = 3, 0.2
-"""Actuators without a verdict [count, fraction of all], from which the rig file is suspected."""
+"""Actuators without a verdict from which a wrong rig file is suspected [count, fraction of all]."""
 
 SICK = ("over", "likely")
 """States of actuators that need work."""
 
 SOUND = "within"
-"""State of actuators that need none."""
+"""State of actuators that need no work."""
 
 COLUMNS: Sequence[Mapping[str, Any]] = (
     {"label": "actuator", "kind": "name", "width": 7.7},
@@ -53,7 +52,7 @@ COLUMNS: Sequence[Mapping[str, Any]] = (
     {"label": "last log", "kind": "text", "width": 6.8},
     {"label": "logs", "kind": "number", "width": 4},
 )
-"""Columns of the table, their widths in sizes of the page's type [rem]; 76 in all fit a screen of 1280 px."""
+"""Columns of the table; widths in units of the page's font size [rem]. 76 in total fit a screen of 1280 px."""
 
 
 def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: str, home: str = "") -> str:
@@ -64,11 +63,11 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     rows : sequence of ActuatorRow
         The sickest first.
     links : Mapping[str, str]
-        Relative path of an actuator's own page, by its name.
+        Relative path of an actuator's own page, by actuator name.
     source : str
-        What the page is of.
+        Description of the fleet's source.
     home : str
-        Path of the page of all logs, where a server has one.
+        Path of the page of all logs, if a server provides one.
     """
     counts = Counter(row.state for row in rows)
     cells = [row_cells(row) for row in rows]
@@ -113,7 +112,7 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
 
 
 def _still(rows: Sequence[ActuatorRow], cells: Sequence[Sequence[Any]]) -> dict[str, Any]:
-    """Return the rows that paper shows, those that stand below where scripts do not run, and what paper leaves out."""
+    """Return the rows shown on paper, further rows shown when scripts do not run, and the counts of the others."""
     sick = sum(row.state in (*SICK, "alarm") for row in rows)
     ailing = [i for i, row in enumerate(rows) if row.state != SOUND][: max(MOST_OPEN, min(sick, MOST_STILL))]
     others = sorted(set(range(len(rows))).difference(ailing))
@@ -127,9 +126,9 @@ def _still(rows: Sequence[ActuatorRow], cells: Sequence[Sequence[Any]]) -> dict[
 
 
 def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:
-    """Return the names with which to begin, five at most: those past a limit, be it only if the rig file is right.
+    """Return the actuators to begin with, five at most: those past a limit, even if only under a correct rig file.
 
-    Where there are none, those that near one.
+    If there are none, return those that are near a limit.
 
     Parameters
     ----------
@@ -147,7 +146,7 @@ def _past(log: LogRow) -> bool:
 
 
 def title_of(rows: Sequence[ActuatorRow]) -> str:
-    """Return a title with the number of sick actuators, among those with readable logs."""
+    """Return a title with the number of sick actuators among those with readable logs."""
     known, alone = ([row for row in rows if bool(row.last.named.actuator) is each] for each in (True, False))
     if len(known) < len(alone):
         known, alone = list(rows), []
@@ -176,14 +175,14 @@ def title_of(rows: Sequence[ActuatorRow]) -> str:
 
 
 def rig_hint(rows: Sequence[ActuatorRow], *, served: bool = False) -> str:
-    """Return advice if many actuators have no verdict; else empty.
+    """Return advice if many actuators have no verdict, else an empty string.
 
     Parameters
     ----------
     rows : sequence of ActuatorRow
         In any order.
     served : bool
-        Whether a server has the logs, in no folder of the reader's.
+        Whether the logs are on a server, not in a folder of the reader.
     """
     unknown = [row for row in rows if row.state == "unknown"]
     if len(unknown) < LEAST_OPEN or len(unknown) < SHARE_OPEN * len(rows):
@@ -200,12 +199,12 @@ def rig_hint(rows: Sequence[ActuatorRow], *, served: bool = False) -> str:
 
 
 def row_cells(row: ActuatorRow) -> list[Any]:
-    """Return the cells of an actuator, as `COLUMNS` lists them.
+    """Return the table cells of an actuator, in the order of `COLUMNS`.
 
     Returns
     -------
     list
-        Text, numbers, or None where nothing is known.
+        Text, numbers, or None if unknown.
     """
     last = row.last
     told = last.told  # the amounts of a model that does not fit are none of the actuator's
@@ -227,7 +226,7 @@ def row_cells(row: ActuatorRow) -> list[Any]:
 
 
 def untold_since(row: ActuatorRow) -> str:
-    """Return since when there is no verdict; empty where there never was one, and where logs have no dates."""
+    """Return since when there is no verdict; empty if there never was one, or if logs have no dates."""
     read = [one for one in row.logs if one.state != "failed"]
     known = [place for place, one in enumerate(read) if one.state != "unknown"]
     day = read[known[-1] + 1].named.day if known and known[-1] + 1 < len(read) else ""
@@ -235,7 +234,7 @@ def untold_since(row: ActuatorRow) -> str:
 
 
 def found_in(log: LogRow) -> str:
-    """Return the finding of a log or the reason for none, without the log's folder."""
+    """Return the finding of a log, or the reason why there is none, without the log's folder."""
     levels = [level_in_words(name, size) for name, size in log.between.items() if size > 0.0]
     if levels:
         return "; ".join(levels) + (IF_RIGHT if log.beside else "")
@@ -243,13 +242,13 @@ def found_in(log: LogRow) -> str:
 
 
 def worst_in(log: LogRow) -> str:
-    """Return the severity that is nearest to its limit, or farthest beyond, with its name."""
+    """Return the severity that is closest to its limit, or farthest beyond it, with its name."""
     name = log.worst.name if log.worst else ""
     return f"{SHOWN.get(name, name.replace('_', ' '))} {amount_in(log, name)}" if name else ""
 
 
 def amount_in(log: LogRow, name: str) -> str:
-    """Return a severity with its unit; empty where the log does not tell it."""
+    """Return a severity with its unit; empty if the log does not determine it."""
     one = log.amounts.get(name)
     if one is None:
         return ""

@@ -1,4 +1,4 @@
-"""One row a log, from the rows of a batch store: state, worst severity, and how near to its limit that is."""
+"""One row per log, from the rows of a batch store: state, worst severity, and its distance from the limit."""
 
 import json
 import math
@@ -19,10 +19,10 @@ STATES: Mapping[str, str] = {
     "within": "within limits",
     "failed": "not readable",
 }
-"""States of a log or an actuator, the most urgent first, and what a reader is told."""
+"""States of a log or an actuator with their descriptions, the most urgent first."""
 
 BETWEEN, BESIDE = str(AgainstCode.BETWEEN_CONDITIONS), str(AgainstCode.OUTSIDE_CONDITIONS)
-"""Codes of logs that one circuit explains, though none of the nine conditions does."""
+"""Codes of logs that fit one circuit, although they fit none of the nine conditions."""
 
 RANKS: Mapping[str, int] = {name: place for place, name in enumerate(STATES)}
 
@@ -36,7 +36,7 @@ class Amount:
     value, low, high : float
         Estimate and 95 % interval [unit].
     healthy, limit : float
-        Of the healthy actuator, and where it stops being sound [unit].
+        Value of a healthy actuator, and value at which it stops being sound [unit].
     """
 
     name: str
@@ -49,12 +49,12 @@ class Amount:
 
     @property
     def share(self) -> float:
-        """Share of the way from healthy to the limit [fraction]: 1 at the limit, more beyond."""
+        """Share of the distance from healthy to the limit [fraction]: 1 at the limit, larger beyond it."""
         return (self.value - self.healthy) / (self.limit - self.healthy)
 
     @property
     def std(self) -> float:
-        """Standard deviation, from a normal interval [unit]."""
+        """Standard deviation, which assumes a normal interval [unit]."""
         return 0.5 * (self.high - self.low) / NORMAL_95
 
     @property
@@ -79,14 +79,15 @@ class LogRow:
     state : str
         One of `STATES`.
     condition : str
-        That was found; empty where none was.
+        The condition found; empty if none was found.
     reason : str
-        Why there is none.
+        Why no condition was found.
     between : Mapping[str, float]
-        Where one circuit explains the log, but its leakage and friction are those of no condition: both to the nearest
-        quarter, where 1 is minor and 2 is major [dimensionless]; else empty.
+        Leakage and friction if one circuit explains the log but its levels are those of no condition: both to the
+        nearest quarter, where 1 is minor and 2 is major [dimensionless]. Empty otherwise.
     beside : bool
-        Whether such a circuit does not even lie between two conditions: the rig file may be another actuator's.
+        Whether such a circuit lies outside all conditions, not even between two: the rig file may be for another
+        actuator.
     """
 
     file: str
@@ -100,39 +101,39 @@ class LogRow:
 
     @property
     def told(self) -> bool:
-        """Whether the severities are the actuator's: a model explains the log, of one of the nine conditions or not."""
+        """Whether the severities are valid: a model explains the log, be it one of the nine conditions or not."""
         return self.state not in ("unknown", "failed")
 
     @property
     def shown(self) -> bool:
-        """Whether severities are shown: they are the actuator's, if the rig file is."""
+        """Whether severities are shown: they are valid, or would be valid if the rig file is right."""
         return self.told or self.beside
 
     @property
     def worst(self) -> Amount | None:
-        """The severity that is farthest towards its limit."""
+        """The severity that is closest to its limit, or farthest beyond it."""
         return max(self.amounts.values(), key=lambda one: one.share, default=None)
 
     @property
     def order(self) -> tuple[int, float]:
-        """The sickest first."""
+        """Sort key: the sickest first."""
         return RANKS[self.state], -(self.worst.share if self.worst else 0.0)
 
 
 def log_rows(
     rows: Iterable[Mapping[str, Any]], names: Mapping[str, Named], limits: Mapping[str, float]
 ) -> list[LogRow]:
-    """Return one row a log that was diagnosed.
+    """Return one row for each log that was diagnosed.
 
     Parameters
     ----------
     rows : iterable of Mapping
-        Of a batch store, with ``file``, ``verb``, ``outcome``, ``found_condition``, ``reason`` and ``quantities``.
+        Rows of a batch store, with ``file``, ``verb``, ``outcome``, ``found_condition``, ``reason`` and ``quantities``,
+        and with ``against`` if it is known.
     names : Mapping[str, Named]
         By file.
-        ``against`` too, where it is known.
     limits : Mapping[str, float]
-        That replace those of the store, by severity [its unit].
+        Limits that replace those of the store, by severity [its unit].
     """
     return [
         _row(row, names.get(row["file"], UNNAMED), limits) for row in rows if row["file"] and row["verb"] == "diagnose"
@@ -152,7 +153,7 @@ def _row(row: Mapping[str, Any], named: Named, limits: Mapping[str, float]) -> L
 
 
 def _placed(text: str | None) -> tuple[str, dict[str, float]]:
-    """Return code, leakage and friction of a log that is unknown only because they are those of no condition."""
+    """Return code, leakage and friction of a log that is unknown only because its levels are those of no condition."""
     against = json.loads(text or "[]")
     if len(against) != 1 or against[0]["code"] not in (BETWEEN, BESIDE) or not against[0]["data"]:
         return "", {}

@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from estimation.identification.state_space.dynamics import StateSpaceDynamics
 
 FORMAT_VERSION = 1
-"""Of a written library: later versions add entries and rename none."""
+"""Version of a written library: later versions add entries and rename none."""
 
 
 def linear_entries(model: "LinearModel") -> dict[str, Any]:
-    """Return a transfer function by the names of the JSON contract."""
+    """Return a transfer function under the names of the JSON contract."""
     bandwidth = model.bandwidth_hz
     extent = "not below the Nyquist frequency" if bandwidth is None else f"{bandwidth:.3g} Hz"
     return {
@@ -36,12 +36,12 @@ def linear_entries(model: "LinearModel") -> dict[str, Any]:
 
 
 def gains_shown(result: Mapping[str, Any]) -> str:
-    """Return the steady gain from each input with one standard deviation; one that is less than it is not determined.
+    """Return the steady gain from each input with one standard deviation; a smaller gain is marked "undetermined".
 
     Parameters
     ----------
     result : mapping
-        With ``dc_gain`` and ``notes``.
+        Entries with ``dc_gain`` and ``notes``.
     """
     from estimation.identification.notes import GAIN_MEANS_NOTHING
 
@@ -56,12 +56,12 @@ def gains_shown(result: Mapping[str, Any]) -> str:
 
 
 def gain_shown(value: float, std: float) -> str:
-    """Return a gain with one standard deviation, where it is more than that.
+    """Return a gain with one standard deviation, if the gain exceeds it.
 
     Parameters
     ----------
     value, std : float
-        Gain and deviation, zero where there is none [output unit / input unit].
+        Gain and standard deviation, zero if there is none [output unit / input unit].
     """
     if not std <= abs(value):
         return "undetermined"
@@ -69,7 +69,7 @@ def gain_shown(value: float, std: float) -> str:
 
 
 def with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
-    """Return complex numbers with their standard deviations, by the names of the JSON contract."""
+    """Return complex numbers with their standard deviations, under the names of the JSON contract."""
     return [
         {"real": float(r.real), "imag": float(r.imag), "real_std": float(s.real), "imag_std": float(s.imag)}
         for r, s in zip(roots, spreads, strict=True)
@@ -77,7 +77,7 @@ def with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
 
 
 def column_entries(found: "Identified") -> dict[str, Any]:
-    """Return a model between columns by the names of the JSON contract."""
+    """Return a model between columns under the names of the JSON contract."""
     from estimation.identification.notes import AGAINST, WARNED
     from estimation.identification.state_space.dynamics import StateSpaceDynamics
 
@@ -116,7 +116,7 @@ def column_entries(found: "Identified") -> dict[str, Any]:
 
 
 def _transfer_entries(model: "FreeRunModel", gain_std: Sequence[float]) -> dict[str, Any]:
-    """Return transfer functions without covariance: of one input in the form of `linear_entries`, else by inputs."""
+    """Return transfer functions without covariance: in the form of `linear_entries` for one input, else by inputs."""
     import numpy as np  # late: help waits for no heavy import
 
     transfer = model.transfer_functions()

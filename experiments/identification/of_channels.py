@@ -1,4 +1,4 @@
-"""`hydrostate identify LOG...`: the transfer function between two channels of a bench, one a log."""
+"""`hydrostate identify LOG...`: the transfer function between two channels of a bench, one for each log."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
     from plant.eha.rig import Rig
 
 INPUT, OUTPUT = "motor_speed_rad_s", "velocity_m_s"
-"""Channels that are related where none are named."""
+"""Default input and output channels."""
 
 TABLE_6_TIME = 1e-3
-"""Sample time of Table 6 as we read it [s] (errata E14)."""
+"""Sample time of Table 6 as inferred [s] (errata E14)."""
 
 STRUCTURES: "Mapping[str, StructureName | None]" = {**STRUCTURE_NAMES, "auto": None}
-"""What ``--structure`` takes; auto compares the first four on data held back."""
+"""Values of ``--structure``; auto compares the first four on held-back data."""
 
 HIGHEST_ORDER = 4
 """``--order auto`` compares orders up to this by BIC."""
 
 MOST_PROFILED, MOST_TESTED = 100_000, 50_000
-"""Longest log whose gain is profiled where a pole is nearly cancelled, and samples that residual tests are given."""
+"""Longest log whose gain is profiled if a pole is nearly cancelled, and maximum number of samples in residual tests."""
 
 NOTHING: Result = {
     "format_version": FORMAT_VERSION,
@@ -55,13 +55,13 @@ class ChannelFit:
     Parameters
     ----------
     order, delay : int or None
-        Of the model; None lets the data choose.
+        Order and delay of the model; None lets the data choose.
     numerator : int or None
-        Count of numerator coefficients; one more than the order if None.
+        Number of numerator coefficients; one more than the order if None.
     sample_time : float or None
-        Of the model, and of a log without a column of time [s].
+        Sample time of the model, and of a log without a column of time [s].
     filter_hz : float or None
-        Cut-off of a low-pass before the fit [Hz].
+        Cut-off frequency of a low-pass before the fit [Hz].
     """
 
     input: str = INPUT
@@ -80,7 +80,7 @@ class ChannelFit:
 def identify_channels(
     logs: Sequence[Path], fit: ChannelFit, rig: "Rig", columns: Mapping[str, str], *, as_json: bool, out: Path | None
 ) -> NoReturn:
-    """Identify one model a log, print what it is worth, and leave with the exit code.
+    """Identify one model for each log, print its quality, and exit with the exit code.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def identify_channels(
 
 
 def _page(result: Result, model: "LinearModel", u: "Array", y: "Array") -> str:
-    """Return the page of a model, with the fit of one of its size on a third of the log that is held back."""
+    """Return the page of a model, with the fit of a model of its size on a held-back third of the log."""
     from estimation.identification.choose import held_back_percent
     from experiments.log_pages.identified_page import identified_page
     from experiments.log_pages.identified_view import view_of_channels
@@ -130,14 +130,14 @@ def _page(result: Result, model: "LinearModel", u: "Array", y: "Array") -> str:
 
 
 def judged_page(model: "LinearModel", u: "Array", y: "Array", title: str) -> str:
-    """Return the page of a model that no command has judged yet.
+    """Return the page of a model that no command has validated yet.
 
     Parameters
     ----------
     u, y : ndarray, shape (n,)
-        Input, no gaps, and output, NaN where missing [in the channels' units].
+        Input without gaps, and output, NaN where missing [in the channels' units].
     title : str
-        What the page calls the log.
+        Name of the log on the page.
     """
     ends = {"input": model.input_name, "output": model.output_name}
     return _page(
@@ -162,7 +162,7 @@ def _form(fit: ChannelFit) -> dict[str, Any]:
 
 
 def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Path | None) -> dict[str, Any]:
-    """Return the residual tests of the model and the gain's interval; draw both if wanted."""
+    """Return the residual tests of the model and the gain's interval; draw both if requested."""
     from estimation.finding import interval_95
     from estimation.identification.fit.profile_interval import dc_gain_interval
     from estimation.identification.fit.validate import validate

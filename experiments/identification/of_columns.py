@@ -31,9 +31,9 @@ class ColumnFit:
     Parameters
     ----------
     order, delay, numerator : int or None
-        Of every input; None lets the data choose.
+        Values for every input; None lets the data choose.
     sample_time, resampled : float or None
-        Between samples of logs without a column of time, and of the model [s].
+        Sample time of logs without a column of time, and of the model [s].
     """
 
     inputs: tuple[str, ...]
@@ -53,7 +53,7 @@ class ColumnFit:
 
 
 AT_OUTPUT = ("absolute-value", "cut-off", "stops")
-"""Kinds of nonlinearity that are at the output, as friction is; others are at the input."""
+"""Kinds of nonlinearity at the output, such as friction; all others are at the input."""
 
 BLANK: Result = {
     **dict.fromkeys(("inputs", "input", "output", "structure", "order", "n_values", "sample_time_s")),
@@ -66,7 +66,7 @@ BLANK: Result = {
 
 
 def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out: Path | None) -> NoReturn:
-    """Identify one model an output from all logs together, print what it is worth, and leave with the exit code.
+    """Identify one model for each output from all logs together, print its quality, and exit with the exit code.
 
     Raises
     ------

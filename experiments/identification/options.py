@@ -1,4 +1,4 @@
-"""Options of `hydrostate identify`, one a line of its help."""
+"""Options of `hydrostate identify`, one for each line of its help."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,7 +7,7 @@ from experiments.command.options import option
 from experiments.identification.of_channels import STRUCTURES
 
 ONLY_BETWEEN_COLUMNS = ("narx", "hammerstein", "wiener", "state-space")
-"""Structures that are fitted between any columns only."""
+"""Structures that can only be fitted between columns."""
 
 StructureName = Annotated[
     str,

@@ -1,4 +1,4 @@
-"""`hydrostate identify LOG --simulate MODEL`: a saved model run free on other logs, and how well it follows them."""
+"""`hydrostate identify LOG --simulate MODEL`: a free run of a saved model on other logs, and how well it fits them."""
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_json: bool, out: Path | None) -> NoReturn:
-    """Simulate a saved model on every log, say how well it follows, and leave with the exit code.
+    """Simulate a saved model on every log, report how well it fits, and exit with the exit code.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def _said(output: str, fit: float) -> str:
 
 
 def _models_of(models: "Sequence[FreeRunModel]", outputs: Sequence[str]) -> "list[FreeRunModel]":
-    """Return the models of outputs in the order that they are asked for; all where columns have other names."""
+    """Return the models of outputs in the requested order; all of them if columns have other names."""
     by_output = {one.output: one for one in models}
     return [by_output[name] for name in outputs if name in by_output] or list(models)
 
@@ -90,14 +90,14 @@ def write_simulated(model: "FreeRunModel", data: "Channels", path: Path) -> None
 
 
 def record_of(log: Path, wanted: Sequence[str], sample_time: float | None, *, assumed: float = 1.0) -> "Record":
-    """Read columns of a log of anything, of which as many samples may be missing as a model can do without.
+    """Read columns of any log; as many samples may be missing as a model can tolerate.
 
     Parameters
     ----------
     sample_time : float or None
-        Between rows of a log without a column of time [s].
+        Sample time of a log without a column of time [s].
     assumed : float
-        Likewise, where nothing is told [s].
+        The same, if none is given [s].
 
     Raises
     ------
@@ -118,7 +118,7 @@ def record_of(log: Path, wanted: Sequence[str], sample_time: float | None, *, as
 
 
 def quality_of(model: "FreeRunModel", data: "Channels", named: str = "the log") -> dict[str, Any]:
-    """Return the fit of a model to its outputs, by the names of the JSON contract.
+    """Return the fit of a model to its outputs, under the names of the JSON contract.
 
     Parameters
     ----------

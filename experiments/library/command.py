@@ -1,4 +1,4 @@
-"""`hydrostate library`: the nine-condition library, shown, or built anew with a report on how it was chosen."""
+"""`hydrostate library`: shows the nine-condition library, or rebuilds it with a report on how it was chosen."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path

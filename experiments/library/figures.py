@@ -40,13 +40,13 @@ COMPARED = {
 """Panels of the comparison: column, title and axis."""
 
 CLOCK_MARKS = "os^Dvp<P*X"
-"""A mark for each test, which colour alone does not tell apart."""
+"""A marker for each test, because colour alone does not distinguish them."""
 
 
 def _draw_structures(tables: Tables) -> Figure:
-    """Draw how the four structures do in each condition, and where each one's criterion looks.
+    """Draw the accuracy of the four structures in each condition, and the frequencies that each one's criterion weighs.
 
-    Three panels, one row a condition, one mark a structure.
+    Three panels, with one row for each condition and one mark for each structure.
     """
     found = tables["structures"]
     margins = Margins(left=BESIDE_CONDITIONS.left, top=0.65)
@@ -80,9 +80,9 @@ def _draw_library(tables: Tables) -> Figure:
 
 
 def _draw_orders(tables: Tables) -> Figure:
-    """Draw singular values over the noise floor, and what each order adds to the fit.
+    """Draw singular values over the noise floor, and how much each order improves the fit.
 
-    Two panels, one row a condition.
+    Two panels, with one row for each condition.
     """
     orders = tables["orders"]
     margins = Margins(left=BESIDE_CONDITIONS.left, top=0.65, bottom=0.8)
@@ -106,7 +106,7 @@ def _draw_orders(tables: Tables) -> Figure:
 
 
 def _draw_clocks(tables: Tables) -> Figure:
-    """Draw how certain each test's clock makes the gain, by frequency."""
+    """Draw the uncertainty of the gain against frequency, for each test's clock."""
     tests = tables["clocks"]
     switched = tests[tests["input"].str.endswith(" ms")]
     switched = switched.iloc[np.argsort([float(name.split()[0]) for name in switched["input"]])]

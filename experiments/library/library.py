@@ -1,8 +1,8 @@
 """The nine-condition library: transfer functions identified on the circuit plant, with Table 6 beside them.
 
 The paper's nine are printed with four digits, without sample time, unit or uncertainty, and those digits do not
-determine the gain of the first (errata E14, E15). This library is at full precision, with both covariances, and says
-what it was fitted to. It ships as ``experiments/published/transfer_function_library.json``.
+determine the gain of the first (errata E14, E15). This library has full precision and both covariances, and records the
+data that it was fitted to. It ships as ``experiments/published/transfer_function_library.json``.
 """
 
 import json
@@ -27,42 +27,42 @@ from plant.eha.simulate import CIRCUIT
 from plant.errors import LogWarning
 
 DURATION = 80.0
-"""Length of a test, all passes together [s]."""
+"""Total duration of all passes of a test [s]."""
 
 PASS_HOLD_TIME = 0.05
-"""Time between chances to switch [s]: 10 to 20 ms suit 25 Hz, 200 ms leaves it several times less certain."""
+"""Time between possible switches [s]: 10 to 20 ms suit 25 Hz; 200 ms makes the gain several times less certain."""
 
 MEAN_V, AMPLITUDE_V = 4.0, 2.0
 """Mean and amplitude of the test [V]. Without a mean the circuit's piston sticks at every reversal, and a linear model
 explains half of its motion; 2 to 6 V are above the dead zone of every condition (errata E8)."""
 
 PASS_TIME, SETTLING = 4.0, 1.5
-"""Length of a pass, which covers some 0.7 of the stroke, and what is left out after the piston turns round [s]."""
+"""Duration of a pass, which covers about 0.7 of the stroke, and of the part omitted after each reversal [s]."""
 
 HIGHEST_ORDER = 2
-"""Orders up to this are compared."""
+"""Highest order in the comparison."""
 
 VAGUE = 0.1
-"""A gain known no better than this share is not determined."""
+"""Relative standard deviation above which a gain counts as not determined."""
 
 
 def circuit_passes(
     rig: CircuitParameters, condition: str, rng: np.random.Generator, duration: float = DURATION
 ) -> tuple[list[Array], list[Array]]:
-    """Return an identification test of the circuit plant, pass by pass, about the mean of each.
+    """Return an identification test of the circuit plant, pass by pass, with each pass's mean removed.
 
-    Each pass is an experiment of its own, with an initial state of its own. Their sample time is that of the models,
-    as inferred for Table 6 (errata E14).
+    Each pass is a separate experiment with its own initial state. The sample time is that of the models, as inferred
+    for Table 6 (errata E14).
 
     Parameters
     ----------
     duration : float
-        Length of all passes [s].
+        Total duration of all passes [s].
 
     Returns
     -------
     speeds, velocities : list of ndarray
-        Motor speed [rad/s] and velocity [m/s] of each pass, as the bench's sensors see them.
+        Motor speed [rad/s] and velocity [m/s] of each pass, as measured by the bench's sensors.
     """
     test = Passes(MEAN_V, AMPLITUDE_V, max(1, round(duration / PASS_TIME)), PASS_TIME, PASS_HOLD_TIME, SETTLING)
     speeds, velocities = run_passes(in_condition(rig, condition), test, rng)
@@ -76,7 +76,8 @@ def build_library(seed: int) -> dict[str, Any]:
     -------
     dict
         ``format``, ``version``, how it was made, and by condition the model of section 4's test (``model``, second
-        order), that of a test around an input mean (``around_mean``, of the order that the data want), and Table 6.
+        order), the model of a test around an input mean (``around_mean``, of the order that the data support), and
+        Table 6.
     """
     rig = CircuitParameters()
     with warnings.catch_warnings(action="ignore", category=LogWarning):  # a fit's doubts stand in its covariance
@@ -115,8 +116,8 @@ def build_library(seed: int) -> dict[str, Any]:
 def _determined_model(speeds: list[Array], velocities: list[Array]) -> LinearModel:
     """Return the output-error model, of order 1 at least, that BIC prefers among those the data determine.
 
-    Left out is a model whose pole a zero nearly cancels, decays slower than a pass lasts, or leaves the gain
-    vague: such a pole stands for what the passes' means differ by, and the gain would be that of a drift.
+    Excluded are models with a pole that a zero nearly cancels, a pole that decays more slowly than a pass lasts, or a
+    vague gain: such a pole models the differences between the passes' means, and the gain would be that of a drift.
     """
     found: list[tuple[float, LinearModel]] = []
     names = dict(zip(("input_name", "output_name"), CHANNELS, strict=True))

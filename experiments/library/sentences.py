@@ -6,17 +6,17 @@ from experiments.library.structures import EARLIER_ORDER, MADE_FOR, PAPER_BANDWI
 
 
 def structure_sentences(found: pd.DataFrame) -> tuple[str, str, str]:
-    """Say which structure is most accurate, and why.
+    """Report which structure is most accurate, and why.
 
     Parameters
     ----------
     found : pandas.DataFrame
-        As `structure_table` returns it.
+        Table from `structure_table`.
 
     Returns
     -------
     tuple of str
-        Who is ahead and by how much; what one-step fits say; where the criteria look.
+        The best structure and its lead; the result of one-step fits; the frequencies that the criteria weigh.
     """
     of = {str(name): rows.set_index("condition") for name, rows in found.groupby("structure", sort=False)}
     ours, others = of["output-error"], (of["ARMAX"], of["Box-Jenkins"])
@@ -47,17 +47,17 @@ def structure_sentences(found: pd.DataFrame) -> tuple[str, str, str]:
 
 
 def order_sentences(found: pd.DataFrame) -> tuple[str, str]:
-    """Say what the data hold of the order and the break frequency, beside the paper.
+    """Report what the data show about the order and the break frequency, compared with the paper.
 
     Parameters
     ----------
     found : pandas.DataFrame
-        As `order_and_bandwidth` returns it.
+        Table from `order_and_bandwidth`.
 
     Returns
     -------
     tuple of str
-        On the order, and on the bandwidth.
+        One sentence on the order, one on the bandwidth.
     """
     by_values, by_bic, kept = (_either(found[f"order_{how}"]) for how in ("by_values", "by_bic", "of_library"))
     second, gained = found["value_2_over_floor"], found["fit_2_percent"] - found["fit_1_percent"]
@@ -77,12 +77,12 @@ def order_sentences(found: pd.DataFrame) -> tuple[str, str]:
 
 
 def clock_sentences(found: pd.DataFrame) -> tuple[str]:
-    """Say what a literal 5 Hz clock costs at 25 Hz.
+    """Report the loss of accuracy at 25 Hz from a literal 5 Hz clock.
 
     Parameters
     ----------
     found : pandas.DataFrame
-        As `clock_table` returns it, indexed or not.
+        Table from `clock_table`, indexed or not.
     """
     at, steady = (found.set_index("input")[name] for name in ("at_25_hz", "steady_state"))
     return (

@@ -20,19 +20,19 @@ from plant.eha.circuit_parameters import CircuitParameters
 from plant.sensors.sensors import BENCH
 
 PAPER_ORDER, EARLIER_ORDER = 2, 3
-"""Section 4's finding, and that of the authors' earlier work."""
+"""The order found in section 4, and the order in the authors' earlier work."""
 
 PAPER_BANDWIDTH = 25.0
-"""Section 7 [Hz]."""
+"""Bandwidth stated in section 7 [Hz]."""
 
 HOLDS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 """Clocks compared [s]; 0.2 s is "5 Hz" read literally."""
 
 AT_FREQUENCIES = (1.0, 10.0, 25.0, 40.0)
-"""Where the clocks are compared [Hz]."""
+"""Frequencies at which the clocks are compared [Hz]."""
 
 MADE_FOR, ONE_TEST = "binary, made for 25 Hz", "multisine, 0.5 to 50 Hz"
-"""Names of the tests that are no plain clock."""
+"""Names of the tests without a plain clock."""
 
 
 @tabled
@@ -41,14 +41,15 @@ def structure_table(
 ) -> Rows:
     """Return the errors of ARX, ARMAX, output error and Box-Jenkins on held-back passes, per condition.
 
-    Each has the order of the library's model, so that none is judged by poles that the data do not determine.
+    All have the order of the library's model, so that no structure is penalised for poles that the data do not
+    determine.
 
     Parameters
     ----------
     models : Mapping[str, LinearModel]
-        The library, whose orders are taken.
+        The library, which gives the orders.
     duration : float
-        Length of each test [s]; two thirds are fitted.
+        Duration of each test [s]; two thirds are fitted.
 
     Returns
     -------
@@ -90,14 +91,15 @@ def weight_above(model: LinearModel, inputs: Sequence[Array], frequency_hz: floa
     """Return the share of a criterion's weight that lies above a frequency.
 
     Least squares of the one-step prediction weighs an error of the transfer function at each frequency by the input's
-    power over that of the noise model, ``|D/C|^2`` (Ljung, System Identification, 1999, equation 8.71).
+    power times ``|D/C|^2``, the inverse power gain of the noise model (Ljung, System Identification, 1999, equation
+    8.71).
 
     Parameters
     ----------
     model : LinearModel
-        Fitted; C = D for output error.
+        Fitted model; C = D for output error.
     inputs : sequence of ndarray, shape (n,)
-        What it was fitted to, of one length [input unit].
+        Inputs that the model was fitted to, all of the same length [input unit].
     frequency_hz : float
         Frequency [Hz].
 
@@ -130,7 +132,7 @@ def order_and_bandwidth(
     models : Mapping[str, LinearModel]
         The library.
     duration : float
-        Length of each test [s].
+        Duration of each test [s].
 
     Returns
     -------
@@ -160,12 +162,12 @@ def clock_table(model: LinearModel, limits: Limits, seed: int, *, duration: floa
     Parameters
     ----------
     duration : float
-        Length of the test [s].
+        Duration of the test [s].
 
     Returns
     -------
     pandas.DataFrame
-        As `rank_inputs`: binary tests of the clocks `HOLDS`, one made for 25 Hz, and a multisine.
+        Table from `rank_inputs`: binary tests of the clocks `HOLDS`, one made for 25 Hz, and a multisine.
     """
     rng = stream(seed, "clock")
     T, n = model.sample_time, round(duration / model.sample_time)

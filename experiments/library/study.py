@@ -1,4 +1,4 @@
-"""The library's study: it is built, looked at from all sides, and put beside Table 6."""
+"""The library's study: builds the library, analyses it, and compares it with Table 6."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -42,7 +42,7 @@ def _find(settings: Seeded, track: Track) -> Found:
 
 
 def _facts(tables: Tables, _: Seeded) -> Mapping[str, Any]:
-    """Return the report's sentences, and the roots with one row a condition."""
+    """Return the report's sentences, and the roots with one row for each condition."""
     ours = tables["structures"].query("structure == 'output-error'")
     return {
         "best": int(ours["best"].sum()),
@@ -72,7 +72,7 @@ def _root(root: Row) -> str:
 
 
 def _with_spread(value: float, spread: float) -> str:
-    """Return a number with what it may be off by, both with the decimals of the latter's first digit."""
+    """Return a number with its uncertainty, both rounded to the first significant digit of the uncertainty."""
     decimals = decimals_of(0.0, 5.0 * spread, 5)
     return f"{fixed(value, decimals)} ± {fixed(spread, decimals)}"
 

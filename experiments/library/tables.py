@@ -35,7 +35,7 @@ def library_table(models: Mapping[str, LinearModel]) -> Rows:
     -------
     pandas.DataFrame
         Gain with standard deviation, the interval of the printed gain, natural frequencies and bandwidth of both, and
-        the share of the gain that acts at once (``jump_ratio``).
+        the share of the gain that acts immediately (``jump_ratio``).
     """
     for name, model in models.items():
         printed, published = printed_model(name), published_model(name)
@@ -63,8 +63,9 @@ def root_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row a root in z: condition, ``kind`` (pole or zero), ``source`` (library or Table 6), ``real``, ``imag``,
-        and what they may be off by: standard deviations of ours, half widths of the printed digits.
+        One row for each root in z: condition, ``kind`` (pole or zero), ``source`` (library or Table 6), ``real``,
+        ``imag``, and their uncertainties: standard deviations of the library's roots, half widths from the printed
+        digits.
     """
     rows: list[tuple[object, ...]] = []
     for name, model in models.items():

@@ -1,4 +1,4 @@
-"""The channels of a log as charts."""
+"""Charts of the channels of a log."""
 
 import math
 from typing import TYPE_CHECKING
@@ -12,24 +12,24 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 MOST_CHANNELS = 8
-"""Most channels that are drawn [count]."""
+"""Largest number of channels drawn [count]."""
 
 SHOWN_IN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "Pa": ("bar", 1e-5), "rad/s": ("rpm", 30.0 / math.pi)}
-"""Units that a shop reads, and the factor from SI."""
+"""Units used in workshops, and the factor from SI, by SI unit."""
 
 
 def channel_charts(record: "Record", found: "Finding", stem: str) -> Charts:
-    """Return the channels of a log, those that were used first.
+    """Return charts of the channels of a log; channels that were used come first.
 
     Parameters
     ----------
     stem : str
-        What a download is named after.
+        Start of the file name of a download.
 
     Returns
     -------
     Charts
-        A panel a channel, `MOST_CHANNELS` at most.
+        One panel per channel, at most `MOST_CHANNELS`.
     """
     names = [name for name in dict.fromkeys([*found.channels, *record]) if name in record and name in UNITS]
     panels: list[Panel] = []
@@ -40,7 +40,7 @@ def channel_charts(record: "Record", found: "Finding", stem: str) -> Charts:
 
 
 def label_of(name: str) -> str:
-    """Return the label of an axis in SI; a column of any other log keeps its name.
+    """Return the axis label of a channel in SI units; an unknown column keeps its name.
 
     Examples
     --------

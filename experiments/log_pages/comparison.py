@@ -1,4 +1,4 @@
-"""Two logs side by side: their quantities, what changed, and the page."""
+"""Two logs side by side: their quantities, the changes, and the page."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LEAST_SHARE = 1e-3
-"""Conditions that are less likely in both logs are not shown [probability]."""
+"""Conditions that are less likely than this in both logs are not shown [probability]."""
 
 MOST_NAMED = 6
-"""Quantities that a title names, at most [count]."""
+"""Largest number of quantities named in a title [count]."""
 
 
 def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities: tuple[str, str] | None = None) -> str:
@@ -26,9 +26,9 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
     Parameters
     ----------
     first, second : Mapping
-        Their entries of the JSON contract.
+        Entries of the logs in the JSON contract.
     identities : tuple of str, optional
-        By which the server has them; without, nothing is linked.
+        Identifiers of the logs on the server; without them, the page has no links.
     """
     from experiments.page.render import render_page
     from experiments.page.tables import Column
@@ -68,7 +68,7 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
 
 
 def quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
-    """Return the quantities of two logs in a reader's units, with what is said of each."""
+    """Return the quantities of two logs in the reader's units, with a comment on each."""
     import pandas as pd
 
     shown = [
@@ -82,7 +82,7 @@ def quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
 
 
 def _probabilities_shown(first: Mapping[str, float] | None, second: Mapping[str, float] | None) -> "pd.DataFrame":
-    """Return the conditions that are likely enough in one of two logs, the likeliest first; a dash for no diagnosis."""
+    """Return the conditions that are likely in at least one log, the most likely first; a dash means no diagnosis."""
     import pandas as pd
 
     both = first or {}, second or {}
@@ -108,8 +108,9 @@ def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[s
     Returns
     -------
     list of dict
-        ``quantity``, ``unit``, ``first`` and ``second`` (entries with value and std, or None), ``difference`` second
-        less first, its 95 % ``interval`` as of independent errors, and whether that leaves out zero, ``changed``.
+        ``quantity``, ``unit``, ``first`` and ``second`` (entries with value and std, or None), ``difference`` (second
+        minus first), its 95 % ``interval`` for independent errors, and ``changed``, whether that interval excludes
+        zero.
     """
     both = [quantities_of(one) for one in (first, second)]
     rows: list[dict[str, Any]] = []
@@ -136,8 +137,8 @@ def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> "pd.Data
     Returns
     -------
     pandas.DataFrame
-        By quantity: ``unit``, ``first``, ``second``, ``difference`` (second less first), the ends ``low`` and ``high``
-        of its 95 % interval [the row's unit], and whether that leaves out zero, ``changed``.
+        By quantity: ``unit``, ``first``, ``second``, ``difference`` (second minus first), the ends ``low`` and ``high``
+        of its 95 % interval [the row's unit], and ``changed``, whether that interval excludes zero.
     """
     import pandas as pd
 
@@ -174,7 +175,7 @@ def quantities_of(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def _halves_of(one: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Return how far the 95 % interval of a quantity reaches below and above its value; None where it has none."""
+    """Return how far the 95 % interval of a quantity extends below and above its value; None if it has no interval."""
     value, std, ends = one["value"], one.get("std"), one.get("ci95")
     if ends and None not in ends:
         return value - ends[0], ends[1] - value
@@ -206,7 +207,7 @@ def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
 
 
 def plain_words(result: Mapping[str, Any]) -> str:
-    """Return the verdict of a diagnosis as its page has it, empty for any other result."""
+    """Return the verdict of a diagnosis as on its page; empty for any other result."""
     from experiments.eha.plain_verdict import how_sure, verdict
     from faults.conditions import CONDITIONS
 
@@ -217,7 +218,7 @@ def plain_words(result: Mapping[str, Any]) -> str:
 
 
 def headings(first: Mapping[str, Any], second: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the sentences that open a comparison: conditions, if both logs were diagnosed, and what changed.
+    """Return the opening sentences of a comparison: the conditions if both logs were diagnosed, and the changes.
 
     Parameters
     ----------
@@ -230,7 +231,7 @@ def headings(first: Mapping[str, Any], second: Mapping[str, Any], rows: Sequence
 
 
 def _conditions_of(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
-    """Return the conditions of two logs, in the order of the logs; empty where one of them was not diagnosed."""
+    """Return the conditions of two logs in the order of the logs; empty if one of them was not diagnosed."""
     if not all(one.get("condition") and one.get("probabilities") for one in (first, second)):
         return ""
     one, other = (_found(each) for each in (first, second))
@@ -246,7 +247,7 @@ def _found(result: Mapping[str, Any]) -> str:
 
 
 def title_of(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return which quantities the second log has more of, and less, in one sentence."""
+    """Return which quantities are higher and which are lower in the second log, in one sentence."""
     changed = [row for row in rows if row["changed"]]
     if not any(row["interval"] for row in rows):
         return "The two logs cannot be compared: no quantity has an interval in both."

@@ -1,4 +1,4 @@
-"""A finding as entries of the JSON contract, whatever the actuator; later versions add entries and rename none."""
+"""A finding as entries of the JSON contract, for any actuator. Later versions add entries and never rename them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -33,8 +33,7 @@ def finding_entries(found: "Finding") -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        The entries of `BLANK`, with outcome, message and warnings. A condition that something speaks against is not
-        named.
+        The entries of `BLANK`, with outcome, message and warnings. The condition is left out if the finding is unknown.
     """
     return {
         "outcome": found.outcome.value,
@@ -81,7 +80,7 @@ SOUND: Mapping[str, str] = {"normal": "leakage and friction are normal", "health
 
 
 def either(named: Sequence[str]) -> str:
-    """Return the condition and those that are not told from it, as a sentence says them.
+    """Return the condition, and all conditions that cannot be told apart from it, as part of a sentence.
 
     Examples
     --------
@@ -92,7 +91,7 @@ def either(named: Sequence[str]) -> str:
 
 
 def _named(found: "Finding") -> Iterator[str]:
-    """Yield what is wrong, each fault beside the condition before a condition that is sound."""
+    """Yield all that is wrong. Faults come before a sound condition, but after any other condition."""
     faults = [str(note) for note in found.faults]
     if len(found.named) == 1 and found.named[0] in SOUND:
         yield from (*faults, SOUND[found.named[0]])
@@ -108,7 +107,7 @@ def message_of(found: "Finding") -> str:
     Returns
     -------
     str
-        The condition, or why there is none; what is not told; what else is wrong.
+        The condition, or why there is none; then what the log does not determine, and what else is wrong.
     """
     from plant.notes import distinct
 

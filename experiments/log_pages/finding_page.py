@@ -1,4 +1,4 @@
-"""The page on one log, whatever the actuator: verdict, what to do, quantities with intervals, notes, the channels."""
+"""The page on one log, for any actuator: verdict, next steps, quantities with intervals, notes, and channels."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -30,13 +30,13 @@ ACTUATORS = {
 """Kinds of actuator in words."""
 
 LEAST_SHARE = 0.001
-"""Probability below which a condition is not listed [probability]."""
+"""Conditions with a lower probability are not listed [probability]."""
 
 OTHER_OIL = frozenset({EstimateCode.STIFFER_THAN_RIG, EstimateCode.SOFTER_THAN_RIG})
-"""Notes that say what to correct."""
+"""Notes that are also listed as advice, since they say what to correct."""
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
-"""A space at which no line ends."""
+"""A space that prevents a line break."""
 
 COLUMNS = {
     "quantities": (
@@ -55,7 +55,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     Parameters
     ----------
     result : Mapping
-        Its entries: ``file``, ``rig``, ``message``, ``notes`` and others.
+        Entries of the log: ``file``, ``rig``, ``message``, ``notes`` and others.
     """
     shown = {**found.quantities, **found.severities}
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
@@ -101,13 +101,13 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
 
 
 def _beyond(title: str, message: str) -> str:
-    """Return of a message what the title does not say; all of it where the title says none of it."""
+    """Return the part of a message that the title does not repeat."""
     rest = message.removeprefix(f"{title[:1].lower()}{title[1:].rstrip('.')}; ")
     return "" if sentence(rest) == title else rest
 
 
 def _shortened(message: str, against: Sequence[str]) -> str:
-    """Return the opening sentence of a page: the first of several reasons, since all are listed below."""
+    """Return the message with only the first of several reasons, since the page lists all of them below."""
     more = len(against) - 1
     if more < 1:
         return message
@@ -158,5 +158,5 @@ def _in_digits(value: float | None, interval: tuple[float, float] | None, si_uni
 
 
 def _whole(shown: str) -> str:
-    """Return a number or a unit that no line breaks."""
+    """Return a number or a unit without places for a line break."""
     return shown.replace(" ", NO_BREAK)

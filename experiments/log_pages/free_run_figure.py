@@ -1,4 +1,4 @@
-"""Measured beside simulated output of a model between any channels, and what is left over."""
+"""Measured and simulated output of a model between any channels, and the residual."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from experiments.page.figure_files import write_png
 from experiments.page.style import BLUE, GREY, VERMILION, Margins, panels
 
 SHOWN_SAMPLES = 8000
-"""About so many samples are drawn of each curve."""
+"""Approximate number of samples drawn for each curve."""
 
 
 def draw_free_run(model: FreeRunModel, data: Channels, log: str) -> Figure:
@@ -20,7 +20,7 @@ def draw_free_run(model: FreeRunModel, data: Channels, log: str) -> Figure:
     Parameters
     ----------
     data : Channels
-        What the model was fitted to, in the channels' units.
+        The data used for the fit, in the channels' units.
     """
     u, y = data.u[0], data.y[0]
     simulated = model.simulate(u, y)
@@ -40,5 +40,5 @@ def draw_free_run(model: FreeRunModel, data: Channels, log: str) -> Figure:
 
 
 def write_free_run(model: FreeRunModel, data: Channels, log: str, path: Path) -> None:
-    """Write that picture as PNG."""
+    """Write the figure as a PNG."""
     write_png(lambda: draw_free_run(model, data, log), path)

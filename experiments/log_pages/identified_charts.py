@@ -1,4 +1,4 @@
-"""Charts of an identified model: the log beside its free run, what is left, the step response, the Bode diagram."""
+"""Charts of an identified model: the log with its free run, the residual, the step response, the Bode diagram."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,39 +18,40 @@ from experiments.page.panels import Curve, Mark, Panel
 from plant.errors import HydrostateError
 
 MOST_LOCAL = 20_000
-"""Longest log whose response is measured line by line [count]; of a longer one it is smoothed, which takes less."""
+"""Longest log whose response is measured at each frequency line [count]; for a longer log a smoothed response is
+computed, which is faster."""
 
 LEAST_STEPS = 50
-"""Samples of a step response at least [count]."""
+"""Smallest number of samples of a step response [count]."""
 
 TIME_CONSTANTS = 6.0
-"""Of the slowest pole, so many are shown [dimensionless]."""
+"""Length of a step response in time constants of the slowest pole [dimensionless]."""
 
 A_DECADE, MOST_DECADES = 60, 5.0
-"""Frequencies a decade at which a response is drawn, and decades below half the sample rate, at most."""
+"""Largest number of frequencies drawn per decade, and of decades below half the sample rate."""
 
 PER_DECADE = 10
-"""Stretches of a decade in which the measured response is judged [count]."""
+"""Intervals per decade in which the measured response is judged [count]."""
 
 KNOWN = 0.5
-"""Radius of the 95 % circle over the gain, up to which a stretch counts as known [fraction], judged."""
+"""Largest ratio of the 95 % circle's radius to the gain at which an interval counts as known [fraction], judged."""
 
 COLOURS = ("blue", "vermilion", "green", "purple", "orange", "grey")
-"""Of the inputs, in their order."""
+"""Colours of the inputs, in their order."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredCurve:
-    """The frequency response that the log itself tells.
+    """The frequency response measured from the log itself.
 
     Parameters
     ----------
     frequency : ndarray, shape (k,)
-        Rising [Hz].
+        In rising order [Hz].
     response : ndarray of complex, shape (k,)
-        In units of the log.
+        In the log's units.
     radius : ndarray, shape (k,)
-        Of the 95 % circle around each [units of the log].
+        Radius of the 95 % circle around each value [the log's units].
     """
 
     frequency: Array
@@ -59,15 +60,15 @@ class MeasuredCurve:
 
     @cached_property
     def begins(self) -> IntArray:
-        """Start of each stretch, `PER_DECADE` per decade, shape (s,)."""
+        """Index at which each interval starts, `PER_DECADE` per decade, shape (s,)."""
         cells = np.floor(PER_DECADE * np.log10(self.frequency))
         return np.flatnonzero(np.diff(cells, prepend=-np.inf))
 
     @cached_property
     def known(self) -> BoolArray:
-        """Whether the log tells the response in each stretch, by its median, shape (s,).
+        """Whether the log determines the response in each interval, shape (s,).
 
-        A line alone is not asked: among lines of noise some are large by chance.
+        This uses the median of the interval: among many lines of pure noise, some are large by chance.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             relative = self.radius / np.abs(self.response)
@@ -75,7 +76,7 @@ class MeasuredCurve:
 
 
 def measured_curve(view: IdentifiedView) -> MeasuredCurve | None:
-    """Return the response that a log with one input tells; None of several inputs, or of a log that tells none."""
+    """Return the response measured from a log with one input; None for several inputs, or if it cannot be measured."""
     if len(view.inputs) > 1:
         return None
     u, y, known = view.u[:, 0], view.y, np.isfinite(view.y)
@@ -95,12 +96,12 @@ def measured_curve(view: IdentifiedView) -> MeasuredCurve | None:
 
 
 def run_charts(view: IdentifiedView, stem: str) -> Charts:
-    """Return inputs, output beside its free run, and what is left.
+    """Return charts of the inputs, the output with its free run, and the residual.
 
     Parameters
     ----------
     stem : str
-        What a download is named after.
+        Start of the file name of a download.
     """
     out = view.output
     driven = [
@@ -118,7 +119,7 @@ def run_charts(view: IdentifiedView, stem: str) -> Charts:
 
 
 def residual_charts(view: IdentifiedView, stem: str) -> Charts:
-    """Return the correlations of the residual with itself and with each input, between limits of chance."""
+    """Return charts of the residual's correlation with itself and each input, with the limits expected by chance."""
     lags = np.arange(-DEFAULT_LAGS, DEFAULT_LAGS + 1)
     reach = NORMAL_95 / np.sqrt(max(np.count_nonzero(np.isfinite(view.residual)), 1))
     chance = (Mark("y", reach, "95 % of white noise"), Mark("y", -reach, ""))
@@ -136,7 +137,7 @@ def residual_charts(view: IdentifiedView, stem: str) -> Charts:
 
 
 def _ends(values: Array, low: float, high: float) -> tuple[float, float]:
-    """Return ends of an axis that shows all values, and this range at least."""
+    """Return axis limits that include all values and at least the given range."""
     there = values[np.isfinite(values)]
     least, most = min([low, *there.tolist()]), max([high, *there.tolist()])
     return least - 0.05 * (most - least), most + 0.05 * (most - least)
@@ -145,7 +146,7 @@ def _ends(values: Array, low: float, high: float) -> tuple[float, float]:
 def step_charts(view: IdentifiedView, stem: str) -> Charts:
     """Return charts of the step response to each input, with a 95 % interval if a covariance is known.
 
-    A step is as high as half the input's range, in round numbers.
+    The height of a step is half the input's range, rounded.
     """
     count = _count(view)
     time = view.sample_time * np.arange(count, dtype=np.float64)
@@ -170,7 +171,7 @@ def step_charts(view: IdentifiedView, stem: str) -> Charts:
 
 
 def step_of(values: Array) -> float:
-    """Return half the range of an input in one digit.
+    """Return half the range of an input, rounded to one digit.
 
     Parameters
     ----------
@@ -192,7 +193,7 @@ def step_of(values: Array) -> float:
 
 
 def _count(view: IdentifiedView) -> int:
-    """Return the number of samples of a step response to show."""
+    """Return the number of samples to show of a step response."""
     moduli = [float(np.max(np.abs(np.roots(f)), initial=0.0)) for _, f in view.transfers]
     slowest = max(moduli, default=1.0)
     lasting = TIME_CONSTANTS / -np.log(slowest) if 0.0 < slowest < 1.0 else np.inf
@@ -201,7 +202,7 @@ def _count(view: IdentifiedView) -> int:
 
 
 def _stepped(view: IdentifiedView, which: int, height: float, count: int) -> Array:
-    """Return the change by a step from the inputs' means, after as long a rest before it."""
+    """Return the change of the output after a step from the inputs' means, which are first held for the same time."""
     inputs = np.tile(view.u.mean(axis=0), (2 * count, 1))
     inputs[count:, which] += height
     output = view.run(inputs)
@@ -209,7 +210,7 @@ def _stepped(view: IdentifiedView, which: int, height: float, count: int) -> Arr
 
 
 def bode_charts(view: IdentifiedView, measured: MeasuredCurve | None, stem: str) -> Charts | None:
-    """Return gain and phase of the model with its 95 % band, beside the response that the log itself tells.
+    """Return charts of the model's gain and phase with its 95 % band, and of the response measured from the log.
 
     Parameters
     ----------
@@ -219,7 +220,7 @@ def bode_charts(view: IdentifiedView, measured: MeasuredCurve | None, stem: str)
     Returns
     -------
     Charts or None
-        None of a model that is not linear, on a log that tells no response.
+        None if the model is not linear and no response was measured.
     """
     if not view.is_linear and measured is None:
         return None
@@ -268,7 +269,7 @@ def _grid(view: IdentifiedView) -> Array:
 
 
 def _thinned(measured: MeasuredCurve) -> MeasuredCurve:
-    """Return the lines of stretches in which the response is known, `A_DECADE` a decade at most."""
+    """Return the lines of the intervals in which the response is known, at most `A_DECADE` per decade."""
     there = np.flatnonzero(np.repeat(measured.known, np.diff(np.append(measured.begins, measured.frequency.size))))
     cells = np.floor(A_DECADE * np.log10(measured.frequency[there])).astype(int)
     _, first = np.unique(cells, return_index=True)

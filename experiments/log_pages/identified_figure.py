@@ -1,4 +1,4 @@
-"""An identified model on one page: measured beside simulated, what is left over, and the frequency response."""
+"""An identified model on one page: measured and simulated output, the residual, and the frequency response."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from experiments.page.style import BLUE, GREY, ORANGE, VERMILION, Margins, panel
 from plant.log.record import CHANNELS
 
 LEAST_COHERENCE = 0.1
-"""Below, the empirical response says nothing and is left out."""
+"""Coherence below which the empirical response is meaningless and is left out."""
 
 
 def _draw_identified(model: LinearModel, u: Array, y: Array, found: Validation, log: str) -> Figure:
@@ -81,12 +81,12 @@ def _response(gain: Axes, phase: Axes, model: LinearModel, u: Array, y: Array) -
 
 
 def write_identified(model: LinearModel, u: Array, y: Array, found: Validation, log: str, path: Path) -> None:
-    """Write the figure as a PNG, whole or not at all.
+    """Write the figure as a PNG; no partial file is left behind.
 
     Parameters
     ----------
     model : LinearModel
-        Fitted to the data; stable.
+        Stable model, fitted to the data.
     u, y : ndarray, shape (n,)
         Input and output [in their channels' units].
     """

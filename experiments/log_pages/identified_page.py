@@ -1,4 +1,4 @@
-"""The page of an identified model: how good it is, what it may be used for, its charts, its numbers to take along."""
+"""The page of an identified model: its quality, its uses, its charts, and its numbers to download."""
 
 import math
 from base64 import b64encode
@@ -92,7 +92,7 @@ def _bode_words(view: IdentifiedView, measured: MeasuredCurve | None) -> str:
 
 
 def _values(view: IdentifiedView) -> Iterator[tuple[str, str, str]]:
-    """Yield rows of quantity, value and interval."""
+    """Yield table rows with quantity, value and interval."""
     result, out = view.result, view.output
     yield "fit, held-back data [%]", _percent(result["held_back_percent"]), MISSING
     yield "fit, data of the fit [%]", _percent(result["fit_percent"]), MISSING
@@ -144,7 +144,7 @@ def _percent(value: float | None) -> str:
 
 
 def _roots(view: IdentifiedView) -> Iterator[tuple[str, ...]]:
-    """Yield poles and zeros, a pair of complex ones in one row."""
+    """Yield poles and zeros; a complex pair shares one row."""
     continuous = view.linear is not None and view.linear.continuous
     for name in ("pole", "zero"):
         for one in view.result.get(f"{name}s") or ():
@@ -160,7 +160,7 @@ def _roots(view: IdentifiedView) -> Iterator[tuple[str, ...]]:
 
 
 def _in_time(root: complex, sample_time: float, continuous: bool) -> tuple[str, str, str]:
-    """Return natural frequency [Hz], damping and time constant [s] of a root, where it has them."""
+    """Return natural frequency [Hz], damping and time constant [s] of a root, as far as they are defined."""
     if not continuous and root == 0.0:
         return MISSING, MISSING, MISSING
     s = root if continuous else complex(np.log(root)) / sample_time
@@ -172,7 +172,7 @@ def _in_time(root: complex, sample_time: float, continuous: bool) -> tuple[str, 
 
 
 def _downloads(view: IdentifiedView, stem: str) -> Iterator[tuple[str, str, str]]:
-    """Yield name, address and words of what a reader takes along; the address is the file itself."""
+    """Yield name, address and description of each download; the address contains the file itself."""
     yield f"{stem}-model.json", _address(json_text([view.result]), "application/json"), "the model as JSON"
     if view.is_linear:
         yield f"{stem}-model.py", _address(control_text(view), "text/x-python"), "a Python file for python-control"
@@ -183,7 +183,7 @@ def _address(text: str, kind: str) -> str:
 
 
 def control_text(view: IdentifiedView) -> str:
-    """Return a Python file that makes the model as an object of python-control."""
+    """Return a Python file that builds the model as a python-control object."""
     linear, names = view.linear, view.names
     if linear is not None and linear.continuous:
         numerators, denominators, clock = [linear.numerator], [linear.denominator], "0"

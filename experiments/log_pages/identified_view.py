@@ -1,4 +1,4 @@
-"""An identified model with the log that it is shown on, whether it relates channels of a bench or any columns."""
+"""An identified model together with the log on which it is shown, for channels of a test bench or any columns."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,22 +20,22 @@ if TYPE_CHECKING:
     from estimation.identification.free_run.model import FreeRunModel
 
 MOST_TESTED = 50_000
-"""Samples that residual tests are given [count]."""
+"""Largest number of samples passed to the residual tests [count]."""
 
 AS_LOGGED = "as logged"
-"""Unit of a column that is no channel."""
+"""Unit shown for a column that is not a known channel."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """A channel or column as a page names it.
+    """A channel or column, as a page names it.
 
     Parameters
     ----------
     unit : str
-        As shown; `AS_LOGGED` where nothing tells it.
+        As shown; `AS_LOGGED` if it is unknown.
     scale : float
-        From the log's unit to that [dimensionless].
+        Factor from the log's unit to the shown unit [dimensionless].
     """
 
     name: str
@@ -44,14 +44,14 @@ class Signal:
 
     @classmethod
     def of(cls, name: str) -> "Signal":
-        """Return a channel in the unit that a shop reads, any other column as it stands in the log."""
+        """Return a channel in the unit used in workshops; any other column keeps the log's unit."""
         if name not in UNITS:
             return cls(name, AS_LOGGED, 1.0)
         unit, scale = SHOWN_IN.get(UNITS[name], (UNITS[name], 1.0))
         return cls(plain_channel(name), unit, scale)
 
     def amount(self, text: str) -> str:
-        """Return a number with the unit, where that is known."""
+        """Return a number with its unit, if the unit is known."""
         return text if self.unit == AS_LOGGED else f"{text} {self.unit}"
 
 
@@ -62,21 +62,21 @@ class IdentifiedView:
     Parameters
     ----------
     result : Mapping
-        Entries of `hydrostate identify`, without folders in names of files.
+        Entries of `hydrostate identify`; file names have no folders.
     inputs, output : tuple of Signal, Signal
-        What it relates.
+        The signals that the model relates.
     sample_time : float
-        Of the model and of the series [s].
+        Sample time of the model and of the series [s].
     u, y, simulated : ndarray, shapes (n, m), (n,), (n,)
-        Inputs, output and free run [in the log's units]; NaN where missing, and in all of a run that is unstable.
+        Inputs, output and free run [in the log's units]; NaN if missing. All of an unstable free run is NaN.
     linear : LinearModel or None
-        With its covariance, where the model is linear and has one input.
+        The model with its covariance, if it is linear and has one input.
     transfers : tuple of tuple of ndarray, shapes (n_b,) and (n_f,)
-        Numerator and denominator from each input, in powers of the delay operator; empty of others.
+        Numerator and denominator from each input, in powers of the delay operator; empty for other models.
     run : callable
-        Output [its unit] from inputs, shape (n, m), that stood at their first values before.
+        Returns the output [its unit] for inputs of shape (n, m) that were held at their first values before the start.
     whiteness_p, cross_correlation_p : float or None
-        Of the tests of the residual [probability]; None where there is none.
+        p-values of the residual tests [probability]; None if a test was not made.
     """
 
     result: Mapping[str, Any]
@@ -94,16 +94,16 @@ class IdentifiedView:
 
     @property
     def is_linear(self) -> bool:
-        """Whether it has a transfer function."""
+        """Whether the model has a transfer function."""
         return self.linear is not None or bool(self.transfers)
 
     @property
     def residual(self) -> Array:
-        """Measured less simulated, shape (n,) [output unit]."""
+        """Measured minus simulated output, shape (n,) [output unit]."""
         return self.y - self.simulated
 
     def gain_unit(self, number: int) -> tuple[float, str]:
-        """Return the unit in which the response from an input is shown: the factor from the log's, and its name."""
+        """Return the unit in which the response to an input is shown: the factor from the log's unit, and its name."""
         above, below = self.output, self.inputs[number]
         if AS_LOGGED in (above.unit, below.unit):
             return 1.0, AS_LOGGED
@@ -111,21 +111,21 @@ class IdentifiedView:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the inputs as the log has them."""
+        """Names of the inputs as in the log."""
         return tuple(self.result.get("inputs") or (self.result["input"],))
 
     def response(self, number: int, frequency: Array) -> ComplexArray:
-        """Return the frequency response from an input.
+        """Return the frequency response to an input.
 
         Parameters
         ----------
         frequency : ndarray, shape (k,)
-            Above zero [Hz].
+            Positive frequencies [Hz].
 
         Returns
         -------
         ndarray of complex, shape (k,)
-            In units of the log.
+            In the log's units.
         """
         if self.linear is not None:
             return self.linear.frequency_response(frequency)
@@ -135,14 +135,14 @@ class IdentifiedView:
 
 
 def view_of_channels(result: Mapping[str, Any], model: LinearModel, u: Array, y: Array) -> IdentifiedView:
-    """Return the view of a transfer function between two channels, on the log that it was fitted to.
+    """Return the view of a transfer function between two channels, on the log used for the fit.
 
     Parameters
     ----------
     result : Mapping
-        Its entries, with the p-values of its tests.
+        Entries of the model, with the p-values of its tests.
     u, y : ndarray, shape (n,)
-        Input, no gaps, and output, NaN where missing [in the channels' units].
+        Input without gaps, and output with NaN for missing samples [in the channels' units].
     """
     stable = model.is_stable
     discrete = model.discretised() if model.continuous else model
@@ -170,7 +170,7 @@ def view_of_columns(result: Mapping[str, Any], model: "FreeRunModel", data: "Cha
     Parameters
     ----------
     data : Channels
-        What it was fitted to.
+        The data used for the fit.
     """
     longest = int(np.argmax([one.size for one in data.y]))
     u, y = data.u[longest], data.y[longest]
@@ -200,7 +200,7 @@ def _transfers(model: "FreeRunModel") -> tuple[tuple[Array, Array], ...]:
 
 
 def _p_value(found: Callable[[], float | None]) -> float | None:
-    """Return a p-value, or None where the residual is too short or not there."""
+    """Return a p-value, or None if the residual is missing or too short."""
     try:
         return found()
     except HydrostateError:
@@ -208,7 +208,10 @@ def _p_value(found: Callable[[], float | None]) -> float | None:
 
 
 def _cross_correlation(model: "FreeRunModel", u: Array, residual: Array) -> float | None:
-    """Return the p-value of an output-error model of one input; no other fit tells what it could absorb."""
+    """Return the p-value of an output-error model with one input; None otherwise.
+
+    For other fits it is not known what they absorbed.
+    """
     linear = model.linear
     if linear is None or linear.structure != "output-error":
         return None
@@ -219,7 +222,7 @@ def _cross_correlation(model: "FreeRunModel", u: Array, residual: Array) -> floa
 
 
 def _without_folders(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Return entries in which files have no folder: a page goes to others."""
+    """Return the entries with folders removed from file names, because pages are passed on to others."""
     names = ", ".join(Path(one).name for one in str(result["file"]).split(", "))
     test = result.get("test")
     return {**result, "file": names, **({"test": _test(test)} if test else {})}

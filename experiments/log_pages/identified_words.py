@@ -1,4 +1,4 @@
-"""Sentences on an identified model: its quality, and what it may and may not be used for."""
+"""Sentences about an identified model: its quality, and what it may and may not be used for."""
 
 import math
 
@@ -24,19 +24,19 @@ KINDS = {
     "wiener": "linear, whose output is measured without its sign",
     "state-space": "state space",
 }
-"""Structures in words."""
+"""Model structures in words."""
 
 ROUGH = 50.0
-"""Fit on held-back data below which more than half of the output's deviation is left [%]."""
+"""Fit on held-back data below which a simulation is called rough: over half of the deviation remains [%]."""
 
 AGREES = 0.3
-"""Median distance from the measured response over its gain, up to which a controller may be designed [fraction],
-judged: margins of 6 dB and 40 degrees leave room for it."""
+"""Largest median distance from the measured response, relative to its gain, at which a controller may be designed
+[fraction]. Judged: margins of 6 dB and 40 degrees can absorb it."""
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
 LEVEL = 0.05
-"""Level of the tests of the residual [probability]."""
+"""Significance level of the residual tests [probability]."""
 
 REASONS = {
     IdentificationCode.SWAPPED: "its input seems to answer its output",
@@ -44,13 +44,13 @@ REASONS = {
     IdentificationCode.WALK_FOLLOWED: "it follows what the output does by itself",
     IdentificationCode.ANSWERS_LATE: "the output seems to answer later than this model does",
 }
-"""What notes say against a model, whatever its fit."""
+"""Reasons against a model, by the code of its note; they hold whatever its fit."""
 
 
 def is_usable(view: IdentifiedView) -> bool:
     """Return whether the model may be used at all: it runs free, and does better than the mean on held-back data.
 
-    Of an output that wanders by itself, the fit of a free run says nothing of the model.
+    If the output wanders by itself, the fit of a free run says nothing about the model.
     """
     held, own = view.result["held_back_percent"], view.result["fit_percent"]
     better = wanders(view) or (own is not None and own > 0.0 and (held is None or held > 0.0))
@@ -63,7 +63,7 @@ def wanders(view: IdentifiedView) -> bool:
 
 
 def has_limits(view: IdentifiedView) -> bool:
-    """Return whether the output is cut off or held by stops."""
+    """Return whether the output is clipped or held by end stops."""
     return (view.result.get("nonlinearity") or {}).get("kind") in ("cut-off", "stops")
 
 
@@ -100,7 +100,7 @@ def _why_not(view: IdentifiedView) -> str:
 
 
 def answer_of(view: IdentifiedView) -> str:
-    """Return the meaning of the verdict's number, and the size of the error."""
+    """Return the meaning of the number in the verdict, and the size of the error."""
     inputs = ", ".join(one.name for one in view.inputs)
     said = f"The model is simulated from {inputs} alone: it never sees the measured output. "
     error = _held_back_error(view)
@@ -112,12 +112,12 @@ def answer_of(view: IdentifiedView) -> str:
 
 
 def _unit_of(output: Signal) -> str:
-    """Return what stands for the unit of a column that names none."""
+    """Return the text shown for the unit of a column that has no known unit."""
     return f" in the unit of {output.name}" if output.unit == AS_LOGGED else ""
 
 
 def _held_back_error(view: IdentifiedView) -> float | None:
-    """Return the error of the free run on held-back data, else on all [shown unit]."""
+    """Return the error of the free run on held-back data, or on all data if none was held back [shown unit]."""
     held = view.result["held_back_percent"]
     if held is None or not is_usable(view):
         own = view.result["rmse"]
@@ -126,7 +126,7 @@ def _held_back_error(view: IdentifiedView) -> float | None:
 
 
 def told_band(measured: MeasuredCurve | None) -> tuple[float, float] | None:
-    """Return the longest run of frequencies in which the log tells the response [Hz]; None where it tells none."""
+    """Return the longest range of frequencies in which the log determines the response [Hz]; None if there is none."""
     if measured is None or not measured.frequency.size:
         return None
     first, last = measured.frequency[measured.begins], measured.frequency[np.append(measured.begins[1:], 0) - 1]
@@ -140,19 +140,19 @@ def told_band(measured: MeasuredCurve | None) -> tuple[float, float] | None:
 
 
 def distance(view: IdentifiedView, measured: MeasuredCurve, band: tuple[float, float]) -> float:
-    """Return the median distance of the model's response from the measured one, over its gain [fraction].
+    """Return the median distance between modelled and measured response, relative to the measured gain [fraction].
 
-    Stretches of equal width on a logarithmic scale count alike.
+    Intervals of equal width on a logarithmic frequency axis have equal weight.
 
     Parameters
     ----------
     band : tuple of float
-        Lowest and highest frequency that is asked [Hz].
+        Lowest and highest frequency to compare [Hz].
 
     Returns
     -------
     float
-        The median over stretches of the median in each [fraction].
+        The median over the intervals of the median in each [fraction].
     """
     there = (measured.frequency >= band[0]) & (measured.frequency <= band[1])
     part = MeasuredCurve(measured.frequency[there], measured.response[there], measured.radius[there])
@@ -161,12 +161,12 @@ def distance(view: IdentifiedView, measured: MeasuredCurve, band: tuple[float, f
 
 
 def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[str], list[str]]:
-    """Return what the model may be used for, and what not, as sentences.
+    """Return what the model may be used for, and what it may not, as sentences.
 
     Parameters
     ----------
     measured : MeasuredCurve or None
-        The response that the log itself tells.
+        The response measured from the log itself.
     """
     good: list[str] = []
     bad: list[str] = []
@@ -211,7 +211,7 @@ def _range(one: Signal, values: np.ndarray) -> str:
 
 
 def _of_gain(view: IdentifiedView) -> list[str]:
-    """Return why a steady gain must not be used, if it must not."""
+    """Return why the steady gain must not be used; empty if it may be used."""
     codes = {one["code"] for one in view.result.get("notes", ())}
     gain = view.result.get("dc_gain")
     if codes & GAIN_MEANS_NOTHING:
@@ -225,7 +225,7 @@ def _of_gain(view: IdentifiedView) -> list[str]:
 
 
 def _of_residual(view: IdentifiedView) -> list[str]:
-    """Return the warning against conclusions on the plant's structure, if the residual contains an input."""
+    """Return the warning against conclusions about the plant's structure, if the residual correlates with an input."""
     cross = view.cross_correlation_p
     if cross is None or cross >= LEVEL:
         return []
@@ -253,7 +253,7 @@ def tests_of(view: IdentifiedView) -> str:
 
 
 def chance(probability: float) -> str:
-    """Return a p-value as one writes it, on one line: no probability is 0.
+    """Return a p-value as text without line breaks; a tiny p-value is shown as an upper bound, never as 0.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A filtered log on one page: the estimate with its band, the innovations, and what was expected of them."""
+"""A filtered log on one page: the estimate with its band, the innovations, and their expected size."""
 
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,10 @@ from experiments.page.figure_files import write_png
 from experiments.page.style import BLACK, BLUE, GREY, ORANGE, VERMILION, Margins, panels
 
 SHOWN_INNOVATIONS = 4000
-"""About so many innovations are drawn of each channel."""
+"""Approximate number of innovations drawn for each channel."""
 
 WINDOWS = 100
-"""Windows over which the squared innovations are averaged."""
+"""Number of windows over which the squared innovations are averaged."""
 
 COLOURS = (BLUE, ORANGE, VERMILION)
 
@@ -32,7 +32,7 @@ def draw_innovations(found: BulkModulusEstimate, log: str) -> Figure:
     Returns
     -------
     Figure
-        Three panels with a common time axis, or one where innovations were not kept.
+        Three panels with a common time axis, or one panel if innovations were not kept.
 
     Raises
     ------
@@ -97,5 +97,5 @@ def _mean_square(axis: Axes, time: np.ndarray, normalised: np.ndarray, estimate:
 
 
 def write_innovations(found: BulkModulusEstimate, log: str, path: Path) -> None:
-    """Write the figure as a PNG, whole or not at all."""
+    """Write the figure as a PNG; no partial file is left behind."""
     write_png(lambda: draw_innovations(found, log), path)

@@ -1,4 +1,4 @@
-"""The page of `hydrostate inspect`: columns with guesses and reasons, the block of a rig file, every column drawn."""
+"""The page of `hydrostate inspect`: columns with guesses and reasons, the rig file's block, a chart of each column."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from plant.log.inspection import ColumnFacts, TableFacts
 
 MOST_COLUMNS, MOST_POINTS = 24, 2000
-"""Columns that are drawn, and points of each, at most."""
+"""Largest number of columns drawn, and of points in each."""
 
 
 def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> str:
-    """Return the page on what a log holds."""
+    """Return the page on the contents of a log."""
     from experiments.log_pages.inspected import block_of, clock_sentence, without_unit
 
     rows = [row for one in result["tables"] for row in one["columns"]]
@@ -71,7 +71,7 @@ def _row(row: Mapping[str, Any]) -> dict[str, str]:
 
 
 class _Time(NamedTuple):
-    """The column of a table that holds the time, its values as they are drawn, and the name of their axis."""
+    """The time column of a table: its values as drawn, and the name of the axis."""
 
     column: "ColumnFacts"
     values: Array
@@ -79,7 +79,7 @@ class _Time(NamedTuple):
 
 
 def _time_of(facts: "TableFacts", told: Sequence[Mapping[str, Any]]) -> _Time | None:
-    """Return the time of a table if it rises from row to row; of dates, the seconds since the first."""
+    """Return the time of a table if it rises with each row; dates become seconds since the first one."""
     names = {row["name"] for row in told}
     for one in facts.columns:
         if one.heading.name in names and one.values is not None:
@@ -93,7 +93,7 @@ def _time_of(facts: "TableFacts", told: Sequence[Mapping[str, Any]]) -> _Time | 
 
 
 def _draw(columns: "Sequence[tuple[ColumnFacts, _Time | None]]") -> Figure:
-    """Draw columns of numbers, each by its table's time, else by its row."""
+    """Draw numeric columns against the time of their table, or against the row number if it has no time."""
     count = max(1, len(columns))
     figure, axes = panels("", count, 1, 0.9 + 1.45 * count, Margins(left=0.9, down=0.6))
     for place, (axis, (one, time)) in enumerate(zip(axes, columns, strict=False)):

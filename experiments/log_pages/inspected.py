@@ -1,4 +1,4 @@
-"""Contents of an unknown log, as entries of the JSON contract: tables, columns, likely channels, readability."""
+"""Contents of an unknown log as entries of the JSON contract: tables, columns, likely channels, readability."""
 
 import json
 from collections.abc import Collection, Mapping, Sequence
@@ -19,25 +19,25 @@ if TYPE_CHECKING:
 BLANK: Result = dict.fromkeys(("plant", "tables", "columns", "options", "reads"))
 
 PLOTTED = 24
-"""Characters of a plot on the terminal."""
+"""Width of a plot on the terminal [characters]."""
 
 GUESSED = "  # the file gives no unit: check this one"
-"""What stands behind a unit that was guessed, in a rig file."""
+"""Comment after a guessed unit in a rig file."""
 
 
 def looked_into(
     log: Path, plant: str | None, sample_time: float | None = None, beside: Sequence[Path] = ()
 ) -> "tuple[dict[str, Any], list[TableFacts]]":
-    """Return the contents of a log, as entries of the JSON contract, and its tables.
+    """Return the contents of a log as entries of the JSON contract, and its tables.
 
     Parameters
     ----------
     plant : str or None
-        Kind of actuator; the one that the names of the columns tell if not given, else the gear-pump actuator.
+        Kind of actuator. If not given, it is inferred from the column names, with the gear-pump actuator as default.
     sample_time : float, optional
-        Time between rows [s] of a log that has no time.
+        Time between rows of a log without a time column [s].
     beside : sequence of Path
-        Files of other loggers of the same test.
+        Files from other loggers in the same test.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def looked_into(
 
 
 def _guessed(tables: "Sequence[TableFacts]", kind: "ActuatorKind") -> "list[ChannelGuess]":
-    """Return the surest guess of each channel over all tables."""
+    """Return the most certain guess for each channel over all tables."""
     from estimation.log_checks.channel_guess import guess_channels
     from plant.eha.model import EhaParameters
     from plant.log.columns import TIME
@@ -87,7 +87,7 @@ def _guessed(tables: "Sequence[TableFacts]", kind: "ActuatorKind") -> "list[Chan
 def _reads(
     log: Path, columns: Mapping[str, str], kind: "ActuatorKind", sample_time: float | None, beside: Sequence[Path]
 ) -> dict[str, Any]:
-    """Return whether the log is read by the block of columns, and what is said then."""
+    """Return whether the log can be read with the block of columns, and the message of that attempt."""
     try:
         with caught() as said:
             record = read_log(log, {}, columns, kind.required, sample_time=sample_time, beside=beside)
@@ -145,7 +145,7 @@ def _column_entries(column: "ColumnFacts", guess: "ChannelGuess | None") -> dict
 
 
 def _options(columns: Mapping[str, str], plant: str, sample_time: float | None, beside: Sequence[Path]) -> str:
-    """Return the options that read the log as the block does."""
+    """Return the options that read the log in the same way as the block."""
     import shlex
 
     parts = [shlex.quote(f"{channel}={spec}") for channel, spec in columns.items()]
@@ -160,9 +160,9 @@ def block_of(columns: Mapping[str, str], guessed: Collection[tuple[str, str]] = 
     Parameters
     ----------
     columns : Mapping[str, str]
-        Column with its unit, by channel.
+        Column with its unit, for each channel.
     guessed : collection of tuple of str
-        Channels and columns whose unit the file does not give.
+        Channels and columns whose unit is not given in the file.
     """
     lines = [
         f"{channel} = {json.dumps(spec, ensure_ascii=True)}{GUESSED if _is_one_of(channel, spec, guessed) else ''}"
@@ -172,12 +172,12 @@ def block_of(columns: Mapping[str, str], guessed: Collection[tuple[str, str]] = 
 
 
 def _is_one_of(channel: str, spec: str, guessed: Collection[tuple[str, str]]) -> bool:
-    """Return whether a channel's own column is one of those whose unit was guessed."""
+    """Return whether the unit of a channel's column was guessed."""
     return any(channel == of and name in (spec, spec.rpartition(":")[0]) for of, name in guessed)
 
 
 def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """Return channel and column of each unit that was guessed, since the file gives none."""
+    """Return channel and column for each guessed unit, which the file does not give."""
     from estimation.log_checks.notes import GuessCode
 
     rows = [row for one in tables for row in one["columns"]]
@@ -187,7 +187,7 @@ def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
 
 
 def clock_sentence(one: Mapping[str, Any]) -> str:
-    """Return what is known of the time of a table, as one sentence."""
+    """Return what is known about the time of a table, as one sentence."""
     clock = one["clock"]
     if clock is None:
         step = one["step_s"]

@@ -1,4 +1,4 @@
-"""A measured frequency response with its 95 % circles, and levels of noise and distortion beside it."""
+"""A measured frequency response with its 95 % circles, and the levels of noise and distortion."""
 
 from pathlib import Path
 
@@ -11,11 +11,11 @@ from experiments.page.figure_files import write_png
 from experiments.page.style import BLUE, GREY, VERMILION, Margins, panels
 
 TINY = 1e-300
-"""Least power that is drawn [output unit squared]: a level of nothing has no logarithm."""
+"""Least power that is drawn [output unit squared]: zero has no logarithm."""
 
 
 def _draw_response(found: MeasuredResponse, title: str) -> Figure:
-    """Draw the gain with its uncertainty, and the output's lines where the input is periodic, else the phase."""
+    """Draw the gain with its uncertainty, and the output's spectral lines if the input is periodic, else the phase."""
     figure, axes = panels(f"{title}: {found.method.replace('-', ' ')}", 2, 1, 8.0, Margins(left=0.9, top=0.65))
     one, told = found.response, found.distortion
     gain, radius = np.abs(one.response), one.radius()
@@ -49,5 +49,5 @@ def _decibels(power: Array) -> Array:
 
 
 def write_response(found: MeasuredResponse, title: str, path: Path) -> None:
-    """Write that picture as PNG."""
+    """Write the figure as a PNG."""
     write_png(lambda: _draw_response(found, title), path)

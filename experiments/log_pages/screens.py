@@ -13,24 +13,24 @@ from experiments.page.numbers import percent_text, reader_unit
 from experiments.page.sentences import sentence
 
 NEXT_LINE = "\n" + 12 * " "
-"""Between reasons, and between pieces of advice: each has its line, below the first."""
+"""Separator between reasons and between pieces of advice: each gets its own line, aligned below the first."""
 
 MOST_REASONS = 4
-"""Reasons against a result that a terminal shows [count]."""
+"""Largest number of reasons against a result shown on a terminal [count]."""
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
 
 def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":
-    """Show what was found of each log: a table of quantities with their intervals, the outcome in words, what to do.
+    """Show the results of each log: a table of quantities with intervals, the outcome in words, and the next steps.
 
     Parameters
     ----------
     results : sequence of Result
-        One a log, with ``quantities``; ``probabilities`` and ``advice`` of a diagnosis.
+        One for each log, with ``quantities``; ``probabilities`` and ``advice`` of a diagnosis.
     options : Mapping[str, Any]
-        As given to the verb; none matters here.
+        Options of the verb; not used here.
     """
     del options
     for result in results:
@@ -52,12 +52,12 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
 
 
 def messages_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
-    """Show the message of each log, with what to do below it.
+    """Show the message of each log, with advice below it.
 
     Parameters
     ----------
     results : sequence of Result
-        One a log, with ``message`` and ``advice``.
+        One for each log, with ``message`` and ``advice``.
     """
     for result in results:
         yield told_in_lines(result, visible_name(result["file"]))
@@ -65,16 +65,16 @@ def messages_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
 
 
 def told_in_lines(result: Result, about: str, before: str = "", after: str = "") -> str:
-    """Return the message of a log, with each of several reasons against its result on a line of its own.
+    """Return the message of a log; if there are several reasons against its result, each gets its own line.
 
     Parameters
     ----------
     result : Result
-        Its entries; the reasons are those of ``gate`` and, of a diagnosis, ``reasons``.
+        Entries of the log; the reasons are those of ``gate`` and, for a diagnosis, ``reasons``.
     about : str
-        The log.
+        Name of the log.
     before, after : str
-        Words before and after the message.
+        Text before and after the message.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def told_in_lines(result: Result, about: str, before: str = "", after: str = "")
 
 
 def _digits(ends: Sequence[float] | None) -> int:
-    """Return the digits that show an interval's width to two; at least four, and the whole of a number below 1e6."""
+    """Return the digits that show an interval's width to two digits: at least four, and all of a number below 1e6."""
     largest = 0.0 if ends is None else max(map(abs, ends))
     if ends is None or not isfinite(largest) or not ends[1] > ends[0]:
         return 4

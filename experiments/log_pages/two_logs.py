@@ -1,4 +1,4 @@
-"""`hydrostate compare A B` of two logs: both diagnosed, and what is higher or lower in the second."""
+"""`hydrostate compare A B` for two logs: diagnoses both, and shows what is higher or lower in the second."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -42,7 +42,7 @@ def compare_logs(
     Parameters
     ----------
     sample_time : float or None
-        Time between rows, in place of the logs' own times [s].
+        Time between rows, which replaces the logs' own times [s].
 
     Raises
     ------

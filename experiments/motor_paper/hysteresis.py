@@ -16,7 +16,7 @@ from plant.motor_paper.hysteresis_model import (
 )
 
 LOOP_FREQUENCIES, LOOP_AMPLITUDE = (1.0, 10.0, 100.0, 480.0), 100.0
-"""Of the hysteresis loops [Hz, V]."""
+"""Frequencies and amplitude of the hysteresis loops [Hz, V]."""
 
 
 @stacked
@@ -48,13 +48,13 @@ def hysteresis_table(loops: pd.DataFrame) -> Rows:
     Parameters
     ----------
     loops : pandas.DataFrame
-        As `hysteresis_loops` returns them.
+        Table from `hysteresis_loops`.
 
     Returns
     -------
     pandas.DataFrame
-        Columns law, frequency_hz, area_v2, width_percent (at no voltage, of the stroke), gain and lag_deg of the
-        displacement's first harmonic over that without hysteresis, distortion_percent.
+        Columns law, frequency_hz, area_v2, width_percent (at zero voltage, relative to the stroke), gain and lag_deg of
+        the displacement's first harmonic relative to that without hysteresis, distortion_percent.
     """
     for (law, frequency), loop in loops.groupby(["law", "frequency_hz"]):
         voltage, hysteresis = loop["voltage_v"].to_numpy(), loop["hysteresis_v"].to_numpy()
@@ -91,6 +91,6 @@ def hysteresis_response(p: HysteresisParameters) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        As `response_table`.
+        Table like that of `response_table`.
     """
     return response_rows("equation 20, small voltages", linearised(p))

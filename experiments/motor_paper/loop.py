@@ -1,7 +1,7 @@
 """The loop of the diaphragm-motor paper's section 5 on its linear model: relay, P, PI and PID with delay and noise.
 
-The displacement x_2 follows a step. The paper gives no gains; ours come from the model (`designed`), and the relay
-finds without the model where the loop would swing.
+The displacement x_2 follows a step. The paper gives no gains; ours come from the model (`designed`), and the relay test
+finds the point of oscillation without the model.
 """
 
 from collections.abc import Mapping
@@ -25,26 +25,27 @@ from plant.motor_paper.loop_blocks import (
 from plant.motor_paper.vibration_model import VibrationParameters, massless_matrices, reduced_stiffness
 
 SAMPLE_TIME, DELAY = 1e-5, 5
-"""Of the loop [s], and by how many samples its command is late."""
+"""Sample time of the loop [s], and delay of its command [samples]."""
 
 STEP, DURATION = 2e-5, 0.06
-"""The reference [m] from 2 ms on, and the runs' length [s]."""
+"""The reference [m] from 2 ms on, and the duration of the runs [s]."""
 
 NOISE_DENSITY = 1e-18
-"""Of the displacement's measurement [m^2/Hz]: 0.3 um at 10 us."""
+"""Noise density of the displacement measurement [m^2/Hz]: 0.3 um at 10 us."""
 
 SAFETY = 2.5
-"""Gain margin of the integral at the resonance [dimensionless]."""
+"""Gain margin of the integral action at the resonance [dimensionless]."""
 
 PROPORTIONAL = 0.1
-"""Proportional gain times the gain at rest; more, and the resonance with its delay swings [dimensionless]."""
+"""Proportional gain times the gain at rest; with a larger one the resonance oscillates because of the delay
+[dimensionless]."""
 
 WANTED_DAMPING = 0.5
-"""Damping ratio that the derivative brings about [dimensionless]."""
+"""Damping ratio that the derivative action sets [dimensionless]."""
 
 
 def _gain_at_rest(p: VibrationParameters) -> float:
-    """Return the displacement that a newton gives at rest, equation 4 mended [m/N] (errata M4)."""
+    """Return the steady displacement per newton, by the corrected equation 4 [m/N] (errata M4)."""
     k1, k2 = p.diaphragm_stiffness, p.fluid_stiffness
     return k2 / (k1 + k2) / reduced_stiffness(p)
 
@@ -52,13 +53,13 @@ def _gain_at_rest(p: VibrationParameters) -> float:
 def designed(p: VibrationParameters) -> Mapping[str, Pid]:
     """Return a P, a PI and a PID controller for the model, section 5.1.1.
 
-    The integral alone would swing at ``2 zeta omega_n`` over the gain at rest; it is kept below by `SAFETY`. The
-    derivative raises zeta, and with it the integral.
+    Integral action alone would oscillate at ``2 zeta omega_n`` over the gain at rest; `SAFETY` keeps it below this. The
+    derivative action raises zeta, and with it the permitted integral gain.
 
     Returns
     -------
     Mapping[str, Pid]
-        By name; gains in N/m, N/(m s), N s/m.
+        Controllers by name; gains in N/m, N/(m s), N s/m.
     """
     omega = 2.0 * pi * p.natural_frequency
     zeta = p.damping / (2.0 * p.cylinder_mass * omega)
@@ -75,7 +76,7 @@ def designed(p: VibrationParameters) -> Mapping[str, Pid]:
 
 @stacked
 def loop_runs(p: VibrationParameters, seed: int) -> Frames:
-    """Return the step under each controller, with delay and noise.
+    """Return the step response under each controller, with delay and noise.
 
     Returns
     -------
@@ -100,18 +101,18 @@ def _under(p: VibrationParameters, pid: Pid, reference: np.ndarray, noise: np.nd
 
 @tabled
 def loop_table(runs: pd.DataFrame) -> Rows:
-    """Return the step response of each controller, in figures.
+    """Return the characteristics of the step response for each controller.
 
     Parameters
     ----------
     runs : pandas.DataFrame
-        As `loop_runs` returns them.
+        Table from `loop_runs`.
 
     Returns
     -------
     pandas.DataFrame
-        Columns controller, overshoot_percent (of the value that it settles to), settling_time_s (into 5 % of it for
-        good), error_percent (of the step, over the last quarter), ripple_m (standard deviation there).
+        Columns controller, overshoot_percent (of the final value), settling_time_s (until it stays within 5 % of that),
+        error_percent (of the step, over the last quarter), ripple_m (standard deviation there).
     """
     for name, run in runs.groupby("controller", sort=False):
         after = run[run["reference_m"] > 0.0]
@@ -151,7 +152,7 @@ def relay_table(p: VibrationParameters) -> pd.DataFrame:
 
 
 def _half_turn(p: VibrationParameters) -> tuple[float, float]:
-    """Gain and frequency at which model, delay and hold turn by half a turn."""
+    """Gain and frequency at which model, delay and hold together have a phase lag of 180 degrees."""
     omega = 2.0 * pi * np.linspace(0.5, 3.0, 100001) * p.natural_frequency
     s = 1j * omega
     A, B, C, _ = massless_matrices(p)
@@ -164,18 +165,18 @@ def _half_turn(p: VibrationParameters) -> tuple[float, float]:
 
 @stacked
 def spectrum_table(runs: pd.DataFrame) -> Frames:
-    """Return the amplitude spectra that noise gives the commands while the reference rests, Figures 19 and 20.
+    """Return the amplitude spectra that noise gives the commands at constant reference, Figures 19 and 20.
 
     Parameters
     ----------
     runs : pandas.DataFrame
-        As `loop_runs` returns them.
+        Table from `loop_runs`.
 
     Returns
     -------
     pandas.DataFrame
-        Columns controller, frequency_hz (up to 5 kHz) and amplitude_n, of the second half's command less its mean,
-        Hann window.
+        Columns controller, frequency_hz (up to 5 kHz) and amplitude_n, of the second half of the command without its
+        mean, Hann window.
     """
     for name, run in runs.groupby("controller", sort=False):
         command = run["command_n"].to_numpy()[len(run) // 2 :]

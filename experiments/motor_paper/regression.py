@@ -1,7 +1,8 @@
 """The regression of the diaphragm-motor paper's Figure 12, in three readings of its Table 2 (errata M24).
 
-Flow on deformation and velocity, least squares with an intercept, six rows. Table 3's rules are applied as printed, and
-what they cannot see is said beside: flow and velocity are one number, by equations 17 and 18.
+It is a least-squares fit of flow on deformation and velocity, with an intercept and six rows. Table 3's rules are
+applied as printed. They miss that flow and velocity are one number by equations 17 and 18, which is reported
+separately.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +23,7 @@ READINGS: Mapping[str, Mapping[tuple[int, str], float]] = {
     "anova": {(5, FLOW): 0.0868, (2, VELOCITY): 2.585e-3},
     "physical": {(2, VELOCITY): 2.585e-3},
 }
-"""What each reading puts into Table 2, by row (from 0) and column."""
+"""Values that each reading replaces in Table 2, by row (from 0) and column."""
 
 FITTED_AS = {"const": "intercept", DEFORMATION: "deformation", VELOCITY: "velocity"}
 """Statsmodels' names of the regressors, and those of the published table."""
@@ -52,14 +53,14 @@ def reading(name: str) -> pd.DataFrame:
 
 
 def fit(table: pd.DataFrame, regressors: Sequence[str] = (DEFORMATION, VELOCITY), of: str = FLOW) -> Any:
-    """Return statsmodels' least-squares fit with an intercept; unless told, of flow on deformation and velocity.
+    """Return statsmodels' least-squares fit with an intercept; by default of flow on deformation and velocity.
 
     Parameters
     ----------
     table : pandas.DataFrame
-        Table 2 in a reading, or another.
+        Table 2 in a reading, or another table.
     of : str
-        The column that is explained.
+        The dependent variable's column.
     """
     from statsmodels.regression.linear_model import OLS  # slow to import, and few callers need it
     from statsmodels.tools.tools import add_constant
@@ -73,7 +74,7 @@ def anova(found: Any) -> Mapping[str, float]:
     Returns
     -------
     Mapping[str, float]
-        By the names of the published table, ``motor_fig12_anova.csv``, in its order.
+        Numbers by the names of the published table, ``motor_fig12_anova.csv``, in its order.
 
     Examples
     --------
@@ -107,7 +108,7 @@ def anova_table() -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Columns quantity, published, one a reading, and relative_difference of the reading `anova`.
+        Columns quantity, published, one for each reading, and relative_difference of the reading `anova`.
     """
     table = load("fig12_anova").rename(columns={"value": "published"})
     for name in READINGS:
@@ -141,14 +142,15 @@ def limits_table() -> pd.DataFrame:
 
 @stacked
 def residual_table() -> Frames:
-    """Return the figures behind the residual, line-fit and probability plots of Figures 10 to 16, per reading.
+    """Return the data behind the residual, line-fit and probability plots of Figures 10 to 16, per reading.
 
     Returns
     -------
     pandas.DataFrame
-        One row a reading and row of Table 2: flow, deformation, velocity, predicted, residual, standardised_residual
-        (residual over its own standard deviation, sqrt(1 - leverage) included), leverage; percentile and sorted_flow,
-        as Figure 12's probability output has them; normal_score, the normal quantile of that percentile.
+        One row for each reading and row of Table 2: flow, deformation, velocity, predicted, residual,
+        standardised_residual (residual over its own standard deviation, sqrt(1 - leverage) included), leverage;
+        percentile and sorted_flow, as in Figure 12's probability output; normal_score, the normal quantile of that
+        percentile.
     """
     for name in READINGS:
         table = reading(name)
@@ -177,7 +179,7 @@ def inflations(found: Any) -> list[float]:
     Returns
     -------
     list of float
-        1/(1 - r^2), r^2 that of the regressor on the others [dimensionless].
+        1/(1 - r^2), with r^2 from the regression of the regressor on the others [dimensionless].
     """
     from statsmodels.stats.outliers_influence import variance_inflation_factor
 
@@ -191,7 +193,7 @@ def predictive_r_square(found: Any) -> float:
     Returns
     -------
     float
-        One less the squared errors of the predictions over those of the mean [dimensionless].
+        One minus the ratio of the predictions' squared errors to the squared deviations from the mean [dimensionless].
     """
     left_out = found.get_influence().resid_press
     return float(1.0 - np.sum(left_out**2) / found.centered_tss)
@@ -236,8 +238,8 @@ def _standardised(found: Any, table: pd.DataFrame, column: str) -> float:
 def circularity() -> pd.DataFrame:
     """Return why the regression says nothing about a motor, in the physical reading.
 
-    Equation 18 gives velocity from flow and load, so velocity over ``1 - F/F_max`` is flow over one area. The pairs
-    that the paper's text speaks of, flow or velocity and sensing voltage, are beside it.
+    Equation 18 gives velocity from flow and load, so velocity divided by ``1 - F/F_max`` is flow divided by one area.
+    The pairs that the paper's text claims to relate, flow or velocity and sensing voltage, are listed beside it.
 
     Returns
     -------

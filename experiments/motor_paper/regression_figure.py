@@ -42,7 +42,7 @@ def _draw_residuals(tables: Tables) -> Figure:
 def _draw_line_fits(tables: Tables) -> Figure:
     """Draw flow and its prediction over deformation and velocity, and normal probability: Figures 11, 13, 14.
 
-    Four panels, of the reading that Figure 12 has.
+    Four panels, for the reading that Figure 12 uses.
     """
     rows = tables["regression residuals"]
     rows = rows[rows["reading"] == "anova"]
@@ -69,9 +69,9 @@ def _draw_line_fits(tables: Tables) -> Figure:
 
 
 def _draw_circle(tables: Tables) -> Figure:
-    """Draw why the regression is circular: flow over unloaded velocity, and over what the text claims.
+    """Draw why the regression is circular: flow over unloaded velocity, and over the variables that the text claims.
 
-    One bar a pair, by R².
+    One bar for each pair, by R².
     """
     table = tables["circularity"].iloc[::-1]
     title = "R² of a straight line through pairs of Table 2's columns, physical reading"

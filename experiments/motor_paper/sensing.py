@@ -1,7 +1,7 @@
 """Velocity of the diaphragm motor from its sensing voltages, by multiple linear regression on simulated data.
 
-This is what the paper sets out to do and its Figure 12 does not (errata M19, M24): voltages of the middle electrodes
-over drive voltages and loads, at 480 Hz. And the spectra of the driven motor, Figure 21.
+The paper sets out to do this, but its Figure 12 does not (errata M19, M24). The data are voltages of the middle
+electrodes over drive voltages and loads, at 480 Hz. The module also gives the spectra of the driven motor, Figure 21.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,13 +22,14 @@ from plant.diaphragm_motor.run import ELECTRODES, LONGEST_STEP, motor_drive, run
 from plant.motor_paper.hysteresis_model import harmonics, total_harmonic_distortion
 
 FREQUENCY = 480.0
-"""Of the drive, section 7.1 [Hz]."""
+"""Frequency of the drive, section 7.1 [Hz]."""
 
 SWINGS, LOAD_SHARES = (100.0, 150.0, 200.0, 250.0, 300.0), (0.0, 0.03, 0.06, 0.09, 0.12, 0.15)
-"""Drives peak to peak [V], and loads [N] over them: thirty points up to near blocking."""
+"""Peak-to-peak drive voltages [V], and ratios of load [N] to that voltage: thirty points up to nearly the blocking
+force."""
 
 RELATIVE_NOISE = 0.005
-"""Of an electrode's amplitude [dimensionless]."""
+"""Noise relative to an electrode's amplitude [dimensionless]."""
 
 DRIVE = "peak_to_peak_v"
 
@@ -39,7 +40,7 @@ MODELS: Mapping[str, Sequence[str]] = {
     "A4 and drive voltage": (ELECTRODES[3], DRIVE),
     "A3, A4, A5 and drive voltage": (*ELECTRODES[2:5], DRIVE),
 }
-"""What velocity is regressed on."""
+"""Regressors of velocity, by the name of the model."""
 
 FAULTS = {
     "A4 reads 20 % low": ("sensor_gain", 4, 0.8),
@@ -50,7 +51,7 @@ FAULTS = {
 """Faults of one part: parameter, place, value."""
 
 HARMONICS = 9
-"""Highest multiple of the drive's frequency that is told [dimensionless]."""
+"""Highest reported multiple of the drive's frequency [dimensionless]."""
 
 
 @tabled
@@ -60,7 +61,7 @@ def operating_points(p: DiaphragmMotorParameters, seed: int) -> Rows:
     Returns
     -------
     pandas.DataFrame
-        Columns peak_to_peak_v, load_n, velocity_m_s and one an electrode [V].
+        Columns peak_to_peak_v, load_n, velocity_m_s and one for each electrode [V].
     """
     rng = stream(seed, "motor sensing")
     for swing, share in product(SWINGS, LOAD_SHARES):
@@ -81,7 +82,7 @@ def sensing_predictions(points: pd.DataFrame) -> Frames:
     Parameters
     ----------
     points : pandas.DataFrame
-        As `operating_points` returns them.
+        Table from `operating_points`.
 
     Returns
     -------
@@ -100,13 +101,13 @@ def sensing_regressions(points: pd.DataFrame) -> Rows:
     Parameters
     ----------
     points : pandas.DataFrame
-        As `operating_points` returns them.
+        Table from `operating_points`.
 
     Returns
     -------
     pandas.DataFrame
         Columns regressors, r_square, predictive_r_square, error_m_s (standard error), largest_vif, and smallest and
-        largest_coefficient of the electrodes [m/s a volt].
+        largest_coefficient of the electrodes [m/s per volt].
     """
     for words, names in MODELS.items():
         found = fit(points, names, "velocity_m_s")
@@ -129,7 +130,7 @@ def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> Rows:
     Parameters
     ----------
     points : pandas.DataFrame
-        As `operating_points` returns them, of the healthy one.
+        Table from `operating_points` for the healthy motor.
 
     Returns
     -------
@@ -159,7 +160,7 @@ def motor_spectra(p: DiaphragmMotorParameters) -> pd.DataFrame:
     -------
     pandas.DataFrame
         Columns signal, peak_to_peak_v, harmonic (0 is the mean), frequency_hz, amplitude (in the signal's unit) and
-        relative_percent, of the first harmonic.
+        relative_percent (of the first harmonic).
     """
     return pd.concat([_spectra(p, swing) for swing in SWINGS], ignore_index=True)
 
@@ -189,12 +190,12 @@ def _spectra(p: DiaphragmMotorParameters, swing: float) -> Frames:
 
 @tabled
 def distortion_table(spectra: pd.DataFrame) -> Rows:
-    """Return the total harmonic distortion of each signal, one column a drive.
+    """Return the total harmonic distortion of each signal, with one column for each drive.
 
     Parameters
     ----------
     spectra : pandas.DataFrame
-        As `motor_spectra` returns them.
+        Table from `motor_spectra`.
 
     Returns
     -------

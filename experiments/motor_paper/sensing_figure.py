@@ -16,7 +16,7 @@ SHOWN = ("A3, A4, A5, as the paper wants", "A4 and drive voltage")
 
 
 def _draw_velocity(tables: Tables) -> Figure:
-    """Draw velocity fitted from sensing voltages over the motor's own."""
+    """Draw velocity fitted from sensing voltages over the motor's true velocity."""
     title = "Velocity from sensing voltages, thirty drives and loads at 480 Hz"
     figure, axes = panels(title, 1, 2, 3.9, Margins(left=0.65, top=0.75, across=0.5), sharey=True)
     rows = tables["sensing predictions"]
@@ -33,7 +33,7 @@ def _draw_velocity(tables: Tables) -> Figure:
 
 
 def _draw_faults(tables: Tables) -> Figure:
-    """Draw by how much the regressions are off when one part fails. One pair of bars a fault."""
+    """Draw the errors of the regressions when one part fails. One pair of bars for each fault."""
     table = tables["sensing faults"].iloc[::-1]
     title = "What a regression fitted to the healthy motor says of a faulty one, less its velocity (200 V, 10 N)"
     figure, (axis,) = panels(title, 1, 1, 3.4, Margins(left=2.3, top=0.45))

@@ -1,4 +1,4 @@
-"""Every table of `hydrostate motor-paper`, by name: the diaphragm-motor paper's numbers computed anew."""
+"""Every table of `hydrostate motor-paper`, by name: the diaphragm-motor paper's numbers recomputed."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict

@@ -1,6 +1,6 @@
-"""Tables 1, 2, 4 and 5 of the diaphragm-motor paper, and what holds in them (errata M14 to M18, M23 to M29).
+"""Tables 1, 2, 4 and 5 of the diaphragm-motor paper, and checks of them (errata M14 to M18, M23 to M29).
 
-Printed units are kept: they are part of what is checked.
+Printed units are kept, because they are part of the check.
 """
 
 from collections.abc import Mapping
@@ -13,16 +13,16 @@ from experiments.motor_paper.regression import FLOW, VELOCITY, reading
 from experiments.published import load
 
 PUMP_PISTON_MM = 38.0
-"""Bore by which Table 4's theory was computed (errata M29) [mm]."""
+"""Bore with which Table 4's theory was computed (errata M29) [mm]."""
 
 UNIT_FACTOR = 1000.0
-"""The factor that equation 17 lacks in Table 2 (errata M17) [dimensionless]."""
+"""The factor missing from equation 17 in Table 2 (errata M17) [dimensionless]."""
 
 PUBLISHED_FLOW_ML_MIN, PUBLISHED_VELOCITY_MM_S, PUBLISHED_FORCE_N = 110.11, 168.1, 141.0
 """Section 7.1 and Table 5 [mL/min, mm/s, N]."""
 
 OBEYED_PERCENT = 0.5
-"""A relation holds in Table 2 if no row is further off [percent]."""
+"""A relation holds in Table 2 if no row deviates by more than this [percent]."""
 
 
 def efficiency(table: pd.DataFrame, *, chambers: int = 5, inverted: bool = True, from_area: bool = True) -> pd.Series:
@@ -33,11 +33,11 @@ def efficiency(table: pd.DataFrame, *, chambers: int = 5, inverted: bool = True,
     table : pandas.DataFrame
         Table 2 in a reading.
     chambers : int
-        Whose square root stands in equation 17 [count].
+        Number of chambers whose square root is in equation 17 [count].
     inverted : bool
-        Whether h_31 is deformation over voltage; otherwise as equation 15 says, voltage over deformation.
+        Whether h_31 is deformation over voltage; otherwise it is voltage over deformation, as in equation 15.
     from_area : bool
-        Whether the diameter is taken from the area; otherwise as printed.
+        Whether the diameter is computed from the area; otherwise it is the printed one.
 
     Returns
     -------
@@ -88,8 +88,9 @@ def table_2() -> pd.DataFrame:
     -------
     pandas.DataFrame
         Columns row; area_ratio (printed area over that of the diameter); displacement_ratio (column 5 over column 4);
-        d31_times_voltage_m, the d_31 U that equation 14 asks for; d31_pm_v, with Table 5's voltage; calibration_v_um,
-        the h_31 of equation 15; efficiency, by 17; piston_area_cm2, by 18; force_ratio, Table 5's over this one's.
+        d31_times_voltage_m, the d_31 U that equation 14 requires; d31_pm_v, with Table 5's voltage; calibration_v_um,
+        the h_31 of equation 15; efficiency, by equation 17; piston_area_cm2, by equation 18; force_ratio, Table 5's
+        force over the force in this table.
     """
     table, actuators = reading("physical"), load("table5_actuators")
     area, thickness = table["diaphragm_area_mm2"], table["diaphragm_thickness_mm"]
@@ -112,7 +113,7 @@ def table_2() -> pd.DataFrame:
 
 
 def relations() -> pd.DataFrame:
-    """Return which of equations 14 to 18 Table 2 obeys, by how much its rows scatter around one constant.
+    """Return which of equations 14 to 18 Table 2 satisfies, and how far its rows scatter about one constant.
 
     Returns
     -------
@@ -139,12 +140,12 @@ def relations() -> pd.DataFrame:
 
 
 def table_4() -> pd.DataFrame:
-    """Return Table 4 with its theory and errors computed anew (errata M29).
+    """Return Table 4 with its theory and errors recomputed (errata M29).
 
     Returns
     -------
     pandas.DataFrame
-        The printed columns; theory_ml_per_min, from a piston of 38 mm; error_by_flowmeter_percent, which is what was
+        The printed columns; theory_ml_per_min, from a piston of 38 mm; error_by_flowmeter_percent, the error as
         printed; error_by_theory_percent.
 
     Examples
@@ -169,15 +170,15 @@ def table_5() -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        The printed columns, and most_power_w: a straight line from one to the other gives at most a quarter of their
-        product.
+        The printed columns, and most_power_w: for a linear force-velocity line the maximum power is a quarter of the
+        product of both.
     """
     table = load("table5_actuators")
     return table.assign(most_power_w=0.25e-3 * table["no_load_velocity_mm_per_s"] * table["blocking_force_n"])
 
 
 def published_motor() -> pd.DataFrame:
-    """Return why the proposed actuator's published numbers do not belong together (errata M26).
+    """Return why the proposed actuator's published numbers are inconsistent (errata M26).
 
     Returns
     -------
@@ -201,7 +202,7 @@ def published_motor() -> pd.DataFrame:
 
 
 def table_1() -> pd.DataFrame:
-    """Return Table 1 with what follows from it.
+    """Return Table 1 with the quantities that follow from it.
 
     Returns
     -------

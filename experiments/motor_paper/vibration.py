@@ -1,4 +1,4 @@
-"""The diaphragm-motor paper's linear models: poles by whose signs, Bode, Nyquist, fractional damping."""
+"""The diaphragm-motor paper's linear models: poles by sign convention, Bode, Nyquist, fractional damping."""
 
 from dataclasses import replace
 from math import gamma, pi
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     import control
 
 FREQUENCIES = np.geomspace(10.0, 1e4, 1201)
-"""Where responses are shown [Hz]."""
+"""Frequencies of the responses [Hz]."""
 
 TUNED_FREQUENCY = 480.0
 """The published resonance, section 7.1 [Hz]."""
 
 ORDERS = (0.5, 1.0, 1.5)
-"""Of Figures 7 to 9."""
+"""Orders in Figures 7 to 9."""
 
 
 def _vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]":
@@ -36,7 +36,7 @@ def _vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]"
 
 @tabled
 def pole_table(p: VibrationParameters) -> Rows:
-    """Return the poles of each model, one of each pair.
+    """Return the poles of each model, one for each conjugate pair.
 
     Returns
     -------
@@ -62,10 +62,10 @@ def _all_models(p: VibrationParameters) -> dict[str, Any]:
 
 @tabled
 def margin_table(p: VibrationParameters) -> Rows:
-    """Return margins of the loops that Figures 22, 23, 31 and 32 speak of: each model times a gain, fed back.
+    """Return margins of the loops in Figures 22, 23, 31 and 32: each model times a gain, with feedback.
 
-    The gain makes the model's own 1 at rest. A loop is stable if its closed poles are; Nyquist's count of clockwise
-    turns says the same only together with the open loop's unstable poles (errata M30).
+    The gain normalises the model's own gain at rest to 1. A loop is stable if its closed-loop poles are; Nyquist's
+    count of clockwise encirclements agrees only together with the open loop's unstable poles (errata M30).
 
     Returns
     -------
@@ -95,14 +95,14 @@ def margin_table(p: VibrationParameters) -> Rows:
 
 
 def _past_poles(poles: "np.ndarray[Any, np.dtype[np.complex128]]") -> "np.ndarray[Any, np.dtype[np.float64]]":
-    """Angular frequencies with steps fine enough for a resonance a ten-thousandth wide, which a plain grid misses."""
+    """Angular frequencies fine enough for a resonance with a relative width of 1/10000, which a regular grid misses."""
     near = [abs(pole) + abs(pole.real) * np.linspace(-300.0, 300.0, 2401) for pole in poles if pole.imag > 0.0]
     grid = np.concatenate([np.geomspace(1.0, 1e6, 2001), *near])
     return np.unique(grid[grid > 0.0])
 
 
 def response_table(p: VibrationParameters) -> pd.DataFrame:
-    """Return the frequency responses of Figures 22 and 23, each over its own gain at rest.
+    """Return the frequency responses of Figures 22 and 23, each relative to its own gain at rest.
 
     Returns
     -------
@@ -113,12 +113,12 @@ def response_table(p: VibrationParameters) -> pd.DataFrame:
 
 
 def response_rows(name: str, model: Any) -> pd.DataFrame:
-    """Return the frequency response of one model over its own gain at rest (equation 13).
+    """Return the frequency response of one model relative to its own gain at rest (equation 13).
 
     Returns
     -------
     pandas.DataFrame
-        As `response_table`.
+        Table like that of `response_table`.
     """
     near = [abs(pole) / (2.0 * pi) * np.linspace(0.9, 1.1, 101) for pole in model.poles() if pole.imag > 0.0]
     frequency = np.unique(np.concatenate([FREQUENCIES, *near]))
@@ -140,8 +140,8 @@ def tuning_table(p: VibrationParameters) -> Rows:
     Returns
     -------
     pandas.DataFrame
-        Columns changed, factor, frequency_hz, damping_ratio, peak_gain (over that at rest) and decay_time_s (to a
-        tenth).
+        Columns changed, factor, frequency_hz, damping_ratio, peak_gain (relative to that at rest) and decay_time_s
+        (decay to a tenth).
     """
     for name in ("diaphragm_stiffness", "fluid_stiffness", "load_stiffness", "cylinder_mass", "damping"):
         for factor in (0.5, 1.0, 2.0):
@@ -180,14 +180,14 @@ def figures_7_to_9() -> Frames:
 
 
 def _with_order(p: VibrationParameters, order: float) -> VibrationParameters:
-    """Return a model whose damper has another order and the same size of force at 480 Hz (errata M5)."""
+    """Return a model with a damper of another order but the same force amplitude at 480 Hz (errata M5)."""
     size = p.damping * (2.0 * pi * TUNED_FREQUENCY) ** (1.0 - order)
     return replace(p, damping=0.0, fractional_damping=size, fractional_order=order)
 
 
 @stacked
 def fractional_table(p: VibrationParameters) -> Frames:
-    """Return responses with fractional damping, exact and by Oustaloup's states.
+    """Return responses with fractional damping, exact and by Oustaloup's approximation.
 
     Returns
     -------

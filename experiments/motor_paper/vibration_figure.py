@@ -77,7 +77,7 @@ def _draw_poles(tables: Tables) -> Figure:
 
 
 def _draw_loop(tables: Tables) -> Figure:
-    """Draw the step under P, PI and PID, and the spectrum of what they ask for, as Figures 19 and 20 do.
+    """Draw the step under P, PI and PID, and the spectrum of their commands, as Figures 19 and 20 do.
 
     Displacement on the left, spectra on the right.
     """

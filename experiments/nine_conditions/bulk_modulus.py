@@ -23,7 +23,7 @@ from plant.sensors.sensors import BENCH
 
 
 class Experiment(NamedTuple):
-    """One way to estimate bulk modulus, as the tables tell it from others."""
+    """One way to estimate bulk modulus, identified by the columns of the tables."""
 
     plant: str
     form: str
@@ -55,10 +55,10 @@ PRESSURE_STEPS = Experiment("lumped", "pressure", "steps", True)
 """Our filter on the nine steps, pressure logged."""
 
 POSITION_STEPS = Experiment("lumped", "pressure", "steps", False)
-"""Our filter on the nine steps, position and velocity alone."""
+"""Our filter on the nine steps, with position and velocity only."""
 
 POSITION_SINE = Experiment("lumped", "pressure", "sine", False)
-"""Our filter on the paper's sine, position and velocity alone (errata E13)."""
+"""Our filter on the paper's sine, with position and velocity only (errata E13)."""
 
 EXPERIMENTS: Mapping[Experiment, str] = {
     PUBLISHED_WAY: "The published method on the plant that it assumes.",
@@ -73,18 +73,18 @@ EXPERIMENTS: Mapping[Experiment, str] = {
 }
 
 TRACK_POINTS = 200
-"""Points of a convergence curve that are kept."""
+"""Number of points kept of a convergence curve."""
 
 
 def bulk_modulus_study(
     rig: EhaParameters, settings: StudySettings, track: Track = untracked
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Estimate bulk modulus in every experiment, condition, and from every first guess.
+    """Estimate bulk modulus in every experiment and condition, from every first guess.
 
     Returns
     -------
     tuple of pandas.DataFrame
-        One row an estimate; and the convergence curves in long form.
+        One row for each estimate; and the convergence curves in long form.
     """
 
     def estimate(case: tuple[Experiment, str]) -> list[tuple[dict[str, object], pd.DataFrame]]:
@@ -120,7 +120,7 @@ def estimate_entries(found: BulkModulusEstimate, truth: float) -> dict[str, obje
     Returns
     -------
     dict[str, object]
-        Outcome, value, interval, error, bound, where the filter settles, and the gate.
+        Outcome, value, interval, error, bound, the value that the filter settles at, and the gate.
     """
     low, high = found.interval or (None, None)
     settled, std = (found.value, found.std) if found.estimate is None else found.estimate.settled(BULK_MODULUS)

@@ -1,4 +1,4 @@
-"""Which class is found for which: confusion matrices, and the scores behind one of them."""
+"""Classification results: confusion matrices, and the scores behind one of them."""
 
 from collections.abc import Mapping, Sequence
 
@@ -14,29 +14,29 @@ from experiments.page.style import BLUE, VERMILION, Margins, panels
 from experiments.page.words import in_short, in_words
 
 DARK = 0.25
-"""Share of the colour scale below which white ink is read better."""
+"""Share of the colour scale below which white text is more legible."""
 
 COUNTS = LinearSegmentedColormap.from_list("counts", ["white", BLUE])
-"""From no run to all."""
+"""Colours from no run to all runs."""
 
 ERRORS = LinearSegmentedColormap.from_list("errors", [BLUE, "#dbe8f0", "white", "#f5ddcc"])
-"""From the smallest error to the largest."""
+"""Colours from the smallest error to the largest."""
 
 
 def draw_confusions(confusions: Mapping[tuple[str, str], pd.DataFrame], accuracy: pd.DataFrame) -> Figure:
-    """Draw one confusion matrix a bank and variant.
+    """Draw one confusion matrix for each bank and variant.
 
     Parameters
     ----------
     confusions : Mapping[tuple of str, pandas.DataFrame]
-        By bank and variant: one row a true condition, one column a found one [count].
+        By bank and variant: one row for each true condition, one column for each found condition [count].
     accuracy : pandas.DataFrame
         The table ``classification``.
 
     Returns
     -------
     Figure
-        One row of panels a variant, one column a bank.
+        One row of panels for each variant, one column for each bank.
     """
     banks = list(dict.fromkeys(accuracy["bank"]))
     variants = list(dict.fromkeys(accuracy["variant"]))
@@ -63,9 +63,9 @@ def draw_confusion(matrix: pd.DataFrame, share: float) -> Figure:
     Parameters
     ----------
     matrix : pandas.DataFrame
-        One row a true condition, one column a found one [count].
+        One row for each true condition, one column for each found condition [count].
     share : float
-        Share that is right, between 0 and 1 [fraction].
+        Share of right classes, between 0 and 1 [fraction].
     """
     title = f"Class found against true class: {100.0 * share:.1f} % right"
     figure, (axis,) = panels(title, 1, 1, 5.6, Margins(left=2.2, bottom=1.45))
@@ -96,17 +96,17 @@ def _class_ticks(axis: Axes, names: Sequence[str]) -> None:
 
 
 def draw_scores(scores: pd.DataFrame) -> Figure:
-    """Draw one run's scores in every condition: the smallest in a row is the class found.
+    """Draw one run's scores in every condition; the smallest score in a row gives the class.
 
     Parameters
     ----------
     scores : pandas.DataFrame
-        The table ``score_example``: one row a true condition, one column a model [dimensionless].
+        The table ``score_example``: one row for each true condition, one column for each model [dimensionless].
 
     Returns
     -------
     Figure
-        A heatmap with the scores written in, the smallest of each row framed.
+        A heatmap with the scores written in and the smallest of each row framed.
     """
     title = "Score of every model on one run in every condition: the smallest names the class"
     figure, (axis,) = panels(title, 1, 1, 5.4, Margins(left=2.2, right=-0.3, top=0.4, bottom=1.05))

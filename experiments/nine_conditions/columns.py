@@ -32,7 +32,7 @@ MEGAPASCAL, _ = shop_unit("Pa")
 
 
 SCALAR_UNITS: Mapping[str, tuple[str, float]] = {"1": ("%", 100.0), "Hz": ("Hz", 1.0), "Pa": ("MPa", MEGAPASCAL)}
-"""How a scalar is shown, by its SI unit."""
+"""Unit and factor with which a scalar is shown, by its SI unit."""
 
 SETTING_UNITS: Mapping[str, str] = {
     "starts": " [Pa]",
@@ -46,7 +46,7 @@ SETTING_UNITS: Mapping[str, str] = {
 
 
 def report_frames(tables: Tables, settings: StudySettings) -> Tables:
-    """Return the tables that the report alone shows: what several of the study's amount to."""
+    """Return the tables that only the report shows; each summarises several of the study's tables."""
     named = {f"{spaced(name)}{SETTING_UNITS.get(name, '')}": value for name, value in asdict(settings).items()}
     return {
         "filterpy by experiment": _filterpy_by_experiment(tables["filterpy"]),
@@ -101,7 +101,7 @@ def _estimate(rows: pd.DataFrame, key: Experiment) -> Cell:
 
 @tabled
 def _models(frame: pd.DataFrame) -> Rows:
-    """Return two rows a condition: ours, and as Table 6 prints it."""
+    """Return two rows for each condition: our model, and the model printed in Table 6."""
     for row in frame.to_dict("records"):
         gain, std = 1e3 * row["dc_gain"], 1e3 * NORMAL_95 * row["dc_gain_std"]
         low, high = 1e3 * row["published_dc_gain_low"], 1e3 * row["published_dc_gain_high"]

@@ -1,4 +1,4 @@
-"""Tables 1 to 4, and what follows from them: where each condition settles at 4 V, and the scalars of the text."""
+"""Tables 1 to 4 and their consequences: each condition's steady state at 4 V, and the scalars of the text."""
 
 from collections.abc import Mapping
 
@@ -45,7 +45,7 @@ def scalar_table(conditions: pd.DataFrame, library: Mapping[str, LinearModel], b
     Parameters
     ----------
     conditions : pandas.DataFrame
-        From `condition_table`.
+        Table from `condition_table`.
     library : Mapping[str, LinearModel]
         Identified transfer functions by condition.
     bulk_modulus : float
@@ -54,7 +54,7 @@ def scalar_table(conditions: pd.DataFrame, library: Mapping[str, LinearModel], b
     Returns
     -------
     pandas.DataFrame
-        One row a scalar: published and ours in SI, and why they differ.
+        One row for each scalar: published and ours in SI, and why they differ.
     """
     by_name = conditions.set_index("condition")
     defined = [(*name.rsplit("_", 1), name) for name in SCALARS if name.startswith(("minor", "major"))]

@@ -15,10 +15,10 @@ from experiments.page.style import BLACK, BLUE, SKY, VERMILION, Margins, panels
 from experiments.page.words import in_words
 
 MEGA = 1e6
-"""Bulk modulus is drawn in megapascal, as the text and the tables have it; Figure 11 has 1e8 Pa."""
+"""Bulk modulus is drawn in MPa, as in the text and tables; Figure 11 uses units of 1e8 Pa."""
 
 GUESS_COLOURS = LinearSegmentedColormap.from_list("guesses", [BLUE, SKY, VERMILION])
-"""From the lowest first guess to the highest."""
+"""Colours from the lowest first guess to the highest."""
 
 TOP = 600.0
 """Upper end of the axis [MPa]; Figure 11 ends at 500."""
@@ -32,7 +32,7 @@ TITLES: Mapping[Experiment, str] = {
 
 
 def draw_convergence(shown: Experiment, curves: pd.DataFrame, truth_pa: float) -> Figure:
-    """Draw the estimates of one experiment over time, from every first guess, a panel a condition.
+    """Draw the estimates of one experiment over time, from every first guess, with one panel for each condition.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Section 3: where each condition settles at 4 V, beside the levels' published definitions (errata E7)."""
+"""Section 3: each condition's steady state at 4 V, beside the levels' published definitions (errata E7)."""
 
 from collections.abc import Mapping
 
@@ -13,7 +13,7 @@ DEFINED: Mapping[str, Mapping[str, str]] = {
     "velocity": {"minor_leakage": "minor_leakage_velocity", "major_leakage": "major_leakage_velocity"},
     "pressure": {"minor_friction": "minor_friction_pressure", "major_friction": "major_friction_pressure"},
 }
-"""By quantity, then condition: the published scalar that defines it."""
+"""By quantity, then condition: the published scalar that defines the condition."""
 
 
 def draw_definitions(conditions: pd.DataFrame) -> Figure:

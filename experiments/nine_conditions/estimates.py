@@ -1,4 +1,4 @@
-"""Every estimate with its interval; and the published form beside ours on a plant that sticks."""
+"""Every estimate with its interval; and the published form beside ours on a plant with stick-slip friction."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -27,7 +27,7 @@ NARROW = 0.035
 
 
 def draw_estimates(estimates: pd.DataFrame, truth_pa: float) -> Figure:
-    """Draw every estimate with its 95 % interval, a panel an experiment, a row a condition.
+    """Draw every estimate with its 95 % interval, one panel for each experiment, one row for each condition.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def draw_estimates(estimates: pd.DataFrame, truth_pa: float) -> Figure:
     Returns
     -------
     Figure
-        One panel an experiment. What is not observable, or lies off the axis, is said in words.
+        One panel for each experiment. Estimates that are not observable or lie off the axis are given as text.
     """
     groups = list(by_experiment(estimates))
     count = (len(groups) + 2) // 3
@@ -80,13 +80,13 @@ def draw_intervals(axis: Axes, rows: pd.DataFrame, height: float, size: float, c
     Parameters
     ----------
     axis : Axes
-        Where; across, bulk modulus [MPa].
+        Axes to draw on; the horizontal axis is bulk modulus [MPa].
     height : float
-        The middle of their marks [count].
+        Vertical position of the centre of the marks [count].
     size : float
-        Of a mark, in points of type [unit of fonts].
+        Marker size in points [unit of fonts].
     colour : callable
-        From an estimate's row to its colour.
+        Function from an estimate's row to its colour.
     """
     for offset, row in zip(spread_out(len(rows), 0.5), rows.to_dict("records"), strict=True):
         centre = row["value_pa"] / MEGA
@@ -101,7 +101,7 @@ def _say(axis: Axes, height: float, centre: float, words: str, colour: str = GRE
 
 
 def draw_forms(estimates: pd.DataFrame, truth_pa: float) -> Figure:
-    """Draw where both forms settle on the plant that sticks, under the paper's sine (errata E9).
+    """Draw where both forms settle on the plant with stick-slip friction, under the paper's sine (errata E9).
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def draw_forms(estimates: pd.DataFrame, truth_pa: float) -> Figure:
     Returns
     -------
     Figure
-        One dot a first guess, one row a condition.
+        One dot for each first guess, one row for each condition.
     """
     sine = estimates[(estimates["plant"] == "lumped") & (estimates["drive"] == "sine")]
     shown: Sequence[tuple[pd.DataFrame, str, str]] = (

@@ -1,4 +1,4 @@
-"""filterpy's own extended Kalman filter beside ours, on the same logs, from the same belief, in nine conditions."""
+"""filterpy's extended Kalman filter beside ours, on the same logs with the same initial state, in nine conditions."""
 
 from collections.abc import Mapping
 from itertools import product
@@ -21,10 +21,10 @@ from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.model import EhaParameters
 
 COMPARED = (PUBLISHED_WAY, PUBLISHED_WAY_STUCK, PRESSURE_STEPS)
-"""The published filter with its printed noise, where it belongs and where it does not, and ours."""
+"""The published filter with its printed noise, once on the plant that it assumes and once not; and our filter."""
 
 EQUAL = 1e-6
-"""Largest relative difference of two tracks of bulk modulus that count as equal [dimensionless]."""
+"""Largest relative difference between two tracks of bulk modulus that count as equal [dimensionless]."""
 
 
 def filterpy_study(rig: EhaParameters, settings: StudySettings, track: Track = untracked) -> pd.DataFrame:
@@ -33,7 +33,7 @@ def filterpy_study(rig: EhaParameters, settings: StudySettings, track: Track = u
     Returns
     -------
     pandas.DataFrame
-        One row an experiment and condition: plant, form, drive, pressure_logged, condition, steps, ours_pa and
+        One row for each experiment and condition: plant, form, drive, pressure_logged, condition, steps, ours_pa and
         filterpy_pa (bulk modulus after the last step), largest_difference (of the two tracks, relative), verdict.
     """
 

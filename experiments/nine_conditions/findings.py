@@ -25,7 +25,8 @@ WANTED_PERCENT: Mapping[Experiment, float] = {
     PRESSURE_STEPS: 1.0,
     POSITION_STEPS: 3.0,
 }
-"""The largest error that each experiment may have [percent]; those not listed show a limit and promise nothing."""
+"""The largest error allowed for each experiment [percent]; experiments not listed show a limitation and have no
+target."""
 
 
 @dataclass(frozen=True)
@@ -35,21 +36,22 @@ class Recovery:
     Parameters
     ----------
     recovered : int
-        Conditions whose every estimate is a number within `wanted_percent`, or where nothing is wanted, within 3 %.
+        Number of conditions in which every estimate is a number within `wanted_percent`, or within 3 % if there is no
+        target.
     unobservable : tuple of str
         Conditions in which bulk modulus is not observable, from any first guess.
     missed : tuple of str
-        The other conditions, in words, with the error or the outcome.
+        The other conditions as text, with the error or the outcome.
     passed, covered : int
-        Estimates that the filter's own gate passes, and whose 95 % interval holds the truth.
+        Number of estimates that pass the filter's own gate, and number whose 95 % interval covers the truth.
     wanted_percent : float or None
-        The largest error that is wanted [percent].
+        The largest error allowed [percent].
     mean_pa, worst_error_percent : float or None
         Mean of the numbers [Pa] and the largest absolute error [percent]; None without a number.
     lowest_bound_percent, highest_bound_percent : float
         Range of the relative Cramér-Rao bound [percent].
     settled_low_pa, settled_high_pa : float
-        Where the filter settles, whether or not that is reported [Pa].
+        Range of values at which the filter settles, reported or not [Pa].
     """
 
     key: Experiment
@@ -79,7 +81,7 @@ class ClassAccuracy:
     bank, variant : str
         The bank, and whether parameters were nominal or spread.
     percent : float
-        Share that was right [percent].
+        Share of right classes [percent].
     likeliest_error : str
         The most frequent confusion in words; empty if there was none.
     """
@@ -97,7 +99,7 @@ def truth_of(tables: Tables) -> float:
     Returns
     -------
     float
-        Of the table ``parameters`` [Pa].
+        Value in the table ``parameters`` [Pa].
     """
     return cell(tables["parameters"].set_index("parameter"), "bulk_modulus", "value")
 
@@ -121,7 +123,7 @@ def experiment_in_words(key: Experiment) -> str:
     Returns
     -------
     str
-        What was believed, on which plant, and which drive and sensors it had, parted by commas.
+        The filter form, the plant, the drive and the sensors, separated by commas.
 
     Examples
     --------
@@ -135,12 +137,12 @@ def experiment_in_words(key: Experiment) -> str:
 
 
 def recoveries(estimates: pd.DataFrame) -> Mapping[Experiment, Recovery]:
-    """Sum up every experiment on bulk modulus.
+    """Summarise every experiment on bulk modulus.
 
     Returns
     -------
     Mapping[Experiment, Recovery]
-        One summary an experiment, in the study's order.
+        One summary for each experiment, in the study's order.
     """
     return {key: _recovery(key, rows) for key, rows in by_experiment(estimates)}
 
@@ -182,7 +184,7 @@ def _recovery(key: Experiment, rows: pd.DataFrame) -> Recovery:
 
 
 def _covered(rows: pd.DataFrame) -> int:
-    """Return how many intervals hold the truth, which is what the errors are counted from."""
+    """Return the number of intervals that cover the truth, from which the errors are counted."""
     known = rows.dropna(subset=["value_pa", "error_percent"])
     truth = known["value_pa"].astype(float) / (1.0 + known["error_percent"].astype(float) / 100.0)
     low, high = known["ci95_low_pa"].astype(float), known["ci95_high_pa"].astype(float)
@@ -190,7 +192,7 @@ def _covered(rows: pd.DataFrame) -> int:
 
 
 def class_accuracies(tables: Tables) -> tuple[ClassAccuracy, ...]:
-    """Sum up the classification, bank by bank."""
+    """Summarise the classification, bank by bank."""
     rows = tables["classification"][["bank", "variant", "runs", "accuracy"]].itertuples(index=False, name=None)
     return tuple(
         ClassAccuracy(bank, variant, runs, 100.0 * share, _likeliest_error(tables[f"confusion {bank} {variant}"]))
@@ -214,7 +216,7 @@ def bank_in_words(bank: str) -> str:
     Returns
     -------
     str
-        The same, saying what was not logged.
+        The name, with a note on what was not logged.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Section 4: frequency responses, the order test, and gains beside what Table 6 leaves open."""
+"""Section 4: frequency responses, the order test, and gains beside the range that Table 6 allows."""
 
 from collections.abc import Mapping
 
@@ -14,7 +14,7 @@ from experiments.page.style import BESIDE_CONDITIONS, BLUE, GREY, ORANGE, VERMIL
 MILLI = 1e3
 
 LEAST_COHERENCE = 0.3
-"""Empirical phase is drawn where the coherence is at least this; below, it says nothing."""
+"""Coherence below which the empirical phase carries no information and is not drawn."""
 
 LEVEL_WORDS = {"none": "normal", "minor": "minor", "major": "major"}
 LEVEL_COLOURS = {"none": BLUE, "minor": ORANGE, "major": VERMILION}
@@ -26,7 +26,7 @@ def draw_bode(responses: pd.DataFrame, conditions: pd.DataFrame) -> Figure:
     Returns
     -------
     Figure
-        Gain above, phase below, one column a leakage level.
+        Gain above, phase below, one column for each leakage level.
     """
     title = "Frequency response from motor speed to velocity: fitted (thick), empirical (thin)"
     figure, axes = panels(title, 2, 3, 5.6, Margins(left=0.7, down=0.2), sharex=True, sharey="row")
@@ -87,7 +87,7 @@ def draw_order(order: pd.DataFrame) -> Figure:
 
 
 def draw_gains(models: pd.DataFrame) -> Figure:
-    """Draw steady gains with their intervals over those that the rounding of Table 6 leaves open (errata E14)."""
+    """Draw steady gains with their intervals over the ranges allowed by the rounding of Table 6 (errata E14)."""
     figure, (axis,) = panels("Steady gain from motor speed to velocity", 1, 1, 3.9, BESIDE_CONDITIONS)
     level = condition_levels(axis, models["condition"])
     low, high = (MILLI * models[f"published_dc_gain_{end}"] for end in ("low", "high"))

@@ -19,7 +19,7 @@ from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.model import EhaParameters
 
 DURATION = 1.0
-"""Length of the log [s]: what becomes of the filter is told by then."""
+"""Duration of the log [s]; long enough to show whether the filter diverges."""
 
 
 def printed_equations(rig: EhaParameters, settings: StudySettings) -> pd.DataFrame:

@@ -1,7 +1,7 @@
-"""Table 6 by section 4's own experiment, to the letter, on the circuit.
+"""Table 6 by section 4's own experiment, exactly as printed, on the circuit.
 
-A binary signal of 4 V without a mean that may switch at 5 Hz, the output alone filtered forth and back by a 12th-order
-Butterworth filter of 30 Hz, and an output-error model of second order.
+The input is a binary signal of 4 V with zero mean that may switch at 5 Hz. Only the output is filtered, forward and
+backward, by a 12th-order Butterworth filter of 30 Hz. The model is an output-error model of second order.
 """
 
 from estimation.finding import NORMAL_95
@@ -23,11 +23,11 @@ from plant.eha.simulate import CIRCUIT, simulate
 from plant.sensors.sensors import BENCH
 
 CLOCK_HZ = 5.0
-"""How often the printed signal may switch [Hz]."""
+"""Clock of the printed signal: the rate at which it may switch [Hz]."""
 
 
 def _printed_test_model(rig: EhaParameters, condition: str, seed: int, duration: float) -> LinearModel:
-    """Return the model that section 4's experiment gives of a circuit."""
+    """Return the model that section 4's experiment gives for a circuit."""
     rng = stream(seed, "Table 6 to the letter", condition)
     p, T = parameters_for(CONDITIONS[condition], rig), IDENTIFICATION_TIME
     drive = prbs(duration, T, p.rated_speed, 1.0 / CLOCK_HZ, rng)
@@ -47,18 +47,18 @@ def _printed_test_model(rig: EhaParameters, condition: str, seed: int, duration:
 
 @tabled
 def printed_test(rig: EhaParameters, seed: int, duration: float, track: Track = untracked) -> Rows:
-    """Return the models that section 4's experiment gives of nine circuits, beside Table 6.
+    """Return the models that section 4's experiment gives for nine circuits, beside Table 6.
 
     Parameters
     ----------
     duration : float
-        Length of each test [s].
+        Duration of each test [s].
 
     Returns
     -------
     pandas.DataFrame
-        One row a condition: coefficients with standard deviations, gain, bandwidth, fit, and ``held``, the coefficients
-        whose 95 % interval meets the printed value within half a unit of its last digit.
+        One row for each condition: coefficients with standard deviations, gain, bandwidth, fit, and ``held``, the
+        coefficients whose 95 % interval meets the printed value within half a unit of its last digit.
     """
     published = as_printed("transfer_functions").set_index("condition")
     done = side_by_side(lambda name: _printed_test_model(rig, name, seed, duration), CONDITIONS)

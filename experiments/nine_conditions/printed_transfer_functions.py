@@ -1,4 +1,4 @@
-"""Table 6 as poles, zeros and gain, with what its four digits leave open (errata E14)."""
+"""Table 6 as poles, zeros and gain, with the uncertainty from rounding to four digits (errata E14)."""
 
 from itertools import product
 from typing import Any
@@ -13,7 +13,7 @@ _DIGITS = 4
 
 
 def printed_model(condition: str) -> dict[str, Any]:
-    """Return a model of Table 6 as printed, with what its rounding leaves open (errata E14).
+    """Return a model of Table 6 as printed, with its uncertainty from rounding (errata E14).
 
     Returns
     -------
@@ -54,7 +54,7 @@ def _reach(centre: np.ndarray, corners: list[np.ndarray]) -> np.ndarray:
 
 
 def pair(value: complex) -> list[float]:
-    """Return a complex number as JSON knows it.
+    """Return a complex number in JSON form.
 
     Returns
     -------
@@ -65,32 +65,32 @@ def pair(value: complex) -> list[float]:
 
 
 def pairs(values: np.ndarray) -> list[list[float | None]]:
-    """Return complex numbers as JSON knows them.
+    """Return complex numbers in JSON form.
 
     Parameters
     ----------
     values : ndarray of complex, shape (n,)
-        Any.
+        Complex numbers in any unit.
 
     Returns
     -------
     list of list
-        Real and imaginary part of each; None for one that is not finite.
+        Real and imaginary part of each; None for a number that is not finite.
     """
     return [[known(float(value.real)), known(float(value.imag))] for value in values]
 
 
 def known(value: float) -> float | None:
-    """Return a number, or None where it is not finite.
+    """Return a number, or None if it is not finite.
 
     Parameters
     ----------
     value : float
-        In any unit.
+        A number in any unit.
 
     Returns
     -------
     float or None
-        The same.
+        The same number, or None.
     """
     return value if np.isfinite(value) else None

@@ -16,7 +16,7 @@ from experiments.page.frames import Tables
 
 
 def verdict(tables: Tables) -> tuple[str, str, str]:
-    """Say in three sentences what a study found.
+    """Summarise the findings of a study in three sentences.
 
     Returns
     -------

@@ -12,15 +12,15 @@ class StudySettings:
     starts : tuple of float
         First guesses of effective bulk modulus [Pa], as in Figure 11.
     duration : float
-        Length of the estimation and validation runs [s].
+        Duration of the estimation and validation runs [s].
     sample_time : float
-        Their sample time, section 7 [s].
+        Sample time of these runs, from section 7 [s].
     identification_duration : float
-        Length of the identification runs [s].
+        Duration of the identification runs [s].
     classification_sample_time : float
         Sample time of the classification runs [s].
     filterpy_samples : int
-        Samples of each log that filterpy's filter is given too, some 0.1 ms each [count].
+        Number of samples of each log that filterpy's filter also processes, about 0.1 ms each [count].
     """
 
     seed: int = 2024

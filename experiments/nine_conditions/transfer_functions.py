@@ -1,4 +1,4 @@
-"""Section 4: nine transfer functions, the empirical frequency response, the order, and what filtering does."""
+"""Section 4: nine transfer functions, the empirical frequency response, the order, and the effect of filtering."""
 
 import warnings
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ from plant.log.record import Record
 COEFFICIENTS = ("b0", "b1", "b2", "a1", "a2")
 
 ROUNDING = 0.5
-"""Half a unit of the last printed digit: what Table 6 leaves open."""
+"""Half a unit of the last printed digit: the rounding error of Table 6."""
 
 RESPONSE_FREQUENCIES = np.geomspace(0.5, 100.0, 80)
 """Frequencies of the response curves [Hz]."""
@@ -60,8 +60,8 @@ def transfer_function_table(models: Mapping[str, LinearModel]) -> Rows:
     Returns
     -------
     pandas.DataFrame
-        One row a condition: coefficients with standard deviations, gain, bandwidth, fit; the published coefficients,
-        and the gain they leave open by rounding (errata E14).
+        One row for each condition: coefficients with standard deviations, gain, bandwidth, fit; the published
+        coefficients, and the range of gains that their rounding allows (errata E14).
     """
     published = load("transfer_functions").set_index("condition")
     for name, model in models.items():
@@ -84,7 +84,7 @@ def transfer_function_table(models: Mapping[str, LinearModel]) -> Rows:
 
 
 def jump_ratio(model: LinearModel) -> float:
-    """Return the share of a model's gain that acts within the sample of a step: 0 where output follows a mass (E15).
+    """Return the share of a model's gain that acts in the sample of the step: 0 if the output follows a mass (E15).
 
     Returns
     -------
@@ -150,7 +150,7 @@ def measured_response(record: Record, lag_window: int, lowest: float, highest: f
     Parameters
     ----------
     lag_window : int
-        Longest lag of the correlations that it is taken from [count].
+        Longest lag of the correlations used to compute the response [count].
     lowest, highest : float
         Ends of the band [Hz].
 
@@ -194,7 +194,7 @@ def order_table(record: Record, rng: np.random.Generator) -> pd.DataFrame:
 
 @tabled
 def filtering_table(rng: np.random.Generator, duration: float) -> Rows:
-    """Return the effect of zero-phase filtering of the output alone on a fit, for a plant with known poles.
+    """Return the effect of zero-phase filtering of only the output on a fit, for a plant with known poles.
 
     Section 4 filters the output only. The plant here is a strictly proper 30 Hz resonance with damping 0.6, driven as
     in section 4 with 5 % noise (errata E15).
@@ -202,12 +202,12 @@ def filtering_table(rng: np.random.Generator, duration: float) -> Rows:
     Parameters
     ----------
     duration : float
-        Length of the test [s].
+        Duration of the test [s].
 
     Returns
     -------
     pandas.DataFrame
-        One row a variant: pole frequency, damping, gain, jump ratio.
+        One row for each variant: pole frequency, damping, gain, jump ratio.
     """
     frequency, damping, T = 2.0 * np.pi * 30.0, 0.6, IDENTIFICATION_TIME
     decay, turn = np.exp(-damping * frequency * T), frequency * np.sqrt(1.0 - damping**2) * T

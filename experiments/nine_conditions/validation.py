@@ -82,13 +82,13 @@ def classification_study(
 ) -> dict[str, pd.DataFrame]:
     """Classify many runs with each bank, at nominal and at spread parameters.
 
-    Spread draws leakage, flow bias and friction uniformly within 10 % and bulk modulus within 20 %; geometry and pump
-    stay.
+    In the spread variant, leakage, flow bias and friction are drawn uniformly within 10 % and bulk modulus within 20 %;
+    geometry and pump are not changed.
 
     Returns
     -------
     dict[str, pandas.DataFrame]
-        ``classification`` (accuracy by bank and variant), one confusion matrix a bank and variant, and
+        ``classification`` (accuracy by bank and variant), one confusion matrix for each bank and variant, and
         ``score_example``, the mathematical bank's scores in the nine conditions.
     """
     bank = mathematical_bank(rig)
@@ -113,7 +113,7 @@ def classification_study(
 
 
 def _score_example(runs: list[dict[str, Scores]]) -> pd.DataFrame:
-    """Return the first run's scores in each condition: one row a true condition, one column a model."""
+    """Return the first run's scores: one row for each true condition, one column for each model."""
     first = zip(CONDITIONS, runs, strict=False)
     return pd.DataFrame.from_dict({name: dict(run[WITH_PRESSURE].by_condition) for name, run in first}, orient="index")
 

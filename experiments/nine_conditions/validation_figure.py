@@ -1,4 +1,4 @@
-"""Section 6: the nine steps, what both kinds of model make of them, and their errors beside Table 5."""
+"""Section 6: the nine steps, the predictions of both kinds of model, and their errors beside Table 5."""
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ from experiments.page.words import in_words
 MILLI = 1e3
 
 BEFORE, AFTER = 0.12, 0.28
-"""What the enlargement shows around a reversal [s]."""
+"""Time before and after a reversal that the enlargement shows [s]."""
 
 LINES = (
     ("velocity_m_s", "measured", GREY, 1.0),

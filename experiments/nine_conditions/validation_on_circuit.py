@@ -1,6 +1,7 @@
-"""Table 5 where the plant is not the model: both kinds of model on nine steps of circuits that differ from each other.
+"""Table 5 on a plant that differs from the model: both kinds of model on nine steps of circuits with spread parameters.
 
-On the lumped plant the mathematical model's error is the sensors' noise, since plant and model are the same equations.
+On the lumped plant the mathematical model's error is only the sensor noise, since plant and model are the same
+equations.
 """
 
 from collections.abc import Mapping
@@ -24,7 +25,7 @@ from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
 MOST_CIRCUITS = 5
-"""Circuits of each condition, unless the study asks for fewer."""
+"""Number of circuits for each condition, unless the study asks for fewer."""
 
 
 def _nine_steps(rig: EhaParameters, condition: str, settings: StudySettings, seed: int) -> Record:
@@ -45,8 +46,8 @@ def validation_on_circuit(
     Returns
     -------
     pandas.DataFrame
-        One row a condition: root mean square of both models' errors over the circuits, and the least and the largest
-        of one circuit [m/s].
+        One row for each condition: root mean square of both models' errors over the circuits, and the smallest and
+        largest error of a single circuit [m/s].
     """
     bank = mathematical_bank(rig)
     circuits = range(min(settings.seeds, MOST_CIRCUITS))

@@ -1,1 +1,1 @@
-"""The open benchmark: logs with their truth, from a simulator that shares no model with any estimator; their scores."""
+"""The open benchmark: logs with known truth, from a simulator that shares no model with any estimator; their scores."""

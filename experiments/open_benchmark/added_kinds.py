@@ -1,4 +1,4 @@
-"""Kinds of sensors and loggers that were added after the first 51; pairs of those are drawn as before."""
+"""Kinds of sensors and loggers added after the first 51. Pairs of the first 51 are drawn as before."""
 
 import numpy as np
 
@@ -67,4 +67,4 @@ ADDED = (
     ),
     Kind("logged_at_200_Hz", "logged at 200 Hz", lambda setup, _: setup.with_logger(sample_time=5e-3)),
 )
-"""Kinds by sensor and logger; the rig file describes their actuator."""
+"""Kinds with a change of sensor or logger; the rig file describes their actuator."""

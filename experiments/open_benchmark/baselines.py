@@ -1,4 +1,4 @@
-"""Ways to name a condition that others can beat: trained on the training split, judged on the test split."""
+"""Baseline classifiers of the condition: trained on the training split, judged on the test split."""
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -13,24 +13,24 @@ from plant.errors import HydrostateError
 
 Names = NDArray[np.str_]
 Verdicts = Callable[[Array], Names]
-"""From series, shape (logs, 4, samples), to the condition of each."""
+"""Function from series, shape (logs, 4, samples), to the condition of each."""
 
 KERNELS = 600
-"""Random kernels of the ROCKET-type transform."""
+"""Number of random kernels of the ROCKET-type transform."""
 
 RIDGES = np.logspace(-2, 4, 13)
-"""Penalties that leave-one-out chooses from."""
+"""Penalties among which leave-one-out cross-validation chooses."""
 
 
 def ridge_classifier(X: Array, y: Names) -> Verdicts:
-    """Return a ridge classifier of features, one class against the rest, its penalty chosen by leave-one-out.
+    """Return a one-against-rest ridge classifier of features, its penalty chosen by leave-one-out.
 
     Parameters
     ----------
     X : ndarray, shape (logs, features)
-        Of the training logs, any unit.
+        Features of the training logs, any unit.
     y : ndarray, shape (logs,)
-        Their classes.
+        Classes of the training logs.
     """
     names = np.unique(y)
     middle, size = X.mean(axis=0), X.std(axis=0) + 1e-12
@@ -58,7 +58,7 @@ def rocket(series: Array, y: Names) -> Verdicts:
     series : ndarray, shape (logs, 4, samples)
         Training logs, SI.
     y : ndarray, shape (logs,)
-        Their conditions.
+        Conditions of the training logs.
     """
     sizes = np.std(series, axis=(0, 2))[:, None]
     kernels = random_kernels(KERNELS, series.shape[2], np.random.default_rng(0))
@@ -80,7 +80,7 @@ def forest_on_features(series: Array, y: Names) -> Verdicts:
     series : ndarray, shape (logs, 4, samples)
         Training logs, SI.
     y : ndarray, shape (logs,)
-        Their conditions.
+        Conditions of the training logs.
 
     Raises
     ------
@@ -100,4 +100,4 @@ LEARNT: Mapping[str, Callable[[Array, Names], Verdicts]] = {
     "ridge on simple features": _ridge_on_features,
     "random kernels and ridge (ROCKET's scheme)": rocket,
 }
-"""What learns from labelled logs, by what it is called."""
+"""Functions that train a classifier on labelled logs, by name."""

@@ -1,4 +1,4 @@
-"""Random draws of a plain log, and of the course of a change."""
+"""Random draws of a plain log, and of how the actuator changes over a log."""
 
 import numpy as np
 
@@ -11,17 +11,17 @@ from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
 SPREAD = 0.05
-"""Half width of leakage, flow bias and friction about their condition's [fraction]."""
+"""Half width of the spread of leakage, flow bias and friction about the values of their condition [fraction]."""
 
 OIL_SPREAD = 0.3
-"""Half width of bulk modulus about the paper's [fraction]."""
+"""Half width of the spread of bulk modulus about the paper's value [fraction]."""
 
 MARGIN = 0.06
-"""From where a drive may take the piston to the end stop [m]."""
+"""Distance between a drive's maximum travel and the end stop [m]."""
 
 
 def _draw_machine(condition: str, rng: np.random.Generator, base: EhaParameters | None = None) -> Machine:
-    """Return an actuator in a condition: Tables 3 and 4 and bulk modulus with their spread, and details of its own."""
+    """Return an actuator in a condition: Tables 3 and 4 and bulk modulus with their spread, and random details."""
     nominal = machine_of(parameters_for(CONDITIONS[condition], base or EhaParameters()))
 
     def about(value: float, width: float = SPREAD) -> float:
@@ -50,7 +50,7 @@ def _draw_machine(condition: str, rng: np.random.Generator, base: EhaParameters 
 
 
 def draw_plain(condition: str, drive: str, rng: np.random.Generator, base: EhaParameters | None = None) -> Setup:
-    """Return a setup with nothing strange, with travel of 20 to 200 mm to either side.
+    """Return a setup with no peculiarity, with travel of 20 to 200 mm to either side.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def draw_plain(condition: str, drive: str, rng: np.random.Generator, base: EhaPa
     drive : str
         One of `DRIVES`.
     rng : numpy.random.Generator
-        Source of all that differs from log to log.
+        Source of everything that differs between logs.
     base : EhaParameters, optional
         The healthy actuator; the paper's if not given.
     """
@@ -76,13 +76,14 @@ def course_of(setup: Setup, rng: np.random.Generator) -> Array:
     Parameters
     ----------
     rng : numpy.random.Generator
-        Source of the drive and of when friction grips.
+        Source of the drive and of the times at which friction grips.
 
     Returns
     -------
     ndarray, shape (n, 5)
-        A row every `TICK`: speed asked for [rad/s] or position [m]; viscosity and leakage over those at the start, and
-        entrained air, a unit of oil [dimensionless]; friction's grip over that at the start [dimensionless].
+        One row for each `TICK`: demanded speed [rad/s] or position [m]; viscosity and leakage relative to their values
+        at the start, and entrained air per unit of oil [dimensionless]; friction's grip relative to its value at the
+        start [dimensionless].
     """
     m, change = setup.machine, setup.change
     glide = 0.75 * m.efficiency * m.displacement / max(m.area_a, m.area_b)

@@ -1,4 +1,4 @@
-"""Commands to the motor, or to the position loop, at every tick; each keeps the piston within its travel."""
+"""Commands to the motor or to the position loop at every tick; each keeps the piston within its travel."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ class DriveLimits:
     Parameters
     ----------
     duration : float
-        [s].
+        Duration [s].
     rated : float
         Motor speed at 4 V [rad/s].
     travel : float
-        How far the piston may go to either side [m].
+        Maximum travel of the piston to either side [m].
     glide : float
-        Rough velocity of the piston over motor speed [m/rad].
+        Approximate ratio of piston velocity to motor speed [m/rad].
     """
 
     duration: float
@@ -32,14 +32,14 @@ class DriveLimits:
 
     @property
     def ticks(self) -> int:
-        """Count of rows of a course."""
+        """Number of rows of a course."""
         return round(self.duration / TICK)
 
 
 def _held(room: DriveLimits, move: Callable[[float], tuple[float, float]]) -> Array:
-    """Return speeds that are held; `move` hears where the piston may be [m] and returns for how long [s] which speed.
+    """Return a piecewise constant speed; `move` takes the estimated position [m] and returns a time [s] and a speed.
 
-    A speed that would lead too far is turned.
+    A speed that would take the piston too far is reversed.
     """
     speed, at, where = np.zeros(room.ticks), 0, 0.0
     while at < room.ticks:
@@ -66,7 +66,7 @@ def steps(room: DriveLimits, rng: np.random.Generator) -> Array:
 
 
 def prbs(room: DriveLimits, rng: np.random.Generator) -> Array:
-    """Return a binary signal held 20 to 100 ms, drawn towards one random place after the other; shape (n,) [rad/s]."""
+    """Return a binary signal held 20 to 100 ms, drawn towards a sequence of random positions; shape (n,) [rad/s]."""
     hold, amplitude = float(rng.choice((0.02, 0.05, 0.1))), rng.uniform(0.5, 1.0) * room.rated
     goals = list(rng.uniform(-room.travel, room.travel, 4 * room.ticks))
 
@@ -80,7 +80,7 @@ def prbs(room: DriveLimits, rng: np.random.Generator) -> Array:
 
 
 def multisine(room: DriveLimits, rng: np.random.Generator) -> Array:
-    """Return twelve sines from 0.2 to 25 Hz of random phase, weaker the faster; shape (n,) [rad/s]."""
+    """Return twelve sines from 0.2 to 25 Hz of random phase, weaker at higher frequency; shape (n,) [rad/s]."""
     time = TICK * np.arange(room.ticks)
     lowest = np.clip(0.5 * room.glide * room.rated / (2.0 * np.pi * room.travel), 0.05, 1.0)
     signal = np.zeros(room.ticks)
@@ -90,7 +90,7 @@ def multisine(room: DriveLimits, rng: np.random.Generator) -> Array:
 
 
 def sines(room: DriveLimits, rng: np.random.Generator) -> Array:
-    """Return a slow sine that uses the travel, and a faster one on it; shape (n,) [rad/s]."""
+    """Return a slow sine that uses the travel, plus a faster one; shape (n,) [rad/s]."""
     time = TICK * np.arange(room.ticks)
     slow = np.clip(0.6 * room.glide * room.rated / (2.0 * np.pi * room.travel), 0.05, 1.0)
     phase, fast = rng.choice((0.0, 0.5)), rng.uniform(2.0, 6.0)
@@ -98,7 +98,7 @@ def sines(room: DriveLimits, rng: np.random.Generator) -> Array:
 
 
 def position_steps(room: DriveLimits, rng: np.random.Generator) -> Array:
-    """Return positions that are held until the loop may have reached them; shape (n,) [m]."""
+    """Return positions that are held long enough for the loop to reach them; shape (n,) [m]."""
     asked, at, last = np.zeros(room.ticks), 0, 0.0
     while at < room.ticks:
         goal = rng.uniform(-1.0, 1.0) * room.travel
@@ -122,10 +122,10 @@ def tracking(room: DriveLimits, rng: np.random.Generator) -> Array:
 Draw = Callable[[DriveLimits, np.random.Generator], Array]
 
 OPEN: Mapping[str, Draw] = {"steps": steps, "multisine": multisine, "prbs": prbs, "sines": sines}
-"""Drives that ask for a motor speed."""
+"""Drives that demand a motor speed."""
 
 CLOSED: Mapping[str, Draw] = {"posn": position_steps, "track": tracking}
-"""Drives that ask for a position."""
+"""Drives that demand a position."""
 
 DRIVES: Mapping[str, Draw] = {**OPEN, **CLOSED}
-"""Every drive by the name that the truth has for it."""
+"""All drives, by their name in the truth."""

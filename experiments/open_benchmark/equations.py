@@ -9,11 +9,12 @@ from experiments.open_benchmark.oil import specific_volume, stiffness
 from plant.arrays import Array
 
 STATES = ("motor_speed", "shaft_angle", "position", "velocity", "pressure_a", "pressure_b", "made_up")
-"""The states: rad/s, rad, m, m/s, stretch pressures of the chambers [Pa], and oil that left the accumulator [m^3]."""
+"""The states: rad/s, rad, m, m/s, stretch pressures of the chambers [Pa], and the oil that left the accumulator
+[m^3]."""
 
 
 def clipped(value: float, low: float, high: float) -> float:
-    """Return a value between two bounds, in its own unit."""
+    """Return a value limited to two bounds, in its own unit."""
     return min(max(value, low), high)
 
 
@@ -38,13 +39,13 @@ def rates(y: Array, stretch: Array, now: Array, demand: float, m: Machine, out: 
     Parameters
     ----------
     y, out : ndarray, shape (7,)
-        States and their rates, each in its unit a second.
+        States and their rates, each rate in its state's unit per second.
     stretch : ndarray, shape (4,)
-        Of the friction's springs [m].
+        Stretch of the friction springs [m].
     now : ndarray, shape (5,)
-        A row of the course.
+        One row of the course.
     demand : float
-        Motor speed asked for [rad/s].
+        Demanded motor speed [rad/s].
     """
     speed, angle, x, v, a, b, made_up = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
     viscosity, wear, air, rough = now[1], now[2], now[3], now[4]

@@ -1,4 +1,4 @@
-"""Kinds with a fault or a change that none of the nine conditions has."""
+"""Kinds with a fault or a change that is in none of the nine conditions."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from experiments.open_benchmark.setup import Setup
 from faults.conditions import LEAKAGE_TABLE
 
 OUTSIDE = (UNKNOWN,)
-"""The verdict on what is none of the nine."""
+"""The right verdict on a log that fits none of the nine."""
 
 
 def _machine(**changes: float) -> Draw:
@@ -22,7 +22,7 @@ def _leaking_seat(setup: Setup, rng: np.random.Generator) -> Setup:
 
 
 def _low_relief(setup: Setup, rng: np.random.Generator) -> Setup:
-    """Set the relief valve between what breaks the piston loose and what it takes near its rated speed."""
+    """Set the relief valve between the piston's breakaway pressure and the pressure near its rated speed."""
     m = setup.machine
     fast = 0.75 * setup.rated_speed * m.displacement / m.area_a
     blocks, film = steady_friction(fast, 1.0, m)
@@ -34,7 +34,7 @@ STARVING = (
     *("minor_friction", "major_friction", "minor_leakage_minor_friction"),
     *("minor_leakage_major_friction", "major_leakage_major_friction"),
 )
-"""Conditions whose pressures empty a chamber that draws no make-up."""
+"""Conditions whose pressures empty a chamber that has no make-up flow."""
 
 FAULTY = (
     Kind(

@@ -1,4 +1,4 @@
-"""Features of a log that need no model of it: what it looks like, and how random kernels respond to it."""
+"""Features of a log that need no model of the actuator: simple statistics, and the response of random kernels."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ TAPS = 9
 
 
 def simple_features(series: Array) -> Array:
-    """Return spread, quantiles and roughness of each channel, and how the channels follow each other.
+    """Return spread, quantiles and roughness of each channel, and relations between channels.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def simple_features(series: Array) -> Array:
     Returns
     -------
     ndarray, shape (logs, 44)
-        Each in its channel's unit, or a ratio of two.
+        Each feature in its channel's unit, or a ratio of two channels.
     """
     speed, _, velocity, pressure = np.moveaxis(series, 1, 0)
     each = [np.std(series, axis=2), np.std(np.diff(series, axis=2), axis=2)]
@@ -40,7 +40,7 @@ def simple_features(series: Array) -> Array:
 
 
 def random_kernels(count: int, samples: int, rng: np.random.Generator) -> list[tuple[Array, Array, int, float]]:
-    """Return kernels as ROCKET draws them: weights, the channels' shares, dilation [samples] and bias.
+    """Return kernels drawn as in ROCKET: weights, the channels' shares, dilation [samples] and bias.
 
     Source: Dempster, Petitjean and Webb, Data Mining and Knowledge Discovery 34 (2020), section 3.1.
 
@@ -64,14 +64,14 @@ def kernel_features(series: Array, kernels: list[tuple[Array, Array, int, float]
     Parameters
     ----------
     series : ndarray, shape (logs, 4, samples)
-        Each channel over its size in the training logs [dimensionless].
+        Each channel divided by its magnitude in the training logs [dimensionless].
     kernels : list of tuple, weights of shape (9,), shares of shape (4,)
-        As `random_kernels` draws them [dimensionless].
+        Kernels from `random_kernels` [dimensionless].
 
     Returns
     -------
     ndarray, shape (logs, 2 kernels)
-        Share of the samples, and the most [dimensionless].
+        Share of samples with a positive response, and the maximum response [dimensionless].
     """
     out = np.empty((len(series), 2 * len(kernels)))
     for k, (weights, shares, dilation, bias) in enumerate(kernels):

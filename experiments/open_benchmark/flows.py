@@ -12,15 +12,15 @@ def orifice_flow(drop: float, coefficient: float) -> float:
     Parameters
     ----------
     drop : float
-        Difference of pressures [Pa].
+        Pressure difference [Pa].
     coefficient : float
-        Flow at one pascal, were it turbulent [m^3/(s Pa^0.5)].
+        Flow at one pascal if it were turbulent [m^3/(s Pa^0.5)].
     """
     return coefficient * drop / math.sqrt(math.sqrt(drop * drop + PRELOAD * PRELOAD))
 
 
 def check_flow(chamber: float, other: float, supply: float, valve: tuple[float, float, float, float]) -> float:
-    """Return the flow of a check valve into its chamber [m^3/s]; a piloted one opens for the other chamber too.
+    """Return the flow of a check valve into its chamber [m^3/s]; the other chamber's pressure also opens a piloted one.
 
     Parameters
     ----------
@@ -37,41 +37,41 @@ def check_flow(chamber: float, other: float, supply: float, valve: tuple[float, 
 
 
 def pump_flow(speed: float, angle: float, m: Machine) -> float:
-    """Return the flow of a gear pump, its teeth felt [m^3/s]; its losses never drive it (errata E8).
+    """Return the flow of a gear pump, including the ripple of its teeth [m^3/s]; its losses never drive it (errata E8).
 
     Parameters
     ----------
     speed : float
-        Of the motor [rad/s].
+        Motor speed [rad/s].
     angle : float
-        Of its shaft [rad].
+        Shaft angle [rad].
     """
     geometric = m.efficiency * m.displacement * speed * (1.0 + m.ripple * math.cos(m.teeth * angle))
     return math.copysign(max(abs(geometric) - m.flow_bias, 0.0), geometric)
 
 
 def filling(pressure: float, air: float, m: Machine) -> float:
-    """Return the filling of a pump's teeth; boiling oil is partly vapour [fraction].
+    """Return the filling of the pump's tooth spaces; boiling oil is partly vapour [fraction].
 
     Parameters
     ----------
     pressure : float
         Stretch pressure of the inlet, absolute [Pa].
     air : float
-        At atmospheric pressure, a unit of oil [dimensionless].
+        Entrained air at atmospheric pressure, per unit of oil [dimensionless].
     """
     return 1.0 if pressure >= m.vapour else specific_volume(m.vapour, air, m) / specific_volume(pressure, air, m)
 
 
 def leakage_flow(drop: float, coefficient: float, m: Machine) -> float:
-    """Return the flow across seals and gaps [m^3/s]: laminar, but for a share that is turbulent.
+    """Return the flow across seals and gaps [m^3/s]: laminar, except for a turbulent share.
 
     Parameters
     ----------
     drop : float
-        Difference of pressures [Pa].
+        Pressure difference [Pa].
     coefficient : float
-        Laminar leakage, or both at the reference pressure [m^3/(s Pa)].
+        Laminar leakage, or the sum of laminar and turbulent leakage at the reference pressure [m^3/(s Pa)].
     """
     laminar = (1.0 - m.turbulent) * coefficient * drop
     return laminar + m.turbulent * orifice_flow(drop, coefficient * math.sqrt(m.turbulent_pressure))
@@ -82,18 +82,18 @@ def oil_flows(
 ) -> tuple[float, float, float]:
     """Return the oil that chamber A and B gain and the accumulator loses, as volume at atmospheric pressure [m^3/s].
 
-    Each flow has the density of the side that it leaves, the pump's that of its outlet, so none is lost.
+    Each flow has the density of the side that it leaves, and the pump's flow that of its outlet, so no oil is lost.
 
     Parameters
     ----------
     pump : tuple of float
         Motor speed [rad/s] and shaft angle [rad].
     pressures : tuple of float
-        Of chamber A and B the stretch pressures, and the accumulator's, absolute [Pa].
+        Stretch pressures of chambers A and B, and the accumulator's pressure, absolute [Pa].
     thin : float
-        By how many times the oil and wear let more through than the machine says [dimensionless].
+        Factor by which thinner oil and wear raise leakage above the machine's value [dimensionless].
     air : float
-        At atmospheric pressure, a unit of oil [dimensionless].
+        Entrained air at atmospheric pressure, per unit of oil [dimensionless].
     """
     supply = pressures[2]
     density_a, density_b = 1.0 / specific_volume(pressures[0], air, m), 1.0 / specific_volume(pressures[1], air, m)

@@ -1,4 +1,4 @@
-"""Writes sets of logs as folders: a file a log, `truth.csv`, and a rig file where one is handed over."""
+"""Writes sets of logs as folders: one file for each log, `truth.csv`, and a rig file if the kind provides one."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,12 +19,12 @@ RIG = "rig.toml"
 
 
 def truth_of(made: MadeLog, split: str, index: int) -> dict[str, Any]:
-    """Return the row of `truth.csv` for a log: coefficients are those in the middle of it.
+    """Return the row of `truth.csv` for a log, with the coefficients at the middle of the log.
 
     Returns
     -------
     dict[str, Any]
-        SI units by name, and words.
+        SI values by name, and text.
     """
     kind, setup, m, change = made.kind, made.setup, made.setup.machine, made.setup.change
     condition, states = CONDITIONS[setup.condition], made.states
@@ -67,7 +67,7 @@ def truth_of(made: MadeLog, split: str, index: int) -> dict[str, Any]:
 
 
 def _rig_text(name: str, note: str, entries: Mapping[str, float]) -> str:
-    """Return a rig file with the given entries only."""
+    """Return a rig file with only the given entries."""
     lines = [f"# {note}", f'name = "{name}"', "", "[parameters]"]
     return "\n".join([*lines, *(f"{entry} = {value!r}" for entry, value in entries.items())]) + "\n"
 
@@ -82,11 +82,11 @@ def write_set(kind: str, split: str, count: int, out: Path, first: int = 0) -> P
     split : str
         One of `SPLITS`.
     count : int
-        Count of logs.
+        Number of logs.
     out : Path
-        Where the folder goes.
+        Folder in which the set's folder is created.
     first : int
-        Index of the first of them.
+        Index of the first log.
 
     Returns
     -------

@@ -1,6 +1,7 @@
 """Friction of spring-loaded blocks (Iwan, J. Appl. Mech. 33, 1966): each sticks until its spring is stretched enough.
 
-It remembers every reversal and needs no rate of its own; while all blocks slip it is the condition's steady curve.
+The model remembers every reversal without rate equations of its own; while all blocks slip, the friction is the
+condition's steady curve.
 """
 
 import math
@@ -9,21 +10,21 @@ from experiments.open_benchmark.machine import Machine
 from plant.arrays import Array
 
 SLIPS = (0.25, 0.6, 1.15, 2.0)
-"""Stretch at which each block slips, in units of `Machine.presliding`; every block carries the same share."""
+"""Stretch at which each block slips, in units of `Machine.presliding`; all blocks carry equal shares."""
 
 MICRO_DAMPING = 0.3
-"""Damping of the blocks that stick, as a share of the critical one [dimensionless]."""
+"""Damping of the blocks that stick, as a share of critical damping [dimensionless]."""
 
 
 def stretched(stretch: Array, moved: float, m: Machine, out: Array) -> None:
-    """Write how far the springs are stretched after the piston moved.
+    """Write the stretch of the springs after the piston moved.
 
     Parameters
     ----------
     stretch, out : ndarray, shape (4,)
-        Before and after [m].
+        Stretch before and after [m].
     moved : float
-        By how much [m].
+        Displacement of the piston [m].
     """
     for i in range(len(SLIPS)):
         most = SLIPS[i] * m.presliding
@@ -33,14 +34,14 @@ def stretched(stretch: Array, moved: float, m: Machine, out: Array) -> None:
 def steady_friction(speed: float, viscosity: float, m: Machine) -> tuple[float, float]:
     """Return the forces of blocks and oil film in steady sliding [N]; their sum is a_1 v^2 + a_2 v + a_3.
 
-    Where a_2 is negative (errata E12) the blocks carry the fall, down to half of a_3.
+    If a_2 is negative (errata E12), the blocks carry the falling part, down to half of a_3.
 
     Parameters
     ----------
     speed : float
-        Of the piston, without sign [m/s].
+        Speed of the piston, without sign [m/s].
     viscosity : float
-        Over that at the start [dimensionless].
+        Viscosity relative to its value at the start [dimensionless].
     """
     blocks = max(m.coulomb + min(m.linear, 0.0) * speed, 0.5 * m.coulomb)
     whole = m.coulomb + (m.linear * viscosity + m.quadratic * speed) * speed
@@ -53,11 +54,11 @@ def friction_force(velocity: float, stretch: Array, viscosity: float, rough: flo
     Parameters
     ----------
     velocity : float
-        Of the piston [m/s].
+        Velocity of the piston [m/s].
     stretch : ndarray, shape (4,)
-        Of the springs [m].
+        Stretch of the springs [m].
     viscosity, rough : float
-        Viscosity and grip of the blocks over those at the start [dimensionless].
+        Viscosity and grip of the blocks relative to their values at the start [dimensionless].
     """
     blocks, film = steady_friction(abs(velocity), viscosity, m)
     share, sticking = 0.0, 0.0

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from typing import Any
 
 OFF = 0.05
-"""Error of bulk modulus from which a silent one counts [fraction]."""
+"""Error of bulk modulus above which it can count as a silent error [fraction]."""
 
 WIDTHS = 3.0
-"""And in half widths of its 95 % interval [dimensionless]."""
+"""The error must also exceed this number of half widths of its 95 % interval [dimensionless]."""
 
 SURE = 0.9
-"""Probability over which a wrong class is a silent error."""
+"""Probability above which a wrong class is a silent error."""
 
 NO_NUMBER = ("failed", "diverged")
 
@@ -31,8 +31,8 @@ def judge_bulk_modulus(said: Entries, truth: Entries) -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        ``error`` [fraction] and ``covered`` (given the rig, and in total), None where there is no number; ``flagged``,
-        ``silent``; ``narrow`` is silent however small the error.
+        ``error`` [fraction] and ``covered`` (given the rig, and in total), None if there is no value; ``flagged``,
+        ``silent``; ``narrow`` is a silent error of any size.
     """
     gate, quantity = said.get("gate") or {}, said.get("bulk_modulus_pa") or {}
     flagged = not gate.get("passed", True) or said["outcome"] in NO_NUMBER
@@ -63,14 +63,14 @@ def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
     said : Mapping
         Entries of the JSON contract.
     truth : Mapping
-        A row of `truth.csv`; ``accept`` holds the verdicts that are right.
+        A row of `truth.csv`; ``accept`` holds the right verdicts.
 
     Returns
     -------
     dict[str, Any]
-        ``verdict`` is right, wrong, unknown, none or failed; ``right`` also where unknown is acceptable.
-        ``false_since``: a condition is said to have begun within a log that has one from end to end.
-        ``since``: what did begin is dated within its interval; None where nothing did.
+        ``verdict`` is right, wrong, unknown, none or failed; ``right`` also if unknown is acceptable. ``false_since``:
+        the diagnosis dates the beginning of a condition within a log that does not change. ``since``: the change is
+        dated within the stated interval; None if nothing changed.
     """
     accept, got = str(truth["accept"]).split(";"), said.get("condition")
     dated = _dated(said, truth)
@@ -90,7 +90,7 @@ def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
 
 
 def _dated(said: Entries, truth: Entries) -> dict[str, Any]:
-    """Return whether what is said of when a condition began is false, and whether it is right."""
+    """Return whether a stated beginning of a condition is false, and whether it is right."""
     ends, began = said.get("since_ci95_s"), str(truth.get("since_s", ""))
     return {
         "false_since": ends is not None and str(truth.get("steady", "")) == "True",
@@ -99,7 +99,7 @@ def _dated(said: Entries, truth: Entries) -> dict[str, Any]:
 
 
 def named(pattern: str, *said: Entries) -> bool | None:
-    """Return whether what was said of a log names its cause; None where nothing need be named."""
+    """Return whether the messages about a log name its cause; None if no cause need be named."""
     if not pattern:
         return None
     sentences = [str(one.get("message") or "") for one in said]

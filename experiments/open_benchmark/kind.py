@@ -10,18 +10,18 @@ from experiments.open_benchmark.setup import Setup
 from faults.conditions import CONDITIONS
 
 OWN = "condition"
-"""Stands for the condition that a log is in, among verdicts that are right."""
+"""Among the right verdicts, stands for the log's own condition."""
 
 UNKNOWN = "unknown"
 
 MAYBE = (OWN, UNKNOWN)
-"""Right is the condition, and that it is not known."""
+"""Both the condition and unknown are right."""
 
 Draw = Callable[[Setup, np.random.Generator], Setup]
 
 
 def unchanged(setup: Setup, rng: np.random.Generator) -> Setup:
-    """Return a setup as it is."""
+    """Return a setup unchanged."""
     del rng
     return setup
 
@@ -33,23 +33,23 @@ class Kind:
     Parameters
     ----------
     name : str
-        Of its set.
+        Name of its set.
     strange : str
-        What is strange, for the truth's notes.
+        The peculiarity in words, for the truth's notes.
     draw : callable
-        From a plain setup to one of this kind.
+        Function from a plain setup to a setup of this kind.
     accept : tuple of str
-        Verdicts that are right: conditions, `OWN`, `UNKNOWN`.
+        Right verdicts: conditions, `OWN`, `UNKNOWN`.
     named : str
-        A regular expression; what a tool says of a log must match it. Empty where nothing need be said.
+        A regular expression that a tool's messages about a log must match; empty if no message is needed.
     drives : tuple of str
-        What the logs are driven with, in turn.
+        Drives of the logs, in turn.
     conditions : tuple of str
         Conditions of the logs, in turn.
     severity : bool
-        Whether the severities of the condition are those of the log, where its condition is a right verdict.
+        Whether the log has the severities of its condition, if the condition is a right verdict.
     draws_anew : bool
-        Whether ``draw`` draws another machine, and keeps of the plain setup its condition and drive alone.
+        Whether ``draw`` draws a new machine and keeps only the condition and drive of the plain setup.
     """
 
     name: str
@@ -63,5 +63,5 @@ class Kind:
     draws_anew: bool = False
 
     def accepted(self, condition: str) -> tuple[str, ...]:
-        """Return the verdicts that are right for a log in this condition."""
+        """Return the right verdicts for a log in this condition."""
         return tuple(condition if verdict == OWN else verdict for verdict in self.accept)

@@ -1,4 +1,4 @@
-"""Every kind of log by name, the splits, and the log that kind, split and index stand for."""
+"""All kinds of log by name, the splits, and the log for a given kind, split and index."""
 
 import zlib
 from collections.abc import Mapping
@@ -24,34 +24,35 @@ from experiments.open_benchmark.setup import Setup
 from plant.errors import HydrostateError, require_known
 
 VERSION = "1.0"
-"""Of the open benchmark: any change of a log, however small, is a new one."""
+"""Version of the open benchmark; any change of a log, however small, needs a new one."""
 
 SPLITS = ("training", "validation", "test")
-"""What may be looked at, what choices may be made on, and what is scored."""
+"""Splits: for learning, for choosing between methods, and for the final score."""
 
 KINDS: Mapping[str, Kind] = {kind.name: kind for kind in (*LOGGERS, *RIGS, *FAULTY, *ADDED)}
-"""Every kind by name."""
+"""All kinds, by name."""
 
 STRIDE = 4
-"""Step through a kind's conditions from log to log, so that few logs hold unlike ones; prime to how many there are."""
+"""Step through a kind's conditions from log to log, so that a few logs have different conditions; coprime to their
+number."""
 
 
 @dataclass(frozen=True, eq=False)
 class MadeLog:
-    """One log and what was true.
+    """One log and its truth.
 
     Parameters
     ----------
     kind : Kind
         Its kind.
     setup : Setup
-        What it was made of.
+        The setup that the log was made from.
     log : pandas.DataFrame, shape (samples, channels)
-        As its file has it.
+        The log as in its file.
     states : ndarray, shape (m, 7)
-        The run, as named in `STATES`, in their units, pressures as they act.
+        States of the run, named as in `STATES`, in their units; pressures are those that act.
     bulk_modulus : tuple of float
-        Effective, lowest and highest that acted [Pa].
+        Lowest and highest effective bulk modulus during the run [Pa].
     """
 
     kind: Kind
@@ -62,12 +63,12 @@ class MadeLog:
 
 
 def kind_of(name: str) -> Kind:
-    """Return a kind by its name; two names with a plus sign between them are the pair of both.
+    """Return a kind by its name; two names joined by a plus sign give the pair of both.
 
     Parameters
     ----------
     name : str
-        One of `KINDS`, or two.
+        One or two names from `KINDS`.
 
     Raises
     ------
@@ -84,16 +85,16 @@ def kind_of(name: str) -> Kind:
 
 
 def drawn_pairs(split: str, count: int) -> list[str]:
-    """Return names of pairs of kinds that do not collide, drawn at random without return; the same for the same split.
+    """Return names of pairs of kinds that do not collide, drawn at random without replacement; a split fixes the draw.
 
-    Those with a kind that was added later come last, so that the first ones stay what they were.
+    Pairs with a kind that was added later come last, so that the first pairs do not change.
 
     Parameters
     ----------
     split : str
         One of `SPLITS`.
     count : int
-        How many, at most all that there are; of more, the first are the same.
+        Number of pairs, limited to all that exist; a larger number adds pairs and keeps the first ones.
     """
     require_known("split", split, SPLITS)
     pairs = [(a, b) for a, b in combinations(KINDS.values(), 2) if not collide(a, b)]
@@ -126,11 +127,11 @@ def make(kind: str, split: str, index: int) -> MadeLog:
     Parameters
     ----------
     kind : str
-        One of `KINDS`, or two with a plus sign between them.
+        One name from `KINDS`, or two joined by a plus sign.
     split : str
         One of `SPLITS`.
     index : int
-        Which log, from 0.
+        Index of the log, from 0.
     """
     drawing, driving, logging = np.random.default_rng(seed_of(kind, split, index)).spawn(3)
     one = kind_of(kind)
@@ -144,9 +145,9 @@ def make(kind: str, split: str, index: int) -> MadeLog:
 
 
 def _stiffnesses(setup: Setup, states: NDArray[np.float64], air: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the ends of bulk modulus over a run, one percent of the pressures left out at either end.
+    """Return the range of bulk modulus over a run, excluding one percent of the pressures at either end.
 
-    It is the oil's at atmospheric pressure by the project's convention, unless air or a stiffening oil change it.
+    It is the oil's value at atmospheric pressure by the project's convention, unless air or a stiffening oil change it.
     """
     m = setup.machine
     if np.max(air) == 0.0 and m.stiffening == Machine().stiffening:

@@ -1,4 +1,4 @@
-"""Reads sets of logs into pandas, and into the arrays ``(X, y, groups)`` that scikit-learn takes."""
+"""Reads sets of logs into pandas, or into the arrays ``(X, y, groups)`` that scikit-learn takes."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from plant.errors import HydrostateError
 
 
 def read_truth(folder: Path) -> pd.DataFrame:
-    """Return the truth of a set, a row a log; what is not said is an empty text.
+    """Return the truth of a set, one row for each log; missing entries are empty texts.
 
     Raises
     ------
@@ -29,12 +29,12 @@ def read_truth(folder: Path) -> pd.DataFrame:
 
 
 def rows_of(truth: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return the rows of a truth, by the names of its columns."""
+    """Return the rows of a truth as dictionaries by column name."""
     return [{str(name): value for name, value in row.items()} for row in truth.to_dict("records")]
 
 
 def read_logs(folder: Path) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
-    """Yield the truth of each log of a set, and the log as its file has it."""
+    """Yield the truth of each log of a set, and the log as in its file."""
     for truth in rows_of(read_truth(folder)):
         yield truth, pd.read_csv(folder / str(truth["file"]))
 
@@ -42,23 +42,23 @@ def read_logs(folder: Path) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
 def read_arrays(
     folders: Sequence[Path], duration: float = 10.0, sample_time: float = 1e-3
 ) -> tuple[Array, NDArray[np.str_], NDArray[np.str_]]:
-    """Return logs as scikit-learn wants them: the first seconds of each on one clock.
+    """Return logs as arrays for scikit-learn: the beginning of each on one clock.
 
     Parameters
     ----------
     folders : sequence of Path
-        Sets, each with `truth.csv`.
+        Folders of sets, each with `truth.csv`.
     duration, sample_time : float
-        How much of each log, and its clock [s]; a shorter log holds its last values.
+        Duration and sample time to use from each log [s]; a shorter log is padded with its last values.
 
     Returns
     -------
     X : ndarray, shape (logs, 4 samples)
-        Motor speed, position, velocity and differential pressure, one behind the other, SI; NaN where not logged.
+        Motor speed, position, velocity and differential pressure, concatenated, SI; NaN if not logged.
     y : ndarray, shape (logs,)
-        The condition of each.
+        Condition of each log.
     groups : ndarray, shape (logs,)
-        Its set.
+        Set of each log.
     """
     clock = np.arange(0.0, duration, sample_time)
     series, conditions, groups = list[Array](), list[str](), list[str]()

@@ -1,4 +1,4 @@
-"""Sensors and logger: the file of a run, with noise, delays and other errors of a bench."""
+"""Sensors and logger: the log of a run, with noise, delays and other errors of a test bench."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,28 +25,27 @@ class Sensor:
     Parameters
     ----------
     noise, quantum : float
-        Standard deviation, and resolution; 0 resolves all [unit of the channel].
+        Standard deviation and resolution; 0 for no quantisation [unit of the channel].
     gain : float
-        What is logged over what is true, less the offset [dimensionless].
+        Ratio of the logged value, less the offset, to the true one [dimensionless].
     offset : float
-        What is logged of nothing [unit of the channel].
+        Logged value at a true value of zero [unit of the channel].
     lag, delay : float
-        Of first order, and pure [s].
+        Time constant of a first-order lag, and pure delay [s].
     corner : float
-        Of a low-pass of second order, a Butterworth's; 0 passes all [Hz].
+        Corner frequency of a second-order Butterworth low-pass; 0 for no filter [Hz].
     hold : int
-        Rows of the logger over which it repeats its last sample [samples].
+        Number of logger rows over which the sensor repeats its last sample [samples].
     average : int
-        Rows over which the logger averages what it reads, a moving average [samples].
+        Number of rows in the logger's moving average [samples].
     drift : float
-        What the offset gains from the first row to the last, evenly [unit of the channel].
+        Change of the offset from the first row to the last, linear in time [unit of the channel].
     play : float
-        How far the quantity moves after it turns round before the sensor follows [unit of the channel].
+        Backlash: movement after a reversal before the sensor follows [unit of the channel].
     hum : float
-        Amplitude of what a cable picks up of the mains; a fifth of it comes at three times their frequency [unit of the
-        channel].
+        Amplitude of mains hum picked up by the cable; the third harmonic has a fifth of it [unit of the channel].
     hum_frequency : float
-        Of the mains [Hz].
+        Mains frequency [Hz].
     """
 
     noise: float = 0.0
@@ -64,21 +63,21 @@ class Sensor:
     hum_frequency: float = 50.0
 
     def read(self, time: Array, fine: Array, values: Array, rng: np.random.Generator) -> Array:
-        """Return the logged channels.
+        """Return the logged channel.
 
         Parameters
         ----------
         time : ndarray, shape (n,)
-            When it samples [s].
+            Sample times of the sensor [s].
         fine, values : ndarray, shape (m,)
-            When the run has its quantity [s], and it [unit of the channel].
+            Times and values of the quantity in the run [s, unit of the channel].
         rng : numpy.random.Generator
             Source of noise.
 
         Returns
         -------
         ndarray, shape (n,)
-            [unit of the channel].
+            Logged values [unit of the channel].
         """
         sensed = _followed(values, self.play) if self.play > 0.0 else values
         sensed = _lagged(sensed, self.lag / RECORD) if self.lag > 0.0 else sensed
@@ -99,7 +98,7 @@ class Sensor:
 
 
 def _lagged(values: Array, records: float) -> Array:
-    """Return values behind a first-order lag, given in records."""
+    """Return values after a first-order lag whose time constant is given in records."""
     from scipy.signal import lfilter
 
     pole = np.exp(-1.0 / records)
@@ -107,7 +106,7 @@ def _lagged(values: Array, records: float) -> Array:
 
 
 def _passed(values: Array, corner: float) -> Array:
-    """Return values behind a Butterworth low-pass of second order, its corner in units of 1/`RECORD`."""
+    """Return values after a second-order Butterworth low-pass, its corner in units of 1/`RECORD`."""
     from scipy.signal import butter, lfilter
 
     over, under = butter(2, 2.0 * corner)
@@ -115,13 +114,13 @@ def _passed(values: Array, corner: float) -> Array:
 
 
 def _averaged(values: Array, rows: int) -> Array:
-    """Return the mean over the last rows; before the first row, its own value counts."""
+    """Return the moving average of the last rows, with the first value extended to before the first row."""
     sums = np.cumsum(np.concatenate([np.full(rows, values[0]), values]))
     return (sums[rows:] - sums[:-rows]) / rows
 
 
 def _followed(values: Array, play: float) -> Array:
-    """Return the output of a play that starts in its middle."""
+    """Return the output of a play (backlash) that starts in its middle."""
     out, at = np.empty_like(values), float(values[0])
     for k, value in enumerate(values.tolist()):
         at = min(max(at, value - 0.5 * play), value + 0.5 * play)
@@ -142,21 +141,22 @@ class Logger:
     Parameters
     ----------
     sensors : Mapping[str, Sensor]
-        By channel.
+        Sensors by channel.
     channels : tuple of str
-        What is logged, in the order of the columns.
+        Logged channels, in column order.
     headings : Mapping[str, str]
-        What a column is called where it is not what its channel is.
+        Column name of a channel, if it differs from the channel's name.
     sample_time : float
-        [s].
+        Sample time [s].
     jitter : float
-        Half width of what the clock is off, a fraction of the sample time; it is logged truly.
+        Half width of the clock's jitter, as a fraction of the sample time; the log has the true times.
     begin : float
-        How long the machine runs before the log begins [s].
+        Time that the machine runs before the log begins [s].
     stalls : int
-        How often the computer that stamps rows is busy; what it samples meanwhile waits, and is stamped at once.
+        Number of times that the computer that stamps rows is busy; rows sampled meanwhile wait and are then stamped
+        together.
     stall : float
-        How long [s].
+        Duration of a stall [s].
     """
 
     sensors: Mapping[str, Sensor] = field(default_factory=_sensors)
@@ -169,12 +169,12 @@ class Logger:
     stall: float = 0.0
 
     def log(self, states: Array, rng: np.random.Generator) -> pd.DataFrame:
-        """Return the log of a run, shape (samples, 1 + channels), columns as they are called in its file.
+        """Return the log of a run, shape (samples, 1 + channels), with the column names of its file.
 
         Parameters
         ----------
         states : ndarray, shape (m, 7)
-            The run, as named in `STATES`.
+            States of the run, named as in `STATES`.
         rng : numpy.random.Generator
             Source of noise and jitter.
         """

@@ -1,4 +1,4 @@
-"""Kinds whose actuator is the rig file's, and whose sensors or logger add something."""
+"""Kinds whose actuator matches the rig file, with a peculiarity of sensors or logger."""
 
 from experiments.open_benchmark.drives import CLOSED
 from experiments.open_benchmark.kind import MAYBE, UNKNOWN, Draw, Kind
@@ -26,13 +26,13 @@ def _speed(**changes: float) -> Draw:
 
 
 RPM = 30.0 / 3.141592653589793
-"""Revolutions a minute in a radian a second."""
+"""Conversion from radians per second to revolutions per minute."""
 
 LATE = r"\b(?:lags?|late|delay)"
-"""Words for a channel behind the others."""
+"""Words for a channel that lags the others."""
 
 REVERSED = r"\bsign\b|reversed|other way|opposite"
-"""Words for one that counts the wrong way."""
+"""Words for a channel with reversed sign."""
 
 LOGGERS = (
     Kind("plain", "nothing: the paper's actuator, travel up to 200 mm"),
@@ -159,4 +159,4 @@ LOGGERS = (
         r"swap|exchang|mixed up|each other",
     ),
 )
-"""Kinds that the rig file describes, by sensor and logger."""
+"""Kinds with a peculiarity of sensor or logger; the rig file describes their actuator."""

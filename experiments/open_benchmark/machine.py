@@ -1,7 +1,7 @@
-"""The actuator that the open benchmark runs: what its equations in `oil`, `flows`, `friction` and `equations` need, SI.
+"""The actuator that the open benchmark simulates: parameters of `oil`, `flows`, `friction` and `equations`, SI.
 
-These files share no model with `plant/` and `estimation/`: pressures are the states and densities follow, friction is a
-row of spring-loaded blocks, check valves are orifices that crack open, and the motor has a current limit.
+These files share no model with `plant/` and `estimation/`: pressures are the states and determine the densities,
+friction is a row of spring-loaded blocks, check valves are orifices that crack open, and the motor has a current limit.
 """
 
 from typing import Annotated, NamedTuple
@@ -10,13 +10,13 @@ from plant.eha.model import EhaParameters
 from plant.units import SI
 
 ATMOSPHERE = 101325.0
-"""Absolute pressure at which oil and air are counted [Pa]."""
+"""Absolute pressure at which amounts of oil and air are measured [Pa]."""
 
 PRELOAD = 2e3
 """Pressure drop below which an orifice is laminar [Pa]."""
 
 LIFT = 2e4
-"""Pressure from where a check valve cracks to where it is wide open [Pa]."""
+"""Pressure range over which a check valve goes from cracked to fully open [Pa]."""
 
 
 class Machine(NamedTuple):

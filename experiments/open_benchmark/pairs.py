@@ -1,4 +1,4 @@
-"""Two strange things in one log: which kinds can be laid over each other, and the kind that both make."""
+"""Two peculiarities in one log: which kinds can be combined, and the kind that a pair makes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -14,19 +14,19 @@ from experiments.open_benchmark.setup import Setup
 from plant.errors import HydrostateError
 
 BOTH = "+"
-"""Between the names of a pair."""
+"""Separator between the names of a pair."""
 
 
 def pair_of(first: Kind, second: Kind) -> Kind:
-    """Return the kind of log in which two kinds are at once, drawn one after the other.
+    """Return the kind of log that combines two kinds, drawn one after the other.
 
-    Right is the class on which both agree; it may be unknown where one of them may be. Both causes must be named. The
-    drives are those of the kind that needs a position loop, where one does.
+    The right class is the one on which both agree; unknown is right if it is right for either. Both causes must be
+    named. If one kind needs a position loop, the pair uses its drives.
 
     Parameters
     ----------
     first, second : Kind
-        Two that do not collide, see `collide`.
+        Two kinds that do not collide, see `collide`.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def pair_of(first: Kind, second: Kind) -> Kind:
 
 
 def _both(first: Kind, second: Kind, setup: Setup, rng: np.random.Generator) -> Setup:
-    """Return a plain log with the changes of both kinds; a kind that draws another machine comes first."""
+    """Return a plain log with the changes of both kinds; a kind that draws a new machine comes first."""
     for kind in (second, first) if second.draws_anew else (first, second):
         setup = kind.draw(setup, rng)
     return setup
@@ -58,8 +58,8 @@ def _both(first: Kind, second: Kind, setup: Setup, rng: np.random.Generator) -> 
 def collide(first: Kind, second: Kind) -> bool:
     """Return whether two kinds cannot be in one log.
 
-    They cannot where both change one and the same thing of machine, sensor, logger or rig file, where both are driven
-    in ways of their own, where no condition is in both, and where one changes nothing.
+    They collide if both change the same part of machine, sensor, logger or rig file, if both have drives of their own,
+    if they share no condition, or if one of them changes nothing.
     """
     changes = touched(first), touched(second)
     return not all(changes) or bool(changes[0] & changes[1]) or not _shared(first, second)
@@ -70,7 +70,7 @@ def _shared(first: Kind, second: Kind) -> tuple[str, ...]:
 
 
 def _accepted(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
-    """Return the verdicts that are right for both; classes of a kind that names its own count, not the condition."""
+    """Return the right verdicts for both; the classes that a kind names itself take precedence over the condition."""
     unknown = (UNKNOWN,) if UNKNOWN in (*first, *second) else ()
     classes = [[verdict for verdict in one if verdict != UNKNOWN] for one in (first, second)]
     own = [one for one in classes if one != [OWN]]
@@ -80,7 +80,7 @@ def _accepted(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
 
 @cache
 def touched(kind: Kind) -> frozenset[str]:
-    """Return the parts of a plain log that a kind changes, its own drives included."""
+    """Return the parts of a plain log that a kind changes, including its drive."""
     plain = draw_plain(kind.conditions[0], kind.drives[0], np.random.default_rng(0))
     before, after = _parts(plain), _parts(kind.draw(plain, np.random.default_rng(1)))
     changed = {name for name in {*before, *after} if before.get(name) != after.get(name)}
@@ -88,7 +88,7 @@ def touched(kind: Kind) -> frozenset[str]:
 
 
 def _parts(setup: Setup) -> Mapping[str, Any]:
-    """Return all that a log is made of, one value a name."""
+    """Return all parts of a setup as values by name."""
     logger, change = setup.logger, setup.change
     parts: dict[str, Any] = {f"machine {name}": value for name, value in setup.machine._asdict().items()}
     parts |= {f"change {one.name}": getattr(change, one.name) for one in fields(change)}

@@ -1,4 +1,4 @@
-"""Kinds of another actuator: one that its rig file describes, one that it does not, and one with a load."""
+"""Kinds with another actuator: one that its rig file describes, one that it does not, and one with a load."""
 
 from dataclasses import replace
 
@@ -16,19 +16,19 @@ RIG_ENTRIES = (
     *("pump_displacement", "piston_area", "chamber_volume", "moving_mass", "leakage_coefficient", "flow_bias"),
     *("friction_quadratic", "friction_linear", "friction_coulomb"),
 )
-"""What the rig file of another actuator says."""
+"""Entries in the rig file of another actuator."""
 
 SINGLE_ROD = 0.7
-"""Area of the rod's side over that of the other."""
+"""Ratio of the rod-side area to the other."""
 
 
 def _scaled(**factors: float) -> Draw:
-    """Return the differences of a machine from the rig file, by field."""
+    """Return the fields of a machine that differ from the rig file."""
     return lambda setup, _: setup.with_machine(**{n: k * getattr(setup.machine, n) for n, k in factors.items()})
 
 
 def _factor(low: float, high: float, *names: str) -> Draw:
-    """Return the difference of a machine from the rig file by one factor, log-uniformly drawn."""
+    """Return the difference between a machine and its rig file by one factor, drawn log-uniformly."""
 
     def draw(setup: Setup, rng: np.random.Generator) -> Setup:
         factor = float(np.exp(rng.uniform(np.log(low), np.log(high))))
@@ -38,7 +38,7 @@ def _factor(low: float, high: float, *names: str) -> Draw:
 
 
 def _oil(low: float, high: float) -> Draw:
-    """Return a draw of the oil's bulk modulus, evenly in its logarithm [Pa]."""
+    """Return a log-uniform draw of the oil's bulk modulus [Pa]."""
     return lambda setup, rng: setup.with_machine(bulk_modulus=float(np.exp(rng.uniform(np.log(low), np.log(high)))))
 
 
@@ -122,4 +122,4 @@ RIGS = (
         severity=False,
     ),
 )
-"""Kinds of another actuator. Where the rig file is wrong, the condition's own coefficients are true."""
+"""Kinds with another actuator. If the rig file is wrong, the condition's own coefficients are the truth."""

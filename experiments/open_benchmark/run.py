@@ -1,4 +1,4 @@
-"""Runs the equations of motion by Heun's method, in small steps of one size, compiled."""
+"""Runs the equations of motion by Heun's method with a small fixed step, compiled."""
 
 import math
 from collections.abc import Callable
@@ -32,15 +32,15 @@ def advance(y: Array, stretch: Array, now: Array, demand: float, m: Machine, ste
     y : ndarray, shape (7,)
         `STATES`.
     stretch : ndarray, shape (4,)
-        Of the friction's springs [m].
+        Stretch of the friction springs [m].
     now : ndarray, shape (5,)
-        A row of the course.
+        One row of the course.
     demand : float
-        Motor speed asked for [rad/s].
+        Demanded motor speed [rad/s].
     step : float
-        [s].
+        Step size [s].
     work : ndarray, shape (4, 7)
-        Room for rates and predictions, in the states' units.
+        Work space for rates and predictions, in the states' units.
     """
     first, second, ahead, pulled = work[0], work[1], work[2], work[3]
     rates(y, stretch, now, demand, m, first)
@@ -54,18 +54,18 @@ def advance(y: Array, stretch: Array, now: Array, demand: float, m: Machine, ste
 
 
 def trajectory(m: Machine, course: Array, y: Array, stretch: Array, substeps: int, out: Array) -> None:
-    """Write the states at every `RECORD`; the controller's clock is the course's.
+    """Write the states at every `RECORD`; the controller runs on the clock of the course.
 
     Parameters
     ----------
     course : ndarray, shape (n, 5)
         `COURSE` at every `TICK`.
     y : ndarray, shape (7,)
-        States at the start; those at the end afterwards, in their units.
+        States at the start, overwritten by those at the end, in their units.
     stretch : ndarray, shape (4,)
-        Of the friction's springs [m].
+        Stretch of the friction springs [m].
     substeps : int
-        Steps a record.
+        Steps per record.
     out : ndarray, shape (10 n, 7)
         The states.
     """
@@ -88,7 +88,7 @@ PARTS = (
     *(orifice_flow, check_flow, pump_flow, filling, leakage_flow, oil_flows),
     *(stretched, steady_friction, friction_force, stop_force, rates, advance, trajectory),
 )
-"""Functions of the compiled run, each behind those that it calls."""
+"""Functions of the compiled run, each after those that it calls."""
 
 
 @cache
@@ -115,7 +115,7 @@ def run(m: Machine, course: Array, start: Array | None = None, refine: int = 1) 
     start : ndarray, shape (7,), optional
         States at the start, in their units; at rest if not given.
     refine : int
-        By how many times the steps are finer than they need be.
+        Factor by which the steps are finer than necessary.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def run(m: Machine, course: Array, start: Array | None = None, refine: int = 1) 
 
 
 def substeps_for(m: Machine, speed: float) -> int:
-    """Return steps a record of at most 20 us that keep the decay of the oil film stable twice over.
+    """Return the steps per record: at most 20 us each, and stable for the decay of the oil film with a margin of two.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Scores what ships on sets of logs: every log is read, estimated and diagnosed as a user would, with its rig file."""
+"""Scores this package on sets of logs: every log is read, estimated and diagnosed as by a user, with its rig file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -20,13 +20,13 @@ from plant.errors import HydrostateError
 FAILED: Mapping[str, Any] = {"outcome": "failed"}
 
 OF_PRESSURE = "pressure_"
-"""What the names of kinds begin with of which the pressure sensor alone is strange: without pressure they are plain."""
+"""Prefix of the kinds in which only the pressure sensor is peculiar; without pressure they are plain."""
 
 Z = "z_"
-"""What the names of columns of errors over their deviations begin with."""
+"""Prefix of the columns with normalised errors (error over standard deviation)."""
 
 LOSSES = ("leakage_coefficient", "flow_bias")
-"""What `estimate` tells beside bulk modulus."""
+"""Quantities that `estimate` gives in addition to bulk modulus."""
 
 COEFFICIENTS: Mapping[str, str] = {
     "leakage_coefficient": "leak_coeff",
@@ -36,18 +36,18 @@ COEFFICIENTS: Mapping[str, str] = {
     "friction_linear": "a2",
     "friction_coulomb": "a3",
 }
-"""Parameters that a truth gives, by its column."""
+"""Parameters in a truth, with their columns."""
 
 
 def score_set(folder: Path, count: int, *, pressure: bool) -> Iterator[dict[str, Any]]:
-    """Yield a row for each of the first logs of a set.
+    """Yield one row for each of the first logs of a set.
 
     Parameters
     ----------
     folder : Path
-        With `truth.csv`.
+        Folder with `truth.csv`.
     count : int
-        Of logs, at most.
+        Maximum number of logs.
     pressure : bool
         Whether pressure may be used.
 
@@ -69,7 +69,7 @@ def score_set(folder: Path, count: int, *, pressure: bool) -> Iterator[dict[str,
 
 
 def without_pressure(truth: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the truth of a log whose pressure is not used: what is strange of that sensor alone is not there.
+    """Return the truth of a log whose pressure is not used: a peculiarity of the pressure sensor alone is removed.
 
     Parameters
     ----------
@@ -79,15 +79,15 @@ def without_pressure(truth: Mapping[str, Any]) -> Mapping[str, Any]:
     Returns
     -------
     Mapping[str, Any]
-        Where the pressure sensor alone is strange, the row of a plain log: its condition is the one right verdict, and
-        nothing need be named. Any other row as it was.
+        If only the pressure sensor is peculiar, the row of a plain log: its condition is the only right verdict, and
+        nothing need be named. Otherwise the row unchanged.
     """
     of_pressure = str(truth.get("set", "")).startswith(OF_PRESSURE) and truth.get("condition")
     return {**truth, "accept": truth["condition"], "named": ""} if of_pressure else truth
 
 
 def _answers(folder: Path, truth: Mapping[str, Any], pressure: bool) -> tuple[Any, Any, EhaParameters]:
-    """Return the entries of both verbs, and the healthy actuator that they were told."""
+    """Return the entries of both verbs, and the healthy actuator that they were given."""
     from hydrostate import read
 
     rig = folder / truth["rig"] if truth["rig"] else None
@@ -109,9 +109,9 @@ def _asked(log: Log, verb: str, pressure: bool) -> Mapping[str, Any]:
 def _errors(
     estimated: Mapping[str, Any], said: Mapping[str, Any], truth: Mapping[str, Any], healthy: EhaParameters
 ) -> dict[str, float]:
-    """Return the error of what both verbs tell over its deviation given the rig, by name: 0 within a range of truths.
+    """Return the normalised error of what both verbs give, given the rig, by name: 0 within a range of truths.
 
-    Severities are meant by the project's own definition of each. Losses count where the estimate passes its check.
+    Severities follow the project's own definition of each. Losses count only if the estimate passes its check.
     """
     from dataclasses import replace
 
@@ -130,18 +130,18 @@ def _errors(
 
 
 def _beyond(ci: Sequence[float], truths: tuple[float, float]) -> float:
-    """Return how far the middle of an interval is from the nearest of a range of truths, in its deviations."""
+    """Return the distance of an interval's middle from the nearest of a range of truths, in standard deviations."""
     middle = 0.5 * (ci[0] + ci[1])
     return NORMAL_95 * (middle - min(max(middle, truths[0]), truths[1])) / (0.5 * (ci[1] - ci[0]))
 
 
 def coverage(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """Return a line a set and quantity: how often 95 % intervals given the rig cover, and whether they are too narrow.
+    """Return one row for each set and quantity: coverage of 95 % intervals given the rig; tells if they are too narrow.
 
     Returns
     -------
     pandas.DataFrame
-        ``z`` is the error over its deviation by root mean square, 1 where intervals are right [dimensionless].
+        ``z`` is the root mean square of the normalised error, 1 if intervals are right [dimensionless].
     """
     table, lines = pd.DataFrame(rows), list[dict[str, Any]]()
     columns = [str(one) for one in table.columns if str(one).startswith(Z)]
@@ -157,7 +157,7 @@ def coverage(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """Return one line a set and sensors: counts, errors [%] and processor time a log [s]."""
+    """Return one row for each set and sensors: counts, errors [%] and processor time per log [s]."""
     lines: list[dict[str, Any]] = []
     for (name, pressure), part in pd.DataFrame(rows).groupby(["set", "pressure"], sort=False):
         sizes = 100.0 * part["error"].dropna().astype(float).abs()

@@ -1,4 +1,4 @@
-"""One log before it is run: actuator, drive, logger, and what changes over time."""
+"""Setup of one log: actuator, drive, logger, and what changes over time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -16,17 +16,17 @@ class Change:
     Parameters
     ----------
     viscosity, wear : float
-        Over those at the start, at the end; both run evenly in their logarithm [dimensionless].
+        Values at the end relative to those at the start; both change exponentially in time [dimensionless].
     air, late_air : float
-        Entrained air at atmospheric pressure throughout, and from `late_from` on, a unit of oil [dimensionless].
+        Entrained air at atmospheric pressure, throughout and from `late_from` on, per unit of oil [dimensionless].
     late_wear : float
-        Leakage over that before, from `late_from` on, at once [dimensionless].
+        Factor by which leakage jumps at `late_from` [dimensionless].
     late_from : float
-        Part of the log after which late air is in, or late wear [fraction].
+        Time at which late air or late wear begins, as a share of the log [fraction].
     bursts : int
-        How often friction grips.
+        Number of times that friction grips.
     grip : float
-        How strongly, over the Coulomb friction [dimensionless].
+        Strength of the grip relative to Coulomb friction [dimensionless].
     """
 
     viscosity: float = 1.0
@@ -46,7 +46,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Setup:
-    """All that a log is made of.
+    """Everything that defines a log.
 
     Parameters
     ----------
@@ -57,19 +57,19 @@ class Setup:
     drive : str
         One of `DRIVES`.
     travel : float
-        How far the drive takes the piston to either side, at most [m].
+        Maximum travel of the drive to either side [m].
     duration : float
-        [s].
+        Duration [s].
     logger : Logger
-        What writes it down.
+        Logger of the log.
     change : Change
-        What changes meanwhile.
+        Changes during the log.
     rig : Mapping[str, float]
-        What the rig file says, SI units; empty where none is handed over and the paper's is assumed.
+        Entries of the rig file, SI units; empty if there is none and the paper's is assumed.
     forward_first : bool
         Whether the first move is forward.
     rated_speed : float
-        Of the drives [rad/s].
+        Rated speed of the drives [rad/s].
     """
 
     condition: str
@@ -84,44 +84,44 @@ class Setup:
     rated_speed: float = EhaParameters().rated_speed
 
     def with_machine(self, **changes: float) -> "Setup":
-        """Return a setup whose machine differs.
+        """Return a setup with a changed machine.
 
         Parameters
         ----------
         **changes : float
-            Values by field, SI.
+            New values by field, SI.
         """
         return replace(self, machine=self.machine._replace(**changes))
 
     def with_sensor(self, channels: tuple[str, ...], **changes: float) -> "Setup":
-        """Return a setup whose channels have other sensors.
+        """Return a setup with changed sensors.
 
         Parameters
         ----------
         channels : tuple of str
-            Which.
+            Channels to change.
         **changes : float
-            Fields of `Sensor` [unit of the channel].
+            New values by field of `Sensor` [unit of the channel].
         """
         sensors = dict(self.logger.sensors)
         sensors |= {name: replace(sensors[name], **changes) for name in channels}
         return self.with_logger(sensors=sensors)
 
     def with_logger(self, **changes: Any) -> "Setup":
-        """Return a setup whose logger has other fields."""
+        """Return a setup with a changed logger."""
         return replace(self, logger=replace(self.logger, **changes))
 
     def with_change(self, **changes: Any) -> "Setup":
-        """Return a setup over which something else changes."""
+        """Return a setup with other changes over time."""
         return replace(self, change=replace(self.change, **changes))
 
     def begins(self, share: float) -> float:
-        """Return the time in the log at which something comes in.
+        """Return the time in the log at which a change begins.
 
         Parameters
         ----------
         share : float
-            When it comes, of the run [fraction].
+            When it begins, as a share of the run [fraction].
 
         Returns
         -------

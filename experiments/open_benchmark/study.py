@@ -1,4 +1,4 @@
-"""The baselines beside what ships: who names the condition of plain logs, of strange ones, and of none of the nine."""
+"""Baselines compared with this package: shares of right verdicts on plain logs, strange logs, and outside faults."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -28,10 +28,10 @@ STRANGE = (
     *("plain", "closed_loop", "stiff_oil", "rig_mass_wrong", "pressure_lags_2_ms", "pressure_gain_20_percent_high"),
     *("worn_pump", "makeup_check_leaks", "pressure_reversed"),
 )
-"""Kinds of logs that the page shows: first the one that was learnt, last those outside the nine conditions."""
+"""Kinds of logs on the page: first the kind used for training, last those outside the nine conditions."""
 
 SERIES = (8.0, 4e-3)
-"""How much of a log the learners see, and on which clock [s]."""
+"""Duration and sample time of the part of a log that the learners see [s]."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class BaselineSettings:
     Parameters
     ----------
     training : int
-        Plain logs to learn from; nine are one of each condition [count].
+        Plain logs for training; nine logs give one of each condition [count].
     test : int
         Logs of each kind to judge [count].
     """
@@ -70,7 +70,7 @@ def find(settings: BaselineSettings, track: Track) -> Found:
 
 
 def learnt(seen: Sequence[Path], judged: Sequence[Path]) -> dict[str, Names]:
-    """Return the verdicts of every learner that is installed, on the logs of the sets in their order."""
+    """Return the verdicts of every installed learner on the logs of the sets, in their order."""
     X, y, _ = read_arrays(seen, *SERIES)
     other = _series(read_arrays(judged, *SERIES)[0])
     found: dict[str, Names] = {}
@@ -83,12 +83,12 @@ def learnt(seen: Sequence[Path], judged: Sequence[Path]) -> dict[str, Names]:
 
 
 def _series(X: Array) -> Array:
-    """Return series by channel, what is not logged as zero; shape (logs, 4, samples), SI."""
+    """Return series by channel, with zeros for channels that are not logged; shape (logs, 4, samples), SI."""
     return np.nan_to_num(X.reshape(len(X), 4, -1))
 
 
 def by_rmse(judged: Iterable[Path]) -> Names:
-    """Return the condition whose lumped model misses each log least, as in the paper's Table 5."""
+    """Return the condition whose lumped model has the smallest error on each log, as in the paper's Table 5."""
     bank = mathematical_bank(EhaParameters())
     files = [folder / str(row["file"]) for folder in judged for row in rows_of(read_truth(folder))]
     return np.array([score_mathematical(read_record(file), bank).condition for file in files])
@@ -100,14 +100,14 @@ def right_shares(judged: Sequence[Path], said: Names) -> dict[str, float]:
     Parameters
     ----------
     judged : sequence of Path
-        Sets.
+        Folders of the sets.
     said : ndarray, shape (logs,)
-        Its verdicts, set by set.
+        Verdicts of the method, set by set.
 
     Returns
     -------
     dict[str, float]
-        [%].
+        Accuracy [%].
     """
     shares, at = dict[str, float](), 0
     for folder in judged:

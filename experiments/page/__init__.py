@@ -1,1 +1,1 @@
-"""One page renderer, one figure style, one result folder."""
+"""The page renderer, the figure style, and the result folder, shared by all."""

@@ -1,4 +1,4 @@
-"""Charts that a reader zooms: panels over one x axis, their numbers inside the page, and a still picture of them."""
+"""Charts that a reader can zoom: panels over one x axis, with their numbers embedded, and a still picture of them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from experiments.page.still import DAYS, still_picture
 from plant.arrays import Array
 
 MOST_DRAWN = 200_000
-"""Values of a series that a page carries at most [count], as many as 20 s at 10 kHz; of a longer one it carries the
-ends of stretches."""
+"""Largest number of values of a series stored in a page [count], which is 20 s at 10 kHz. For a longer series, the page
+stores the minimum and maximum of each interval."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,17 +27,17 @@ class Charts:
     Parameters
     ----------
     x : ndarray, shape (n,)
-        Places of the values, rising [unit of the label].
+        Positions of the values, rising [unit of the label].
     label : str
-        Of the x axis, with its unit.
+        Label of the x axis, with its unit.
     file : str
-        What a download is called, without suffix.
+        File name of a download, without suffix.
     group : str
-        Charts of one group zoom together.
+        Name of a group of charts that zoom together.
     log : bool
-        Whether the x axis is logarithmic; all places are then above zero.
+        Whether the x axis is logarithmic; all positions must then be above zero.
     dates : bool
-        Whether places are dates, in days since 1970-01-01.
+        Whether positions are dates, in days since 1970-01-01.
     """
 
     x: Array
@@ -49,7 +49,7 @@ class Charts:
     dates: bool = False
 
     def html(self, name: str, caption: str) -> Markup:
-        """Return the figure with its numbers, the still picture of them, and a table of their ranges.
+        """Return the figure with its numbers, their still picture, and a table of their ranges.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ def _carried(values: Array) -> Mapping[str, Any]:
 
 
 def _places(x: Array, length: int) -> Mapping[str, Any]:
-    """Return the x axis: start and step where it is uniform, else its values."""
+    """Return the x axis: start and step if it is uniform, else its values."""
     count = len(x)
     step = float(x[-1] - x[0]) / max(count - 1, 1)
     if np.allclose(np.diff(x), step, rtol=1e-3, atol=0.0) and step > 0.0:

@@ -1,4 +1,4 @@
-"""Names of conditions for a reader; imports nothing, so that a verb on a log starts fast."""
+"""Names of conditions for readers; imports nothing, so that a verb on a log starts fast."""
 
 LEVELS = ("none", "minor", "major")
 """Levels of leakage and friction, by size."""
@@ -10,7 +10,7 @@ def in_words(condition: str) -> str:
     Returns
     -------
     str
-        The same with spaces, both faults joined by a plus.
+        The name with spaces; two faults are joined by a plus.
 
     Examples
     --------
@@ -21,12 +21,12 @@ def in_words(condition: str) -> str:
 
 
 def level_in_words(name: str, size: float) -> str:
-    """Return between which levels a fault lies.
+    """Return the level of a fault in words, or the levels between which it lies.
 
     Parameters
     ----------
     size : float
-        Where 1 is minor and 2 is major [dimensionless].
+        On the scale where 1 is minor and 2 is major [dimensionless].
 
     Examples
     --------

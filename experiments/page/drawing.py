@@ -1,4 +1,4 @@
-"""Drawing functions that several figures share."""
+"""Drawing functions shared by several figures."""
 
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import Any, TypeAlias
@@ -14,14 +14,14 @@ Colour: TypeAlias = str | tuple[float, ...]
 
 
 def say(axis: Axes, words: str, at: tuple[float, float], shift: tuple[float, float] = (0.0, 0.0), **look: Any) -> None:
-    """Write words beside a point.
+    """Write text beside a point.
 
     Parameters
     ----------
     at : tuple of float
         The point [axes' units].
     shift : tuple of float
-        From the point to the words, in points of type [unit of fonts].
+        Offset of the text from the point, in points of type [unit of fonts].
     **look : Any
         Passed to `matplotlib.axes.Axes.annotate`.
     """
@@ -29,12 +29,12 @@ def say(axis: Axes, words: str, at: tuple[float, float], shift: tuple[float, flo
 
 
 def diamonds(axis: Axes, x: Any, y: Any, label: str | None = None) -> None:
-    """Mark what is published.
+    """Mark published values.
 
     Parameters
     ----------
     x, y : float or sequence of float
-        The points [axes' units]; empty for an entry in the legend alone.
+        The points [axes' units]; empty for an entry in the legend only.
     label : str, optional
         For the legend.
     """
@@ -42,15 +42,15 @@ def diamonds(axis: Axes, x: Any, y: Any, label: str | None = None) -> None:
 
 
 def shaded(groups: Iterable[tuple[Hashable, Any]], last: float = 0.7) -> Iterator[tuple[float, Any, Colour]]:
-    """Give a series of curves their colours, dark to light.
+    """Assign colours to a series of curves, from dark to light.
 
     Parameters
     ----------
     groups : iterable of tuple
-        Of each curve its value and its rows, as `groupby` gives them.
+        For each curve its value and its rows, as from `groupby`.
     last : float
-        Where the colours end, between 0 and 1 [dimensionless]; lighter ones cannot be read on white, nor turned round
-        on black.
+        Lightest colour used, between 0 and 1 [dimensionless]; lighter ones are unreadable on white, or on black if
+        reversed.
 
     Yields
     ------
@@ -63,7 +63,7 @@ def shaded(groups: Iterable[tuple[Hashable, Any]], last: float = 0.7) -> Iterato
 
 
 def named_rows(axis: Axes, names: Sequence[str]) -> "np.ndarray[Any, np.dtype[np.int_]]":
-    """Lay names on the vertical axis, the first at the bottom, and return where each stands.
+    """Place names on the vertical axis, the first at the bottom, and return their positions.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def named_rows(axis: Axes, names: Sequence[str]) -> "np.ndarray[Any, np.dtype[np
 
 
 def paired_bars(axis: Axes, names: Sequence[str], pairs: Sequence[tuple[str, pd.Series, Colour]]) -> None:
-    """Draw two bars a name, to the right and to the left of zero.
+    """Draw two bars for each name, to the right and to the left of zero.
 
     Parameters
     ----------
@@ -95,16 +95,16 @@ Course: TypeAlias = tuple[tuple[str, float], Sequence[tuple[str, Colour, str]]]
 
 
 def courses(axes: Sequence[Axes], time: pd.Series, frame: pd.DataFrame, panels: Sequence[Course], room: float) -> None:
-    """Draw signals over one time axis, a panel a unit, with room for a legend above the curves.
+    """Draw signals over a common time axis, one panel for each unit, with space for a legend above the curves.
 
     Parameters
     ----------
     axes : sequence of Axes
-        One a panel, from the top.
+        One for each panel, from the top.
     panels : sequence of Course
-        What each panel shows [its label's unit].
+        Contents of each panel [its label's unit].
     room : float
-        Height of the legend over that of the curves [dimensionless].
+        Ratio of the legend's height to that of the curves [dimensionless].
     """
     for axis, ((label, scale), columns) in zip(axes, panels, strict=True):
         for column, colour, words in columns:

@@ -1,4 +1,4 @@
-"""The errata in one line each, ``errata.txt``, for reports; told in full, with reasons, in ``docs/errata.md``."""
+"""One-line texts of the errata for reports, from ``errata.txt``; ``docs/errata.md`` gives them in full with reasons."""
 
 import re
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 _LINES = files("experiments.page").joinpath("errata.txt").read_text(encoding="utf-8").splitlines()
 
 ERRATA: Mapping[str, str] = dict(line.split(": ", 1) for line in _LINES)
-"""One sentence an erratum, by number."""
+"""One sentence for each of the errata, by number."""
 
 _CITED_OR_TAG = re.compile(
     r"<script\b.*?</script>|<[^>]*>|\berrat(?:a|um)(?:(?:,|\s+and|\s+to)?\s+[EPM]\d{1,2}\b)+", re.DOTALL
@@ -19,19 +19,19 @@ _LINK = re.compile(r'href="#([EPM]\d{1,2})"')
 
 
 def linked(text: str) -> Markup:
-    """Return a text or a part of a page with the errata that it cites linked to the report's list.
+    """Return a text or part of a page in which cited errata are linked to the report's list.
 
-    A number counts after the word "errata" alone: columns and actuators of a log may have names such as P1.
+    Only a number after the word "errata" or "erratum" counts, since columns and actuators may have names such as P1.
 
     Parameters
     ----------
     text : str
-        Plain text, or markup whose tags stay as they are.
+        Plain text, or markup whose tags stay unchanged.
 
     Returns
     -------
     Markup
-        The same, escaped, each number of `ERRATA` a link.
+        The escaped text, in which each number of `ERRATA` is a link.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def linked(text: str) -> Markup:
 
 
 def numbers_linked(text: str) -> Markup:
-    """Return a list of errata with each number of `ERRATA` a link.
+    """Return a list of errata in which each number of `ERRATA` is a link.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Figures that are drawn from named tables, as the files that they become."""
+"""Draws figures from named tables and turns them into files."""
 
 import re
 from base64 import b64encode
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Drawings: TypeAlias = "Mapping[str, Callable[[Tables], Figure]]"
-"""From a study's tables to its figures, by file name."""
+"""Maps file names to functions that draw figures from a study's tables."""
 
 PNG_DOTS_PER_INCH, LOG_DOTS_PER_INCH = 150, 130
 """Resolution of the PNG figures of studies, 1500 pixels wide, and of logs."""
 
 
 TALL = 0.7
-"""Height over width of a figure from which it is tall: 9.2 cm high, it would be less than 13 of 18 cm wide."""
+"""Ratio of height to width above which a figure counts as tall: at 9.2 cm high it would be under 13 of 18 cm wide."""
 
 
 def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
@@ -48,7 +48,7 @@ def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
 
 
 def svg_of(figure: "Figure") -> bytes:
-    """Return a figure as an SVG file that is the same at every run."""
+    """Return a figure as an SVG file that is identical in every run."""
     buffer = BytesIO()
     with styled():
         figure.savefig(buffer, format="svg", metadata={"Date": None})
@@ -56,14 +56,14 @@ def svg_of(figure: "Figure") -> bytes:
 
 
 def image_of(figure: "Figure | bytes", words: str) -> Markup:
-    """Return a figure as an image that is inside its page.
+    """Return a figure as an image embedded in its page.
 
     Parameters
     ----------
     figure : Figure or bytes
         The figure, or its SVG file.
     words : str
-        What it shows, for those who do not see it.
+        Text alternative for readers who do not see the image.
     """
     content = figure if isinstance(figure, bytes) else svg_of(figure)
     data = b64encode(content).decode("ascii")
@@ -71,7 +71,7 @@ def image_of(figure: "Figure | bytes", words: str) -> Markup:
 
 
 def is_tall(svg: bytes) -> bool:
-    """Return whether a figure is so much taller than usual that a third of a sheet would make its words unreadable.
+    """Return whether a figure is so tall that its text would be unreadable on a third of a sheet.
 
     Examples
     --------
@@ -83,7 +83,7 @@ def is_tall(svg: bytes) -> bool:
 
 
 def write_png(draw: "Callable[[], Figure]", path: Path) -> None:
-    """Write the figure of one log as a PNG, whole or not at all.
+    """Write the figure of one log as a PNG; no partial file is left behind.
 
     Raises
     ------

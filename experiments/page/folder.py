@@ -1,4 +1,4 @@
-"""One result folder a study, written whole or not at all."""
+"""One result folder for each study; no partial folder is left behind."""
 
 import errno
 import json
@@ -19,18 +19,18 @@ from experiments.running.refusal import refused
 from plant.errors import HydrostateError
 
 SERIES_FORMAT = "%.9g"
-"""Digits of the curves; tables keep all."""
+"""Number format of curves; tables keep all digits."""
 
 UNWRITABLE = "result folder {} must be in a place that can be written, got"
 
 _TRIES = 10
-"""Times that a result is moved to its name while other studies take it [count]."""
+"""Number of attempts to rename a result while other studies take its name [count]."""
 
 _HERE, _EXCHANGE = -100, 2
-"""AT_FDCWD, by which a path is taken from the current folder, and RENAME_EXCHANGE, of Linux."""
+"""Linux constants: AT_FDCWD, for paths relative to the current folder, and RENAME_EXCHANGE."""
 
 DESKTOP_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
-"""Files that file managers leave behind, which are nobody's work."""
+"""Files that file managers create, which contain nobody's work."""
 
 
 def write_tables(
@@ -40,23 +40,23 @@ def write_tables(
     files: Mapping[str, bytes] = MappingProxyType({}),
     series: Tables = MappingProxyType({}),
 ) -> Path:
-    """Write a study's tables, and what was made of them, as one folder, replacing an earlier study's.
+    """Write a study's tables, and everything made from them, as one folder, replacing an earlier study's.
 
-    All is written beside the folder first, reaches the disk, and takes its name at the end: an earlier result stays
-    whole until then, also where the power fails.
+    All files are first written to a temporary folder beside it and flushed to disk, and only then renamed. Until then
+    an earlier result stays complete, even if the power fails.
 
     Parameters
     ----------
     tables : Mapping[str, pandas.DataFrame]
-        What was found, by name.
+        Results, by name.
     manifest : Mapping[str, Any]
-        What it takes to run it again; its ``study`` names it.
+        All that is needed to run the study again; its ``study`` names the study.
     folder : Path
         The folder; new, empty, or an earlier study's result.
     files : Mapping[str, bytes]
         Report, figures and others, by their path within the folder.
     series : Mapping[str, pandas.DataFrame]
-        Curves, which keep nine digits.
+        Curves, written with nine digits.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def write_tables(
     Raises
     ------
     HydrostateError
-        If the folder holds anything that no study wrote, or cannot be written.
+        If the folder contains anything not written by a study, or cannot be written.
     """
     target = check_target(folder)
     contents = {**csv_files("tables", tables), **csv_files("series", series, SERIES_FORMAT), **files}
@@ -95,9 +95,9 @@ def csv_files(place: str, frames: Tables, float_format: str | None = None) -> di
     Parameters
     ----------
     frames : Mapping[str, pandas.DataFrame]
-        By name; rows that have a name are conditions.
+        By name; rows with a label are conditions.
     float_format : str, optional
-        How numbers are written; all their digits unless told.
+        Number format; by default all digits.
     """
     files: dict[str, bytes] = {}
     for name, frame in frames.items():
@@ -114,9 +114,9 @@ def json_file(values: Mapping[str, Any]) -> bytes:
 
 
 def check_target(folder: Path) -> Path:
-    """Tell whether a study may be written to a folder, before the study is run.
+    """Check whether a study may be written to a folder, before the study is run.
 
-    What a run left beside it that was killed is removed; an earlier result that it had moved gets its name back.
+    Remains of a killed run beside the folder are removed. An earlier result that this run had moved gets its name back.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def _checked(folder: Path) -> Path:
 
 
 def _strangers(folder: Path) -> set[str]:
-    """Return the files in a folder that no study wrote."""
+    """Return the files in a folder that were not written by a study."""
     present = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
     with suppress(FileNotFoundError, ValueError, TypeError, KeyError):
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
@@ -188,12 +188,12 @@ def _swap(temporary: Path, target: Path) -> None:
 
 
 def _exchanged(first: Path, second: Path) -> bool:
-    """Exchange the names of two folders in one step, so that each name always has a whole one.
+    """Exchange the names of two folders in one step, so that both names always have a complete folder.
 
     Returns
     -------
     bool
-        False where the system or the file system cannot do it; then nothing has changed.
+        False if the system or the file system does not support it; then nothing has changed.
 
     References
     ----------
@@ -209,7 +209,7 @@ def _exchanged(first: Path, second: Path) -> bool:
 
 
 def _tidy(target: Path) -> None:
-    """Remove what a writer left that was killed, and give a result back its name that it had moved."""
+    """Remove the remains of a killed writer, and restore the name of a result that it had moved."""
     if not target.parent.is_dir() or not os.access(target.parent, os.W_OK | os.X_OK):
         return
     left = re.compile(rf"\.{re.escape(target.name)}\.[0-9a-f]{{8}}\.(?:tmp|old)")
@@ -223,12 +223,12 @@ def _tidy(target: Path) -> None:
 
 @contextmanager
 def held(folder: Path) -> Generator[bool]:
-    """Hold a folder as one that is written to, until the block or the process ends.
+    """Lock a folder for writing until the block or the process ends.
 
     Yields
     ------
     bool
-        False where another process holds it, or no system can tell.
+        False if another process holds the lock, or the system cannot determine this.
     """
     if os.name == "nt":  # pragma: no cover -- folders have no locks there, and nothing is tidied
         yield False

@@ -1,4 +1,4 @@
-"""Tables by name, single numbers out of them, and the table of a rig's parameters."""
+"""Tables by name, single numbers from them, and the table of a rig's parameters."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, fields
@@ -21,7 +21,7 @@ P = ParamSpec("P")
 
 
 def tabled(rows: Callable[P, Rows]) -> Callable[P, pd.DataFrame]:
-    """Make a function that yields rows return them as a table."""
+    """Decorate a function that yields rows, so that it returns them as a table."""
 
     @wraps(rows)
     def made(*args: P.args, **kwargs: P.kwargs) -> pd.DataFrame:
@@ -31,7 +31,7 @@ def tabled(rows: Callable[P, Rows]) -> Callable[P, pd.DataFrame]:
 
 
 def stacked(parts: Callable[P, Frames]) -> Callable[P, pd.DataFrame]:
-    """Make a function that yields parts of a table return them one below the other."""
+    """Decorate a function that yields parts of a table, so that it returns them stacked into one."""
 
     @wraps(parts)
     def made(*args: P.args, **kwargs: P.kwargs) -> pd.DataFrame:
@@ -63,7 +63,7 @@ def cell(frame: pd.DataFrame, row: object, column: str) -> float:
 
 @tabled
 def parameter_table(parameters: Any) -> Rows:
-    """Return parameters with the notes that the code carries.
+    """Return parameters with the notes given in the code.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def parameter_table(parameters: Any) -> Rows:
     Returns
     -------
     pandas.DataFrame
-        One row a parameter: parameter, value, unit, meaning, source.
+        One row per parameter: parameter, value, unit, meaning, source.
     """
     noted = notes(type(parameters))
     for field in fields(parameters):

@@ -1,4 +1,4 @@
-"""Severities as a column or a title has room for; one noun for each on every page."""
+"""Short names of severities for columns and titles; each has the same noun on every page."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ SHOWN: Mapping[str, str] = {
     "bulk_modulus": "bulk modulus",
     "entrained_air": "entrained air",
 }
-"""What each severity is called in short."""
+"""Short name of each severity."""
 
 
 def quantity_name(name: str) -> str:

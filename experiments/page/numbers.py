@@ -1,24 +1,24 @@
-"""Numbers as a reader wants them: sensible digits, exponents in threes, raised units."""
+"""Numbers for readers: sensible digits, exponents in multiples of three, superscripts in units."""
 
 import math
 import re
 from collections.abc import Mapping, Sequence
 
 MISSING = "\N{EN DASH}"
-"""What stands where there is no number."""
+"""Shown in place of a missing number."""
 
 MINUS, TIMES = "\N{MINUS SIGN}", " \N{MULTIPLICATION SIGN} "
 
 SUPERSCRIPTS = str.maketrans("-.0123456789", "⁻·⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 MOST_DIGITS = 4
-"""Digits that a value with an interval is shown with, at most [count]; files for programs have all."""
+"""Largest number of digits for a value with an interval [count]; files for programs have all digits."""
 
 PLAIN_FROM, PLAIN_TO = 1e-3, 1e5
-"""Between these magnitudes a number is written without an exponent."""
+"""Magnitudes between which a number is written without an exponent."""
 
 MOST_DECIMALS = 6
-"""Decimals of a number without a power of ten, at most [count]."""
+"""Largest number of decimals of a number without a power of ten [count]."""
 
 SHOP_UNITS: Mapping[str, tuple[float, str]] = {
     "Pa": (1e-6, "MPa"),
@@ -29,7 +29,7 @@ SHOP_UNITS: Mapping[str, tuple[float, str]] = {
 
 
 def number(value: float | None, digits: int = 4) -> str:
-    """Write a number as an engineer does: exponents in threes, no more digits than are asked for.
+    """Write a number in engineering notation: exponents in multiples of three, no more digits than requested.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def number(value: float | None, digits: int = 4) -> str:
     Returns
     -------
     str
-        The number, or a dash where there is none.
+        The number, or a dash if there is none.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def percent_text(probability: float) -> str:
-    """Return a probability in percent, never nought and never a hundred.
+    """Return a probability in percent; it is never shown as 0 or 100.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def percent_text(probability: float) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Write a number with a given count of decimals, for columns that are compared.
+    """Write a number with a fixed number of decimals, for columns that are compared.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def fixed(value: float | None, decimals: int) -> str:
     Returns
     -------
     str
-        The number, or a dash where there is none; zero has no sign.
+        The number, or a dash if there is none; zero has no sign.
 
     Examples
     --------
@@ -102,14 +102,14 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def decimals_of(low: float, high: float, most: int = 3) -> int:
-    """Return the decimals that leave two digits of an interval's width, and its ends `MOST_DIGITS` digits at most.
+    """Return the decimals that show an interval's width to two digits, but its ends to at most `MOST_DIGITS` digits.
 
     Parameters
     ----------
     low, high : float
-        Its ends [any unit].
+        Ends of the interval [any unit].
     most : int
-        Decimals, at most [count].
+        Largest number of decimals [count].
 
     Examples
     --------
@@ -125,14 +125,14 @@ def decimals_of(low: float, high: float, most: int = 3) -> int:
 
 
 def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit: str) -> list[str]:
-    """Return a value and the ends of its interval with the decimals that the interval leaves it.
+    """Return a value and its interval as text, with the number of decimals that the interval justifies.
 
     Parameters
     ----------
     value : float or None
         The value [``unit``].
     interval : sequence of float or None
-        Its ends [``unit``]; None where there is none.
+        Ends of the interval [``unit``]; None if unknown.
 
     Examples
     --------
@@ -159,7 +159,7 @@ def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit:
 
 
 def exact(value: float) -> str:
-    """Write a number as it was given, for parameters and settings.
+    """Write a number exactly as given, for parameters and settings.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def exact(value: float) -> str:
     Returns
     -------
     str
-        The shortest decimals that give it back to ten digits, with exponents in threes.
+        The shortest decimal number that equals it to ten digits, with exponents in multiples of three.
 
     Examples
     --------
@@ -181,7 +181,7 @@ def exact(value: float) -> str:
 
 
 def as_set(value: float) -> str:
-    """Write a number as it was given if three digits give it exactly, for then it was set and not measured.
+    """Write a number exactly if three digits suffice: it was then set, not measured.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def as_set(value: float) -> str:
 
 
 def reader_unit(unit: str) -> tuple[float, str]:
-    """Return the unit in which a reader is told a quantity: that of a workshop, and percent for shares.
+    """Return the unit in which a quantity is shown: the workshop unit, and percent for shares.
 
     Returns
     -------
@@ -213,7 +213,7 @@ def reader_unit(unit: str) -> tuple[float, str]:
 
 
 def shop_unit(unit: str) -> tuple[float, str]:
-    """Return the unit in which a workshop reads a severity.
+    """Return the workshop unit of a severity.
 
     Returns
     -------
@@ -229,7 +229,7 @@ def shop_unit(unit: str) -> tuple[float, str]:
 
 
 def pretty_unit(unit: str) -> str:
-    """Return a unit with raised exponents.
+    """Return a unit with exponents as superscripts.
 
     Examples
     --------

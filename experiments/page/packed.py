@@ -1,4 +1,4 @@
-"""Numbers of a chart as a page carries them: 16-bit steps, deflated; long series as the ends of each stretch."""
+"""Numbers of a chart as stored in a page: 16-bit steps, compressed; long series as the extremes of each interval."""
 
 import zlib
 from base64 import b64encode
@@ -10,25 +10,25 @@ import numpy as np
 from plant.arrays import Array
 
 CODES = 32_500
-"""Steps on either side of the middle of the range of values [count]."""
+"""Steps on each side of the middle of the value range [count]."""
 
 MISSING = -32_768
-"""Code of a value that is not there."""
+"""Code of a missing value."""
 
 
 def packed(values: Array) -> Mapping[str, Any]:
-    """Return a series as JSON carries it.
+    """Return a series in a form for JSON.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        The series [its unit]; what is not finite is missing.
+        The series [its unit]; values that are not finite count as missing.
 
     Returns
     -------
     Mapping[str, Any]
-        ``data``, differences of 16-bit codes, deflated and in base64; a value is ``middle + quantum * code``, right to
-        half a ``quantum``, which is the range over 65,000 [its unit].
+        ``data``: differences of 16-bit codes, deflated and in base64. A value is ``middle + quantum * code``, accurate
+        to half a ``quantum``, which is the range divided by 65,000 [its unit].
 
     Examples
     --------
@@ -50,19 +50,19 @@ def packed(values: Array) -> Mapping[str, Any]:
 
 
 def ends_of_stretches(values: Array, most: int) -> Array:
-    """Return the least and the largest value of each stretch of a series, in their order.
+    """Return the minimum and maximum of each interval of a series, in time order.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
         The series [its unit]; NaN is missing.
     most : int
-        Values wanted at most, two or more [count].
+        Largest number of values wanted, at least two [count].
 
     Returns
     -------
     ndarray, shape (m,)
-        The series as it is where it is short enough; else two values a stretch, which keep every peak.
+        The unchanged series if it is short enough, else two values for each interval, which keep every peak.
 
     Examples
     --------
@@ -83,5 +83,5 @@ def ends_of_stretches(values: Array, most: int) -> Array:
 
 
 def stretch_length(count: int, most: int) -> int:
-    """Return the number of samples in a stretch of `ends_of_stretches`; 1 if all are kept."""
+    """Return the number of samples in each interval of `ends_of_stretches`; 1 if all are kept."""
     return 1 if count <= most else -(-count // (most // 2))

@@ -1,4 +1,4 @@
-"""Panels of a chart: curves of one unit over an x axis, and lines across them."""
+"""Panels of a chart: curves with a common unit over an x axis, and lines across them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ COLOURS: Mapping[str, str] = {
     "grey": GREY,
     "black": BLACK,
 }
-"""Names of colours: a page's style gives each a value for a light and for a dark ground; here that on paper."""
+"""Colours on paper, by name; a page's style gives each name a value for a light and a dark background."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +25,9 @@ class Curve:
     Parameters
     ----------
     values : ndarray, shape (n,)
-        One a place on the x axis [the panel's unit]; NaN is missing.
+        One for each position on the x axis [the panel's unit]; NaN is missing.
     colour : str
-        Of `COLOURS`.
+        A name in `COLOURS`.
     look : str
         ``"line"``, ``"dots"``, or ``"edge"`` for the edge of a band.
     """
@@ -45,9 +45,9 @@ class Mark:
     Parameters
     ----------
     axis : str
-        ``"x"`` or ``"y"``: the axis on which it stands.
+        ``"x"`` or ``"y"``: the axis on which its position is given.
     at : float
-        Where [that axis' unit].
+        Position [that axis' unit].
     """
 
     axis: str
@@ -57,14 +57,14 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Curves of one unit.
+    """Curves with a common unit.
 
     Parameters
     ----------
     bands : sequence of tuple
-        Places of two curves, the upper and the lower, between which it is shaded.
+        Pairs of curve indices, the upper and the lower, between which the area is shaded.
     ends : tuple of float, optional
-        Ends of the y axis [its unit]; by default those of all that is drawn.
+        Ends of the y axis [its unit]; by default the range of all that is drawn.
     """
 
     label: str

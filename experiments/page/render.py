@@ -1,4 +1,4 @@
-"""A report as one HTML file that needs nothing beside it: the words of its template, with tables and figures inside."""
+"""A report as one self-contained HTML file: the text of its template, with tables and figures embedded."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -26,26 +26,26 @@ _KEPT_TOGETHER = re.compile(
 def render_page(
     template: str, facts: Mapping[str, Any], columns: Mapping[str, Columns], files: Mapping[str, bytes]
 ) -> str:
-    """Return a report as one HTML page with its figures inside, and the errata that it cites.
+    """Return a report as one HTML page with embedded figures and the errata that it cites.
 
     Parameters
     ----------
     template : str
-        The page's words, by their path below ``experiments``; it extends ``page/templates/page.html``. There
-        ``table(name, caption)``, ``folded(name, by, count)``, ``figure(name, caption)`` and ``chart(name, caption)``
-        stand for what they name.
+        Template with the page's text, by its path below ``experiments``; it extends ``page/templates/page.html``. In
+        it, ``table(name, caption)``, ``folded(name, by, count)``, ``figure(name, caption)`` and ``chart(name,
+        caption)`` insert the named item.
     facts : Mapping[str, Any]
-        What was found, by name: data frames that the page shows, `Charts` by name under ``charts``, and what else its
-        words need.
+        Findings by name: data frames that the page shows, `Charts` by name under ``charts``, and other values used in
+        its text.
     columns : Mapping[str, Columns]
         How each data frame is shown.
     files : Mapping[str, bytes]
-        The figures, as `figure_files` returns them.
+        The figures, in the form that `figure_files` returns.
 
     Returns
     -------
     str
-        The page; it loads nothing.
+        The page; it loads nothing from elsewhere.
     """
 
     def table(name: str, caption: str, *, cards: bool = False) -> Markup:
@@ -88,5 +88,5 @@ def _templates() -> Environment:
 
 
 def _headings_of(body: str) -> Sequence[tuple[str, Markup]]:
-    """Return anchor and heading of each section; what stands before a colon names it."""
+    """Return anchor and heading of each section; the heading is the text before a colon."""
     return [(name, Markup(heading)) for name, heading in _HEADING.findall(body)]  # noqa: S704 - already on the page

@@ -1,4 +1,4 @@
-"""Scripts of a page, put inside it, and a policy that lets nothing else run and nothing be loaded."""
+"""Embeds the scripts of a page, with a policy that allows no other script and no loading."""
 
 import json
 import re
@@ -21,19 +21,19 @@ NEEDED = (
     ('class="live-stream"', "uplot/uPlot.iife.min.js"),
     ('class="live-stream"', "live.js"),
 )
-"""A mark that a page may hold, and the script that then goes with it, in their order."""
+"""Marks that a page may contain, and the scripts that each requires, in their order."""
 
 OF_A_SERVER = ('class="dropped-logs"', 'class="live-stream"')
-"""Marks of pages that may ask the server that they come from, and no other."""
+"""Marks of pages that may send requests to their own server, but to no other."""
 
 CHART_STYLE = "uplot/uPlot.min.css"
 
 POLICY_HERE, SCRIPTS_HERE = "<!-- policy -->", "<!-- scripts -->"
-"""Where the policy and the scripts go."""
+"""Placeholders for the policy and the scripts."""
 
 
 def with_scripts(page: str) -> str:
-    """Return a page with the scripts that it needs and a policy by which only they run.
+    """Return a page with the scripts that it needs, and with a policy that allows only these.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def with_scripts(page: str) -> str:
     Returns
     -------
     str
-        The same; scripts and styles are allowed by their hashes, images from inside the page, and nothing else.
+        The page with scripts and styles allowed by their hashes, embedded images, and nothing else.
     """
     needed = [file for mark, file in NEEDED if mark in page]
     scripts = [_text(file) for file in needed]
@@ -61,17 +61,17 @@ def with_scripts(page: str) -> str:
 
 
 def data_block(data: Any) -> Markup:
-    r"""Return data as JSON that may stand inside a script element: no tag can begin in it.
+    r"""Return data as JSON that is safe inside a script element: no tag can start in it.
 
     Parameters
     ----------
     data : object
-        Of what JSON knows; infinities are refused.
+        Any JSON value; infinities are rejected.
 
     Returns
     -------
     Markup
-        That a template does not escape.
+        Text that a template does not escape.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Clauses of results as sentences, for a page and for a terminal."""
+"""Turns clauses of results into sentences, for pages and terminals."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,7 @@ def rig_in_words(name: str) -> str:
 
 
 def sentence(said: str) -> str:
-    """Return a clause as a sentence; the name of a channel stays as it is spelt.
+    """Return a clause as a sentence; the name of a channel keeps its spelling.
 
     Examples
     --------
@@ -38,7 +38,7 @@ def sentence(said: str) -> str:
 
 
 def in_a_row(names: Sequence[str]) -> str:
-    """Return names as a sentence lists them.
+    """Return names as a list within a sentence.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def in_a_row(names: Sequence[str]) -> str:
 
 
 def whole_dates(said: str) -> Markup:
-    """Return words in which no line ends within a date.
+    """Return text in which no line break falls within a date.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def left_unread(result: Mapping[str, Any]) -> list[str]:
     Parameters
     ----------
     result : Mapping
-        Entries of a log; its ``notes`` have what reading it brought up.
+        Entries of a log; its ``notes`` include remarks from reading it.
     """
     codes = (LogCode.COLUMN_OVERLOOKED, LogCode.CHAMBER_ALONE)
     return [sentence(one["text"]) for one in result.get("notes", ()) if one["code"] in codes]

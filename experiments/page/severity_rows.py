@@ -1,4 +1,4 @@
-"""Severities on a page: a bar each, with interval, healthy value, and a limit that the reader may change."""
+"""Severities on a page: one bar each, with interval, healthy value, and a limit that the reader can change."""
 
 import math
 from collections.abc import Mapping
@@ -9,29 +9,29 @@ from estimation.finding import Quantity
 from experiments.page.numbers import shop_unit
 
 ROOM = 1.05
-"""A bar's scale ends so far beyond the largest number on it [dimensionless]."""
+"""Length of a bar's scale relative to the largest number on it [dimensionless]."""
 
 LEAST_RANGE = 1e-3
-"""A scale that is shorter is taken to be so long [any row's unit]."""
+"""Smallest scale length used in the rounding test [any row's unit]."""
 
 ROUNDING = 1e-6
-"""Share of a bar's scale below which a number is zero [fraction]."""
+"""Share of a bar's scale below which a number counts as zero [fraction]."""
 
 
 @dataclass(frozen=True)
 class SeverityRow:
-    """One severity in the unit that is shown; places on the bar run from 0 to 100.
+    """One severity in the displayed unit; positions on the bar run from 0 to 100.
 
     Parameters
     ----------
     value, low, high : float
         The severity and its 95 % interval [the row's unit].
     sound : float
-        That of the healthy actuator [the row's unit].
+        Value of the healthy actuator [the row's unit].
     limit : float or None
-        Until the reader changes it [the row's unit].
+        Initial limit, which the reader can change [the row's unit].
     side : str
-        ``"below"`` where a value below the limit is bad, else ``"above"``.
+        ``"below"`` if a value below the limit is bad, else ``"above"``.
     first, last : float
         Ends of the bar's scale [the row's unit].
     """
@@ -49,12 +49,12 @@ class SeverityRow:
     last: float
 
     def place(self, value: float) -> float:
-        """Return the place of a value on the bar.
+        """Return the position of a value on the bar.
 
         Parameters
         ----------
         value : float
-            Of the severity [the row's unit].
+            Value of the severity [the row's unit].
 
         Returns
         -------
@@ -65,12 +65,12 @@ class SeverityRow:
 
     @property
     def sound_shown(self) -> float:
-        """The healthy value, zero where it is no more than rounding [the row's unit]."""
+        """The healthy value; zero if it differs from zero only by rounding [the row's unit]."""
         return self.sound if abs(self.sound) > ROUNDING * max(self.last - self.first, LEAST_RANGE) else 0.0
 
     @property
     def limit_text(self) -> str:
-        """The limit with as many digits as matter and no exponent; empty where there is none."""
+        """The limit with all significant digits and no exponent; empty if there is none."""
         return "" if self.limit is None else f"{Decimal(f'{self.limit:.3g}'):f}"
 
 
@@ -82,14 +82,14 @@ def severity_row(name: str, words: str, one: Quantity, sound: float, limit: floa
     one : Quantity
         The severity.
     sound : float
-        Of the healthy actuator [unit of the quantity].
+        Value of the healthy actuator [unit of the quantity].
     limit : float or None
         Its limit [unit of the quantity].
 
     Returns
     -------
     SeverityRow or None
-        None where the log does not tell it.
+        None if the log does not determine it.
     """
     if one.value is None or one.ci95 is None or not all(map(math.isfinite, (one.value, *one.ci95))):
         return None
@@ -105,16 +105,16 @@ def severity_row(name: str, words: str, one: Quantity, sound: float, limit: floa
 def severity_rows(
     found: Mapping[str, Quantity], healthy: Mapping[str, float], limits: Mapping[str, float], words: Mapping[str, str]
 ) -> list[SeverityRow]:
-    """Return the severities that a log tells as rows.
+    """Return the severities that the log determines, as rows.
 
     Parameters
     ----------
     found : Mapping[str, Quantity]
         Severities by name.
     healthy, limits : Mapping[str, float]
-        The same of the healthy actuator, and where it stops being sound [each in the same unit].
+        The values of the healthy actuator, and those at which it stops being sound [each in the same unit].
     words : Mapping[str, str]
-        What each is called.
+        Displayed name of each severity.
     """
     rows = [
         severity_row(name, words.get(name, name.replace("_", " ")), one, healthy.get(name, 0.0), limits.get(name))

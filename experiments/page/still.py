@@ -1,4 +1,4 @@
-"""The still picture of a chart as SVG, written directly: a plotting library takes 50 ms for one."""
+"""The still picture of a chart as SVG. It is written directly, because a plotting library needs 50 ms for one."""
 
 import math
 from bisect import bisect_left
@@ -13,46 +13,46 @@ from experiments.page.style import BLUE
 from plant.arrays import Array
 
 MOST_STILL = 1_600
-"""Points of a series in the still picture [count]."""
+"""Largest number of points of a series in the still picture [count]."""
 
 LEGEND_FROM = 2
-"""Curves from which a still panel has a legend [count]."""
+"""Number of curves from which a still panel has a legend [count]."""
 
 LOW_FROM = 3
-"""Rows of a still picture from which each is lower, so that the picture fills the width of a page [count]."""
+"""Number of rows from which each row is lower, so that the picture fills the width of a page [count]."""
 
 ONE_COLUMN = 4
-"""Panels of a still picture in one column; more stand in two, so that they are not tiny on paper [count]."""
+"""Largest number of panels in one column; more are set in two columns, so that they are not tiny on paper [count]."""
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM, ACROSS, DOWN = 720.0, 66.0, 10.0, 20.0, 38.0, 70.0, 26.0
-"""Of the picture, of its margins, and between panels [point]."""
+"""Width of the picture, its margins, and the distances between panels [point]."""
 
 TALL, LOW = 100.0, 72.0
-"""Height of a panel, and of one where there are `LOW_FROM` rows or more [point]."""
+"""Height of a panel, and its height if there are at least `LOW_FROM` rows [point]."""
 
 LETTER = 4.6
-"""Mean width of a letter of a legend [point]."""
+"""Mean width of a letter in a legend [point]."""
 
 MOST_ACROSS, MOST_UP = 8, 4
-"""Steps between ticks at most [count]."""
+"""Largest number of steps between ticks on the x and y axes [count]."""
 
 ROUND = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 2.5, 5.0, 10.0, 20.0)
 """Distances between ticks, times a power of ten [dimensionless]."""
 
 DATE_WIDE = 70.0
-"""Least distance between two dates on an axis [point]."""
+"""Smallest distance between two dates on an axis [point]."""
 
 DAYS = (1, 2, 7, 14, 28, 56, 91, 182, 365, 730, 1825, 3650)
-"""Distances between ticks of an axis of dates, here and in a browser [day]."""
+"""Distances between ticks of a date axis, here and in a browser [day]."""
 
 FEW_DECADES = 2.5
-"""Powers of ten below which a logarithmic axis has ticks between them too [decade]."""
+"""Range below which a logarithmic axis also has ticks between the powers of ten [decade]."""
 
 EDGE = 1e-9
-"""A tick this close beyond an end of the axis is on it, as a share of a step [fraction]."""
+"""A tick this close outside the end of an axis still counts as on it, as a share of a step [fraction]."""
 
 ROOM = 0.05
-"""Room above and below the data, as a share of their range [fraction]."""
+"""Margin above and below the data, as a share of their range [fraction]."""
 
 STYLE = (
     "text{font:8.5px 'DejaVu Sans',Verdana,sans-serif;fill:#000}.grid{stroke:#e3e3e3;stroke-width:.6}"
@@ -62,7 +62,7 @@ STYLE = (
 )
 
 STROKES: Mapping[str, str] = {"dots": 'class="dots"', "edge": 'class="line" stroke-width=".4"'}
-"""How a curve is drawn, by its look; any other look is a line."""
+"""SVG attributes of a curve, by its look; any other look is a plain line."""
 
 
 def still_picture(x: Array, label: str, panels: Sequence[Panel], *, log: bool = False, dates: bool = False) -> bytes:
@@ -71,15 +71,15 @@ def still_picture(x: Array, label: str, panels: Sequence[Panel], *, log: bool = 
     Parameters
     ----------
     x : ndarray, shape (n,)
-        Places of the values, rising [unit of the label].
+        Positions of the values, rising [unit of the label].
     label : str
-        Of the x axis, with its unit.
+        Label of the x axis, with its unit.
     panels : sequence of Panel
-        From the top; two in a row where there are more than `ONE_COLUMN`.
+        From the top; two per row if there are more than `ONE_COLUMN`.
     log : bool
         Whether the x axis is logarithmic.
     dates : bool
-        Whether places are dates, in days since 1970-01-01.
+        Whether positions are dates, in days since 1970-01-01.
     """
     places = np.log10(x) if log else x
     columns = 1 if len(panels) <= ONE_COLUMN else 2
@@ -151,7 +151,7 @@ def _panel(
 
 
 def _place(at: float, axis: str, log: bool) -> float:
-    """Return the place of a mark on its axis."""
+    """Return the position of a mark on its axis."""
     return math.log10(at) if log and axis == "x" else at
 
 
@@ -164,7 +164,7 @@ def _curve(curve: Curve, places: Array, heights: Callable[[Array], Array]) -> st
 
 
 def _path(x: Array, y: Array, *, dots: bool) -> str:
-    """Return a path that is broken where a value is missing; dots are strokes of no length."""
+    """Return a path with breaks at missing values; dots are strokes of zero length."""
     said: list[str] = []
     down = False
     for one, other in zip(x.tolist(), y.tolist(), strict=True):
@@ -182,16 +182,16 @@ def _points(x: Array, y: Array) -> str:
 
 
 def _every(panel: Panel) -> Array:
-    """Return all values of a panel and the places of lines across it."""
+    """Return all values of a panel, and the positions of lines across it."""
     lines = [mark.at for mark in panel.marks if mark.axis == "y"]
     return np.concatenate([np.asarray(lines, dtype=np.float64), *(curve.values for curve in panel.curves)])
 
 
 PLAIN_TO = 1e5
-"""Size below which a number on an axis has no power of ten [any unit]."""
+"""Size below which a number on an axis is written without a power of ten [any unit]."""
 
 LEAST = 1e-290
-"""Size below which a channel that does not change is drawn as zero [any unit]."""
+"""Size below which a constant channel is drawn as zero [any unit]."""
 
 
 def _range(values: Array, room: float) -> tuple[float, float]:
@@ -204,9 +204,9 @@ def _range(values: Array, room: float) -> tuple[float, float]:
 
 
 def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
-    """Return round places within a range, at least two, with their words.
+    """Return round positions within a range, at least two, with their labels.
 
-    Their distance is the least of `ROUND` that makes no more than so many steps, or the next one below.
+    Their distance is the smallest in `ROUND` that gives at most this many steps; if fewer than two fit, it is smaller.
     """
     least = (high - low) / most
     decade = 10.0 ** math.floor(math.log10(least))
@@ -224,21 +224,21 @@ def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
 
 
 def _days(low: float, high: float, wide: float) -> list[tuple[float, str]]:
-    """Return dates within a range of days since 1970-01-01 that is so wide [point], with their words."""
+    """Return dates within a range of days since 1970-01-01, with their labels, for an axis of this width [point]."""
     step = next((one for one in DAYS if (high - low) / one <= wide / DATE_WIDE), DAYS[-1])
     within = np.arange(step * math.ceil(low / step - EDGE), high + EDGE * step, step, dtype=np.float64)
     return [(float(one), str(np.datetime64(round(one), "D"))) for one in within]
 
 
 def _decades(low: float, high: float) -> list[tuple[float, str]]:
-    """Return the powers of ten within a range of logarithms, and their twofold and fivefold where they are few."""
+    """Return the powers of ten within a range of logarithms, and also 2 and 5 times these if there are few."""
     steps = (1.0, 2.0, 5.0) if high - low < FEW_DECADES else (1.0,)
     within = [one * 10.0**power for power in range(math.floor(low), math.ceil(high) + 1) for one in steps]
     return [(math.log10(one), f"{one:g}") for one in within if low - EDGE <= math.log10(one) <= high + EDGE]
 
 
 def _legend(curves: Sequence[Curve], wide: float) -> Iterator[str]:
-    """Yield the names of the curves above a panel, where they hide no data, the last at the right."""
+    """Yield the names of the curves, placed above a panel where they hide no data, the last at the right."""
     at = wide
     for curve in reversed(curves):
         at -= LETTER * len(curve.name)

@@ -1,4 +1,4 @@
-"""One look for all figures: Okabe-Ito colours, small type, no state outside the figure itself."""
+"""Common style of all figures: Okabe-Ito colours, small type, no state outside the figure itself."""
 
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,21 +17,21 @@ if TYPE_CHECKING:  # half a second, which a page without figures does not need
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
-"""The palette of Okabe and Ito, which the colour-blind can tell apart."""
+"""Okabe-Ito palette, which colour-blind readers can tell apart."""
 
 GREY = "#6b6b6b"
-"""For what stands behind the data."""
+"""Colour of background elements."""
 
 WIDTH_INCHES = 10.0
 """Width of every figure; the report shows them at about the same size."""
 
 STYLE = Path(__file__).with_name("hydrostate.mplstyle")
-"""Type, lines and grid of every figure, as matplotlib reads them."""
+"""Type, lines and grid of every figure, as a matplotlib style file."""
 
 
 @contextmanager
 def styled() -> Generator[None]:
-    """Draw and save figures in the project's look inside this block."""
+    """Apply the project's style to figures drawn and saved inside this block."""
     from matplotlib import style
 
     with style.context(STYLE):
@@ -40,12 +40,12 @@ def styled() -> Generator[None]:
 
 @dataclass(frozen=True)
 class Margins:
-    """Room around and between panels. Fixed, since finding it for every figure takes as long as drawing.
+    """Space around and between panels. It is fixed, since computing it for each figure takes as long as drawing.
 
     Parameters
     ----------
     left, right, top, bottom : float
-        From the figure's edge to the outer panels [inch].
+        Distance from the figure's edge to the outer panels [inch].
     across, down : float
         Between panels side by side, and one above the other [inch].
     """
@@ -59,7 +59,7 @@ class Margins:
 
 
 BESIDE_CONDITIONS = Margins(left=2.0, top=0.4)
-"""Room for the conditions' names on the left."""
+"""Margins with space for the names of conditions on the left."""
 
 
 def panels(
@@ -98,12 +98,12 @@ def panels(
 
 
 def condition_rows(axis: "Axes", conditions: Sequence[str]) -> Mapping[str, float]:
-    """Lay conditions on the vertical axis, the first on top, and return where each stands.
+    """Place conditions on the vertical axis, the first at the top, and return their positions.
 
     Parameters
     ----------
     conditions : sequence of str
-        Names in results, from the top.
+        Names as in results, from the top.
 
     Returns
     -------
@@ -119,12 +119,12 @@ def condition_rows(axis: "Axes", conditions: Sequence[str]) -> Mapping[str, floa
 
 
 def condition_levels(axis: "Axes", conditions: Iterable[str]) -> NDArray[np.float64]:
-    """Lay the conditions of a table on the vertical axis, the first on top, and return where each row stands.
+    """Place the conditions of a table on the vertical axis, the first at the top, and return the position of each row.
 
     Parameters
     ----------
     conditions : iterable of str
-        Names in results, one a row.
+        Names as in results, one per row.
 
     Returns
     -------
@@ -137,12 +137,12 @@ def condition_levels(axis: "Axes", conditions: Iterable[str]) -> NDArray[np.floa
 
 
 def spread_out(count: int, span: float) -> list[float]:
-    """Return offsets that keep the marks of one row apart.
+    """Return offsets that separate the marks of one row.
 
     Parameters
     ----------
     span : float
-        Distance from the first to the last [any unit].
+        Distance between the first and the last offset [any unit].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Tables for a reader: columns with their units in the header, cells by what they hold."""
+"""Tables for readers: columns with units in the header, and cells formatted by their type."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,12 +10,12 @@ from markupsafe import Markup
 from experiments.page.numbers import MINUS, as_set, exact, fixed, number
 
 WORDS = 24
-"""Characters of a cell from which its column holds words, and needs room to be read [count]."""
+"""Length of a cell from which its column counts as text and needs a readable width [count]."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell that says more than a number.
+    """A cell with a class or markup in addition to its text.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "_v": ("V", 1.0),
     "_w": ("W", 1.0),
 }
-"""Endings of column names: the unit that a reader gets, and the factor from the name's."""
+"""Endings of column names: the unit shown, and the factor from the unit in the name."""
 
 
 @dataclass(frozen=True)
@@ -53,17 +53,17 @@ class Column:
     Parameters
     ----------
     header : str, optional
-        Heading; the name in words without its unit, unless told.
+        Heading; by default the name in words without its unit.
     unit : str, optional
-        Unit as shown, after scaling; that of the name's ending in `UNITS` unless told.
+        Unit as shown, after scaling; by default that of the name's ending in `UNITS`.
     scale : float, optional
-        Factor from the name's unit to the unit shown [dimensionless]; goes with `unit`.
+        Factor from the unit in the name to the unit shown [dimensionless]; must be given with `unit`.
     digits : int, optional
-        Digits of a number; unless told, four, and a number that three digits give exactly stands as it was given.
+        Significant digits. By default four, and a number that three digits give exactly is shown as it was given.
     words : callable, optional
-        From a value to what is written, instead of a number.
+        Converts a value to the text shown, in place of a number.
     of_row : callable, optional
-        From a row to what is written, where one value does not say it.
+        Converts a whole row to the text shown, if one value is not enough.
     """
 
     source: str
@@ -75,7 +75,7 @@ class Column:
     of_row: Callable[[Row], Shown] | None = None
 
     def in_full(self) -> "Column":
-        """Return the column with heading, unit and scale, those of its name where none were told."""
+        """Return the column with heading, unit and scale; missing ones are derived from its name."""
         ending = next((ending for ending in UNITS if self.source.endswith(ending)), "")
         header = self.source.removesuffix(ending).replace("_", " ") if self.header is None else self.header
         if self.unit is not None:
@@ -85,22 +85,23 @@ class Column:
 
 
 Columns: TypeAlias = Sequence[Column | str | Callable[[str], Column | None]]
-"""Columns of a table: a name alone is shown as its type asks for; a function is given every column that is not named
-beside it, and returns how it is shown, or None."""
+"""Columns of a table. A plain name is shown in the format of its type.
+
+A function is called with each column that is not named otherwise, and returns how to show it, or None."""
 
 
 def _yes_or_no(good: bool) -> Cell:
-    """Return a cell that says yes, or no as what a reader should see."""
+    """Return a cell that says yes, or a highlighted no."""
     return Cell("yes", "good") if good else Cell("no", "bad")
 
 
 def right(text: str) -> Cell:
-    """Return a cell that stands to the right, as numbers do."""
+    """Return a cell aligned to the right, like numbers."""
     return Cell(text, "number")
 
 
 def as_given(value: float) -> Cell:
-    """Return a cell with a number as it was given.
+    """Return a cell with a number exactly as given.
 
     Parameters
     ----------
@@ -111,12 +112,12 @@ def as_given(value: float) -> Cell:
 
 
 def decimals(count: int) -> Callable[[float | None], Cell]:
-    """Return a writer of cells with a given count of decimals.
+    """Return a formatter of cells with a given number of decimals.
 
     Returns
     -------
     callable
-        From a number to its cell, as `fixed` writes it.
+        From a number to its cell, in the format of `fixed`.
     """
     return lambda value: right(fixed(value, count))
 
@@ -127,12 +128,12 @@ def spaced(name: str) -> str:
 
 
 def interval(low: str, high: str, digits: int = 4) -> Callable[[Row], str]:
-    """Return a writer of cells with both ends of an interval."""
+    """Return a formatter of cells with both ends of an interval."""
     return lambda row: f"{number(row[low], digits)} to {number(row[high], digits)}"
 
 
 def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bool = False) -> Markup:
-    """Return a data frame as an HTML table in a box that scrolls sideways; with cards, a card a row on a phone."""
+    """Return a data frame as an HTML table in a sideways scrolling box; with cards, a phone shows one card per row."""
     shown = [column.in_full() for column in _named(frame, columns)]
     body = [[_cell(column, row, named=cards) for column in shown] for row in frame.to_dict("records")]
     head = Markup("").join(
@@ -153,7 +154,7 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bo
 
 
 def _worded(cell: Markup) -> Markup:
-    """Return a cell of a column of words, which is no narrow one."""
+    """Return a cell of a text column, which must not be narrow."""
     text = str(cell)  # markup would escape what it is given
     if ' class="' in text.split(">", 1)[0]:
         return Markup(text.replace(' class="', ' class="words ', 1))  # noqa: S704 - it is markup already
@@ -161,16 +162,16 @@ def _worded(cell: Markup) -> Markup:
 
 
 def folded_tables(frame: pd.DataFrame, columns: Columns, by: str, count: str) -> Markup:
-    """Return a long data frame as a table for each group of rows, which a click opens; paper shows those that are open.
+    """Return a long data frame as one table for each group of rows, opened by a click; paper shows the open ones.
 
-    A box of the page with the id ``every-row`` opens them all.
+    A checkbox on the page with the id ``every-row`` opens all of them.
 
     Parameters
     ----------
     by : str
-        Column that names the group of a row; groups stand in the order of their first rows.
+        Column that names the group of a row; groups are in the order of their first rows.
     count : str
-        Column whose values are counted in the line of a group.
+        Column whose values are counted in the heading of a group.
     """
     made: list[Markup] = []
     others = [one for one in columns if by not in (one, getattr(one, "source", None))]

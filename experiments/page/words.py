@@ -1,11 +1,11 @@
-"""Names in results as a reader wants them."""
+"""Names in results, as shown to readers."""
 
 from experiments.page.condition_names import in_words
 from experiments.page.tables import Cell, Column
 
 
 def in_short(condition: str) -> str:
-    """Return a condition's name for a crowded axis.
+    """Return a condition's name, shortened for a crowded axis.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""The three papers, row by row: what is printed, what we find, and one rule that says whether it came back."""
+"""The three papers, row by row: the printed value, our result, and one rule that decides whether it was reproduced."""

@@ -1,4 +1,4 @@
-"""Every row of the page: tables cell by cell, what the text claims from ``claims.csv``, and every figure."""
+"""Every row of the page: all table cells, all claims of the text from ``claims.csv``, and every figure."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -105,7 +105,7 @@ def _filter_rows(found: Evidence) -> Iterator[Row]:
 
 @tabled
 def row_table(rows: list[Row]) -> Rows:
-    """Return the rows as a table, each with the verdict that the rule gives it.
+    """Return the rows as a table, each with its verdict by the rule.
 
     Returns
     -------
@@ -133,17 +133,17 @@ def row_table(rows: list[Row]) -> Rows:
 
 @tabled
 def figure_table(rows: pd.DataFrame) -> Rows:
-    """Return every figure of the three papers: drawn, drawn with a difference, or not, and why.
+    """Return every figure of the three papers: drawn, drawn with a difference, or not drawn, with the reason.
 
     Parameters
     ----------
     rows : pandas.DataFrame
-        From `row_table`; those whose place names a figure speak of it.
+        Table from `row_table`; rows whose place names a figure refer to that figure.
 
     Returns
     -------
     pandas.DataFrame
-        Columns paper, figure, title, drawn, difference, missed (rows that did not come back), rows, shown_by.
+        Columns paper, figure, title, drawn, difference, missed (rows that were not reproduced), rows, shown_by.
     """
     for figure in read_csv("figures.csv"):
         drawings, command = DRAWN_BY[figure["study"]] if figure["study"] else ({}, "")
@@ -166,7 +166,7 @@ def figure_table(rows: pd.DataFrame) -> Rows:
 
 
 def _figures_named(where: str) -> set[str]:
-    """Return the figures that a place names; a range counts whole.
+    """Return the figures that a place names; a range includes all its figures.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Our figures beside the claims of the gear-pump paper's text, by the key of ``claims.csv``."""
+"""Our results beside the claims of the gear-pump paper's text, by the key of ``claims.csv``."""
 
 from collections.abc import Mapping
 from inspect import signature
@@ -32,7 +32,7 @@ RIG = EhaParameters()
 
 
 def eha_ours(found: Evidence) -> Mapping[str, Ours]:
-    """Return our figure beside each claim of the gear-pump paper."""
+    """Return our result for each claim of the gear-pump paper."""
     return {
         **_rig(),
         **_settings(),
@@ -63,7 +63,7 @@ def _rig() -> Mapping[str, Ours]:
 
 
 def _compression_factor() -> float:
-    """Return the plant's flow of compression over V_0/beta times the rate of differential pressure."""
+    """Return the ratio of the plant's compression flow to V_0/beta times the rate of differential pressure."""
     rate = float(pressure_rate(0.0, 0.0, RIG.rated_speed, RIG))
     pumped = RIG.rated_flow - RIG.flow_bias
     return pumped * RIG.bulk_modulus / (RIG.chamber_volume * rate)
@@ -195,7 +195,7 @@ def settled_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
     Returns
     -------
     Mapping[str, Ours]
-        By condition [Pa]: mean over the first guesses, whether or not the gate lets it out.
+        By condition [Pa]: mean over the first guesses, whether or not the gate passes it.
     """
     rows = dict(by_experiment(estimates))[PUBLISHED_WAY]
     return {str(name): _settled(of_one) for name, of_one in rows.groupby("condition", sort=False)}
@@ -207,7 +207,7 @@ def printed_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
     Returns
     -------
     Mapping[str, Ours]
-        By condition: largest error over the first guesses [percent]; no number where none of them stays finite.
+        By condition: largest error over the first guesses [percent]; no number if none of them stays finite.
     """
     return {str(name): _as_printed(rows) for name, rows in estimates.groupby("condition", sort=False)}
 

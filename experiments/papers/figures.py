@@ -1,4 +1,4 @@
-"""Figures of the diaphragm-motor paper that its tables hold and no other study draws. They compute nothing."""
+"""Figures of the diaphragm-motor paper that show its tables and that no other study draws. They compute nothing."""
 
 import matplotlib.ticker as ticker
 import numpy as np
@@ -10,7 +10,7 @@ from experiments.page.frames import Tables
 from experiments.page.style import BLUE, VERMILION, Margins, panels
 
 RISING = LinearSegmentedColormap.from_list("rising", (VERMILION, "#f7f7f7", BLUE))
-"""Colours of what falls, rests and rises."""
+"""Colours from negative through zero to positive."""
 
 
 def _draw_table_4(tables: Tables) -> Figure:
@@ -59,7 +59,7 @@ def _draw_modes(tables: Tables) -> Figure:
 
 
 def _draw_bent_plate(tables: Tables) -> Figure:
-    """Draw how the diaphragm bends at a voltage and under a pressure: Figure 42."""
+    """Draw the deflection of the diaphragm under a voltage and under a pressure: Figure 42."""
     figure, (axis,) = panels("Deflection of the dry diaphragm along a radius", 1, 1, 3.6, Margins(left=0.75, top=0.5))
     rows = tables["bent plate"]
     axis.plot(1e3 * rows["radius_m"], 1e6 * rows["at_100_v_m"], color=BLUE, label="100 V, no pressure")

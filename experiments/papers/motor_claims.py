@@ -1,4 +1,4 @@
-"""Our figures beside the claims of the diaphragm-motor paper's text, by the key of ``claims.csv``."""
+"""Our results beside the claims of the diaphragm-motor paper's text, by the key of ``claims.csv``."""
 
 from collections.abc import Mapping
 
@@ -17,11 +17,11 @@ from plant.diaphragm_motor.run import HIGHEST_VOLTAGE, motor_drive
 from plant.units import notes
 
 OPTIMA = (0.01378, 0.004562, 0.003384)
-"""The frequencies of the abstract's triples [rad/s]."""
+"""The frequencies in the abstract's triples [rad/s]."""
 
 
 def motor_ours(found: Evidence) -> Mapping[str, Ours]:
-    """Return our figure beside each claim of the diaphragm-motor paper."""
+    """Return our result for each claim of the diaphragm-motor paper."""
     motor, paper = found["diaphragm-motor"], found["motor-paper"]
     return {
         **_settings(),
@@ -48,7 +48,7 @@ def _settings() -> Mapping[str, Ours]:
 
 
 def _is_sine() -> bool:
-    """Tell whether the motor's drive, once it has grown, is a sine."""
+    """Return whether the motor's drive is a sine after its amplitude has built up."""
     wave = motor_drive(sweeps.PEAK, sweeps.SWING, 0.1, 1e-5)
     last = wave[len(wave) // 2 :]
     tones = np.abs(np.fft.rfft(last * np.hanning(len(last))))

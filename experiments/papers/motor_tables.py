@@ -22,7 +22,7 @@ ACTUATORS = "Another device, of which we have no model."
 
 
 def motor_table_rows(found: Evidence) -> Iterator[Row]:
-    """Yield a row for every cell of the tables that something here computes, or was given."""
+    """Yield a row for every table cell that this project computes or was given."""
     paper = found["motor-paper"]
     yield from _sizes(paper["table_1"])
     yield from _relations(paper["table_2"])
@@ -52,7 +52,7 @@ def _sizes(table: pd.DataFrame) -> Iterator[Row]:
 
 
 def _relations(ours: pd.DataFrame) -> Iterator[Row]:
-    """Yield the columns of Table 2 that equations or other tables give, each row by the rows' median constant."""
+    """Yield the columns of Table 2 that follow from equations or other tables, with the rows' median constant."""
     printed, accept = as_printed("table2"), f"± {OBEYED_PERCENT:g} %"
     constants = ours.median()
     relations = (

@@ -1,4 +1,4 @@
-"""The studies whose results the rows are read from: each is run once, kept as a folder of tables, and read there."""
+"""The studies that supply the rows' results: each is run once, kept as a folder of tables, and read from there."""
 
 import hashlib
 import json
@@ -37,21 +37,21 @@ from experiments.running.study import Seeded, versions
 from plant.errors import LogWarning
 
 Evidence: TypeAlias = Mapping[str, Tables]
-"""Tables by part and name, as they stand in the folders."""
+"""Tables by part and name, as stored in the folders."""
 
 
 @dataclass(frozen=True)
 class PapersSettings(StudySettings):
-    """Size of the studies that the rows are read from.
+    """Size of the studies that supply the rows' results.
 
     Parameters
     ----------
     calibrations, turns : int
-        Calibrations of the piezo-stack plant without Figure 12, and most steps of each [count].
+        Calibrations of the piezo-stack plant without Figure 12, and the maximum number of steps in each [count].
     """
 
     filterpy_samples: int = 2
-    """Of a comparison that no row reads [count]."""
+    """Number of samples in a comparison that no row uses [count]."""
 
     calibrations: int = 3
     turns: int = TURNS
@@ -116,18 +116,18 @@ PARTS: Mapping[str, Callable[[PapersSettings, Track], Tables]] = {
     "diaphragm-motor": _motor,
     "motor-paper": _motor_paper,
 }
-"""What makes each part, by the verb that shows it."""
+"""Function that makes each part, by the verb that shows it."""
 
 
 def gather(folder: Path, settings: PapersSettings, track: Track) -> Evidence:
-    """Return the tables of every part; those that an earlier run left behind unchanged are not made again.
+    """Return the tables of every part; unchanged parts of an earlier run are reused.
 
-    Each part is written whole once it is made, so that an interrupted run goes on where it stopped.
+    Each part is written completely when it is finished, so that an interrupted run continues where it stopped.
 
     Parameters
     ----------
     folder : Path
-        The folder of the parts, one folder a part.
+        The folder of the parts, with one sub-folder for each part.
 
     Raises
     ------
@@ -147,12 +147,12 @@ def gather(folder: Path, settings: PapersSettings, track: Track) -> Evidence:
 
 
 def read_tables(folder: Path) -> Tables:
-    """Return the tables of a folder, by file name without its ending.
+    """Return the tables of a folder, by file name without its extension.
 
     Parameters
     ----------
     folder : Path
-        As `write_tables` leaves it.
+        A folder written by `write_tables`.
     """
     return {
         path.stem: pd.read_csv(path, keep_default_na=False, na_values=[""])
@@ -161,7 +161,7 @@ def read_tables(folder: Path) -> Tables:
 
 
 def sources_digest() -> str:
-    """Return a digest of the packages' sources, without this folder, which only reads."""
+    """Return a digest of the packages' sources, excluding this folder, which only reads results."""
     digest = hashlib.sha256()
     for path in _sources():
         digest.update(path.read_bytes())
@@ -186,7 +186,7 @@ def _manifest(name: str, settings: PapersSettings, sources: str) -> dict[str, An
 
 
 def _kept(folder: Path) -> dict[str, Any]:
-    """Return the manifest of an earlier run without its list of files; nothing where there is none."""
+    """Return the manifest of an earlier run without its list of files; empty if there is none."""
     try:
         found = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
         whole = all((folder / name).is_file() for name in found.pop("files"))

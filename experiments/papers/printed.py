@@ -24,7 +24,7 @@ def read_csv(name: str) -> list[dict[str, str]]:
 
 
 def claimed(row: Mapping[str, str], ours: Ours) -> Row:
-    """Return a claim with what stands beside it."""
+    """Return a claim with our result."""
     text = row["value"]
     value = None if not text else text if row["accept"] == "same" else float(text)
     return Row(

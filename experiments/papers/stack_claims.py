@@ -1,4 +1,4 @@
-"""Our figures beside the claims of the piezo-stack paper's text, by the key of ``claims.csv``."""
+"""Our results beside the claims of the piezo-stack paper's text, by the key of ``claims.csv``."""
 
 from collections.abc import Mapping
 
@@ -13,17 +13,17 @@ from plant.units import LITRE_PER_MINUTE
 
 
 def stack_ours(found: Tables) -> Mapping[str, Ours]:
-    """Return our figure beside each claim of the piezo-stack paper."""
+    """Return our result for each claim of the piezo-stack paper."""
     return {**figures_ours(found), **_hysteresis(found), **_left_out(found), **_settings(), "nothing": Ours(None)}
 
 
 def figures_ours(found: Tables) -> Mapping[str, Ours]:
-    """Return our figure beside each claim about a curve of Figures 10 to 14.
+    """Return our result for each claim about a curve of Figures 10 to 14.
 
     Parameters
     ----------
     found : Mapping[str, pandas.DataFrame]
-        As `stack_ours`; the tables of the figures and of the loops' widths are enough.
+        As for `stack_ours`; the tables of the figures and of the loops' widths are enough.
     """
     widths = found["figure_10_loop_widths"]["width_percent"]
     return {**_no_load(found), **_loaded(found), "loops_narrowing": Ours(float((widths.diff() <= 0.0).sum()))}
@@ -84,7 +84,7 @@ def _hysteresis(found: Tables) -> Mapping[str, Ours]:
 
 
 def _left_out(found: Tables) -> Mapping[str, Ours]:
-    """Return the worst of what calibrations without Figure 12 say of it."""
+    """Return the worst prediction of Figure 12 by calibrations without it."""
     table = found["figure_12_left_out"]
     best = table["best_weak_hz"]
     worst = best[(best - PEAK).abs().idxmax()]

@@ -1,4 +1,4 @@
-"""The page of the three papers: every table, figure and claim, with what we find and the verdict of one rule."""
+"""The page of the three papers: every table, figure and claim, with our result and the verdict of one rule."""
 
 import re
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ from plant.eha.circuit_parameters import CircuitParameters
 from plant.piezo_stack.parameters import PiezoStackParameters
 
 SECTIONS: Mapping[str, str] = {"002": "rows of 002", "000": "rows of 000", "001": "rows of 001"}
-"""The page's table of each paper."""
+"""Name of the page's table for each paper."""
 
 
 def papers_study(parts: Path) -> Study[PapersSettings]:
@@ -33,7 +33,7 @@ def papers_study(parts: Path) -> Study[PapersSettings]:
     Parameters
     ----------
     parts : Path
-        The folder of the parts; those that are there and unchanged are not made again.
+        The folder of the parts; existing unchanged parts are reused.
     """
 
     def find(settings: PapersSettings, track: Track) -> Found:
@@ -82,7 +82,7 @@ def _verdict(word: str) -> Cell:
 
 
 def _in_powers(text: str) -> str:
-    """Return a number such as -4.1e-6 with signs and powers of ten as a reader has them; other texts as they are."""
+    """Return a number such as -4.1e-6 with typographic signs and powers of ten; other texts are unchanged."""
     found = re.fullmatch(r"(-?[\d.]+)(?:e(-?\d+))?", text)
     if found is None:
         return text

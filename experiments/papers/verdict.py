@@ -1,4 +1,4 @@
-"""One row of the page, and the one rule that gives it its verdict. No verdict is written anywhere else."""
+"""One row of the page, and the one rule that decides its verdict. No verdict is written anywhere else."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,12 +10,12 @@ from experiments.published.digits import digits_half
 from plant.errors import HydrostateError, require_known
 
 Basis: TypeAlias = Literal["computed", "model", "target"]
-"""Where ours is from: computed from what is printed or from data; predicted by a model that was not told the printed
+"""Origin of our value: computed from printed values or from data; predicted by a model that was not given the printed
 number; or a number that a model was given or calibrated to."""
 
 
 class Verdict(StrEnum):
-    """Whether a printed value came back."""
+    """Whether a printed value was reproduced."""
 
     REPRODUCED = "reproduced"
     PREDICTED = "predicted"
@@ -37,10 +37,10 @@ AGREES: dict[Basis, Verdict] = {
     "model": Verdict.PREDICTED,
     "target": Verdict.CALIBRATED,
 }
-"""The verdict on what agrees, by where ours is from."""
+"""The verdict on a value that agrees, by the origin of our value."""
 
 MISSED = frozenset({Verdict.NOT_REPRODUCED, Verdict.ERRATUM})
-"""The verdicts on what does not agree."""
+"""The verdicts on values that do not agree."""
 
 
 TONES: Mapping[str, str] = {
@@ -53,21 +53,21 @@ TONES: Mapping[str, str] = {
     "drawn with a difference": "none",
     "cannot be drawn": "bad",
 }
-"""How a verdict is coloured."""
+"""The colour of each verdict."""
 
 
 @dataclass(frozen=True)
 class Ours:
-    """Our result beside a claim.
+    """Our result for a claim.
 
     Parameters
     ----------
     value : float, str or None
-        The number [the row's unit], or words; None where we have none.
+        The number [the row's unit], or words; None if we have none.
     low, high : float, optional
-        Its own interval [the row's unit]; the number itself unless told.
+        Its own interval [the row's unit]; by default the number itself.
     said : str
-        What else there is to say of it.
+        Further remarks.
     """
 
     value: float | str | None
@@ -78,21 +78,21 @@ class Ours:
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One printed value, or one claim, with what we find.
+    """One printed value or claim, with our result.
 
     Parameters
     ----------
     printed : str
         As printed.
     value : float, str or None
-        The same as a number [`unit`], or as words that ours must equal.
+        The printed value as a number [`unit`], or as words that our result must equal.
     accept : str
-        When ours counts as the printed value; see `accepted`.
+        When our result counts as the printed value; see `accepted`.
     errata : str
-        Numbers of the errata by which the printed value itself is wrong, ambiguous or contradicted by the paper; empty
-        if there are none.
+        Numbers of the errata that find the printed value wrong, ambiguous or contradicted by the paper; empty if there
+        are none.
     shown_by : str
-        The command that shows it.
+        The command that shows the result.
     """
 
     paper: str
@@ -141,10 +141,10 @@ def number_row(
 
 
 def accepted(row: Row) -> tuple[float, float]:
-    """Return the range in which ours counts as the printed value.
+    """Return the range in which our result counts as the printed value.
 
-    ``same`` is for words, which are compared as they are. ``digits`` is half a unit of the last printed digit, ``± x``
-    and ``± x %`` are about the printed value, ``a to b``, ``at least a`` and ``at most a`` stand for themselves.
+    ``same`` is for words, which must be equal. ``digits`` is half a unit of the last printed digit, ``± x`` and ``± x
+    %`` are about the printed value, ``a to b``, ``at least a`` and ``at most a`` are absolute.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def accepted(row: Row) -> tuple[float, float]:
 
 
 def agrees(row: Row) -> bool:
-    """Tell whether ours counts as the printed value: its interval meets the accepted range, or words are the same.
+    """Return whether our result agrees: its interval meets the accepted range, or the words are the same.
 
     Raises
     ------
@@ -203,9 +203,9 @@ def agrees(row: Row) -> bool:
 def verdict_of(row: Row) -> Verdict:
     """Return the verdict on a row.
 
-    What agrees is *calibrated* if a model was given it, *predicted* if a model was not told it, *reproduced* if it
-    was computed or estimated. What does not agree is an *erratum* if an erratum says that the printed value is wrong or
-    contradicted, and *not reproduced* otherwise.
+    If the values agree, the verdict is *calibrated* if a model was given the printed value, *predicted* if a model was
+    not given it, and *reproduced* if our value was computed or estimated. If they do not agree, it is *erratum* if an
+    erratum says that the printed value is wrong or contradicted, and *not reproduced* otherwise.
 
     Raises
     ------
@@ -219,7 +219,7 @@ def verdict_of(row: Row) -> Verdict:
 
 
 def excluded(row: Row) -> str:
-    """Return a sentence where our own interval excludes the printed value and what its digits leave open; else nothing.
+    """Return a sentence if our own interval excludes the printed value and its rounding interval; else an empty text.
 
     Examples
     --------
@@ -232,16 +232,16 @@ def excluded(row: Row) -> str:
 
 
 def drawn_as(drawing: bool, difference: str, verdicts: Sequence[str]) -> Drawn:
-    """Return the function that draws a figure of a paper.
+    """Return the status of a figure of a paper.
 
     Parameters
     ----------
     drawing : bool
         Whether a study draws it.
     difference : str
-        What is known to be different; empty if nothing.
+        Known differences; empty if there are none.
     verdicts : sequence of str
-        Those of the rows that speak of the figure: one that did not come back is a difference too.
+        Verdicts of the rows that refer to the figure; a row that was not reproduced is also a difference.
 
     Examples
     --------

@@ -14,13 +14,13 @@ SENSOR_SETS = {
     "stack displacement, position": ("stack_displacement_m", "position_m"),
     "all four": ("stack_displacement_m", "stack_force_n", "position_m", "chamber_pressure_pa"),
 }
-"""Channels beside the drive, by what the card calls them."""
+"""Measured channels in addition to the drive, by their name on the card."""
 
 FREQUENCIES = (100.0, 275.0)
-"""Drives that are looked at [Hz]."""
+"""Drive frequencies examined [Hz]."""
 
 DURATION = 0.1
-"""Length of the experiment [s]."""
+"""Duration of the experiment [s]."""
 
 
 @tabled
@@ -31,7 +31,7 @@ def identifiability_card(healthy: PiezoStackParameters) -> Rows:
     -------
     pandas.DataFrame
         Columns frequency_hz, sensors, and for each quantity its standard deviation in percent: of a minor fault for
-        leaks and friction, of itself for the others.
+        leaks and friction, of its own value for the others.
     """
     for frequency in FREQUENCIES:
         drive = sine_drive(frequency, 140.0, DURATION, SAMPLE_TIME)

@@ -1,4 +1,4 @@
-"""The piezo-stack actuator's figures: the paper's Figures 10 to 14 repeated, a pump cycle, maps, and what limits it.
+"""The piezo-stack actuator's figures: the paper's Figures 10 to 14 repeated, a pump cycle, maps, and flow limits.
 
 They read the tables of `hydrostate piezo-stack`, and compute nothing.
 """
@@ -21,7 +21,7 @@ from plant.units import LITRE_PER_MINUTE
 MEGA, MICRO, MILLI = 1e-6, 1e6, 1e3
 
 _CONTOUR = 0.2
-"""Flow from one contour to the next [L/min]."""
+"""Flow interval between contours [L/min]."""
 
 CYCLE: Sequence[Course] = (
     (
@@ -156,7 +156,7 @@ def _draw_maps(tables: Tables) -> Figure:
 
 
 def _draw_limits(tables: Tables) -> Figure:
-    """Draw by how much the flow answers to each part. One pair of bars a part, the strongest on top."""
+    """Draw the sensitivity of the flow to each part. One pair of bars for each part, the strongest on top."""
     table = tables["what limits the flow"]
     order = table[["percent_up", "percent_down"]].abs().max(axis=1).sort_values().index
     table = table.loc[order]

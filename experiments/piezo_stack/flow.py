@@ -1,6 +1,6 @@
 """The piezo-stack actuator's flow: Figures 10 to 14 repeated, design maps, and what limits the flow.
 
-Published are only the numbers that the paper's text quotes (errata P17).
+Only the numbers that the paper's text quotes are published (errata P17).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ LOOP_FREQUENCIES = (1.0, 50.0, 100.0, 200.0, 300.0, 400.0)
 """Frequencies of Figure 10's loops [Hz]."""
 
 LOOP_VOLTAGE = 100.0
-"""Swing of Figure 10 [V]."""
+"""Peak-to-peak voltage of Figure 10 [V]."""
 
 FREQUENCIES = tuple(np.arange(25.0, 451.0, 25.0).tolist())
 """Frequencies of Figures 11 to 13 [Hz]."""
@@ -39,7 +39,7 @@ HIGH_BIAS, LOW_BIAS = 1.0e6, 0.6e6
 """The two bias pressures [Pa]."""
 
 HIGH_VOLTAGE, LOW_VOLTAGE = 140.0, 100.0
-"""The two swings [V]."""
+"""The two peak-to-peak voltages [V]."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class OperatingPoint:
     Parameters
     ----------
     frequency_hz, voltage_v : float
-        Of the drive: frequency, and swing from trough to crest.
+        Frequency and peak-to-peak voltage of the drive.
     bias_pressure_pa : float
         Bias pressure.
     load_kg : float
@@ -90,7 +90,7 @@ QUICK_GRID = DesignGrid((150.0, 275.0, 400.0), (100.0, 140.0), (LOW_BIAS, HIGH_B
 
 
 def sweep(p: PiezoStackParameters, points: Sequence[OperatingPoint]) -> Iterator[dict[str, float]]:
-    """Run many operating points, several side by side, and return what each gives: flow, and power in and out.
+    """Run many operating points, several side by side, and return the results of each: flow, and power in and out.
 
     Yields
     ------
@@ -107,7 +107,7 @@ def rows_of(cases: Sequence[tuple[PiezoStackParameters, OperatingPoint]]) -> Ite
     Parameters
     ----------
     cases : sequence of tuple
-        Actuator and setting of each.
+        Actuator and setting of each case.
 
     Yields
     ------
@@ -141,7 +141,7 @@ def _row(q: PiezoStackParameters, point: OperatingPoint, states: np.ndarray) -> 
 
 
 def _run_time(frequency: float) -> float:
-    """Return the length of a run: the bench's, longer where its second half would hold no cycle [s]."""
+    """Return the duration of a run: the bench's, or longer if its second half would not hold a cycle [s]."""
     return max(FLOW_TIME, 4.0 / frequency)
 
 
@@ -228,10 +228,10 @@ LIMITS: Mapping[str, tuple[str, ...]] = {
     "piston area": ("piston_area",),
     "cylinder friction": ("viscous_friction", "coulomb_friction"),
 }
-"""What may limit the flow, and the parameters that it stands for."""
+"""Parts that may limit the flow, with their parameters."""
 
 STEP = 0.05
-"""By how much each is changed [fraction]."""
+"""Relative change of each parameter [fraction]."""
 
 
 def sensitivities(p: PiezoStackParameters, load: float = 10.0) -> pd.DataFrame:
@@ -259,21 +259,22 @@ def sensitivities(p: PiezoStackParameters, load: float = 10.0) -> pd.DataFrame:
 
 
 def best_points(design: pd.DataFrame, voltage_limit: float, power_limit: float) -> pd.DataFrame:
-    """Return for each load and bias pressure the setting of most flow within limits.
+    """Return the setting with the largest flow within limits, for each load and bias pressure.
 
     Parameters
     ----------
     design : pandas.DataFrame
-        Rows of `sweep`.
+        Rows from `sweep`.
     voltage_limit : float
-        Largest swing [V].
+        Largest peak-to-peak voltage [V].
     power_limit : float
         Largest power of the stack [W].
 
     Returns
     -------
     pandas.DataFrame
-        The rows of most flow, one a load and bias pressure; none where no setting within the limits lifts the load.
+        The rows with the largest flow, one for each load and bias pressure; none if no setting within the limits lifts
+        the load.
     """
     within = (design["voltage_v"] <= voltage_limit) & (design["stack_power_w"] <= power_limit)
     allowed = design[within & (design["flow_m3_s"] > 0.0)]

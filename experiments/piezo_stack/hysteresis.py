@@ -13,7 +13,7 @@ from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import SAMPLE_TIME, sine_drive
 
 SLOW = 0.1
-"""Frequency at which the stack's lag moves it by a nanometre only [Hz]."""
+"""Frequency at which the stack's lag changes its displacement by only a nanometre [Hz]."""
 
 SAMPLES = round(1.0 / (SLOW * SAMPLE_TIME))
 """Samples in a cycle, as the bench logs them."""
@@ -22,13 +22,13 @@ FEW_SAMPLES = 5000
 """Samples in a cycle of a slow logger."""
 
 CYCLES = 3
-"""Cycles from rest until a loop has closed: the last is the one that is logged."""
+"""Number of cycles from rest until a loop has closed; the last one is logged."""
 
 NOISE = 2e-8
 """Noise of the displacement sensor [m]."""
 
 SMALL, LARGE = 5.0, 100.0
-"""Swings of the small and of the large experiment [V]."""
+"""Peak-to-peak voltages of the small and of the large experiment [V]."""
 
 
 @tabled
@@ -38,7 +38,7 @@ def hysteresis_table(p: PiezoStackParameters, seed: int) -> Rows:
     Parameters
     ----------
     seed : int
-        Seed of the sensor noise; the printed procedure is given noiseless signals, or it fails sooner.
+        Seed of the sensor noise; the printed procedure gets noise-free signals, because noise makes it fail earlier.
 
     Returns
     -------
@@ -67,13 +67,13 @@ def hysteresis_table(p: PiezoStackParameters, seed: int) -> Rows:
 
 @tabled
 def loop_card(p: PiezoStackParameters) -> Rows:
-    """Return the Cramér-Rao bounds for a slow loop of 100 V, by its course and sample rate.
+    """Return the Cramér-Rao bounds for a slow loop of 100 V, by its waveform and sample rate.
 
     Returns
     -------
     pandas.DataFrame
-        Columns loop, samples, and for each parameter its standard deviation in percent; infinite where the loop cannot
-        tell it.
+        Columns loop, samples, and for each parameter its standard deviation in percent; infinite if the loop does not
+        determine it.
     """
     for samples in (FEW_SAMPLES, SAMPLES):
         for loop, cycles, from_rest in (
@@ -92,9 +92,9 @@ def slow_loop(p: PiezoStackParameters, swing: float) -> tuple[np.ndarray, np.nda
     Parameters
     ----------
     p : PiezoStackParameters
-        The stack; its own vibration is damped, which at this frequency nobody sees.
+        The stack; its own vibration is damped, which has no visible effect at this frequency.
     swing : float
-        Swing of the drive [V].
+        Peak-to-peak voltage of the drive [V].
 
     Returns
     -------

@@ -42,13 +42,13 @@ SENSORS: Mapping[str, str] = {
 """Channels by the names of ``--sensors``."""
 
 SINE = {"frequency": 275.0, "voltage": 140.0}
-"""The drive where it is not given: frequency [Hz], voltage peak to peak [V]."""
+"""The default drive: frequency [Hz], voltage peak to peak [V]."""
 
 BENCH = {"sensors": "bench", "duration": None, "sample_time": SAMPLE_TIME}
-"""Sensors, length [s] and time between samples [s] where they are not given."""
+"""Default sensors, duration [s] and sample time [s]."""
 
 OF_THE_RUN = {"bias_pressure": None, "load": None}
-"""What a run is made under; the rig's own where it is not given."""
+"""Operating conditions of a run; by default the rig's own."""
 
 
 class StackRunCode(Code):
@@ -86,7 +86,7 @@ def _at(rig: Rig[Any], options: Options) -> Rig[Any]:
 
 
 def _prepared(rig: Rig[Any], options: Options) -> tuple[Rig[Any], tuple[str, ...]]:
-    """Return the actuator as a healthy run shows it, if there is one, and the channels that are used."""
+    """Return the actuator calibrated to a healthy run, if there is one, and the channels that are used."""
     channels, healthy = _channels(options.get("sensors", "")), _at(rig, options)
     if options["healthy"] is not None:
         healthy = replace(healthy, parameters=calibrated_stack(options["healthy"], healthy.parameters))

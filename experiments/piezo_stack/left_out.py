@@ -1,7 +1,7 @@
-"""Figure 12 left out: parameters calibrated to Figures 11 and 13 alone, and what they say of 100 V.
+"""Figure 12 left out: parameters calibrated to only Figures 11 and 13, and their prediction at 100 V.
 
-No calibration here sees a run at 100 V. Each begins from parameters that are drawn about those that ship, since these
-were searched with Figure 12 (decision 25), and is held to where it began.
+No calibration here uses a run at 100 V. Each starts from parameters drawn about those that ship, since the shipped ones
+were fitted with Figure 12 (decision 25), and is regularised towards its starting point.
 """
 
 from collections.abc import Sequence
@@ -37,26 +37,26 @@ FREED: tuple[tuple[str, ...], ...] = (
     ("viscous_friction",),
     ("air_fraction",),
 )
-"""Parameters that are searched; those that stand together change by one factor."""
+"""Parameters that are searched; those in one group change by the same factor."""
 
 APART, LOOSE = 0.1, 0.2
-"""By how much the beginnings are drawn apart, and how loosely a search is held to its own [logarithm]."""
+"""Spread of the starting points, and standard deviation of the prior about its own starting point [logarithm]."""
 
 PEAK_FREQUENCIES = (225.0, 250.0, 275.0, 300.0, 325.0)
-"""Where the flow is looked at for its maximum [Hz]."""
+"""Frequencies at which the maximum flow is sought [Hz]."""
 
 PEAK = 275.0
-"""Where Figure 11 has its maxima [Hz]."""
+"""Frequency of the maxima in Figure 11 [Hz]."""
 
 WANTED, ALLOWED = np.array([1.6, 1.0, PEAK, PEAK]), np.array([0.05, 0.05, 12.5, 12.5])
-"""What the text quotes of Figures 11 and 13, and half a unit of the digit or half the sweep's step: largest flow at
-1.0 MPa and flow with 20 kg [L/min], best frequencies at 1.0 and 0.6 MPa [Hz]."""
+"""Values that the text quotes from Figures 11 and 13, with half a unit of the last digit or half the sweep's step:
+largest flow at 1.0 MPa and flow with 20 kg [L/min], best frequencies at 1.0 and 0.6 MPa [Hz]."""
 
 LIFTED = 20.0
 """The load of the quoted point of Figure 13 [kg]."""
 
 STEP, TURNS = 0.02, 8
-"""Difference that slopes are taken over [logarithm], and most steps of a search."""
+"""Step of the finite differences [logarithm], and maximum number of search steps."""
 
 
 def changed(p: PiezoStackParameters, logs: Array) -> PiezoStackParameters:
@@ -93,7 +93,7 @@ def _misfits(actuators: Sequence[PiezoStackParameters]) -> Array:
 
 
 def _summit(curves: Array) -> Array:
-    """Return the top of a parabola through the flows, within the sweep [Hz]."""
+    """Return the frequency at the top of a parabola through the flows, within the sweep [Hz]."""
     frequencies = np.array(PEAK_FREQUENCIES)
     square, slope, _ = np.polyfit(frequencies - PEAK, curves.T, 2)
     reach = frequencies[-1] - PEAK
@@ -102,16 +102,16 @@ def _summit(curves: Array) -> Array:
 
 
 def calibrated(start: PiezoStackParameters, turns: int = TURNS) -> PiezoStackParameters:
-    """Return parameters that come as near as they can to what the text quotes of Figures 11 and 13.
+    """Return the parameters that best match the values that the text quotes from Figures 11 and 13.
 
-    Levenberg and Marquardt's steps on the logarithms of the freed values.
+    The search uses Levenberg-Marquardt steps on the logarithms of the freed values.
 
     Parameters
     ----------
     start : PiezoStackParameters
-        The beginning, from which the freed values stray by some `LOOSE`.
+        The starting point, from which the freed values deviate by about `LOOSE`.
     turns : int
-        Most steps of the search.
+        Maximum number of search steps.
     """
     size = len(FREED)
     logs, damping, misfit = np.zeros(size), 1.0, _misfits([start])[0]
@@ -144,17 +144,17 @@ def figure_12_left_out(
     Parameters
     ----------
     rig : PiezoStackParameters
-        The parameters about which the beginnings are drawn.
+        The parameters about which the starting points are drawn.
     starts : int
-        Calibrations, each from a beginning of its own.
+        Number of calibrations, each from its own starting point.
     turns : int
-        Most steps of each.
+        Maximum number of steps in each.
 
     Returns
     -------
     pandas.DataFrame
-        Columns calibration; flow_max_l_min, flow_20kg_l_min, best_high_hz and best_low_hz, which it was calibrated to;
-        and ratio (flow at 100 V over that at 140 V, both at 275 Hz) and best_weak_hz at 100 V, which it was not.
+        Columns calibration; flow_max_l_min, flow_20kg_l_min, best_high_hz and best_low_hz, used for the calibration;
+        and ratio (flow at 100 V over that at 140 V, both at 275 Hz) and best_weak_hz at 100 V, not used for it.
     """
     rng = stream(seed, "figure 12 left out")
     beginnings = [changed(rig, APART * rng.standard_normal(len(FREED))) for _ in range(starts)]

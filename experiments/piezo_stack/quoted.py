@@ -14,19 +14,20 @@ ROLES: Mapping[Basis, str] = {
     "model": "prediction",
     "computed": "computed",
 }
-"""What a quoted number was to the model."""
+"""How the model used a quoted number."""
 
 
 @tabled
 def quoted_numbers(tables: Mapping[str, pd.DataFrame]) -> Rows:
-    """Return the numbers that the paper's text quotes of its curves, beside those of the figures' tables.
+    """Return the numbers that the paper's text quotes from its curves, beside those of the figures' tables.
 
-    Claims, tolerances and the rule of the verdict are those of `hydrostate papers`.
+    Claims, tolerances and the verdict rule are those of `hydrostate papers`.
 
     Parameters
     ----------
     tables : Mapping[str, pandas.DataFrame]
-        The tables of `experiments.piezo_stack.flow.figure_points`, and of `loop_widths` as ``figure 10 loop widths``.
+        The tables of `experiments.piezo_stack.flow.figure_points`, and that of `loop_widths` as ``figure 10 loop
+        widths``.
 
     Returns
     -------

@@ -29,9 +29,9 @@ class StackSettings:
     Parameters
     ----------
     quick : bool
-        Whether the design map is a small one.
+        Whether to use a small design map.
     voltage_limit_v : float
-        Largest swing of the best operating points [V].
+        Largest peak-to-peak voltage of the best operating points [V].
     power_limit_w : float
         Largest power of the stack at the best operating points [W].
     """

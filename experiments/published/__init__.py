@@ -1,6 +1,6 @@
 """The published results, as printed: tables and scalars of the EHA paper, and tables of the diaphragm-motor paper.
 
-Nothing here is corrected. What the project departs from is told in ``docs/errata.md``, by number.
+Nothing here is corrected. ``docs/errata.md`` lists by number where the project departs from the papers.
 """
 
 import csv
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 TableName: TypeAlias = Literal["conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"]
 
 MotorTableName: TypeAlias = Literal["table1_geometry", "table2", "fig12_anova", "table4_flow", "table5_actuators"]
-"""The diaphragm-motor paper's tables, and the regression that its Figure 12 holds."""
+"""The diaphragm-motor paper's tables, and the regression in its Figure 12."""
 
 
 @dataclass(frozen=True)
 class PublishedScalar:
-    """A number that stands in the paper's text and in none of its tables.
+    """A number that is in the paper's text but in none of its tables.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class PublishedScalar:
     si_unit : str
         The SI unit; ``"1"`` for a ratio.
     where : str
-        Section of the paper, with the erratum where one applies.
+        Section of the paper, with the erratum if one applies.
     """
 
     value: float
@@ -62,13 +62,13 @@ _FILES: Mapping[TableName | MotorTableName, str] = {
 
 
 def load(name: TableName | MotorTableName) -> "pd.DataFrame":
-    """Return a published table, one row a line of the paper's, columns named with their units.
+    """Return a published table, one row for each row of the paper's table, with units in the column names.
 
     Parameters
     ----------
     name : TableName or MotorTableName
-        Which of the EHA paper's Tables 1 to 6, in this order, or of the diaphragm-motor paper's. The transfer functions
-        are ``(b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2)``, their sample time and input are not given (errata E14).
+        One of the EHA paper's Tables 1 to 6, in this order, or of the diaphragm-motor paper's. The transfer functions
+        are ``(b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2)``; their sample time and input are not given (errata E14).
 
     Returns
     -------
@@ -94,7 +94,7 @@ def load(name: TableName | MotorTableName) -> "pd.DataFrame":
 
 
 def as_printed(name: TableName | MotorTableName) -> "pd.DataFrame":
-    """Return a published table as `load` does, every cell as the text that is printed.
+    """Return a published table as `load` does, with every cell as the printed text.
 
     Returns
     -------

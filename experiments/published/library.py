@@ -12,21 +12,21 @@ from estimation.identification.model.linear_model import LinearModel
 from plant.errors import HydrostateError
 
 FORMAT = "hydrostate transfer-function library"
-"""What the file says it is."""
+"""Format name in the file."""
 
 VERSION = 2
-"""Of the format; a reader refuses another one."""
+"""Version of the format; a reader refuses other versions."""
 
 
 def library_models(library: Mapping[str, Any], which: str = "model") -> dict[str, LinearModel]:
-    """Return the models of a library by condition, equal in every bit to those that went in.
+    """Return the models of a library by condition, bit for bit as they were stored.
 
     Parameters
     ----------
     library : Mapping
-        The values of a library's file.
+        The values of a library file.
     which : str
-        ``model``, or ``around_mean`` for those of a test around an input mean.
+        ``model``, or ``around_mean`` for the models of a test around an input mean.
 
     Returns
     -------
@@ -37,14 +37,14 @@ def library_models(library: Mapping[str, Any], which: str = "model") -> dict[str
 
 
 def read_library(path: Path | None = None, which: str = "model") -> dict[str, LinearModel]:
-    """Return the models of a library's file.
+    """Return the models of a library file.
 
     Parameters
     ----------
     path : Path, optional
-        The file; the library that ships with the package unless told.
+        The file; by default the library that ships with the package.
     which : str
-        As `library_models`.
+        As for `library_models`.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def read_library(path: Path | None = None, which: str = "model") -> dict[str, Li
 
 @cache
 def _shipped(which: str) -> dict[str, LinearModel]:
-    """Return the models that ship with the package, read for the first log of a process."""
+    """Return the models that ship with the package, read at the first log of a process."""
     return _read(files("experiments.published") / "transfer_function_library.json", which)
 
 

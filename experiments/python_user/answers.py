@@ -1,4 +1,4 @@
-"""Answers of a log in Python: they print and draw themselves, and turn into tables."""
+"""Answers about a log in Python: they print and draw themselves, and convert to tables."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -21,12 +21,12 @@ _FIVE = "{:.5g}".format
 
 
 def no_such(owner: str, name: str, known: Sequence[str]) -> str:
-    """Return the sentence for a name that is not there.
+    """Return the error sentence for an unknown name.
 
     Returns
     -------
     str
-        With the nearest name, or all of them.
+        With the closest name, or with all names.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def no_such(owner: str, name: str, known: Sequence[str]) -> str:
 
 
 def refuse(message: str) -> NoReturn:
-    """Raise our error.
+    """Raise a `HydrostateError`.
 
     Raises
     ------
@@ -52,12 +52,12 @@ def refuse(message: str) -> NoReturn:
 
 
 def names_of(option: str, given: Any) -> list[str]:
-    """Return names of channels that were given as one name or several.
+    """Return the names of channels, given as one name or several.
 
     Raises
     ------
     HydrostateError
-        If they are no names.
+        If they are not names.
 
     Examples
     --------
@@ -86,7 +86,7 @@ class Shown:
 
 
 class Named(dict[str, Any]):
-    """Entries by name; a misspelt name brings an error with the nearest one."""
+    """Entries by name; a misspelt name raises an error with the nearest one."""
 
     def __missing__(self, name: str) -> NoReturn:
         from plant.errors import NoSuchEntryError
@@ -95,18 +95,18 @@ class Named(dict[str, Any]):
 
 
 class Answer(Shown):
-    """Answer of a log, to be printed, drawn and passed on.
+    """Answer about a log, to print, draw and pass on.
 
     Parameters
     ----------
     entries : Mapping[str, Any]
-        The same by the names of the JSON contract.
+        The answer by the names of the JSON contract.
     screen : callable
-        From a list of entries to what a terminal shows.
+        From a list of entries to the terminal output.
     page : callable
         From a title to the page of the log, as HTML.
     name : str
-        What the log is called where the answer is printed.
+        Name of the log when the answer is printed.
     """
 
     def __init__(
@@ -135,17 +135,17 @@ class Answer(Shown):
 
     @property
     def condition(self) -> str | None:
-        """Condition of the log: ``"unknown"`` if all are contradicted, None if none was asked for."""
+        """Condition found in the log: ``"unknown"`` if all are contradicted, None if no diagnosis was requested."""
         return "unknown" if self.finding.unknown else self.finding.condition
 
     @property
     def believed(self) -> bool:
-        """Whether the numbers can be believed."""
+        """Whether the numbers passed the checks."""
         return self.finding.gate.passed
 
     @property
     def all_notes(self) -> "tuple[Note, ...]":
-        """Every remark, each once, as a code with data and a sentence."""
+        """Every remark once, as a code with data and a sentence."""
         return self.finding.all_notes
 
     def __str__(self) -> str:
@@ -167,7 +167,7 @@ class Answer(Shown):
         Returns
         -------
         pandas.DataFrame
-            As `experiments.log_pages.comparison.differences` has it; ``second`` is the other [the row's unit].
+            As in `experiments.log_pages.comparison.differences`; ``second`` is the other answer [the row's unit].
         """
         from experiments.log_pages.comparison import differences
 
@@ -205,14 +205,14 @@ class Answer(Shown):
         return pd.DataFrame.from_dict(rows, orient="index", columns=["value", *ends, "unit"])
 
     def report(self, path: "str | Path", title: str = "log") -> "Path":
-        """Write the page of the log: one HTML file with charts, which needs no network.
+        """Write the page of the log as one HTML file with charts, which works offline.
 
         Parameters
         ----------
         path : str or Path
-            Where to; ``.html`` is added to a name without an ending, and folders that are missing are made.
+            Path of the file. ``.html`` is added to a name without an ending, and missing folders are created.
         title : str
-            What the page calls the log.
+            Name of the log on the page.
 
         Returns
         -------
@@ -222,19 +222,19 @@ class Answer(Shown):
         Raises
         ------
         HydrostateError
-            If the file cannot be written, or its name ends as no page's does.
+            If the file cannot be written, or its name does not have the ending of a page.
         """
         from experiments.python_user.own_page import write_page
 
         return write_page(path, self._page(title))
 
     def plot(self) -> "list[Axes]":
-        """Draw the probabilities, where there are some, and every quantity with its interval.
+        """Draw the probabilities, if there are any, and every quantity with its interval.
 
         Returns
         -------
         list of matplotlib.axes.Axes
-            One for the probabilities, then one a quantity.
+            One for the probabilities, then one for each quantity.
         """
         import matplotlib.pyplot as plt
 
@@ -256,7 +256,7 @@ class Answer(Shown):
 
 
 class Model(Shown):
-    """A transfer function that was identified, with everything that `LinearModel` has.
+    """An identified transfer function, with all attributes of `LinearModel`.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ class Model(Shown):
         return f"<p>{self._title}</p>{self.to_frame().to_html(float_format=_FIVE)}"
 
     def report(self, path: "str | Path", title: str = "log") -> "Path":
-        """Write the page of the model to ``path``, as `Answer.report` does that of a log, and return the file."""
+        """Write the page of the model to ``path``, as in `Answer.report`, and return the file."""
         from experiments.python_user.own_page import write_page
 
         return write_page(path, self._page(title))
@@ -305,7 +305,7 @@ class Model(Shown):
         return self.model.to_control()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the model as `LinearModel.from_dict` reads it.
+        """Return the model in the form that `LinearModel.from_dict` reads.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Result of a fit of own equations in Python, and the logs that such a fit takes."""
+"""Result of fitting a user's own equations in Python, and the logs accepted by such a fit."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ _FIVE = "{:.5g}".format
 
 
 class FittedGreyBox(Shown):
-    """Result of a fit of own equations."""
+    """Result of fitting a user's own equations."""
 
     def __init__(self, fit: "EquationsFit", records: "Sequence[Record]") -> None:
         self.fit, self._records = fit, tuple(records)
@@ -35,7 +35,7 @@ class FittedGreyBox(Shown):
 
     @property
     def quantities(self) -> "Mapping[str, Quantity]":
-        """Parameters and fitted initial states with their 95 % intervals; value None where the logs do not tell."""
+        """Parameters and fitted initial states with 95 % intervals; value None if the logs do not determine it."""
         return self.fit.finding.quantities
 
     @property
@@ -45,22 +45,22 @@ class FittedGreyBox(Shown):
 
     @property
     def condition(self) -> float:
-        """Condition number of the scaled sensitivities; large where parameters are hard to tell apart."""
+        """Condition number of the scaled sensitivities; a large value means that parameters are hard to separate."""
         return self.fit.covariance.condition
 
     @property
     def fit_percent(self) -> Mapping[str, float]:
-        """Fit of each output: 100 is perfect, 0 is as good as its mean."""
+        """Fit of each output: 100 is perfect, 0 is no better than the output's mean."""
         return self.fit.fit_percent
 
     @property
     def noise(self) -> Mapping[str, float]:
-        """Standard deviation of each output's noise."""
+        """Standard deviation of the noise of each output."""
         return self.fit.noise
 
     @property
     def correlation(self) -> "pd.DataFrame":
-        """Correlation of the parameters' errors."""
+        """Correlation between the errors of the parameters."""
         import pandas as pd
 
         names = list(self.fit.solution.problem.names)
@@ -122,14 +122,14 @@ class FittedGreyBox(Shown):
         Parameters
         ----------
         log : Log, Record or pandas.DataFrame
-            With the inputs; where it has the outputs too, free initial states are fitted to them.
+            Must contain the inputs. If it also contains the outputs, free initial states are fitted to them.
         initial : Mapping[str, float], optional
             The states at the first sample [their units].
 
         Returns
         -------
         pandas.DataFrame
-            One column an output, by time [s].
+            One column for each output, by time [s].
         """
         import pandas as pd
 
@@ -137,12 +137,12 @@ class FittedGreyBox(Shown):
         return pd.DataFrame(dict(self.fit.predicted(record, initial)), index=times_of(log, record))
 
     def plot(self) -> "list[Axes]":
-        """Draw measured and fitted outputs of every log, and the residuals below.
+        """Draw measured and fitted outputs of every log, with the residuals below.
 
         Returns
         -------
         list of matplotlib.axes.Axes
-            Two an output and log.
+            Two for each output and log.
         """
         import matplotlib.pyplot as plt
 
@@ -168,12 +168,12 @@ def _label(name: str, unit: str) -> str:
 
 
 def record_of(log: Any) -> "Record":
-    """Return the record of a log, a record itself, or a table by time [s].
+    """Return the record of a log, of a record itself, or of a table indexed by time [s].
 
     Parameters
     ----------
     log : Log, Record or pandas.DataFrame
-        What a user has.
+        The user's log.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def record_of(log: Any) -> "Record":
 
 
 def times_of(log: Any, record: "Record") -> "pd.Index[Any]":
-    """Return the times of what is simulated: a table's own, so that columns can be put into it."""
+    """Return the times of the simulated samples: a table keeps its own index, so that columns can be added to it."""
     import pandas as pd
 
     return log.index if isinstance(log, pd.DataFrame) else pd.Index(record.time, name="time_s")

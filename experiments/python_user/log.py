@@ -1,4 +1,4 @@
-"""A log in the hands of a Python user: its channels, and the verbs that say what it holds."""
+"""A log for Python users: its channels, and the verbs that analyse it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 
 ANY = "anything"
-"""Kind of a log whose columns are not those of an actuator: its channels can be related, and nothing be diagnosed."""
+"""Kind of a log whose columns are not those of an actuator: its channels can be related, but nothing can be
+diagnosed."""
 
 
 FREE_OPTIONS = ("input", "output", "structure", "order", "delay", "n_numerator", "sample_time", "reference")
@@ -32,21 +33,21 @@ FREE_OPTIONS = ("input", "output", "structure", "order", "delay", "n_numerator",
 
 
 WHOLE = ("order", "delay", "n_numerator")
-"""Those of them that are whole numbers, if given."""
+"""Those options that must be whole numbers, if given."""
 
 
 def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: str) -> Mapping[str, Any]:
-    """Return options if a verb has them all, and each is of the kind of its default.
+    """Return the options if the verb has each of them, and each has the type of its default.
 
     Parameters
     ----------
     options, known : Mapping[str, Any]
-        What was given, and every option with its default.
+        The given options, and all options with their defaults.
 
     Raises
     ------
     HydrostateError
-        If one is unknown, or text where a number belongs.
+        If one is unknown, or is text instead of a number.
     """
     for name, value in options.items():
         if name not in known:
@@ -136,7 +137,7 @@ class Log(Shown):
         Parameters
         ----------
         begin, end : float
-            From when to when [s].
+            Start and end of the part [s].
 
         Raises
         ------
@@ -186,12 +187,12 @@ class Log(Shown):
         return self.record if self._sparse is None else self._sparse
 
     def estimate(self, **options: Any) -> "Answer":
-        """Estimate what cannot be measured: effective bulk modulus, leakage, and what the actuator's kind adds.
+        """Estimate what cannot be measured: effective bulk modulus, leakage, and more for some kinds of actuator.
 
         Parameters
         ----------
         **options
-            As `hydrostate estimate` takes them: ``method="ekf"``, ``no_pressure=True``.
+            Options of `hydrostate estimate`, such as ``method="ekf"``, ``no_pressure=True``.
 
         Returns
         -------
@@ -201,12 +202,12 @@ class Log(Shown):
         return self._asked("estimate", options)
 
     def diagnose(self, **options: Any) -> "Answer":
-        """Say what is wrong: which condition, how probable, how bad, or that it is none of them.
+        """Find what is wrong: which condition, how probable, how severe, or that none of them fits.
 
         Parameters
         ----------
         **options
-            As `hydrostate diagnose` takes them: ``no_pressure=True``.
+            Options of `hydrostate diagnose`, such as ``no_pressure=True``.
 
         Returns
         -------
@@ -221,7 +222,7 @@ class Log(Shown):
         Parameters
         ----------
         *logs : Log
-            Further experiments, where ``input`` and ``output`` are given.
+            Further experiments, if ``input`` and ``output`` are given.
         **options
             With ``input`` and ``output``, names or lists of them: ``structure`` ("output-error", "narx", "hammerstein",
             "wiener", "state-space", "auto"), ``order``, ``delay``, ``n_numerator``, ``sample_time`` [s], ``reference``
@@ -231,7 +232,7 @@ class Log(Shown):
         Returns
         -------
         Model or Relation
-            The transfer function with its uncertainty, or one model an output.
+            The transfer function with its uncertainty, or one model for each output.
         """
         import inspect
 
@@ -264,7 +265,7 @@ class Log(Shown):
         return identified([one.related for one in logs], inputs, outputs, options)
 
     def _tell_sparse(self, asked: "Sequence[str]") -> None:
-        """Warn of channels that lack too many samples for the record; the samples that are there are used now."""
+        """Warn about channels with too many missing samples for the record; their remaining samples are used here."""
         import warnings
 
         import numpy as np
@@ -310,7 +311,7 @@ class Log(Shown):
         return Answer(found, entries, words.screen, partial(words.page, found, entries), self._name)
 
     def _found(self, chosen: "LogVerb", record: "Record", rig: "Rig[Any]", prepared: Any) -> "Finding":
-        """Return the finding of a verb, with results that another verb of this log has cached."""
+        """Return the finding of a verb, reusing results that another verb has cached for this log."""
         if chosen.run_beside is None:
             return chosen.run(record, rig, prepared)
         if self._kept[0] is not record:
@@ -323,7 +324,7 @@ class Log(Shown):
         Returns
         -------
         pandas.DataFrame
-            One row a sample, by time [s]; one column a channel, in SI.
+            One row per sample, by time [s]; one column per channel, in SI.
         """
         import pandas as pd
 

@@ -1,4 +1,4 @@
-"""A user's own equations in the hands of a Python user: written, fitted, printed, drawn, simulated."""
+"""A user's own equations in Python: written, fitted, printed, drawn and simulated."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -18,25 +18,25 @@ class GreyBox(Shown):
     Parameters
     ----------
     derivative : callable
-        ``derivative(state, inputs, parameters)``: the rate of every state a second, in the states' order. NumPy's
-        functions may be used; what depends on a state is chosen by ``np.where``, not by ``if``.
+        ``derivative(state, inputs, parameters)``: the time derivatives of the states, in the states' order. NumPy
+        functions may be used; a choice that depends on a state needs ``np.where`` instead of ``if``.
     states, inputs, outputs : Mapping[str, str] or sequence of str
-        Names, with units or without. Inputs and outputs are channels of the log; outputs are states unless ``observe``
+        Names, with or without units. Inputs and outputs are channels of the log; outputs are states unless ``observe``
         computes them.
     parameters : Mapping[str, Parameter or float]
-        What is fitted, and numbers that are known [each its unit].
+        Parameters to fit, and known numbers [each its unit].
     observe : callable, optional
         ``observe(state, inputs, parameters)``: the outputs, in their order.
     initial : Mapping[str, Parameter or float], optional
-        The states at the first sample [their units], held where a number is given; otherwise fitted, for every log
-        anew.
+        The states at the first sample [their units]: fixed if a number is given, otherwise fitted separately for each
+        log.
     held : sequence of str
-        Inputs that stand still between samples, as a controller's commands do; the others are taken as linear.
+        Inputs that are constant between samples, such as a controller's commands; the others are interpolated linearly.
 
     Raises
     ------
     HydrostateError
-        If names or functions do not fit together.
+        If names or functions do not match.
 
     Examples
     --------
@@ -98,23 +98,23 @@ class GreyBox(Shown):
         *logs : Log, Record or pandas.DataFrame
             With the inputs and outputs as channels; a table's index is the time [s].
         noise : Mapping[str, float], optional
-            Standard deviation of an output's noise [its unit], where it is known.
+            Standard deviation of an output's noise [its unit], if it is known.
         robust : bool
-            Whether outliers count linearly.
+            Whether large residuals enter the cost linearly, so that outliers count less.
         starts : int
-            Starts of the search; those after the first are drawn within the bounds.
+            Number of starts of the search; those after the first are drawn within the bounds.
         seed : int
-            Of what is drawn.
+            Seed of these random starts.
 
         Returns
         -------
         FittedGreyBox
-            Values with intervals, whether to believe them, and what the logs do not tell.
+            Values with intervals, whether to believe them, and what the logs do not determine.
 
         Raises
         ------
         HydrostateError
-            If a log lacks a channel, an input has gaps, or the equations run away.
+            If a log lacks a channel, an input has gaps, or the equations diverge.
         """
         from estimation.equations.fit import fit_equations
 
@@ -131,16 +131,16 @@ class GreyBox(Shown):
         Parameters
         ----------
         log : Log, Record or pandas.DataFrame
-            With the inputs.
+            Must contain the inputs.
         values : Mapping[str, float], optional
-            Parameters [their units]; those not named have their starts.
+            Parameters [their units]; omitted ones take their start values.
         initial : Mapping[str, float], optional
-            The states at the first sample [their units]; those not named begin as a fit would, or at zero.
+            The states at the first sample [their units]; omitted ones start as in a fit, or at zero.
 
         Returns
         -------
         pandas.DataFrame
-            One column an output, by time [s].
+            One column for each output, by time [s].
         """
         import pandas as pd
 
@@ -152,7 +152,7 @@ class GreyBox(Shown):
 
 
 def _named(what: str, names: Any) -> dict[str, str]:
-    """Return names with their units; ``"1"`` where none is given."""
+    """Return names with their units; ``"1"`` if no unit is given."""
     if isinstance(names, Mapping):
         return {str(name): str(unit) for name, unit in names.items()}
     if isinstance(names, str) or not isinstance(names, Sequence):

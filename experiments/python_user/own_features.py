@@ -1,4 +1,4 @@
-"""Features of logs and cycles by one call: what a user's own classes are learnt from."""
+"""Features of logs and cycles in one call, from which a user's own classes are learnt."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 SAME_CLOCK = 1e-3
-"""Share by which sample times may differ and still be one."""
+"""Largest relative difference between two sample times that count as equal."""
 
 
 def features(
@@ -26,26 +26,26 @@ def features(
     parts: int = 12,
     bands: int | Sequence[float] = 8,
 ) -> "pd.DataFrame":
-    """Return features of runs, a row a run: what `Classifier` learns from.
+    """Return features of runs, one row per run, as input for `Classifier`.
 
-    Of each channel: mean and deviation in equal parts of the run, skewness, kurtosis, crest factor, and logarithms of
-    deviation and of power in bands of frequency.
+    For each channel: mean and standard deviation in equal parts of the run, skewness, kurtosis, crest factor, and the
+    logarithms of standard deviation and of power in frequency bands.
 
     Parameters
     ----------
     runs : sequence of Log, Record or pandas.DataFrame, one of them, or ndarray of shape (runs, channels, samples)
-        A table's index is the time [s]. Gaps are bridged by straight lines.
+        The index of a table is the time [s]. Gaps are filled by linear interpolation.
     channels : sequence of str, optional
-        Channels that are looked at, or names of an array's; all unless told.
+        Channels to use, or the names of an array's channels; all by default.
     cycle : float, optional
-        Length of a repeated cycle into which each log is cut [s]; a log is one run unless told.
+        Length of a repeated cycle into which each log is cut [s]; by default a whole log is one run.
     sample_time : float, optional
-        Seconds between samples of an array [s]; 1 unless told.
+        Time between samples of an array [s]; 1 by default.
     parts : int
-        Parts of a run that give a mean and a deviation each: as many as a repeated cycle has steps or more, 1 where
-        runs have no common course.
+        Number of equal parts of a run, each with a mean and a standard deviation: at least the number of steps in a
+        repeated cycle, or 1 if runs have no common time course.
     bands : int or sequence of float
-        Octaves below half the sampling rate, or edges of bands [Hz].
+        Number of octaves below half the sample rate, or edges of the bands [Hz].
 
     Returns
     -------

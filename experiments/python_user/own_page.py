@@ -1,4 +1,4 @@
-"""The page of an answer in Python: one HTML file, with the name that the command line would take too."""
+"""The page of an answer in Python: one HTML file, with the file name that the command line would accept too."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +17,7 @@ def page_path(path: "str | Path") -> Path:
     Raises
     ------
     HydrostateError
-        If it is no path, or its name ends as no page's does.
+        If it is not a path, or its name does not have the ending of a page.
 
     Examples
     --------
@@ -36,7 +36,7 @@ def page_path(path: "str | Path") -> Path:
 
 
 def write_page(path: "str | Path", page: str) -> Path:
-    """Write a page whole or not at all, and return the file; folders that are missing are made.
+    """Write a page and return its file; no partial file is left behind, and missing folders are created.
 
     Raises
     ------
@@ -56,11 +56,11 @@ def page_of_columns(entries: Mapping[str, Any], model: "FreeRunModel", data: "Ch
     Parameters
     ----------
     entries : Mapping
-        Of the model by the names of the JSON contract.
+        Of the model, by the names of the JSON contract.
     data : Channels
-        That it was fitted to.
+        The data used for the fit.
     title : str
-        What the page calls the log.
+        Name of the log on the page.
     """
     from experiments.log_pages.identified_page import identified_page
     from experiments.log_pages.identified_view import view_of_columns
@@ -69,16 +69,16 @@ def page_of_columns(entries: Mapping[str, Any], model: "FreeRunModel", data: "Ch
 
 
 def page_of_channels(record: "Record", model: "LinearModel", options: Mapping[str, Any], title: str) -> str:
-    """Return the page of a transfer function between two channels of a bench, as ``identify --report`` writes it.
+    """Return the page of a transfer function between two channels of a test bench, as ``identify --report`` writes it.
 
     Parameters
     ----------
     record : Record
-        That it was fitted to.
+        The log used for the fit.
     options : Mapping
-        Of the fit.
+        Options of the fit.
     title : str
-        What the page calls the log.
+        Name of the log on the page.
     """
     from estimation.identification.from_record import record_signals
     from experiments.identification.of_channels import judged_page

@@ -1,4 +1,4 @@
-"""Errors of the command in the words of Python: arguments in place of options."""
+"""Errors of the command line rephrased for Python: arguments instead of options."""
 
 import re
 from collections.abc import Generator
@@ -7,12 +7,12 @@ from contextlib import contextmanager
 
 @contextmanager
 def options_by_name() -> Generator[None]:
-    """Give options in errors the names that Python users know them by: ``start_std`` in place of ``--start-std``.
+    """Rename options in errors to the names known in Python: ``start_std`` instead of ``--start-std``.
 
     Raises
     ------
     HydrostateError
-        The same as within, with its options renamed.
+        The error raised in the block, with its options renamed.
     """
     from plant.errors import HydrostateError
 
@@ -25,17 +25,17 @@ def options_by_name() -> Generator[None]:
 
 
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
-"""An option as the command spells it."""
+"""An option in command line form."""
 
 _COLUMNS = re.compile(r"--columns '([^']*)'")
-"""Columns as an error offers them for the command line."""
+"""Columns as suggested by an error for the command line."""
 
 ELSEWHERE = {"--with FILE": "beside=FILE", "--rig rig.toml": "rig='rig.toml'"}
-"""Options that Python calls otherwise, or gives a value in quotes."""
+"""Options that have another name in Python, or a value in quotes."""
 
 
 def in_python(said: str) -> str:
-    """Return a sentence with its options as Python users know them; a command in backticks stays as it is.
+    """Return a sentence with options renamed for Python users; commands in backticks stay unchanged.
 
     Examples
     --------
@@ -52,6 +52,6 @@ def in_python(said: str) -> str:
 
 
 def _mapping(option: str) -> dict[str, str]:
-    """Return columns as `read` takes them; a comma within a name begins no channel."""
+    """Return columns in the form that `read` takes; a comma inside a name does not start a new channel."""
     pairs = re.split(r",(?=[a-z0-9_]+=)", option)
     return {channel: name for channel, _, name in (pair.partition("=") for pair in pairs)}

@@ -1,4 +1,4 @@
-"""Reading a log for Python users: one that lacks too many samples to be estimated may still relate its channels."""
+"""Reading logs for Python users. A log with too many missing samples for estimation may still relate its channels."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """A log as it was read.
+    """A log after reading.
 
     Parameters
     ----------
     record : Record
         The log.
     said : sequence of LogWarning
-        What reading it brought up.
+        Remarks from reading the log.
     sparse : Record or None
-        The log with the channels that `record` lacks, up to half of each missing; None if it lacks none.
+        The log including the channels that `record` lacks, with up to half of each missing; None if it lacks none.
     refusal : str
-        Why nothing is estimated of `record`; empty where few enough samples are missing.
+        Why nothing is estimated from `record`; empty if few enough samples are missing.
     """
 
     record: "Record"
@@ -47,17 +47,17 @@ def read_whole_or_sparse(read: "Callable[..., Record]") -> Reading:
     Returns
     -------
     Reading
-        The log. It is read again only where too many samples of it, or of a channel, are missing.
+        The log. It is read a second time only if it, or one of its channels, lacks too many samples.
 
     Raises
     ------
     LogError
-        If the log cannot be read or trusted; where over half is missing, in the words for an estimate.
+        If the log cannot be read or trusted; if over half is missing, with the message used for estimates.
 
     Warns
     -----
     LogWarning
-        What reading it brings up.
+        Remarks from reading the log.
     """
     with overheard() as said:
         try:

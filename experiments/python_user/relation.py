@@ -1,4 +1,4 @@
-"""A model between any channels in the hands of a Python user: it prints, draws, simulates, tests and saves itself."""
+"""A model between any channels for Python users: it can be printed, drawn, simulated, tested and saved."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,14 +21,14 @@ _FIVE = "{:.5g}".format
 
 
 class Relation(Shown):
-    """Models from the same inputs, one an output.
+    """Models with the same inputs, one for each output.
 
     Parameters
     ----------
     models : sequence of FreeRunModel
-        One an output.
+        One for each output.
     entries : sequence of Mapping
-        What is known of each by the names of the JSON contract; empty for models that were loaded.
+        Results for each model by the names of the JSON contract; empty for loaded models.
     """
 
     def __init__(
@@ -60,18 +60,18 @@ class Relation(Shown):
         return self.to_frame().to_html(float_format=_FIVE)
 
     def simulate(self, log: Any) -> "np.ndarray[Any, Any]":
-        """Return the free run on a log, its initial state taken from the measured output where that is there.
+        """Return the free run on a log; the initial state is taken from the measured output if there is one.
 
         Parameters
         ----------
         log : Log, Record, table, or array_like of shape (n, m) or (n,)
-            A log with the model's channels, or a table as `hydrostate.read` takes it; columns are taken by their
-            names. Or inputs alone, in the model's order and on its sample time.
+            A log with the model's channels, or a table in a form that `hydrostate.read` takes, whose columns are found
+            by name. Or an array of the inputs alone, in the model's order and at its sample time.
 
         Returns
         -------
         ndarray, shape (n,), or (n, outputs)
-            Simulated output, on the model's sample time.
+            Simulated output, at the model's sample time.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class Relation(Shown):
         return runs[0] if len(runs) == 1 else np.column_stack(runs)
 
     def validate(self, log: Any) -> "pd.DataFrame":
-        """Return the fit of each output of another log.
+        """Return the fit of each output on another log.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class Relation(Shown):
         Warns
         -----
         LogWarning
-            As `simulate` does.
+            As in `simulate`.
         """
         import pandas as pd
 
@@ -148,12 +148,12 @@ class Relation(Shown):
         }
 
     def to_control(self) -> "TransferFunction | StateSpace":
-        """Return linear models as one object of python-control, a row an output.
+        """Return linear models as one python-control object, one row per output.
 
         Returns
         -------
         control.TransferFunction or control.StateSpace
-            The latter of a state space, in the channels' units. Offsets are left out.
+            A `control.StateSpace` for state space models, in the channels' units. Offsets are left out.
         """
         import control
 
@@ -169,7 +169,7 @@ class Relation(Shown):
         return control.TransferFunction(numerators, denominators, self.models[0].sample_time)
 
     def to_dict(self) -> list[dict[str, Any]]:
-        """Return the models as JSON values, one an output."""
+        """Return the models as JSON values, one for each output."""
         return [one.to_dict() for one in self.models]
 
     def save(self, path: str | Path) -> None:
@@ -201,19 +201,20 @@ class Relation(Shown):
         Parameters
         ----------
         path : str or Path
-            Where to; ``.html`` is added to a name without an ending, and of several outputs the name of each.
+            Path of the file. ``.html`` is added to a name without an ending; with several outputs, each file name also
+            contains its output's name.
         title : str
-            What the pages call the log.
+            Name of the log on the pages.
 
         Returns
         -------
         list of Path
-            The files written, one an output.
+            The files written, one for each output.
 
         Raises
         ------
         HydrostateError
-            If a file cannot be written, its name ends as no page's does, or the models were loaded without a log.
+            If a file cannot be written, its name does not end like a page, or the models were loaded without a log.
         """
         from experiments.command.output_paths import own_paths
         from experiments.python_user.own_page import page_of_columns, page_path, write_page
@@ -227,12 +228,12 @@ class Relation(Shown):
         ]
 
     def plot(self) -> "list[Axes]":
-        """Draw measured and simulated output, and the difference, one figure an output.
+        """Draw measured and simulated output, and the difference, in one figure per output.
 
         Returns
         -------
         list of matplotlib.axes.Axes
-            Two an output.
+            Two for each output.
         """
         from experiments.log_pages.free_run_figure import draw_free_run
 
@@ -241,7 +242,7 @@ class Relation(Shown):
 
 
 def _shared_states(models: "Sequence[FreeRunModel]", outputs: "Sequence[StateSpaceDynamics]") -> "StateSpace":
-    """Return the state space that all outputs share, its dead times as states of their own."""
+    """Return the state space shared by all outputs; dead times become states."""
     import control
 
     from estimation.identification.state_space.dynamics import system_in_units
@@ -252,9 +253,9 @@ def _shared_states(models: "Sequence[FreeRunModel]", outputs: "Sequence[StateSpa
 
 
 def _record_of(log: Any, sample_time: float, names: Sequence[str]) -> "Record | None":
-    """Return the record of a log or of a table, rows without a time `sample_time` apart; None of plain arrays.
+    """Return the record of a log or table; None for plain arrays. Rows without a time are `sample_time` apart.
 
-    Rows that were sent twice are left out, by those of the named columns that are there.
+    Rows that were sent twice are left out; they are detected by the named columns that the log contains.
     """
     from estimation.identification.free_run.from_records import sent_once
     from experiments.python_user.log import Log
@@ -301,7 +302,8 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     inputs, outputs : str or sequence of str
         Channels.
     options : Mapping[str, Any]
-        As `identify_outputs` takes them, ``sample_time`` of the model [s], and ``reference``: what drives a loop.
+        Options of `identify_outputs`, the model's ``sample_time`` [s], and ``reference``, the channels that drive a
+        closed loop.
     """
     from estimation.identification.free_run.from_records import sent_once
     from estimation.identification.two_stage import identify_columns

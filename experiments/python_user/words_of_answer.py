@@ -1,4 +1,4 @@
-"""Display of an answer, looked up by the names of actuator and verb, so that answers can be pickled."""
+"""Display of an answer. It is looked up by actuator and verb name, so that answers can be pickled."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Words:
-    """Extra data for the page and the screen of an answer.
+    """Data for the page and the terminal output of an answer.
 
     Parameters
     ----------
     plant, verb : str
-        Kind of actuator, and what was asked of the log.
+        Kind of actuator, and the verb that was run.
     options : Mapping[str, Any]
         The verb's options.
     rig : str
@@ -28,7 +28,7 @@ class Words:
     record : Record
         The log.
     said : sequence of LogWarning
-        What reading the log brought up.
+        Remarks from reading the log.
     """
 
     plant: str

@@ -1,1 +1,1 @@
-"""Executors and random streams of studies."""
+"""Executors and random streams for studies."""

@@ -1,8 +1,8 @@
-"""Running independent cases side by side: threads for one process, `concurrent.futures` executors for many.
+"""Runs independent cases in parallel: threads in one process, `concurrent.futures` executors for several.
 
-The compiled kernels release the interpreter's lock, so threads do within one process. Linear algebra libraries keep to
-one thread each meanwhile: theirs and ours together would oversubscribe the cores. A batch study takes an executor: this
-process itself, processes of this machine, or a Dask cluster.
+The compiled kernels release the interpreter's lock, so threads are enough within one process. Meanwhile, linear algebra
+libraries are limited to one thread each: their threads and ours together would oversubscribe the cores. A batch study
+uses an executor: this process itself, several processes on this machine, or a Dask cluster.
 """
 
 import multiprocessing
@@ -24,17 +24,17 @@ Found = TypeVar("Found")
 
 
 def side_by_side(run: Callable[[Case], Found], cases: Iterable[Case]) -> Iterator[Found]:
-    """Run every case and yield the results in the cases' order.
+    """Run every case and yield the results in the order of the cases.
 
     Parameters
     ----------
     run : callable
-        From a case to its result; depends on nothing but the case.
+        From a case to its result; must depend only on the case.
 
     Yields
     ------
     object
-        One result a case. Cases not yet started are dropped when the consumer stops early or is interrupted.
+        One result per case. Cases not yet started are dropped when the consumer stops early or is interrupted.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def side_by_side(run: Callable[[Case], Found], cases: Iterable[Case]) -> Iterato
 
 
 class SerialExecutor(Executor):
-    """Runs what is submitted at once, in this process."""
+    """Runs submitted functions immediately, in this process."""
 
     def submit(self, fn: Callable[..., Found], /, *args: Any, **kwargs: Any) -> Future[Found]:
         """Run a function and return its finished future."""
@@ -64,12 +64,12 @@ class SerialExecutor(Executor):
 
 @contextmanager
 def open_executor(workers: int = 1, cluster: str | None = None) -> Generator[tuple[Executor, int]]:
-    """Open what runs a batch study's tasks.
+    """Open an executor for the tasks of a batch study.
 
     Parameters
     ----------
     workers : int
-        Processes of this machine; one is this process itself.
+        Number of processes on this machine; 1 means this process itself.
     cluster : str, optional
         Address of a Dask scheduler, ``tcp://host:8786``, which is used instead.
 
@@ -81,7 +81,7 @@ def open_executor(workers: int = 1, cluster: str | None = None) -> Generator[tup
     Raises
     ------
     HydrostateError
-        If Dask is wanted and not installed, or no scheduler answers.
+        If Dask is requested but not installed, or no scheduler answers.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def open_executor(workers: int = 1, cluster: str | None = None) -> Generator[tup
 
 
 def process_pool(workers: int) -> ProcessPoolExecutor:
-    """Return processes with one thread each, which leave Ctrl-C to the parent and do not outlive it."""
+    """Return a pool of single-threaded processes, which leave Ctrl-C to the parent and end with it."""
     return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin_worker)
 
 
@@ -122,7 +122,7 @@ def _begin_worker() -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process when its parent has been killed; it would wait for work for ever."""
+    """End this process when its parent has been killed; otherwise it would wait for work forever."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -7,7 +7,7 @@ Piece = TypeVar("Piece")
 
 
 class Track(Protocol):
-    """Shows how far a study has come, as `rich.progress.Progress.track` does."""
+    """Shows the progress of a study, as `rich.progress.Progress.track` does."""
 
     def __call__(
         self, sequence: Iterable[Piece], total: float | None = None, *, description: str = ...
@@ -17,19 +17,19 @@ class Track(Protocol):
 
 
 def untracked(sequence: Iterable[Piece], total: float | None = None, *, description: str = "") -> Iterable[Piece]:
-    """Return the pieces and show nothing.
+    """Return the pieces without showing progress.
 
     Parameters
     ----------
     total : float, optional
-        How many [count].
+        Number of pieces [count].
     """
     del total, description
     return sequence
 
 
 def in_one_piece(track: Track, description: str, make: Callable[[], Piece]) -> Piece:
-    """Do one thing that shows no progress of its own.
+    """Run a single function that shows no progress of its own.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Random streams by name: order and worker count change nothing."""
+"""Named random streams: results do not depend on the order of cases or the number of workers."""
 
 import zlib
 

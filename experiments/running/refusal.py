@@ -1,4 +1,4 @@
-"""A system's error as a sentence for the user."""
+"""Operating system errors as sentences for the user."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ from plant.errors import HydrostateError
 
 @contextmanager
 def refused(said: str) -> Generator[None]:
-    """Turn a system's error in this block into one that begins with these words."""
+    """Turn an operating system error in this block into an error that starts with the given words."""
     try:
         yield
     except OSError as error:
@@ -17,7 +17,7 @@ def refused(said: str) -> Generator[None]:
 
 
 def reason_of(error: OSError) -> str:
-    """Return why the system refused, and what to do where a file is in the way of a folder.
+    """Return why the system refused, and what to do if a file has the name of the required folder.
 
     Examples
     --------

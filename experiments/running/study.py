@@ -1,4 +1,4 @@
-"""A study: what it finds, what it draws and what its page says. One runner makes a result folder of any."""
+"""A study: its results, figures and page. One runner makes the result folder for all studies."""
 
 import platform
 from collections.abc import Callable, Mapping
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 PACKAGES = ("hydrostate", "numpy", "scipy", "llvmlite", "pandas", "control", "filterpy", "matplotlib")
-"""Whose versions a result keeps."""
+"""Packages whose versions are stored with a result."""
 
 Settings = TypeVar("Settings", bound="DataclassInstance", contravariant=True)
 
 
 @dataclass(frozen=True)
 class Seeded:
-    """Settings of a study that has no others."""
+    """Settings of a study that needs only a seed."""
 
     seed: int
 
@@ -45,7 +45,7 @@ class Found:
     series : Mapping[str, pandas.DataFrame]
         Curves to draw, in long form, by name; their files keep nine digits.
     files : Mapping[str, bytes]
-        What else goes into the folder, by path.
+        Other files for the folder, by path.
     """
 
     tables: Tables
@@ -54,7 +54,7 @@ class Found:
 
     @property
     def frames(self) -> Tables:
-        """Tables and series together, which figures and page read."""
+        """Tables and series together, which are read by the figures and the page."""
         return {**self.tables, **self.series}
 
 
@@ -64,22 +64,22 @@ def _no_facts(_: Tables, __: object) -> Mapping[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Study(Generic[Settings]):
-    """A study of one question. It knows nothing of files and processes; `run_study` makes its folder.
+    """A study of one question. It knows nothing about files and processes; `run_study` makes its folder.
 
     Parameters
     ----------
     template : str
-        The words of its page, by their path below ``experiments``.
+        Text of its page, by its path below ``experiments``.
     find : callable
-        From settings, and what shows the progress, to what is found.
+        From the settings, and a progress display, to the results.
     figures : Mapping[str, callable]
-        From what was found to the figures, by file name. They compute nothing.
+        From the results to the figures, by file name. They compute nothing.
     columns : Mapping[str, Columns]
         How the page shows its tables, by name.
     parameters : Mapping[str, Any]
-        Of what is studied, for the manifest.
+        Parameters of the studied object, for the manifest.
     facts : callable
-        From what was found, and the settings, to what else the page's words and tables need.
+        From the results and the settings to other values used in the page's text and tables.
     """
 
     name: str
@@ -92,12 +92,12 @@ class Study(Generic[Settings]):
 
 
 def run_study(study: Study[Settings], settings: Settings, out: Path, console: Console) -> Path:
-    """Run a study and write its tables, figures and report as one folder, whole or not at all.
+    """Run a study and write its tables, figures and report as one folder; no partial folder is left behind.
 
     Parameters
     ----------
     out : Path
-        Folder of the result; replaced whole if it holds an earlier study.
+        Folder of the result; replaced as a whole if it contains an earlier study.
 
     Raises
     ------
@@ -119,12 +119,12 @@ def run_study(study: Study[Settings], settings: Settings, out: Path, console: Co
 
 
 def write_result(study: Study[Settings], settings: Settings, found: Found, out: Path) -> None:
-    """Write what a study found, with its figures and its report, as one folder.
+    """Write the results of a study, with its figures and its report, as one folder.
 
     Parameters
     ----------
     out : Path
-        Folder of the result; replaced whole if it holds an earlier study.
+        Folder of the result; replaced as a whole if it contains an earlier study.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def write_result(study: Study[Settings], settings: Settings, found: Found, out: 
 
 
 def manifest_of(study: Study[Settings], settings: Settings) -> Mapping[str, Any]:
-    """Return the manifest that reproduces a study."""
+    """Return the manifest needed to reproduce a study."""
     return {
         "study": study.name,
         "settings": asdict(settings),
@@ -150,5 +150,5 @@ def manifest_of(study: Study[Settings], settings: Settings) -> Mapping[str, Any]
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what a result was made with, by package."""
+    """Return the versions of the packages used for a result, by package."""
     return {package: version(package) for package in PACKAGES}

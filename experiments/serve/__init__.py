@@ -1,1 +1,1 @@
-"""The server: logs are dropped, worked on in processes that can be killed, and kept; streams are watched."""
+"""The server: logs are uploaded, processed in processes that can be killed, and stored; streams are watched."""

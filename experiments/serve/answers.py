@@ -1,4 +1,4 @@
-"""Answers of the server, as its OpenAPI describes them."""
+"""Responses of the server, as described by its OpenAPI schema."""
 
 from typing import Any, Literal
 
@@ -11,18 +11,18 @@ Verb = Literal["diagnose", "estimate", "inspect"]
 
 
 class Refusal(BaseModel):
-    """Why a request was not done."""
+    """Why a request was refused."""
 
     detail: str
 
 
 class Log(BaseModel):
-    """A log that the server has.
+    """A log on the server.
 
     Parameters
     ----------
     received, ended : float, float or None
-        When it came and when the work on it was over, since 1970 [s].
+        When it was received and when the work on it ended, since 1970 [s].
     """
 
     number: int = Field(description="Later logs have larger numbers.")
@@ -46,7 +46,7 @@ class Logs(BaseModel):
 
 
 class Health(BaseModel):
-    """Whether the server has room."""
+    """Whether the server has capacity."""
 
     waiting: int = Field(description="Number of logs that are running or waiting.")
     most_waiting: int
@@ -55,14 +55,14 @@ class Health(BaseModel):
 
 
 class Difference(BaseModel):
-    """A quantity of two logs.
+    """A quantity in two logs.
 
     Parameters
     ----------
     difference : float or None
-        The second log's less the first's [unit].
+        Second log minus first [unit].
     interval : list of float or None
-        95 % interval of that [unit].
+        95 % interval of the difference [unit].
     """
 
     quantity: str
@@ -83,7 +83,7 @@ class Comparison(BaseModel):
 
 
 class StreamState(BaseModel):
-    """A stream that is watched."""
+    """A watched stream."""
 
     name: str
     state: Literal["connecting", "learning", "watching", "ended", "failed"]
@@ -99,7 +99,7 @@ class StreamHistory(StreamState):
 
 
 def log_of(kept: StoredLog, jobs: Jobs) -> Log:
-    """Return a log as it is answered."""
+    """Return a log in the form of a response."""
     unfinished = kept.state == UNFINISHED
     phase = jobs.phase(kept.id) if unfinished else None
     state = ("waiting" if phase is None else "running") if unfinished else kept.state

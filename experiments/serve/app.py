@@ -1,4 +1,4 @@
-"""`make_app(settings)`: the server, as FastAPI and its OpenAPI describe it."""
+"""`make_app(settings)`: the server as a FastAPI application with its OpenAPI schema."""
 
 import asyncio
 import re
@@ -62,7 +62,7 @@ _CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2
 
 
 def why(*more: int, page: bool = False) -> dict[int | str, dict[str, Any]]:
-    """Return the refusals of a request, for OpenAPI; a page is refused as JSON too, except to a browser."""
+    """Return the possible refusals of a request, for OpenAPI; refusals are JSON, except for browsers."""
     schema = {"$ref": "#/components/schemas/Refusal"}
     kinds = {"application/json": {"schema": schema}, "text/html": {"schema": {"type": "string"}}}
     said: dict[str, Any] = {"content": kinds} if page else {"model": Refusal}
@@ -84,14 +84,14 @@ def make_app(settings: Settings, refused: Callable[[HydrostateError], None] | No
     Parameters
     ----------
     settings : Settings
-        What it is told.
+        Settings of the server.
     refused : callable, optional
-        Is told why the folder cannot be opened; the error is raised too.
+        Called with the reason if the folder cannot be opened; the error is raised too.
 
     Returns
     -------
     FastAPI
-        Its folder is opened, and unfinished logs are taken up, when it starts.
+        The application; at its start it opens its folder and resumes unfinished logs.
     """
     service = Service(settings)
 
@@ -126,7 +126,7 @@ def make_app(settings: Settings, refused: Callable[[HydrostateError], None] | No
 
 
 def plain_name(name: str) -> str:
-    """Return the name of a file without folders and signs that no reader sees.
+    """Return a file name without folders and invisible characters.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def plain_name(name: str) -> str:
 
 
 def methods_at(app: FastAPI, scope: Scope) -> list[str]:
-    """Return the methods by which a path may be asked for."""
+    """Return the methods allowed for a path."""
     routes = [route for route in app.routes if isinstance(route, Route) and route.matches(scope)[0] is not Match.NONE]
     return sorted({method for route in routes for method in route.methods or ()})
 
@@ -239,7 +239,7 @@ async def _received(request: Request, service: Service, name: str, verb: Verb) -
 def _offer_state(app: FastAPI, service: Service) -> None:
     @app.get("/api/health", tags=["server"])
     def health() -> Health:
-        """Return whether the server has room for more."""
+        """Return whether the server has capacity for more logs."""
         waiting, most = service.jobs.waiting, service.settings.waiting
         return Health(
             waiting=waiting, most_waiting=most, room=max(service.room.left(), 0), version=version("hydrostate")
@@ -299,7 +299,7 @@ def _offer_pages(app: FastAPI, service: Service) -> None:
 
     @app.get("/", response_class=HTMLResponse, responses=why(page=True), tags=["pages"])
     def home() -> HTMLResponse:
-        """Return the page on which logs are dropped."""
+        """Return the page for uploading logs."""
         return shown(home_page(service.settings))
 
     @app.get("/logs/{id}", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])

@@ -1,4 +1,4 @@
-"""Connections with an end to patience: slow headers, bodies nobody reads, readers that do not read, and too many."""
+"""Connections with timeouts: slow headers, unread request bodies, clients that do not read, too many connections."""
 
 import asyncio
 import resource
@@ -8,13 +8,13 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 HEADERS_IN = 10.0
-"""How long the headers of a request may take, or a body that nobody reads [s]."""
+"""Longest time for the headers of a request, or for a body that the server does not read [s]."""
 
 READ_IN = 30.0
-"""How long a client may leave an answer unread [s]."""
+"""Longest time that a client may leave a response unread [s]."""
 
 MOST_CONNECTIONS = 512
-"""Connections at once, fewer where the system allows fewer files [count]."""
+"""Largest number of connections, fewer if the system allows fewer files [count]."""
 
 FULL = b"HTTP/1.1 429 Too Many Requests\r\nretry-after: 5\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
 
@@ -22,19 +22,19 @@ LATE = b"HTTP/1.1 408 Request Timeout\r\ncontent-length: 0\r\nconnection: close\
 
 
 def most_connections() -> int:
-    """Return the largest number of open connections [count]; each may need a file beside itself."""
+    """Return the largest number of open connections [count]; each may need one more file."""
     allowed, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return MOST_CONNECTIONS if allowed < 0 else min(MOST_CONNECTIONS, max(allowed // 2 - 32, 8))
 
 
 class PatientProtocol(H11Protocol):
-    """HTTP/1.1 of uvicorn, which by itself waits for ever."""
+    """HTTP/1.1 of uvicorn with timeouts; uvicorn alone waits forever."""
 
     _headers_due: asyncio.TimerHandle | None = None
     _reading_due: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: Any) -> None:
-        """Take a connection, or say that there are too many."""
+        """Accept a connection, or reply that there are too many."""
         super().connection_made(transport)
         if len(self.connections) > most_connections():
             transport.write(FULL)
@@ -43,7 +43,7 @@ class PatientProtocol(H11Protocol):
         self._look()
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes that the client sent."""
+        """Receive data from the client."""
         if self.transport.is_closing():
             return
         super().data_received(data)
@@ -57,19 +57,19 @@ class PatientProtocol(H11Protocol):
         super().connection_lost(exc)
 
     def pause_writing(self) -> None:
-        """Begin to wait for a client that does not read."""
+        """Start to wait for a client that does not read."""
         super().pause_writing()
         self._reading_due = self.loop.call_later(READ_IN, self.transport.abort)
 
     def resume_writing(self) -> None:
-        """Stop waiting, the client reads."""
+        """Stop waiting, because the client reads again."""
         if self._reading_due is not None:
             self._reading_due.cancel()
             self._reading_due = None
         super().resume_writing()
 
     def send_400_response(self, msg: str) -> None:
-        """Refuse what is no HTTP; in the middle of an answer the connection can only end."""
+        """Refuse data that are not HTTP; in the middle of a response, the connection can only be closed."""
         try:
             super().send_400_response(msg)
         except h11.LocalProtocolError:
@@ -80,7 +80,7 @@ class PatientProtocol(H11Protocol):
             cycle.message_event.set()
 
     def _look(self) -> None:
-        """Start or stop the timer for headers, or for the rest of a body after its answer."""
+        """Start or stop the timer for headers, or for the rest of a body after the response."""
         unread = self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY
         if self.conn.their_state is h11.IDLE or unread:
             if self._headers_due is None:

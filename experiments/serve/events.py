@@ -1,4 +1,4 @@
-"""Server-sent events of a stream: what is new, a few times a second, for as long as somebody looks."""
+"""Server-sent events of a stream: new data a few times per second, as long as a client is connected."""
 
 import asyncio
 import json
@@ -10,10 +10,10 @@ from experiments.serve.gauges import EVERY
 from experiments.serve.live import Stream, Streams
 
 MOST_LOOKING = 64
-"""Views of streams that are open at once [count]."""
+"""Largest number of open views of streams [count]."""
 
 ALIVE = 15.0
-"""Time after which something is sent even if nothing is new [s]."""
+"""Longest time without a message, even if there is nothing new [s]."""
 
 
 def message(event: str, data: Any) -> bytes:

@@ -1,4 +1,4 @@
-"""The pages of the fleet of all logs that a server has, and of an actuator, made in a process that can be killed."""
+"""The pages of the fleet of all logs on a server, and of one actuator, made in a process that can be killed."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from experiments.fleet.actuators import ActuatorRow
 
 Diagnosed: TypeAlias = Sequence[tuple[str, str, Mapping[str, Any]]]
-"""Identity, name and entries of a row of each log that was diagnosed."""
+"""Identity, name and batch row entries of each diagnosed log."""
 
 
 Repairs: TypeAlias = Mapping[str, Sequence[float]]
-"""When actuators were repaired, by name [day]."""
+"""Times of repairs, by actuator name [day]."""
 
 
 def fleet_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float], repairs: Repairs, source: str) -> str:
@@ -24,13 +24,13 @@ def fleet_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float]
     Parameters
     ----------
     rows : sequence of tuple
-        As `Diagnosed` says.
+        In the form of `Diagnosed`.
     pattern : str or None
-        How logs are named.
+        Pattern of log names.
     limits : Mapping[str, float]
         Limits of severities [their units].
     repairs : Mapping[str, sequence of float]
-        When actuators were repaired, by name [day].
+        Times of repairs, by actuator name [day].
     """
     from experiments.fleet.page import fleet_page
 
@@ -46,16 +46,16 @@ def fleet_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float]
 def actuator_view(
     rows: Diagnosed, pattern: str | None, limits: Mapping[str, float], repairs: Repairs, name: str
 ) -> str:
-    """Return the page of an actuator, empty if there is none of that name.
+    """Return the page of an actuator; empty if there is none with that name.
 
     Parameters
     ----------
     rows, pattern
-        As for `fleet_view`.
+        As in `fleet_view`.
     limits : Mapping[str, float]
         Limits of severities [their units].
     repairs : Mapping[str, sequence of float]
-        When actuators were repaired, by name [day].
+        Times of repairs, by actuator name [day].
     """
     from experiments.fleet.actuator_page import actuator_page
 

@@ -1,4 +1,4 @@
-"""The process of a stream: it watches what comes and tells the server gauges a few times a second, and every event."""
+"""The process of a stream: it watches the rows, and sends the server gauges a few times per second, and every event."""
 
 import contextlib
 import signal
@@ -45,14 +45,14 @@ class Gauges(WatchEvents):
         self._peaks: dict[str, float] = {}
 
     def events(self, events: "Sequence[Event]") -> None:
-        """Tell what has happened; a balance that raised an alarm begins again at once, and its peak is told once."""
+        """Report new events; after an alarm, a balance restarts at once, and its peak is reported once."""
         from faults.watch.events import Alarm
 
         super().events(events)
         self._peaks |= {event.balance: event.score for event in events if isinstance(event, Alarm)}
 
     def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
-        """Take notice of samples; every `EVERY` the range of each channel since then is told."""
+        """Process samples; every `EVERY`, report the range of each channel since the last report."""
         import numpy as np
 
         super().saw(channels, last, gap)
@@ -71,14 +71,14 @@ class Gauges(WatchEvents):
         self.flush(last, {name: float(values[-1]) for name, values in channels.items()})
 
     def flush(self, last: float, values: Mapping[str, float]) -> None:
-        """Tell the gauges now.
+        """Report the gauges now.
 
         Parameters
         ----------
         last : float
-            Time of the stream [s].
+            Stream time [s].
         values : Mapping[str, float]
-            What each channel reads [SI].
+            Current reading of each channel [SI].
         """
         if self.watch is None:
             return
@@ -100,20 +100,20 @@ class Gauges(WatchEvents):
 
 @dataclass(frozen=True)
 class StreamTask:
-    """A stream that is to be watched.
+    """A stream to be watched.
 
     Parameters
     ----------
     address : str
-        As `plant.log.stream.source.stream_lines` takes it.
+        In the form of `plant.log.stream.source.stream_lines`.
     rig : Path or None
         Rig file.
     columns : tuple of tuple
         Pairs of channel and foreign column.
     false_alarms : float
-        Of healthy, moving operation [1/h].
+        Rate during healthy, moving operation [1/h].
     state : Path
-        File in which the watch is kept over a restart.
+        File that keeps the state of the watch over a restart.
     """
 
     address: str
@@ -124,14 +124,14 @@ class StreamTask:
 
 
 def watch_stream(out: Connection, server: int, task: StreamTask) -> None:
-    """Watch a stream until it ends, in a process of its own.
+    """Watch a stream until it ends, in its own process.
 
     Parameters
     ----------
     out : Connection
-        To the server.
+        Connection to the server.
     server : int
-        Process identity of the server, without which this one ends.
+        Process ID of the server; this process ends with it.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     bind_to_server(server)

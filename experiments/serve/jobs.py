@@ -1,4 +1,4 @@
-"""The queue of a server: logs are worked on in processes with a limit of time and memory, and can be taken back."""
+"""The queue of a server: logs are processed in processes with limits on time and memory, and can be cancelled."""
 
 import multiprocessing
 import os
@@ -18,22 +18,22 @@ from experiments.serve.work import NO_MEMORY, LogResult, Task, begin_worker, wor
 from plant.errors import HydrostateError
 
 MOST_TRIES = 3
-"""Servers that may end in the middle of the work on a log before it is given up [count]."""
+"""Number of servers that may end while processing a log before it is given up [count]."""
 
 FRESH_AFTER = 50
-"""Logs after which a process is replaced by a new one [count], so that no library's leak grows."""
+"""Logs after which a process is replaced by a new one [count], which limits memory leaks in libraries."""
 
 VIEW_SECONDS = 60.0
-"""Longest work on a page over many logs [s]."""
+"""Longest time to make a page about several logs [s]."""
 
 MOST_VIEWS = 8
-"""Such pages that may be under way or wait [count]."""
+"""Largest number of such pages in progress or waiting [count]."""
 
 T = TypeVar("T")
 
 
 class BusyError(RuntimeError):
-    """There is no room for more work now."""
+    """There is no capacity for more work now."""
 
 
 class Jobs:
@@ -42,9 +42,9 @@ class Jobs:
     Parameters
     ----------
     settings : Settings
-        How much of it is done at once, and its limits.
+        The number of parallel jobs, and their limits.
     store : Store
-        Receives what comes of it.
+        Receives the results.
     """
 
     def __init__(self, settings: Settings, store: Store) -> None:
@@ -60,11 +60,11 @@ class Jobs:
 
     @property
     def waiting(self) -> int:
-        """Logs that are worked on or wait [count]."""
+        """Logs that are running or waiting [count]."""
         return len(self._waiting)
 
     def resume(self) -> None:
-        """Take up what an earlier server did not finish; a log over which several ended is given up."""
+        """Resume what an earlier server did not finish; a log is given up if several servers ended during its work."""
         for log in self._store.unfinished():
             if phase_file(self._settings, log.id).exists():
                 self._store.tried(log.id)
@@ -103,30 +103,30 @@ class Jobs:
         future.add_done_callback(lambda done: self._ended(log, done))
 
     def cancel(self, identity: str) -> None:
-        """Take a log back: out of the queue, or by the end of the process that works on it."""
+        """Cancel a log: remove it from the queue, or end the process that works on it."""
         with self._lock:
             future = self._waiting.pop(identity, None)
         if future is not None:
             future.cancel()
 
     def phase(self, identity: str) -> str | None:
-        """Return the phase of the work on a log; None while it waits."""
+        """Return the current step of the work on a log; None while it waits."""
         with suppress(OSError):
             return phase_file(self._settings, identity).read_text(encoding="utf-8") or None
         return None
 
     def view(self, make: Callable[..., T], *args: Any) -> "Future[T]":
-        """Have a page made that is over many logs.
+        """Make a page about several logs in another process.
 
         Parameters
         ----------
         make : callable
-            A function of a module, and its arguments, which go to another process.
+            A module-level function and its arguments, which are sent to another process.
 
         Raises
         ------
         BusyError
-            If too many are under way.
+            If too many are in progress.
         """
         with self._lock:
             if self._views >= MOST_VIEWS:
@@ -142,7 +142,7 @@ class Jobs:
         return future
 
     def close(self) -> None:
-        """End the processes; what is unfinished is taken up by the next server."""
+        """End the processes; the next server resumes unfinished work."""
         self._closing = True
         for pool in (self._pool, self._drawing):
             pool.stop()
@@ -205,5 +205,5 @@ def page_file(settings: Settings, identity: str) -> Path:
 
 
 def phase_file(settings: Settings, identity: str) -> Path:
-    """Return the file that says where the work on a log is."""
+    """Return the file that holds the current step of the work on a log."""
     return settings.work / identity

@@ -1,4 +1,4 @@
-"""Whom a server answers and how much it takes from them: who may ask, what a page may do, bodies, files, patience."""
+"""Access and load limits of a server: who may send requests, what a page may do, bodies, files and timeouts."""
 
 import asyncio
 import hmac
@@ -16,22 +16,22 @@ from experiments.serve.refusals import POLICY, refusal_page, wants_page
 from experiments.serve.settings import MB, Settings, is_loopback
 
 MOST_REQUESTS = 256
-"""Requests that are answered at once [count]; more are told to come again."""
+"""Requests handled at the same time [count]; further ones are told to retry."""
 
 MOST_UPLOADS = 16
-"""Logs that come in at once [count]."""
+"""Logs uploaded at the same time [count]."""
 
 IDLE = 15.0
-"""Longest silence within a body [s]."""
+"""Longest pause within a request body [s]."""
 
 GRACE, SLOWEST = 30.0, 10_000.0
-"""Time after which a body must have come faster than so much on average [s, bytes/s]."""
+"""Grace period, after which a body must arrive faster than the given average rate [s, bytes/s]."""
 
 DRAINED = 5.0
-"""How long what is still sent is thrown away after a refusal, so that the client reads why [s]."""
+"""How long further data are discarded after a refusal, so that the client can read the reason [s]."""
 
 SPARE = 256 * MB
-"""Space that is left on the disk [bytes]."""
+"""Disk space that is left free [bytes]."""
 
 COOKIE = "hydrostate_token"
 
@@ -46,18 +46,18 @@ HEADERS: Mapping[bytes, bytes] = {
     b"cross-origin-resource-policy": b"same-origin",
     b"cache-control": b"no-store",
 }
-"""What every answer has, unless it says otherwise."""
+"""Default headers of every response."""
 
 
 class RefusedError(Exception):
-    """A request is not done.
+    """A request is refused.
 
     Parameters
     ----------
     status : int
-        Of HTTP.
+        HTTP status code.
     detail : str
-        Why, in a sentence.
+        The reason, in a sentence.
     """
 
     def __init__(self, status: int, detail: str) -> None:
@@ -66,17 +66,17 @@ class RefusedError(Exception):
 
     @property
     def headers(self) -> dict[str, str]:
-        """Headers of the answer: when to try again."""
+        """Headers of the response: when to retry."""
         return {"Retry-After": RETRY[1].decode()} if self.status == 429 else {}
 
 
 class Guard:
-    """Refuses those who may not ask, and puts the policy of pages on every answer.
+    """Refuses unauthorised requests, and adds the policy of pages to every response.
 
     Parameters
     ----------
     app : ASGIApp
-        What answers the others.
+        The application that answers all other requests.
     settings : Settings
         Host and token.
     """
@@ -109,7 +109,7 @@ class Guard:
             self._busy -= 1
 
     def _let_in(self, scope: Scope, headers: Mapping[bytes, bytes]) -> list[tuple[bytes, bytes]] | None:
-        """Refuse a request or let it in; the headers of a redirection where it brought its token in the address."""
+        """Refuse or accept a request; return redirection headers if the address contained the token."""
         if self._busy > MOST_REQUESTS:
             raise RefusedError(429, f"more than {MOST_REQUESTS} requests are being answered, come again")
         host = headers.get(b"host", b"").decode("latin-1").lower()
@@ -160,7 +160,7 @@ def _host_name(host: str) -> str:
 
 
 class _Exchange:
-    """A request and its answer: every answer has `HEADERS`, and a refusal is read before the connection ends."""
+    """A request and its response: every response has `HEADERS`, and a refusal is read before the connection ends."""
 
     def __init__(self, receive: Receive, send: Send) -> None:
         self._receive, self._send = receive, send
@@ -205,7 +205,7 @@ class _Exchange:
 
 
 class FreeSpace:
-    """Space left in the folder of a server."""
+    """Free space in the folder of a server."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -213,7 +213,7 @@ class FreeSpace:
         self.uploads = 0
 
     def left(self) -> int:
-        """Return the number of bytes that may still come; refreshed every few seconds."""
+        """Return the number of bytes that may still be received; refreshed every few seconds."""
         if time.monotonic() - self._looked > IDLE:
             folders = (self._settings.logs, self._settings.pages, self._settings.work)
             self._taken = sum(_size(entry) for folder in folders for entry in os.scandir(folder))
@@ -222,7 +222,7 @@ class FreeSpace:
         return min(self._settings.room - self._taken, free)
 
     def takes(self, size: int) -> None:
-        """Count what has come [bytes]."""
+        """Count received data [bytes]."""
         self._taken += size
 
 
@@ -287,12 +287,12 @@ async def receive_file(chunks: AsyncIterator[bytes], path: Path, most: int, room
 
 
 def require_size(size: int, most: int, room: int) -> None:
-    """Refuse a body that is too large for a log or for the folder.
+    """Refuse a request body that is too large for a log or for the folder.
 
     Parameters
     ----------
     size, most, room : int
-        What comes or came, the most of a log, and what the folder still takes [bytes].
+        Size of the body, largest size of a log, and space left in the folder [bytes].
 
     Raises
     ------

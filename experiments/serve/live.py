@@ -1,4 +1,4 @@
-"""Streams under watch: a process each, its gauges and events kept for whoever looks on, begun again when it ends."""
+"""Watched streams: one process each, restarted when it ends; gauges and events are stored for viewers."""
 
 import multiprocessing
 import os
@@ -18,26 +18,26 @@ from experiments.streams.watch_events import STATES
 from plant.errors import HydrostateError
 
 KEPT = 2400
-"""Gauges that are remembered [count]: ten minutes of four a second."""
+"""Number of stored gauges [count]: ten minutes at four per second."""
 
 AGAIN_AFTER = 5.0
-"""Time from the end of a stream to the next attempt [s]."""
+"""Delay between the end of a stream and the next attempt [s]."""
 
 SHOWN_EVENTS = 200
-"""Events that a view begins with [count]."""
+"""Number of past events in a new view [count]."""
 
 
 class Stream:
-    """One stream.
+    """A watched stream.
 
     Parameters
     ----------
     name : str
-        What it is asked for by.
+        Name in requests.
     address : str
-        Where it comes from.
+        Source of the stream.
     settings, store : Settings, Store
-        Rig and columns; where its events are kept.
+        Rig and columns, and the store for its events.
     """
 
     def __init__(self, name: str, address: str, settings: Settings, store: Store) -> None:
@@ -53,11 +53,11 @@ class Stream:
         self._thread = threading.Thread(target=self._run, name=f"stream {name}", daemon=True)
 
     def start(self) -> None:
-        """Begin to watch."""
+        """Start to watch."""
         self._thread.start()
 
     def close(self) -> None:
-        """End the watch and its process; it goes on from where it was when there is one again."""
+        """End the watch and its process; the next watch continues from its saved state."""
         with self._lock:  # a process is either begun before, and ended here, or not begun
             self._closed.set()
             if self._process is not None and self._process.is_alive():
@@ -74,11 +74,11 @@ class Stream:
 
     @property
     def revision(self) -> tuple[int, int]:
-        """Numbers of the last gauges and of the last change of state or event: what is new has larger ones."""
+        """Numbers of the last gauges and of the last change of state or event; new ones have larger numbers."""
         return self._count, self._fresh
 
     def since(self, number: int) -> list[dict[str, Any]]:
-        """Return the kept gauges whose ``number`` is higher; 0 returns all."""
+        """Return the stored gauges with a ``number`` above the given one; 0 returns all."""
         with self._lock:
             new = min(self._count - number, len(self._gauges))
             return list(self._gauges)[len(self._gauges) - new :] if new > 0 else []
@@ -98,7 +98,7 @@ class Stream:
             self._closed.wait(AGAIN_AFTER)
 
     def _watch_once(self) -> None:
-        """Watch the stream in a process of its own until that ends."""
+        """Watch the stream in its own process until that ends."""
         settings, context = self._settings, multiprocessing.get_context("spawn")
         state = settings.folder / f"stream-{self.name}.npz"
         rig = rig_of_stream(self.name, settings.rigs, settings.rig)
@@ -162,7 +162,7 @@ class Streams:
     Parameters
     ----------
     settings, store : Settings, Store
-        Which they are; where their events are kept.
+        The streams to watch, and the store for their events.
     """
 
     def __init__(self, settings: Settings, store: Store) -> None:
@@ -170,11 +170,11 @@ class Streams:
         self.looking = 0
 
     def start(self) -> None:
-        """Begin to watch all."""
+        """Start to watch all streams."""
         for one in self.by_name.values():
             one.start()
 
     def close(self) -> None:
-        """End all."""
+        """End all watches."""
         for one in self.by_name.values():
             one.close()

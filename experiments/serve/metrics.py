@@ -34,11 +34,11 @@ def exposition(
     counts : Mapping[str, int]
         Logs by state.
     waiting : int or None
-        Logs that are worked on or wait; None of a watch, which has none.
+        Logs that are running or waiting; None for a watch, which has none.
     streams : sequence of tuple
-        State of each stream as `experiments.serve.live.Stream.state` gives it, and its alarms.
+        State of each stream as in `experiments.serve.live.Stream.state`, and its alarms.
     now : float
-        Since 1970 [s].
+        Current time, since 1970 [s].
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The server's own pages, and the policy that a page which is kept says of itself."""
+"""The server's own pages, and the content security policy stored in saved pages."""
 
 import html
 import re
@@ -18,18 +18,18 @@ WORDS: Mapping[str, str] = {
     "estimate": "bulk modulus of the oil",
     "inspect": "what the file contains",
 }
-"""What each verb answers."""
+"""Question that each verb answers."""
 
 FORMATS = ("CSV or other text", "Parquet", "Feather", "MAT")
 MORE_FORMATS: Mapping[str, str] = {"nptdms": "TDMS", "asammdf": "MDF", "h5py": "HDF5", "openpyxl": "XLSX"}
-"""Formats of logs that any server reads, and those that need a package, by its module."""
+"""Log formats that need a package, by its module; any server reads the others."""
 
 HEAD = 4096
-"""Letters of a page among which its policy stands [count]."""
+"""Length of the start of a page in which its policy is found [count]."""
 
 
 def policy_of(page: str) -> str:
-    """Return the content security policy of a page, for the header; a page without one may do nothing.
+    """Return the content security policy of a page, for the header; without one, the page is allowed nothing.
 
     Examples
     --------
@@ -48,7 +48,7 @@ def policy_of_file(path: Path) -> str:
 
 
 def home_page(settings: Settings) -> str:
-    """Return the page on which logs are dropped."""
+    """Return the page for uploading logs."""
     more = tuple(name for module, name in MORE_FORMATS.items() if find_spec(module) is not None)
     return _rendered(
         "serve/home.html",

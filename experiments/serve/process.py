@@ -1,15 +1,15 @@
-"""A process that a server begins: its linear algebra keeps to one thread, and it does not outlive the server."""
+"""A process started by a server: its linear algebra uses one thread, and it ends with the server."""
 
 import os
 import threading
 import time
 
 LOOKED_AFTER = 1.0
-"""Time between two looks whether the server is still there [s]."""
+"""Time between two checks whether the server still runs [s]."""
 
 
 def bind_to_server(server: int) -> None:
-    """Bind this process to its server's life, before it loads what computes."""
+    """Make this process end with its server, before it imports libraries for computing."""
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
     threading.Thread(target=_end_with, args=(server,), daemon=True).start()

@@ -1,4 +1,4 @@
-"""Refusals as a person sees them: a page with one sentence, in light or dark."""
+"""Refusals for human readers: a page with one sentence, in light or dark mode."""
 
 import hashlib
 import html
@@ -9,7 +9,7 @@ STYLE = (
     "color:#1c1f23}h1{font-size:1.4rem}p{overflow-wrap:anywhere}a{color:#0072b2}"
     "@media(prefers-color-scheme:dark){body{background:#16191d;color:#e8eaed}a{color:#6fc0f0}}"
 )
-"""How it looks: no other page's style may be loaded here."""
+"""Style of the page, which may not load another page's style."""
 
 _HASH = b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
 
@@ -18,7 +18,7 @@ POLICY = f"default-src 'none'; style-src 'sha256-{_HASH}'; frame-ancestors 'none
 
 
 def wants_page(method: str, path: str, accept: str) -> bool:
-    """Return whether a refusal is read by a person: a browser asks for a page, a program says what it accepts.
+    """Return whether a refusal is read by a person: a browser accepts pages, a program states what it accepts.
 
     Examples
     --------
@@ -29,7 +29,7 @@ def wants_page(method: str, path: str, accept: str) -> bool:
 
 
 def refusal_page(detail: str) -> str:
-    """Return the page that says why there is no other."""
+    """Return the page that gives the reason for a refusal."""
     said = html.escape(f"{detail[:1].upper()}{detail[1:].rstrip('.')}.")
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Hydrostate: not shown</title>'

@@ -1,4 +1,4 @@
-"""Which rig file a log takes on a server: that of its actuator, or that of all others."""
+"""Selects the rig file for a log on a server: the one for its actuator, or the common one."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 
 
 def rig_files(folder: Path | None) -> dict[str, Path]:
-    """Return the rig files of a folder by actuator, whose name each of them has."""
+    """Return the rig files of a folder by actuator; each file is named after its actuator."""
     return {} if folder is None else {one.stem: one for one in sorted(folder.glob("*.toml"))}
 
 
 def require_rigs(plant: str | None, rigs: Path | None, others: Path | None) -> None:
-    """Read every rig file of a folder.
+    """Read every rig file of a folder, as a check.
 
     Parameters
     ----------
     plant, others : str or None, Path or None
-        As `load_actuator_of_log` takes them.
+        As in `load_actuator_of_log`.
     rigs : Path or None
         The folder.
 
@@ -45,13 +45,13 @@ def rig_of(name: str, pattern: str | None, folder: Path | None, others: Path | N
     Parameters
     ----------
     name : str
-        Of the log.
+        Name of the log.
     pattern : str or None
-        How logs are named, as `experiments.fleet.naming.actuator_in_name` takes it.
+        Pattern of log names, as in `experiments.fleet.naming.actuator_in_name`.
     folder : Path or None
-        Of rig files by actuator, if the server has one.
+        Folder of rig files by actuator, if the server has one.
     others : Path or None
-        Rig file of the logs whose actuator has none of its own.
+        Rig file for logs whose actuator has no rig file of its own.
 
     Raises
     ------
@@ -68,14 +68,14 @@ def rig_of(name: str, pattern: str | None, folder: Path | None, others: Path | N
 
 
 def rig_of_stream(name: str, folder: Path | None, others: Path | None) -> Path | None:
-    """Return the rig file of a stream, which has the name of its actuator.
+    """Return the rig file of a stream, which is named after its actuator.
 
     Parameters
     ----------
     folder : Path or None
-        Of the rig files by actuator.
+        Folder of rig files by actuator.
     others : Path or None
-        Rig file of the streams whose actuator has none of its own.
+        Rig file for streams whose actuator has no rig file of its own.
 
     Raises
     ------
@@ -86,12 +86,12 @@ def rig_of_stream(name: str, folder: Path | None, others: Path | None) -> Path |
 
 
 def require_rig_of_stream(name: str, folder: Path | None, others: Path | None) -> None:
-    """Read the rig file of a stream, of which only the gear-pump actuator's can be watched; see `rig_of_stream`.
+    """Read the rig file of a stream, which must be for the gear-pump actuator; see `rig_of_stream`.
 
     Raises
     ------
     HydrostateError
-        If it has none, or that of another kind of actuator.
+        If it has none, or one for another kind of actuator.
     """
     try:
         load_rig(rig_of_stream(name, folder, others))
@@ -105,8 +105,8 @@ def load_actuator_of_log(plant: str | None, rig: Path | None, others: Path | Non
     Parameters
     ----------
     plant, rig, others : str or None, Path or None
-        Kind of actuator that the server was told, rig file of the log, and that of logs without one of their own. A
-        log's own rig file may name another kind.
+        Kind of actuator in the server's settings, rig file of the log, and rig file for logs without their own. A log's
+        own rig file may name another kind.
     """
     if rig is not None and rig != others:
         from plant.eha.rig import plant_of

@@ -1,4 +1,4 @@
-"""`run_server(settings, say)`: listen, answer until asked to end, and let the folder go."""
+"""`run_server(settings, say)`: listens, answers until asked to end, and releases the folder."""
 
 import errno
 import gc
@@ -15,16 +15,17 @@ from experiments.serve.settings import Settings
 from plant.errors import HydrostateError
 
 LEFT_TO_END = 3
-"""How long answers under way are waited for at the end [s]."""
+"""Longest wait at the end for responses in progress [s]."""
 
 LONGEST_HEADERS = 32 << 10
-"""Headers of a request [bytes]."""
+"""Largest size of the headers of a request [bytes]."""
 
 OBJECTS = 10_000
-"""More objects than were freed, after which garbage is looked for: a command looks seldom, a server must not grow."""
+"""Garbage collector threshold, in objects allocated minus freed. It is lower than for a command, as a server must not
+grow."""
 
 BACKLOG = 512
-"""Connections that wait to be accepted [count]."""
+"""Connections that may wait to be accepted [count]."""
 
 
 def run_server(settings: Settings, say: Callable[[str], None]) -> None:
@@ -33,14 +34,14 @@ def run_server(settings: Settings, say: Callable[[str], None]) -> None:
     Parameters
     ----------
     settings : Settings
-        What the server is told.
+        Settings of the server.
     say : callable
-        Is told the address once it listens.
+        Called with the address once the server listens.
 
     Raises
     ------
     HydrostateError
-        If it cannot listen there, or cannot have the folder.
+        If it cannot listen there, or cannot use the folder.
     """
     logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # what goes wrong is told by the application
     gc.freeze()
@@ -76,7 +77,7 @@ ANYWHERE = ("0.0.0.0", "::")  # noqa: S104 - hosts that another machine cannot o
 
 
 class _Speaking(uvicorn.Server):
-    """A server that says when it listens."""
+    """A server that reports when it listens."""
 
     def __init__(self, config: uvicorn.Config, say: Callable[[], None]) -> None:
         super().__init__(config)

@@ -1,4 +1,4 @@
-"""The server behind its requests: its folder, its store and its jobs."""
+"""The server's state: its folder, its store and its jobs."""
 
 import asyncio
 import fcntl
@@ -23,7 +23,7 @@ LOCK = "in-use"
 
 
 class Service:
-    """A server's folder and what is done in it."""
+    """A server's folder, and all work done in it."""
 
     store: Store
     jobs: Jobs
@@ -41,7 +41,7 @@ class Service:
         Raises
         ------
         HydrostateError
-            If it cannot be written, another server has it, or it holds something else.
+            If it cannot be written, is used by another server, or contains something else.
         """
         settings = self.settings
         if settings.folder.is_file():
@@ -67,7 +67,7 @@ class Service:
             undone.pop_all()
 
     def close(self) -> None:
-        """End what is under way and let the folder go."""
+        """Stop current work and release the folder."""
         self.streams.close()
         self.jobs.close()
         self.store.close()
@@ -79,25 +79,25 @@ class Service:
         Raises
         ------
         RefusedError
-            If as many wait as may.
+            If the queue is full.
         """
         if self.jobs.waiting + self.room.uploads >= self.settings.waiting:
             raise RefusedError(429, f"{self.settings.waiting} logs are waiting, try again later")
 
     def take_in(self, identity: str, part: Path, name: str, verb: str, size: int) -> StoredLog:
-        """Keep a log that has come, and put it into the queue.
+        """Store a received log, and put it into the queue.
 
         Parameters
         ----------
         part : Path
-            Its file, whole and on the disk.
+            Its file, complete and on the disk.
         size : int
-            Of the file [bytes].
+            Size of the file [bytes].
 
         Raises
         ------
         RefusedError
-            If the database takes no more; the file is deleted then.
+            If the database accepts no more; the file is then deleted.
         """
         place = log_file(self.settings, identity)
         part.replace(place)
@@ -189,7 +189,7 @@ class Service:
         Raises
         ------
         RefusedError
-            If no log was diagnosed yet, or too much is asked at once.
+            If no log was diagnosed yet, or there are too many requests at once.
         """
         repairs = await asyncio.to_thread(self._repairs)
         revision = f"{await asyncio.to_thread(self.store.revision)} {repairs}"
@@ -207,14 +207,14 @@ class Service:
             raise
 
     def _page_of(self, revision: str) -> "asyncio.Future[str] | None":
-        """Return the page of the fleet that is there or under way, None where it is to be made."""
+        """Return the fleet page that is ready or in progress; None if it has to be made."""
         known = self._fleet
         return None if known is None or known[0] != revision or known[1].cancelled() else known[1]
 
     def _begun(
         self, revision: str, rows: list[tuple[str, str, dict[str, Any]]], repairs: Repairs
     ) -> "asyncio.Future[str]":
-        """Begin the page of the fleet."""
+        """Start to make the fleet page."""
         settings = self.settings
         name = settings.folder.resolve().name
         made = self._view(fleet_view, rows, settings.pattern, dict(settings.limits), repairs, name)
@@ -228,7 +228,7 @@ class Service:
         Raises
         ------
         RefusedError
-            If one is not there or not done, or too much is asked at once.
+            If one is missing or unfinished, or there are too many requests at once.
         """
         pair = [await asyncio.to_thread(self.result, one) for one in (first, second)]
         return await self._view(compare_view, *pair, (first, second))
@@ -244,7 +244,7 @@ class Service:
         Raises
         ------
         RefusedError
-            If no log is of that actuator, or too much is asked at once.
+            If that actuator has no log, or there are too many requests at once.
         """
         rows = await asyncio.to_thread(lambda: list(self.store.diagnosed()))
         repairs = await asyncio.to_thread(self._repairs)
@@ -255,7 +255,7 @@ class Service:
         return page
 
     def _repairs(self) -> Repairs:
-        """Return when actuators were repaired, as the table says now."""
+        """Return the times at which actuators were repaired, as currently in the table."""
         from experiments.fleet.outlook import read_maintenance
 
         try:
@@ -273,7 +273,7 @@ class Service:
 
 
 def delete_orphans(settings: Settings, store: Store) -> None:
-    """Delete files of logs that were deleted in the middle of the work on them."""
+    """Delete files of logs that were deleted while they were processed."""
     for folder in (settings.logs, settings.pages):
         for path in folder.iterdir():
             if store.get(path.stem) is None:

@@ -1,4 +1,4 @@
-"""Settings of a server: its folder, whom it answers, and its limits."""
+"""Settings of a server: its folder, its access control, and its limits."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,10 +8,10 @@ from pathlib import Path
 from plant.errors import HydrostateError
 
 VERBS = ("diagnose", "estimate", "inspect")
-"""What may be done with a log."""
+"""Verbs that the server can run on a log."""
 
 LEAST_TOKEN = 16
-"""Letters of a token, at least [count]."""
+"""Smallest length of a token [characters]."""
 
 MB = 1 << 20
 
@@ -25,42 +25,42 @@ class Settings:
     Parameters
     ----------
     folder : Path
-        All that it keeps is in here.
+        Folder for everything that the server stores.
     host, port : str, int
-        Where it listens.
+        Address on which it listens.
     token : str or None
-        What a client must show; None only where this machine alone can connect.
+        Token that a client must present; None only if no other machine can connect.
     plant, rig, columns : str or None, Path or None, Mapping[str, str]
-        Actuator of the logs, as the command line has it.
+        Actuator of the logs, as on the command line.
     rigs : Path or None
-        Folder of rig files, each for the logs of the actuator that its name is; ``rig`` is then that of all others.
+        Folder of rig files, each named after the actuator whose logs it applies to; ``rig`` is then for all other logs.
     pattern : str or None
-        How logs are named, as `experiments.fleet.naming.by_pattern` takes it.
+        Pattern of log names, as in `experiments.fleet.naming.by_pattern`.
     limits : Mapping[str, float]
         Limits of severities [their units].
     maintenance : Path or None
-        Table of repairs, as `experiments.fleet.outlook.read_maintenance` takes it; it is read for each page.
+        Table of repairs, as in `experiments.fleet.outlook.read_maintenance`; it is read for each page.
     workers : int
-        Logs that are worked on at once [count].
+        Logs processed in parallel [count].
     seconds : float
-        Longest work on a log [s].
+        Longest processing time for a log [s].
     memory : int
-        Most memory of a process that works on a log [bytes].
+        Largest memory of a process that works on a log [bytes].
     largest : int
-        Largest log that is taken [bytes].
+        Largest log that is accepted [bytes].
     room : int
-        Most that the folder's logs and pages may take [bytes].
+        Largest total size of the folder's logs and pages [bytes].
     waiting : int
-        Logs that may wait to be worked on [count].
+        Largest number of waiting logs [count].
     streams : Mapping[str, str]
-        Address of each stream that is watched, by its name.
+        Address of each watched stream, by its name.
     false_alarms : float
-        Of each stream, of healthy, moving operation [1/h].
+        Rate for each stream, during healthy, moving operation [1/h].
 
     Raises
     ------
     HydrostateError
-        If a token is wanted and missing, or too short.
+        If a required token is missing or too short.
     """
 
     folder: Path
@@ -91,27 +91,27 @@ class Settings:
 
     @property
     def logs(self) -> Path:
-        """Folder of the logs as they came."""
+        """Folder of the logs as received."""
         return self.folder / "logs"
 
     @property
     def pages(self) -> Path:
-        """Folder of their pages."""
+        """Folder of the pages of logs."""
         return self.folder / "pages"
 
     @property
     def work(self) -> Path:
-        """Folder of what is under way; it is emptied at the start."""
+        """Folder for work in progress; it is emptied at the start."""
         return self.folder / "work"
 
     @property
     def database(self) -> Path:
-        """File of what is known of the logs."""
+        """Database file with the state and results of the logs."""
         return self.folder / "hydrostate.sqlite"
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether this machine alone can connect to a host name or address.
+    """Return whether a host name or address accepts connections only from this machine.
 
     Examples
     --------

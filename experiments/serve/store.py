@@ -15,10 +15,10 @@ from experiments.running.refusal import refused
 from plant.errors import HydrostateError
 
 VERSION = 1
-"""Of the tables; a folder that a later version wrote is refused."""
+"""Version of the tables; a folder written by a later version is refused."""
 
 MOST_EVENTS = 10_000
-"""Events of streams that are kept [count]."""
+"""Largest number of stream events that are stored [count]."""
 
 TABLES = """
 CREATE TABLE logs (
@@ -36,7 +36,8 @@ CREATE INDEX events_by_stream ON events (stream, number);
 """
 
 UNFINISHED, DONE, FAILED, INTERRUPTED = "unfinished", "done", "failed", "interrupted"
-"""States of a log: to be worked on, worked on, not usable, and given up since the server ended in the middle of it."""
+"""States of a log: not yet processed, processed, unusable, and given up because the server ended while processing
+it."""
 
 
 @dataclass(frozen=True)
@@ -46,23 +47,23 @@ class StoredLog:
     Parameters
     ----------
     number : int
-        Later logs have larger ones.
+        Later logs have larger numbers.
     id : str
-        What it is asked for by.
+        Identity in requests.
     name : str
-        Of the file, as the client called it.
+        File name given by the client.
     verb : str
-        What is done with it.
+        Verb that is run on it.
     size : int
-        Of the file [bytes].
+        Size of the file [bytes].
     state : str
         ``unfinished``, ``done``, ``failed`` or ``interrupted``.
     tries : int
-        How often work on it was begun by a server that then ended.
+        How often a server started work on it and then ended.
     received, ended : float, float or None
-        When it came and when the work was over, since 1970 [s].
+        When it was received and when the work ended, since 1970 [s].
     outcome, message : str or None
-        What came of it, and that in a sentence.
+        The outcome, and the result in a sentence.
     """
 
     number: int
@@ -84,7 +85,7 @@ class Store:
     Raises
     ------
     HydrostateError
-        If the file is no such database, or of a later version; later on, whenever it cannot be written.
+        If the file is not such a database, or has a later version; afterwards, whenever it cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -107,17 +108,17 @@ class Store:
             raise HydrostateError(f"{path}: must be of version {VERSION}, a later Hydrostate wrote version {version}")
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the database file."""
         with self._lock:
             self._connection.close()
 
     def add(self, identity: str, name: str, verb: str, size: int) -> StoredLog:
-        """Keep a log that came, to be worked on.
+        """Store a received log, to be processed.
 
         Parameters
         ----------
         size : int
-            Of its file [bytes].
+            Size of its file [bytes].
         """
         with self._writing() as connection:
             connection.execute(
@@ -130,7 +131,7 @@ class Store:
         return found
 
     def get(self, identity: str) -> StoredLog | None:
-        """Return a stored log; None if there is none of that identity."""
+        """Return a stored log; None if there is none with that identity."""
         rows = self._asked("SELECT * FROM kept WHERE id = ?", identity)
         return StoredLog(*rows[0]) if rows else None
 
@@ -140,14 +141,14 @@ class Store:
         Parameters
         ----------
         before : int, optional
-            Number that theirs are below.
+            Return only logs with a smaller number.
         """
         below = before if before is not None else 1 << 62
         rows = self._asked("SELECT * FROM kept WHERE number < ? ORDER BY number DESC LIMIT ?", below, most)
         return [StoredLog(*row) for row in rows]
 
     def unfinished(self) -> list[StoredLog]:
-        """Return the logs that are to be worked on, the first first."""
+        """Return the logs still to be processed, the oldest first."""
         rows = self._asked("SELECT * FROM kept WHERE state = ? ORDER BY number", UNFINISHED)
         return [StoredLog(*row) for row in rows]
 
@@ -156,7 +157,7 @@ class Store:
         return {str(state): int(count) for state, count in self._asked("SELECT state, COUNT(*) FROM logs GROUP BY 1")}
 
     def tried(self, identity: str) -> None:
-        """Count that a server ended in the middle of the work on a log."""
+        """Count that a server ended while processing a log."""
         with self._writing() as connection:
             connection.execute("UPDATE logs SET tries = tries + 1 WHERE id = ?", (identity,))
 
@@ -168,18 +169,18 @@ class Store:
         entries: Mapping[str, Any] | None = None,
         said: str = "",
     ) -> None:
-        """Keep the result of a log; a log that was deleted meanwhile stays deleted.
+        """Store the result of a log; a log that was deleted meanwhile stays deleted.
 
         Parameters
         ----------
         state : str
             ``done``, ``failed`` or ``interrupted``.
         result : Mapping
-            Entries of the JSON contract, ``outcome`` and ``message`` among them.
+            Entries of the JSON contract, including ``outcome`` and ``message``.
         entries : Mapping, optional
-            Those of a row of a batch, for the fleet.
+            Entries of a batch row, for the fleet.
         said : str
-            The result in one sentence, if another than its ``message``.
+            The result in one sentence, if it differs from its ``message``.
         """
         text = json.dumps(result, allow_nan=False)
         told = None if entries is None else json.dumps(entries, allow_nan=False)
@@ -190,29 +191,29 @@ class Store:
             )
 
     def result(self, identity: str) -> dict[str, Any] | None:
-        """Return the result of a log as entries of the JSON contract, None before it is there."""
+        """Return the result of a log as entries of the JSON contract; None if it is not ready."""
         rows = self._asked("SELECT result FROM logs WHERE id = ?", identity)
         return json.loads(rows[0][0]) if rows and rows[0][0] else None
 
     def delete(self, identity: str) -> bool:
-        """Forget a log; return whether there was one."""
+        """Delete a log from the store; return whether it existed."""
         with self._writing() as connection:
             return connection.execute("DELETE FROM logs WHERE id = ?", (identity,)).rowcount > 0
 
     def diagnosed(self) -> Iterator[tuple[str, str, dict[str, Any]]]:
-        """Yield identity, name and entries of a row for each log that was diagnosed, the first first."""
+        """Yield identity, name and batch row entries of each diagnosed log, the oldest first."""
         for identity, name, text in self._asked(
             "SELECT id, name, entries FROM logs WHERE entries IS NOT NULL ORDER BY number"
         ):
             yield identity, name, json.loads(text)
 
     def revision(self) -> str:
-        """Return a text that changes whenever what `diagnosed` yields does."""
+        """Return a text that changes whenever the output of `diagnosed` changes."""
         query = "SELECT COUNT(*), COALESCE(MAX(ended), 0), COALESCE(SUM(number), 0) FROM logs WHERE entries IS NOT NULL"
         return "-".join(str(one) for one in self._asked(query)[0])
 
     def add_event(self, stream: str, event: Mapping[str, Any]) -> None:
-        """Keep what a watch told; the oldest go when there are too many."""
+        """Store an event of a watch; the oldest are deleted if there are too many."""
         with self._writing() as connection:
             connection.execute(
                 "INSERT INTO events (stream, received, event) VALUES (?, ?, ?)",

@@ -1,4 +1,4 @@
-"""The work on a log, in a process that may be killed at any moment: it writes a page, whole or not at all."""
+"""The work on a log, in a process that may be killed at any time: it writes a complete page, or none at all."""
 
 import os
 import sys
@@ -27,42 +27,43 @@ if TYPE_CHECKING:
     _Tools: TypeAlias = tuple[ActuatorKind, Rig[Any], LogVerb, Rig[Any], Any]
 
 READING, WORKING, WRITING = "reading the log", "working it out", "writing the page"
-"""Where the work on a log is."""
+"""Steps of the work on a log."""
 
 OTHER_NAMES = (
     "if the log has them under other names, choose inspect and drop it again: its page gives the lines that the rig "
     "file on the server must have"
 )
-"""What helps a log that is refused for its columns: whoever sends it has no command line."""
+"""Advice for a log rejected because of its columns, for users without a command line."""
 
 GUESSED: Mapping[bool, str] = {
     True: "The log can be read with the columns that its page names.",
     False: "The columns that could be guessed are too few to read the log; its page shows them.",
 }
-"""What an inspection found, by whether the log reads with the columns that were guessed."""
+"""Result of an inspection, by whether the log can be read with the guessed columns."""
 
 NO_MEMORY = 77
-"""How a process ends whose log asked for more memory than there is: what it still holds, the next log would want."""
+"""Exit code of a process whose log needed more memory than there is. The process ends, since the memory that it still
+holds would be missing for the next log."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """A log that is to be worked on.
+    """A log to be processed.
 
     Parameters
     ----------
     log : Path
-        Its file.
+        File of the log.
     name : str
-        What the client calls it.
+        Name given by the client.
     page : Path
-        Where its page goes.
+        Path for its page.
     phase : Path
-        File that says where the work is.
+        File that holds the current step of the work.
     plant, rig, columns : str or None, Path or None, tuple of tuple
-        As the server was told them; columns are pairs of channel and foreign column.
+        From the server's settings; columns are pairs of channel and foreign column.
     rigs, pattern : Path or None, str or None
-        Likewise: folder of rig files, and how logs are named.
+        Likewise: folder of rig files, and the pattern of log names.
     """
 
     log: Path
@@ -86,9 +87,9 @@ class LogResult:
     result : Mapping
         Entries of the JSON contract.
     entries : Mapping or None
-        Those of a row of a batch, where the log was diagnosed.
+        Entries of a batch row, if the log was diagnosed.
     said : str
-        The result in one sentence, if another than its ``message``.
+        The result in one sentence, if it differs from its ``message``.
     """
 
     result: Mapping[str, Any]
@@ -97,14 +98,14 @@ class LogResult:
 
 
 def begin_worker(server: int, memory: int) -> None:
-    """Bind a process to its server's life and to a limit of memory.
+    """Make a process end with its server, and limit its memory.
 
     Parameters
     ----------
     server : int
-        Process identity of the server.
+        Process ID of the server.
     memory : int
-        Most that it may ask for [bytes].
+        Largest memory that the process may request [bytes].
     """
     bind_to_server(server)
     os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"  # the others reserve 1 GiB ahead, which the limit counts
@@ -116,12 +117,12 @@ def begin_worker(server: int, memory: int) -> None:
 
 
 def work_on(task: Task) -> LogResult:
-    """Say what a log holds and write its page.
+    """Analyse a log and write its page.
 
     Returns
     -------
     LogResult
-        With the outcome ``failed`` where the log cannot be used. Where memory is wanting, the process ends with
+        With the outcome ``failed`` if the log cannot be used. If memory is insufficient, the process ends with
         `NO_MEMORY` instead.
     """
     blank: Mapping[str, Any] = {}
@@ -192,7 +193,7 @@ def _tools(task: Task, rig: Path | None) -> "_Tools":
 
 @lru_cache(maxsize=128)
 def _prepared(plant: str | None, rig: Path | None, others: Path | None, changed: int, verb: str) -> "_Tools":
-    """Return what works on a log; a rig file counts as it was when it was last `changed` [ns since 1970]."""
+    """Return the function that processes a log; a rig file is identified by when it was `changed` [ns since 1970]."""
     del changed
     from experiments.actuators import offered
 
@@ -223,7 +224,7 @@ def _write(task: Task, page: str) -> None:
 
 
 def _without_path(value: Any, task: Task) -> Any:
-    """Return entries in which the log has the name that the client gave it, and no place on this machine."""
+    """Return entries in which the log has the client's name, and no path on this machine."""
     if isinstance(value, str):
         for folder in {one for one in (task.rig and task.rig.parent, task.rigs) if one}:
             value = value.replace(f"{folder}{os.sep}", "")

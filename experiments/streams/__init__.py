@@ -1,1 +1,1 @@
-"""Streams: rows as they come, watched or filtered, and where what is told of them goes."""
+"""Streams: rows as they arrive, watched or filtered, and the outputs of their results."""

@@ -1,4 +1,4 @@
-"""Events of a stream at an MQTT broker."""
+"""Publishes the events of a stream at an MQTT broker."""
 
 import json
 import time
@@ -11,17 +11,17 @@ from experiments.command.terminal import note
 from plant.log.stream.source import broker_of, broker_package, connect
 
 PATIENCE = 5.0
-"""How long the last messages to a broker may take [s]."""
+"""Longest time for the last messages to a broker [s]."""
 
 MOST_WAITING = 200
-"""Messages at most whose arrival is waited for at the end [count]."""
+"""Largest number of messages whose delivery is awaited at the end [count]."""
 
 
 @contextmanager
 def published(address: str) -> Generator[Callable[[Mapping[str, Any]], None]]:
-    """Publish every event at a broker, as the same JSON object that the line is.
+    """Publish every event at a broker, as the same JSON object as on its line.
 
-    A broker that goes away does not end the watch: what it missed is sent when it is back.
+    If the broker goes away, the watch continues; missed events are sent when the broker is back.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def published(address: str) -> Generator[Callable[[Mapping[str, Any]], None]]:
     Raises
     ------
     HydrostateError
-        If it is no such address, or the package for MQTT is missing.
+        If the address is invalid, or the package for MQTT is missing.
     LogError
         If no broker answers there.
     """

@@ -17,20 +17,20 @@ class EventSource(Protocol):
     """Source of a stream's events."""
 
     def end(self, outcome: str, message: str) -> None:
-        """Tell that the stream has ended, and how."""
+        """Report that the stream has ended, and how."""
         ...
 
 
 @contextmanager
 def end_told(told: EventSource) -> Generator[None]:
-    """Follow a stream; whatever ends it, the last line says so.
+    """Follow a stream; however it ends, the last line reports it.
 
     Raises
     ------
     HydrostateError
-        As within.
+        Any such error raised in the block.
     typer.Exit
-        After an error that nobody expected, which is noted.
+        After an unexpected error, which is reported.
     """
     try:
         yield
@@ -49,7 +49,7 @@ def end_told(told: EventSource) -> Generator[None]:
 
 
 def stop_at_signals() -> None:
-    """Let a signal to end a process, or a terminal that is closed, interrupt it, so that its last line is written."""
+    """Turn a termination signal, or a closed terminal, into an interrupt, so that the last line is written."""
     if threading.current_thread() is not threading.main_thread():
         return
     for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP

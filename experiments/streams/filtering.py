@@ -1,4 +1,4 @@
-"""The verb `hydrostate filter`: rows to samples, samples to a filter, and its estimates to lines."""
+"""The verb `hydrostate filter`: turns rows into samples, filters the samples, and prints estimates as lines."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from plant.log.stream.csv_rows import CsvStream
 
 LEARNING = 1.0
-"""Time at the start of a stream from which noise and first belief are taken, if no log is named [s]."""
+"""Time at the start of a stream from which noise levels and initial estimate are taken, if no log is named [s]."""
 
 FEWEST = 200
-"""Least count of rows that a filter starts from."""
+"""Smallest number of rows from which a filter starts."""
 
 TOGETHER = 0.1
 """Longest piece of a stream that is filtered at once [s]; results do not depend on it."""
@@ -32,24 +32,24 @@ TOGETHER = 0.1
 
 @dataclass
 class Filtering:
-    """A stream that is filtered, and what is told of it.
+    """A filtered stream and its output.
 
     Parameters
     ----------
     say : callable
-        Takes the entries of a line.
+        Receives the entries of a line.
     asked : StreamFilterOptions
         The filter.
     columns : tuple of two Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.
     every : float
-        Time of the stream between two estimates [s].
+        Stream time between two estimates [s].
     like : Record or None
-        A log of the same bench that gives the noise levels; the beginning of the stream if None.
+        A log from the same test bench that gives the noise levels; the beginning of the stream if None.
     state : Path or None
-        File in which the filter is kept over a restart.
+        File that keeps the state of the filter over a restart.
     source : str
-        What the stream is called in lines, errors and warnings.
+        Name of the stream in lines, errors and warnings.
     """
 
     say: Callable[[dict[str, Any]], None]
@@ -64,12 +64,12 @@ class Filtering:
     _sums: "tuple[NDArray[np.float64], NDArray[np.float64]] | None" = field(default=None, init=False)
 
     def follow(self, lines: Iterable[str]) -> None:
-        """Filter header and rows as they come, until they end.
+        """Filter a header and rows as they arrive, until they end.
 
         Raises
         ------
         HydrostateError
-            If too many rows are garbage, or the stream is not one that can be filtered.
+            If too many rows are garbage, or the stream cannot be filtered.
         """
         stream = open_rows(lines, *self.columns, self.source)
         told = stream.start_time
@@ -88,7 +88,7 @@ class Filtering:
         warn_if_cut(stream, self.source)
 
     def end(self, outcome: str, message: str) -> None:
-        """Tell that the stream has ended, and how."""
+        """Report that the stream has ended, and how."""
         taken = 0 if self.filtered is None else self.filtered.taken
         self._line("end", outcome=outcome, samples=taken, message=message or f"{taken} samples filtered")
 
@@ -99,7 +99,7 @@ class Filtering:
             save_filter(state, self.asked, self.filtered, self.last)
 
     def _pieces(self, stream: "CsvStream") -> "Iterator[tuple[float, NDArray[np.float64], bool]]":
-        """Yield rows; together those that a filter begins with, first and after a gap."""
+        """Yield pieces of rows; at the start and after a gap, the first piece has enough rows to start the filter."""
         import numpy as np
 
         resumes = self.state is not None and self.state.exists()
@@ -119,11 +119,11 @@ class Filtering:
             yield last, np.concatenate(first), after_gap
 
     def _wanted(self, stream: "CsvStream") -> int:
-        """Return the number of rows from which a filter starts."""
+        """Return the number of rows needed to start a filter."""
         return 1 if self.like is not None else max(round(LEARNING / stream.sample_time), FEWEST)
 
     def _ready(self, stream: "CsvStream", rows: "NDArray[np.float64]", last: float, gap: bool) -> "OnlineFilter":
-        """Return the filter; it begins, goes on from its state, or begins again after a gap."""
+        """Return the filter, which starts, resumes from its state file, or restarts after a gap."""
         from estimation.eha.online import begin_filter
         from plant.log.record import Record
 
@@ -142,7 +142,7 @@ class Filtering:
         return self.filtered
 
     def _resume(self, state: Path, sample_time: float, start: float) -> None:
-        """Go on from the state file; rows that are missing up to here are missing samples."""
+        """Resume from the state file; rows missing since then count as missing samples."""
         import numpy as np
 
         from estimation.eha.online import load_filter
@@ -176,7 +176,7 @@ class Filtering:
         self._line("start", file=self.source, rate_hz=round(1.0 / task.sample_time, 6), **about, message=how)
 
     def _estimate(self, filtered: "OnlineFilter") -> None:
-        """Tell what is believed, and how large innovations were since it was last told."""
+        """Report the estimates, and the size of the innovations since the last report."""
         import numpy as np
 
         from estimation.trust.consistency import LARGEST_NIS, MISMATCH_NIS
@@ -208,6 +208,6 @@ class Filtering:
 
 
 def _listed(names: Iterable[str], values: "NDArray[np.float64]") -> dict[str, float | None]:
-    """Return numbers by name; what is no number is null."""
+    """Return numbers by name; values that are not finite become null."""
     shown = (float(value) for value in values)
     return {name: value if abs(value) < float("inf") else None for name, value in zip(names, shown, strict=True)}

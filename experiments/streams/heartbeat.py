@@ -1,4 +1,4 @@
-"""A sign of life of a watch, also while nothing comes: a process that hangs is told from a bench that is silent."""
+"""A heartbeat of a watch, even if no rows arrive: it tells a process that hangs from a test bench that is silent."""
 
 import threading
 import time
@@ -10,12 +10,12 @@ from experiments.streams.watch_events import WatchEvents
 
 @contextmanager
 def beating(told: WatchEvents, every: float | None) -> Generator[None]:
-    """Tell in this block, every so often, that the watch is alive.
+    """Report at intervals during this block that the watch is alive.
 
     Parameters
     ----------
     every : float or None
-        Time between two signs of life [s]; None tells none.
+        Time between two heartbeats [s]; None sends none.
     """
     if every is None:
         yield

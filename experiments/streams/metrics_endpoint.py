@@ -1,4 +1,4 @@
-"""A page of metrics of a watch, for Prometheus."""
+"""A metrics page for a watch, in the format of Prometheus."""
 
 import threading
 import time
@@ -11,16 +11,16 @@ from experiments.streams.watched import Watched
 from plant.errors import HydrostateError
 
 LOOPBACK = "127.0.0.1"
-"""Where metrics are offered unless told."""
+"""Default address for metrics."""
 
 
 def endpoint(text: str) -> tuple[str, int]:
-    """Return host and port of ``PORT`` or ``HOST:PORT``.
+    """Return host and port from ``PORT`` or ``HOST:PORT``.
 
     Parameters
     ----------
     text : str
-        As a user writes it; an IPv6 address stands in brackets.
+        As the user writes it; an IPv6 address is in brackets.
 
     Raises
     ------
@@ -45,12 +45,12 @@ def metrics_offered(where: str, told: Watched) -> Generator[int]:
     Parameters
     ----------
     where : str
-        As `endpoint` takes it; port 0 takes a free one.
+        In the form of `endpoint`; port 0 selects a free one.
 
     Raises
     ------
     HydrostateError
-        If nothing can be offered there.
+        If no server can listen there.
     """
     from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer  # which no other verb needs
 
@@ -69,7 +69,7 @@ def metrics_offered(where: str, told: Watched) -> Generator[int]:
             self.wfile.write(body)
 
         def log_message(self, format: str, *_: object) -> None:  # noqa: A002 - the name that the base class gives it
-            """Say nothing of each request."""
+            """Do not log requests."""
 
     try:
         server = ThreadingHTTPServer(endpoint(where), Answer)

@@ -1,4 +1,4 @@
-"""Rows of a stream: its lines opened by their header, and what is missing of them said on standard error."""
+"""Rows of a stream: reads the header, then the rows, and reports missing parts on standard error."""
 
 import io
 from collections.abc import Generator, Iterable, Iterator, Mapping
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from plant.log.stream.csv_rows import CsvStream
 
 STANDARD_INPUT = "standard input"
-"""What standard input is called in events and errors."""
+"""Name of standard input in events and errors."""
 
 
 def stream_input(file: TextIO) -> Iterator[str]:
-    """Yield the lines of standard input; bytes that are no text are refused later as no numbers.
+    """Yield the lines of standard input; bytes that are not text are rejected later as invalid numbers.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def open_rows(
     rig_columns, columns : Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.
     source : str
-        What the stream is called in errors and warnings.
+        Name of the stream in errors and warnings.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def open_rows(
 
 @contextmanager
 def garbage_told(stream: "CsvStream", source: str) -> Generator[None]:
-    """Say at the end of this block what was left out of a stream, whatever ends it."""
+    """Report at the end of this block which rows of a stream were left out, however it ends."""
     try:
         yield
     finally:
@@ -73,13 +73,13 @@ def garbage_told(stream: "CsvStream", source: str) -> Generator[None]:
 
 
 def warn_if_cut(stream: "CsvStream", source: str) -> None:
-    """Say that the last row was left out, where it was not whole."""
+    """Report that the last row was left out, if it was incomplete."""
     if stream.cut:
         note(f"{source}: warning: the last row is incomplete and was left out")
 
 
 def warn_of_lost(address: str, received: BatchCounts) -> None:
-    """Say what became of the batches of a network stream, where one is missing."""
+    """Report what happened to the batches of a network stream, if any are missing."""
     for count, fate in (
         (received.lost, "never came"),
         (received.late, "came late or twice"),

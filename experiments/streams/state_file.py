@@ -1,4 +1,4 @@
-"""The file in which a stream keeps what it has learnt, so that it continues after a restart."""
+"""The file in which a stream saves what it has learnt, so that it continues after a restart."""
 
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -8,23 +8,23 @@ from experiments.command.terminal import note
 from plant.errors import HydrostateError, LogError
 
 SAVED_EVERY = 10.0
-"""Time of a stream between two looks at its state file [s]."""
+"""Stream time between two checks of the state file [s]."""
 
 
 @contextmanager
 def state_kept(path: Path | None, write: Callable[[Path], None], start: float) -> Generator[Callable[[float], None]]:
-    """Save what a stream has learnt now and then in this block, and at its end.
+    """Save what a stream has learnt at intervals during this block, and at its end.
 
-    While the stream runs, a file that cannot be written is said once and the stream goes on.
+    If the file cannot be written while the stream runs, this is reported once, and the stream continues.
 
     Parameters
     ----------
     path : Path or None
-        The state file; None keeps nothing.
+        The state file; None saves nothing.
     write : callable
-        Writes the file, whole or not at all.
+        Writes the file; must leave no partial file behind.
     start : float
-        Time of the stream at which the block begins [s].
+        Stream time at the start of the block [s].
 
     Yields
     ------
@@ -62,14 +62,14 @@ def state_kept(path: Path | None, write: Callable[[Path], None], start: float) -
 
 
 def require_same_rate(path: Path, kept: float, sample_time: float, source: str) -> None:
-    """Refuse a state file of another sample rate than the stream's.
+    """Raise an error if the sample rate of a state file differs from the stream's.
 
     Parameters
     ----------
     kept, sample_time : float
-        Time between samples of the state file and of the stream [s].
+        Sample times of the state file and of the stream [s].
     source : str
-        What the stream is called in errors.
+        Name of the stream in errors.
 
     Raises
     ------

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 STATES: Mapping[str, str] = {"start": "learning", "ready": "watching", "end": "ended"}
-"""What a watch does from an event on."""
+"""State of a watch after an event."""
 
 
 BALANCES: Mapping[str, str] = {
@@ -24,16 +24,16 @@ BALANCES: Mapping[str, str] = {
     "force": "moving the piston takes a different pressure than before",
     "motion": "the piston follows the pump differently than before",
 }
-"""What a balance compares, as what it means that it changed."""
+"""Meaning of a change in each balance."""
 
 
 class WatchEvents:
-    """Tells the events of a watch as entries, and counts samples, gaps and alarms for the last event.
+    """Reports the events of a watch as entries, and counts samples, gaps and alarms for the last event.
 
     Parameters
     ----------
     say : callable
-        Takes the entries of an event: ``event``, ``time_s`` and what belongs to it.
+        Receives the entries of an event: ``event``, ``time_s`` and its own entries.
     """
 
     def __init__(self, say: Callable[[dict[str, Any]], None]) -> None:
@@ -44,14 +44,14 @@ class WatchEvents:
         self._came = time.monotonic()
 
     def start(self, source: str, watch: "Watch", rig: str, false_alarms: float) -> None:
-        """Tell that a stream begins.
+        """Report the start of a stream.
 
         Parameters
         ----------
         rig : str
             Name of the rig.
         false_alarms : float
-            Of healthy, moving operation [1/h].
+            Rate during healthy, moving operation [1/h].
         """
         self.watch, self.began = watch, watch.last
         about = {"file": source, "rig": rig, "rate_hz": round(1.0 / watch.sample_time, 6)}
@@ -73,23 +73,23 @@ class WatchEvents:
         self._line("ready", time, thresholds=named, message="learning is over, alarms are possible from now on")
 
     def alive(self) -> None:
-        """Tell that the watch is alive, what it has taken and left out, and for how long nothing has come."""
+        """Report that the watch is alive, how much it has processed and left out, and how long no rows have arrived."""
         time_s = None if self.watch is None else self.watch.last
         silent = round(time.monotonic() - self._came, 3)
         taken = {"samples": self.rows, "left_out": self.left_out}
         self._line("alive", time_s, **taken, silent_s=silent, alarms=self.alarms, message="alive")
 
     def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
-        """Take notice of samples that the watch has taken: they and the gaps before them are counted.
+        """Process samples that the watch has taken: count them and the gaps before them.
 
         Parameters
         ----------
         channels : Mapping[str, ndarray], shape (n,) each
             Samples by channel [SI].
         last : float
-            Time of the last one [s].
+            Time of the last sample [s].
         gap : bool
-            Whether rows are missing before them.
+            Whether rows are missing before the samples.
         """
         del last
         self.gaps += gap
@@ -97,13 +97,13 @@ class WatchEvents:
         self._came = time.monotonic()
 
     def nearness(self) -> dict[str, Any]:
-        """Return the nearness of each balance to an alarm.
+        """Return how near each balance is to an alarm.
 
         Returns
         -------
         dict[str, Any]
-            ``scores`` and ``thresholds`` by balance [dimensionless], and ``unlearnt_s``, the motion that is still to be
-            learnt [s]; empty before the watch begins.
+            ``scores`` and ``thresholds`` by balance [dimensionless], and ``unlearnt_s``, the motion time still needed
+            for learning [s]; empty before the watch starts.
         """
         if self.watch is None:
             return {}
@@ -112,7 +112,7 @@ class WatchEvents:
         return {**named, "unlearnt_s": self.watch.unlearnt}
 
     def events(self, events: "Sequence[Event]") -> None:
-        """Tell what has happened."""
+        """Report new events."""
         from faults.watch.events import Alarm, Ready
 
         for event in events:
@@ -130,14 +130,14 @@ class WatchEvents:
                 self._line("change", event.time, **_alarm(event.alarm), **about, message=_reading(event))
 
     def end(self, outcome: str, message: str) -> None:
-        """Tell that the stream has ended, and how.
+        """Report that the stream has ended, and how.
 
         Parameters
         ----------
         outcome : str
             ``ok``, ``failed`` or ``interrupted``.
         message : str
-            Why; the count of alarms where it is empty, and beside it after an interruption.
+            The reason. The count of alarms is used if it is empty, and is added after an interruption.
         """
         if self.watch is not None:
             seconds = self.watch.last - self.began
@@ -154,7 +154,7 @@ class WatchEvents:
 
 
 def _rounded(time: float | None) -> float | None:
-    """Return a time to the microsecond, as far as any logger's clock goes [s]."""
+    """Return a time rounded to the microsecond, the finest resolution of loggers' clocks [s]."""
     return None if time is None else round(time, 6)
 
 

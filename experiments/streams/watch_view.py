@@ -1,4 +1,4 @@
-"""A watch on a terminal: how far each balance is from an alarm, what the channels read, the last events."""
+"""A watch on a terminal: how near each balance is to an alarm, the channels' readings, the last events."""
 
 import math
 import sys
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from rich.console import Console, Group
 
 EVENTS = 8
-"""Events that are shown [count]."""
+"""Number of events shown [count]."""
 
 A_SECOND = 4
-"""How often the view is drawn [1/s]."""
+"""Redraw rate of the view [1/s]."""
 
 CALM, NEAR = 0.5, 0.8
-"""Shares of an alarm's threshold up to which a bar is green, and yellow [fraction]."""
+"""Shares of an alarm's threshold below which a bar is green, and yellow [fraction]."""
 
 BAR = 30
 """Length of a bar [characters]."""
@@ -32,17 +32,17 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "_m": ("mm", 1e3),
     "_pa": ("bar", 1e-5),
 }
-"""Endings of channels: the unit that a reader gets, and the factor from SI."""
+"""Endings of channel names: the unit shown, and the factor from SI."""
 
 
 @contextmanager
 def viewed(told: Watched, console: "Console | None" = None) -> Generator[None]:
-    """Draw a watch on standard error in this block.
+    """Show a watch on standard error during this block.
 
     Parameters
     ----------
     console : Console, optional
-        Where instead.
+        Output to use instead.
     """
     from rich.console import Console
     from rich.live import Live
@@ -53,12 +53,12 @@ def viewed(told: Watched, console: "Console | None" = None) -> Generator[None]:
 
 
 def lines_wanted(view: bool) -> bool:
-    """Return whether JSON lines are written: not beside a view on the same terminal."""
+    """Return whether JSON lines are written; they are not if a view uses the same terminal."""
     return not (view and sys.stdout.isatty())
 
 
 def drawn(told: Watched) -> "Group":
-    """Return one picture of a watch."""
+    """Return one frame of the view of a watch."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text
@@ -104,7 +104,7 @@ def _standing(state: Mapping[str, Any], alarms: int) -> str:
 
 
 def _bar(score: float, threshold: float | None, unlearnt: float) -> tuple[Any, str]:
-    """Return a bar as long as a score is of its threshold, and the share in percent; or how long learning takes [s]."""
+    """Return a bar of a score relative to its threshold, and the share in percent; while learning, the time left."""
     from rich.text import Text
 
     if not threshold:

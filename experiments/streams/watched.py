@@ -1,4 +1,4 @@
-"""A watch with all its outputs: every event goes to each output, and the watch's state can be asked for."""
+"""A watch with all its outputs: each event goes to every output, and the watch's state can be queried."""
 
 import threading
 import time
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SHOWN_EVENTS = 200
-"""Events that are remembered for a view [count]."""
+"""Number of events stored for a view [count]."""
 
 Sink = Callable[[Mapping[str, Any]], None]
 
 
 class Watched(WatchEvents):
-    """Sends the events of a watch to every output, and knows its state."""
+    """Sends the events of a watch to every output, and keeps its state."""
 
     def __init__(self, source: str) -> None:
         self._lock = threading.Lock()
@@ -31,7 +31,7 @@ class Watched(WatchEvents):
         super().__init__(self._send)
 
     def to(self, sink: Sink) -> None:
-        """Send every event from here on to one more output, before those that were there."""
+        """Send all future events to one more output, ahead of the earlier outputs."""
         with self._lock:
             self._sinks.insert(0, sink)
 
@@ -46,7 +46,7 @@ class Watched(WatchEvents):
                 sink(told)
 
     def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
-        """Take notice of samples: they are counted, and the last of each channel is kept."""
+        """Process new samples: count them, and keep the last value of each channel."""
         super().saw(channels, last, gap)
         self._seen = last, time.time(), {name: float(values[-1]) for name, values in channels.items() if len(values)}
 

@@ -1,4 +1,4 @@
-"""The verb `hydrostate watch`: rows to samples, and samples to a watch."""
+"""The verb `hydrostate watch`: turns rows into samples, and passes the samples to a watch."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 LEARNING = 120.0
-"""Healthy running before alarms can come, unless told otherwise [s]: `faults.watch.watch.LEARNING`, which a help text
-need not import."""
+"""Default duration of healthy running before alarms are possible [s]. A copy of `faults.watch.watch.LEARNING`, so that
+a help text need not import it."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,11 @@ class WatchSettings:
     columns : Mapping[str, str]
         Foreign column by channel.
     false_alarms : float
-        Of healthy, moving operation [1/h].
+        Rate during healthy, moving operation [1/h].
     learning : float
-        Healthy running before alarms can come [s].
+        Healthy running before alarms are possible [s].
     healthy : Path or None
-        A healthy log to learn first.
+        A healthy log from which to learn first.
     """
 
     rig: "Rig"
@@ -51,7 +51,7 @@ class WatchSettings:
     no_pressure: bool = False
 
     def watch(self, sample_time: float, pressure: bool, start: float) -> "Watch":
-        """Return the watch, with the healthy log learnt.
+        """Return the watch, which has already learnt the healthy log.
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class WatchSettings:
         Raises
         ------
         LogError
-            If the healthy log does not go with the stream.
+            If the healthy log does not match the stream.
         """
         from faults.watch.events import Alarm
         from faults.watch.watch import Watch
@@ -92,7 +92,7 @@ class WatchSettings:
 
 
 def watch_file(told: WatchEvents, path: Path, settings: WatchSettings) -> None:
-    """Watch a log as if its rows came now.
+    """Watch a log as if its rows arrived now.
 
     Raises
     ------
@@ -107,19 +107,19 @@ def watch_file(told: WatchEvents, path: Path, settings: WatchSettings) -> None:
 
 
 def watch_network(told: WatchEvents, address: str, settings: WatchSettings, state: Path | None) -> None:
-    """Watch a stream of the network until it ends.
+    """Watch a network stream until it ends.
 
     Parameters
     ----------
     address : str
-        As `plant.log.stream.source.stream_lines` takes it.
+        In the form of `plant.log.stream.source.stream_lines`.
     state : Path or None
-        File in which the watch is kept over a restart.
+        File that keeps the state of the watch over a restart.
 
     Raises
     ------
     HydrostateError
-        If nobody answers there, or what comes cannot be watched.
+        If no source answers there, or the data cannot be watched.
     """
     received = BatchCounts()
     try:
@@ -131,14 +131,14 @@ def watch_network(told: WatchEvents, address: str, settings: WatchSettings, stat
 def watch_rows(
     told: WatchEvents, lines: Iterable[str], settings: WatchSettings, source: str, state: Path | None
 ) -> None:
-    """Watch header and rows as they come.
+    """Watch a header and rows as they arrive.
 
     Parameters
     ----------
     source : str
-        What they are called in errors.
+        Name of the stream in errors.
     state : Path or None
-        File in which the watch is kept over a restart.
+        File that keeps the state of the watch over a restart.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def watch_rows(
 def _begun(
     settings: WatchSettings, sample_time: float, pressure: bool, start: float, source: str, state: Path | None
 ) -> "tuple[Watch, float]":
-    """Return a watch, continued where there is a state of one, and how far the piston had come [m]."""
+    """Return a watch, resumed from its state file if there is one, and the piston travel so far [m]."""
     if state is None or not state.exists():
         return settings.watch(sample_time, pressure, start), 0.0
     import numpy as np

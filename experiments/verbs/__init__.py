@@ -1,1 +1,1 @@
-"""The verbs of the command `hydrostate` that are no study, one a file; a study has its verb in its own folder."""
+"""The verbs of the command `hydrostate` that are not studies, one per file; a study's verb is in its own folder."""

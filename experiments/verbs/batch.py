@@ -1,4 +1,4 @@
-"""`hydrostate batch STUDY`: run a study file's cases into a store, or go on where the last run stopped."""
+"""`hydrostate batch STUDY`: runs a study file's cases into a store, or continues where the last run stopped."""
 
 import os
 import time

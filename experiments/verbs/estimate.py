@@ -1,4 +1,4 @@
-"""`hydrostate estimate LOG...`: what each log says of the actuator in numbers, or a sentence why not."""
+"""`hydrostate estimate LOG...`: numerical estimates for the actuator from each log, or a sentence why not."""
 
 from pathlib import Path
 from typing import Annotated, TypeAlias

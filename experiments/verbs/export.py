@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 SAMPLE_TIME = 1e-4
-"""Of a plant, and of a simulated bench, unless told [s]."""
+"""Default sample time of a plant and of a simulated test bench [s]."""
 
 commands = typer.Typer(help="Export a filter, a plant or a model: C99, FMU, MATLAB.", no_args_is_help=True)
 
@@ -231,7 +231,7 @@ def _plant(
 def _bench_log(
     log: Path | None, bench: "Rig", columns: Mapping[str, str], sample_time: float | None, *, no_pressure: bool
 ) -> "Record":
-    """Return the log that a filter is made for, of a simulated bench where none is given."""
+    """Return the log for which a filter is made; a simulated one if none is given."""
     if log is None:
         record = _simulated_bench(bench, sample_time or SAMPLE_TIME)
     else:
@@ -251,7 +251,7 @@ def _simulated_bench(bench: "Rig", sample_time: float) -> "Record":
 
 
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[str]:
-    """Write files into a folder, each whole or not at all.
+    """Write files into a folder; no partial file is left behind.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""`hydrostate filter -`: what a filter believes of a stream, as it comes, one JSON object a line."""
+"""`hydrostate filter -`: a filter's estimates for a stream as rows arrive, one JSON object per line."""
 
 import sys
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""`hydrostate fleet FOLDER_OR_STORE`: one page with a row an actuator, the sick ones on top."""
+"""`hydrostate fleet FOLDER_OR_STORE`: one page with one row per actuator, the sick ones at the top."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 PAGE = "index.html"
 
 RIG = "rig.toml"
-"""Name of a rig file that lies among logs."""
+"""Name of a rig file among logs."""
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".gz", ".zst", ".parquet", ".feather", ".arrow", ".mat", ".h5", ".hdf5")
 OTHERS = (".tdms", ".mf4", ".mdf", ".xlsx")
-"""Endings of files that are taken for logs; the second need a package for their format."""
+"""Other file endings that count as logs; these formats need a package."""
 
 commands = typer.Typer()
 
@@ -126,7 +126,7 @@ def fleet(
 
 
 def _warn(rows: "Sequence[ActuatorRow]", repairs: Mapping[str, Sequence[float]], unnamed: str) -> None:
-    """Say which files stand alone, and which repairs restart nothing."""
+    """Report which files have no actuator or usable date, and which repairs do not restart a trend."""
     every = [one for row in rows for one in row.logs]
     alone = [one.file for one in every if not (one.named.actuator or one.named.problem)]
     if alone and unnamed:
@@ -161,7 +161,7 @@ def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
     Raises
     ------
     HydrostateError
-        If a severity is not known, or a value is no number.
+        If a severity is not known, or a value is not a number.
     """
     if not texts:
         return {}
@@ -181,7 +181,7 @@ def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
 def _names(
     files: Sequence[str], pattern: str | None, names: Path | None, folder: str = ""
 ) -> "tuple[Mapping[str, Named], str]":
-    """Return actuator and date of logs, and what is said of those that have none."""
+    """Return actuator and date of each log, and a message about logs that have none."""
     from experiments.fleet.naming import by_dates, by_pattern, by_table
 
     if pattern is not None and names is not None:
@@ -195,7 +195,7 @@ def _names(
 
 
 def _say_split(named: "Mapping[str, Named]") -> None:
-    """Say how names of files were split that no option explains."""
+    """Report how file names were split if no option gives the pattern."""
     known = {file: one for file, one in named.items() if one.actuator}
     if not known:
         return
@@ -232,7 +232,7 @@ def _diagnosed(
     sample_time: float | None,
     workers: int | None,
 ) -> "PartStore":
-    """Diagnose the logs of a folder into a store; Ctrl-C ends without a page, which would lack actuators."""
+    """Diagnose the logs of a folder into a store; Ctrl-C ends without a page, which would lack some actuators."""
     from experiments.batch.cases import plan_study
     from experiments.batch.part_store import open_store
     from experiments.batch.run_on_terminal import RunSettings, run_plan
@@ -262,21 +262,21 @@ def _diagnosed(
 
 
 def rigs_of_folders(folder: Path, logs: Sequence[Path], given: Path | None = None) -> dict[str, Path]:
-    """Return the rig files that lie among logs, each for the logs at and below its folder, and tell of them.
+    """Return the rig files found among logs, each valid for the logs in and below its folder, and report them.
 
     Parameters
     ----------
     folder : Path
-        Of the fleet.
+        Folder of the fleet.
     logs : sequence of Path
-        Its logs.
+        Logs of the fleet.
     given : Path or None
-        Rig file of the logs in no folder that has one of its own, in place of that in the fleet's folder.
+        Rig file for logs outside all folders with their own rig file; it replaces the one in the fleet's folder.
 
     Returns
     -------
     dict[str, Path]
-        By the path of the folder from the fleet's, with slashes; empty for the fleet's own.
+        By the folder's path relative to the fleet's, with slashes; empty for the fleet's own.
     """
     above = {one for log in logs for one in log.parents if one == folder or folder in one.parents}
     found = {
@@ -299,7 +299,7 @@ def _page_writer(
     columns: Any,
     sample_time: float | None,
 ) -> Callable[[str, Path], bool]:
-    """Return what writes the page of a log, and says whether the log is still there."""
+    """Return a function that writes the page of a log and returns whether the log still exists."""
     from experiments.actuators import kind_of_rig, offered, read_own_rig
     from experiments.batch.logs_listed import nearest_folder
 

@@ -1,4 +1,4 @@
-"""`hydrostate identifiability`: what an experiment would tell, before it is made."""
+"""`hydrostate identifiability`: predicts what an experiment can determine, before it is run."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from experiments.actuator_kind import Experiment
 
 COMMON = frozenset({"plant", "rig", "out", "seed", "as_json"})
-"""Options of every kind of actuator."""
+"""Options that apply to every kind of actuator."""
 
 commands = typer.Typer()
 

@@ -129,7 +129,7 @@ def identify(
 def _relate_columns(
     logs: Sequence[Path], fit: ColumnFit, model: Path | None, *, as_json: bool, out: Path | None
 ) -> NoReturn:
-    """Fit a model between any columns, or run a saved one on the logs, and leave."""
+    """Fit a model between any columns, or run a saved one on the logs, and exit."""
     if model is None:
         identify_columns(logs, fit, as_json=as_json, out=out)
     of_fits: dict[str, object] = {"--validate": fit.validate or None, "--figure": fit.figure, "--report": fit.report}
@@ -151,7 +151,7 @@ def whole_or_auto(option: str, text: str, least: int, most: int | None = None) -
     Returns
     -------
     int or None
-        None where the data are to say.
+        None if the data decide.
 
     Raises
     ------

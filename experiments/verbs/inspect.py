@@ -1,4 +1,4 @@
-"""`hydrostate inspect FILE...`: what a strange log holds, which column is which, and the block that names them."""
+"""`hydrostate inspect FILE...`: contents of an unknown log, the meaning of its columns, and a block that names them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`hydrostate isolability`: which faults an experiment could tell apart, before it is made."""
+"""`hydrostate isolability`: predicts which faults an experiment can tell apart, before it is run."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any

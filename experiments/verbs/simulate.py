@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from experiments.actuator_kind import Run, Simulation
 
 COMMON = frozenset({"plant", "rig", "out", "seed", "as_json"})
-"""Options of every kind of actuator."""
+"""Options that apply to every kind of actuator."""
 
 commands = typer.Typer()
 
@@ -122,7 +122,7 @@ def simulate(
 
 
 def _prepare(out: Path) -> None:
-    """Refuse a file that cannot be written before the work, not after it."""
+    """Raise an error before the work, not after it, if a file cannot be written."""
     from plant.log.files import SUFFIXES
 
     if out.suffix.lower() not in SUFFIXES:

@@ -1,4 +1,4 @@
-"""`hydrostate size-cylinder`: a double-acting cylinder with its pump, valves and pipes, from what it shall do."""
+"""`hydrostate size-cylinder`: sizes a double-acting cylinder with its pump, valves and pipes for a required task."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
@@ -24,7 +24,7 @@ SHOP_UNITS = {
     "m^3/s": ("L/min", 6e4),
     "m^3/(s Pa^0.5)": ("L/min at 1 bar", 6e4 * 1e5**0.5),
 }
-"""How the screen shows what is SI in the results."""
+"""Units on the screen, and the factor from the SI units of the results."""
 
 
 @commands.command(

@@ -1,4 +1,4 @@
-"""`hydrostate watch -`: events of a stream as they come, one JSON object a line."""
+"""`hydrostate watch -`: events of a stream as they occur, one JSON object per line."""
 
 import sys
 from contextlib import ExitStack
@@ -103,7 +103,7 @@ def watch(
 
 
 def _opened(told: Watched, outputs: ExitStack, publish: str | None, metrics: str | None, view: bool) -> None:
-    """Open the outputs that are asked for."""
+    """Open the requested outputs."""
     if publish is not None:
         told.to(outputs.enter_context(published(publish)))
     if metrics is not None:

@@ -1,9 +1,9 @@
-"""Which fault a log of the diaphragm motor shows: its signature laid beside every fault's curve of signatures.
+"""Which fault a log of the diaphragm motor shows: its signature is compared with every fault's curve of signatures.
 
-Each fault of `faults.diaphragm_motor.faults` draws a curve through the 29 numbers of a signature as its severity rises.
-The nearest point of each curve by generalised least squares gives its severity and chi-square; the curves' evidence, by
-Laplace's rule, its probability. Faults that one bench cannot tell apart share the probability and are named together.
-Where no curve comes near, the fault is unknown.
+Each fault of `faults.diaphragm_motor.faults` traces a curve through the 29 numbers of a signature as its severity
+rises. The nearest point of each curve by generalised least squares gives its severity and chi-square; the curves'
+evidence, by Laplace's rule, gives its probability. Faults that one bench cannot tell apart share the probability and
+are named together. If no curve comes near, the fault is unknown.
 """
 
 from collections.abc import Mapping
@@ -25,25 +25,26 @@ from plant.errors import LogError
 from plant.log.record import Record
 
 UNKNOWN_BELOW = 1e-3
-"""Probability of so large a chi-square, under the best fault, below which the fault is called unknown."""
+"""Probability of the best fault's chi-square below which the fault is called unknown."""
 
 NAMED_TOGETHER = 0.05
-"""Probability from which a fault is named beside the most probable one."""
+"""Probability from which a fault is named together with the most probable one."""
 
 PRIOR_HEALTHY = 0.5
-"""Probability of a healthy motor before the log is seen; kinds of fault share the rest alike."""
+"""Prior probability of a healthy motor; kinds of fault share the rest equally."""
 
 TOLD_APART = 3.0
 """Standard deviations from which two faults count as told apart."""
 
 LOOKS_ALIKE = 0.99
-"""Cosine between two faults' changes of the electrodes' fundamentals from which they look alike [dimensionless]."""
+"""Cosine between the changes of the electrodes' fundamentals by two faults from which these look alike
+[dimensionless]."""
 
 SAME_DRIVE = 0.005
-"""By how much frequency and swing of a log and its healthy run may differ [fraction] (judged)."""
+"""Largest difference in frequency and swing between a log and its healthy run [fraction] (judged)."""
 
 LEAST_TONE = 0.1
-"""Fundamental of an electrode below which no motor is healthy [V] (judged)."""
+"""Fundamental of an electrode below which a motor cannot be healthy [V] (judged)."""
 
 _FUNDAMENTALS = 2 * DIAPHRAGMS
 """Numbers at the beginning of a signature: real parts of the electrodes' fundamentals, then imaginary ones."""
@@ -52,13 +53,13 @@ _LEAST_CHANGE = 1e-3
 """Size of a change of the fundamentals below which it has no direction [V] (judged)."""
 
 _GRID = 201
-"""Severities at which a fault's curve is looked at before its nearest point is sought [count]."""
+"""Severities at which a fault's curve is evaluated before its nearest point is sought [count]."""
 
 _KINDS = [fault.kind for fault in MOTOR_FAULTS.values()]
 _A_KIND = (1.0 - PRIOR_HEALTHY) / len(set(_KINDS))
 
 _PRIORS = {name: _A_KIND / _KINDS.count(fault.kind) for name, fault in MOTOR_FAULTS.items()}
-"""Probability of each fault before the log is seen: those of a kind share what the kind has [fraction]."""
+"""Prior probability of each fault: the faults of a kind share the probability of the kind [fraction]."""
 
 
 @dataclass(frozen=True)
@@ -70,13 +71,13 @@ class Match:
     name : str
         The fault, or ``healthy``.
     severity : float
-        Severity there [the fault's unit].
+        Severity at that point [the fault's unit].
     deviation : float
         Its standard deviation [the fault's unit].
     chi_square : float
-        Squared distance in standard deviations [dimensionless].
+        Squared distance, in standard deviations squared [dimensionless].
     probability : float
-        Of the fault after the log was seen [fraction].
+        Posterior probability of the fault [fraction].
     """
 
     name: str
@@ -98,16 +99,16 @@ class MotorDiagnosis:
     Parameters
     ----------
     matches : tuple of Match
-        Every hypothesis, the most probable first.
+        All hypotheses, the most probable first.
     freedom : int
-        Degrees of freedom of the best one's chi-square.
+        Degrees of freedom of the best hypothesis's chi-square.
     signature : Signature
-        What the log showed, as the model's own motor would have if there is a calibration.
+        Signature of the log, converted to the model's own motor if there is a calibration.
     expected : ndarray, shape (29,)
-        What a healthy motor shows.
+        Signature of a healthy motor.
     lookalikes : tuple of str
-        Faults that bend the electrodes' fundamentals the same way as the best one. Those that are not of the group are
-        told from it by velocity, second harmonics and the last few percent, so only as far as the model is exact.
+        Faults that change the electrodes' fundamentals in the same direction as the best one. Those outside the group
+        are told from it by velocity, second harmonics and the last few percent, so only as far as the model is exact.
     """
 
     matches: tuple[Match, ...]
@@ -124,7 +125,7 @@ class MotorDiagnosis:
 
     @property
     def group(self) -> tuple[Match, ...]:
-        """All that the log leaves probable, the most probable first."""
+        """All hypotheses that the log leaves probable, the most probable first."""
         return (self.best, *(match for match in self.matches[1:] if match.probability >= NAMED_TOGETHER))
 
 
@@ -140,7 +141,7 @@ class _Curve:
         self.points = self.at(self.grid)
 
     def nearest(self, seen: Floats) -> tuple[float, float, float]:
-        """Return the severity nearest to what was seen, its standard deviation, and the squared distance."""
+        """Return the severity nearest to the observed signature, its standard deviation, and the squared distance."""
         nearest = int(np.argmin(np.sum((self.points - seen) ** 2, axis=1)))
         between = self.grid[max(nearest - 1, 0)], self.grid[min(nearest + 1, _GRID - 1)]
         reach = between[1] - between[0]
@@ -157,7 +158,7 @@ class _Curve:
 
 @lru_cache(maxsize=4)
 def _simulated(healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Mapping[str, Floats]:
-    """Return every fault's signatures at its severities, and the healthy one, by the model."""
+    """Return every fault's signatures at its severities, and the healthy signature, from the model."""
 
     def shown(name: str, severity: float) -> Floats:
         return modelled_signature(motor_with_fault(healthy, name, severity), frequency, peak_to_peak)
@@ -169,7 +170,7 @@ def _simulated(healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak
 def diagnose_motor(
     record: Record, healthy: DiaphragmMotorParameters, *, calibration: Signature | None = None
 ) -> MotorDiagnosis:
-    """Say which fault a run under a steady sine shows, how bad it is, and what it cannot be told from.
+    """Return the fault that a run under a steady sine shows, its severity, and the faults it cannot be told from.
 
     Parameters
     ----------
@@ -178,8 +179,8 @@ def diagnose_motor(
     healthy : DiaphragmMotorParameters
         The motor as it should be, at the run's load.
     calibration : Signature, optional
-        Of this motor when it was healthy, under the same drive and load; what it differs by from the model is taken
-        to stay.
+        Signature of this motor when it was healthy, under the same drive and load; its difference from the model is
+        assumed to stay.
 
     Raises
     ------
@@ -191,7 +192,7 @@ def diagnose_motor(
 
 
 def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters) -> MotorDiagnosis:
-    """Lay a signature beside every fault's curve (`diagnose_motor`)."""
+    """Compare a signature with every fault's curve (`diagnose_motor`)."""
     point = _operating_point(seen)
     simulated = _simulated(healthy, *point)
     whitening = _whitening(tolerance(healthy, *point) + seen.covariance)
@@ -223,9 +224,9 @@ def separations(
     Parameters
     ----------
     frequency, peak_to_peak : float
-        Of the drive [Hz], [V].
+        Frequency and swing of the drive [Hz], [V].
     sizes : Mapping[str, float]
-        Severity of each fault that is asked for [the fault's unit].
+        Severity of each fault to be compared [the fault's unit].
 
     Returns
     -------
@@ -250,7 +251,7 @@ def _whitening(covariance: Floats) -> Floats:
 
 
 def _lookalikes(best: Match, healthy: DiaphragmMotorParameters, point: tuple[float, float]) -> tuple[str, ...]:
-    """Return the faults whose change of the fundamentals points the same way as the best one's, the nearest first."""
+    """Return the faults that change the fundamentals in the same direction as the best one, the nearest first."""
     if best.name == HEALTHY:
         return ()
     simulated = _simulated(healthy, *point)

@@ -1,7 +1,7 @@
 """Faults of the diaphragm motor as changes of its parameters, each with a severity.
 
-A fault of one valve, diaphragm, electrode or chamber is a hypothesis for each place; faults of the whole motor are one
-each. Friction and load, and other pairs, look alike from outside: `faults.diaphragm_motor.diagnose` says which.
+A fault of one valve, diaphragm, electrode or chamber is one hypothesis for each place; faults of the whole motor are
+one each. Friction and load, and other pairs, look alike from outside: `faults.diaphragm_motor.diagnose` lists them.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -13,10 +13,10 @@ from plant.diaphragm_motor.parameters import ROWS, DiaphragmMotorParameters, cha
 from plant.errors import HydrostateError, require_known
 
 HEALTHY = "healthy"
-"""What a motor without a fault is called."""
+"""Name of a motor without a fault."""
 
 Change: TypeAlias = Callable[[float, float], float]
-"""From a healthy value and a severity to the faulty value."""
+"""Maps a healthy value and a severity to the faulty value."""
 
 
 @dataclass(frozen=True)
@@ -26,15 +26,15 @@ class MotorFault:
     Parameters
     ----------
     name : str
-        Such as ``valve_4_leak``.
+        Name, such as ``valve_4_leak``.
     kind : str
-        The same without its place: ``valve_leak``.
+        The name without its place: ``valve_leak``.
     change : callable
-        How, from the healthy value and the severity.
+        Function of the healthy value and the severity.
     severities : tuple of float
         Rising severities at which the fault's signature is computed [the fault's unit]; 0 is healthy.
     place : int
-        Which valve or diaphragm, from 1 at the inlet; 0 for all.
+        Number of the valve or diaphragm, from 1 at the inlet; 0 for all.
     """
 
     name: str
@@ -52,9 +52,9 @@ class MotorFault:
         Parameters
         ----------
         healthy : DiaphragmMotorParameters
-            The motor without it.
+            The motor without the fault.
         severity : float
-            How bad it is [the fault's unit].
+            Severity of the fault [the fault's unit].
         """
         value = getattr(healthy, self.parameter)
         if self.place:
@@ -79,7 +79,7 @@ def _enlarged(value: float, severity: float) -> float:
 
 
 def _at_each_place(part: str, kind: str, parameter: str, *rest: Any) -> Iterator[MotorFault]:
-    """Yield a kind of fault at each place; `rest` is as `MotorFault` takes it."""
+    """Yield one kind of fault at each place; `rest` is as in `MotorFault`."""
     for place in range(1, ROWS[parameter] + 1):
         yield MotorFault(f"{part}_{place}_{kind.removeprefix(f'{part}_')}", kind, parameter, *rest, place=place)
 
@@ -190,7 +190,7 @@ def motor_with_fault(healthy: DiaphragmMotorParameters, name: str, severity: flo
     name : str
         One of `MOTOR_FAULTS`.
     severity : float
-        How bad [the fault's unit]; 0 is healthy.
+        Severity of the fault [the fault's unit]; 0 is healthy.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""`motor_fault_finding(record, motor) -> Finding`: which fault a log of the diaphragm motor shows, and how bad."""
+"""`motor_fault_finding(record, motor) -> Finding`: which fault a log of the diaphragm motor shows, and its severity."""
 
 from estimation.diaphragm_motor.signature import DRIVE, POSITION, Signature
 from estimation.finding import Finding, Gate, Outcome, Quantity
@@ -45,7 +45,7 @@ class MotorAdviceCode(Code):
 def motor_fault_finding(
     record: Record, healthy: DiaphragmMotorParameters, *, calibration: Signature | None = None
 ) -> Finding:
-    """Say which fault a run under a steady sine shows, how bad it is, and what it cannot be told from.
+    """Return the fault that a run under a steady sine shows, its severity, and the faults it cannot be told from.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def motor_fault_finding(
     healthy : DiaphragmMotorParameters
         The motor as it should be, at the run's load.
     calibration : Signature, optional
-        Of this motor when it was healthy, under the same drive and load.
+        Signature of this motor when it was healthy, under the same drive and load.
 
     Returns
     -------

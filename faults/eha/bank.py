@@ -1,4 +1,4 @@
-"""Banks of models, one a condition: the lumped mathematical model, and the identified transfer functions."""
+"""Banks of models, one for each condition: the lumped mathematical model, and the identified transfer functions."""
 
 import warnings
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
 
 STEP = 2.5e-4
-"""Longest step of the lumped models on a log [s]. With 0.1 ms no error of a nominal model differs by more than two
+"""Longest step of the lumped models on a log [s]. With 0.1 ms no error of a nominal model changes by more than two
 parts in 10,000."""
 
 IDENTIFICATION_TIME = 0.001
@@ -34,12 +34,12 @@ IDENTIFICATION_DURATION = 20.0
 """Length of the identification run [s]."""
 
 LIBRARY_DURATION = 60.0
-"""Length of each test behind a library that is kept [s]."""
+"""Length of each test behind a saved library [s]."""
 
 
 @lru_cache(maxsize=16)
 def mathematical_bank(rig: EhaParameters) -> Mapping[str, EhaParameters]:
-    """Return the actuator's parameters in each of the nine conditions, kept for the next log."""
+    """Return the actuator's parameters in each of the nine conditions, cached for the next log."""
     return MappingProxyType({name: parameters_for(condition, rig) for name, condition in CONDITIONS.items()})
 
 
@@ -77,7 +77,7 @@ def predict_runs(record: Record, bank: Mapping[str, EhaParameters]) -> Mapping[s
     Returns
     -------
     Mapping[str, Mapping[str, ndarray of shape (n,)]]
-        By condition, as of `predict_run`.
+        By condition, as in `predict_run`.
     """
     names = list(bank)
     together, alone = names[: len(names) // LANES * LANES], names[len(names) // LANES * LANES :]
@@ -119,7 +119,7 @@ def identification_run(
     duration : float
         Length of the test [s].
     plant : Plant
-        What is simulated.
+        The plant to simulate.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def identify_bank(
     rig : EhaParameters
         The healthy actuator.
     rng : numpy.random.Generator
-        Source of the drives and of sensor noise; each condition draws from a stream of its own.
+        Source of the drives and of sensor noise; each condition draws from its own stream.
     duration : float
         Length of each test [s].
 

@@ -77,7 +77,7 @@ def spread(
     parameters : EhaParameters
         The nominal actuator.
     rng : numpy.random.Generator
-        Source of the spread; the same six numbers are drawn whatever the half-widths are.
+        Source of the spread; it draws the same six numbers for any half-widths.
     leakage : float
         Half-width for the leakage coefficient and for the flow bias [dimensionless].
     friction : float

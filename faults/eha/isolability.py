@@ -1,4 +1,4 @@
-"""Which faults could be told apart, before any experiment: by structure, and by Kullback-Leibler distance a second."""
+"""Which faults can be told apart, before any experiment: by structure, and by Kullback-Leibler distance per second."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ EQUATIONS: Mapping[str, tuple[str, ...]] = {
     "velocity_m_s": ("velocity",),
     "differential_pressure_pa": ("dp",),
 }
-"""Equations 5.8 and 5.9 and the sensors, each with what it holds of what is not known; a rate counts as its state."""
+"""Equations 5.8 and 5.9 and the sensors, each with the unknowns in it; a rate counts as its state."""
 
 FAULTS: Mapping[str, str] = {
     "leakage": "flow balance",
@@ -46,35 +46,35 @@ SPREAD: Mapping[str, float] = {
 """Relative standard deviations within a class [fraction]."""
 
 MODEL_ERROR = 0.05
-"""What the lumped plant leaves out, as a share of each channel's deviation, judged [fraction]."""
+"""Error of the lumped plant, as a share of each channel's deviation, judged [fraction]."""
 
 LASTING = 0.05
-"""How long such an error lasts before it is another, judged [s]."""
+"""Correlation time of such an error, judged [s]."""
 
 STEP = 1e-3
 """Relative step of the numerical derivatives [fraction]."""
 
 ERROR = 0.01
-"""Share of wrong verdicts between two conditions at which they are told apart [fraction]."""
+"""Share of wrong verdicts between two conditions at which they count as told apart [fraction]."""
 
 
 def structural_isolability(channels: Sequence[str]) -> Mapping[str, tuple[str, ...] | None]:
-    """Return from which other faults each fault cannot be told, if a fault may be any signal.
+    """Return the faults from which each fault cannot be told, if a fault may be any signal.
 
     A fault is detectable if its equation is in the overdetermined part of the model, and isolable from another if it
-    stays there once the other's equation is taken out (Krysander and Frisk, IEEE Transactions on Systems, Man and
+    stays there after the other's equation is removed (Krysander and Frisk, IEEE Transactions on Systems, Man and
     Cybernetics A 38, 2008, page 197, after Dulmage and Mendelsohn).
 
     Parameters
     ----------
     channels : sequence of str
-        Channels logged beside motor speed.
+        Channels logged besides motor speed.
 
     Returns
     -------
     Mapping[str, tuple of str or None]
-        By fault, those that it cannot be told from; None where it cannot even be detected. Faults of sensors that are
-        not there are left out.
+        For each fault, those that it cannot be told from; None if it cannot even be detected. Faults of sensors that
+        are not present are left out.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def structural_isolability(channels: Sequence[str]) -> Mapping[str, tuple[str, .
 
 
 def overdetermined(equations: set[str]) -> set[str]:
-    """Return the equations that could be checked against others: the overdetermined part.
+    """Return the equations that can be checked against others: the overdetermined part.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def overdetermined(equations: set[str]) -> set[str]:
     Returns
     -------
     set of str
-        Those that an alternating path joins to an equation without an unknown of its own in a maximum matching.
+        Those that an alternating path joins, in a maximum matching, to an equation without an unknown of its own.
     """
     owner: dict[str, str] = {}
 
@@ -135,7 +135,7 @@ class Distances:
     Parameters
     ----------
     nats : ndarray, shape (conditions, conditions)
-        Kullback-Leibler distance of the row's condition to the column's class [dimensionless].
+        Kullback-Leibler distance from the row's condition to the column's class [dimensionless].
     seconds : float
         Length of the experiment [s].
     """
@@ -146,20 +146,20 @@ class Distances:
 
     @property
     def mutual(self) -> Array:
-        """The smaller distance of both directions, infinite on the diagonal, shape (conditions, conditions)."""
+        """The smaller distance of the two directions, infinite on the diagonal, shape (conditions, conditions)."""
         both = np.minimum(self.nats, self.nats.T)
         np.fill_diagonal(both, inf)
         return both
 
     @property
     def hardest(self) -> tuple[str, str]:
-        """The two conditions that are nearest to each other."""
+        """The two conditions nearest to each other."""
         row, column = np.unravel_index(int(self.mutual.argmin()), self.nats.shape)
         return self.conditions[row], self.conditions[column]
 
     @property
     def least(self) -> float:
-        """Their distance [dimensionless], by which drives are ranked."""
+        """The distance between the nearest two conditions [dimensionless], by which drives are ranked."""
         return float(self.mutual.min())
 
 
@@ -174,7 +174,7 @@ def wrong_verdicts(nats: float) -> float:
     Returns
     -------
     float
-        For Gaussian processes of like covariance, both conditions being as likely [fraction].
+        For Gaussian processes of similar covariance, with both conditions equally likely [fraction].
 
     Examples
     --------
@@ -191,13 +191,13 @@ def condition_distances(
     channels: Sequence[str] = SENSED,
     sensors: Sensors = BENCH,
 ) -> Distances:
-    """Return the distances between the nine conditions under a drive, each a class of actuators.
+    """Return the distances between the nine conditions under a drive, each condition being a class of actuators.
 
-    The noiseless run of one condition is explained as well as another's model can, its bulk modulus, leakage, bias and
-    friction moved within `SPREAD` (linearised); half the weighted sum of what is left and of the moves is the
-    Kullback-Leibler distance. Noise is that of the sensors and what the model leaves out (`MODEL_ERROR`): without the
-    latter, an encoder of a micrometre would tell any two conditions apart in a millisecond. Motor speed's own noise
-    moves the position by micrometres and is left out beside it.
+    The noiseless run of one condition is fitted as well as another's model can, with bulk modulus, leakage, bias and
+    friction moved within `SPREAD` (linearised). Half the weighted sum of squares of the residuals and of the moves is
+    the Kullback-Leibler distance. Noise comes from the sensors and from model error (`MODEL_ERROR`): without model
+    error, an encoder of a micrometre would tell any two conditions apart in a millisecond. Motor speed's own noise
+    moves the position by micrometres and is neglected beside it.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def condition_distances(
     sample_time : float
         Time between samples [s].
     channels : sequence of str
-        Channels logged beside motor speed.
+        Channels logged besides motor speed.
 
     Raises
     ------

@@ -1,6 +1,7 @@
 """Faults as physical changes of the circuit: throttle voltages, air in the oil, a worn pump, a drifting relief valve.
 
-Each returns other parameters; `faults.eha.inject.abrupt` and `faults.eha.inject.growing` let them come.
+Each function returns changed parameters; `faults.eha.inject.abrupt` and `faults.eha.inject.growing` apply them over
+time.
 """
 
 from dataclasses import replace
@@ -18,7 +19,7 @@ OIL_DENSITY = 860.0
 """Density of hydraulic oil [kg/m^3], judged; it cancels between calibration and use."""
 
 SHUT_ORIFICE = 3.7e-10
-"""Flow over the root of the pressure of a shut throttle [m^3/(s Pa^0.5)], judged: 100 mL/min at 207 bar."""
+"""Flow of a shut throttle over the root of pressure [m^3/(s Pa^0.5)], judged: 100 mL/min at 207 bar."""
 
 VOLTS_A = (SHUT_VOLTS, 2.0, 1.75)
 """Throttle A's voltages for leakage none, minor, major [V], Table 1 (errata E6)."""
@@ -56,19 +57,19 @@ THROTTLE_B = _paper_throttle_b()
 
 
 def throttled(base: CircuitParameters, a_volts: float, b_volts: float) -> CircuitParameters:
-    """Return the circuit with its throttles at other voltages; it was healthy, A shut and B open.
+    """Return the circuit with its throttles at other voltages; the given circuit is healthy, with A shut and B open.
 
-    At Table 1's voltages the paper's rig becomes Tables 3 and 4. Throttle A adds a leakage path and its bias, B an
-    orifice's load on the coupled cylinder (a_1); a_2 and a_3 belong to the seals, run linearly with that load between
-    Table 4's rows, so that friction rises at every speed, and stay at the last. Another rig keeps its own values and
-    has the paper's valves added.
+    At Table 1's voltages the paper's rig becomes Tables 3 and 4. Throttle A adds a leakage path and its bias; B adds an
+    orifice's load on the coupled cylinder (a_1). a_2 and a_3 belong to the seals and are interpolated linearly in that
+    load between Table 4's rows, so that friction rises at every speed; beyond the last row they stay constant. Another
+    rig keeps its own values and has the paper's valves added.
 
     Parameters
     ----------
     base : CircuitParameters
         The healthy circuit.
     a_volts, b_volts : float
-        Control voltages of throttles A and B [V], 0 to 10: 10 V shuts.
+        Control voltages of throttles A and B [V], 0 to 10; 10 V is shut.
 
     Raises
     ------
@@ -114,12 +115,12 @@ def aerated(base: CircuitParameters, air_fraction: float) -> CircuitParameters:
 
 
 def drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
-    """Return the circuit with its relief valve set elsewhere.
+    """Return the circuit with another set-point of its relief valve.
 
     Parameters
     ----------
     factor : float
-        Set-point over the healthy one [dimensionless], positive, at most 2.
+        Set-point relative to the healthy one [dimensionless], positive, at most 2.
 
     Raises
     ------
@@ -138,7 +139,7 @@ def drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
 
 
 def _seals(load: float) -> tuple[float, float]:
-    """Return a_2 and a_3 over their healthy values for a load of throttle B, between Table 4's rows."""
+    """Return a_2 and a_3 relative to their healthy values for a load of throttle B, between Table 4's rows."""
     levels = [FRICTION_TABLE[level] for level in LEVELS]
     loads = [level.friction_quadratic - levels[0].friction_quadratic for level in levels]
     linear, coulomb = (

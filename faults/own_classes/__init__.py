@@ -1,1 +1,1 @@
-"""Classes of a user's own: features of runs, a classifier learnt from labelled runs, verdicts on runs held back."""
+"""User-defined classes: features of runs, a classifier learnt from labelled runs, verdicts on held-back runs."""

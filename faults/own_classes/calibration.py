@@ -1,8 +1,8 @@
-"""Scores made into calibrated probabilities: flattened and floored until they fit the runs held back.
+"""Converts scores to calibrated probabilities: a temperature and a floor, fitted to held-back runs.
 
-A discriminant takes runs for independent and its covariance for known, so its probabilities are too near to 0 and 1.
-Scores are divided by a temperature (Guo and others, ICML 2017), and a share of all probability is spread evenly; both
-are those with which runs held back are most probable.
+A discriminant assumes independent runs and a known covariance, so its probabilities are too near to 0 and 1. Scores are
+divided by a temperature (Guo and others, ICML 2017), and a share of all probability is spread evenly; both are chosen
+to make the held-back runs most probable.
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from scipy.optimize import minimize_scalar
 from estimation.arrays import Array, IntArray
 
 COLDEST, HOTTEST = 0.3, 3000.0
-"""Temperatures among which the best is sought [dimensionless]."""
+"""Range in which the best temperature is sought [dimensionless]."""
 
 SPREADS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.4)
-"""Shares of probability spread evenly that are tried, beside that of one run [fraction]."""
+"""Evenly spread shares of probability that are tried, besides that of one run [fraction]."""
 
 
 @dataclass(frozen=True)
@@ -26,23 +26,23 @@ class Calibration:
     Parameters
     ----------
     temperature : float
-        By which scores are divided [dimensionless].
+        Divisor of the scores [dimensionless].
     spread : float
-        Share of probability that all classes have alike [fraction].
+        Share of probability that is spread evenly over the classes [fraction].
     """
 
     temperature: float = 1.0
     spread: float = 0.0
 
     def probabilities(self, scores: Array, merged: IntArray) -> Array:
-        """Return probabilities of the classes that are reported.
+        """Return the probabilities of the reported classes.
 
         Parameters
         ----------
         scores : ndarray, shape (n, learnt)
-            Log probabilities but for a constant; one is finite in every row [dimensionless].
+            Log probabilities up to a constant; at least one is finite in every row [dimensionless].
         merged : ndarray of int, shape (learnt,)
-            Reported class of each learnt one.
+            Reported class of each learnt class.
 
         Returns
         -------
@@ -62,40 +62,40 @@ class Calibration:
 
 
 def log_loss(probabilities: Array, true: IntArray) -> float:
-    """Return the mean surprise of the true classes.
+    """Return the mean log loss of the true classes.
 
     Parameters
     ----------
     probabilities : ndarray, shape (n, classes)
-        Of each class [fraction].
+        Probability of each class [fraction].
     true : ndarray of int, shape (n,)
-        Place of the true one.
+        Index of the true class.
 
     Returns
     -------
     float
-        Zero where every true class was certain [nats, a count].
+        Zero if every true class was certain [nats, a count].
     """
     given = probabilities[np.arange(len(true)), true]
     return -float(np.mean(np.log(np.maximum(given, 1e-300))))
 
 
 def calibrated(scores: Array, merged: IntArray, true: IntArray) -> Calibration:
-    """Return the calibration with which runs held back are most probable.
+    """Return the calibration that makes held-back runs most probable.
 
     Parameters
     ----------
     scores : ndarray, shape (n, learnt)
-        Of runs that had no part in the learning [dimensionless].
+        Scores of runs that were not used in learning [dimensionless].
     merged : ndarray of int, shape (learnt,)
-        Reported class of each learnt one.
+        Reported class of each learnt class.
     true : ndarray of int, shape (n,)
-        Their reported class.
+        Reported class of each run.
 
     Returns
     -------
     Calibration
-        At least one run's share of probability is spread evenly: so much is unknown after as many runs.
+        At least one run's share of probability is spread evenly: that much remains unknown after so many runs.
     """
     least = 1.0 / (len(true) + 2.0)
     found: list[tuple[float, Calibration]] = []

@@ -1,4 +1,4 @@
-"""A classifier of a user's own classes, after the conventions of scikit-learn."""
+"""A classifier of user-defined classes, after the conventions of scikit-learn."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -17,51 +17,51 @@ from faults.own_classes.verdicts import Verdicts
 from plant.errors import HydrostateError
 
 INNER = 5
-"""Folds by which a fit sees how sure it may be."""
+"""Number of folds with which a fit calibrates its probabilities."""
 
 SHRINKAGES = (1.0, 0.1, 0.01)
 """Shares of Ledoit and Wolf's shrinkage that are tried [fraction]."""
 
 CLEARLY = 0.05
-"""Share of the log loss by which less shrinkage must do better on runs held back [fraction]."""
+"""Relative improvement of the log loss on held-back runs that less shrinkage must bring [fraction]."""
 
 MOST = 0.5
-"""Share of a class that may be held back at once where a fit sees how sure it may be [fraction]."""
+"""Largest share of a class that may be held back at once when a fit calibrates its probabilities [fraction]."""
 
 UNKNOWN = "unknown"
-"""What a run is called that is like none of the runs learnt from."""
+"""Name of a run that is unlike all runs learnt from."""
 
 Merge = str | Mapping[Any, Any] | Callable[[Any], Any] | None
 """See `Classifier`."""
 
 
 class Classifier(ClassifierMixin, BaseEstimator):
-    """Learn classes from features of labelled runs; say of others which class, how probable, and whether it is one.
+    """Learn classes from features of labelled runs; give the class of other runs, its probability, and novelty.
 
-    Linear discriminant analysis with a shrunk covariance. How much it is shrunk, and how sure probabilities may be, is
-    chosen on runs held back, in groups or contiguous blocks.
+    Linear discriminant analysis with a shrunk covariance. The shrinkage and the calibration of the probabilities are
+    chosen on held-back runs, in groups or contiguous blocks.
 
     Parameters
     ----------
     merge : str, Mapping or callable, optional
-        From the classes that are learnt to those that are reported, where a state looks different under each load:
-        labels such as ``"worn@full load"`` are learnt one by one, and with ``"@"`` reported as ``"worn"``; a mapping
-        or a function says it of other labels.
+        Map from learnt classes to reported ones, for a state that looks different under each load: labels such as
+        ``"worn@full load"`` are learnt one by one, and with ``"@"`` reported as ``"worn"``; a mapping or a function
+        does so for other labels.
     unknown : float, optional
-        Share of runs of known classes that may be called ``"unknown"`` [fraction]; none is unless told.
+        Share of runs of known classes that may be called ``"unknown"`` [fraction]; none by default.
 
     Attributes
     ----------
     classes_ : ndarray
-        Classes that are reported.
+        Reported classes.
     learnt_classes_ : ndarray
-        Classes that were learnt.
+        Learnt classes.
     calibration_ : Calibration
-        How probabilities are made of scores.
+        Calibration from scores to probabilities.
     shrinkage_ : float
-        How much of Ledoit and Wolf's shrinkage was taken [fraction].
+        Share of Ledoit and Wolf's shrinkage that was applied [fraction].
     n_features_in_ : int
-        Features.
+        Number of features.
 
     Examples
     --------
@@ -86,7 +86,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         y : array_like, shape (n,)
             Class of each run.
         groups : array_like, shape (n,), optional
-            Which runs belong together, as those of one specimen or one day; contiguous blocks of runs if not given.
+            Group of each run, such as runs of one specimen or one day; contiguous blocks of runs if not given.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return self
 
     def predict_proba(self, X: Any) -> Array:
-        """Return probabilities of the classes, given that a run is of one of them.
+        """Return probabilities of the classes, assuming that a run belongs to one of them.
 
         Parameters
         ----------
@@ -126,8 +126,9 @@ class Classifier(ClassifierMixin, BaseEstimator):
     def likeness(self, X: Any) -> Array:
         """Return the likeness of runs to the known classes: the share of known runs at least as far from them.
 
-        The known runs were held back for that (conformal anomaly detection, Laxhammar and Falkman 2015), so of runs of
-        known classes a share of at most ``s`` has a likeness of ``s`` or less, where new runs come as the old ones did.
+        The known runs were held back for this (conformal anomaly detection, Laxhammar and Falkman 2015). So at most a
+        share ``s`` of runs of known classes has a likeness of ``s`` or less, if new runs are drawn as the old ones
+        were.
 
         Parameters
         ----------
@@ -137,13 +138,13 @@ class Classifier(ClassifierMixin, BaseEstimator):
         Returns
         -------
         ndarray, shape (n,)
-            One where nothing is known of that [fraction].
+            One if there is no basis for a likeness [fraction].
         """
         x = self._features(X)
         return _likeness(self._far, self._learnt.distances(x))
 
     def predict(self, X: Any) -> NDArray[Any]:
-        """Return the most probable class of each run, or ``"unknown"`` where that was asked for.
+        """Return the most probable class of each run, or ``"unknown"`` if that was requested.
 
         Parameters
         ----------
@@ -162,14 +163,14 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return np.where(self.likeness(X) <= self.unknown, UNKNOWN, found.astype(object))
 
     def score(self, X: Any, y: Any, sample_weight: Any = None) -> float:
-        """Return the share of runs that is found right.
+        """Return the share of runs that are classified correctly.
 
         Parameters
         ----------
         X : array_like, shape (n, p)
             Features [any unit].
         y : array_like, shape (n,)
-            Their classes, those learnt or those reported.
+            Their classes, learnt or reported.
         sample_weight : array_like, shape (n,), optional
             Weight of each run [dimensionless].
 
@@ -188,7 +189,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         groups: Sequence[Any] | NDArray[Any] | None = None,
         blocks: int = 10,
     ) -> Verdicts:
-        """Judge every run by what the others teach, never those of its own group: cross-validation.
+        """Judge every run by a classifier learnt from the other groups: cross-validation.
 
         Parameters
         ----------
@@ -197,14 +198,14 @@ class Classifier(ClassifierMixin, BaseEstimator):
         y : array_like, shape (n,)
             Class of each run.
         groups : array_like, shape (n,), optional
-            Which runs belong together; contiguous blocks of runs if not given.
+            Group of each run; contiguous blocks of runs if not given.
         blocks : int
-            Parts that are held back one after the other.
+            Number of parts that are held back in turn.
 
         Returns
         -------
         Verdicts
-            Of all runs. This classifier itself learns nothing.
+            Verdicts on all runs. This classifier itself learns nothing.
 
         Raises
         ------
@@ -231,19 +232,19 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return Verdicts(tuple(str(one) for one in classes), true, probabilities, likeness)
 
     def _features(self, X: Any) -> Array:
-        """Return features as they were learnt, after scikit-learn's checks."""
+        """Return features in the learnt order, after scikit-learn's checks."""
         check_is_fitted(self)
         checked: Any = validate_data(self, X, reset=False, dtype=np.float64)
         return np.asarray(checked, dtype=np.float64)
 
     def _reported(self, label: Any) -> Any:
-        """Return the name that a label is reported under; a label that was not learnt keeps its own."""
+        """Return the name under which a label is reported; a label that was not learnt keeps its own."""
         known = np.flatnonzero(self.learnt_classes_ == label)
         return self.classes_[self._merged[known[0]]] if known.size else label
 
 
 def _merged(learnt: NDArray[Any], merge: Merge) -> tuple[NDArray[Any], IntArray]:
-    """Return the classes that are reported, and the place of each learnt one among them."""
+    """Return the reported classes, and the index of each learnt class among them."""
     if merge is None:
         return learnt, np.arange(len(learnt))
     if isinstance(merge, str):
@@ -261,7 +262,7 @@ def _merged(learnt: NDArray[Any], merge: Merge) -> tuple[NDArray[Any], IntArray]
 def _held_back(
     x: Array, places: IntArray, merged: IntArray, groups: Sequence[Any] | NDArray[Any] | None
 ) -> tuple[float, Calibration, Array]:
-    """Return shrinkage and calibration with which runs held back are most probable, and the distances of these."""
+    """Return the shrinkage and calibration that make held-back runs most probable, and the distances of these runs."""
     scores, far = [list[Array]() for _ in SHRINKAGES], [list[Array]() for _ in SHRINKAGES]
     true = list[IntArray]()
     try:
@@ -289,7 +290,7 @@ def _held_back(
 
 
 def _likeness(known: Array, distances: Array) -> Array:
-    """Return the share of known distances, and of the run itself, that are as large; twice the smaller of the two."""
+    """Return the share of known distances, the run itself included, that are as large; twice the smaller one."""
     if not len(known):
         return np.ones(len(distances))
     beyond = [

@@ -16,13 +16,13 @@ class Discriminant:
     Parameters
     ----------
     mean, scale : ndarray, shape (p,)
-        By which features are standardised [the feature's unit].
+        Values that standardise the features [the feature's unit].
     centres : ndarray, shape (classes, p)
         Means of the classes, standardised [dimensionless].
     factor : ndarray, shape (p, p)
         Lower Cholesky factor of the covariance [dimensionless].
     log_priors : ndarray, shape (classes,)
-        Logarithm of each class's share; minus infinity for one that was not there [dimensionless].
+        Logarithm of each class's share; minus infinity for a class without runs [dimensionless].
     """
 
     mean: Array
@@ -32,7 +32,7 @@ class Discriminant:
     log_priors: Array
 
     def scores(self, x: Array) -> Array:
-        """Return log probabilities of classes, but for a constant of each run.
+        """Return log probabilities of classes, up to a constant for each run.
 
         Parameters
         ----------
@@ -49,10 +49,10 @@ class Discriminant:
         return (x - self.mean) / self.scale @ weights + shift
 
     def distances(self, x: Array) -> Array:
-        """Return the Mahalanobis distance of every run from the nearest class: along the classes, and in all.
+        """Return the Mahalanobis distance of every run from the nearest class: within the classes' space, and overall.
 
-        Along the classes is the space that their means span: there a class that was not learnt is not hidden by what
-        varies in every class, as temperatures do.
+        The classes' space is spanned by their means: variation common to all classes, such as temperature, cannot hide
+        an unknown class there.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ def learn(x: Array, places: IntArray, count: int, shares: Sequence[float] = (1.0
     """Learn classes from labelled runs.
 
     The covariance within classes is shrunk by the rule of Ledoit and Wolf (Journal of Multivariate Analysis 88, 2004,
-    page 365), after each feature is brought to unit deviation within classes, or by a share of what the rule asks.
+    page 365), or by a share of it, after each feature is scaled to unit deviation within classes.
 
     Parameters
     ----------
@@ -95,9 +95,9 @@ def learn(x: Array, places: IntArray, count: int, shares: Sequence[float] = (1.0
     places : ndarray of int, shape (n,)
         Class of each run.
     count : int
-        Classes; one may be without runs.
+        Number of classes; one may be without runs.
     shares : sequence of float
-        How much of the rule's shrinkage is taken [fraction].
+        Shares of the rule's shrinkage that are applied [fraction].
     """
     from sklearn.covariance import ledoit_wolf_shrinkage
 
@@ -119,7 +119,7 @@ def learn(x: Array, places: IntArray, count: int, shares: Sequence[float] = (1.0
 
 
 def _factor(covariance: Array, shrinkage: float) -> Array:
-    """Return the lower Cholesky factor of a covariance that is drawn towards a multiple of the unit matrix."""
+    """Return the lower Cholesky factor of a covariance that is shrunk towards a multiple of the unit matrix."""
     level = float(np.trace(covariance)) / len(covariance)
     shrunk = (1.0 - shrinkage) * covariance
     # a covariance of fewer runs than features, or of constant ones, still needs an inverse
@@ -128,5 +128,5 @@ def _factor(covariance: Array, shrinkage: float) -> Array:
 
 
 def _positive(deviation: Array) -> Array:
-    """Return deviations, 1 in place of those of features that do not vary."""
+    """Return deviations, with 1 for features that do not vary."""
     return np.where(deviation > 1e-12 * (1.0 + deviation.max(initial=0.0)), deviation, 1.0)

@@ -1,4 +1,4 @@
-"""The classifier by its public name; without scikit-learn, a class that says how to install it."""
+"""The classifier under its public name; without scikit-learn, a class that tells how to install it."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 class ClassifierWithoutScikitLearn:
-    """Placeholder of `Classifier` if scikit-learn is not installed.
+    """Placeholder for `Classifier` if scikit-learn is not installed.
 
     Raises
     ------
@@ -22,7 +22,7 @@ class ClassifierWithoutScikitLearn:
 
 
 def __getattr__(name: str) -> Any:
-    """Return the classifier when it is first asked for."""
+    """Return the classifier when it is first requested."""
     if name != "Classifier":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:

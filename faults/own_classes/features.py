@@ -11,13 +11,13 @@ from estimation.arrays import Array, BoolArray
 from plant.errors import HydrostateError
 
 PARTS = 12
-"""Parts of a run, unless told (judged: a repeated cycle often holds some ten steps)."""
+"""Default number of parts of a run (judged: a repeated cycle often holds some ten steps)."""
 
 OCTAVES = 8
-"""Octaves below half the sampling rate whose power is taken, unless told (judged)."""
+"""Default number of octaves below half the sampling rate whose power is taken (judged)."""
 
 FLOOR = 1e-4
-"""Of a channel's root-mean-square: less is taken for rounding, and added before a logarithm [fraction]."""
+"""Share of a channel's root-mean-square that counts as rounding and is added before a logarithm [fraction]."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class Recipe:
     Parameters
     ----------
     parts : int
-        Equal parts of a run that give a mean and a deviation each.
+        Number of equal parts of a run that give a mean and a deviation each.
     octaves : int
-        Octaves of power at most, where no edges are told.
+        Largest number of octaves of power, if no edges are given.
     edges : tuple of float
         Edges of frequency bands instead [Hz].
     """
@@ -40,9 +40,9 @@ class Recipe:
 
 
 def channel_features(names: Sequence[str], runs: Sequence[Array], sample_time: float, recipe: Recipe) -> pd.DataFrame:
-    """Return features of runs: a row a run, a column for each feature of each channel.
+    """Return features of runs: one row for each run, one column for each feature of each channel.
 
-    Of each channel: mean and deviation in equal parts of the run, skewness, kurtosis and crest factor of the whole,
+    For each channel: mean and deviation in equal parts of the run, skewness, kurtosis and crest factor of the whole,
     logarithm of its deviation and of the mean power in bands of frequency (Hann's window).
 
     Parameters
@@ -89,7 +89,7 @@ def channel_features(names: Sequence[str], runs: Sequence[Array], sample_time: f
 
 
 def _bands(recipe: Recipe, shortest: int, sample_time: float) -> list[tuple[float, float]]:
-    """Return bands of frequency [Hz], each with a spectral line of the shortest run."""
+    """Return bands of frequency [Hz], each of which contains a spectral line of the shortest run."""
     if recipe.edges:
         edges = list(recipe.edges)
         if len(edges) < 2 or edges[0] < 0.0 or any(after <= before for before, after in pairwise(edges)):

@@ -1,4 +1,4 @@
-"""Runs that belong together are held back together: neighbours in time are near copies of one another."""
+"""Holds back related runs together: neighbours in time are nearly copies of one another."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,19 +11,19 @@ from plant.errors import HydrostateError
 
 
 def contiguous_blocks(places: IntArray, count: int, most: float = 1.0) -> IntArray:
-    """Return a block for every run: contiguous stretches of runs, in the order in which they were made.
+    """Return the block of every run: contiguous stretches of runs, in the order in which they were made.
 
-    Where a block would hold so much of a class that it could not be learnt from the others, as in runs that are sorted
-    by class, the runs of each class are cut into stretches instead.
+    If a block would hold so much of a class that the other blocks could not teach it, as with runs sorted by class, the
+    runs of each class are cut into stretches instead.
 
     Parameters
     ----------
     places : ndarray of int, shape (n,)
         Class of each run.
     count : int
-        Blocks.
+        Number of blocks.
     most : float
-        Share of a class from which on a block holds too much of it [fraction].
+        Share of a class above which a block holds too much of it [fraction].
 
     Returns
     -------
@@ -50,24 +50,24 @@ def contiguous_blocks(places: IntArray, count: int, most: float = 1.0) -> IntArr
 def folds(
     places: IntArray, groups: Sequence[Any] | NDArray[Any] | None, count: int, most: float = 1.0
 ) -> list[IntArray]:
-    """Return the runs of one fold after the other; every group lies in one fold.
+    """Return the runs of each fold; every group lies in one fold.
 
     Parameters
     ----------
     places : ndarray of int, shape (n,)
         Class of each run.
     groups : sequence, shape (n,), optional
-        What each run belongs to; contiguous blocks if not given. Where there are more groups than folds, they are
-        spread so that each fold has runs of all classes, as far as that can be.
+        Group of each run; contiguous blocks if not given. If there are more groups than folds, they are spread so that
+        each fold has runs of all classes, as far as possible.
     count : int
-        Folds.
+        Number of folds.
     most : float
-        As `contiguous_blocks` takes it [fraction].
+        As in `contiguous_blocks` [fraction].
 
     Returns
     -------
     list of ndarray of int
-        Places of the runs of each fold.
+        Indices of the runs of each fold.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def folds(
 
 
 def _spread(places: IntArray, blocks: IntArray, count: int) -> list[IntArray]:
-    """Return folds of whole groups, each group added where its classes are scarcest; large groups first."""
+    """Return folds of whole groups, large groups first: each goes to the fold in which its classes are scarcest."""
     table = np.zeros((int(blocks.max()) + 1, int(places.max()) + 1))
     np.add.at(table, (blocks, places), 1.0)
     held = np.zeros((count, table.shape[1]))

@@ -18,9 +18,9 @@ class Verdicts:
     classes : tuple of str
         The classes.
     true : ndarray of int, shape (n,)
-        Place of each run's class.
+        Index of each run's class.
     probabilities : ndarray, shape (n, classes)
-        Of each class, given the run [fraction].
+        Probability of each class, given the run [fraction].
     likeness : ndarray, shape (n,)
         Share of known runs that lie at least as far from the classes [fraction].
     """
@@ -32,12 +32,12 @@ class Verdicts:
 
     @property
     def found(self) -> IntArray:
-        """Place of the most probable class of each run."""
+        """Index of the most probable class of each run."""
         return self.probabilities.argmax(axis=1)
 
     @property
     def confusion(self) -> pd.DataFrame:
-        """Counts: a row for each true class, a column for each found one."""
+        """Counts: one row for each true class, one column for each found class."""
         counts = np.zeros((len(self.classes), len(self.classes)), dtype=np.int64)
         np.add.at(counts, (self.true, self.found), 1)
         names = list(self.classes)
@@ -45,33 +45,33 @@ class Verdicts:
 
     @property
     def accuracy(self) -> float:
-        """Share of runs that was found right [fraction]."""
+        """Share of runs that were classified correctly [fraction]."""
         return float(np.mean(self.found == self.true))
 
     @property
     def balanced_accuracy(self) -> float:
-        """Mean over the classes of the share that was found right [fraction]."""
+        """Mean over the classes of the share of runs that were classified correctly [fraction]."""
         counts = self.confusion.to_numpy()
         there = counts.sum(axis=1) > 0
         return float(np.mean(np.diag(counts)[there] / counts.sum(axis=1)[there]))
 
     @property
     def log_loss(self) -> float:
-        """Mean surprise of the true classes [nats]."""
+        """Mean log loss of the true classes [nats]."""
         return calibration.log_loss(self.probabilities, self.true)
 
     def reliability(self, bins: int = 10) -> pd.DataFrame:
-        """Return the share of right verdicts per probability.
+        """Return the share of correct verdicts in each range of probability.
 
         Parameters
         ----------
         bins : int
-            Ranges of probability, from 0 to 1.
+            Number of ranges of probability, from 0 to 1.
 
         Returns
         -------
         pandas.DataFrame
-            A row for each range that holds runs: ``claimed`` and ``right`` [fraction], ``runs`` [count].
+            One row for each range that holds runs: ``claimed`` and ``right`` [fraction], ``runs`` [count].
         """
         claimed, right = self.probabilities.max(axis=1), self.found == self.true
         place = np.minimum((claimed * bins).astype(np.int64), bins - 1)
@@ -82,7 +82,7 @@ class Verdicts:
 
     @property
     def calibration_error(self) -> float:
-        """Mean distance between claimed probability and share found right, over ten ranges [fraction]."""
+        """Mean difference between claimed probability and share of correct verdicts, over ten ranges [fraction]."""
         table = self.reliability()
         weights = table["runs"].to_numpy() / len(self.true)
         return float(weights @ np.abs(table["claimed"].to_numpy() - table["right"].to_numpy()))

@@ -1,4 +1,4 @@
-"""From what a piezo-stack log says to a class: the nine conditions, and every other fault by name and size."""
+"""From a piezo-stack log to a class: the nine conditions, and every other fault by name and size."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -23,7 +23,7 @@ SELDOM: tuple[tuple[tuple[str, ...], tuple[Mapping[str, float], ...]], ...] = (
     (GAPS, ({}, *({name: gap} for gap in (0.3, 1.5) for name in GAPS))),
     (("bias_pressure",), tuple({"bias_pressure": log(share)} for share in (0.8, 0.6, 0.4, 1.5))),
 )
-"""Unknowns that are tried in turn where all others leave a misfit, with first guesses as in
+"""Unknowns that are tried in turn if all others leave a misfit, with first guesses as in
 `estimation.piezo_stack.unknowns.STARTS`."""
 
 CALIBRATED = (
@@ -36,28 +36,29 @@ CALIBRATED = (
     "delivery_length",
     "discharge_coefficient",
 )
-"""What a healthy run calibrates: with leaks known to be none, friction is told from lines and reeds."""
+"""Quantities that a healthy run calibrates: with leaks known to be absent, friction can be told from lines and
+reeds."""
 
 SURE = 3.0
-"""Standard deviations by which a quantity must lie off its healthy value before a fault is named (judged)."""
+"""Standard deviations by which a quantity must differ from its healthy value before a fault is named (judged)."""
 
 MORE_AIR = 0.3
-"""Rise of the entrained air from which it is a fault [fraction of the healthy share] (judged)."""
+"""Rise of the entrained air from which it counts as a fault [fraction of the healthy share] (judged)."""
 
 LEAST_CHAMBER_LEAKAGE = 1e-12
-"""Leakage of the pump chamber from which it is a fault [m^3/(s Pa)] (judged)."""
+"""Leakage of the pump chamber from which it counts as a fault [m^3/(s Pa)] (judged)."""
 
 LEAST_DEPOLARISED = 0.05
-"""Lost stroke of the stack from which it is a fault [fraction] (judged)."""
+"""Lost stroke of the stack from which it counts as a fault [fraction] (judged)."""
 
 REED_CHANGED = 0.2
-"""Change of a reed's stiffness from which it is a fault [fraction] (judged)."""
+"""Change of a reed's stiffness from which it counts as a fault [fraction] (judged)."""
 
 LEAST_GAP = 5e-6
-"""Gap below a reed from which it is a fault [m] (judged)."""
+"""Gap below a reed from which it counts as a fault [m] (judged)."""
 
 BIAS_CHANGED = 0.05
-"""Change of the bias pressure from which it is a fault [fraction] (judged)."""
+"""Change of the bias pressure from which it counts as a fault [fraction] (judged)."""
 
 
 class StackFaultCode(Code):
@@ -96,7 +97,7 @@ class StackAdviceCode(Code):
 def diagnose_stack(
     record: Record, healthy: PiezoStackParameters, *, channels: tuple[str, ...] = STACK_CHANNELS
 ) -> Finding:
-    """Say which of the nine conditions a run shows, and what else is wrong.
+    """Return which of the nine conditions a run shows, and its other faults.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def diagnose_stack(
     Returns
     -------
     Finding
-        Condition, other faults, and what speaks against them; its evidence is the `StackEstimate`.
+        Condition, other faults, and the objections to them; its evidence is the `StackEstimate`.
 
     Raises
     ------
@@ -175,7 +176,7 @@ def _remedy(fault: Note) -> Note:
 
 
 def _level(found: StackEstimate, name: str, healthy: float, levels: Mapping[str, float]) -> str | None:
-    """Return the nearest level, None where two standard deviations span half the least step between levels."""
+    """Return the nearest level; None if two standard deviations exceed half the smallest step between levels."""
     if 2.0 * found.deviations[name] > 0.5 * levels["minor"]:
         return None
     above = found.values[name] - healthy
@@ -183,7 +184,7 @@ def _level(found: StackEstimate, name: str, healthy: float, levels: Mapping[str,
 
 
 def _fault(name: str, found: StackEstimate, healthy: PiezoStackParameters) -> Note | None:
-    """Return the fault that a quantity shows; None if it shows none, or not for sure."""
+    """Return the fault that a quantity shows; None if there is none, or it is uncertain."""
     value, sure = found.values[name], SURE * found.deviations[name]
     base = 1.0 if name == "polarisation" else float(getattr(healthy, name))
     reed, _, part = name.partition("_reed_")
@@ -206,7 +207,7 @@ def _fault(name: str, found: StackEstimate, healthy: PiezoStackParameters) -> No
 
 
 def calibrated_stack(record: Record, nominal: PiezoStackParameters) -> PiezoStackParameters:
-    """Return the actuator as a healthy run shows it: the nominal one with `CALIBRATED` fitted.
+    """Return the actuator that a healthy run shows: the nominal one with `CALIBRATED` fitted.
 
     Parameters
     ----------

@@ -9,13 +9,14 @@ from plant.errors import require_known
 from plant.piezo_stack.parameters import PiezoStackParameters
 
 StackFault: TypeAlias = Callable[[PiezoStackParameters], PiezoStackParameters]
-"""From a healthy actuator to a faulty one."""
+"""Maps a healthy actuator to a faulty one."""
 
 CROSSPORT_LEAKAGE: Mapping[str, float] = {"none": 0.0, "minor": 5e-12, "major": 2e-11}
-"""Leakage across the cylinder of each level [m^3/(s Pa)]: about 10 and 33 % of the flow at 275 Hz and 10 kg, judged."""
+"""Cross-port leakage of the cylinder at each level [m^3/(s Pa)]: about 10 and 33 % of the flow at 275 Hz and 10 kg,
+judged."""
 
 ADDED_FRICTION: Mapping[str, float] = {"none": 0.0, "minor": 100.0, "major": 250.0}
-"""Coulomb friction of each level above the healthy one [N]: about 23 and 56 % of that flow, judged."""
+"""Coulomb friction added to the healthy one at each level [N]: about 23 and 56 % of that flow, judged."""
 
 
 def _air(factor: float) -> StackFault:
@@ -43,7 +44,7 @@ STACK_FAULTS: Mapping[str, StackFault] = {
     "depolarised_25_percent": _depolarised(0.25),
     "bias_lost": lambda p: replace(p, bias_pressure=0.6 * p.bias_pressure),
 }
-"""Faults beside the nine conditions, by name."""
+"""Faults other than the nine conditions, by name."""
 
 
 def stack_in_condition(healthy: PiezoStackParameters, name: str) -> PiezoStackParameters:

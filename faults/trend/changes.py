@@ -9,33 +9,33 @@ from faults.trend.kalman import Belief, Settings, beliefs, evidence_of
 from plant.arrays import Array
 
 FEWEST, LATEST = 3, 6
-"""Logs of a new stretch from which a jump is seen, and up to which it is looked for [count]."""
+"""Number of logs of a new stretch from which a jump can be seen, and up to which it is searched for [count]."""
 
 JUMP = 4.0
-"""Jump of the medians, in standard deviations of a log, from which a change is tried [dimensionless]."""
+"""Jump of the medians, in standard deviations of a log, at which a change is tried [dimensionless]."""
 
 RARE = 1.0 / 200.0
-"""Jumps that are expected a log [probability]."""
+"""Expected number of jumps per log [probability]."""
 
 
 def stretches(
     times: Array, values: Array, stds: Array, known: Collection[int], grid: Settings
 ) -> Iterator[tuple[int, Belief]]:
-    """Yield, after each log, where its stretch begins and what is believed of it; later logs play no part.
+    """Yield the first log of the stretch and the belief after each log; later logs are not used.
 
     Parameters
     ----------
     times, values, stds : ndarray, shape (n,)
-        As `faults.trend.kalman.beliefs` takes them.
+        As in `faults.trend.kalman.beliefs`.
     known : collection of int
-        Logs with which a stretch begins for certain: the first after each maintenance.
+        Logs with which a stretch certainly begins: the first after each maintenance.
     grid : Settings
         The grid.
 
     Yields
     ------
     tuple of int and Belief
-        Place of the stretch's first log, and the belief.
+        Index of the stretch's first log, and the belief.
     """
     jumped = {length: jumps(values, stds, length) for length in range(FEWEST, LATEST + 1)}
     start, run = 0, beliefs(times, values, stds, grid)
@@ -56,19 +56,19 @@ def stretches(
 
 
 def jumps(values: Array, stds: Array, length: int) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
-    """Return the logs from which on the next ones lie far from those before.
+    """Return the logs at which the following logs lie far from those before.
 
     Parameters
     ----------
     values, stds : ndarray, shape (n,)
-        What each log says, and its own standard deviation [one unit].
+        Value of each log, and its own standard deviation [one unit].
     length : int
-        So many logs from each on; `FEWEST` before it, and the scatter of `LATEST` [count].
+        Number of logs compared from each log on; `FEWEST` before it, and the scatter of `LATEST` [count].
 
     Returns
     -------
     ndarray of bool, shape (n,)
-        Whether the medians lie more than `JUMP` apart; False where there are too few logs on either side.
+        Whether the medians differ by more than `JUMP`; False if there are too few logs on either side.
     """
     count = len(values)
     found = np.zeros(count, dtype=np.bool_)
@@ -83,6 +83,6 @@ def jumps(values: Array, stds: Array, length: int) -> "np.ndarray[tuple[int], np
 
 
 def _medians(values: Array, length: int) -> Array:
-    """Return the median of each value and its next neighbours; `numpy.median` takes ten times as long over a few."""
+    """Return the median of each value and its next neighbours; `numpy.median` is ten times slower on so few."""
     ranked = np.sort(sliding_window_view(values, length), axis=1)
     return 0.5 * (ranked[:, (length - 1) // 2] + ranked[:, length // 2])

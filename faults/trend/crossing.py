@@ -1,4 +1,4 @@
-"""When a limit is crossed: by Monte Carlo from what is believed now, settings drawn by their weight."""
+"""When a limit is crossed: by Monte Carlo from the current belief, with settings drawn by their weight."""
 
 from dataclasses import dataclass
 
@@ -9,16 +9,16 @@ from faults.trend.kalman_loops import Index
 from plant.arrays import Array
 
 DRAWS = 1000
-"""Futures that are drawn [count]."""
+"""Number of futures that are drawn [count]."""
 
 STRIDES = np.concatenate([np.ones(60), np.full(30, 8.0)])
-"""Times in which a future is followed, fine at first [count]."""
+"""Time steps in which a future is followed, fine at first [count]."""
 
 HORIZON = float(np.sum(STRIDES))
-"""How far is looked ahead [count]."""
+"""Time over which futures are followed [count]."""
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Of the crossing time: ends of the 90 % interval, of the 50 % interval, and the median [probability]."""
+"""Quantiles of the crossing time: ends of the 90 % interval, of the 50 % interval, and the median [probability]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +28,14 @@ class Crossing:
     Parameters
     ----------
     steps : ndarray, shape (draws,)
-        From now, sorted; infinite where it is not within `HORIZON` [count].
+        Times from now, sorted; infinite if not within `HORIZON` [count].
     """
 
     steps: Array
 
     @property
     def quantiles(self) -> Array:
-        """At `QUANTILES`, shape (5,); infinite where it is not within `HORIZON` [count]."""
+        """Crossing times at `QUANTILES`, shape (5,); infinite if not within `HORIZON` [count]."""
         places = np.minimum((np.array(QUANTILES) * len(self.steps)).astype(int), len(self.steps) - 1)
         return self.steps[places]
 
@@ -45,7 +45,7 @@ class Crossing:
         Parameters
         ----------
         steps : float
-            From now [count].
+            Time from now [count].
 
         Returns
         -------
@@ -61,18 +61,18 @@ def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: fl
     Parameters
     ----------
     belief : Belief
-        After the last log.
+        The belief after the last log.
     grid : Settings
-        Of the belief.
+        The settings of the belief.
     rng : numpy.random.Generator
-        What draws the futures.
+        Source of the futures.
     limit : float
-        Where [dimensionless].
+        The limit [dimensionless].
 
     Returns
     -------
     Crossing
-        From `DRAWS` futures; between two steps the crossing is placed on a straight line.
+        From `DRAWS` futures; between two steps the crossing is interpolated linearly.
     """
     chosen = rng.choice(len(grid.slope), DRAWS, p=belief.weights(grid))
     level, slope, curvature = _drawn(belief, chosen, rng)
@@ -106,7 +106,7 @@ def _paced(stride: float, grid: Settings, chosen: Index) -> tuple[Array, Array]:
 
 
 def _drawn(belief: Belief, chosen: Index, rng: np.random.Generator) -> Array:
-    """Return levels, slopes and curvatures, shape (3, draws), under the settings that were chosen."""
+    """Return levels, slopes and curvatures, shape (3, draws), under the settings that were drawn."""
     sizes, axes = np.linalg.eigh(belief.covariance)
     roots = axes * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]
     normal = rng.standard_normal((len(chosen), 3))

@@ -3,10 +3,10 @@
 Level and slope follow the local linear trend (Durbin and Koopman, Time Series Analysis by State Space Methods, 2012,
 section 3.2), in continuous time so that logs need not be evenly spaced: over a time d the slope gains variance
 ``bend**2 d``, and the level ``wander**2 d + bend**2 d**3 / 3`` with covariance ``bend**2 d**2 / 2``. A third state, the
-curvature, lets growth speed up or come to rest; it gains variance ``jerk**2 d``. Wear that feeds on itself grows
-exponentially: the slope then grows by ``pace`` times itself in a unit of time. Each log brings its own measurement
-variance, to which every setting adds ``scatter**2``. Values are on the scale on which the healthy actuator is 0 and the
-limit 1; the unit of time is the usual time between two logs, a count of logs.
+curvature, lets growth speed up or come to rest; it gains variance ``jerk**2 d``. Self-accelerating wear grows
+exponentially: the slope then grows by ``pace`` times itself in a unit of time. Each log has its own measurement
+variance, to which every setting adds ``scatter**2``. Values are scaled so that the healthy actuator is at 0 and the
+limit at 1; the unit of time is the usual time between two logs, a count of logs.
 """
 
 from dataclasses import dataclass
@@ -25,16 +25,17 @@ SLOPES = (0.005, 0.03)
 """Standard deviation of the slope before the first log [1/log]."""
 
 FAST_SLOPE = 0.2
-"""The same of growth that takes a few logs to the limit, which has no curvature [1/log]."""
+"""The same for growth that reaches the limit within a few logs; it has no curvature [1/log]."""
 
 CURVATURES = ((0.0, 0.0), (1e-3, 4e-4))
-"""Standard deviation of the curvature before the first log, and that which it gains in a step [1/log^2]."""
+"""Standard deviation of the curvature before the first log, and the standard deviation that it gains in a step
+[1/log^2]."""
 
 PACES = (0.03, 0.1)
 """Rate of exponential growth of the slope [1/log]: it doubles in 23 logs, or in 7."""
 
 PACED_BENDS = (0.0, 3e-3)
-"""Standard deviation that a slope gains in a step beside its exponential growth [1/log]."""
+"""Standard deviation that a slope gains in a step besides its exponential growth [1/log]."""
 
 WANDERS = (0.0, 0.005, 0.02)
 """Standard deviation that the level gains in a step by wandering [dimensionless]."""
@@ -43,13 +44,13 @@ SCATTERS = (0.0, 0.01, 0.03, 0.1)
 """Standard deviation from log to log beyond each log's own [dimensionless]."""
 
 SMALLEST_GROWTH = 1e-4
-"""Relative growth in a step below which it is none [fraction]: what is left out is as large."""
+"""Relative growth in a step below which growth is taken as zero [fraction]: the neglected terms are as large."""
 
 LEVEL = 1.0
 """Standard deviation of the level before the first log [dimensionless]."""
 
 GROSS = 3.5
-"""An innovation counts as no more than so many standard deviations [dimensionless]: one wrong log is no trend."""
+"""Limit at which an innovation is clipped, in standard deviations [dimensionless]: one wrong log is not a trend."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ class Settings:
     Parameters
     ----------
     pace, slope, curvature, jerk, bend, wander, scatter : ndarray, shape (g,)
-        As `PACES`, `SLOPES`, `FAST_SLOPE`, `CURVATURES`, `BENDS`, `WANDERS` and `SCATTERS` say [each in its unit];
+        Values from `PACES`, `SLOPES`, `FAST_SLOPE`, `CURVATURES`, `BENDS`, `WANDERS` and `SCATTERS` [each in its unit];
         paces rise.
     """
 
@@ -73,12 +74,12 @@ class Settings:
 
     @property
     def growing(self) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
-        """Whether a slope is believed at all."""
+        """Whether each setting has a slope."""
         return self.slope > 0.0
 
     @cached_property
     def by_pace(self) -> tuple[tuple[float, slice], ...]:
-        """Each pace, and which settings have it."""
+        """Each pace, and the settings that have it."""
         paces, first = np.unique(self.pace, return_index=True)
         ends = [*first[1:], len(self.pace)]
         return tuple((float(pace), slice(int(a), int(b))) for pace, a, b in zip(paces, first, ends, strict=True))
@@ -90,19 +91,19 @@ class Settings:
 
     @cached_property
     def paced(self) -> Index:
-        """Which of them each setting has, shape (g,)."""
+        """Index of each setting's pace, shape (g,)."""
         return np.repeat(np.arange(len(self.by_pace)), [own.stop - own.start for _, own in self.by_pace])
 
     @property
     def rows(self) -> GridRows:
-        """Its settings, as the loops take them."""
+        """The settings in the form that the loops take."""
         return GridRows(self.paced, self.bend, self.jerk, self.scatter)
 
     @cached_property
     def log_prior(self) -> Array:
         """Logarithm of each setting's prior weight, half to each hypothesis [dimensionless].
 
-        Ways of growing share the half of growth alike: steady, bending, curved, exponential.
+        The kinds of growth share the half for growth equally: steady, bending, curved, exponential.
         """
         kinds = [~self.growing, self.pace > 0.0, self.curvature > 0.0, self.bend > 0.0]
         way = np.select(kinds, np.arange(len(kinds)), default=len(kinds))
@@ -131,7 +132,7 @@ class Belief:
     mean : ndarray, shape (g, 3)
         Level, slope and curvature [dimensionless, 1/log, 1/log^2].
     covariance : ndarray, shape (g, 3, 3)
-        Of the three [products of their units].
+        Their covariance [products of their units].
     evidence : ndarray, shape (g,)
         Logarithm of the probability of all logs so far [dimensionless].
     """
@@ -161,9 +162,9 @@ def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> list[Be
     Parameters
     ----------
     times : ndarray, shape (n,)
-        Rising [count].
+        Times of the logs, rising [count].
     values, stds : ndarray, shape (n,)
-        What each log says, and its own standard deviation [dimensionless].
+        Value of each log, and its own standard deviation [dimensionless].
     grid : Settings
         The grid.
 
@@ -192,7 +193,7 @@ def predict(now: Belief, step: float, grid: Settings) -> Belief:
     Parameters
     ----------
     step : float
-        How much later [count].
+        Time to the prediction [count].
     """
     moves, bent, jerked = _step(step, grid.paces)
     mean, covariance = np.empty_like(now.mean), np.empty_like(now.covariance)
@@ -213,14 +214,16 @@ def _step(step: float, paces: tuple[float, ...]) -> tuple[Array, Array, Array]:
 
 
 def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
-    """Return the transition of level and slope under a growing slope, and the covariance of unit white noise on it.
+    """Return the transition of level and slope for a growing slope, and the covariance from white noise on the slope.
+
+    The white noise has unit density.
 
     Parameters
     ----------
     step : float
         The time [count].
     pace : float
-        By how much of itself the slope grows in a unit of time, 0 included [1/log].
+        Relative growth of the slope in a unit of time, may be 0 [1/log].
 
     Returns
     -------
@@ -238,7 +241,7 @@ def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
 
 
 def _gained(step: float, states: int) -> Array:
-    """Return the covariance, shape (3, 3), that unit white noise on the last of some states brings in a time."""
+    """Return the covariance, shape (3, 3), that unit white noise on the last of some states adds over a time."""
     place = np.arange(states - 1, -1, -1)
     power = place[:, None] + place + 1
     factorials = np.array([1.0, 1.0, 2.0])[place]
@@ -248,14 +251,14 @@ def _gained(step: float, states: int) -> Array:
 
 
 def evidence_of(belief: Belief, grid: Settings) -> float:
-    """Return the logarithm of the probability of all logs, settings integrated out [dimensionless]."""
+    """Return the logarithm of the probability of all logs, marginalised over the settings [dimensionless]."""
     return float(np.logaddexp.reduce(belief.evidence + grid.log_prior))
 
 
 def growth_evidence(belief: Belief, grid: Settings) -> float:
-    """Return the odds of the logs with a slope against none.
+    """Return the log odds of the logs with a slope against none.
 
-    Without a slope the ratio has mean 1 at any time, so it ever exceeds 1/a with a probability of a at most (Ville,
+    Without a slope the ratio has mean 1 at any time, so the probability that it ever exceeds 1/a is at most a (Ville,
     Étude critique de la notion de collectif, 1939).
 
     Returns
@@ -269,7 +272,7 @@ def growth_evidence(belief: Belief, grid: Settings) -> float:
 
 
 def moments(now: Belief, grid: Settings, state: int = 0) -> tuple[float, float]:
-    """Return mean and standard deviation of a state, settings integrated out.
+    """Return mean and standard deviation of a state, marginalised over the settings.
 
     Parameters
     ----------

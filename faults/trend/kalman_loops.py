@@ -1,4 +1,4 @@
-"""A step and a log of every setting of the grid of `faults.trend.kalman`, as plain loops that are compiled."""
+"""One filter step, and a whole series of logs, for all settings of the grid of `faults.trend.kalman`: compiled."""
 
 import math
 from typing import NamedTuple, TypeAlias
@@ -10,16 +10,16 @@ from plant.arrays import Array
 from plant.compiled.native.loops import natively
 
 Index: TypeAlias = NDArray[np.int64]
-"""Places."""
+"""Indices."""
 
 
 class GridRows(NamedTuple):
-    """The settings of a grid, a number each.
+    """The settings of a grid, one number each.
 
     Parameters
     ----------
     paced : ndarray of int, shape (g,)
-        Which pace a setting has.
+        Index of each setting's pace.
     bend, jerk : ndarray, shape (g,)
         Standard deviation that slope and curvature gain in a unit of time [1/log, 1/log^2].
     scatter : ndarray, shape (g,)
@@ -38,9 +38,9 @@ class Steps(NamedTuple):
     Parameters
     ----------
     moves, bent : ndarray, shape (n, paces, 3, 3)
-        What moves level, slope and curvature of each pace, and what unit white noise on the slope brings.
+        Transition of level, slope and curvature for each pace, and the covariance from unit white noise on the slope.
     jerked : ndarray, shape (n, 3, 3)
-        What unit white noise on the curvature brings.
+        Covariance from unit white noise on the curvature.
     wandered : ndarray, shape (n, g)
         Variance that the level gains [dimensionless].
     """
@@ -61,20 +61,20 @@ def fill_predicted(
     next_mean: Array,
     next_covariance: Array,
 ) -> None:
-    """Fill in what is believed a step later.
+    """Fill in the belief predicted one step later.
 
     Parameters
     ----------
     mean : ndarray, shape (g, 3)
         Level, slope and curvature [dimensionless, 1/log, 1/log^2].
     covariance : ndarray, shape (g, 3, 3)
-        Of the three [products of their units].
+        Their covariance [products of their units].
     place : int
-        Which of the steps it is.
+        Index of the step.
     next_mean : ndarray, shape (g, 3)
-        Room for the means.
+        Output for the means.
     next_covariance : ndarray, shape (g, 3, 3)
-        Room for the covariances.
+        Output for the covariances.
     """
     moves, bent, jerked, wandered = steps.moves[place], steps.bent[place], steps.jerked[place], steps.wandered[place]
     for k in range(mean.shape[0]):
@@ -107,22 +107,22 @@ def fill_predicted(
 def take_in(
     mean: Array, covariance: Array, evidence: Array, value: float, std: float, gross: float, scatter: Array
 ) -> None:
-    """Update the belief by what a log says.
+    """Update the belief with a log.
 
     Parameters
     ----------
     mean : ndarray, shape (g, 3)
         Level, slope and curvature [dimensionless, 1/log, 1/log^2].
     covariance : ndarray, shape (g, 3, 3)
-        Of the three [products of their units].
+        Their covariance [products of their units].
     evidence : ndarray, shape (g,)
         Logarithm of the probability of all logs so far [dimensionless].
     value : float
-        What the log says [dimensionless].
+        Value of the log [dimensionless].
     std : float
-        Its own standard deviation [dimensionless].
+        Standard deviation of that value [dimensionless].
     gross : float
-        An innovation counts as no more than so many standard deviations [dimensionless].
+        Limit at which an innovation is clipped, in standard deviations [dimensionless].
     scatter : ndarray, shape (g,)
         Standard deviation from log to log beyond each log's own [dimensionless].
     """
@@ -156,15 +156,15 @@ def follow(
     Parameters
     ----------
     values, stds : ndarray, shape (n,)
-        What each log says, and its own standard deviation [dimensionless].
+        Value of each log, and its own standard deviation [dimensionless].
     gross : float
         See `take_in` [dimensionless].
     mean : ndarray, shape (rows, g, 3)
-        A row more than there are logs.
+        Means; one more row than there are logs.
     covariance : ndarray, shape (rows, g, 3, 3)
-        The same.
+        Covariances, in the same rows.
     evidence : ndarray, shape (rows, g)
-        The same.
+        Log evidence, in the same rows.
     """
     for k in range(values.shape[0]):
         fill_predicted(mean[k], covariance[k], grid, steps, k, mean[k + 1], covariance[k + 1])

@@ -12,16 +12,16 @@ from faults.trend.kalman import Belief, growth_evidence, moments, settings
 from plant.arrays import Array
 
 FALSE_ALARMS = 0.01
-"""Probability that a stretch without growth ever raises an alarm, however long it is [probability]."""
+"""Probability that a stretch without growth ever raises an alarm, whatever its length [probability]."""
 
 AHEAD = 25.0
-"""An alarm is raised when a crossing within so many steps is more probable than not [count]."""
+"""Number of steps ahead: an alarm is raised if a crossing within them is more probable than not [count]."""
 
 SURE = 0.95
-"""Probability that the level is past the limit, from which that is an alarm by itself [probability]."""
+"""Probability that the level has passed the limit at which an alarm is raised for that alone [probability]."""
 
 FEWEST = 4
-"""Logs of a stretch before which nothing is forecast [count]."""
+"""Least number of logs in a stretch for a forecast [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +31,13 @@ class Series:
     Parameters
     ----------
     times : ndarray, shape (n,)
-        Rising [any unit].
+        Times of the logs, rising [any unit].
     values, stds : ndarray, shape (n,)
         Estimate and standard deviation of each log [the severity's unit].
     healthy, limit : float
-        Of the healthy actuator, and the limit [the severity's unit].
+        Value of the healthy actuator, and the limit [the severity's unit].
     maintained : tuple of float
-        When the actuator was repaired [unit of the times].
+        Times of repairs [unit of the times].
 
     Raises
     ------
@@ -65,7 +65,7 @@ class Series:
 
     @property
     def size(self) -> float:
-        """From healthy to the limit, negative where a severity falls to it [the severity's unit]."""
+        """Distance from healthy to the limit; negative if the severity falls to its limit [the severity's unit]."""
         return self.limit - self.healthy
 
 
@@ -78,11 +78,11 @@ class Trend:
     series : Series
         The whole series.
     place : int
-        Of the log.
+        Index of the log.
     begin : int
-        Of the first log of its stretch: the last jump or repair.
+        Index of the first log of its stretch, after the last jump or repair.
     belief : Belief
-        After the log, on the scale of `faults.trend.kalman`.
+        The belief after the log, on the scale of `faults.trend.kalman`.
     """
 
     series: Series
@@ -98,13 +98,13 @@ class Trend:
 
     @property
     def growth(self) -> tuple[float, float]:
-        """Growth a step and its standard deviation [the severity's unit/log]."""
+        """Growth per step and its standard deviation [the severity's unit/log]."""
         mean, std = moments(self.belief, settings(), 1)
         return self.series.size * mean, abs(self.series.size) * std
 
     @cached_property
     def growing(self) -> float:
-        """Logarithm of how much more probable the logs are with growth than without [dimensionless]."""
+        """Log odds of the logs with growth against without [dimensionless]."""
         return growth_evidence(self.belief, settings())
 
     @property
@@ -122,12 +122,12 @@ class Trend:
 
     @property
     def certain(self) -> bool:
-        """Whether it grows, with a probability of `FALSE_ALARMS` at most of ever saying so wrongly."""
+        """Whether it grows; the probability of ever claiming this wrongly is at most `FALSE_ALARMS`."""
         return self.growing >= -float(np.log(FALSE_ALARMS)) and moments(self.belief, settings(), 1)[0] > 0.0
 
     @property
     def alarm(self) -> bool:
-        """Whether it grows for certain and probably reaches its limit within `AHEAD`, or is past it with `SURE`."""
+        """Whether it certainly grows and will probably reach its limit within `AHEAD`, or has passed it with `SURE`."""
         mean, std = moments(self.belief, settings())
         if self._short or (not self.certain and mean + 3.0 * std < 1.0):
             return False  # before futures are drawn, which is what takes the time
@@ -135,7 +135,7 @@ class Trend:
 
 
 def trends(series: Series) -> Iterator[Trend]:
-    """Yield what a series says after each log; later logs play no part."""
+    """Yield the trend of a series after each log; later logs are not used."""
     scaled = (series.values - series.healthy) / series.size
     known = first_logs_after(series.times, series.maintained)
     parts = stretches(series.times / series.step, scaled, series.stds / abs(series.size), known, settings())
@@ -144,14 +144,14 @@ def trends(series: Series) -> Iterator[Trend]:
 
 
 def first_logs_after(times: Array, events: Iterable[float]) -> set[int]:
-    """Return the first log at or after each event, of those that have one.
+    """Return the first log at or after each event; events after the last log are ignored.
 
     Parameters
     ----------
     times : ndarray, shape (n,)
-        Rising [any unit].
+        Times of the logs, rising [any unit].
     events : iterable of float
-        When something was done [the same unit].
+        Times of the events [the same unit].
 
     Examples
     --------

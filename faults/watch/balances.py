@@ -1,8 +1,9 @@
 """Balances of flow, force and motion that learn themselves, by recursive least squares with fading memory.
 
-A balance predicts one quantity of an interval from the others and from the last intervals: of flow, what the pump
-delivers and the piston does not sweep (equation 5.8); of force, pressure (equation 5.9); without pressure, the piston's
-motion. Quantities are shares of the actuator's ratings: speed ``w``, velocity ``v``, pressure ``p``, and ``q = w - v``.
+A balance predicts one quantity of an interval from the others and from the last intervals: for flow, the part of the
+pump's delivery that the piston does not sweep (equation 5.8); for force, pressure (equation 5.9); without pressure, the
+piston's motion. Quantities are relative to the actuator's ratings: speed ``w``, velocity ``v``, pressure ``p``, and ``q
+= w - v``.
 """
 
 import math
@@ -13,20 +14,20 @@ FEATURES = 8
 """Regressors of a balance."""
 
 GAINS = 5
-"""Sums of a block from which gains follow."""
+"""Number of sums of a block from which the gains follow."""
 
 GAIN_QP, GAIN_WP, GAIN_PV, GAIN_VV, GAIN_PP = range(GAINS)
-"""Places in them: of q p, w p, p v, v v and p p."""
+"""Indices of these sums: q p, w p, p v, v v and p p."""
 
 V1, V2, W1, P1, P2, Q1, Q2 = range(7)
-"""Places in what the last intervals were: velocity, pressure and lost speed of the last two, speed of the last one."""
+"""Indices in the last intervals: velocity, pressure and lost speed of the last two, speed of the last one."""
 
 BENT = 0.05
-"""Speed or velocity at which what depends on the direction of motion is half of what it is at speed [fraction]."""
+"""Speed or velocity at which the term that depends on the direction of motion is half of its full value [fraction]."""
 
 
 def regress(w: float, v: float, p: float, lags: Array, features: Array, target: Array) -> None:
-    """Set the regressors of each balance and what it predicts, from an interval and the last two."""
+    """Set the regressors and the target of each balance, from an interval and the last two."""
     v1, v2, w1, p1, p2, q1, q2 = lags[V1], lags[V2], lags[W1], lags[P1], lags[P2], lags[Q1], lags[Q2]
     bent, bent1 = w / (abs(w) + BENT), w1 / (abs(w1) + BENT)
     rub, rub1 = v / (abs(v) + BENT), v1 / (abs(v1) + BENT)
@@ -51,7 +52,7 @@ def shift(w: float, v: float, p: float, lags: Array) -> None:
 def learn(
     c: int, features: Array, target: Array, fade: float, information: Array, moment: Array, found: Array
 ) -> float:
-    """Add an interval to balance c's normal equations, the older ones faded; return what it missed the target by."""
+    """Add an interval to the faded normal equations of balance c; return its prediction error."""
     error = target[c]
     for i in range(FEATURES):
         error -= found[c, i] * features[c, i]
@@ -63,7 +64,7 @@ def learn(
 
 
 def count_gains(w: float, v: float, p: float, place: int, gains: Array) -> None:
-    """Add an interval to its block's sums: flow lost against pressure, and force that motion takes."""
+    """Add an interval to the sums of its block: lost flow against pressure, and the force of motion."""
     gains[place, GAIN_QP] += (w - v) * p
     gains[place, GAIN_WP] += w * p
     gains[place, GAIN_PV] += p * v
@@ -72,7 +73,7 @@ def count_gains(w: float, v: float, p: float, place: int, gains: Array) -> None:
 
 
 def solve(information: Array, moment: Array, found: Array, factor: Array) -> None:
-    """Solve the normal equations by Cholesky's factors; a ridge of 1e-8 keeps what was never excited at zero."""
+    """Solve the normal equations by Cholesky factors; a ridge of 1e-8 keeps unexcited coefficients at zero."""
     n = len(moment)
     for i in range(n):
         for j in range(i + 1):

@@ -1,7 +1,7 @@
-"""The CUSUM of Page (Biometrika 41, 1954, page 100) on a balance's log NIS, and the threshold for a rate of alarms.
+"""The CUSUM of Page (Biometrika 41, 1954, page 100) on a balance's log NIS, and the threshold for a false-alarm rate.
 
-The logarithm of a block's NIS is standardised by what is usual for its excitation (`faults.watch.excitation`).
-`faults.watch.watch` says why the threshold follows from the peaks of the sum's excursions.
+The logarithm of a block's NIS is standardised by the usual values for its excitation (`faults.watch.excitation`).
+`faults.watch.watch` explains why the threshold follows from the peaks of the sum's excursions.
 """
 
 import math
@@ -9,12 +9,12 @@ import math
 from plant.arrays import Array
 
 SUM, PEAK, THRESHOLD, SQUARES = range(4)
-"""Places in a balance's score: the CUSUM, the peak of its excursion and its threshold [standard deviations]; squared
-innovations of the block under way."""
+"""Indices in a balance's score: the CUSUM, the peak of its excursion and its threshold [standard deviations]; the
+squared innovations of the current block."""
 
 
 def accumulate(score: Array, peaks: Array, u: float, allowance: float, width: float) -> None:
-    """Add a block's score to the CUSUM; when an excursion ends, count its peak by levels of a width."""
+    """Add a block's score to the CUSUM; when an excursion ends, count its peak in a histogram of levels."""
     score[SUM] = max(0.0, score[SUM] + u - allowance)
     if score[SUM] > 0.0:
         score[PEAK] = max(score[PEAK], score[SUM])
@@ -24,18 +24,18 @@ def accumulate(score: Array, peaks: Array, u: float, allowance: float, width: fl
 
 
 def threshold(peaks: Array, alarms: float, width: float, expected: float) -> float:
-    """Return the level that peaks are expected to pass `expected` times in the time that they were gathered.
+    """Return the level that peaks are expected to exceed `expected` times in the time over which they were gathered.
 
     Parameters
     ----------
     peaks : ndarray, shape (levels,)
-        How many excursions peaked at each level [count].
+        Number of excursions that peaked at each level [count].
     alarms : float
-        How many passed the threshold [count].
+        Number of excursions that passed the threshold [count].
     width : float
-        Of a level [standard deviations].
+        Width of a level [standard deviations].
     expected : float
-        How many may pass [count].
+        Number of excursions allowed to exceed the threshold [count].
 
     Returns
     -------

@@ -7,7 +7,7 @@ import numpy as np
 from plant.arrays import Array
 
 SLOW = "loss"
-"""What an alarm calls a loss of flow that has grown, beside the balances."""
+"""Name in an alarm for a loss of flow that has grown slowly; the other names are those of balances."""
 
 LIKELY = 1.92
 """Drop of the log-likelihood at the ends of a 95 % interval: half the quantile of chi-square with one degree."""
@@ -15,14 +15,14 @@ LIKELY = 1.92
 
 @dataclass(frozen=True)
 class Ready:
-    """Enough has been learnt: alarms can come from here on.
+    """Enough has been learnt: alarms can be raised from here on.
 
     Parameters
     ----------
     time : float
-        When [s].
+        When learning was complete [s].
     thresholds : tuple of float
-        Of the balances, and of what is lost; a CUSUM has the unit of a score [dimensionless].
+        Thresholds of the balances and of the loss; a CUSUM has the unit of a score [dimensionless].
     """
 
     time: float
@@ -31,7 +31,7 @@ class Ready:
 
 @dataclass(frozen=True)
 class Alarm:
-    """A balance no longer holds, or more is lost than warming oil explains.
+    """A balance no longer holds, or the loss exceeds what warming oil explains.
 
     Parameters
     ----------
@@ -40,11 +40,11 @@ class Alarm:
     balance : str
         ``flow``, ``force``, ``motion`` or ``loss``.
     since : float
-        When the change most likely came [s].
+        Most likely time of the change [s].
     interval : tuple of float
-        95 % interval of that [s].
+        95 % interval of that time [s].
     score, threshold : float
-        The CUSUM and what it passed [dimensionless].
+        The CUSUM and the threshold that it passed [dimensionless].
     """
 
     time: float
@@ -62,12 +62,12 @@ class Change:
     Parameters
     ----------
     time : float
-        When this was told [s].
+        When the change was determined [s].
     lost : tuple of float, or None
-        Flow lost before and after, as a share of what the pump delivers, weighed with pressure, so that oil that is
-        only squeezed comes back [fraction]; None where pressure is not logged.
+        Flow lost before and after, as a share of the pump's delivery, weighted with pressure so that oil that is only
+        compressed is returned [fraction]; None if pressure is not logged.
     pressure : float or None
-        Change of differential pressure at a velocity [fraction]; None where pressure is not logged.
+        Change of differential pressure at the same velocity [fraction]; None if pressure is not logged.
     """
 
     time: float
@@ -88,12 +88,12 @@ def change_time(scores: Array) -> tuple[int, tuple[int, int]]:
     Parameters
     ----------
     scores : ndarray, shape (n,)
-        Standardised scores of the blocks, the newest first, the last of them raised.
+        Standardised scores of the blocks, newest first; the newest are raised.
 
     Returns
     -------
     tuple
-        Blocks since the change, and the least and most of a 95 % interval.
+        Number of blocks since the change, and the ends of its 95 % interval.
 
     Examples
     --------

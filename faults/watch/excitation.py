@@ -1,8 +1,8 @@
 """Excitation of a block by the drive: scores are compared with those of similarly excited blocks.
 
-What a balance leaves depends on the drive: after a reversal it leaves more than in steady motion. Blocks fall into
-classes by how much speed changed in them and in the block before, in octaves. Each class has a usual log NIS of its
-own, so the drive's pattern raises no score, and a drive that has not been seen before is learnt before it is judged.
+A balance's residual depends on the drive: it is larger after a reversal than in steady motion. Blocks fall into
+classes, in octaves of the change of speed in the block and in the block before. Each class has its own usual log NIS,
+so the drive's pattern raises no score, and a new kind of drive is learnt before it is judged.
 """
 
 import math
@@ -10,37 +10,38 @@ import math
 from plant.arrays import Array
 
 OCTAVES = 13
-"""Octaves of excitation, the first and last open."""
+"""Number of octaves of excitation; the first and last are open."""
 
 STILL = 1e-3
 """Excitation below which a block counts as steady: a change of speed by 3 % of rated speed, squared [dimensionless]."""
 
 MEAN, VARIANCE, COUNT = range(3)
-"""Places in what is usual for a class: mean and variance of its log NIS, and its blocks up to the memory."""
+"""Indices in the usual values of a class: mean and variance of its log NIS, and its number of blocks, up to the
+memory."""
 
 LARGEST_SCORE = 8.0
 """Cap of a block's score [standard deviations]: no single block decides."""
 
 LEAST_BLOCKS = 20.0
-"""Blocks of a class before its scores count [count]."""
+"""Number of blocks of a class before its scores count [count]."""
 
 
 def excitation_octave(change: float) -> int:
-    """Return the octave of a block's summed squared changes of speed, which are relative to rated speed."""
+    """Return the octave of a block's sum of squared speed changes, which are relative to rated speed."""
     return min(max(int(math.log(change / STILL + 1.0) / math.log(2.0)), 0), OCTAVES - 1)
 
 
 def standardise(value: float, memory: float, judged: bool, usual: Array) -> float:
-    """Return the excess of a log NIS over the usual of its class, and update the usual.
+    """Return how far a log NIS exceeds the usual value of its class, and update the usual value.
 
     Parameters
     ----------
     value : float
         Logarithm of a block's NIS [dimensionless].
     memory : float
-        Blocks of a class that are remembered [count].
+        Number of blocks of a class that are remembered [count].
     judged : bool
-        Whether it counts; 0 is returned otherwise, and while too few blocks of the class are known.
+        Whether the block counts; 0 is returned otherwise, and while too few blocks of the class are known.
     usual : ndarray, shape (3,)
         Mean, variance and count of the class.
 

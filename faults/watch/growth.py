@@ -1,4 +1,4 @@
-"""When slow growth began: a level that was steady, and then rises or jumps."""
+"""When slow growth began: a steady level that then rises or jumps."""
 
 import numpy as np
 
@@ -6,33 +6,34 @@ from faults.watch.events import LIKELY
 from plant.arrays import Array
 
 FEWEST = 4
-"""Levels that it takes to say so."""
+"""Least number of levels for an answer."""
 
 MOST_ALIKE = 0.95
-"""Correlation of neighbouring levels at the most [fraction]: from so few it is not known better."""
+"""Upper limit of the correlation of neighbouring levels [fraction]: so few levels do not determine it better."""
 
 OIL_MOVES = 0.1
-"""By how much of the time of a rise the oil's drift beside it moves its beginning at the most [fraction] (judged)."""
+"""Largest shift of a rise's beginning by simultaneous drift of the oil, relative to the rise's duration [fraction]
+(judged)."""
 
 WIDER = 2
-"""Spans by which the interval is wider at both ends: the first ones of a rise hold little of it."""
+"""Number of spans by which the interval is widened at both ends: the first spans of a rise contain little of it."""
 
 
 def growth_time(levels: Array, ends: Array) -> tuple[float, tuple[float, float]]:
-    """Return since when levels have risen, by least squares over a steady level that turns into a slope or jumps.
+    """Return the time since which levels have risen, by least squares: a steady level that turns into a slope or jumps.
 
     Parameters
     ----------
     levels : ndarray, shape (n,)
-        Levels of spans, the oldest first, the last of them raised [any unit].
+        Level of each span, the oldest first; the last one is raised [any unit].
     ends : ndarray, shape (n,)
-        When each span ended [s].
+        End of each span [s].
 
     Returns
     -------
     tuple
-        When the rise began [s], and a 95 % interval of that [s]: wider where what the levels leave is correlated, as
-        oil's drift is.
+        When the rise began [s], and its 95 % interval [s], which is wider if the residuals are correlated, as with
+        drifting oil.
 
     Examples
     --------
@@ -58,7 +59,7 @@ def growth_time(levels: Array, ends: Array) -> tuple[float, tuple[float, float]]
 
 
 def _missed(shapes: Array, levels: Array) -> Array:
-    """Return the squares that a constant and each shape leave, shape (shapes,)."""
+    """Return the sums of squared residuals of a constant and of each shape, shape (shapes,)."""
     centred = shapes - shapes.mean(axis=1, keepdims=True)
     away = levels - levels.mean()
     explained = np.maximum(centred @ away, 0.0) ** 2 / np.maximum((centred**2).sum(axis=1), 1e-30)

@@ -1,8 +1,8 @@
-"""The compiled watch: samples to intervals, intervals to blocks, and what each block says.
+"""The compiled watch: samples to intervals, intervals to blocks, and the result of each block.
 
 Samples are averaged over *intervals* of some milliseconds, from which `faults.watch.balances` learns. The squared
-innovations of a *block* of intervals are its NIS, which feeds the CUSUM of `faults.watch.cusum`. Beside them
-`faults.watch.loss` judges what is lost, by *spans* of blocks.
+innovations of a *block* of intervals are its NIS, which feeds the CUSUM of `faults.watch.cusum`. In addition
+`faults.watch.loss` judges the loss, by *spans* of blocks.
 """
 
 import math
@@ -56,39 +56,39 @@ from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
 
 ALLOWANCE = 1.0
-"""What a block's score must exceed for the CUSUM to rise [standard deviations]: more than oil's drift moves it by."""
+"""Score of a block above which the CUSUM rises [standard deviations]: drift of the oil moves it by less."""
 
 LEVEL = 0.02
-"""Distance of the levels at which peaks are counted [standard deviations]."""
+"""Spacing of the levels at which peaks are counted [standard deviations]."""
 
 MOVING = 0.05
 """Share of rated speed below which the actuator is at rest, and nothing is learnt or judged [fraction]."""
 
 INTERVALS = 10
-"""Intervals a block."""
+"""Intervals in a block."""
 
 NOTHING, READY, LOSS = -1, 100, 101
-"""What a block may say, beside which balance raises an alarm: nothing, that the thresholds have been learnt, and that
-more is lost."""
+"""Possible results of a block, besides the balance that raises an alarm: nothing, the thresholds have been learnt, and
+the loss has grown."""
 
 REFRESHED = 200
-"""Blocks from one look at the thresholds to the next."""
+"""Number of blocks between two updates of the thresholds."""
 
 
 def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, memory: Memory) -> tuple[int, int]:
-    """Take samples from `first` on, up to the end of them or of a block with news; return where, and the news.
+    """Take samples from `first` on, until they end or a block has news; return the position reached, and the news.
 
     Parameters
     ----------
     rows : ndarray, shape (samples, 3)
         Motor speed [rad/s], position [m], differential pressure [Pa].
     first : int
-        Which of them is the first.
+        Index of the first sample to take.
 
     Returns
     -------
     tuple of int
-        The sample after the last one taken, and what a block has said.
+        The sample after the last one taken, and the result of the block.
     """
     partial, lags, score = memory.partial, memory.lags, memory.score
     features, target, factor = np.empty((2, FEATURES)), np.empty(score.shape[0]), np.empty((FEATURES, FEATURES))
@@ -130,7 +130,7 @@ def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, m
 
 
 def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: Array) -> int:
-    """Judge a whole block; return what it says."""
+    """Judge a whole block; return its result."""
     partial, clock, score, peaks, known = memory.partial, memory.clock, memory.score, memory.peaks, memory.known
     moved, recent, octave = partial[MOVED], memory.scores.shape[1], excitation_octave(partial[CHANGED])
     excited = octave * OCTAVES + int(partial[OCTAVE])
@@ -171,18 +171,18 @@ def score_balances(
     excited: int,
     place: int,
 ) -> int:
-    """Score a block by each balance; return the one that passes its threshold by most, or that none does.
+    """Score a block by each balance; return the balance that passes its threshold by most, or that none does.
 
     Parameters
     ----------
     factor : ndarray, shape (features, features)
-        Room for a factor of the information.
+        Workspace for a factor of the information.
     moved : float
         Intervals of the block in which the actuator moved [count].
     since : float
-        Usable blocks since the balances were last learnt anew [count].
+        Usable blocks since the balances last began to learn again [count].
     excited, place : int
-        How the drive excited the block, and where its score is kept.
+        Octave of the block's excitation, and the index at which its score is kept.
     """
     clock, score, peaks = memory.clock, memory.score, memory.peaks
     news = NOTHING
@@ -207,7 +207,7 @@ def score_balances(
 
 
 def renew_thresholds(setting: WatchSetting, memory: Memory) -> None:
-    """Set each balance's threshold by the peaks so far, so that all together raise the false alarms allowed."""
+    """Set each balance's threshold from the peaks so far, so that together they give the allowed false-alarm rate."""
     score, peaks = memory.score, memory.peaks
     for c in range(score.shape[0]):
         expected = setting.false_alarms * memory.clock[SCORED] / score.shape[0]
@@ -215,7 +215,7 @@ def renew_thresholds(setting: WatchSetting, memory: Memory) -> None:
 
 
 def end_span(memory: Memory) -> bool:
-    """Judge what was lost in a whole span; return whether it is more than warming oil explains."""
+    """Judge the loss in a whole span; return whether it exceeds what warming oil explains."""
     told, known = np.empty(SPAN_TELLS), memory.known
     if memory.score.shape[0] == 2:
         measure_work(memory.work, told)
@@ -227,7 +227,7 @@ def end_span(memory: Memory) -> bool:
 
 
 def drop_span(memory: Memory) -> None:
-    """Begin a new span."""
+    """Discard the current span and begin a new one."""
     memory.known[BLOCKS] = 0.0
     memory.work[:] = 0.0
     memory.lag[:] = 0.0
@@ -235,7 +235,7 @@ def drop_span(memory: Memory) -> None:
 
 
 def begin_again(memory: Memory) -> None:
-    """Forget most of what is known of the balances after an alarm, so that they are learnt again; peaks are kept."""
+    """Forget most of the balances' state after an alarm, so that they are learnt again; peaks are kept."""
     information, moment, score = memory.information, memory.moment, memory.score
     memory.clock[LEARNT_FROM] = memory.clock[USABLE]
     information *= 0.01

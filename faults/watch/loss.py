@@ -2,13 +2,14 @@
 
 The balances of `faults.watch.balances` forget within half a minute, so they learn slower growth and do not detect it. A
 *span* of some seconds measures the loss. With pressure it is a share of the pump's work, in which compressed oil
-returns what it took. Without pressure it is the part of the speed that the piston never follows, from a regression in
-which its lag has coefficients of its own.
+returns the work it took. Without pressure it is the part of the speed that the piston never follows, from a regression
+in which the piston's lag has its own coefficients.
 
 Thinner oil leaks more, but at most in inverse proportion to its viscosity (`OIL`); a larger loss is a leak. A change of
-load or speed is none. Relative to pumped flow, lost flow rises with load, relative to pressure it does not; relative to
-pumped flow it rises at lower speed, relative to time it does not. So the smaller of the two shares counts. Without
-pressure that is not enough, since the lag depends on the drive: only spans with a drive like the one learnt count.
+load or speed is not a leak. Relative to pumped flow, lost flow rises with load; relative to pressure it does not.
+Relative to pumped flow it rises at lower speed; relative to time it does not. So the smaller of the two shares counts.
+Without pressure that is not enough, since the lag depends on the drive: only spans with a drive like the learnt one
+count.
 """
 
 import math
@@ -41,8 +42,8 @@ LEAST_LOSS = 0.05
 """Least loss for comparison [fraction]: a rig's entries may be wrong by that much (judged)."""
 
 LEAST_TOLD = 0.02
-"""Share of the speed that its previous changes must not explain [fraction], so that lost speed and lag can be
-separated."""
+"""Least share of the speed that its previous changes must leave unexplained [fraction], so that lost speed and lag can
+be separated."""
 
 ALIKE = 1.25
 """Factor by which a span's drive may differ from the one learnt, without pressure [fraction] (judged)."""
@@ -131,7 +132,7 @@ def measure_work(work: Array, told: Array) -> None:
     work : ndarray, shape (5,)
         Sums of the span.
     told : ndarray, shape (6,)
-        By place, see `SPAN_SHARE`; how fast and how lively the drive is does not matter here [dimensionless].
+        Results, by index, see `SPAN_SHARE`; how fast and how lively the drive is does not matter here [dimensionless].
     """
     told[SPAN_RESISTANCE], told[SPAN_FAST], told[SPAN_LIVELY] = 0.0, 1.0, 1.0
     if min(work[WORK_WP], work[WORK_PP], work[WORK_VV]) > 0.0:
@@ -179,11 +180,11 @@ def judge_loss(told: Array, now: float, loss: Array, levels: Array) -> bool:
     Parameters
     ----------
     told : ndarray, shape (6,)
-        From `measure_work`.
+        Results of the span, from `measure_work` or `measure_lag`.
     now : float
         Blocks so far [count].
     loss : ndarray, shape (16,)
-        What is known.
+        State of the loss.
     levels : ndarray, shape (spans, 2)
         Level and end [blocks] of the last spans.
     """

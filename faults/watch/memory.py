@@ -14,22 +14,22 @@ RECENT = 512
 """Blocks whose scores and gains are remembered for the change estimate."""
 
 LEVELS = 4096
-"""Levels at which the peaks of the CUSUM are counted."""
+"""Number of levels at which the peaks of the CUSUM are counted."""
 
 KEPT_SPANS = 512
-"""Spans of which it is remembered what was lost."""
+"""Number of spans whose loss is remembered."""
 
 PARTIAL, CLOCK, LAGS, SCORE = 9, 4, 8, 4
-"""Lengths of arrays: the interval and block under way, the clock, the last intervals, and a balance's score."""
+"""Lengths of arrays: the current interval and block, the clock, the last intervals, and a balance's score."""
 
 SAMPLES, SPEED_SUM, PRESSURE_SUM, POSITION, SOUND, MOVED, WHOLE, CHANGED, OCTAVE = range(PARTIAL)
-"""Places in the interval and the block under way: its samples, the sums of speed [rad/s] and pressure [Pa] over them,
-and position at its beginning [m]; sound intervals in a row; those of the block in which the actuator moved, and all of
-it; the summed squared changes of speed in it, and the octave of the last block's."""
+"""Indices in the current interval and block: samples of the interval, their sums of speed [rad/s] and pressure [Pa],
+and position at its beginning [m]; consecutive sound intervals; intervals of the block in which the actuator moved, and
+all its intervals; its sum of squared speed changes, and the octave of the last block."""
 
 ALL, USABLE, LEARNT_FROM, SCORED = range(CLOCK)
-"""Places in the clock: blocks so far, those that moved, how many of them had when learning began anew, and those whose
-scores counted."""
+"""Indices in the clock: blocks so far, those in motion, the number of these when learning last restarted, and those
+whose scores counted."""
 
 
 class Memory(NamedTuple):
@@ -38,37 +38,37 @@ class Memory(NamedTuple):
     Parameters
     ----------
     partial : ndarray, shape (9,)
-        The interval and the block under way, by place: see `SAMPLES`.
+        The current interval and block, by index: see `SAMPLES`.
     clock : ndarray, shape (4,)
-        Blocks so far [count], by place: see `ALL`.
+        Counters of blocks [count], by index: see `ALL`.
     lags : ndarray, shape (8,)
-        The last intervals, by place: see `faults.watch.balances.V1`.
+        The last intervals, by index: see `faults.watch.balances.V1`.
     information : ndarray, shape (balances, features, features)
-        Of the balances' normal equations.
+        Matrices of the balances' normal equations.
     moment, found : ndarray, shape (balances, features)
-        Their right-hand sides, and the coefficients that follow.
+        Right-hand sides of the normal equations, and their solutions.
     score : ndarray, shape (balances, 4)
-        As `faults.watch.cusum` has it.
+        Scores, as in `faults.watch.cusum`.
     peaks : ndarray, shape (balances, levels)
-        How often excursions of the CUSUM peaked at a level, and alarms.
+        Number of CUSUM excursions that peaked at each level, and of alarms.
     scores : ndarray, shape (balances, recent)
-        Of the last blocks.
+        Scores of the last blocks.
     gains : ndarray, shape (recent, gains)
-        Of the last blocks.
+        Gain sums of the last blocks.
     usual : ndarray, shape (balances, classes, 3)
-        As `faults.watch.excitation` has it.
+        Usual values of each class, as in `faults.watch.excitation`.
     work : ndarray, shape (5,)
-        Of the span under way, with pressure.
+        Sums of the current span, with pressure.
     speeds : ndarray, shape (2, lagged)
-        The last speeds, and what is regressed on.
+        The last speeds, and the regressors.
     lag : ndarray, shape (lagged, lagged)
-        Information of the span under way, without pressure.
+        Information matrix of the current span, without pressure.
     lost : ndarray, shape (lagged,)
-        Its moment.
+        Right-hand side of the current span, without pressure.
     known : ndarray, shape (16,)
-        Of what is lost, as `faults.watch.loss` has it.
+        State of the loss, as in `faults.watch.loss`.
     levels : ndarray, shape (spans, 2)
-        Of the last spans.
+        Levels of the last spans.
     """
 
     partial: Array
@@ -96,13 +96,13 @@ class WatchSetting(NamedTuple):
     Parameters
     ----------
     fade : float
-        By what a balance fades in an interval [fraction].
+        Fading of a balance per interval [fraction].
     score_memory : float
-        Over how many blocks of a class scores are remembered [count].
+        Number of blocks of a class over which scores are remembered [count].
     false_alarms : float
-        Alarms of the balances in a block of a healthy stream [count].
+        Expected false alarms of the balances per block of a healthy stream [count].
     rated_speed, rated_step, relief : float
-        What speed, the piston's way in a sample and pressure are relative to [rad/s, m, Pa].
+        References for speed, for the piston's travel in a sample, and for pressure [rad/s, m, Pa].
     """
 
     fade: float
@@ -114,7 +114,7 @@ class WatchSetting(NamedTuple):
 
 
 class WatchSizes(NamedTuple):
-    """Samples an interval; blocks to settle, to learn, and until scores count again [count]."""
+    """Samples in an interval; blocks to settle, to learn, and until scores count again [count]."""
 
     samples: int
     settle: int
@@ -123,14 +123,14 @@ class WatchSizes(NamedTuple):
 
 
 def empty_memory(balances: int, loss_threshold: float) -> Memory:
-    """Return the memory of a watch that has seen nothing.
+    """Return the memory of a watch that has seen no sample.
 
     Parameters
     ----------
     balances : int
-        Count of the balances.
+        Number of balances.
     loss_threshold : float
-        That of what is lost, in standard deviations [dimensionless].
+        Threshold of the loss, in standard deviations [dimensionless].
     """
     lagged = DELAYS + 2
     balance = (FEATURES, FEATURES), (FEATURES,), (FEATURES,), (SCORE,), (LEVELS + 1,), (RECENT,)

@@ -19,7 +19,7 @@ def watched_samples(channels: Mapping[str, Array], sample_time: float, travelled
     sample_time : float
         Time between samples [s].
     travelled : float
-        Position before a piece that has velocity alone [m].
+        Position before the first sample of a piece that has only velocity [m].
 
     Returns
     -------
@@ -49,7 +49,7 @@ def watched_samples(channels: Mapping[str, Array], sample_time: float, travelled
 
 
 def missing_channels(channels: Sequence[str]) -> str:
-    """Return a sentence on the channels that a watch lacks; empty if none is missing."""
+    """Return a sentence that names the channels a watch lacks; empty if none is missing."""
     motion = any(name in channels for name in ("position_m", "velocity_m_s"))
     if "motor_speed_rad_s" in channels and motion:
         return ""

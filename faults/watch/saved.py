@@ -1,4 +1,4 @@
-"""A watch kept over a restart: its memory in one file, from which it continues to the last bit."""
+"""Saves a watch to one file, from which it continues exactly after a restart."""
 
 from pathlib import Path
 
@@ -12,14 +12,14 @@ FORMAT = "hydrostate watch 2"
 
 
 def save_watch(watch: Watch, path: Path, travelled: float = 0.0) -> None:
-    """Write what a watch remembers, whole or not at all.
+    """Write the state of a watch to a file, atomically.
 
     Parameters
     ----------
     path : Path
-        Where to.
+        The file to write.
     travelled : float
-        How far the piston has come by its velocity, where position is not logged [m].
+        Distance that the piston has travelled by its velocity, if position is not logged [m].
 
     Raises
     ------
@@ -31,17 +31,18 @@ def save_watch(watch: Watch, path: Path, travelled: float = 0.0) -> None:
 
 
 def load_state(path: Path) -> tuple[dict[str, Array], float, float]:
-    """Read what a watch remembered.
+    """Read the saved state of a watch.
 
     Parameters
     ----------
     path : Path
-        A file of `save_watch`.
+        A file written by `save_watch`.
 
     Returns
     -------
     tuple of (dict[str, ndarray], float, float)
-        What `Watch.resume` takes, the time between samples [s], and how far the piston had come [m].
+        The state that `Watch.resume` takes, the time between samples [s], and the distance that the piston has
+        travelled [m].
 
     Raises
     ------

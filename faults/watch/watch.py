@@ -1,15 +1,15 @@
-"""`Watch(...).take(samples)`: that something changed inside an actuator, at a set rate of false alarms.
+"""`Watch(...).take(samples)`: detects a change inside an actuator, at a chosen rate of false alarms.
 
-With differential pressure there are two balances: flow (what the pump delivers and the piston sweeps, equation 5.8) and
-force (pressure and what friction and mass take, equation 5.9). Without it one of motion remains. Each raises an alarm
-when the CUSUM of its log NIS passes a threshold. They follow slow drift, so beside them a slow one asks whether more
-is lost than warming oil explains (`faults.watch.loss`). All share one rate of false alarms.
+With differential pressure there are two balances: flow (pump delivery and the piston's swept flow, equation 5.8) and
+force (pressure, friction and inertia, equation 5.9). Without it one of motion remains. Each raises an alarm if the
+CUSUM of its log NIS passes a threshold. They follow slow drift, so a slower test also asks whether the loss exceeds
+what warming oil explains (`faults.watch.loss`). All share one rate of false alarms.
 
 The threshold follows from the rate: the CUSUM of a healthy stream rises from zero and returns, and the peaks of these
 excursions have an exponential tail whatever the dependence from block to block (Cramér and Lundberg; Asmussen, Applied
 Probability and Queues, 2003, chapter XIII.5). Its scale is learnt from the highest peaks so far, about the two-thirds
 power of their number, and extrapolated. With scale and count uncertain, the expected rate at a level h above the lowest
-of k peaks is ``k (1 + h / (k s))^-k`` (a Pareto predictive law), which is set to what the user asked for.
+of k peaks is ``k (1 + h / (k s))^-k`` (a Pareto predictive law), which is set to the rate that the user chose.
 """
 
 from collections.abc import Mapping
@@ -56,50 +56,50 @@ from plant.errors import HydrostateError
 from plant.log.record import Record
 
 INTERVAL = 5e-3
-"""Time over which samples are averaged [s], or one sample where they are further apart."""
+"""Time over which samples are averaged [s]; one sample if they are further apart."""
 
 SLOWEST = 0.05
-"""Longest time between samples that can be watched [s]: slower, a reversal is over between two."""
+"""Longest time between samples that can be watched [s]: at a longer one a reversal can fall between two samples."""
 
 MEMORY = 30.0
 """Fading memory of the balances [s]."""
 
 SCORE_MEMORY = 15.0
-"""Fading memory of the score's mean and deviation, of blocks that were excited alike [s]."""
+"""Fading memory of the mean and deviation of the scores of similarly excited blocks [s]."""
 
 SETTLE = 10.0
-"""What the balances learn from before their innovations count, and then before their deviation does [s]."""
+"""Time in which the balances learn before their innovations count, and again before their deviation does [s]."""
 
 LEARNING = 120.0
 """Healthy running before alarms can be raised [s]."""
 
 LEAST_LEARNING = 60.0
-"""The same, at the least [s]."""
+"""Shortest healthy running that can be set before alarms [s]."""
 
 AFTER = 2.0
-"""Running after an alarm from which the change of the gains is told [s]."""
+"""Running time after an alarm from which the change of the gains is determined [s]."""
 
 BUILD_UP = 6
-"""Blocks before the first one that shows a change in which it may have come: some reversal must make it felt."""
+"""Blocks before the first one that shows a change in which it may have come: only a reversal may reveal it."""
 
 BALANCES = ("flow", "force")
 """The balances with differential pressure."""
 
 SLOW_SHARE = 0.05
-"""Share of the false alarms that is left to slow growth [fraction]: oil that is not at its thinnest uses none of it."""
+"""Share of the false alarms that is reserved for slow growth [fraction]; oil that is not thinnest uses none."""
 
 
 class Watch:
-    """A stream under watch; its memory does not grow.
+    """Watch a stream; the memory it needs does not grow.
 
     Parameters
     ----------
     parameters : EhaParameters
-        The actuator; what it contributes are sizes, the balances are learnt.
+        The actuator; only its sizes are used, the balances are learnt.
     sample_time : float
         Time between samples [s].
     false_alarms : float
-        Rate at which a healthy stream may raise alarms [1/h], of moving time.
+        Rate of false alarms in a healthy stream [1/h], per hour of motion.
     learning : float
         Healthy running before alarms can be raised [s].
     start : float
@@ -132,7 +132,7 @@ class Watch:
         self.sample_time, self.start = sample_time, start
         samples = max(1, round(INTERVAL / sample_time))
         self.block = samples * INTERVALS
-        """Samples a block."""
+        """Samples in a block."""
         duration = self.block * sample_time
         rated_velocity = parameters.rated_flow / parameters.piston_area
         scales = parameters.rated_speed, rated_velocity * sample_time, parameters.relief_pressure
@@ -158,7 +158,7 @@ class Watch:
 
     @property
     def unlearnt(self) -> float:
-        """Motion that is still to be learnt before alarms can be raised [s]; standing still does not count."""
+        """Time in motion that is still to be learnt before alarms can be raised [s]; standstill does not count."""
         return max(0.0, self._sizes.learning - float(self._clock[USABLE])) * self.block * self.sample_time
 
     @property
@@ -169,22 +169,22 @@ class Watch:
 
     @property
     def scores(self) -> tuple[float, ...]:
-        """The CUSUM of each balance [dimensionless]: an alarm is raised where one passes its threshold."""
+        """The CUSUM of each balance [dimensionless]: an alarm is raised if one passes its threshold."""
         return tuple(float(value) for value in (*self._score[:, SUM], self._known[RISEN]))
 
     def take(self, samples: Array) -> list[Event]:
-        """Take samples, one or many: what comes of them does not depend on how they are cut.
+        """Take samples, one or many; the result does not depend on how the stream is cut into pieces.
 
         Parameters
         ----------
         samples : ndarray, shape (n, 3)
-            Motor speed [rad/s], position [m], differential pressure [Pa]; NaN where missing, and anything finite for
-            a pressure that is not logged.
+            Motor speed [rad/s], position [m], differential pressure [Pa]; NaN if missing, and any finite value for a
+            pressure that is not logged.
 
         Returns
         -------
         list of Ready, Alarm or Change
-            What happened, in order.
+            Events, in order.
         """
         kernel, rows = watch_kernel(), np.ascontiguousarray(samples, dtype=np.float64)
         events: list[Event] = []
@@ -206,7 +206,7 @@ class Watch:
         return events
 
     def clock_reads(self, time: float) -> None:
-        """Set the clock: a stream's own time stamps go before counting its samples.
+        """Set the clock: a stream's own time stamps take precedence over counting its samples.
 
         Parameters
         ----------
@@ -216,14 +216,14 @@ class Watch:
         self.start = time - self._taken * self.sample_time
 
     def interrupt(self) -> None:
-        """Say that the next sample does not follow on the last: another log, or a gap in time."""
+        """Declare that the next sample does not follow the last one: another log, or a gap in time."""
         self._clock[ALL] += 1.0 if self._taken > self._clock[ALL] * self.block else 0.0
         self._partial[:] = 0.0
         self._partial[POSITION] = np.nan
         watch_kernel().begin_again(self._memory)
 
     def remembered(self) -> dict[str, Array]:
-        """Return all that the watch remembers, for `resume`.
+        """Return the full state of the watch, for `resume`.
 
         Returns
         -------
@@ -241,12 +241,12 @@ class Watch:
         return kept
 
     def resume(self, kept: Mapping[str, Array]) -> None:
-        """Continue where another watch of the same settings was: to the last bit.
+        """Continue exactly from where another watch of the same settings stopped.
 
         Parameters
         ----------
         kept : Mapping[str, ndarray], each of its own shape
-            What it remembered [any unit].
+            Its state, from `remembered` [any unit].
 
         Raises
         ------
@@ -269,7 +269,7 @@ class Watch:
 
     @property
     def _taken(self) -> int:
-        """Samples taken, those of the block under way included."""
+        """Samples taken, including those of the current block."""
         intervals = int(self._clock[ALL]) * INTERVALS + int(self._partial[WHOLE])
         return intervals * (self.block // INTERVALS) + int(self._partial[SAMPLES])
 
@@ -290,7 +290,7 @@ class Watch:
         return alarm
 
     def _lost(self) -> list[Event]:
-        """Return the alarm of what is lost slowly, with what has changed since the usual loss was learnt."""
+        """Return the alarm for slow growth of the loss, with the changes since the usual loss was learnt."""
         known, seen = self._known, int(self._known[SEEN])
         kept = np.arange(max(0, seen - KEPT_SPANS), seen) % KEPT_SPANS
         levels, ends = self._memory.levels[kept].T
@@ -302,7 +302,7 @@ class Watch:
         return [alarm, Change(self.time, alarm, lost, resisted)]
 
     def _recent_scores(self, which: int) -> Array:
-        """Return the last scores, the newest first, those of blocks at rest left out as zero."""
+        """Return the last scores, newest first; those of blocks at rest are left out as zero."""
         clock = self._clock
         now, usable = int(clock[ALL]), min(int(clock[USABLE] - clock[LEARNT_FROM]), RECENT // 2)
         return np.nan_to_num(self._memory.scores[which, (now - 1 - np.arange(usable)) % RECENT])
@@ -334,9 +334,9 @@ def watch_record(
     Parameters
     ----------
     record : Record
-        The log, with motor speed, position or velocity, and differential pressure where there is one.
+        The log, with motor speed, position or velocity, and differential pressure if there is one.
     false_alarms : float
-        Rate at which a healthy log may raise alarms [1/h].
+        Rate of false alarms in a healthy log [1/h].
     learning : float
         Healthy running at its beginning [s].
 

@@ -1,6 +1,6 @@
 """The Jacobian of a graph by elimination of its inner nodes, cheapest first.
 
-Differentiating forward carries every input through every operation. Where many operations depend on few quantities, as
+Forward differentiation carries every input through every operation. If many operations depend on few quantities, as
 flows on pressures, it costs less to join the derivatives on both sides of such a quantity once. Each elimination of a
 node joins its uses with its operands; taking the node with the fewest joins next is Markowitz's rule (Griewank and
 Walther 2008, Evaluating Derivatives, section 9).
@@ -12,7 +12,7 @@ from typing import TypeAlias
 from plant.compiled.expression import ONE, ZERO, Expression, ordered, select, slopes_of
 
 Edges: TypeAlias = dict[int, dict[int, Expression]]
-"""``edges[a][b]``: the derivative of a by its operand b; of uses, the derivative of b by its operand a."""
+"""For operands, ``edges[a][b]`` is the derivative of a by operand b; for uses, the derivative of b by operand a."""
 
 _MINUS = -ONE
 
@@ -23,7 +23,7 @@ def eliminated_jacobian(outputs: Sequence[Expression], inputs: Sequence[Expressi
     Parameters
     ----------
     inputs : sequence of Expression
-        Symbols, or other nodes: what these are computed from then counts as constant.
+        Symbols, or other nodes; the operands of such a node count as constant.
 
     Returns
     -------
@@ -74,12 +74,12 @@ def _join(edges: dict[int, Expression], operand: int, slope: Expression) -> None
 
 
 def _choice(a: Expression) -> bool:
-    """Whether a node chooses between something and nothing."""
+    """Whether a node chooses between a value and zero."""
     return a.operation == "where" and (a.arguments[1] is ZERO or a.arguments[2] is ZERO)
 
 
 def _product(a: Expression, b: Expression) -> Expression:
-    """Multiply; a choice chooses the product, for nothing times what was not chosen may not be finite."""
+    """Multiply; a choice selects the product, since zero times the other value may not be finite."""
     if _choice(a):
         condition, chosen, other = a.arguments
         return select(condition, _product(chosen, b), _product(other, b))
@@ -92,12 +92,12 @@ def _product(a: Expression, b: Expression) -> Expression:
 
 
 def _negated(a: Expression) -> Expression | None:
-    """Return x of a node ``0 - x``."""
+    """Return x if the node is ``0 - x``."""
     return a.arguments[1] if a.operation == "-" and a.arguments[0] is ZERO else None
 
 
 def _sum(a: Expression, b: Expression) -> Expression:
-    """Add; two choices by one condition are one."""
+    """Add; two choices by the same condition become one."""
     if _choice(a) and _choice(b) and a.arguments[0] is b.arguments[0]:
         condition = a.arguments[0]
         return select(condition, _sum(a.arguments[1], b.arguments[1]), _sum(a.arguments[2], b.arguments[2]))

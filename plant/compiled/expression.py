@@ -1,7 +1,7 @@
-"""Arithmetic as a graph: what a model function returns when it is called with symbols.
+"""Arithmetic as a graph: the result of a model function that is called with symbols.
 
-Equal sub-expressions are one node, so common sub-expressions cost nothing, and differentiation works node by node:
-its size grows with the model's operations, not with the size of the expanded formula.
+Equal sub-expressions are one node, so common sub-expressions cost nothing. Differentiation works node by node: its size
+grows with the model's operations, not with the size of the expanded formula.
 """
 
 from collections.abc import Iterable, Sequence
@@ -20,11 +20,11 @@ class Expression:
     Parameters
     ----------
     operation : str
-        ``symbol``, ``constant``, a comparison, or another operation that `plant.compiled.source` can spell.
+        ``symbol``, ``constant``, a comparison, or another operation that `plant.compiled.source` can write.
     value : float or str
         A constant's value [any unit], or a symbol's name.
     slopes : tuple of (Expression, Expression)
-        What it depends on where derivatives are taken, each with its derivative by that; nothing: its arguments.
+        What it depends on for derivatives, each with the derivative by it; if empty, its arguments.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def node(
     value: float | str = 0.0,
     slopes: tuple[tuple[Expression, Expression], ...] = (),
 ) -> Expression:
-    """Return the one node for this operation on these arguments.
+    """Return the unique node of this operation on these arguments.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def node(
     Returns
     -------
     Expression
-        The node, made on first use.
+        The node, created on first use.
     """
     known = tuple(id(one) for pair in slopes for one in pair)
     key = (operation, tuple(id(argument) for argument in arguments), value, known)
@@ -196,7 +196,7 @@ def unary(operation: str, a: Expression) -> Expression:
 
 
 def select(condition: Expression, a: Expression, b: Expression) -> Expression:
-    """Return ``a`` where the condition holds, else ``b``.
+    """Return ``a`` if the condition holds, else ``b``.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def select(condition: Expression, a: Expression, b: Expression) -> Expression:
     Returns
     -------
     Expression
-        The node; ``a`` itself where both are the same.
+        The node; ``a`` itself if both are the same.
     """
     return a if a is b else node("where", condition, a, b)
 
@@ -217,9 +217,9 @@ def ordered(outputs: Iterable[Expression], *, by_slopes: bool = False) -> list[E
     Parameters
     ----------
     outputs : iterable of Expression
-        What is wanted in the end.
+        The final results.
     by_slopes : bool
-        Whether a node needs what its derivatives are by, rather than what it is computed from.
+        Whether to follow the nodes by which a node's derivatives are taken, rather than its operands.
     """
     order: list[Expression] = []
     seen: set[int] = set()
@@ -242,7 +242,7 @@ def local_derivatives(item: Expression) -> Sequence[Expression]:
     Raises
     ------
     NotImplementedError
-        If the operation has none yet.
+        If the derivative of the operation is not defined yet.
     """
     a = item.arguments[0]
     match item.operation:
@@ -278,7 +278,7 @@ def local_derivatives(item: Expression) -> Sequence[Expression]:
 
 
 def slopes_of(item: Expression) -> Sequence[tuple[Expression, Expression]]:
-    """Return the derivatives of a node, each with the expression that it is taken by."""
+    """Return the derivatives of a node, each with the expression by which it is taken."""
     if item.slopes or not item.arguments:
         return item.slopes
     return tuple(zip(item.arguments, local_derivatives(item), strict=True))
@@ -315,7 +315,7 @@ def jacobian(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> lis
 
 
 def _chain(item: Expression, local: Expression, inner: Expression) -> Expression:
-    """Multiply by a local derivative; a choice chooses the tangent rather than multiplying it by 0 or 1."""
+    """Multiply by a local derivative; a choice selects the tangent rather than multiplying it by 0 or 1."""
     if item.operation != "where" or item.slopes:
         return local * inner
     condition = item.arguments[0]

@@ -1,6 +1,6 @@
-"""The functions that a model may use, for floats, arrays, and symbols alike.
+"""The functions that a model may use, for floats, arrays and symbols.
 
-Models are written with ``+ - * / **`` and these, and can then be run, vectorised, differentiated and compiled.
+Models written with these functions and ``+ - * / **`` can be run, vectorised, differentiated and compiled.
 """
 
 from typing import Any, TypeAlias, cast
@@ -10,7 +10,7 @@ import numpy as np
 from plant.compiled.expression import Expression, as_expression, select, unary
 
 Scalar: TypeAlias = Any
-"""A float, an array of shape (runs,), or an `Expression`: whatever a model is called with."""
+"""A float, an array of shape (runs,), or an `Expression`: any argument of a model."""
 
 
 def _apply(name: str, x: Scalar) -> Scalar:
@@ -164,7 +164,7 @@ def absolute(x: Scalar) -> Scalar:
 
 
 def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
-    """Return a where the condition holds, else b; both are evaluated.
+    """Return a if the condition holds, else b; both are evaluated.
 
     Parameters
     ----------

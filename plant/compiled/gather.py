@@ -1,4 +1,4 @@
-"""Gathers what multiplies: numbers and slowly changing factors in front of a product, where they are computed once."""
+"""Moves numbers and slowly changing factors to the front of a product, where they are computed once."""
 
 from collections import Counter
 from collections.abc import Collection, Mapping
@@ -12,7 +12,7 @@ from plant.compiled.hoist import settled_nodes
 
 @dataclass(frozen=True, eq=False)
 class _Product:
-    """A number times what changes seldom times what changes often."""
+    """A number times slowly changing factors times fast changing factors."""
 
     number: Fraction
     seldom: Expression
@@ -35,8 +35,8 @@ class _Product:
 def gathered(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[str, Expression]:
     """Gather numbers and slowly changing factors in front of products, and make one node of ``a * b`` and ``b * a``.
 
-    Numbers are multiplied exactly, so a scale and its inverse leave nothing. What serves several times is one node, its
-    factors gathered within; only the number of an output stays apart, for other outputs to do without.
+    Numbers are multiplied exactly, so a scale and its inverse cancel. A product with several uses is one node, with its
+    factors gathered inside; only the number of an output stays separate, so that other outputs can do without it.
     `fixed` are symbols that seldom change; values stay the same to rounding.
 
     Examples
@@ -66,7 +66,7 @@ class _Gathering:
         self._twins: dict[tuple[str, int, int], Expression] = {}
 
     def outputs(self) -> dict[str, Expression]:
-        """Go through all nodes, operands first."""
+        """Process all nodes, operands first."""
         users = Counter(argument for item in self._order for argument in {id(one) for one in item.arguments})
         ends = {id(output) for output in self._given.values()}
         for item in self._order:
@@ -106,7 +106,7 @@ class _Gathering:
         return a * b if a is ONE or b is ONE else self._twin("*", a, b, a * b)
 
     def _twin(self, operation: str, a: Expression, b: Expression, result: Expression) -> Expression:
-        """Return the result of the same operation on b and a, if it was met before."""
+        """Return the result of the same operation on b and a, if it exists already."""
         twin = self._twins.get((operation, id(b), id(a)))
         return self._twins.setdefault((operation, id(a), id(b)), result) if twin is None else twin
 
@@ -126,7 +126,7 @@ class _Gathering:
         return _plain(self._twin("+", a.whole(), b.whole(), a.whole() + b.whole()))
 
     def _choice(self, condition: _Product, a: _Product, b: _Product) -> _Product:
-        """Draw out a number that both branches share; nothing has every number."""
+        """Factor out a number that both branches share; zero shares every number."""
         number = a.number or b.number
         if number and a.number in (0, number) and b.number in (0, number):
             inner = [one.times(1 / number).whole() for one in (a, b)]

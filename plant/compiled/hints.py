@@ -1,6 +1,6 @@
-"""Hints of a model on its own arithmetic: known derivatives, waypoints of a covariance, late values.
+"""Hints of a model about its own arithmetic: known derivatives, waypoints of a covariance, late values.
 
-None changes a value. A number is handed through as it is, and so is whatever is no expression.
+No hint changes a value. A number is returned unchanged, and so is any value that is not an expression.
 """
 
 from plant.compiled.expression import ONE, ZERO, Expression, as_expression, node, select
@@ -24,15 +24,15 @@ def frozen(x: Scalar) -> Scalar:
 
 
 def following(x: Scalar, *slopes: tuple[Scalar, Scalar]) -> Scalar:
-    """Return the same number, with derivatives that are known: what solves an equation moves as its balance does.
+    """Return the same number with known derivatives: an equation's solution changes as the equation's balance does.
 
     Parameters
     ----------
     x : float, ndarray of shape (runs,), or Expression
         Any unit.
     *slopes : tuple of (float or Expression, float or Expression)
-        What it depends on [any unit], each with its derivative by that [unit of x over that one's]; what it is computed
-        from plays no part.
+        The quantities on which it depends [any unit], each with its derivative by that quantity [unit of x over that
+        one's]; the operands from which it is computed are ignored.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def following(x: Scalar, *slopes: tuple[Scalar, Scalar]) -> Scalar:
 
 
 def waypoint(x: Scalar) -> Scalar:
-    """Return the same number, through which a filter carries its covariance (`estimation.engine.spread`).
+    """Return the same number, marked as a node that a filter's covariance passes through (`estimation.engine.spread`).
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ def _sloped(x: Scalar, *slopes: tuple[Expression, Expression]) -> Scalar:
 
 
 def late_in(y: Scalar, x: Scalar) -> Scalar:
-    """Return y, which is affine in x, as a sum of what does not wait for x and a multiple of x.
+    """Return y, which is affine in x, as a sum of a part that does not wait for x and a multiple of x.
 
     Parameters
     ----------
     y : float, ndarray of shape (runs,), or Expression
         Any unit.
     x : float, ndarray of shape (runs,), or Expression
-        What comes late, any unit; None if nothing does.
+        The quantity that is available late, any unit; None if there is none.
 
     Returns
     -------
@@ -124,7 +124,7 @@ def late_in(y: Scalar, x: Scalar) -> Scalar:
 
 
 def _affine(item: Expression, known: dict[int, tuple[Expression, Expression]]) -> tuple[Expression, Expression]:
-    """Return a node without x, and its slope by x; a choice stays what x makes it."""
+    """Return a node without x, and its slope by x; the condition of a choice may still depend on x."""
     if id(item) not in known:
         operands = item.arguments[1:] if item.operation == "where" else item.arguments
         parts = [_affine(one, known) for one in operands]

@@ -1,26 +1,26 @@
-"""Splits a graph into what is the same at every step, computed once, and what is not."""
+"""Splits a graph into a part that is the same at every step, computed once, and the rest."""
 
 from collections.abc import Collection, Mapping, Sequence, Set
 
 from plant.compiled.expression import Expression, ordered, symbol
 
 COMPARISONS = ("<", "<=", ">", ">=", "present")
-"""Operations whose result is a truth, not a number: an ``int`` in C."""
+"""Operations whose result is a Boolean, not a number: an ``int`` in C."""
 
 
 def hoisted(
     outputs: Mapping[str, Expression], varying: Set[str], prefix: str
 ) -> tuple[dict[str, Expression], dict[str, Expression]]:
-    """Move every largest sub-expression of unvarying symbols out of the outputs.
+    """Move the largest sub-expressions of constant symbols out of the outputs.
 
     Parameters
     ----------
     outputs : Mapping[str, Expression]
-        What is computed at every step, by the variable that receives it.
+        Expressions that are computed at every step, by the variable that receives each.
     varying : set of str
         Symbols whose value changes from step to step.
     prefix : str
-        Beginning of the new symbols' names; a number follows.
+        Prefix of the new symbols' names; a number follows.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def hoisted(
 
 
 def settled_nodes(order: Sequence[Expression], fixed: Collection[str]) -> set[int]:
-    """Return the ids of the nodes that depend on some fixed symbols and on constants alone.
+    """Return the ids of the nodes that depend only on certain fixed symbols and on constants.
 
     Parameters
     ----------

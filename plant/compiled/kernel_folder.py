@@ -1,4 +1,4 @@
-"""The folder of compiled kernels, and whether what is in it may be run."""
+"""The folder of compiled kernels, and whether its contents may be run."""
 
 import os
 import stat

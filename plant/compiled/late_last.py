@@ -1,7 +1,7 @@
-"""Sums and products in which what comes last is taken in last.
+"""Sums and products that take in their latest operand last.
 
-A filter's step waits for the one before along a chain of operations. Where a sum takes in the quantity that comes last
-first, every later term makes the chain longer by an operation; taken in last, it passes one.
+Each step of a filter waits for the previous one along a chain of operations. If a sum takes in the latest quantity
+first, every further term makes the chain one operation longer; if it takes it in last, the sum adds only one.
 """
 
 from collections import Counter
@@ -12,10 +12,10 @@ from plant.compiled.expression import ZERO, Expression, node, ordered
 from plant.compiled.hoist import COMPARISONS
 
 LATENCY: Mapping[str, float] = {"+": 3.0, "-": 3.0, "*": 4.0, "/": 14.0, "sqrt": 18.0, "abs": 1.0, "where": 0.0}
-"""How long a result takes [cycles]: x86-64 processors of 2021 to 2024, choices foreseen; others as `CALL`."""
+"""Latency of a result [cycles]: x86-64 processors of 2021 to 2024, choices predicted correctly; others as `CALL`."""
 
 CALL = 40.0
-"""How long a call of exp, log or the like takes [cycles]: judged."""
+"""Latency of a call of exp, log or the like [cycles]: judged."""
 
 SUMS = ("+", "-")
 
@@ -23,19 +23,19 @@ SUMS = ("+", "-")
 def late_last(
     outputs: Mapping[str, Expression], arrival: Mapping[str, float]
 ) -> tuple[dict[str, Expression], dict[str, float]]:
-    """Put sums and products in the order in which their terms and factors come.
+    """Order sums and products by the times at which their terms and factors become available.
 
     Parameters
     ----------
     outputs : Mapping[str, Expression]
-        What is computed, by name.
+        Outputs, by name.
     arrival : Mapping[str, float]
-        When symbols come [cycles]; all others are there long before.
+        Times at which symbols become available [cycles]; all others are available long before.
 
     Returns
     -------
     tuple of (dict[str, Expression], dict[str, float])
-        The same values to rounding, by the same names, and when each comes [cycles].
+        The same values to rounding, by the same names, and the time of each [cycles].
 
     Examples
     --------
@@ -62,7 +62,7 @@ class _LateLast:
         self._times: dict[int, float] = {}
 
     def outputs(self) -> tuple[dict[str, Expression], dict[str, float]]:
-        """Go through all nodes, operands first."""
+        """Process all nodes, operands first."""
         for item in self._order:
             if id(item) not in self._inner:
                 self._new[id(item)] = self._made(item)
@@ -100,7 +100,7 @@ class _LateLast:
         return first
 
     def _terms(self, item: Expression, sign: int) -> list[tuple[int, Expression]]:
-        """Return the terms of a sum with their signs; what is added and taken away again is none."""
+        """Return the terms of a sum with their signs; a term that is added and subtracted again is dropped."""
         found: list[tuple[int, Expression]] = []
         for one, its in zip(item.arguments, (sign, sign if item.operation == "+" else -sign), strict=True):
             for term in self._terms(one, its) if id(one) in self._inner else [(its, one)]:
@@ -112,7 +112,7 @@ class _LateLast:
         return found
 
     def _sum(self, terms: list[tuple[int, Expression]]) -> Expression:
-        """Add up; a product that serves nothing else is rounded with the sum, so what it waits for is its factors."""
+        """Add up; a product with no other use is rounded with the sum, so the sum waits for its factors."""
         if not terms:
             return ZERO
         timed: list[tuple[float, int, Expression, float]] = []

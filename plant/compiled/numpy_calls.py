@@ -1,7 +1,7 @@
-"""NumPy's functions on symbols: a model that is written with ``np.sin`` and ``np.where`` is traced as one of ours.
+"""NumPy's functions on symbols: a model written with ``np.sin`` and ``np.where`` is traced like one of ours.
 
-NumPy hands over what it cannot compute itself (NEP 13 and 18); every function that a graph can be differentiated
-through has an entry here, and every other is refused by name.
+NumPy passes on calls that it cannot compute itself (NEP 13 and 18). Every function through which a graph can be
+differentiated has an entry here; every other is refused by name.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -70,10 +70,10 @@ UFUNCS: Mapping[Any, Function] = {
 """NumPy's element-wise functions, and ours."""
 
 CHOICES: Mapping[Any, Function] = {np.where: functions.where, np.clip: _clip}
-"""Likewise, of those that are none."""
+"""Likewise, for functions that are not element-wise ufuncs."""
 
 KNOWN = "abs, sign, sqrt, square, exp, log, sin, cos, tan, arctan, sinh, cosh, tanh, minimum, maximum, clip, where"
-"""Names of what a model may call, beside arithmetic and comparisons."""
+"""Names of the functions that a model may call, besides arithmetic and comparisons."""
 
 
 def called(function: Any, method: str, arguments: Sequence[Any], options: Mapping[str, Any]) -> Expression:
@@ -84,14 +84,14 @@ def called(function: Any, method: str, arguments: Sequence[Any], options: Mappin
     function : numpy.ufunc
         The function.
     method : str
-        How it is called; ``"__call__"`` alone is known.
+        Method of the call; only ``"__call__"`` is supported.
     arguments, options : sequence, Mapping
-        What it is called with.
+        Its arguments.
 
     Raises
     ------
     ModelError
-        If it is none of `KNOWN`.
+        If it is not one of `KNOWN`.
 
     Examples
     --------
@@ -112,12 +112,12 @@ def chosen(function: Any, arguments: Sequence[Any], options: Mapping[str, Any]) 
     function : callable
         The function.
     arguments, options : sequence, Mapping
-        What it is called with.
+        Its arguments.
 
     Raises
     ------
     ModelError
-        If it is none of `KNOWN`.
+        If it is not one of `KNOWN`.
     """
     if function not in CHOICES or options:
         raise ModelError(_refusal(function))
@@ -125,7 +125,7 @@ def chosen(function: Any, arguments: Sequence[Any], options: Mapping[str, Any]) 
 
 
 def _single(argument: Any) -> Any:
-    """Return a number where NumPy has one of its own."""
+    """Return a plain number in place of NumPy's own scalar."""
     if isinstance(argument, np.ndarray):
         if argument.ndim:
             raise ModelError(f"a model computes with single numbers, got an array of shape {argument.shape}")

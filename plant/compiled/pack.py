@@ -1,7 +1,7 @@
-"""Lets one run share the divider: divisions and roots that do not wait for each other become one instruction.
+"""Shares the divider within one run: independent divisions and roots become one instruction.
 
-A processor divides eight numbers in little more time than one, and one run of a plant asks for dozens of quotients and
-roots a step. Side by side runs fill the vectors by themselves.
+A processor divides eight numbers in little more time than one, and one run of a plant needs dozens of quotients and
+roots per step. Runs side by side fill the vectors without this.
 """
 
 from collections.abc import Mapping
@@ -10,16 +10,16 @@ from plant.compiled.expression import Expression, ordered
 from plant.compiled.source import function_source, leaf, spelt
 
 PACKED: Mapping[str, str] = {"/": "ratios", "sqrt": "roots"}
-"""Operations that are packed, and the functions of `plant.compiled.native.lines` that do it."""
+"""Operations that are packed, and the functions of `plant.compiled.native.lines` that compute them."""
 
 
 def packed_source(name: str, outputs: Mapping[str, Expression]) -> str:
-    """Write straight lines as `plant.compiled.source.lines_source` does, divisions and roots side by side.
+    """Write straight lines as `plant.compiled.source.lines_source` does, with divisions and roots side by side.
 
     Parameters
     ----------
     outputs : Mapping[str, Expression]
-        What it gives, by name.
+        Its results, by name.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Rewrites a graph so that it costs less, where the last digits do not matter; a kernel asks for it.
+"""Rewrites a graph so that it costs less if the last digits do not matter; a kernel asks for it.
 
-Factors are gathered, divisions by one divisor share its reciprocal (a division takes as long as five to ten products),
-and sums of products are rounded once. Each function takes what is computed, by name, and the symbols that seldom
+Factors are gathered, divisions by the same divisor share its reciprocal (a division takes as long as five to ten
+products), and sums of products are rounded once. Each function takes the outputs, by name, and the symbols that seldom
 change; it returns the same values, to rounding, under the same names.
 """
 
@@ -14,7 +14,7 @@ from plant.compiled.gather import gathered
 from plant.compiled.hoist import settled_nodes
 
 Nodes: TypeAlias = Mapping[int, Expression]
-"""What stands for each node that has been gone through, by its id."""
+"""Replacement of each processed node, by its id."""
 
 FUSED = ("fma", "fnma", "fms")
 """Products with a sum, rounded once: ``a * b + c``, ``c - a * b`` and ``a * b - c``."""
@@ -26,7 +26,7 @@ def simplified(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dic
 
 
 def share_reciprocals(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[str, Expression]:
-    """Replace divisions by products with a reciprocal, wherever it serves twice or changes seldom.
+    """Replace divisions by products with a reciprocal if it is used twice or changes seldom.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def share_reciprocals(outputs: Mapping[str, Expression], fixed: Collection[str])
 
 
 def share_ratios(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Let a ratio and its reverse take one division, by the product of the two; neither may be zero.
+    """Compute a ratio and its inverse with one division, by the product of the two; neither may be zero.
 
     Examples
     --------
@@ -89,10 +89,10 @@ def share_ratios(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
 
 
 def fused(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Round a sum with a product once, where the product serves nothing else: ``fma``, as `source` spells it.
+    """Round a sum with a product once if the product has no other use: ``fma``, as `source` writes it.
 
-    Written out, it is the same on every machine and in every shape of kernel, which is not so where a compiler chooses.
-    The result cannot be differentiated any more.
+    Written explicitly, it is the same on every machine and in every form of kernel; a compiler's own choice would not
+    be. The result can no longer be differentiated.
 
     Examples
     --------
@@ -125,7 +125,7 @@ def fused(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
 def rewritten(
     outputs: Mapping[str, Expression], rule: Callable[[Expression, Nodes], Expression | None]
 ) -> dict[str, Expression]:
-    """Put in every node's place what a rule makes of it, operands first; where it makes nothing, the same node."""
+    """Replace every node by the result of a rule, operands first; if the rule gives none, keep the operation."""
     new: dict[int, Expression] = {}
     for item in ordered(outputs.values()):
         made = rule(item, new)

@@ -6,10 +6,10 @@ from typing import TypeAlias
 from plant.compiled.expression import Expression, ordered
 
 Slot: TypeAlias = int | tuple[int, int]
-"""Where a number stands: so many numbers behind a step's address, or behind another address, by its place in a row."""
+"""Place of a number: its offset in numbers from a step's address; or which other address, and the offset from that."""
 
 ROWS = 8
-"""Samples of as many logs that `plant.compiled.native.operations.transpose` turns at a time."""
+"""Number of logs whose samples `plant.compiled.native.operations.transpose` transposes at a time."""
 
 CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "sin", "cos", "atan", "ratios", "roots", "where", "fma")
 """Functions that lines call (`plant.compiled.native.lines`): no symbol may have their names."""
@@ -22,7 +22,7 @@ _CALLS: Mapping[str, str] = {
     "fnma": "fma(-{0}, {1}, {2})",
     "fms": "fma({0}, {1}, -{2})",
 }
-"""How each operation is spelt; a new one needs a line here and one in `expression.local_derivatives`."""
+"""Spelling of each operation; a new one needs a line here and one in `expression.local_derivatives`."""
 
 
 def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
@@ -31,7 +31,7 @@ def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
     Parameters
     ----------
     outputs : Mapping[str, Expression]
-        What it gives, by name.
+        Its results, by name.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
 def function_source(
     name: str, outputs: Mapping[str, Expression], lines: Sequence[str], names: Mapping[int, str]
 ) -> str:
-    """Return lines as a function of the symbols in alphabetical order, which gives the outputs by name.
+    """Return lines as a function of the symbols in alphabetical order, which returns the outputs by name.
 
     Parameters
     ----------
@@ -83,11 +83,11 @@ def operations_source(lines: Mapping[str, str], slots: Mapping[str, Slot], width
     Parameters
     ----------
     lines : Mapping[str, str]
-        Source of functions by their names, as `lines_source` gives it.
+        Sources of functions by name, as from `lines_source`.
     slots : Mapping[str, Slot]
-        Where the first of a symbol's numbers stands.
+        Place of the first of a symbol's numbers.
     width : int
-        How many numbers of each are taken at a time.
+        Number of values of each symbol that are processed at a time.
 
     Returns
     -------

@@ -4,9 +4,9 @@ from plant.compiled.functions import Scalar
 
 
 def gas_pressure(amount: Scalar, charge_amount: Scalar, charge_pressure: Scalar, gas_volume: Scalar) -> Scalar:
-    """Return the accumulator's absolute pressure: isothermal gas, pushed back by the oil that has come in.
+    """Return the accumulator's absolute pressure: isothermal gas, compressed by the oil that has entered.
 
-    Source: section 2 gives the pressure, 40 psi; isothermal because what leaks comes and goes slowly, judged.
+    Source: section 2 gives the pressure, 40 psi; isothermal is judged, since leakage flows slowly.
 
     Parameters
     ----------

@@ -1,12 +1,13 @@
-"""Bouc-Wen hysteresis: the asymmetric law of a piezo stack and the classical one of a yielding spring.
+"""Bouc-Wen hysteresis: the asymmetric law of a piezo stack and the classical law of a yielding spring.
 
-Both are rate-independent: the hysteresis moves with its input only. Written without ``sign``, they are Lipschitz.
+Both are rate-independent: the hysteresis changes only if its input changes. Written without ``sign``, they are
+Lipschitz continuous.
 """
 
 from plant.compiled.functions import Scalar, absolute, exp, log, maximum
 
 LEAST_SIZE = 1e-12
-"""Hysteresis whose powers are taken for zero's [V]: a logarithm has none."""
+"""Smallest hysteresis [V] in the powers, since zero has no logarithm."""
 
 
 def asymmetric_bouc_wen_rate(
@@ -53,7 +54,7 @@ def bouc_wen_rate(rate: Scalar, force: Scalar, alpha: Scalar, beta: Scalar, gamm
     alpha : float or Expression
         Small-signal stiffness [N/m].
     beta : float or Expression
-        How fast the force saturates [1/m].
+        Rate at which the force saturates [1/m].
     gamma, delta : float or Expression
         Shape of the loop [dimensionless]; only their products with beta act.
 
@@ -73,9 +74,9 @@ def bouc_wen_rate(rate: Scalar, force: Scalar, alpha: Scalar, beta: Scalar, gamm
 def power_bouc_wen_rate(
     rate: Scalar, hysteresis: Scalar, alpha: Scalar, beta: Scalar, gamma: Scalar, exponent: Scalar
 ) -> Scalar:
-    """Return the rate of the classical law of any exponent, ``a u' - b |u'| h |h|^(n-1) - g u' |h|^n``.
+    """Return the rate of the classical law for any exponent, ``a u' - b |u'| h |h|^(n-1) - g u' |h|^n``.
 
-    Source: equation 21 of the diaphragm-motor paper with the rates that it leaves out, errata M21.
+    Source: equation 21 of the diaphragm-motor paper, with the rates that it omits (errata M21).
 
     Parameters
     ----------

@@ -1,20 +1,20 @@
-"""Check valves, which let oil through one way."""
+"""Check valves, which let oil through in one direction."""
 
 from plant.compiled.functions import Scalar, maximum, where
 
 
 def check_valve_flow(drop: Scalar, conductance: Scalar, opening_pressure: Scalar) -> Scalar:
-    """Return the flow of a check valve whose poppet lifts with the pressure drop: none backward, smooth at its seat.
+    """Return the flow of a check valve whose poppet lifts with the pressure drop: none backward, smooth at the seat.
 
-    It opens in proportion ``drop / (drop + opening_pressure)``, so that flow and slope are continuous, and flow never
-    runs against pressure. Source: judged, the paper gives no characteristic.
+    The opening is ``drop / (drop + opening_pressure)``, so flow and slope are continuous, and oil never flows against
+    the pressure. Source: judged, the paper gives no characteristic.
 
     Parameters
     ----------
     drop : float or Expression
-        Pressure before the valve less that behind it [Pa].
+        Upstream pressure minus downstream pressure [Pa].
     conductance : float or Expression
-        Flow a pascal when wide open [m^3/(s Pa)].
+        Flow per pascal when wide open [m^3/(s Pa)].
     opening_pressure : float or Expression
         Drop at which it is half open [Pa], positive.
 
@@ -40,11 +40,11 @@ def make_up_flow(
     opening_pressure: Scalar,
     pilot_share: Scalar,
 ) -> Scalar:
-    """Return the make-up flow from the inner circuit into a chamber, less the back flow that a pilot permits.
+    """Return the make-up flow from the inner circuit into a chamber, minus the back flow through a piloted valve.
 
-    A single rod displaces more oil on one side than on the other; what is over leaves through the low side's valve,
-    which the pressure of the other side holds open. Source: Rahmfeld and Ivantysynova, *Displacement controlled linear
-    actuator with differential cylinder*, International Journal of Fluid Power 2 (2001).
+    A single-rod piston displaces more oil on one side than on the other. The excess leaves through the valve of the
+    low-pressure side, which the pressure of the other side holds open. Source: Rahmfeld and Ivantysynova, *Displacement
+    controlled linear actuator with differential cylinder*, International Journal of Fluid Power 2 (2001).
 
     Parameters
     ----------
@@ -53,11 +53,12 @@ def make_up_flow(
     supply : float or Expression
         Pressure of the inner circuit [Pa].
     conductance : float or Expression
-        Flow of the valve a pascal when wide open [m^3/(s Pa)].
+        Flow of the valve per pascal when wide open [m^3/(s Pa)].
     opening_pressure : float or Expression
         Drop at which it is half open [Pa].
     pilot_share : float or Expression
-        Conductance while it is held open, over its own; 0 for a plain check valve [dimensionless].
+        Conductance of the valve held open by the pilot, relative to `conductance`; 0 for a plain check valve
+        [dimensionless].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A piezo diaphragm on its chamber: what the chamber stores, what the voltage displaces, how far the centre bends."""
+"""A piezo diaphragm on its chamber: chamber compliance and centre deflection."""
 
 from plant.compiled.functions import Scalar, exp, log
 
@@ -6,10 +6,10 @@ from plant.compiled.functions import Scalar, exp, log
 def chamber_compliance(
     pressure: Scalar, diaphragm: Scalar, liquid: Scalar, gas: Scalar, exponent: Scalar, rest_pressure: Scalar
 ) -> Scalar:
-    """Return the volume that a chamber takes in a pascal: diaphragm, liquid and entrapped gas side by side.
+    """Return the compliance of a chamber: diaphragm, liquid and entrapped gas in parallel.
 
-    The gas follows ``p V^n = const``, so that it gives ``V/n (p0/p)^(1/n) / p`` a pascal. Source: the paper is silent;
-    the diaphragm-motor paper's equation 1 with errata M1 takes the diaphragm alone, errata M22.
+    The gas follows ``p V^n = const``, so its compliance is ``V/n (p0/p)^(1/n) / p``. Source: the paper gives none; the
+    diaphragm-motor paper's equation 1 with errata M1 takes the diaphragm alone, errata M22.
 
     Parameters
     ----------
@@ -20,11 +20,11 @@ def chamber_compliance(
     liquid : float or Expression
         Compliance of the liquid, volume over bulk modulus [m^3/Pa].
     gas : float or Expression
-        Gas at the rest pressure [m^3], not negative.
+        Gas volume at the rest pressure [m^3], not negative.
     exponent : float or Expression
         Polytropic exponent n [dimensionless].
     rest_pressure : float or Expression
-        Absolute pressure at which the gas is as given [Pa].
+        Absolute pressure at which the gas has the given volume [Pa].
 
     Returns
     -------
@@ -42,14 +42,14 @@ def chamber_compliance(
 def centre_deflection(
     voltage: Scalar, pressure: Scalar, deflection_a_volt: Scalar, deflection_a_pascal: Scalar
 ) -> Scalar:
-    """Return the deflection of a diaphragm's centre by voltage and pressure (equation 16, errata M16).
+    """Return the deflection of a diaphragm's centre due to voltage and pressure (equation 16, errata M16).
 
     Parameters
     ----------
     voltage : float, ndarray or Expression
-        Voltage less its hysteresis [V].
+        Voltage minus its hysteresis [V].
     pressure : float, ndarray or Expression
-        Of the chamber above the outside [Pa].
+        Chamber pressure above the outside pressure [Pa].
     deflection_a_volt : float
         w_V [m/V].
     deflection_a_pascal : float

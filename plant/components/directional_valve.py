@@ -1,10 +1,10 @@
-"""A 4/3 directional valve with tandem centre: which side of the cylinder the pump feeds, and what returns to tank."""
+"""A 4/3 directional valve with tandem centre: which cylinder side the pump feeds, and which side returns to tank."""
 
 from plant.compiled.functions import Scalar, absolute, sign, sqrt, where
 from plant.components.friction import velocity_under_friction
 
 SHUT = 1e-5
-"""Share of a land's opening that remains when it is covered: a spool is not tight [dimensionless]."""
+"""Fraction of a land's opening that remains when the land is covered, because a spool leaks [dimensionless]."""
 
 
 def fed_pressure(spool: Scalar, side_a: Scalar, side_b: Scalar) -> Scalar:
@@ -13,14 +13,14 @@ def fed_pressure(spool: Scalar, side_a: Scalar, side_b: Scalar) -> Scalar:
     Parameters
     ----------
     spool : float or Expression
-        1 feeds side A, -1 side B; at 0 the pump runs to tank and the cylinder is shut [dimensionless].
+        1 feeds side A, -1 feeds side B; at 0 the pump runs to tank and the cylinder ports are shut [dimensionless].
     side_a, side_b : float or Expression
         Pressures above the tank's [Pa].
 
     Returns
     -------
     float or Expression
-        Pressure behind the feeding land [Pa].
+        Pressure downstream of the feeding land [Pa].
 
     Examples
     --------
@@ -31,7 +31,7 @@ def fed_pressure(spool: Scalar, side_a: Scalar, side_b: Scalar) -> Scalar:
 
 
 def tank_openings(spool: Scalar) -> tuple[Scalar, Scalar]:
-    """Return the openings of the lands from side A and side B to tank (section 5.1).
+    """Return the openings of the lands that connect side A and side B to tank (section 5.1).
 
     Parameters
     ----------
@@ -57,9 +57,9 @@ def return_flow(pressure: Scalar, conductance: Scalar) -> Scalar:
     Parameters
     ----------
     pressure : float or Expression
-        Of the side above the tank's [Pa].
+        Pressure of the side above the tank's [Pa].
     conductance : float or Expression
-        Flow over the root of the pressure [m^3/(s Pa^0.5)].
+        Flow per square root of the pressure [m^3/(s Pa^0.5)].
 
     Returns
     -------
@@ -77,14 +77,14 @@ def return_flow(pressure: Scalar, conductance: Scalar) -> Scalar:
 def pressure_after_return(
     pressure: Scalar, inflow: Scalar, compliance: Scalar, conductance: Scalar, h: Scalar
 ) -> Scalar:
-    """Return a side's pressure after an implicit step of ``C p' = inflow - K sqrt(p)``, steep as the root is at zero.
+    """Return a side's pressure after an implicit step of ``C p' = inflow - K sqrt(p)``, which is stiff near zero.
 
-    Source: the implicit Euler rule on `return_flow`.
+    Source: the implicit Euler rule applied to `return_flow`.
 
     Parameters
     ----------
     pressure : float or Expression
-        At the step's start, above the tank's [Pa].
+        Pressure at the start of the step, above the tank's [Pa].
     inflow : float or Expression
         All other flow into the side [m^3/s].
     compliance : float or Expression
@@ -97,7 +97,7 @@ def pressure_after_return(
     Returns
     -------
     float or Expression
-        Pressure at the step's end [Pa].
+        Pressure at the end of the step [Pa].
 
     Examples
     --------

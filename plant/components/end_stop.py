@@ -1,4 +1,4 @@
-"""The ends of the stroke."""
+"""End stops of the stroke."""
 
 from plant.compiled.functions import Scalar, maximum
 
@@ -6,10 +6,10 @@ from plant.compiled.functions import Scalar, maximum
 def end_stop_force(
     position: Scalar, velocity: Scalar, half_stroke: Scalar, stiffness: Scalar, damping: Scalar
 ) -> Scalar:
-    """Return the force of the cylinder's ends on the piston, zero within the stroke.
+    """Return the force of the end stops on the piston; it is zero within the stroke.
 
-    A spring with damping in proportion to its compression, so that force is continuous at contact and energy is
-    only ever lost. Source: Hunt and Crossley, ASME Journal of Applied Mechanics 42 (1975), page 440.
+    A spring whose damping is proportional to its compression: the force is continuous at contact, and energy is only
+    lost. Source: Hunt and Crossley, ASME Journal of Applied Mechanics 42 (1975), page 440.
 
     Parameters
     ----------
@@ -18,11 +18,11 @@ def end_stop_force(
     velocity : float or Expression
         Piston velocity [m/s].
     half_stroke : float or Expression
-        Travel from the middle to either end [m].
+        Travel from mid-stroke to either end [m].
     stiffness : float or Expression
         Stiffness of an end [N/m].
     damping : float or Expression
-        Damping force over spring force, a unit of velocity [s/m].
+        Ratio of damping force to spring force, per unit of velocity [s/m].
 
     Returns
     -------

@@ -1,6 +1,6 @@
-"""A soft check valve in a port: it opens with a lag over a band of pressure, and its liquid has inertia.
+"""A soft check valve in a port: it opens with a lag over a pressure range, and its liquid has inertia.
 
-Source: judged; the diaphragm-motor paper gives no law of its umbrella valves, errata M22.
+Source: judged; the diaphragm-motor paper gives no law for its umbrella valves, errata M22.
 """
 
 from plant.compiled.functions import Scalar, absolute, maximum, minimum
@@ -15,11 +15,11 @@ def opening_target(
     Parameters
     ----------
     drop : float, ndarray or Expression
-        Pressure before less pressure behind [Pa].
+        Upstream pressure minus downstream pressure [Pa].
     leak : float or Expression
-        Opening that remains when it is shut [dimensionless]; 1 is stuck open.
+        Opening that remains when it is shut [dimensionless]; 1 means stuck open.
     lift : float or Expression
-        Opening when wide open [dimensionless]; as small as the leak is stuck shut.
+        Opening when wide open [dimensionless]; if it equals the leak, the flap is stuck shut.
     cracking_pressure : float or Expression
         Drop at which it leaves its seat [Pa].
     opening_range : float or Expression
@@ -28,7 +28,7 @@ def opening_target(
     Returns
     -------
     float, ndarray or Expression
-        Share of the port's area [dimensionless].
+        Fraction of the port's area [dimensionless].
 
     Examples
     --------
@@ -39,14 +39,14 @@ def opening_target(
 
 
 def orifice_drag(opening: Scalar, area: Scalar, coefficient: Scalar, density: Scalar) -> Scalar:
-    """Return the pressure that an orifice takes over the square of its flow, ``rho / (2 (C_q A s)^2)``.
+    """Return the pressure drop of an orifice divided by the square of its flow, ``rho / (2 (C_q A s)^2)``.
 
     Source: the law of a sharp-edged orifice.
 
     Parameters
     ----------
     opening : float, ndarray or Expression
-        Share of the area that stands open s [dimensionless], positive.
+        Open fraction s of the area [dimensionless], positive.
     area : float or Expression
         Area of the port [m^2].
     coefficient : float or Expression
@@ -71,17 +71,17 @@ def orifice_drag(opening: Scalar, area: Scalar, coefficient: Scalar, density: Sc
 def port_flow_after(
     flow: Scalar, drop: Scalar, drag: Scalar, resistance: Scalar, inertance: Scalar, h: Scalar
 ) -> Scalar:
-    """Return the flow after a step of ``I q' = drop - R q - D q |q|``, whatever the drag.
+    """Return the flow after a step of ``I q' = drop - R q - D q |q|``, stable at any drag.
 
-    Losses count by a share at the step's end that goes from a half where they are slow, which is of second order, to
-    one where the port is all but shut, so that no port is too tight for the step.
+    The weight of the losses at the end of the step goes from a half if they are slow, which is second order, to one if
+    the port is almost shut. So the step is stable even for an almost shut port.
 
     Parameters
     ----------
     flow : float, ndarray or Expression
         Flow at the step's start [m^3/s].
     drop : float, ndarray or Expression
-        Pressure before less pressure behind at the step's middle [Pa].
+        Upstream pressure minus downstream pressure at the middle of the step [Pa].
     drag : float, ndarray or Expression
         D, see `orifice_drag` [Pa s^2/m^6].
     resistance : float or Expression
@@ -109,17 +109,17 @@ def port_flow_after(
 
 
 def late_share(decay: Scalar) -> Scalar:
-    """Return the share of a loss that counts at a step's end: 1/2 for slow decay, of second order; 1 for sudden decay.
+    """Return the weight of a loss at the end of a step: 1/2 for slow decay, which is second order; 1 for sudden decay.
 
     Parameters
     ----------
     decay : float, ndarray or Expression
-        Rate of decay times step [dimensionless], not negative.
+        Rate of decay times the step [dimensionless], not negative.
 
     Returns
     -------
     float, ndarray or Expression
-        Share [dimensionless].
+        Weight [dimensionless].
 
     Examples
     --------

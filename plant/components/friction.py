@@ -1,4 +1,4 @@
-"""The piston's friction, as a force law and as the implicit step that really sticks."""
+"""The piston's friction, as a force law and as an implicit step in which the piston really sticks."""
 
 from plant.compiled.functions import Scalar, absolute, sqrt, where
 
@@ -8,14 +8,15 @@ def quadratic_friction(
 ) -> Scalar:
     """Return the friction force of a sliding piston, equation 5.10.
 
-    The law stands in four other forms too, `sliding` first; ``docs/friction-law.md`` lists them.
+    The law is also written in four other forms, first in `sliding`; ``docs/friction-law.md`` lists them.
 
     Parameters
     ----------
     velocity : float or Expression
         Piston velocity [m/s].
     direction : float or Expression
-        Sense of sliding, -1 or 1 [dimensionless]; the velocity's sign, or the sense in which it will break loose.
+        Direction of sliding, -1 or 1 [dimensionless]; the sign of the velocity, or the direction of the coming
+        breakaway.
     quadratic, linear, coulomb : float or Expression
         Coefficients a_1 [N s^2/m^2], a_2 [N s/m], a_3 [N].
 
@@ -36,13 +37,13 @@ def velocity_under_friction(push: Scalar, resistance: Scalar, quadratic: Scalar,
     """Solve ``resistance * v + quadratic * v * |v| + coulomb * Sgn(v) = push`` for v, where Sgn(0) is all of [-1, 1].
 
     This is the force balance, equation 5.9, with the friction of equation 5.10 over one implicit step. Below the
-    Coulomb force the answer is exactly zero, so the piston sticks; above it there is one root as long as the resistance
-    is positive, in a form that loses no digits to cancellation.
+    Coulomb force the result is exactly zero, so the piston sticks. Above it there is one root if the resistance is
+    positive, computed in a form without cancellation.
 
     Parameters
     ----------
     push : float or Expression
-        Driving force, with the momentum carried in by the step [N].
+        Driving force, including the momentum at the start of the step [N].
     resistance : float or Expression
         Everything proportional to the new velocity [N s/m], positive.
     quadratic : float or Expression
@@ -67,14 +68,14 @@ def velocity_under_friction(push: Scalar, resistance: Scalar, quadratic: Scalar,
 
 
 def sliding(push: Scalar, resistance: Scalar, quadratic: Scalar, coulomb: Scalar) -> tuple[Scalar, Scalar]:
-    """Return the velocity of `velocity_under_friction`, and half the force that a change of velocity takes.
+    """Return the velocity of `velocity_under_friction`, and half the derivative of the force by the velocity.
 
     Source: the root of the quadratic in the velocity, differentiated by the force.
 
     Parameters
     ----------
     push : float or Expression
-        Driving force, with the momentum carried in by the step [N].
+        Driving force, including the momentum at the start of the step [N].
     resistance : float or Expression
         Everything proportional to the new velocity [N s/m], positive.
     quadratic : float or Expression
@@ -85,7 +86,7 @@ def sliding(push: Scalar, resistance: Scalar, quadratic: Scalar, coulomb: Scalar
     Returns
     -------
     tuple of (float or Expression, float or Expression)
-        New velocity [m/s]; and half the force that a change of velocity takes while it slides [N s/m].
+        New velocity [m/s]; and half the derivative of the force by the velocity during sliding [N s/m].
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Oil in a volume that a gas spring lets grow with pressure: an accumulator's port, or a wall that gives."""
+"""Oil in a volume that a gas spring lets grow with pressure: an accumulator's port, or a compliant wall."""
 
 from plant.compiled.functions import Scalar
 from plant.components.oil import ATMOSPHERE, NUCLEI, root_above_zero
@@ -9,8 +9,9 @@ def compliant_oil_pressure(
 ) -> Scalar:
     """Return the absolute pressure of oil in a volume that grows by the compliance times the pressure above rest.
 
-    `plant.components.oil.oil_pressure` with one more spring beside the liquid: volumes of liquid, air and vapour add up
-    to ``volume + compliance (p - rest_pressure)``, a quadratic in p. Source: the accumulator's node, errata P16.
+    This is `plant.components.oil.oil_pressure` with one more spring in parallel with the liquid: the volumes of liquid,
+    air and vapour add up to ``volume + compliance (p - rest_pressure)``, a quadratic in p. Source: the accumulator's
+    node, errata P16.
 
     Parameters
     ----------
@@ -19,9 +20,9 @@ def compliant_oil_pressure(
     volume : float or Expression
         Volume at the rest pressure [m^3].
     compliance : float or Expression
-        Growth of the volume a pascal [m^3/Pa]; 0 for rigid walls.
+        Growth of the volume per pascal [m^3/Pa]; 0 for rigid walls.
     rest_pressure : float or Expression
-        Pressure at which the volume is as given [Pa].
+        Pressure at which the volume has the given value [Pa].
     oil : tuple of float or Expression
         Bulk modulus [Pa], air fraction [dimensionless] and vapour pressure [Pa], as in `oil_pressure`.
 

@@ -13,7 +13,7 @@ def line_flow_rate(
     Parameters
     ----------
     drop : float or Expression
-        Pressure at the inlet less that at the outlet [Pa].
+        Inlet pressure minus outlet pressure [Pa].
     flow : float or Expression
         Flow [m^3/s].
     length : float or Expression
@@ -30,7 +30,7 @@ def line_flow_rate(
     Returns
     -------
     float or Expression
-        Rate of the flow [m^3/s^2].
+        Rate of change of the flow [m^3/s^2].
 
     Examples
     --------

@@ -1,13 +1,12 @@
-"""Oil with entrained air, and with vapour where there is too little of it: one closed-form equation of state.
+"""Oil with entrained air, and with vapour if there is too little oil: one closed-form equation of state.
 
-The *amount* of oil is its mass, given as the volume that it would fill at atmospheric pressure [m^3]. A chamber of
-volume V that holds the amount n is filled by liquid, which shrinks linearly with pressure, and by air, which shrinks
-as 1/p (isothermal)::
+The *amount* of oil is its mass, given as its volume at atmospheric pressure [m^3]. A chamber of volume V with the
+amount n is filled by liquid, which shrinks linearly with pressure, and by air, which shrinks as 1/p (isothermal)::
 
     V/n = (1 - air) (1 - (p - p_a)/beta) + air (p_a - p_v)/(p - p_v)
 
 Its stiffness is equation 5 of the piezo-stack paper with n = 1 (errata P5) to first order in the air fraction. Vapour
-takes the room that is left, so pressure never falls below that of the vapour, p_v.
+fills the remaining volume, so the pressure never falls below the vapour pressure p_v.
 """
 
 from plant.compiled.functions import Scalar, absolute, sqrt, where
@@ -16,13 +15,13 @@ ATMOSPHERE = 101_325.0
 """Pressure at which the air fraction is stated [Pa], equation 6 of the piezo-stack paper."""
 
 NUCLEI = 1e-9
-"""Air fraction of oil without free air: bubble nuclei, which soften the onset of vapour over about 100 Pa."""
+"""Air fraction of oil without free air: bubble nuclei, which smooth the onset of vapour over about 100 Pa."""
 
 
 def oil_pressure(
     amount: Scalar, volume: Scalar, bulk_modulus: Scalar, air_fraction: Scalar, vapour_pressure: Scalar
 ) -> Scalar:
-    """Return the absolute pressure of an amount of oil in a volume, above that of the vapour at any positive amount.
+    """Return the absolute pressure of a positive amount of oil in a volume; it always exceeds the vapour pressure.
 
     Parameters
     ----------
@@ -33,7 +32,7 @@ def oil_pressure(
     bulk_modulus : float or Expression
         Bulk modulus beta of the oil without air [Pa].
     air_fraction : float or Expression
-        Volume of air over that of oil and air, at atmospheric pressure [dimensionless].
+        Volume of air over the volume of oil and air, at atmospheric pressure [dimensionless].
     vapour_pressure : float or Expression
         Vapour pressure p_v [Pa].
 
@@ -57,14 +56,14 @@ def oil_pressure(
 
 
 def root_above_zero(softness: Scalar, squeezed: Scalar, gas: Scalar) -> Scalar:
-    """Return the pressure above the vapour's at which ``softness p^2 - squeezed p = gas``, without cancellation.
+    """Return the pressure above the vapour pressure at which ``softness p^2 - squeezed p = gas``, without cancellation.
 
     Parameters
     ----------
     softness : float or Expression
-        What a pascal takes off the volume of oil, and adds to that of its walls [unit of volume/Pa], positive.
+        Decrease of the oil's volume plus increase of the walls' volume per pascal [unit of volume/Pa], positive.
     squeezed : float or Expression
-        By how much the oil without air is larger than its room at the vapour's pressure [unit of volume].
+        Excess of the volume of the oil without air over the available volume, at the vapour pressure [unit of volume].
     gas : float or Expression
         Volume of the air times its pressure [unit of volume times Pa], positive.
 
@@ -89,7 +88,7 @@ def specific_volume(pressure: Scalar, bulk_modulus: Scalar, air_fraction: Scalar
     Parameters
     ----------
     pressure : float or Expression
-        Absolute pressure [Pa], above the vapour's.
+        Absolute pressure [Pa], above the vapour pressure.
     bulk_modulus, air_fraction, vapour_pressure : float or Expression
         As in `oil_pressure` [Pa, dimensionless, Pa].
 
@@ -116,7 +115,7 @@ def effective_bulk_modulus(
     Parameters
     ----------
     pressure : float or Expression
-        Absolute pressure [Pa], above the vapour's.
+        Absolute pressure [Pa], above the vapour pressure.
     bulk_modulus, air_fraction, vapour_pressure : float or Expression
         As in `oil_pressure` [Pa, dimensionless, Pa].
 

@@ -1,23 +1,23 @@
-"""Throttles: a sharp-edged orifice, a laminar path in line with one, and what an orifice asks of a piston."""
+"""Throttles: a sharp-edged orifice, a laminar path in series with one, and an orifice's friction on a piston."""
 
 from plant.compiled.functions import Scalar, absolute, sqrt
 
 
 def laminar_orifice_flow(drop: Scalar, conductance: Scalar, orifice: Scalar) -> Scalar:
-    """Return the flow through a laminar path in line with an orifice.
+    """Return the flow through a laminar path in series with an orifice.
 
-    The path takes ``flow / conductance`` of the pressure and the orifice ``(flow / orifice)^2``; the sum is solved for
-    the flow. Small drops see the laminar path, large ones the orifice. Source: Table 3's flows are linear in pressure,
-    section 3 gives the valve's rated flow; equation 5.7.
+    The pressure drop is ``flow / conductance`` across the path and ``(flow / orifice)^2`` across the orifice; the sum
+    is solved for the flow. The laminar path dominates at small drops, the orifice at large ones. Source: Table 3's
+    flows are linear in pressure, section 3 gives the valve's rated flow; equation 5.7.
 
     Parameters
     ----------
     drop : float or Expression
-        Pressure before less pressure behind [Pa].
+        Upstream pressure minus downstream pressure [Pa].
     conductance : float or Expression
-        Laminar flow a pascal [m^3/(s Pa)], not negative.
+        Laminar flow per pascal [m^3/(s Pa)], not negative.
     orifice : float or Expression
-        Orifice flow over the root of its drop [m^3/(s Pa^0.5)], positive.
+        Orifice flow per square root of its pressure drop [m^3/(s Pa^0.5)], positive.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def laminar_orifice_flow(drop: Scalar, conductance: Scalar, orifice: Scalar) -> 
 
 
 def orifice_constant(flow: Scalar, drop: Scalar) -> Scalar:
-    """Return an orifice's flow over the root of its pressure drop, from one rated point.
+    """Return an orifice's flow per square root of its pressure drop, from one rated point.
 
     Source: the law of a sharp-edged orifice, the paper's reference 2.
 
@@ -62,8 +62,8 @@ def orifice_constant(flow: Scalar, drop: Scalar) -> Scalar:
 def orifice_friction(density: Scalar, piston_area: Scalar, effective_area: Scalar) -> Scalar:
     """Return the quadratic friction that an orifice between the chambers of a coupled cylinder adds.
 
-    The piston pushes ``A v`` through the orifice, which takes the pressure ``rho (A v / (C_d A_o))^2 / 2``, and feels
-    it on the area A: the increment of a_1 in equation 5.10 is ``rho A^3 / (2 (C_d A_o)^2)``.
+    The piston pushes the flow ``A v`` through the orifice, whose pressure drop ``rho (A v / (C_d A_o))^2 / 2`` acts on
+    the area A: the increment of a_1 in equation 5.10 is ``rho A^3 / (2 (C_d A_o)^2)``.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def orifice_friction(density: Scalar, piston_area: Scalar, effective_area: Scala
 
 
 def effective_area(density: Scalar, piston_area: Scalar, friction: Scalar) -> Scalar:
-    """Return the effective area of the orifice that adds a quadratic friction: the inverse of `orifice_friction`.
+    """Return the effective area of the orifice that adds a given quadratic friction: the inverse of `orifice_friction`.
 
     Parameters
     ----------

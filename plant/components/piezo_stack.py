@@ -4,7 +4,7 @@ from plant.compiled.functions import Scalar
 
 
 def lagged_force_rate(force: Scalar, voltage: Scalar, newtons_a_volt: Scalar, lag: Scalar) -> Scalar:
-    """Return the rate of the stack's linear force, equation 2 as the first-order lag that it means (errata P2).
+    """Return the rate of the stack's linear force, equation 2 read as the intended first-order lag (errata P2).
 
     Parameters
     ----------
@@ -33,16 +33,16 @@ def lagged_force_rate(force: Scalar, voltage: Scalar, newtons_a_volt: Scalar, la
 def stack_force(
     driven: Scalar, hysteresis: Scalar, displacement: Scalar, velocity: Scalar, stiffness: Scalar, damping: Scalar
 ) -> Scalar:
-    """Return the force that the stack pushes with, and that a sensor below it feels: equation 2 without its mass.
+    """Return the force that the stack exerts, and that a sensor below it measures: equation 2 without its mass.
 
     Parameters
     ----------
     driven : float, ndarray or Expression
         Linear force F_lin [N].
     hysteresis : float, ndarray or Expression
-        h, which takes from the stroke (errata P2) [m].
+        h, which reduces the stroke (errata P2) [m].
     displacement, velocity : float, ndarray or Expression
-        Of the stack's end [m], [m/s].
+        Displacement [m] and velocity [m/s] of the stack's end.
     stiffness, damping : float or Expression
         k_0 [N/m], c_0 [N s/m].
 

@@ -1,8 +1,8 @@
 """Linear piezoelectricity of a poled ceramic, class 6mm: equations 8 to 12 of the diaphragm-motor paper.
 
 Vectors of strain and stress have six components in Voigt's order, 11, 22, 33, 23, 13, 12; those of field and electric
-displacement three. Poled along 3, such a ceramic has s_13 = s_23, s_44 = s_55, d_31 = d_32, d_15 = d_24 and
-eps_11 = eps_22, which the printed matrices leave open (errata M10, M11 and M12).
+displacement have three. A ceramic poled along 3 has s_13 = s_23, s_44 = s_55, d_31 = d_32, d_15 = d_24 and eps_11 =
+eps_22, which the printed matrices do not state (errata M10, M11 and M12).
 """
 
 from dataclasses import dataclass
@@ -98,7 +98,7 @@ def strain(stress: Array, field: Array, c: PoledCeramic) -> Array:
 
 
 def electric_displacement(stress: Array, field: Array, c: PoledCeramic) -> Array:
-    """Return the charge that stress and field displace: the direct effect, equations 8, 10 and 12 (errata M12).
+    """Return the electric displacement due to stress and field: the direct effect, equations 8, 10 and 12 (errata M12).
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
-"""Friction that yields before it slides: a LuGre bristle around the steady-state law, equation 5.10.
+"""Presliding friction, which yields before it slides: a LuGre bristle with the steady-state law, equation 5.10.
 
-Why LuGre and not Dahl: under minor friction a_2 is negative (errata E12), the force falls with speed. A Dahl spring
-must take that part beside itself, as negative damping that shakes the mass on the spring and creates energy; the LuGre
-bristle holds the falling part in its own steady law g(v), and cannot give back more than was put in.
+Why LuGre and not Dahl: under minor friction a_2 is negative (errata E12), so the force decreases with speed. A Dahl
+spring needs that part in parallel, as negative damping, which shakes the mass on the spring and creates energy; the
+LuGre bristle has the decreasing part in its own steady-state law g(v), and cannot release more energy than it
+received.
 
 The law is split so that it is passive and exact in the steady state. With ``falling = max(-a_2, 0)``::
 
@@ -17,7 +18,7 @@ from plant.compiled.functions import Scalar, absolute, maximum, sqrt, where
 
 
 def bristle_rate(velocity: Scalar, bristle: Scalar, linear: Scalar, coulomb: Scalar, displacement: Scalar) -> Scalar:
-    """Return the rate of the bristle's deflection, in units of the deflection at which it slides.
+    """Return the rate of the bristle's deflection, normalised by the deflection at which it slides.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ def presliding_friction(
     mass: Scalar,
     damping_ratio: Scalar,
 ) -> Scalar:
-    """Return the friction force of a bristle that deflects, and of what slides beside it.
+    """Return the friction force of a deflecting bristle and of the sliding part in parallel with it.
 
     Parameters
     ----------
@@ -71,8 +72,8 @@ def presliding_friction(
     mass : float or Expression
         Moving mass [kg].
     damping_ratio : float or Expression
-        Damping of the mass on the bristle over the critical [dimensionless]; it fades as the bristle slides, by
-        the factor ``1 / (1 + damping |v| / a_3)``, which keeps it passive at any speed.
+        Damping ratio of the mass on the bristle [dimensionless]. It is multiplied by a factor that falls as the bristle
+        slides, ``1 / (1 + damping |v| / a_3)``, which keeps the friction passive at any speed.
 
     Returns
     -------

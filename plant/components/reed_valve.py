@@ -8,14 +8,14 @@ def reed_flow(
 ) -> Scalar:
     """Return the flow past a reed, equations 14 and 15 of the piezo-stack paper, laminar at small drops (errata P8).
 
-    Either way: a reed that has not shut yet lets oil flow back.
+    Oil flows in both directions: it flows back through a reed that has not closed yet.
 
     Parameters
     ----------
     drop : float or Expression
-        Pressure before less pressure behind [Pa].
+        Upstream pressure minus downstream pressure [Pa].
     opening : float or Expression
-        How far the reed stands open [m]; shut below zero.
+        Lift of the reed [m]; the valve is shut below zero.
     perimeter : float or Expression
         Perimeter w of the opening [m].
     coefficient : float or Expression
@@ -41,20 +41,20 @@ def reed_flow(
 
 
 def contact_force(depth: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar, soft_depth: Scalar) -> Scalar:
-    """Return the force that pushes back out of a seat or stop: a spring and a damper that grows in (errata P7).
+    """Return the restoring force of a seat or stop: a spring, and a damper that increases gradually (errata P7).
 
     Parameters
     ----------
     depth : float or Expression
-        How deep the contact is pressed in [m]; none below zero.
+        Penetration depth of the contact [m]; no contact below zero.
     rate : float or Expression
-        How fast it is pressed in [m/s].
+        Rate of penetration [m/s].
     stiffness : float or Expression
         Stiffness [N/m].
     damping : float or Expression
-        Damping once the contact is pressed in by more than the soft depth [N s/m].
+        Damping beyond the soft depth [N s/m].
     soft_depth : float or Expression
-        Depth over which the damping grows, so that the force does not jump [m].
+        Depth over which the damping increases, so that the force does not jump [m].
 
     Returns
     -------

@@ -1,13 +1,13 @@
-"""Flows through the pump's losses and the relief valve."""
+"""Flows of the pump with its losses and of the relief valve."""
 
 from plant.compiled.functions import Scalar, absolute, maximum, sign
 
 
 def pumped_flow(speed: Scalar, displacement: Scalar, bias: Scalar) -> Scalar:
-    """Return the flow that the pump delivers, less the flow bias, as a dead zone.
+    """Return the flow that the pump delivers: the ideal flow minus the flow bias, as a dead zone.
 
-    The paper subtracts ``sign(speed) * bias`` (equation 5.8), which would pump backward while the ideal flow is below
-    the bias; a loss cannot exceed the flow (errata E8).
+    The paper subtracts ``sign(speed) * bias`` (equation 5.8), which would pump backward if the ideal flow is below the
+    bias; a loss cannot exceed the flow (errata E8).
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ def relief_flow(pressure: Scalar, setting: Scalar, conductance: Scalar) -> Scala
     setting : float or Expression
         Pressure at which it opens [Pa].
     conductance : float or Expression
-        Flow a pascal above the setting [m^3/(s Pa)].
+        Flow per pascal above the setting [m^3/(s Pa)].
 
     Returns
     -------
     float or Expression
-        Flow from the high side to the low side [m^3/s], with the sign of the pressure.
+        Flow from the high-pressure side to the low-pressure side [m^3/s], with the sign of the pressure.
 
     Examples
     --------

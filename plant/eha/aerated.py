@@ -1,4 +1,4 @@
-"""The gear-pump actuator whose oil holds air: what a log says of its oil, beside what its rig file says of the rest."""
+"""The gear-pump actuator with air in its oil: the oil as estimated from a log, the rest as given in the rig file."""
 
 from dataclasses import dataclass, fields
 
@@ -8,9 +8,9 @@ from plant.units import si
 
 @dataclass(frozen=True, kw_only=True)
 class AeratedParameters(EhaParameters):
-    """Parameters of an actuator, and the air in its oil. Bulk modulus is that of the oil without it.
+    """Parameters of an actuator, and the air in its oil. Bulk modulus is that of the oil without air.
 
-    The circuit around it (`plant.eha.circuit_parameters.circuit_of`) has that air.
+    The circuit around it (`plant.eha.circuit_parameters.circuit_of`) has the same air fraction.
 
     Examples
     --------
@@ -29,7 +29,7 @@ def aerated(p: EhaParameters, air_fraction: float, bulk_modulus: float) -> Aerat
     p : EhaParameters
         The actuator.
     air_fraction : float
-        Volume of air over that of oil and air, at atmospheric pressure [fraction].
+        Volume of air over the volume of oil and air, at atmospheric pressure [fraction].
     bulk_modulus : float
         Bulk modulus of the oil without air [Pa].
     """

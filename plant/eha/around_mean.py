@@ -1,4 +1,4 @@
-"""The actuator in small motion about a steady velocity: where its gain falls by 3 dB."""
+"""The actuator in small motion about a steady velocity: the frequency at which its gain falls by 3 dB."""
 
 from math import pi, sqrt
 
@@ -7,14 +7,14 @@ from plant.eha.steady_state import steady_state
 
 
 def break_frequency_about(speed: float, p: EhaValues) -> float:
-    """Return the -3 dB frequency from motor speed to velocity, about the steady state of a speed.
+    """Return the -3 dB frequency from motor speed to velocity, about the steady state at a motor speed.
 
-    Equations 5.8 to 5.10, linearised: the slope of quadratic friction, a_2 + 2 a_1 v, damps a spring of oil on a mass.
+    Equations 5.8 to 5.10, linearised: the slope of quadratic friction, a_2 + 2 a_1 v, damps a mass on a spring of oil.
 
     Parameters
     ----------
     speed : float
-        Mean of the motor's speed [rad/s], positive and above the dead zone.
+        Mean motor speed [rad/s], positive and above the dead zone.
     p : EhaParameters or namespace of float
         The actuator.
 

@@ -1,11 +1,11 @@
 """The whole circuit of Figures 1 and 2: two chambers, pump, accumulator, check valves, relief, throttles, seals.
 
-Level 3 beside the reduced and the lumped plant. Oil is counted by mass, as its volume at atmospheric pressure, and
-moves between the chambers and the accumulator only, so that no scheme that keeps sums can lose any. Pressures follow
-from the equation of state of `plant.components.oil`, and are above that of the vapour by its form.
+Level 3, next to the reduced and the lumped plant. Oil is counted by mass, as its volume at atmospheric pressure, and
+moves only between the chambers and the accumulator, so no scheme that conserves sums can lose any. Pressures follow
+from the equation of state of `plant.components.oil`, and always exceed the vapour pressure.
 
-Every flow carries the density of the side it comes from, the pump's that of its outlet, so that the steady state is
-that of equations 5.7 and 5.8. Below atmospheric density at its inlet the pump fills in proportion only.
+Every flow has the density of its upstream side, the pump's that of its outlet, so that the steady state is that of
+equations 5.7 and 5.8. Below atmospheric density at its inlet the pump fills only in proportion to that density.
 """
 
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.model import load_on_rod, piston_areas
 
 CircuitValues: TypeAlias = CircuitParameters | SimpleNamespace
-"""What the model reads: the parameters, or a namespace of the same names holding expressions or arrays."""
+"""What the model reads: the parameters, or a namespace of the same names that holds expressions or arrays."""
 
 CircuitState: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
 
@@ -76,7 +76,7 @@ class OilFlows(NamedTuple):
 
 
 def chamber_volumes(position: Scalar, p: CircuitValues) -> tuple[Scalar, Scalar]:
-    """Return the volumes of chambers A and B, on average twice the lumped plant's in the middle (5.3, errata E2).
+    """Return the volumes of chambers A and B; in mid-stroke their mean is twice the lumped plant's (5.3, errata E2).
 
     Parameters
     ----------
@@ -99,14 +99,14 @@ def chamber_volumes(position: Scalar, p: CircuitValues) -> tuple[Scalar, Scalar]
 
 
 def circuit_pressures(position: Scalar, oil: tuple[Scalar, Scalar, Scalar], p: CircuitValues) -> Pressures:
-    """Return the pressures, from where the piston stands and where the oil is.
+    """Return the pressures from the piston position and the oil in each volume.
 
     Parameters
     ----------
     position : float, ndarray or Expression
         Piston position [m].
     oil : tuple of float, ndarray or Expression
-        Oil in chamber A, in chamber B, in the accumulator, as its volume at atmospheric pressure [m^3].
+        Oil in chamber A, in chamber B and in the accumulator, as its volume at atmospheric pressure [m^3].
     p : CircuitParameters or namespace of Expression
         The circuit.
 
@@ -132,7 +132,7 @@ def circuit_flows(speed: Scalar, densities: tuple[Scalar, Scalar], pressures: Pr
     speed : float or Expression
         Motor speed [rad/s].
     densities : tuple of float or Expression
-        Oil over volume in chambers A and B [dimensionless].
+        Oil divided by volume in chambers A and B [dimensionless].
     pressures : Pressures
         Absolute pressures [Pa].
     p : CircuitParameters or namespace of Expression
@@ -141,7 +141,7 @@ def circuit_flows(speed: Scalar, densities: tuple[Scalar, Scalar], pressures: Pr
     Returns
     -------
     OilFlows
-        Net oil into each, as its volume at atmospheric pressure [m^3/s].
+        Net oil flow into each, as its volume at atmospheric pressure [m^3/s].
     """
     density_a, density_b = densities
     dp = pressures.a - pressures.b
@@ -181,14 +181,14 @@ def circuit_derivative(state: CircuitState, command: Scalar, p: CircuitValues) -
         As named in `STATES`: motor speed [rad/s], presliding [dimensionless], position [m], velocity [m/s], and the
         oil in chamber A, chamber B and accumulator [m^3].
     command : float or Expression
-        Motor speed asked for [rad/s].
+        Commanded motor speed [rad/s].
     p : CircuitParameters or namespace of Expression
         The circuit.
 
     Returns
     -------
     tuple of float or Expression
-        Rates of the states, each a second.
+        Rates of the states, each per second.
     """
     motor, bristle, x, v, oil_a, oil_b, held = state
     lagging = p.motor_lag > 0.0
@@ -235,11 +235,11 @@ def observe_circuit(state: CircuitState, p: CircuitValues) -> Mapping[str, Scala
 
 
 def circuit_step_rate(p: SimpleNamespace) -> float:
-    """Return the least count of steps a second at which the integrator follows the quadratic friction.
+    """Return the smallest number of steps per second at which the integrator follows the quadratic friction.
 
     A linearly-implicit step of ``M v' = F - a_1 v |v|`` overshoots through zero and grows once the step is several
-    times ``M / (2 sqrt(a_1 F))``, as when throttle B is all but shut. The relief valve bounds the force F (equations
-    5.9 and 5.10).
+    times ``M / (2 sqrt(a_1 F))``, for example if throttle B is almost shut. The relief valve bounds the force F
+    (equations 5.9 and 5.10).
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ def circuit_step_rate(p: SimpleNamespace) -> float:
     Returns
     -------
     float
-        Steps a second [1/s].
+        Steps per second [1/s].
     """
     force = _FORCE_MARGIN * p.piston_area * p.relief_pressure
     damping = 2.0 * np.sqrt(p.friction_quadratic * force) / p.moving_mass
@@ -259,7 +259,7 @@ def circuit_step_rate(p: SimpleNamespace) -> float:
 def circuit_scales(p: SimpleNamespace | CircuitParameters) -> NDArray[np.float64]:
     """Return the error scale of each state, for error-controlled solvers.
 
-    Oil counts most: a stuck piston shakes on its seals with what a small error in pressure puts into them.
+    The error in oil matters most: a small error in pressure makes a stuck piston oscillate on its seals.
 
     Parameters
     ----------
@@ -269,9 +269,9 @@ def circuit_scales(p: SimpleNamespace | CircuitParameters) -> NDArray[np.float64
     Returns
     -------
     ndarray, shape (7,)
-        As named in `STATES`, each in its SI unit: rated speed, the whole presliding, how far the piston moves while
-        oil is squeezed up to the relief pressure, a third of its speed at rated flow, a sixtieth of the oil that a
-        chamber takes up to that pressure. The shares are judged by the error that a given effort leaves.
+        As named in `STATES`, each in its SI unit: rated speed, the whole presliding, the piston's travel while oil is
+        compressed up to the relief pressure, a third of its speed at rated flow, a sixtieth of the oil that a chamber
+        takes up to that pressure. The fractions are judged by the error that remains for a given effort.
 
     Examples
     --------
@@ -290,14 +290,15 @@ _RATED_VOLTS = 4.0
 """Voltage of the rated speed in the paper's experiments [V]."""
 
 _FORCE_MARGIN = 1.5
-"""Largest force on the piston over that at the relief setting: what the valve's slope and a reversal add."""
+"""Largest force on the piston over the force at the relief setting: the valve's slope and a reversal raise it."""
 
 _DAMPING_A_STEP = 1.5
-"""Damping rate times step size that the linearly-implicit step takes without overshoot, found by trial."""
+"""Largest product of damping rate and step size for which the linearly-implicit step does not overshoot, found by
+trial."""
 
 
 def circuit_breaches(states: NDArray[np.float64]) -> Mapping[str, NDArray[np.bool_]]:
-    """Return the samples at which a run left the model's validity, by reason.
+    """Return the samples at which a run is outside the model's validity, by reason.
 
     Parameters
     ----------
@@ -307,7 +308,7 @@ def circuit_breaches(states: NDArray[np.float64]) -> Mapping[str, NDArray[np.boo
     Returns
     -------
     Mapping[str, ndarray]
-        Reason, and the samples at which it holds, shape (n,).
+        For each reason the samples at which it applies, shape (n,).
     """
     return {
         "a chamber ran out of oil": np.minimum(states[:, 4], states[:, 5]) <= 0.0,

@@ -1,4 +1,4 @@
-"""Parameters of the circuit-level plant: those of the actuator, and what the lumped plant leaves out."""
+"""Parameters of the circuit-level plant: the actuator's, and those that the lumped plant omits."""
 
 from dataclasses import asdict, dataclass, fields
 from types import SimpleNamespace
@@ -17,9 +17,9 @@ from plant.units import si
 class CircuitParameters(EhaParameters):
     """Parameters of the whole circuit of Figures 1 and 2, normal condition by default.
 
-    ``leakage_coefficient`` stays the lumped L_t of all paths; what the pump and the drain do not take flows inside the
-    cylinder and through throttle A (`cylinder_leakage`, errata E17). Each chamber's volume is twice ``chamber_volume``,
-    so that this is the same actuator as the lumped one (errata E2).
+    ``leakage_coefficient`` is still the lumped L_t of all paths; the part that does not flow through pump and drain
+    flows inside the cylinder and through throttle A (`cylinder_leakage`, errata E17). Each chamber's volume is twice
+    ``chamber_volume``, so that this is the same actuator as the lumped one (errata E2).
 
     Raises
     ------
@@ -73,16 +73,16 @@ class CircuitParameters(EhaParameters):
 
     @property
     def cylinder_leakage(self) -> float:
-        """Leakage L_in inside the cylinder and through throttle A, what is left of L_t by errata E17 [m^3/(s Pa)]."""
+        """Leakage L_in inside the cylinder and through throttle A: the remainder of L_t by errata E17 [m^3/(s Pa)]."""
         drained = self.pump_case_leakage + self.cylinder_drain_leakage
         return self.leakage_coefficient - self.pump_crossport_leakage - 0.5 * drained
 
     @property
     def settled_leakage(self) -> float:
-        """Leakage in the steady state [m^3/(s Pa)], what equation 5.7 measures.
+        """Leakage in the steady state [m^3/(s Pa)], as measured by equation 5.7.
 
-        Errata E17's halves hold while both chambers float. Make-up holds the low one at the accumulator's pressure
-        before long, and then the drain takes its whole from the high one.
+        The halves of errata E17 are valid while both chambers float. Make-up soon holds the low-pressure chamber at the
+        accumulator's pressure, and then the drain takes all its flow from the high-pressure chamber.
         """
         return self.leakage_coefficient + 0.5 * (self.pump_case_leakage + self.cylinder_drain_leakage)
 
@@ -121,13 +121,13 @@ class CircuitParameters(EhaParameters):
 
 
 MOST_AIR = 0.5
-"""Largest air fraction that still makes an oil with bubbles of it rather than a foam."""
+"""Largest air fraction at which the mixture is oil with bubbles rather than a foam."""
 
 _FULLEST = 0.95
-"""Largest share of a chamber that the piston may sweep: past the end stop there is still volume."""
+"""Largest fraction of a chamber that the piston may sweep, so that volume remains beyond the end stop."""
 
 _ROUNDING = 1e-9
-"""Share of L_t by which rounding may leave the cylinder's part below zero."""
+"""Fraction of L_t by which the cylinder's part may be negative due to rounding."""
 
 
 def oil_demand(p: CircuitParameters) -> float:
@@ -146,7 +146,7 @@ def oil_demand(p: CircuitParameters) -> float:
 
 
 def longest_stroke(p: EhaParameters | SimpleNamespace) -> Any:
-    """Return the stroke that the chambers of an actuator have room for.
+    """Return the longest stroke that fits into the chambers of an actuator.
 
     Parameters
     ----------
@@ -169,15 +169,15 @@ def longest_stroke(p: EhaParameters | SimpleNamespace) -> Any:
 
 
 def circuit_of(p: EhaParameters) -> CircuitParameters:
-    """Return the circuit around an actuator: itself if it is one, else with the paper's rest, scaled to fit.
+    """Return the circuit around an actuator: a circuit unchanged, else with the paper's other parameters, scaled.
 
-    Leakage of the pump is at most its share of L_t; the accumulator grows with the compliance of the chambers. A stroke
-    that is not known is no longer than the chambers have room for.
+    Leakage of the pump is at most its share of L_t; the accumulator grows with the compliance of the chambers. An
+    unknown stroke is at most as long as the chambers allow.
 
     Returns
     -------
     CircuitParameters
-        The circuit; all that the actuator has of its own is kept.
+        The circuit; it keeps all of the actuator's own parameters.
 
     Raises
     ------
@@ -209,7 +209,7 @@ _PLACES = {field.name: place for place, field in enumerate(fields(CircuitParamet
 
 
 class CircuitRows:
-    """Parameters of circuits by name, looked up in their rows: most who ask read a few of forty.
+    """Parameters of circuits by name, read from their rows on access: most callers read only a few of forty.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ class CircuitRows:
 
 
 def circuit_values(rows: Array) -> Any:
-    """Return a circuit's parameters by name, from a row of them, or from rows of many circuits.
+    """Return a circuit's parameters by name, from one row or from rows of many circuits.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""States in which the circuit begins: at rest, or under the pressure that a log begins with."""
+"""Initial states of the circuit: at rest, or under the pressure at the start of a log."""
 
 from plant.compiled.functions import Scalar, maximum, minimum, where
 from plant.components.oil import specific_volume
@@ -6,7 +6,7 @@ from plant.eha.circuit import CircuitState, CircuitValues, chamber_volumes
 
 
 def at_rest(p: CircuitValues) -> CircuitState:
-    """Return the state at rest in mid-stroke: both chambers at the accumulator's pressure, or one above it for a load.
+    """Return the state at rest in mid-stroke: both chambers at the accumulator's pressure, or one higher under a load.
 
     Parameters
     ----------
@@ -22,9 +22,9 @@ def at_rest(p: CircuitValues) -> CircuitState:
 
 
 def under_pressure(pressure: Scalar, velocity: Scalar, p: CircuitValues) -> CircuitState:
-    """Return a state in mid-stroke under a differential pressure: one chamber stands above the accumulator's pressure.
+    """Return a state in mid-stroke under a differential pressure: one chamber is above the accumulator's pressure.
 
-    The seals are strained as far as what pushes the piston strains them.
+    The seals are deflected as far as the force on the piston deflects them.
 
     Parameters
     ----------

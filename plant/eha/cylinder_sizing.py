@@ -1,7 +1,7 @@
-"""Sizes of a double-acting cylinder and its circuit from what it shall do, section 5.1 of the diaphragm-motor paper.
+"""Sizing of a double-acting cylinder and its circuit for a given duty, section 5.1 of the diaphragm-motor paper.
 
-A cylinder with one rod between a 4/3 directional valve, a pump with relief valve, check valves and pipes. The paper
-says that these were determined and gives no numbers. Steady balances only; standard bores and rods are ISO 3320's.
+A single-rod cylinder with a 4/3 directional valve, a pump with relief valve, check valves and pipes. The paper says
+that these were determined and gives no numbers. Only steady balances; standard bores and rods are from ISO 3320.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ RODS_MM = (
 """Standard diameters, ISO 3320 [mm]."""
 
 STEEL_STIFFNESS, BUCKLING_SAFETY = 2.1e11, 3.5
-"""Young's modulus of the rod [Pa], and how far below Euler's load it stays [dimensionless]."""
+"""Young's modulus of the rod [Pa], and the safety factor against Euler's load [dimensionless]."""
 
 LARGEST_ROD_SHARE = 0.75
-"""A rod is at most this share of its bore [dimensionless]."""
+"""Largest ratio of rod to bore diameter [dimensionless]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +66,7 @@ class Duty:
 
 @dataclass(frozen=True)
 class CylinderCircuit:
-    """A cylinder with the flows, pressures and sizes of what is around it."""
+    """A cylinder with the flows, pressures and sizes of the circuit around it."""
 
     bore: Annotated[float, SI("m", "bore of the cylinder", "section 5.1")]
     rod: Annotated[float, SI("m", "diameter of the rod", "section 5.1")]
@@ -89,14 +89,14 @@ class CylinderCircuit:
 
 
 def buckling_rod(force: float, stroke: float) -> float:
-    """Return the rod that carries a force wholly out, one end free: Euler's load ``pi^2 E I/(2 L)^2``, with safety.
+    """Return the rod that carries a force at full extension, one end free: Euler's load ``pi^2 E I/(2 L)^2``, safely.
 
     Parameters
     ----------
     force : float
         Pushing force [N].
     stroke : float
-        Length L that is out [m].
+        Extended length L [m].
 
     Returns
     -------
@@ -163,17 +163,17 @@ def cylinder_circuit(duty: Duty, bore: float, rod: float) -> CylinderCircuit:
 
 
 def size_cylinder(duty: Duty) -> CylinderCircuit:
-    """Return the smallest standard cylinder that does its duty, with its circuit (section 5.1).
+    """Return the smallest standard cylinder that meets its duty, with its circuit (section 5.1).
 
     Returns
     -------
     CylinderCircuit
-        With the smallest bore, and the thinnest rod that does not buckle when the load blocks it at the relief setting.
+        With the smallest bore, and the thinnest rod that does not buckle if the load is blocked at the relief setting.
 
     Raises
     ------
     HydrostateError
-        If no standard cylinder does it, naming what is in the way.
+        If no standard cylinder meets the duty; the message names the reason.
 
     Examples
     --------

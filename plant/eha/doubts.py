@@ -1,7 +1,7 @@
-"""Default uncertainties of a gear-pump actuator's rig entries, where its rig file gives none.
+"""Default uncertainties of a gear-pump actuator's rig entries, for entries without one in the rig file.
 
-Nobody hands over a rig file with error bars, and bulk modulus is known no better than the volume that it is counted
-over. Each entry below is what one would bet on a figure from a catalogue, and on one that was measured on the bench.
+Nobody supplies a rig file with error bars, and bulk modulus is known no better than the volume to which it refers. Each
+entry below is what one would bet on a figure from a catalogue, and on a figure measured on the bench.
 """
 
 from collections.abc import Collection, Mapping
@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 PRESSURE_GAIN = "pressure_gain"
-"""What the gain of the differential pressure is called: an entry of its uncertainty alone, its value is 1."""
+"""Name of the gain of the differential pressure: it has only an uncertainty, its value is 1."""
 
 
 class Spread(NamedTuple):
@@ -19,7 +19,7 @@ class Spread(NamedTuple):
     Parameters
     ----------
     down, up : float
-        Standard deviation of its logarithm below and above the value given [dimensionless].
+        Standard deviation of its logarithm below and above the given value [dimensionless].
     """
 
     down: float
@@ -27,7 +27,7 @@ class Spread(NamedTuple):
 
     @staticmethod
     def of(one: "float | Spread") -> "Spread":
-        """Return a spread, of one number that is alike either way.
+        """Return a spread from one number that is the same in both directions.
 
         Parameters
         ----------
@@ -37,21 +37,21 @@ class Spread(NamedTuple):
         Returns
         -------
         Spread
-            Itself if it is one.
+            The argument itself if it is a spread.
         """
         return one if isinstance(one, Spread) else Spread(one, one)
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """Default uncertainty of an entry, where a rig file gives none.
+    """Default uncertainty of an entry without one in the rig file.
 
     Parameters
     ----------
     usual, measured : Spread
-        Of a figure from a drawing or a catalogue, and of one that was measured on the bench.
+        Spread of a figure from a drawing or a catalogue, and of a figure measured on the bench.
     reason : str
-        Where both come from.
+        Origin of both.
     """
 
     usual: Spread
@@ -103,7 +103,8 @@ DOUBTS: Mapping[str, Doubt] = {
         "temperatures; measured against a reference gauge, class A, within 0.5 %",
     ),
 }
-"""Of each entry that is doubted; any other is taken as known where the rig file does not say."""
+"""Default uncertainty of each uncertain entry; any other entry is taken as known unless the rig file gives an
+uncertainty."""
 
 
 def spreads_of(doubts: Mapping[str, Doubt], given: Mapping[str, float], measured: Collection[str]) -> dict[str, Spread]:
@@ -112,16 +113,16 @@ def spreads_of(doubts: Mapping[str, Doubt], given: Mapping[str, float], measured
     Parameters
     ----------
     doubts : Mapping[str, Doubt]
-        What is not known unless said.
+        Default uncertainties.
     given : Mapping[str, float]
-        What a rig file says: relative standard deviation [fraction].
+        Uncertainties in a rig file: relative standard deviation [fraction].
     measured : collection of str
-        Entries that it says were measured.
+        Entries that the file says were measured.
 
     Returns
     -------
     dict[str, Spread]
-        By entry; what the file says goes before what is doubted of all.
+        By entry; the file's uncertainty takes precedence over the default.
 
     Examples
     --------

@@ -8,14 +8,14 @@ from plant.errors import DriveError
 from plant.runs import require_positive
 
 LIMIT_SLACK = 1e-9
-"""Fraction by which a limit may be passed, for rounding."""
+"""Fraction by which a limit may be exceeded, for rounding."""
 
 
 def check_drive(speed: NDArray[np.float64], sample_time: float, parameters: EhaParameters) -> None:
-    """Refuse a drive that the motor or the stroke does not allow.
+    """Refuse a drive that exceeds the motor's limit or the stroke.
 
-    The stroke needed is the range of the ideal displacement, ``pump_displacement / piston_area`` times the
-    integral of speed; losses only shorten it.
+    The required stroke is the range of the ideal displacement, ``pump_displacement / piston_area`` times the integral
+    of speed; losses only shorten it.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Drive signals: motor speed over time, within the limits of speed and stroke.
 
-Every signal is a pure function of its description and, where it is random, of a generator. Amplitudes are
-motor speeds [rad/s]; the paper's 4 V are ``parameters.rated_speed``.
+Every signal is a pure function of its description and, if it is random, of a generator. Amplitudes are motor speeds
+[rad/s]; the paper's 4 V are ``parameters.rated_speed``.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,14 +20,14 @@ Drive: TypeAlias = Callable[[float, float, EhaParameters, np.random.Generator], 
 """A drive by name: duration [s], sample time [s], actuator and generator in, motor speed [rad/s] out."""
 
 STEPS = 9
-"""Steps in the validation signal of section 6."""
+"""Number of steps in the validation signal of section 6."""
 
 HOLD_TIME = 0.05
-"""Hold time of the drive "prbs" [s], the slow end of what identifying a 25 Hz bandwidth needs."""
+"""Hold time of the drive "prbs" [s], the slow end of the range for identifying a 25 Hz bandwidth."""
 
 
 def sine(duration: float, sample_time: float, amplitude: float, frequency: float = 10.0) -> NDArray[np.float64]:
-    """Return a sine; at 10 Hz and 4 V the paper's signal for bulk modulus, section 7.
+    """Return a sine; with 10 Hz and 4 V it is the paper's signal for bulk modulus, section 7.
 
     Parameters
     ----------
@@ -102,17 +102,17 @@ def prbs(
 ) -> NDArray[np.float64]:
     """Return a random binary signal with zero mean, the identification signal of section 4.
 
-    The paper says "5 Hz" without saying of what: clocked at 5 Hz it holds 200 ms, at a fundamental of 5 Hz
-    100 ms. Identifying a 25 Hz bandwidth needs a hold of 10 to 50 ms; a 200 ms hold leaves the response at
-    25 Hz several times less certain. Half of the holds are positive, in random order, so that the mean is
-    zero and the piston comes back (up to one hold, when their number is odd or the last is cut short).
+    The paper says "5 Hz" without further explanation: clocked at 5 Hz it holds 200 ms, at a fundamental of 5 Hz 100 ms.
+    Identifying a 25 Hz bandwidth needs a hold of 10 to 50 ms; a 200 ms hold leaves the response at 25 Hz several times
+    less certain. Half of the holds are positive, in random order, so that the mean is zero and the piston returns (to
+    within one hold, if their number is odd or the last is cut short).
 
     Parameters
     ----------
     duration, sample_time : float
         Length of the signal and time between samples [s].
     amplitude : float
-        Motor speed, held with either sign [rad/s].
+        Magnitude of the motor speed, held with either sign [rad/s].
     hold_time : float
         Time between chances to switch [s], rounded to whole samples.
     rng : numpy.random.Generator
@@ -157,7 +157,7 @@ def nine_steps(
     duration, sample_time : float
         Length of the signal and time between samples [s].
     parameters : EhaParameters
-        The actuator, for its motor speed a volt.
+        The actuator, for its motor speed per volt.
     rng : numpy.random.Generator
         Source of the magnitudes.
     lowest_volts, highest_volts : float
@@ -198,9 +198,8 @@ def multisine(
 ) -> NDArray[np.float64]:
     """Return a periodic sum of equal sines at every multiple of ``1 / period`` in a band.
 
-    Schroeder's phases (IEEE Transactions on Information Theory 16, 1970, page 85) keep the peak low for the
-    power, so that the drive stays out of the dead zone; the generator picks where in the period the signal
-    starts.
+    Schroeder's phases (IEEE Transactions on Information Theory 16, 1970, page 85) keep the peak low for the power, so
+    that the drive stays out of the dead zone; the generator picks the point of the period at which the signal starts.
 
     Parameters
     ----------
@@ -213,7 +212,7 @@ def multisine(
     lowest, highest : float
         Band [Hz], below half the sampling frequency.
     period : float
-        Period [s]; whole periods in the duration leave no leakage in a Fourier transform.
+        Period [s]; a whole number of periods in the duration avoids leakage in a Fourier transform.
 
     Returns
     -------
@@ -270,7 +269,7 @@ def make_drive(
     parameters : EhaParameters
         The actuator.
     rng : numpy.random.Generator
-        Source of what is random in the drive.
+        Source of the drive's randomness.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """The gear-pump electro-hydrostatic actuator: its parameters, and its reduced and lumped models.
 
-Level 1, *reduced*, is equation 5.14 solved for the third derivative of position: the plant that the paper's own
-filter assumes. Level 2, *lumped*, keeps the flow balance 5.8 and the force balance 5.9 apart, with differential
-pressure as a state, so that friction enters undifferentiated and the piston really sticks (errata E9).
+Level 1, *reduced*, is equation 5.14 solved for the third derivative of position: the plant that the paper's own filter
+assumes. Level 2, *lumped*, keeps the flow balance 5.8 and the force balance 5.9 separate, with differential pressure as
+a state, so that friction is not differentiated and the piston really sticks (errata E9).
 """
 
 from collections.abc import Mapping
@@ -96,7 +96,7 @@ class EhaParameters:
 
     @property
     def single_rod(self) -> bool:
-        """Whether the piston has unlike areas, so that make-up valves open at every stroke."""
+        """Whether the piston has unequal areas, so that make-up valves open at every stroke."""
         return self.area_difference != 0.0
 
     @property
@@ -106,20 +106,21 @@ class EhaParameters:
 
 
 PAIRS: Mapping[str, str] = {"piston_area": "area_difference", "chamber_volume": "volume_difference"}
-"""Entries that a rig file may give as two numbers, of sides A and B: mean, and their difference over their sum."""
+"""Entries that a rig file may give as two numbers, for sides A and B: each with the entry for their difference over
+their sum."""
 
 SIZED_BY_PUMP = ("relief_conductance", "makeup_conductance")
-"""Entries that go with the flow of the pump where a rig file does not give them: what is judged of the paper's."""
+"""Entries that scale with the pump's flow unless a rig file gives them: judged values of the paper's valves."""
 
 JUDGED_STROKE = 0.25
-"""Stroke [m] of a simulated actuator whose own is not known: the paper gives none."""
+"""Stroke [m] of a simulated actuator with unknown stroke: the paper gives none."""
 
 
 PARAMETER_NAMES = parameter_names(EhaParameters)
 """Order of the columns of a parameter row."""
 
 EhaValues: TypeAlias = EhaParameters | SimpleNamespace
-"""What the models read: the parameters, or a namespace of the same names holding expressions."""
+"""What the models read: the parameters, or a namespace of the same names that holds expressions."""
 
 
 def piston_areas(p: EhaValues) -> tuple[Scalar, Scalar]:
@@ -139,7 +140,7 @@ def piston_areas(p: EhaValues) -> tuple[Scalar, Scalar]:
 
 
 def load_on_rod(position: Scalar, p: EhaValues) -> Scalar:
-    """Return the force that holds the rod back: a constant load and a spring.
+    """Return the load force on the rod: a constant load and a spring.
 
     Parameters
     ----------
@@ -161,8 +162,8 @@ def reduced_derivative(
 ) -> tuple[Scalar, Scalar, Scalar]:
     """Return the rates of the reduced model, equation 5.14 with errata E3, E8 and E19.
 
-    Valid between reversals only: it holds the sign of the velocity constant where equation 5.13 differentiates
-    the Coulomb force (errata E9).
+    Valid only between reversals: it holds the sign of the velocity constant when equation 5.13 differentiates the
+    Coulomb force (errata E9).
 
     Parameters
     ----------
@@ -220,9 +221,9 @@ def lumped_step(
 ) -> tuple[Scalar, Scalar, Scalar]:
     """Advance the lumped model by one L-stable implicit step, with friction as a set-valued law (errata E9).
 
-    Each of the two stages of the SDIRK2 scheme is an implicit Euler step, which for these equations is a quadratic
-    in the new velocity and solved in closed form (`sliding`). When the first stage ends stuck, the
-    second starts from rest: friction has absorbed the momentum.
+    Each of the two stages of the SDIRK2 scheme is an implicit Euler step, which for these equations is a quadratic in
+    the new velocity, solved in closed form (`sliding`). If the first stage ends stuck, the second starts from rest:
+    friction has absorbed the momentum.
 
     Parameters
     ----------
@@ -238,7 +239,7 @@ def lumped_step(
     Returns
     -------
     tuple of float or Expression
-        The state one step later.
+        The state after the step.
 
     Examples
     --------
@@ -257,9 +258,9 @@ def lumped_step(
 
 
 class _Solved(NamedTuple):
-    """A stage with its valve shut or open; ``held`` and ``filled`` say by how much pressure gives way.
+    """A stage with its valve shut or open; ``held`` and ``filled`` describe the pressure.
 
-    Without the piston's motion pressure would be ``filled / held``.
+    Without motion of the piston the pressure would be ``filled / held``.
     """
 
     held: Scalar
@@ -271,9 +272,9 @@ class _Solved(NamedTuple):
 def _implicit_stage(
     base: tuple[Scalar, Scalar, Scalar], speed: Scalar, p: EhaValues, h: Scalar, late: Scalar = None
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """Solve ``y = base + h f(y)`` of the lumped model, with the relief valve shut, then open if the answer says so.
+    """Solve ``y = base + h f(y)`` of the lumped model, with the relief valve shut, then open if the pressure opens it.
 
-    ``late`` is what the base is affine in and comes last.
+    The base is affine in ``late``, which is the last quantity to be computed.
     """
     A, L, C = p.piston_area, p.leakage_coefficient, p.relief_conductance
     pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
@@ -307,7 +308,7 @@ def _solved(
 def _with_slopes(
     base: tuple[Scalar, Scalar, Scalar], solved: _Solved, leaking: Scalar, delivered: Scalar, p: EhaValues, h: Scalar
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """Return the stage's state, with derivatives from the balances of force and flow that it solves."""
+    """Return the stage's state, with derivatives from its balances of force and flow."""
     x, v, dp = base
     A, M, a1, a2, a3 = p.piston_area, p.moving_mass, p.friction_quadratic, p.friction_linear, p.friction_coulomb
     held, filled, new_v, root = solved

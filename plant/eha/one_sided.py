@@ -1,6 +1,6 @@
-"""The circuit whose make-up valves of chambers A and B are not alike: one is stuck shut, or leaks past its seat.
+"""The circuit with unequal make-up valves of chambers A and B: one is stuck shut, or its seat leaks.
 
-Its parameters are the circuit's and go on with four more, so a row of one tells by its length which it is.
+Its parameters are the circuit's followed by four more, so the length of a row tells which circuit it is.
 """
 
 from collections.abc import Iterator
@@ -23,12 +23,12 @@ from plant.units import si
 
 @dataclass(frozen=True, kw_only=True)
 class OneSidedParameters(CircuitParameters):
-    """Parameters of a circuit, and what is wrong with the make-up valve of either chamber; nothing by default.
+    """Parameters of a circuit, and the faults of the make-up valve of each chamber; no fault by default.
 
     Raises
     ------
     RigError
-        As `CircuitParameters`, and if more of a valve is shut than there is.
+        As for `CircuitParameters`, and if the stuck share of a valve exceeds 1.
 
     Examples
     --------
@@ -49,7 +49,7 @@ class OneSidedParameters(CircuitParameters):
 
 
 def one_sided(p: CircuitParameters, **faults: float) -> OneSidedParameters:
-    """Return a circuit with something wrong with its make-up valves.
+    """Return a circuit with faults of its make-up valves.
 
     Parameters
     ----------
@@ -67,14 +67,14 @@ def one_sided_derivative(state: CircuitState, command: Scalar, p: OneSidedParame
     state : tuple of float or Expression
         As named in `plant.eha.circuit.STATES` [SI].
     command : float or Expression
-        Motor speed asked for [rad/s].
+        Commanded motor speed [rad/s].
     p : OneSidedParameters or namespace of Expression
         The circuit.
 
     Returns
     -------
     tuple of float or Expression
-        Rates of the states, each a second.
+        Rates of the states, each per second.
     """
     *others, into_a, into_b, into_supply = circuit_derivative(state, command, p)
     _, _, position, _, *oil = state
@@ -102,25 +102,25 @@ _WIDTH = len(parameter_names(OneSidedParameters))
 
 
 def circuit_plant(width: int) -> Plant:
-    """Return the circuit, or the one with unlike make-up valves.
+    """Return the circuit, or the circuit with unequal make-up valves.
 
     Parameters
     ----------
     width : int
-        How many parameters its row has.
+        Number of parameters in its row.
     """
     return ONE_SIDED if width == _WIDTH else CIRCUIT
 
 
 def as_wide(row: Array, width: int) -> Array:
-    """Return a row of parameters with as many as another circuit's: where valves are alike, nothing is wrong.
+    """Return a parameter row extended to another circuit's width; the added fault parameters are zero.
 
     Parameters
     ----------
     row : ndarray, shape (parameters,)
         The circuit [SI].
     width : int
-        How many parameters the other has.
+        Number of parameters of the other circuit.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def circuit_groups(
     drive_tolerance: float,
     bulge: float,
 ) -> Iterator[Array]:
-    """Run circuits of one kind side by side in steps of controlled error, some at a time.
+    """Run circuits of one kind side by side in error-controlled steps, in groups.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`ParameterPath`: the actuator's parameters over time, for faults that come and grow."""
+"""`ParameterPath`: the actuator's parameters over time, for faults that appear and grow."""
 
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
@@ -17,9 +17,9 @@ Growth: TypeAlias = Literal["step", "linear"]
 
 @dataclass(frozen=True)
 class ParameterPath:
-    """Parameters given at some times, and how they change between.
+    """Parameters given at several times, and their change between these times.
 
-    Before the first time the first parameters hold, after the last time the last ones.
+    The first parameters hold before the first time, and the last ones after the last time.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class ParameterPath:
 
     @classmethod
     def constant(cls, parameters: EhaParameters) -> "ParameterPath":
-        """Return the path on which nothing changes."""
+        """Return the path of constant parameters."""
         return cls((0.0,), (parameters,))
 
     @property

@@ -1,6 +1,6 @@
-"""The rig file: an actuator's parameters, how well they are known, and what its logs call the channels.
+"""The rig file: an actuator's parameters, their uncertainties, and the names of the channels in its logs.
 
-A rig is of any kind of actuator: its parameters are a frozen dataclass whose fields carry `SI` notes.
+A rig may be of any kind of actuator: its parameters are a frozen dataclass whose fields carry `SI` notes.
 """
 
 from collections.abc import Iterable, Mapping
@@ -33,14 +33,14 @@ _EXAMPLES: Mapping[str, str] = {
 
 
 EHA = "eha"
-"""What a rig file calls the gear-pump actuator; one that names no plant is taken for what is needed."""
+"""Name of the gear-pump actuator in a rig file; a file without a plant is read as the kind that is required."""
 
 UNNAMED = "paper"
-"""Name of the rig without a rig file, and of a rig file until its owner gives another."""
+"""Name of the rig if there is no rig file, and of a rig file until its owner gives another."""
 
 MOST_UNCERTAIN = 2.0
-"""Largest relative standard deviation [fraction]: what is worse known is not known at all, and a larger number is a
-percentage that should be a fraction. Of 1 and 2 that cannot be told."""
+"""Largest relative standard deviation [fraction]: a larger one means that the value is unknown, or that a percentage
+was given as a fraction. For 1 and 2 that cannot be decided."""
 
 UNEQUAL_SIDES = (*PAIRS.values(), "pilot_share")
 """Entries that two numbers for sides A and B set: a template has them as comments, so that they do not contradict."""
@@ -49,7 +49,7 @@ P = TypeVar("P", default=EhaParameters)
 
 
 SIZED = f",\n# except {' and '.join(SIZED_BY_PUMP)}, which then go with the pump's flow."
-"""What the template says of entries that are left out."""
+"""Remark in the template on omitted entries."""
 
 
 @dataclass(frozen=True)
@@ -59,25 +59,26 @@ class Rig(Generic[P]):
     Parameters
     ----------
     name : str
-        What reports call it.
+        Name in reports.
     parameters : dataclass
-        Its parameters, SI; the paper's gear-pump actuator by default. A file that leaves out the conductances of the
-        valves has them sized by its pump; given here, they are what they are (`plant.eha.scales.with_valves_sized`).
+        Its parameters, SI; the paper's gear-pump actuator by default. If a file omits the conductances of the valves,
+        they are sized by its pump; given here, they are not changed (`plant.eha.scales.with_valves_sized`).
     uncertainties : Mapping[str, float]
-        Relative standard deviation by parameter, a fraction, 0.3 for 30 %, or of the `pressure_gain`; what has none is
-        known as well as `plant.eha.doubts.DOUBTS` says.
+        Relative standard deviation by parameter, a fraction, 0.3 for 30 %, or of the `pressure_gain`; the default is
+        that of `plant.eha.doubts.DOUBTS`.
     columns : Mapping[str, str]
         Foreign log columns by channel: ``{"position_m": "POS_MM:mm"}``.
     measured : tuple of str
-        Entries that were measured on the bench, so that less is doubted of them.
+        Entries that were measured on the bench, whose default uncertainty is smaller.
     plant : str or None
-        Kind of actuator that its file was read as; None of a rig without a file.
+        Kind of actuator as which its file was read; None for a rig without a file.
 
     Raises
     ------
     RigError
-        If an uncertainty is of no parameter or negative, if what was measured is nothing that is doubted or has an
-        uncertainty too, or if either is said of an entry without a value, or if a column's channel or unit is unknown.
+        If an uncertainty is negative or of an unknown entry, if a measured entry has no default uncertainty or has an
+        own uncertainty as well, if either is given for an entry without a value, or if a column's channel or unit is
+        unknown.
 
     Examples
     --------
@@ -116,27 +117,27 @@ class Rig(Generic[P]):
 
     @property
     def spreads(self) -> Mapping[str, Spread]:
-        """Uncertainty of each entry: that of the rig file, else the default of such a figure."""
+        """Uncertainty of each entry: that of the rig file, else the default."""
         return spreads_of(doubts_of(self.parameters), self.uncertainties, self.measured)
 
 
 def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant: str = EHA) -> Rig[Any]:
-    """Read a rig file; what it leaves out keeps the default, a name that is the template's gives way to the file's.
+    """Read a rig file; omitted entries keep their default, and the template's name is replaced by the file's name.
 
     Parameters
     ----------
     path : str or Path
-        A TOML file as `rig_template` writes it.
+        A TOML file in the format of `rig_template`.
     parameter_class : type
-        What holds the parameters of the actuator that is wanted.
+        Class of the required actuator's parameters.
     plant : str
-        What that actuator is called.
+        Name of that kind of actuator.
 
     Raises
     ------
     RigError
-        If the file cannot be read or is no TOML, is of another kind of actuator, or an entry is unknown, of the wrong
-        kind, out of range, or of a size that no actuator has in SI.
+        If the file cannot be read or is not TOML, is of another kind of actuator, or an entry is unknown, of the wrong
+        type, out of range, or of a size that no actuator has in SI.
     """
     from plant.eha.rig_entries import wrong_kinds
 
@@ -151,17 +152,17 @@ def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant
 
 
 def plant_of(path: str | Path) -> str | None:
-    """Return which kind of actuator a rig file says that it describes.
+    """Return the kind of actuator that a rig file names.
 
     Returns
     -------
     str or None
-        Its ``plant``; None where it names none.
+        Its ``plant``; None if it names none.
 
     Raises
     ------
     RigError
-        If the file cannot be read or is no TOML.
+        If the file cannot be read or is not TOML.
     """
     plant = _content(Path(path)).get("plant")
     return plant if isinstance(plant, str) else None
@@ -200,7 +201,7 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
 
 
 def _require_on_top(content: Mapping[str, Any]) -> None:
-    """Refuse an entry of the whole file that stands below the line of a section, of which TOML makes it a part."""
+    """Refuse an entry of the whole file that stands below a section's line, since TOML makes it part of the section."""
     for section in ("parameters", "uncertainty", "columns"):
         entries = content.get(section)
         for name in ("name", "plant", "measured"):
@@ -213,7 +214,7 @@ def _pairs_of(parameter_class: type[Any]) -> Mapping[str, str]:
 
 
 def _unpaired(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[str, Any]:
-    """Return a file's values, with pairs for sides A and B as their mean and relative difference."""
+    """Return a file's values; pairs for sides A and B become their mean and relative difference."""
     values = dict(given)
     for name, difference in pairs.items():
         pair = given.get(name)
@@ -253,16 +254,16 @@ def rig_template(
     Parameters
     ----------
     parameter_class : type
-        What holds them; the paper's gear-pump actuator by default.
+        Class of the parameters; the paper's gear-pump actuator by default.
     plant : str
-        What the kind of actuator is called.
+        Name of the kind of actuator.
     columns : Mapping[str, str]
         An example of a foreign column by channel.
 
     Returns
     -------
     str
-        The text; `read_rig` makes default parameters of it.
+        The text; `read_rig` reads it as default parameters.
 
     Examples
     --------
@@ -325,14 +326,14 @@ def _uncertainty_lines(parameter_class: type[Any]) -> list[str]:
 
 
 def write_rig_template(path: str | Path, template: str | None = None) -> None:
-    """Write a commented rig file, unless a file of that name is there.
+    """Write a commented rig file, unless a file of that name exists.
 
     Parameters
     ----------
     path : str or Path
-        Where to.
+        The file to write.
     template : str, optional
-        As `rig_template` gives it; that of the paper's actuator if not given.
+        A text from `rig_template`; that of the paper's actuator if not given.
 
     Raises
     ------

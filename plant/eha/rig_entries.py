@@ -1,4 +1,4 @@
-"""Schema of a rig file, checked by pydantic, which is needed only where a rig file is read."""
+"""Schema of a rig file, checked by pydantic, which is needed only to read a rig file."""
 
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
@@ -18,7 +18,7 @@ class RigEntries(BaseModel):
     Parameters
     ----------
     name, plant : str
-        What reports call the rig, and the kind of actuator.
+        Name of the rig in reports, and the kind of actuator.
     measured : tuple of str
         Entries that were measured on the bench.
     parameters : dict
@@ -40,14 +40,14 @@ class RigEntries(BaseModel):
 
 
 def numbers_of(given: Mapping[str, Any], parameter_class: type[Any]) -> dict[str, Any]:
-    """Return the parameters that a file gives as numbers, or rows of numbers where the class has rows.
+    """Return the parameters that a file gives as numbers, or as rows of numbers if the class has rows.
 
     Parameters
     ----------
     given : Mapping[str, Any]
-        What the file says.
+        Entries of the file.
     parameter_class : type
-        What holds the parameters.
+        Class of the parameters.
 
     Returns
     -------
@@ -62,12 +62,12 @@ def numbers_of(given: Mapping[str, Any], parameter_class: type[Any]) -> dict[str
 
 @contextmanager
 def wrong_kinds() -> Generator[None]:
-    """Raise our error where an entry of a rig file is of the wrong kind.
+    """Raise our error if an entry of a rig file has the wrong type.
 
     Raises
     ------
     RigError
-        With the entry, what it must be, and what it is.
+        The message names the entry, its required type, and its actual type.
     """
     try:
         yield

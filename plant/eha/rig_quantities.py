@@ -1,4 +1,4 @@
-"""`numbers_with_units(...)`: entries of a rig file such as ``"3.5 cm^3/rev"``, as a nameplate has them, in SI."""
+"""`numbers_with_units(...)`: entries of a rig file such as ``"3.5 cm^3/rev"``, as on a nameplate, converted to SI."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,12 +14,12 @@ PLAIN = "write a decimal point, and nothing between thousands"
 
 
 def numbers_with_units(given: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
-    """Return the entries of a rig file with every text of a number and a unit as its number in SI.
+    """Return the entries of a rig file; a text of a number and a unit becomes its number in SI.
 
     Parameters
     ----------
     given : Mapping[str, Any]
-        What the file says: numbers in SI stay as they are, in lists too, and so do names that are no parameter's.
+        Entries of the file: numbers in SI are unchanged, also in lists, and so are entries that are not parameters.
     units : Mapping[str, str]
         The SI unit of each parameter.
 
@@ -31,7 +31,8 @@ def numbers_with_units(given: Mapping[str, Any], units: Mapping[str, str]) -> di
     Raises
     ------
     RigError
-        If a text is no number with a unit, or its unit is unknown, measures something else, or is a gauge pressure.
+        If a text is not a number with a unit, or its unit is unknown, measures another quantity, or is a gauge
+        pressure.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Entries of a rig file in another unit than SI, told by sizes that no actuator has.
+"""Entries of a rig file that are not in SI, detected by sizes that no actuator has.
 
-A number in a wrong unit makes another actuator, whose bulk modulus and class may pass every check, or a search that
-finds no end. Limits are far beyond what is built, so that only a slip of units is outside.
+A number in a wrong unit describes another actuator, whose bulk modulus and class may pass every check, or a search that
+does not end. The limits are far beyond any real actuator, so that only an error in a unit exceeds them.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ class Limits(NamedTuple):
     least, most : float
         Its limits [SI].
     unit, example : str
-        Its unit, and how a nameplate may have it.
+        Its unit, and an example as on a nameplate.
     """
 
     least: float
@@ -42,15 +42,15 @@ LIMITS: Mapping[str, Limits] = MappingProxyType(
         "stroke": Limits(1e-4, 30.0, "m", "200 mm"),
     }
 )
-"""What entries may be; judged."""
+"""Limits of the entries; judged."""
 
 LENGTHS = (1e-3, 1e2)
-"""Chamber volume over piston area [m]; judged: half a chamber, with port and hose, is as long as some pistons' travel.
-Litres are told by it in any size of actuator."""
+"""Limits of chamber volume over piston area [m]; judged: half a chamber, with port and hose, is as long as some
+pistons' travel. It detects litres in an actuator of any size."""
 
 MOST_GAS = 100.0
-"""Gas of the accumulator over a chamber's dead volume [dimensionless]; judged: cubic metres that are litres have a
-thousand times what they should."""
+"""Largest ratio of accumulator gas to a chamber's dead volume [dimensionless]; judged: litres given as cubic metres
+make it a thousand times too large."""
 
 
 def _quoted(example: str) -> str:
@@ -58,7 +58,7 @@ def _quoted(example: str) -> str:
 
 
 def require_si(p: EhaParameters) -> None:
-    """Refuse an actuator if one of its entries is in another unit than SI.
+    """Refuse an actuator if one of its entries is not in SI.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""By how much leakage and friction of the paper's rig are multiplied to mean the same on another actuator.
+"""Factors by which the paper rig's leakage and friction are multiplied to mean the same on another actuator.
 
-Section 3 defines leakage by the share of velocity it costs and friction by the share of pressure it adds, both in the
-normal state at rated speed.
+Section 3 defines leakage by the fraction of velocity that it costs and friction by the fraction of pressure that it
+adds, both in the normal state at rated speed.
 """
 
 import math
@@ -19,7 +19,7 @@ PAPER_RIG = EhaParameters()
 def leakage_scales(p: EhaParameters) -> Mapping[str, float]:
     """Return the scales of leakage coefficient and flow bias.
 
-    Flow bias goes with the rated flow of the pump, the leakage coefficient with that flow over the differential
+    Flow bias scales with the rated flow of the pump, the leakage coefficient with that flow divided by the differential
     pressure at which the healthy actuator settles.
 
     Returns
@@ -39,8 +39,8 @@ def leakage_scales(p: EhaParameters) -> Mapping[str, float]:
 def friction_scales(p: EhaParameters) -> Mapping[str, float]:
     """Return the scales of the three coefficients of friction.
 
-    Friction goes with that differential pressure times the piston's area, at the same share of the velocity that the
-    pump's rated flow would give without losses.
+    Friction scales with that differential pressure times the piston's area, at the same fraction of the velocity that
+    the pump's rated flow would give without losses.
 
     Returns
     -------
@@ -63,23 +63,23 @@ def friction_scales(p: EhaParameters) -> Mapping[str, float]:
 
 
 def with_valves_sized(p: EhaParameters, given: Container[str]) -> EhaParameters:
-    """Return an actuator whose valves, where its rig file says nothing of them, let its own pump's flow through.
+    """Return an actuator whose valves pass its own pump's flow, unless its rig file gives the valves.
 
-    A single rod sends half of that through its make-up valves at every stroke. With the paper's valves, a pump of 15
-    times the flow lost 5 bar there, and its friction came out half as large as it was. What a file gives is taken at
-    its word.
+    A single-rod actuator sends half of that flow through its make-up valves at every stroke. With the paper's valves, a
+    pump of 15 times the flow lost 5 bar there, and the friction estimate was half the true value. Values that a file
+    gives are not changed.
 
     Parameters
     ----------
     p : EhaParameters
-        The actuator, with the paper's valves where nothing is given.
+        The actuator, with the paper's valves unless the file gives them.
     given : container of str
         Entries that its rig file gives.
 
     Returns
     -------
     EhaParameters
-        With the paper's drop at rated flow.
+        With the paper's pressure drop at rated flow.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def with_valves_sized(p: EhaParameters, given: Container[str]) -> EhaParameters:
 
 
 def natural_frequency(p: EhaParameters) -> float:
-    """Return the natural frequency of the piston on its oil, pump and valves shut, in the middle position.
+    """Return the natural frequency of the piston on its oil, with pump and valves shut, in mid-stroke.
 
     Source: Merritt, Hydraulic Control Systems (1967), section 6-2, for two chambers of ``2 V_0`` each.
 
@@ -111,9 +111,9 @@ def natural_frequency(p: EhaParameters) -> float:
 
 @lru_cache(maxsize=256)
 def _pressure_ratio(p: EhaParameters) -> float:
-    """Return the healthy pressure at rated speed over the paper's; 1 for an actuator that needs none.
+    """Return the healthy pressure at rated speed over the paper's; 1 for an actuator that needs no pressure.
 
-    The starts of a search, and the nine conditions of each log of a batch, ask it of one rig.
+    Cached: the starts of a search, and the nine conditions of each log of a batch, use it for the same rig.
     """
     _, pressure = steady_state(p.rated_speed, p)
     _, paper = steady_state(PAPER_RIG.rated_speed, PAPER_RIG)

@@ -1,4 +1,4 @@
-"""`simulate(plant, drive, ...) -> Record`: a run of a plant under a drive, seen through its sensors."""
+"""`simulate(plant, drive, ...) -> Record`: a run of a plant under a drive, measured by its sensors."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -62,22 +62,22 @@ class Plant:
     step : callable
         ``step(state, speeds, parameters, h)``, see `plant.solvers.steps.StepFunction`.
     observe : callable
-        ``observe(state, parameters)``, which returns position, velocity and differential pressure, and more where the
-        plant has more.
+        ``observe(state, parameters)``, which returns position, velocity and differential pressure, and more channels if
+        the plant has them.
     substeps : int
-        Steps of the integrator in 0.1 ms, enough for relative errors under 1e-4.
+        Integrator steps per 0.1 ms, enough for relative errors under 1e-4.
     parameter_class : type
-        What its parameter rows hold.
+        Class of its parameter rows.
     complete : callable
         ``complete(parameters)``, which returns an actuator's parameters as that class.
     start : callable
         ``start(parameter row)``, the state at rest.
     step_rate : callable
-        ``step_rate(parameter rows)``, the least count of steps a second, where faults can make a plant stiffer.
+        ``step_rate(parameter rows)``, the smallest number of steps per second, if faults can make a plant stiffer.
     breaches : callable
-        ``breaches(states)``: by reason, the samples at which the run left what the model describes.
+        ``breaches(states)``: by reason, the samples at which the run was outside the model's validity.
     control : ErrorControl, optional
-        What steps of controlled error need, which then replace the fixed ones.
+        What error-controlled steps need; these then replace the fixed steps.
     """
 
     name: str
@@ -119,7 +119,7 @@ def _observe_lumped(state: Any, p: Any) -> Mapping[str, Scalar]:
 
 
 def _observe_reduced(state: Any, p: Any) -> Mapping[str, Scalar]:
-    """Differential pressure follows from the force balance 5.12; the reduced plant has no state for it."""
+    """Differential pressure follows from the force balance 5.12; it is not a state of the reduced plant."""
     position, velocity, acceleration = state
     coefficients = p.friction_quadratic, p.friction_linear, p.friction_coulomb
     friction = quadratic_friction(velocity, sign(velocity), *coefficients)
@@ -170,31 +170,31 @@ def simulate(
     rng: np.random.Generator | None = None,
     keep_truth: bool = False,
 ) -> Record:
-    """Run a plant from rest under a drive and return what its sensors log.
+    """Run a plant from rest under a drive and return its sensors' log.
 
     Parameters
     ----------
     plant : Plant
         `REDUCED`, `LUMPED` or `CIRCUIT`.
     drive : ndarray, shape (n,)
-        Motor speed at the samples [rad/s], linear between; for a plant with a motor of its own, what is asked of it.
+        Motor speed at the samples [rad/s], linear between; for a plant with its own motor, the commanded speed.
     sample_time : float
         Seconds between samples [s].
     parameters : EhaParameters or ParameterPath
         The actuator, constant or changing with time; the circuit also takes an actuator without its circuit.
     sensors : Sensors
-        What the bench sees; `IDEAL` by default.
+        Sensors of the bench; `IDEAL` by default.
     rng : numpy.random.Generator, optional
         Source of sensor noise; needed unless the sensors are ideal.
     keep_truth : bool
-        Whether the noiseless channels stand beside the sensors' as ``true_...``.
+        Whether the record also holds the noiseless channels as ``true_...``.
 
     Raises
     ------
     DriveError
         If the drive is not a finite series of at least two samples.
     HydrostateError
-        If the simulated state stops being finite or leaves what the model describes.
+        If the simulated state stops being finite or leaves the model's validity.
 
     Examples
     --------
@@ -219,7 +219,7 @@ def simulate_each(
     sensors: Sensors = IDEAL,
     rngs: Sequence[np.random.Generator] | None = None,
 ) -> list[Record]:
-    """Run several actuators under one drive, side by side: in a third of the time of one after the other.
+    """Run several actuators under one drive, side by side: this takes a third of the time of separate runs.
 
     Parameters
     ----------
@@ -232,15 +232,14 @@ def simulate_each(
     parameters : sequence of EhaParameters
         The actuators.
     sensors : Sensors
-        What the bench sees; `IDEAL` by default.
+        Sensors of the bench; `IDEAL` by default.
     rngs : sequence of numpy.random.Generator, optional
         Sources of sensor noise.
 
     Raises
     ------
     DriveError, HydrostateError
-        As `simulate`.
-
+        As for `simulate`.
     """
     speed = checked_series(drive)
     complete = [plant.complete(given) for given in parameters]
@@ -311,7 +310,7 @@ def _record(
 
 
 LOGGED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
-"""What every plant has, and `plant.sensors.sensors.measure` measures."""
+"""Channels that every plant has, and that `plant.sensors.sensors.measure` measures."""
 
 
 def _measured_beside(truth: Record, sensors: Sensors, rng: np.random.Generator) -> Mapping[str, Array]:

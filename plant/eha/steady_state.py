@@ -12,15 +12,15 @@ from plant.eha.model import EhaValues
 def steady_state(speed: float, p: EhaValues) -> tuple[Any, Any]:
     """Return velocity and differential pressure in the steady state, with dead zone and relief (errata E7, E8).
 
-    With no rates left, the flow balance gives the pressure as a line in velocity, and the force balance becomes the
-    same quadratic that an implicit step solves.
+    If all rates are zero, the flow balance gives the pressure as a linear function of velocity, and the force balance
+    becomes the same quadratic that an implicit step solves.
 
     Parameters
     ----------
     speed : float
         Motor speed [rad/s].
     p : EhaParameters or namespace of float or ndarray
-        The actuator, or many that differ in some parameters.
+        The actuator, or many actuators that differ in some parameters.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def steady_state(speed: float, p: EhaValues) -> tuple[Any, Any]:
 
 
 def _settled(flow: Any, conductance: Any, p: EhaValues) -> tuple[Any, Any]:
-    """Return velocity and pressure where this flow passes piston and leakage paths."""
+    """Return the velocity and pressure at which this flow passes through piston and leakage paths."""
     area, quadratic, coulomb = p.piston_area, p.friction_quadratic, p.friction_coulomb
     tight = np.asarray(conductance == 0.0)  # all of the flow moves the piston, whatever the pressure
     paths = np.where(tight, 1.0, conductance)

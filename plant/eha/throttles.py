@@ -1,7 +1,8 @@
-"""Throttle valves: what a control voltage does to leakage (valve A) and to load (valve B), section 3.
+"""Throttle valves: the effect of a control voltage on leakage (valve A) and on load (valve B), section 3.
 
-The valves are open at 0 V and shut at 10 V. What they do in between is known at Table 1's voltages only; the
-laws here run monotonely through calibrated points, in the logarithm of what spans decades. Source: section 3, Table 1.
+The valves are open at 0 V and shut at 10 V. Between them, their effect is known only at Table 1's voltages; the laws
+here pass monotonically through calibrated points, in the logarithm if a quantity spans decades. Source: section 3,
+Table 1.
 """
 
 from collections.abc import Sequence
@@ -24,11 +25,11 @@ class ThrottleA:
     Parameters
     ----------
     volts : tuple of float
-        Control voltages, falling from shut to open [V].
+        Control voltages, decreasing from shut to open [V].
     leakage : tuple of float
-        Lumped leakage L_t of the actuator at each [m^3/(s Pa)], rising.
+        Lumped leakage L_t of the actuator at each [m^3/(s Pa)], increasing.
     bias : tuple of float
-        Flow bias Q_b at each [m^3/s], rising.
+        Flow bias Q_b at each [m^3/s], increasing.
 
     Raises
     ------
@@ -44,7 +45,7 @@ class ThrottleA:
         _require_monotone("throttle A", self.volts, self.leakage, self.bias)
 
     def at(self, volts: float) -> tuple[float, float]:
-        """Return leakage and flow bias at a voltage, beyond the last point on the line through the last two.
+        """Return leakage and flow bias at a voltage; extrapolates along the line through the last two points.
 
         Parameters
         ----------
@@ -54,7 +55,7 @@ class ThrottleA:
         Returns
         -------
         tuple of float
-            L_t [m^3/(s Pa)], by its logarithm, and Q_b [m^3/s].
+            L_t [m^3/(s Pa)], interpolated in its logarithm, and Q_b [m^3/s].
 
         Raises
         ------
@@ -73,9 +74,9 @@ class ThrottleB:
     Parameters
     ----------
     volts : tuple of float
-        Control voltages, falling from shut to open [V].
+        Control voltages, decreasing from shut to open [V].
     area : tuple of float
-        Discharge coefficient times area C_d A_o at each [m^2], rising.
+        Discharge coefficient times area C_d A_o at each [m^2], increasing.
 
     Raises
     ------
@@ -100,7 +101,7 @@ class ThrottleB:
         Returns
         -------
         float
-            C_d A_o [m^2], by its logarithm.
+            C_d A_o [m^2], interpolated in its logarithm.
 
         Raises
         ------
@@ -112,12 +113,12 @@ class ThrottleB:
 
 
 def require_volts(name: str, volts: float) -> None:
-    """Refuse a control voltage that a throttle does not take.
+    """Refuse a control voltage outside a throttle's range.
 
     Parameters
     ----------
     name : str
-        Which throttle, for the message.
+        Name of the throttle, for the message.
     volts : float
         Control voltage [V].
 
@@ -139,7 +140,7 @@ def _require_monotone(name: str, volts: Sequence[float], *series: Sequence[float
 
 
 def _monotone(volts: float, points: Sequence[float], values: Sequence[float]) -> float:
-    """Interpolate by a monotone cubic; beyond the lowest voltage go on along the line through the last two points."""
+    """Interpolate by a monotone cubic; below the lowest voltage, extrapolate the line through the last two points."""
     from scipy.interpolate import PchipInterpolator
 
     rising, ordered = np.array(points[::-1]), np.array(values[::-1])

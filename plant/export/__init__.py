@@ -1,1 +1,1 @@
-"""Plants for use outside Python: C99 for a controller, and what an exchange format is told of them."""
+"""Plants for use outside Python: C99 for a controller, and the description for an exchange format."""

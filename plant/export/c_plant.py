@@ -1,4 +1,4 @@
-"""A plant's step as C99: the fixed step that Python runs, with its parameters, and what a bench could measure."""
+"""A plant's step as C99: the fixed step that Python runs, with its parameters and measurable channels."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -38,9 +38,9 @@ class PlantGraphs:
     Parameters
     ----------
     constants : dict[str, Expression]
-        What is the same at every step.
+        Quantities that are the same at every step.
     stepped, outputs : dict[str, Expression]
-        The state one step later, and what a bench could measure, by channel.
+        The state after one step, and the channels that a bench could measure.
     """
 
     constants: dict[str, Expression]
@@ -49,7 +49,7 @@ class PlantGraphs:
 
 
 def substeps_of(plant: Plant, sample_time: float, row: Array) -> int:
-    """Return the number of fixed steps in a sample.
+    """Return the number of fixed steps per sample.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def substeps_of(plant: Plant, sample_time: float, row: Array) -> int:
 
 
 def plant_graphs(plant: Plant) -> PlantGraphs:
-    """Trace a plant's step and what it shows."""
+    """Trace a plant's step and its measurable channels."""
     given = [*(f"x{i}" for i in range(len(plant.states))), "u_start", "u_end"]
     *state, start, end = map(symbol, given)
     known = parameter_symbols(plant.parameter_class)
@@ -85,7 +85,7 @@ def plant_in_c(
     sample_time : float
         Seconds between samples [s].
     name : str
-        What its files, types and functions are called: a name of C.
+        Name of its files, types and functions: a valid name in C.
     precision : str
         ``double`` or ``float``.
 
@@ -97,7 +97,7 @@ def plant_in_c(
     Raises
     ------
     HydrostateError
-        If the name is none of C, or the precision is not known.
+        If the name is not valid in C, or the precision is not known.
     """
     real, name = precision_of(precision), checked_name(name)
     require_positive("sample_time", sample_time, "s")

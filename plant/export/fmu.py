@@ -1,4 +1,4 @@
-"""FMUs for co-simulation: a model's C sources behind the interface, compiled for this machine, in one archive."""
+"""FMUs for co-simulation: a model's C sources with the interface, compiled for this machine, in one archive."""
 
 import hashlib
 import io
@@ -23,13 +23,13 @@ from plant.solvers.steps import parameter_names, parameter_row
 from plant.units import notes
 
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
-"""How the binary is compiled."""
+"""Compiler flags of the binary."""
 
 PLATFORMS: Mapping[str, Mapping[str, str]] = {
     "2.0": {"x86_64": "linux64"},
     "3.0": {"x86_64": "x86_64-linux", "aarch64": "aarch64-linux"},
 }
-"""Folder of the binary by version and machine; elsewhere an FMU has its sources alone."""
+"""Folder of the binary by version and machine; on other machines an FMU holds only its sources."""
 
 STATE_UNITS: Mapping[str, str] = {"acceleration_m_s2": "m/s^2", "presliding": "1"}
 
@@ -45,7 +45,7 @@ def plant_fmu(plant: Plant, parameters: EhaParameters, sample_time: float, fmi: 
     plant : Plant
         One of `plant.eha.simulate.PLANTS`.
     parameters : EhaParameters
-        The actuator: start values of the FMU's parameters.
+        The actuator, which gives the start values of the FMU's parameters.
     sample_time : float
         Shortest communication step [s].
     fmi : str
@@ -56,7 +56,7 @@ def plant_fmu(plant: Plant, parameters: EhaParameters, sample_time: float, fmi: 
     Raises
     ------
     HydrostateError
-        If the name is none of C, the version is not known, or the compiler does not do its work.
+        If the name is not valid in C, the version is not known, or the compiler fails.
     """
     files = plant_in_c(plant, parameters, sample_time, name=name)
     row = parameter_row(plant.complete(parameters))
@@ -90,23 +90,23 @@ def archive(model: Described, files: Mapping[str, str], glue: tuple[str, str, st
     Parameters
     ----------
     model : Described
-        What its description says, its token left empty.
+        Its description, with an empty token.
     files : Mapping[str, str]
-        Sources of what is inside, by file name.
+        The sources, by file name.
     glue : tuple of str
-        Package, folder and file of the template that joins the two, and what the type inside is called.
+        Package, folder and file of the template that connects the two, and the name of the type inside.
     fmi : str
         Version of the interface.
 
     Returns
     -------
     bytes
-        The archive, the same for the same model.
+        The archive; the same model always gives the same archive.
 
     Raises
     ------
     HydrostateError
-        If the version is not known, or the compiler does not do its work.
+        If the version is not known, or the compiler fails.
     """
     require_known("version of FMI", fmi, VERSIONS)
     package, folder, template, kind = glue

@@ -13,7 +13,7 @@ VERSIONS = ("2.0", "3.0")
 """Versions of the interface that FMUs are written for."""
 
 UNKNOWN = 1e300
-"""What stands for infinity, which XML's numbers do not have [any unit]."""
+"""Number that represents infinity, which XML's numbers do not have [any unit]."""
 
 _BASE = {"kilogram": "kg", "meter": "m", "second": "s", "ampere": "A", "kelvin": "K", "mole": "mol", "radian": "rad"}
 
@@ -27,7 +27,7 @@ class Variable:
     name : str
         Its name.
     unit : str
-        SI unit; empty where it has none.
+        SI unit; empty if it has none.
     meaning : str
         What it is.
     causality : str
@@ -44,7 +44,7 @@ class Variable:
 
     @property
     def shown_unit(self) -> str:
-        """Its unit, or nothing where it is a plain number."""
+        """Its unit, or nothing if it is a plain number."""
         return "" if self.unit == "1" else self.unit
 
 
@@ -55,9 +55,9 @@ class Described:
     Parameters
     ----------
     name, meaning, token : str
-        The model's identifier in C, what it is, and the text by which description and binary know each other.
+        The model's identifier in C, its meaning, and the text that must match in description and binary.
     variables : sequence of Variable
-        Parameters, then inputs, then outputs; their references count from 1.
+        Parameters, then inputs, then outputs; their references start at 1.
     sample_time : float
         Time between samples [s].
     interpolates : bool
@@ -110,12 +110,12 @@ def described(model: Described, fmi: str) -> str:
 
 
 def sources(name: str, fmi: str) -> tuple[str, ...]:
-    """Return the names of the sources that are compiled."""
+    """Return the names of the compiled sources."""
     return f"{name}.c", "model.c", f"fmi{fmi[0]}.c"
 
 
 def build_description(name: str) -> str:
-    """Return ``buildDescription.xml``, which FMI 3.0 wants beside the sources."""
+    """Return ``buildDescription.xml``, which FMI 3.0 requires with the sources."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=name)
     files = ET.SubElement(configuration, "SourceFileSet", language="C99")

@@ -1,1 +1,1 @@
-"""Linear models of the diaphragm motor's paper: vibration, hysteresis, control loops."""
+"""Linear models of the diaphragm-motor paper: vibration, hysteresis, control loops."""

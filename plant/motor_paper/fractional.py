@@ -1,9 +1,9 @@
 """Fractional derivatives: Caputo's, from rest, sampled by Grünwald and Letnikov, or as states by Oustaloup.
 
-From rest (all zero before the start) the derivatives of Caputo, Riemann-Liouville and Grünwald-Letnikov are one, and it
-stands where the diaphragm-motor paper has its equations 5 and 6 (errata M5, M6). Between order 0, a spring, and 2, a
-mass, lies the damper of order 1; damping goes with ``sin(a pi/2)``. Sources: Podlubny, Fractional Differential
-Equations (1999), chapter 7; Oustaloup, Levron, Mathieu, Nanot (2000), IEEE Trans. Circuits Syst. I 47, 25.
+From rest (all zero before the start) the derivatives of Caputo, Riemann-Liouville and Grünwald-Letnikov are equal; the
+diaphragm-motor paper uses it in equations 5 and 6 (errata M5, M6). Between order 0, a spring, and 2, a mass, lies the
+damper of order 1; damping is proportional to ``sin(a pi/2)``. Sources: Podlubny, Fractional Differential Equations
+(1999), chapter 7; Oustaloup, Levron, Mathieu, Nanot (2000), IEEE Trans. Circuits Syst. I 47, 25.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ def gl_weights(order: float, count: int) -> Array:
     Returns
     -------
     ndarray, shape (count,)
-        Weights of the newest sample, of the one before, and so on.
+        Weights of the newest sample, of the previous one, and so on.
 
     Examples
     --------
@@ -40,21 +40,21 @@ def gl_weights(order: float, count: int) -> Array:
 
 
 def fractional_history(weights: Array, ring: Array, newest: int) -> float:
-    """Return the sum of weights 1, 2, ... on the samples before the next; for a kernel, or as it is.
+    """Return the sum of weights 1, 2, ... on the samples before the next one; also usable in a kernel.
 
     With ``weights = gl_weights(a, m)``, ``ring = zeros(2 (m - 1))``, ``newest = 0`` and step h, the derivative at the
-    next sample is ``h**-a * (sample + fractional_history(weights, ring, newest))``: known but for the sample, so that
-    an implicit step stays linear in it. Then ``newest = fractional_push(ring, newest, sample)``. Samples are less the
-    first.
+    next sample is ``h**-a * (sample + fractional_history(weights, ring, newest))``: all but the sample is known, so
+    that an implicit step is linear in it. Then ``newest = fractional_push(ring, newest, sample)``. The first sample is
+    subtracted from all samples.
 
     Parameters
     ----------
     weights : ndarray, shape (m,)
-        As `gl_weights` gives them [dimensionless].
+        Weights of `gl_weights` [dimensionless].
     ring : ndarray, shape (2 (m - 1),)
         Past samples from `newest` on, newest first [any unit].
     newest : int
-        Place of the newest.
+        Index of the newest sample.
 
     Returns
     -------
@@ -68,14 +68,14 @@ def fractional_history(weights: Array, ring: Array, newest: int) -> float:
 
 
 def fractional_push(ring: Array, newest: int, sample: float) -> int:
-    """Put a sample into the ring, twice, so that the last half of its length always lies in a row.
+    """Store a sample in the ring, twice, so that the last half of the ring's length is always contiguous.
 
     Parameters
     ----------
     ring : ndarray, shape (2 (m - 1),)
         Past samples, see `fractional_history` [any unit].
     newest : int
-        Place of the newest so far.
+        Index of the newest sample so far.
     sample : float
         The new one [any unit].
     """
@@ -100,12 +100,12 @@ def grunwald_letnikov(samples: Array, order: float, sample_time: float, memory: 
     sample_time : float
         Time between samples [s].
     memory : int, optional
-        How many samples are weighed, the newest included; all unless given.
+        Number of samples that are weighted, the newest included; all by default.
 
     Returns
     -------
     ndarray, shape (n,)
-        The signal's unit over s to the power of the order.
+        Derivative, in the signal's unit over s to the power of the order.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def grunwald_letnikov(samples: Array, order: float, sample_time: float, memory: 
 
 
 def caputo_from_rest(samples: Array, order: float, sample_time: float, memory: int | None = None) -> Array:
-    """Return Caputo's derivative of a signal at rest before its first sample: that of how far it has moved (errata M6).
+    """Return Caputo's derivative of a signal at rest before its first sample: that of its change since (errata M6).
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def caputo_from_rest(samples: Array, order: float, sample_time: float, memory: i
     sample_time : float
         Time between samples [s].
     memory : int, optional
-        How many samples are weighed, the newest included; all unless given.
+        Number of samples that are weighted, the newest included; all by default.
 
     Returns
     -------
@@ -176,7 +176,7 @@ class FractionalStates:
     B : ndarray, shape (n,)
         Each state settles to its input [1/s].
     C : ndarray, shape (n,)
-        Output, in s to the power of minus the order, one more where the input is the velocity.
+        Output, in s to the power of minus the order, plus one if the input is the velocity.
     D : float
         Feed-through, in the unit of C.
     on_velocity : bool
@@ -200,7 +200,7 @@ class FractionalStates:
         Returns
         -------
         ndarray of complex, shape (m,)
-            To be compared with ``(2 pi i f)**a``.
+            Approximates ``(2 pi i f)**a``.
         """
         s = 2j * np.pi * frequency
         poles = -np.diag(self.A)
@@ -209,16 +209,16 @@ class FractionalStates:
 
 
 def oustaloup_states(order: float, low_hz: float, high_hz: float, count: int = 5) -> FractionalStates:
-    """Return a fractional derivative made of first-order states, right between two frequencies (Oustaloup et al. 2000).
+    """Return a fractional derivative as first-order states, valid between two frequencies (Oustaloup et al. 2000).
 
     Parameters
     ----------
     order : float
         Order a [dimensionless], 0 or more and below 2; 0 and 1 are exact and need no state.
     low_hz, high_hz : float
-        The band; two decades beyond what matters on either side for an error below one percent [Hz].
+        The band; for an error below one percent, two decades wider on either side than the band of interest [Hz].
     count : int
-        States, one pole and one zero each.
+        Number of states, each with one pole and one zero.
 
     Raises
     ------

@@ -1,7 +1,8 @@
-"""The diaphragm-motor paper's stack with hysteresis, equations 20 and 21: its loop, and the linear model about it.
+"""The diaphragm-motor paper's stack with hysteresis, equations 20 and 21: its loop, and the linearised model.
 
-``m x'' + b x' + k x = k d (u - h)``, where h is Bouc-Wen's, in volts (errata M20, M21). For small voltages h is a share
-of u; at an amplitude its first harmonic is one too, with a phase that no frequency changes: the describing function.
+``m x'' + b x' + k x = k d (u - h)``, where h is the Bouc-Wen hysteresis, in volts (errata M20, M21). For small voltages
+h is a fraction of u; at a given amplitude so is its first harmonic, with a phase that does not depend on frequency: the
+describing function.
 """
 
 from dataclasses import dataclass
@@ -77,14 +78,15 @@ def hysteresis_loop(
     frequency : float
         Its frequency [Hz].
     samples : int
-        Steps a cycle.
+        Steps per cycle.
     law : {"mended", "printed"}
-        ``alpha u' - beta abs(u') h abs(h)^(n-1) - gamma u' abs(h)^n``; printed, u' is u in the first and last term.
+        ``alpha u' - beta abs(u') h abs(h)^(n-1) - gamma u' abs(h)^n``; the printed law has u instead of u' in the first
+        and last term.
 
     Returns
     -------
     tuple of ndarray, each of shape (samples + 1,)
-        Voltage [V] and hysteresis [V]; the last sample is where the next cycle begins.
+        Voltage [V] and hysteresis [V]; the last sample is the start of the next cycle.
 
     Examples
     --------
@@ -114,7 +116,7 @@ def hysteresis_loop(
 
 
 def loop_area(voltage: Array, hysteresis: Array) -> float:
-    """Return the area of a closed loop, by trapezia: what equation 20 turns into heat, over k d.
+    """Return the area of a closed loop, by trapezia: the heat of equation 20, divided by k d.
 
     Parameters
     ----------
@@ -132,19 +134,19 @@ def loop_area(voltage: Array, hysteresis: Array) -> float:
 
 
 def describing_function(voltage: Array, hysteresis: Array) -> complex:
-    """Return the first harmonic of the hysteresis over that of its sine of voltage.
+    """Return the first harmonic of the hysteresis divided by that of its sinusoidal voltage.
 
     Parameters
     ----------
     voltage : ndarray, shape (n,)
-        One cycle [V], its last sample the next one's first.
+        One cycle [V]; its last sample is the first of the next cycle.
     hysteresis : ndarray, shape (n,)
-        The same of the hysteresis [V].
+        The same for the hysteresis [V].
 
     Returns
     -------
     complex
-        Its real part is the share in phase with the voltage, its imaginary part times pi a^2 the loop's area.
+        Its real part is the fraction in phase with the voltage, its imaginary part times pi a^2 the loop's area.
     """
     return complex(harmonics(hysteresis, 1)[1] / harmonics(voltage, 1)[1])
 
@@ -155,9 +157,9 @@ def harmonics(cycle: Array, count: int, cycles: int = 1) -> NDArray[np.complex12
     Parameters
     ----------
     cycle : ndarray, shape (n,)
-        Whole cycles [any unit], the last sample the next one's first.
+        Whole cycles [any unit]; the last sample is the first of the next cycle.
     count : int
-        Harmonics wanted, the first included.
+        Number of harmonics, the first included.
 
     Returns
     -------
@@ -176,17 +178,17 @@ def harmonics(cycle: Array, count: int, cycles: int = 1) -> NDArray[np.complex12
 
 
 def total_harmonic_distortion(lines: NDArray[np.complex128]) -> float:
-    """Return the harmonics above the first over the first, Figure 21.
+    """Return the ratio of the higher harmonics to the first, Figure 21.
 
     Parameters
     ----------
     lines : ndarray of complex, shape (n,)
-        As `harmonics` returns them [any unit].
+        Result of `harmonics` [any unit].
 
     Returns
     -------
     float
-        Root of their summed squares over the first's size [dimensionless].
+        Root of their summed squares over the magnitude of the first [dimensionless].
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Blocks of the diaphragm-motor paper's loop, section 5: noise, relay, delay and PID, and a loop around a linear model.
 
-The relay is not only a block: a loop that it closes swings at the frequency where the model and its delay turn by half
-a turn, with an amplitude that gives the gain there (Åström and Hägglund 1984, Automatica 20, 645).
+The relay also serves to identify: a loop closed by it oscillates at the frequency at which the model and its delay have
+a phase of half a turn, with an amplitude that gives the gain there (Åström and Hägglund 1984, Automatica 20, 645).
 """
 
 from collections import deque
@@ -24,12 +24,12 @@ Controller: TypeAlias = Callable[[Memory, float], tuple[float, Memory]]
 
 
 def band_limited_noise(rng: np.random.Generator, count: int, sample_time: float, density: float) -> Array:
-    """Return white noise of a spectral density, as the noise block of section 5 makes it.
+    """Return white noise of a given spectral density, as the noise block of section 5 generates it.
 
     Parameters
     ----------
     count : int
-        Samples.
+        Number of samples.
     sample_time : float
         Time between samples [s].
     density : float
@@ -38,7 +38,7 @@ def band_limited_noise(rng: np.random.Generator, count: int, sample_time: float,
     Returns
     -------
     ndarray, shape (count,)
-        Noise of variance density over sample time.
+        Noise whose variance is density over sample time.
     """
     return rng.normal(0.0, np.sqrt(density / sample_time), count)
 
@@ -49,9 +49,9 @@ def relay(was_high: bool, error: float, width: float = 0.0) -> bool:
     Parameters
     ----------
     error : float
-        What it listens to, in any unit.
+        Its input, in any unit.
     width : float
-        It turns at plus and minus half of this [the error's unit].
+        It switches at plus and minus half of this [the error's unit].
 
     Examples
     --------
@@ -63,14 +63,14 @@ def relay(was_high: bool, error: float, width: float = 0.0) -> bool:
 
 @dataclass(frozen=True)
 class Pid:
-    """A PID controller with a filtered derivative, limits, and an integral that waits while they hold it.
+    """A PID controller with a filtered derivative, limits, and an integral that stops while a limit is active.
 
     Parameters
     ----------
     proportional : float
         Gain [any unit].
     integral : float
-        Gain of the integral, a second [1/s times the gain's unit].
+        Gain of the integral, per second [1/s times the gain's unit].
     derivative : float
         Gain of the derivative [s times the gain's unit].
     filter_time : float
@@ -108,7 +108,7 @@ class PidMemory:
     Parameters
     ----------
     integral : float
-        Part of the command that has been integrated [its unit].
+        Integral part of the command [its unit].
     error : float
         The last error, filtered for the derivative [its unit].
     """
@@ -123,7 +123,7 @@ def pid_step(pid: Pid, memory: PidMemory, error: float, sample_time: float) -> t
     Parameters
     ----------
     error : float
-        Reference less measurement, in any unit.
+        Reference minus measurement, in any unit.
     sample_time : float
         Time between samples [s].
 
@@ -157,11 +157,11 @@ class LoopRun:
     time : ndarray, shape (n,)
         Sample times [s].
     command : ndarray, shape (n,)
-        What the controller asked for, in the model's input unit.
+        The controller's command, in the model's input unit.
     output : ndarray, shape (n,)
         The model's output without noise, in its unit.
     measured : ndarray, shape (n,)
-        What the controller was told, in the output's unit.
+        The measurement that the controller receives, in the output's unit.
     """
 
     time: Array
@@ -180,7 +180,7 @@ def run_loop(
     delay: int = 0,
     noise: Array | None = None,
 ) -> LoopRun:
-    """Run a controller on a linear model from rest, its command held between samples and late by whole ones.
+    """Run a controller on a linear model from rest; the command is held between samples and delayed by whole samples.
 
     Parameters
     ----------
@@ -189,13 +189,13 @@ def run_loop(
     controller : callable
         ``controller(memory, error) -> (command, memory)``.
     reference : ndarray, shape (n,)
-        What the output shall be, in its unit.
+        Desired output, in its unit.
     sample_time : float
         Time between samples [s].
     delay : int
-        Samples by which the command is late.
+        Delay of the command in samples.
     noise : ndarray, shape (n,), optional
-        Added to what is measured, in the output's unit.
+        Added to the measurement, in the output's unit.
     """
     A, B, C, _, _ = cont2discrete(matrices, sample_time)
     n = reference.shape[0]
@@ -212,14 +212,14 @@ def run_loop(
 
 
 def ultimate_point(run: LoopRun, amplitude: float) -> tuple[float, float]:
-    """Return gain and frequency at which a proportional loop would swing for ever, from a loop closed by a relay.
+    """Return the gain and frequency at which a proportional loop would oscillate for ever, from a relay's loop.
 
     Parameters
     ----------
     run : LoopRun
-        A run to a reference of zero; its second half counts.
+        A run with reference zero; only its second half is used.
     amplitude : float
-        The relay's [the command's unit].
+        The relay's amplitude [the command's unit].
 
     Returns
     -------

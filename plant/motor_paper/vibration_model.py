@@ -1,8 +1,8 @@
-"""The diaphragm-motor paper's linear vibration model, equations 1 to 4, with its signs mended and as printed.
+"""The diaphragm-motor paper's linear vibration model, equations 1 to 4, with corrected signs and as printed.
 
 Two masses and three springs: the diaphragms, the fluid and the load at the cylinder (errata M1 to M4, M13). It gives
-the alternating motion and its resonance only. Valves rectify nothing here, so there is no mean velocity: that is the
-diaphragm-motor plant's.
+only the alternating motion and its resonance. It has no valves that rectify the flow, so there is no mean velocity; the
+diaphragm-motor plant has one.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ Matrices: TypeAlias = tuple[Array, Array, Array, Array]
 Signs: TypeAlias = Literal["mended", "printed"]
 
 OUSTALOUP_BAND_HZ, OUSTALOUP_STATES = (1.0, 1e5), 9
-"""Where and by how many states a fractional damping is imitated in a linear model."""
+"""Band and number of states that approximate a fractional damping in a linear model."""
 
 CALIBRATED = "calibrated: first mode at 480 Hz"
 
@@ -62,7 +62,7 @@ class VibrationParameters:
 
     @property
     def natural_frequency(self) -> float:
-        """First natural frequency without M_1 and damping, equation 4 mended (errata M4) [Hz]."""
+        """First natural frequency without M_1 and damping, equation 4 corrected (errata M4) [Hz]."""
         return sqrt(reduced_stiffness(self) / self.cylinder_mass) / (2.0 * pi)
 
 
@@ -74,7 +74,7 @@ def reduced_stiffness(
     Parameters
     ----------
     equation : {"mended", "printed", "printed_1_to_3"}
-        With restoring springs; as equation 4 prints it; or as equations 1 to 3 as printed would give it.
+        With restoring springs; as equation 4 prints it; or as it follows from equations 1 to 3 as printed.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def mechanical_matrices(p: VibrationParameters, signs: Signs = "mended") -> Matr
     p : VibrationParameters
         Masses, springs, damper.
     signs : {"mended", "printed"}
-        Whose signs. Printed, equation 1 has ``-k_2 (x_1 - x_2)`` and equation 2 ``-k_3 x_2 - c x_2'``.
+        Which signs. As printed, equation 1 has ``-k_2 (x_1 - x_2)`` and equation 2 ``-k_3 x_2 - c x_2'``.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def mechanical_matrices(p: VibrationParameters, signs: Signs = "mended") -> Matr
 
 
 def massless_matrices(p: VibrationParameters) -> Matrices:
-    """Return the state space of equation 4: M_1 left out, signs mended (errata M3, M4).
+    """Return the state space of equation 4: without M_1, with corrected signs (errata M3, M4).
 
     Parameters
     ----------
@@ -149,14 +149,14 @@ def with_fractional_damping(matrices: Matrices, p: VibrationParameters) -> Matri
     Parameters
     ----------
     matrices : tuple of ndarray
-        As `mechanical_matrices` or `massless_matrices` return them: x_2 and x_2' are the last two states.
+        As returned by `mechanical_matrices` or `massless_matrices`: x_2 and x_2' are the last two states.
     p : VibrationParameters
         Damping, order and mass.
 
     Returns
     -------
     tuple of ndarray
-        The same with Oustaloup's states behind; unchanged if there is no fractional damping.
+        The same with Oustaloup's states appended; unchanged if there is no fractional damping.
     """
     if p.fractional_damping == 0.0:
         return matrices
@@ -179,11 +179,11 @@ def state_space(p: VibrationParameters, *, massless: bool = False, signs: Signs 
     Parameters
     ----------
     p : VibrationParameters
-        The model; its fractional damping becomes Oustaloup's states, its cubic spring is left out.
+        The model; its fractional damping becomes Oustaloup's states, its cubic spring is omitted.
     massless : bool
-        Whether M_1 is left out, as in equation 4.
+        Whether M_1 is omitted, as in equation 4.
     signs : {"mended", "printed"}
-        Whose signs; the printed ones only with both masses and without fractional damping.
+        Which signs; the printed ones only with both masses and without fractional damping.
 
     Returns
     -------
@@ -199,12 +199,12 @@ def state_space(p: VibrationParameters, *, massless: bool = False, signs: Signs 
 
 
 def first_mode(poles: NDArray[np.complex128]) -> complex:
-    """Return the slowest oscillating pole, of positive frequency.
+    """Return the slowest oscillating pole, with positive frequency.
 
     Parameters
     ----------
     poles : ndarray of complex, shape (n,)
-        Of a linear model [rad/s].
+        Poles of a linear model [rad/s].
 
     Returns
     -------
@@ -229,12 +229,12 @@ def first_mode(poles: NDArray[np.complex128]) -> complex:
 
 
 def exact_response(p: VibrationParameters, frequency: Array) -> NDArray[np.complex128]:
-    """Return the response from force to x_2 with the fractional damping as it is, ``c_f (i omega)^a`` (errata M2, M5).
+    """Return the response from force to x_2 with the exact fractional damping, ``c_f (i omega)^a`` (errata M2, M5).
 
     Parameters
     ----------
     p : VibrationParameters
-        The model, both masses; its cubic spring is left out.
+        The model, both masses; its cubic spring is omitted.
     frequency : ndarray, shape (n,)
         Frequencies [Hz].
 

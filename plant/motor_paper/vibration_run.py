@@ -1,7 +1,7 @@
-"""Equation 4 of the diaphragm-motor paper in time, with its cubic spring and a fractional damping that remembers.
+"""Equation 4 of the diaphragm-motor paper in time, with its cubic spring and a fractional damping with memory.
 
-M_1 is left out and signs are mended (errata M2 to M5). The step is semi-implicit: springs at the old place, damping at
-the new velocity; with order 1 the fractional damper is the viscous one to the last digits.
+M_1 is omitted and signs are corrected (errata M2 to M5). The step is semi-implicit: springs at the old position,
+damping at the new velocity; at order 1 the fractional damper equals the viscous one to the last digits.
 """
 
 from functools import cache
@@ -29,14 +29,14 @@ def forced_vibration(
     Parameters
     ----------
     force : ndarray, shape (n,)
-        On the cylinder [N].
+        Force on the cylinder [N].
     start, speed : float
         Displacement and velocity at the first sample [m], [m/s].
     constants : tuple (float; float; float; float; float)
         Mass [kg], stiffness [N/m], cubic stiffness [N/m^3], damping [N s/m], and fractional damping over ``h**a``
         [N/m].
     weights : ndarray, shape (m,)
-        As `gl_weights` gives them [dimensionless].
+        Weights of `gl_weights` [dimensionless].
     h : float
         Step [s].
 
@@ -81,20 +81,20 @@ def vibration_run(
     speed: float = 0.0,
     memory: int | None = None,
 ) -> tuple[Array, Array]:
-    """Return displacement and velocity x_2 and x_2' under a force on the diaphragms, equation 4 mended (errata M4).
+    """Return displacement and velocity x_2 and x_2' under a force on the diaphragms, equation 4 corrected (errata M4).
 
     Parameters
     ----------
     force : ndarray, shape (n,)
         f of equation 1 [N].
     sample_time : float
-        Time between samples, and the step [s].
+        Time between samples, equal to the step [s].
     start : float
-        Displacement at the first sample, at rest before it [m].
+        Displacement at the first sample; at rest before it [m].
     speed : float
         Velocity at the first sample [m/s]; with an order above 1 it should be zero.
     memory : int, optional
-        How many samples the fractional damping weighs, the newest included; all unless given.
+        Number of samples that the fractional damping weights, the newest included; all by default.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""Measurement of a run by a bench: noise, quantisation, rate, and sensors that fail."""
+"""Measurement of a run on a bench: noise, quantisation, rate, and sensor faults."""

@@ -1,7 +1,7 @@
 """Sensor faults: a bias, a gain, a drift, a freeze, a saturation or drop-outs, on one channel of a log.
 
-Each fault is a change of a measured channel that comes at some time, at once or growing. Source: the fault classes of
-Isermann, Fault-Diagnosis Systems (2006), sensors.
+Each fault changes a measured channel from a given time on, at once or growing. Source: the fault classes of Isermann,
+Fault-Diagnosis Systems (2006), sensors.
 """
 
 from dataclasses import dataclass
@@ -26,16 +26,16 @@ class SensorFault:
     channel : str
         The channel, as a `Record` names it.
     kind : {"bias", "gain", "drift", "freeze", "saturation", "dropout"}
-        What happens: ``bias`` adds `size`; ``gain`` multiplies by ``1 + size``; ``drift`` adds `size` a second;
+        The effect: ``bias`` adds `size`; ``gain`` multiplies by ``1 + size``; ``drift`` adds `size` per second;
         ``freeze`` repeats the last healthy value; ``saturation`` limits the magnitude to `size`; ``dropout`` loses the
-        share `size` of the samples.
+        fraction `size` of the samples.
     size : float
-        In the channel's unit, a fraction for ``gain`` and ``dropout``, the unit a second for ``drift``; not used
-        by ``freeze``.
+        In the channel's unit, a fraction for ``gain`` and ``dropout``, the unit per second for ``drift``; not used by
+        ``freeze``.
     start : float
-        Time at which it comes, from the start of the record [s].
+        Time at which it begins, from the start of the record [s].
     growth : float
-        Time over which bias and gain grow linearly to their size [s]; 0 is at once.
+        Time over which bias and gain grow linearly to their size [s]; 0 means at once.
 
     Raises
     ------
@@ -72,14 +72,14 @@ class SensorFault:
 
 
 def with_fault(record: Record, fault: SensorFault, rng: np.random.Generator | None = None) -> Record:
-    """Return the record with one channel measured by a faulty sensor; the truth beside it is kept.
+    """Return the record with one channel measured by a faulty sensor; the true channels are kept.
 
     Parameters
     ----------
     record : Record
         A measured run.
     rng : numpy.random.Generator, optional
-        Source of which samples drop out; needed for ``dropout`` only.
+        Source of the choice of samples that drop out; needed for ``dropout`` only.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def with_fault(record: Record, fault: SensorFault, rng: np.random.Generator | No
     LogError
         If the channel is not in the record.
     RigError
-        If samples shall drop out and there is no generator.
+        If the fault is a drop-out and there is no generator.
     """
     time = record.sample_time * np.arange(len(record), dtype=np.float64)
     values = _faulty(record[fault.channel], time, fault, rng)
@@ -100,7 +100,7 @@ def with_fault(record: Record, fault: SensorFault, rng: np.random.Generator | No
 
 
 def _faulty(values: Array, time: Array, fault: SensorFault, rng: np.random.Generator | None) -> Array:
-    """Return the channel as the faulty sensor gives it."""
+    """Return the channel as measured by the faulty sensor."""
     present = time >= fault.start
     since = np.maximum(time - fault.start, 0.0)
     grown = np.minimum(since / fault.growth, 1.0) if fault.growth > 0.0 else present.astype(np.float64)

@@ -1,4 +1,4 @@
-"""Sensors: what a bench would have logged of a true run, with noise, quantisation and drop-outs."""
+"""Sensors: a bench's log of a true run, with noise, quantisation and drop-outs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -22,12 +22,12 @@ def require_not_negative(sensors: Any) -> None:
     Parameters
     ----------
     sensors : dataclass instance
-        Its noises and quanta, each in its own unit; what is true or false is left alone.
+        Its noises and quanta, each in its own unit; booleans are not checked.
 
     Raises
     ------
     RigError
-        If one is, with its name.
+        If a number is negative or not finite; the message names it.
 
     Examples
     --------
@@ -87,10 +87,10 @@ IDEAL = Sensors(
     position_noise=0.0,
     position_quantum=0.0,
 )
-"""Sensors that change nothing. Their variances are zero, which a filter cannot use."""
+"""Sensors that change nothing. Their variances are zero, so a filter cannot use them."""
 
 PAPER = replace(IDEAL, velocity_noise=1e-2, position_noise=1e-6, pressure=False)
-"""As the paper's filter was set: R of equation 7.7, position and velocity measured, motor speed known."""
+"""The setting of the paper's filter: R of equation 7.7, position and velocity measured, motor speed known."""
 
 RIG = Sensors(velocity_from_position=True)
 """The paper's rig, section 2: an optical encoder, its position differentiated, and pressure transducers; noise as on
@@ -103,18 +103,17 @@ SENSORS: Mapping[str, Sensors] = {"bench": BENCH, "rig": RIG, "paper": PAPER, "i
 def measure(truth: Record, sensors: Sensors, rng: np.random.Generator, keep_truth: bool = False) -> Record:
     """Return the sensors' log of a true run.
 
-    Each channel has a stream of its own, spawned from the generator, so that changing or switching off one
-    sensor leaves the noise of the others as it was.
+    Each channel has its own stream, spawned from the generator, so that changing or switching off one sensor does not
+    change the noise of the others.
 
     Parameters
     ----------
     truth : Record
-        True ``motor_speed_rad_s``, ``position_m``, ``velocity_m_s``, and ``differential_pressure_pa`` where
-        it is logged.
+        True ``motor_speed_rad_s``, ``position_m``, ``velocity_m_s``, and ``differential_pressure_pa`` if it is logged.
     rng : numpy.random.Generator
         Parent of the channels' streams.
     keep_truth : bool
-        Whether the truth stands beside the measurements, as ``true_position_m`` and so on.
+        Whether the record also holds the true channels, as ``true_position_m`` and so on.
 
     Returns
     -------
@@ -149,7 +148,7 @@ def measure(truth: Record, sensors: Sensors, rng: np.random.Generator, keep_trut
 def differentiated(position: NDArray[np.float64], sample_time: float, window: float) -> NDArray[np.float64]:
     """Return velocity as the difference of position across a window centred on each sample.
 
-    Centred, it does not delay; within half a window of the ends the window is cut and the noise grows.
+    A centred window has no delay; within half a window of the ends the window is cut and the noise grows.
 
     Parameters
     ----------
@@ -187,11 +186,10 @@ def differentiated(position: NDArray[np.float64], sample_time: float, window: fl
 
 
 def noise_variances(sensors: Sensors) -> Mapping[str, float]:
-    """Return the variance that a filter should expect on each channel that is logged.
+    """Return the variance that a filter should expect on each logged channel.
 
-    Quantisation counts as uniform noise, its quantum squared over 12. Differentiated velocity carries the
-    position's errors at both ends of the window; they are correlated from sample to sample, which a
-    variance cannot say.
+    Quantisation counts as uniform noise, its quantum squared over 12. Differentiated velocity carries the position's
+    errors at both ends of the window; they are correlated from sample to sample, which a variance cannot express.
 
     Returns
     -------
@@ -219,14 +217,14 @@ def noise_variances(sensors: Sensors) -> Mapping[str, float]:
 def drop_samples(
     record: Record, fraction: float, rng: np.random.Generator, channels: Sequence[str] | None = None
 ) -> Record:
-    """Return a copy in which a fraction of the samples is missing (NaN), all channels at the same instants.
+    """Return a copy in which a fraction of the samples is missing (NaN), in all channels at the same times.
 
     Parameters
     ----------
     record : Record
         A measured run.
     fraction : float
-        Fraction of the samples that go missing, 0 to 1 [dimensionless]; rounded to whole samples.
+        Fraction of missing samples, 0 to 1 [dimensionless]; rounded to whole samples.
     channels : sequence of str, optional
         The channels that drop out; all but the ``true_`` ones when not given.
 

@@ -1,4 +1,4 @@
-"""Runs in steps of controlled error: short ones at corners, long ones where all is quiet; many runs side by side."""
+"""Runs in error-controlled steps: short at corners and long in quiet intervals; many runs side by side."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -10,36 +10,36 @@ from plant.solvers.adaptive_kernel import compile_adaptive
 from plant.solvers.steps import Derivative, Parameters
 
 LANES = 8
-"""Trajectories side by side in one kernel, as many as a vector register of 512 bits holds."""
+"""Number of trajectories side by side in one kernel, as many as fit in a 512-bit vector register."""
 
 TOLERANCE = 2e-6
-"""Error of a step, root mean square over the states relative to their sizes; whole runs stay within 1e-4 by it."""
+"""Error of a step, root mean square over the states relative to their sizes; it keeps whole runs within 1e-4."""
 
 SMOOTH = 10.0
-"""Multiple of the tolerance by which a drive may leave the parabola that one step follows, relative to its size:
-what it leaves swings about that parabola, and next to nothing of it remains over a step."""
+"""Multiple of the tolerance by which a drive may deviate from the parabola that one step follows, relative to its size:
+the deviation oscillates about the parabola, and its effect over a step almost vanishes."""
 
 STRAIGHT, SAMPLES, MEANS = 0.0, 1.0 / 12.0, 1.0 / 8.0
-"""By how much straight lines through a drive's samples exceed its mean over a sample time, over its second difference
-[dimensionless], by Taylor's series: where the drive is those lines, where the samples lie on a curve, and where each is
-the mean of a curve over the sample time about it."""
+"""Excess of straight lines through a drive's samples over its mean over a sample time, divided by its second difference
+[dimensionless], by Taylor's series. The first holds if the drive is those lines, the second if the samples lie on a
+curve, the third if each sample is the mean of a curve over the sample time around it."""
 
 
 @dataclass(frozen=True)
 class ErrorControl:
-    """Functions of a plant that error-controlled steps need.
+    """Functions of a plant for error-controlled steps.
 
     Parameters
     ----------
     derivative : callable
         ``derivative(state, speed, parameters)``.
     scales : callable
-        ``scales(parameter row)``: the size of each state that errors are relative to [its SI unit]. Of several runs
-        side by side the first one's hold.
+        ``scales(parameter row)``: the size of each state, to which errors are relative [its SI unit]. For several runs
+        side by side, the sizes of the first run hold.
     drive_scale : callable
         ``drive_scale(parameter row)``: the size of the drive [its SI unit].
     shortest : callable
-        ``shortest(parameter rows)``: step [s] that is taken whatever its error.
+        ``shortest(parameter rows)``: the step [s] that is accepted whatever its error.
     """
 
     derivative: Derivative
@@ -61,9 +61,9 @@ def controlled_run(
     drive_tolerance: float | None = None,
     longest: float = np.inf,
 ) -> Array:
-    """Run a plant along a drive in steps of controlled error, for one or many sets of parameters side by side.
+    """Run a plant along a drive in error-controlled steps, for one or many sets of parameters side by side.
 
-    The steps are common to up to `LANES` trajectories: as short as the hardest of them asks.
+    Up to `LANES` trajectories share the same steps, which are as short as the most demanding trajectory requires.
 
     Parameters
     ----------
@@ -78,8 +78,8 @@ def controlled_run(
     tolerance : float
         Error of a step relative to the states' sizes [dimensionless].
     drive_tolerance : float, optional
-        By how much steps may smooth the drive, relative to its size [dimensionless]; `SMOOTH` times the
-        tolerance if not given.
+        Amount by which steps may smooth the drive, relative to its size [dimensionless]; `SMOOTH` times the tolerance
+        if not given.
     longest : float
         Longest step [s].
 
@@ -119,7 +119,7 @@ def controlled_groups(
     longest: float = np.inf,
     bulge: float = STRAIGHT,
 ) -> Iterator[Array]:
-    """Yield what `controlled_run` returns, up to `LANES` runs at a time, which takes less memory.
+    """Yield the result of `controlled_run`, up to `LANES` runs at a time, which takes less memory.
 
     Parameters
     ----------
@@ -134,11 +134,11 @@ def controlled_groups(
     tolerance : float
         Error of a step [dimensionless].
     drive_tolerance : float, optional
-        By how much steps may smooth the drive [dimensionless].
+        Amount by which steps may smooth the drive [dimensionless].
     longest : float
         Longest step [s].
     bulge : float
-        `STRAIGHT`, `SAMPLES` or `MEANS`: what the drive does between samples [dimensionless].
+        `STRAIGHT`, `SAMPLES` or `MEANS`: the course of the drive between samples [dimensionless].
 
     Yields
     ------

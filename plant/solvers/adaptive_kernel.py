@@ -2,7 +2,7 @@
 
 The scheme is RODAS3: four stages on three evaluations of the rates, third order, L-stable, with an embedded second
 order (Sandu et al. 1997, Atmospheric Environment 31, 3459). Samples within a step lie on the cubic through states and
-rates at both ends. A drive is linear between samples; a step spans several of them where they stand on one line.
+rates at both ends. A drive is linear between samples; a step spans several samples if they lie on one line.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,7 +40,7 @@ def rodas3_stages(
     state : tuple of Expression
         State at the start [any unit].
     speeds : tuple of Expression
-        Motor speed at the start and at the end of the step, and what it would gain at its first rate [rad/s].
+        Motor speed at the start and at the end of the step, and its increase over the step at its initial rate [rad/s].
     h : Expression
         Step size [s].
 
@@ -69,7 +69,8 @@ def rodas3_stages(
 
 
 _SHARED = ("u_start", "u_end", "u_rise", "h", "pace")
-"""Motor speed at a step's start and end and its rise at the first rate [rad/s], the step and the one before [s]."""
+"""Motor speed at a step's start and end and its rise at the initial rate [rad/s]; this step and the previous one
+[s]."""
 
 
 def _named(letter: str, values: Sequence[Expression]) -> dict[str, Expression]:
@@ -77,7 +78,7 @@ def _named(letter: str, values: Sequence[Expression]) -> dict[str, Expression]:
 
 
 def _outputs(derivative: Derivative, width: int, p: object) -> dict[str, Expression]:
-    """Return new states ``n``, rates at the start ``r`` and the mean squared error of a step."""
+    """Return the new states ``n``, the rates at the start ``r`` and the mean squared error of a step."""
     state = tuple(symbol(f"x{i}") for i in range(width))
     u1, _, u3, u4 = rodas3_stages(
         derivative, state, (symbol("u_start"), symbol("u_end"), symbol("u_rise")), p, symbol("h")
@@ -92,7 +93,7 @@ def _outputs(derivative: Derivative, width: int, p: object) -> dict[str, Express
 
 
 def _between(width: int) -> dict[str, Expression]:
-    """Return the state ``y`` at a share ``j`` of the step before: the cubic through states and rates at both ends."""
+    """Return the state ``y`` at a fraction ``j`` of the previous step: the cubic through states and rates at both."""
     part, pace = symbol("j"), symbol("pace")
     result: dict[str, Expression] = {}
     for i in range(width):
@@ -108,20 +109,20 @@ def _between(width: int) -> dict[str, Expression]:
 def compile_adaptive(
     name: str, derivative: Derivative, width: int, parameter_class: type[Parameters], lanes: int
 ) -> Kernel:
-    """Generate the kernel that runs a plant along a drive in steps of controlled error.
+    """Generate the kernel that runs a plant along a drive in error-controlled steps.
 
     Parameters
     ----------
     name : str
-        What the kernel is, for its file's name.
+        Name of the kernel, for its file's name.
     derivative : callable
         ``derivative(state, speed, parameters)``, written for symbols.
     width : int
-        Count of states.
+        Number of states.
     parameter_class : type
-        What the parameter rows hold, field by field.
+        Class of the parameter rows, field by field.
     lanes : int
-        Trajectories side by side.
+        Number of trajectories side by side.
 
     Returns
     -------
@@ -137,7 +138,7 @@ def compile_adaptive(
 
 @cache
 def _lines(derivative: Derivative, width: int, parameter_class: type[Parameters]) -> tuple[dict[str, str], list[str]]:
-    """Return the lines of a plant, and the constants that they share; the same for any lanes."""
+    """Return the plant's straight-line source, and the constants that its functions share; the same for any lanes."""
     names = parameter_names(parameter_class)
     outputs = _outputs(derivative, width, parameter_symbols(parameter_class))
     outputs = simplified(share_ratios(outputs), set(names))

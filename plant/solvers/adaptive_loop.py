@@ -10,23 +10,23 @@ from plant.solvers.drive_pieces import same, slope_at, smooth
 from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
 
 TINY = 1e-6
-"""Share of a sample time within which a step ends at a sample."""
+"""Fraction of a sample time within which a step ends at a sample."""
 
 NEARLY = 0.999999
-"""Share of what is left of a piece of the drive from which a step takes all of it [fraction]."""
+"""If a step takes at least this fraction of the rest of a piece of the drive, it takes the whole rest [fraction]."""
 
 
 class ControlledKernel(SideBySide, Protocol):
     """Interface of the kernel of error-controlled steps.
 
-    In memory stand, `LANES` numbers each: the states, the new states of a step, rates, old states and their rates, the
-    states between, weights of the errors, the error, five numbers that all runs share (drive at a step's start and
-    end, its rise at the first rate, the step and the one before), the parameters, and what `settle_at` makes of them.
+    The memory holds, `LANES` numbers each: the states, the new states of a step, rates, old states and their rates, the
+    states between, weights of the errors, the error, five numbers that all runs share (drive at a step's start and end,
+    its rise at the initial rate, this step and the previous one), the parameters, and the results of `settle_at`.
 
     Attributes
     ----------
     stages_at, between_at : callable
-        A step; and the state a share ``j`` of the last step after its start.
+        A step; and the state at a fraction ``j`` of the last step.
     move : callable
         ``move(from, to)``: copies as many numbers as there are lanes.
     """
@@ -49,7 +49,7 @@ def run_controlled(
     shortest: float,
     states: Array,
 ) -> None:
-    """Fill in the states of runs side by side at their samples.
+    """Fill in the states at the samples of runs side by side.
 
     Parameters
     ----------
@@ -62,15 +62,15 @@ def run_controlled(
     sample_time : float
         Seconds between samples [s].
     weights : ndarray, shape (states,)
-        One over the error of a step that each state may have [one over its unit].
+        Reciprocal of each state's permitted error in a step [one over its unit].
     bend : float
-        By how much a step may smooth the drive [the drive's unit].
+        Amount by which a step may smooth the drive [the drive's unit].
     bulge : float
         See `plant.solvers.drive_pieces.smooth` [dimensionless].
     longest, shortest : float
         Steps [count of samples].
     states : ndarray, shape (n, states, up to lanes)
-        Room for the states.
+        Output array for the states.
     """
     n, block = states.shape[0], kernel.WIDTH * kernel.LANES
     shared = 7 * block + kernel.LANES
@@ -128,14 +128,14 @@ def run_controlled(
 
 
 def within(size: float, left: float, longest: float, shortest: float) -> float:
-    """Return a step that ends with its piece of the drive, or leaves enough of it for another.
+    """Return a step that ends at the end of its piece of the drive, or leaves enough of the piece for another step.
 
     Parameters
     ----------
     size : float
         Step that the error allows [count of samples].
     left : float
-        What is left of the piece; nothing at the end of the run [count of samples].
+        Rest of the piece; zero at the end of the run [count of samples].
     longest, shortest : float
         Bounds [count of samples].
 
@@ -153,14 +153,14 @@ def within(size: float, left: float, longest: float, shortest: float) -> float:
 def along(
     lift: float, ramp: float, curvature: float, place: float, reach: float, size: float
 ) -> tuple[float, float, float]:
-    """Return the drive at a step's start and end, and its rise at the first rate, along a piece of a parabola.
+    """Return the drive at a step's start and end, and its rise at the initial rate, along a piece of a parabola.
 
     Parameters
     ----------
     lift, ramp, curvature : float
-        The piece: where it begins, its mean rise a sample, its curvature [the drive's unit].
+        The piece: its start, its mean rise per sample, its curvature [the drive's unit].
     place, reach : float
-        How far into it the step starts, and its length [count of samples].
+        Start of the step within the piece, and the length of the piece [count of samples].
     size : float
         The step [count of samples].
 
@@ -175,7 +175,7 @@ def along(
 
 
 def growth(error: float) -> float:
-    """Return the growth factor of the next step, for a scheme of third order.
+    """Return the growth factor of the next step, for a third-order scheme.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def growth(error: float) -> float:
 
 
 def _largest(kernel: ControlledKernel, work: Array, place: int, lost: int) -> float:
-    """Return the largest of the errors at a place, infinite where more runs have none than were lost before."""
+    """Return the largest error at a place; infinite if more errors are NaN than the number of runs already lost."""
     error = 0.0
     for lane in range(kernel.LANES):
         if work[place + lane] > error:
@@ -217,7 +217,7 @@ def _unknown(kernel: ControlledKernel, work: Array, place: int) -> int:
 
 
 def _accept(work: Array, block: int) -> None:
-    """Make a step's new states the states, and those before with their rates the old ones; each is a block."""
+    """Make a step's new states the current ones, and the current states and rates the old ones; each is a block."""
     for i in range(block):
         work[3 * block + i] = work[i]
         work[4 * block + i] = work[2 * block + i]
@@ -227,9 +227,10 @@ def _accept(work: Array, block: int) -> None:
 def _fill(
     kernel: ControlledKernel, work: Array, states: Array, sample: int, here: float, start: float, taken: float
 ) -> int:
-    """Copy the states at the samples within the last step, and return the first sample that is left.
+    """Copy the states at the samples within the last step, and return the first sample that remains.
 
-    The step began at ``start``, ended at ``here`` and took ``taken`` samples; ``sample`` is the first that is not kept.
+    The step began at ``start``, ended at ``here`` and took ``taken`` samples; ``sample`` is the first that is not
+    stored.
     """
     while sample < here - TINY:
         for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
@@ -251,4 +252,4 @@ def _keep(kernel: ControlledKernel, work: Array, place: int, states: Array, samp
 
 
 INNER = (lay, share, same, slope_at, within, along, growth, _unknown, _largest, _accept, _keep, _fill)
-"""Parts of the loop and of `smooth`, compiled as if they stood there."""
+"""Parts of the loop and of `smooth`, which are inlined."""

@@ -1,4 +1,4 @@
-"""Means over blocks of a channel that a plant shows, of several runs side by side, in one pass over their states."""
+"""Block means of a channel of a plant, for several runs side by side, in one pass over their states."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -21,36 +21,36 @@ from plant.solvers.fixed_step_loops import lay
 from plant.solvers.steps import Parameters, parameter_names, parameter_symbols
 
 LANES = 8
-"""Runs side by side, as many as a vector register of 512 bits holds."""
+"""Number of runs side by side, as many as fit in a 512-bit vector register."""
 
 Observe: TypeAlias = Callable[[Any, Any], Mapping[str, Scalar]]
-"""``observe(state, parameters)``: what a bench could measure, by channel."""
+"""``observe(state, parameters)``: the channels that a bench could measure."""
 
 
 def block_means(
     observe: Observe, channel: str, states: Array, parameters: Array, block: int, parameter_class: type[Parameters]
 ) -> Array:
-    """Return the means over whole blocks of a channel that runs show.
+    """Return the means of a channel of runs over whole blocks.
 
     Parameters
     ----------
     observe : callable
         ``observe(state, parameters)``, written for symbols.
     channel : str
-        One of what it shows.
+        One of the channels of `observe`.
     states : ndarray, shape (n, states, runs)
         States at the samples [SI].
     parameters : ndarray, shape (1 or n, runs, parameters)
-        Parameter rows, each of which holds at its sample.
+        Parameter rows, each valid at its sample.
     block : int
-        Samples a block.
+        Samples per block.
     parameter_class : type
-        What the parameter rows hold, field by field.
+        Class of the parameter rows, field by field.
 
     Returns
     -------
     ndarray, shape (n // block, runs)
-        The means [the channel's unit]; what is left at the end is dropped.
+        The means [the channel's unit]; an incomplete block at the end is dropped.
     """
     runs = states.shape[2]
     means = np.empty((len(states) // block, runs))

@@ -1,4 +1,4 @@
-"""The loop that averages what runs side by side show, as a plain function: `plant.solvers.block_means` pastes it."""
+"""The loop that averages the channel of runs side by side, as a plain function for `plant.solvers.block_means`."""
 
 from typing import Protocol
 
@@ -11,31 +11,31 @@ from plant.solvers.fixed_step_loops import Operation, SideBySide, lay
 class ShowingKernel(SideBySide, Protocol):
     """Interface of the kernel of block means.
 
-    In memory stand, `LANES` numbers each, the states, what is shown of them, the parameters, and what `settle_at` makes
-    of those.
+    The memory holds, `LANES` numbers each, the states, the channel computed from them, the parameters, and the results
+    of `settle_at`.
 
     Attributes
     ----------
     show_at : callable
-        What is shown of the states.
+        Computes the channel from the states.
     """
 
     show_at: Operation
 
 
 def average_blocks(kernel: ShowingKernel, states: Array, parameters: Array, block: int, means: Array) -> None:
-    """Fill in the means over blocks of what runs side by side show.
+    """Fill in the block means of the channel of runs side by side.
 
     Parameters
     ----------
     states : ndarray, shape (n, states, up to lanes)
         States at the samples [SI].
     parameters : ndarray, shape (1 or n, lanes, parameters)
-        Parameter rows, each of which holds at its sample.
+        Parameter rows, each valid at its sample.
     block : int
-        Samples a block.
+        Samples per block.
     means : ndarray, shape (blocks, up to lanes)
-        Room for the means.
+        Output array for the means.
     """
     room = np.zeros(kernel.NUMBERS + 8)
     work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long

@@ -1,11 +1,11 @@
-"""Parabolas through a drive's samples, which one step may follow: pasted into a kernel with the loop."""
+"""Parabolas through a drive's samples, each of which one step may follow: pasted into a kernel with the loop."""
 
 import numpy as np
 
 from plant.arrays import Array
 
 ROUNDEST = 100.0
-"""A drive that bends by more than this many times what a step may smooth has a corner there."""
+"""A drive has a corner if its second difference exceeds this multiple of the amount that a step may smooth."""
 
 
 def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: float) -> tuple[int, float, float, float]:
@@ -16,17 +16,18 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: floa
     drive : ndarray, shape (n,)
         Drive at the samples [its SI unit].
     parameters : ndarray, shape (1 or n, lanes, parameters)
-        Parameter rows; where they change, a piece ends.
+        Parameter rows; a piece ends at each change.
     bend : float
-        By how much it may leave the parabola [the drive's unit].
+        Amount by which the drive may deviate from the parabola [the drive's unit].
     bulge : float
-        By how much straight lines between samples exceed the drive's mean over a sample time, over its second
-        difference [dimensionless]: 0 where it is those lines. Else a piece has a curve's mean, and ends off corners.
+        Excess of straight lines between samples over the drive's mean over a sample time, divided by its second
+        difference [dimensionless]: 0 if the drive is those lines. Otherwise a piece has a curve's mean, and does not
+        end at corners.
 
     Returns
     -------
     tuple of (int, float, float, float)
-        Last sample of the piece; where the parabola begins, its mean rise a sample, its curvature [the drive's unit].
+        Last sample of the piece; start of the parabola, its mean rise per sample, its curvature [the drive's unit].
     """
     n = drive.shape[0]
     end = begin + 1
@@ -59,19 +60,19 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: floa
 
 
 def slope_at(drive: Array, sample: int) -> float:
-    """Return the slope of a drive at one of its samples, from those beside it.
+    """Return the slope of a drive at one of its samples, from the neighbouring samples.
 
     Parameters
     ----------
     drive : ndarray, shape (n,)
         Drive at the samples [its SI unit].
     sample : int
-        Which.
+        Index of the sample.
 
     Returns
     -------
     float
-        Slope [the drive's unit a sample].
+        Slope [the drive's unit per sample].
     """
     before, after = max(sample - 1, 0), min(sample + 1, drive.shape[0] - 1)
     return (drive[after] - drive[before]) / (after - before)

@@ -1,7 +1,7 @@
-"""Kernels of fixed steps written as straight lines of instructions: one run, or several runs side by side.
+"""Fixed-step kernels written as straight lines of instructions: one run, or several runs side by side.
 
-`plant.solvers.trajectory.compile_trajectory` takes the same step as it is written. Here factors are gathered, products
-are fused with sums, and a lone run divides several numbers at a time (`plant.compiled.pack`). As many runs as fit into
+`plant.solvers.trajectory.compile_trajectory` takes the same step as written. Here factors are gathered, products are
+fused with sums, and a single run performs several divisions at a time (`plant.compiled.pack`). As many runs as fit into
 the processor's vectors take little longer than one, and give the same bits as one.
 """
 
@@ -35,15 +35,15 @@ def compile_fixed_step(
     Parameters
     ----------
     name : str
-        What the kernel is, for its file's name.
+        Name of the kernel, for its file's name.
     step : callable
         ``step(state, drives, parameters, h)``, written for symbols.
     width : int
-        Count of states.
+        Number of states.
     parameter_class : type
-        What the parameter rows hold, field by field.
+        Class of the parameter rows, field by field.
     lanes : int
-        Runs side by side: 1 or 8.
+        Number of runs side by side: 1 or 8.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""The loops of fixed-step runs, as plain functions: a plant's step, generated beside them, goes along a drive.
+"""The loops of fixed-step runs, as plain functions; a plant's step is generated next to them and runs along a drive.
 
-`plant.solvers.trajectory` and `plant.solvers.fixed_step_kernel` paste them into kernel files. What they find in such a
-file is their parameter `kernel`.
+`plant.solvers.trajectory` and `plant.solvers.fixed_step_kernel` paste them into kernel files. The parameter `kernel`
+stands for the other contents of such a file.
 """
 
 from collections.abc import Callable
@@ -21,17 +21,17 @@ Advance: TypeAlias = Callable[[Any, int], Any]
 class RunKernel(Protocol):
     """Interface of the kernel of one run.
 
-    In memory stand the states at the last sample, the step's length, the parameters, and what `settle_at` makes of
-    the two; from step to step the state is a tuple.
+    The memory holds the states at the last sample, the step's length, the parameters, and the results of `settle_at`
+    from these two; from step to step the state is a tuple.
 
     Attributes
     ----------
     WIDTH, COLUMNS, NUMBERS : int
-        Count of states, of parameters, and of the numbers in memory.
+        Number of states, of parameters, and of the numbers in memory.
     load, store : callable
-        ``load(address)`` and ``store(state, address)``: a state out of memory, and into it.
+        ``load(address)`` and ``store(state, address)``: read a state from memory, and write it.
     settle_at : callable
-        What is the same at every step.
+        Computes what is the same at every step.
     advance : callable
         The step, from the state and the drive at its start and end.
     """
@@ -51,11 +51,11 @@ class SideBySide(Protocol):
     Attributes
     ----------
     LANES, VECTOR : int
-        Runs side by side, and how many of them are stepped at a time.
+        Number of runs side by side, and of runs that are stepped at a time.
     WIDTH, COLUMNS, NUMBERS : int
-        Count of states, of parameters, and of the numbers in memory.
+        Number of states, of parameters, and of the numbers in memory.
     settle_at : callable
-        What is the same at every step.
+        Computes what is the same at every step.
     """
 
     LANES: int
@@ -69,13 +69,13 @@ class SideBySide(Protocol):
 class LanesKernel(SideBySide, Protocol):
     """Interface of the kernel of fixed steps side by side.
 
-    In memory stand, `LANES` numbers each, the states, the drive at the last sample and its rise in a step, the step's
-    length, the parameters, and what `settle_at` makes of them.
+    The memory holds, `LANES` numbers each, the states, the drive at the last sample and its rise in a step, the step's
+    length, the parameters, and the results of `settle_at` from these.
 
     Attributes
     ----------
     step_at : callable
-        The step with the number ``j`` after the last sample.
+        Step number ``j`` after the last sample.
     """
 
     step_at: Operation
@@ -97,7 +97,7 @@ def run_alone(
     sample_time : float
         Seconds between samples [s].
     substeps : int
-        Steps a sample.
+        Steps per sample.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def run_side_by_side(
     substeps: int,
     states: Array,
 ) -> None:
-    """Fill in the states of runs side by side at their samples.
+    """Fill in the states at the samples of runs side by side.
 
     Parameters
     ----------
@@ -150,9 +150,9 @@ def run_side_by_side(
     sample_time : float
         Seconds between samples [s].
     substeps : int
-        Steps a sample.
+        Steps per sample.
     states : ndarray, shape (n, states, up to lanes)
-        Room for the states.
+        Output array for the states.
     """
     room = np.empty(kernel.NUMBERS + 8)
     work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
@@ -180,7 +180,7 @@ def run_side_by_side(
 
 
 def lay(kernel: SideBySide, work: Array, place: int, values: Array, count: int) -> None:
-    """Put numbers of runs side by side in their places.
+    """Write the numbers of runs side by side to their places in memory.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def lay(kernel: SideBySide, work: Array, place: int, values: Array, count: int) 
 
 
 def share(kernel: SideBySide, work: Array, place: int, values: Array | tuple[float, ...]) -> None:
-    """Put numbers that all runs share in their places.
+    """Write numbers that all runs share to their places in memory.
 
     Parameters
     ----------

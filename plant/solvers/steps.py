@@ -1,9 +1,9 @@
-"""Steps of fixed length, of any plant: schemes from its readable rates, and the parameters that these read.
+"""Steps of fixed length for any plant: schemes from its readable rates, and the parameters that these read.
 
-``ros2`` is a two-stage, second-order, L-stable Rosenbrock method with the analytic Jacobian; ``sdirk2`` the implicit
-one of the same order, for rates that turn stiff within a step; ``rk4`` the classical explicit one; a plant may bring a
-step of its own (the lumped plant's closed-form implicit one). Parameters are any frozen dataclass whose fields are
-numbers: a row of them stands in the fields' order.
+``ros2`` is a two-stage, second-order, L-stable Rosenbrock method with the analytic Jacobian; ``sdirk2`` is the implicit
+method of the same order, for rates that become stiff within a step; ``rk4`` is the classical explicit method; a plant
+may have its own step (the lumped plant's closed-form implicit one). Parameters are any frozen dataclass whose fields
+are numbers: a row holds them in the fields' order.
 """
 
 import re
@@ -34,8 +34,8 @@ GAMMA = 1.0 - 0.5**0.5
 """Diagonal coefficient of two-stage, second-order, L-stable schemes: ROS2, and SDIRK2 (Alexander 1977, theorem 5)."""
 
 NEWTON = 2
-"""Newton's iterations of a stage of SDIRK2 [count]. A check valve's flow is close to two straight lines, of which the
-first iteration finds the right one. Three change nothing: of eleven rigs at most 0.01 deviations of a log's noise."""
+"""Newton iterations per stage of SDIRK2 [count]. A check valve's flow is close to two straight lines, and the first
+iteration finds the right line. A third changes nothing: on eleven rigs at most 0.01 deviations of a log's noise."""
 
 
 class Parameters(Protocol):
@@ -45,7 +45,7 @@ class Parameters(Protocol):
 
 
 _TAKEN = re.compile(r"[A-Za-z]_?\d+(_\d+)?|theta\d+|h|j|share|drive|rise|pace|u_start|u_end|u_rise|error")
-"""What kernels call their own numbers."""
+"""Names that kernels use for their own numbers."""
 
 
 @cache
@@ -55,7 +55,7 @@ def parameter_names(parameter_class: type[Parameters]) -> tuple[str, ...]:
     Raises
     ------
     HydrostateError
-        If a field is called as kernels call a number of their own.
+        If a field has a name that kernels use for their own numbers.
     """
     names = tuple(field.name for field in fields(parameter_class))
     taken = [name for name in names if _TAKEN.fullmatch(name)]
@@ -83,14 +83,14 @@ def parameter_row(
     Parameters
     ----------
     parameters : dataclass
-        The parameters; with a class given, anything that has its fields' names.
+        The parameters; if a class is given, any object with its fields' names.
     parameter_class : type, optional
-        Whose fields are wanted; those of the parameters' own class by default.
+        Class whose fields are used; by default the class of the parameters.
 
     Returns
     -------
     ndarray, shape (parameters,)
-        Their values in SI; infinite where one is not known.
+        Their values in SI; infinite if a value is not known.
 
     Examples
     --------
@@ -144,7 +144,7 @@ def solve_linear(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) ->
 
 
 def _ahead(slopes: list[list[Scalar]], h: Scalar) -> list[list[Scalar]]:
-    """Return ``I - h J``, from a row of slopes a state; slopes by anything but states come last, and are left out."""
+    """Return ``I - h J`` from one row of slopes for each state; the slopes by non-states stand last and are ignored."""
     states = range(len(slopes))
     return [[(ONE if i == j else ZERO) - h * slopes[i][j] for j in states] for i in states]
 
@@ -183,8 +183,8 @@ def ros2_step(derivative: Derivative) -> StepFunction:
 def sdirk2_step(derivative: Derivative) -> StepFunction:
     """Build the two-stage, second-order, stiffly accurate implicit step of a derivative (Alexander 1977, theorem 5).
 
-    Where a valve opens within a step, ROS2 takes its flow from the slopes of the shut valve, and comes out far on the
-    other side. Here each stage solves its equation, with the slopes at where it ends.
+    If a valve opens within a step, ROS2 computes its flow from the slopes of the shut valve, and overshoots far to the
+    other side. Here each stage solves its equation, with the slopes at its end.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def sdirk2_step(derivative: Derivative) -> StepFunction:
     Returns
     -------
     callable
-        ``step(state, speeds, parameters, h)``; its derivatives are those of what Newton's iterations return.
+        ``step(state, speeds, parameters, h)``; its derivatives are those of the result of Newton's iterations.
     """
 
     def step(state: State, speeds: tuple[Scalar, Scalar], p: object, h: Scalar) -> State:
@@ -252,7 +252,7 @@ def rk4_step(derivative: Derivative) -> StepFunction:
 
 
 def rate_driven_step(derivative: RateDriven) -> StepFunction:
-    """Build the classical Runge-Kutta step of rates that read how fast their drive rises, linear over a step.
+    """Build the classical Runge-Kutta step of rates that depend on the rate of their drive, linear over a step.
 
     Parameters
     ----------

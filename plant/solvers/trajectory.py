@@ -34,8 +34,8 @@ def trajectory(
     Parameters
     ----------
     step : callable
-        ``step(state, drives, parameters, h)``, written for symbols: of a plant's rates ``derivative(state, drive,
-        parameters)`` take `plant.solvers.steps.ros2_step`, which is L-stable, or `plant.solvers.steps.rk4_step`.
+        ``step(state, drives, parameters, h)``, written for symbols. For a plant's ``derivative(state, drive,
+        parameters)`` use `plant.solvers.steps.ros2_step`, which is L-stable, or `plant.solvers.steps.rk4_step`.
     start : ndarray, shape (states,)
         Initial state in SI.
     drive : ndarray, shape (n,)
@@ -83,13 +83,13 @@ def compile_trajectory(name: str, step: StepFunction, width: int, parameter_clas
     Parameters
     ----------
     name : str
-        What the kernel is, for its file's name.
+        Name of the kernel, for its file's name.
     step : callable
         ``step(state, speeds, parameters, h)``, written for symbols.
     width : int
-        Count of states.
+        Number of states.
     parameter_class : type
-        What the parameter rows hold, field by field.
+        Class of the parameter rows, field by field.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""A back end for controllers: the graphs and loops that kernels are made of, written as C99 without allocation."""
+"""A back end for controllers: the graphs and loops of a kernel, written as C99 without allocation."""

@@ -19,9 +19,9 @@ class Body(Values):
     Parameters
     ----------
     owner : Translation
-        What it is part of.
+        The translation to which it belongs.
     names : dict[str, Thing]
-        What its parameters are [any unit].
+        Its parameters [any unit].
     node : ast.FunctionDef
         The function.
     """
@@ -80,7 +80,7 @@ class Body(Values):
         return lines
 
     def _set_once(self, targets: Sequence[ast.expr]) -> bool:
-        """Return whether targets are names that nothing else in the function sets: then they stand for their value."""
+        """Return whether the targets are names that the function sets only once; such a name represents its value."""
         return all(isinstance(target, ast.Name) and self._settings[target.id] == 1 for target in targets)
 
     def _place(self, target: ast.expr, value: Scalar) -> str | Block:
@@ -162,7 +162,7 @@ class Body(Values):
         return [f"for (int {counter} = {ends[0]}; {counter} < {ends[1]}; ++{counter}) {{", *_indented(lines), "}"]
 
     def _repeated(self, body: list[ast.stmt], most: int) -> list[str]:
-        """Return a loop's body, what it takes counted as often as it may run."""
+        """Return a loop's body; its operations count as often as the body may run."""
         outer, self.counted = self.counted, Counter[str]()
         self.depth += 1
         lines = self.block(body)
@@ -186,7 +186,7 @@ class Body(Values):
         Parameters
         ----------
         thing : Scalar, Block or tuple of them
-            What is written to [any unit].
+            The thing that is written [any unit].
         """
         self.written.update(one.root for _, one in members("", thing))
 

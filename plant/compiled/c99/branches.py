@@ -1,4 +1,4 @@
-"""Choices with much work on one side, as blocks: the work is done only where that side is chosen."""
+"""Choices with much work on one side, as blocks: the work is done only if that side is chosen."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from plant.compiled.expression import Expression
 
 LEAST = 8
-"""A side that needs so many operations for itself makes a block [operations]; judged: a few cost less than a jump."""
+"""Number of operations that one side needs alone for a block [operations]; judged: a few cost less than a jump."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,11 +17,11 @@ class Block:
     Parameters
     ----------
     condition : Expression
-        What they choose by.
+        Condition of the choices.
     choices : list of Expression
         The choices; none depends on another.
     sides : tuple of list of Expression
-        What only one side of them needs, operands before results: where the condition holds, and where not.
+        Nodes that only one side of them needs, operands before results: the side if the condition holds, and the other.
     """
 
     condition: Expression
@@ -30,7 +30,7 @@ class Block:
 
 
 def blocks_of(order: Sequence[Expression], kept: Sequence[Expression]) -> dict[int, Block]:
-    """Find choices that are worth a block; `kept` are nodes that are wanted whatever is chosen.
+    """Find choices that are worth a block; the nodes `kept` are always needed.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def blocks_of(order: Sequence[Expression], kept: Sequence[Expression]) -> dict[i
 
 
 def _apart(order: Sequence[Expression]) -> list[list[Expression]]:
-    """Return choices by the same condition together, without those that depend on another of them."""
+    """Return groups of choices by the same condition, without those that depend on another choice of the group."""
     groups: dict[int, list[Expression]] = {}
     below: dict[int, set[int]] = {}
     for item in order:

@@ -1,4 +1,4 @@
-"""Files of exported C: a header, a source, an example and a Makefile, from templates with names in their places."""
+"""Files of exported C: a header, a source, an example and a Makefile, from templates whose names are filled in."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ _KEYWORD = re.compile(
 
 
 def checked_name(name: str) -> str:
-    """Return a name that C takes for types, functions and files.
+    """Return a name if it is valid in C for types, functions and files.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def checked_name(name: str) -> str:
     Raises
     ------
     HydrostateError
-        If it is none.
+        If it is not valid.
 
     Examples
     --------
@@ -47,13 +47,13 @@ def c_files(package: str, kind: str, name: str, real: Precision, facts: Mapping[
     Parameters
     ----------
     package : str
-        In whose ``export/templates`` the templates ``KIND.h``, ``KIND.c`` and ``KIND_example.c`` are.
+        Package whose ``export/templates`` holds the templates ``KIND.h``, ``KIND.c`` and ``KIND_example.c``.
     kind : str
-        What is exported.
+        The kind of export.
     name : str
-        What its files, types and functions are called.
+        Name of its files, types and functions.
     facts : Mapping[str, Any]
-        What the templates ask for, by name, beside name, version, and what spells numbers.
+        Values for the templates, by name, besides name, version, and the spelling of numbers.
     """
     templates = {
         f"{name}.h": f"own/{kind}.h",
@@ -73,9 +73,9 @@ def filled(package: str, folder: str, template: str, facts: Mapping[str, Any]) -
     Parameters
     ----------
     package, folder, template : str
-        Where it is.
+        Location of the template.
     facts : Mapping[str, Any]
-        What it asks for, by name.
+        Values for the template, by name.
     """
     return _filled(package, folder, f"own/{template}", facts)
 

@@ -1,7 +1,7 @@
-"""Straight lines of a graph as C: the same operations in the same order as in the kernels that Python runs.
+"""Straight-line code of a graph as C: the same operations in the same order as in the kernels that Python runs.
 
-Every line is one operation, so no compiler may fuse or reorder what the kernels do not. Choices are conditional
-expressions, or blocks where one side is much work; so a step costs at most the operations that are counted.
+Every line is one operation, so no compiler may fuse or reorder operations that the kernels do not. Choices are
+conditional expressions, or blocks if one side is much work; so a step takes at most the counted operations.
 """
 
 from collections import Counter
@@ -28,7 +28,7 @@ KINDS: Mapping[str, str] = {
     "where": "choices and comparisons",
     **dict.fromkeys(COMPARISONS, "choices and comparisons"),
 }
-"""What each operation counts as, where operations are counted."""
+"""Category in which each operation is counted."""
 
 
 def spelt_in_c(item: Expression, operands: list[str], precision: Precision) -> str:
@@ -73,11 +73,11 @@ def c_lines(
     Parameters
     ----------
     outputs : Mapping[str, Expression]
-        What is computed, by name.
+        Outputs, by name.
     reads : Mapping[str, str]
-        Where each symbol is read from; only those needed are.
+        Source of each symbol; only the needed symbols are read.
     writes : Mapping[str, str]
-        Where each output goes.
+        Destination of each output.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def c_lines(
 
 
 class _Writer:
-    """Writes nodes one after another: their ``lines``, and by the nodes' ids the ``names`` of what these hold."""
+    """Writes nodes one after another: their ``lines``, and the ``names`` of their variables by the nodes' ids."""
 
     def __init__(self, outputs: list[Expression], precision: Precision) -> None:
         order = ordered(outputs)
@@ -142,7 +142,7 @@ class _Writer:
         return self.names[id(item)]
 
     def _write_block(self, block: Block, indent: str) -> None:
-        """Write what both sides need, then the sides."""
+        """Write the nodes that both sides need, then the sides."""
         alone = {id(one) for side in block.sides for one in side}
         for item in (*block.sides[0], *block.sides[1], *block.choices):
             for one in item.arguments:
@@ -166,7 +166,7 @@ def operations_of(outputs: Mapping[str, Expression]) -> Counter[str]:
     Parameters
     ----------
     outputs : Mapping[str, Expression]
-        What is computed, by name.
+        Outputs, by name.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Loops as C: a kernel's typed Python functions, for arrays whose shapes are known when C is written.
+"""Loops as C: a kernel's typed Python functions, for arrays whose shapes are known when the C code is written.
 
-A function is translated for the shapes that it is called with, and all that it calls with it. Loops are ``for`` over
-``range`` or over an array, so each is bounded and the most operations that a call can take are counted on the way. What
-else Python has is refused by its line.
+A function is translated for the shapes of its arguments, together with all functions that it calls. Loops are ``for``
+over ``range`` or over an array, so each is bounded, and the largest number of operations of a call is counted during
+the translation. All other Python is refused, with its line number.
 """
 
 import ast
@@ -19,16 +19,16 @@ from plant.compiled.paste import bare_text
 
 @dataclass(frozen=True)
 class Outside:
-    """A function that stands in C already.
+    """A function that already exists in C.
 
     Parameters
     ----------
     name : str
-        Its name there.
+        Its name in C.
     written : tuple of bool
-        Which of its arguments it writes to.
+        Whether it writes to each of its arguments.
     operations : Counter
-        What a call takes at most [operations].
+        Largest number of operations of a call [operations].
     """
 
     name: str
@@ -45,11 +45,11 @@ class Translated:
     name, text : str
         Its name, and its definition.
     written : tuple of bool
-        Which of its parameters, groups spelt out, it writes to.
+        Whether it writes to each of its parameters, groups expanded.
     operations : Counter
-        What a call takes at most [operations].
+        Largest number of operations of a call [operations].
     results : tuple of bool
-        For each result, whether it is whole; beyond the first they come through pointers.
+        For each result, whether it is an integer; results after the first are returned through pointers.
     """
 
     name: str
@@ -61,18 +61,18 @@ class Translated:
 
 @dataclass
 class Translation:
-    """Functions of a kernel, translated as they are called.
+    """Functions of a kernel, each translated when it is called.
 
     Parameters
     ----------
     functions : Mapping[str, callable]
         The Python functions, by name.
     constants : Mapping[str, int]
-        Whole numbers that they read by name.
+        Integers that the functions read by name.
     outside : Mapping[str, Outside]
-        What they call that stands in C already.
+        Functions called that already exist in C.
     prefix : str
-        What the names of their translations begin with.
+        Prefix of the names of their translations.
     """
 
     functions: Mapping[str, Callable[..., object]]
@@ -83,19 +83,19 @@ class Translation:
     _done: dict[tuple[str, object], Translated] = field(default_factory=dict[tuple[str, object], Translated])
 
     def entered(self, name: str, given: Sequence[Thing], known: Mapping[str, int] | None = None) -> Translated:
-        """Translate a function for the shapes of what it is given.
+        """Translate a function for the shapes of its arguments.
 
         Parameters
         ----------
         given : sequence of Scalar, Block or groups of them
             Its arguments [any unit].
         known : Mapping[str, int], optional
-            Whole parameters that always have one value.
+            Integer parameters that always have one value.
 
         Returns
         -------
         Translated
-            The function; whatever it calls is in `text` too.
+            The function; `text` also has all functions that it calls.
         """
         key = name, tuple(kind_of(one) for one in given)
         if key not in self._done:
@@ -104,7 +104,7 @@ class Translation:
 
     @property
     def text(self) -> str:
-        """All functions, each below what it calls."""
+        """All functions, each after those that it calls."""
         return "\n\n".join(one.text for one in self._done.values())
 
     def _translated(self, name: str, given: Sequence[Thing], known: Mapping[str, int]) -> Translated:

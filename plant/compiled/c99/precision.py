@@ -1,4 +1,4 @@
-"""The two kinds of real numbers that exported C computes in, and how each spells a number and a function."""
+"""The two kinds of real numbers for exported C, and the spelling of numbers and functions in each."""
 
 from dataclasses import dataclass
 from math import isinf, isnan
@@ -16,9 +16,9 @@ class Precision:
     name : str
         Its type in C.
     literal_suffix, function_suffix : str
-        What stands behind a number, and behind a function of ``math.h``.
+        Suffix of a number, and of a function of ``math.h``.
     digits : int
-        Digits that bring back every number of this type [digits].
+        Digits that reproduce every number of this type [digits].
     """
 
     name: str

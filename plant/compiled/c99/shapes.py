@@ -1,4 +1,4 @@
-"""Meaning of names in a translated loop: numbers, and arrays whose shapes are known when C is written."""
+"""Meaning of names in a translated loop: numbers, and arrays whose shapes are known when the C code is written."""
 
 from dataclasses import dataclass
 from math import prod
@@ -12,7 +12,7 @@ class Scalar:
     Parameters
     ----------
     root : str
-        The array that it is an element of.
+        The array of which it is an element.
     """
 
     text: str
@@ -29,7 +29,7 @@ class Block:
     text : str
         C expression that points at its first element.
     root : str
-        The parameter that it is part of, which counts as written where one of its elements is.
+        The parameter to which it belongs, which counts as written if one of its elements is written.
     """
 
     text: str
@@ -38,17 +38,17 @@ class Block:
     whole: bool = False
 
     def at(self, places: list[str]) -> "Block | Scalar":
-        """Return an element, or what is left with fewer places given than dimensions.
+        """Return an element, or a sub-array if there are fewer indices than dimensions.
 
         Parameters
         ----------
         places : list of str
-            C expressions of the leading places.
+            C expressions of the leading indices.
 
         Returns
         -------
         Block or Scalar
-            A row where places are left, else a number.
+            A row if dimensions remain, else a number.
 
         Examples
         --------
@@ -67,11 +67,11 @@ class Block:
 
 Group: TypeAlias = "tuple[Thing, ...]"
 Thing: TypeAlias = "Scalar | Block | Group"
-"""What a name or an argument may be; a group is handed on as its members."""
+"""What a name or an argument may be; a group is passed on as its members."""
 
 
 def kind_of(thing: Thing) -> object:
-    """Return the kind of a thing; one translated function serves all things of a kind.
+    """Return the kind of a thing; one translated function serves all things of the same kind.
 
     Parameters
     ----------
@@ -88,19 +88,19 @@ def kind_of(thing: Thing) -> object:
 
 
 def members(name: str, thing: Thing) -> list[tuple[str, "Scalar | Block"]]:
-    """Return a thing as parameters of C, groups spelt out.
+    """Return a thing as parameters of C, groups expanded.
 
     Parameters
     ----------
     name : str
         The parameter's name.
     thing : Scalar, Block or tuple of them
-        What it is [any unit].
+        The thing [any unit].
 
     Returns
     -------
     list of (str, Scalar or Block)
-        Each parameter's name, and what it is.
+        Name and thing of each parameter.
     """
     if isinstance(thing, tuple):
         return [pair for i, one in enumerate(thing) for pair in members(f"{name}_{i}", one)]
@@ -118,7 +118,7 @@ def received(name: str, thing: Thing) -> Thing:
     Returns
     -------
     Scalar, Block or tuple of them
-        The same under its name there.
+        The same thing under its name there.
     """
     match thing:
         case Scalar():

@@ -16,7 +16,7 @@ OPERATORS: Mapping[type[ast.operator], tuple[str, str]] = {
     ast.Mult: ("*", "products"),
     ast.Div: ("/", "divisions"),
 }
-"""How C spells an operation, and what it counts as."""
+"""Spelling in C of each operation, and the category in which it is counted."""
 
 COMPARED: Mapping[type[ast.cmpop], str] = {
     ast.Lt: "<",
@@ -31,19 +31,19 @@ NUMBERS = {"inf": "INFINITY", "nan": "NAN"}
 
 
 def refused(node: ast.AST) -> NotImplementedError:
-    """Return the error for what is not translated."""
+    """Return the error for code that is not translated."""
     return NotImplementedError(f"{ast.unparse(node)} is none of what is translated to C")
 
 
 class Values:
-    """Writes the expressions of one function, and counts what they take.
+    """Writes the expressions of one function, and counts their operations.
 
     Parameters
     ----------
     owner : Translation
-        What the function is part of.
+        The translation to which the function belongs.
     names : dict[str, Thing]
-        What its names are [any unit].
+        Its names [any unit].
     """
 
     def __init__(self, owner: "Translation", names: dict[str, Thing]) -> None:
@@ -52,7 +52,7 @@ class Values:
         self.counted = Counter[str]()
 
     def thing(self, node: ast.expr) -> Thing:
-        """Return the number, array or tuple that an expression stands for."""
+        """Return the number, array or tuple that an expression represents."""
         match node:
             case ast.Name(id=name) if name in self.names:
                 return self.names[name]
@@ -132,7 +132,7 @@ class Values:
                 return f"{self.scalar(node).text} != 0"
 
     def call(self, node: ast.Call, behind: "list[str] | None" = None) -> str:
-        """Return a call of a function that is translated, or stands in C already."""
+        """Return a call of a function that is translated, or that already exists in C."""
         if not isinstance(node.func, ast.Name):
             raise refused(node)
         name, given = node.func.id, [self.thing(one) for one in node.args]
@@ -161,7 +161,7 @@ class Values:
         return self.scalar(node).text
 
     def most(self, node: ast.expr) -> int:
-        """Return the end of a loop as a number that is known now."""
+        """Return the end of a loop as a number known at translation."""
         text = self.thing_text(node)
         if not text.isdigit():
             raise refused(node)

@@ -1,4 +1,4 @@
-"""Arrays of a kernel: how they are made, indexed, viewed, filled, and computed with element by element."""
+"""Arrays of a kernel: creation, indexing, views, filling, and element-wise computation."""
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
@@ -20,7 +20,7 @@ from plant.compiled.native.operators import convert, strides, truth
 from plant.compiled.native.scope import Scope, integer
 
 ON_STACK = 512
-"""An array of as many numbers at most, of a shape that is known, is put on the stack."""
+"""Largest number of elements of an array on the stack, if its shape is known."""
 
 WHOLE_AXIS = Held(Slice(), ("", ""))
 
@@ -80,7 +80,7 @@ def made(scope: Scope, element: ScalarKind, lengths: Sequence[str], *, zero: boo
 
 
 def _owned(scope: Scope, size: str) -> str:
-    """Return memory that is freed when the function ends: its first 16 bytes link it to what was made before."""
+    """Return memory that is freed when the function ends: its first 16 bytes link it to the previous allocation."""
     scope.keeps = True
     block = scope.op(f"call noalias ptr @malloc(i64 {scope.whole('add', size, '16')})")
     before = scope.op(f"load ptr, ptr {scope.owner}")
@@ -90,7 +90,7 @@ def _owned(scope: Scope, size: str) -> str:
 
 
 def indexed(scope: Scope, value: Held, items: Sequence[Held]) -> Held:
-    """Return an element, or a view where not every axis has an index."""
+    """Return an element, or a view if some axes have no index."""
     rank = value.array.rank
     if len(items) > rank:
         raise KernelError(f"{len(items)} indices of an {value.array.name}")
@@ -129,7 +129,7 @@ def view(scope: Scope, value: Held, items: Sequence[Held]) -> Held:
 
 
 def _ends(scope: Scope, length: str, item: Held) -> tuple[str, str]:
-    """Return the begin and end of a slice; it ends with its axis at the latest."""
+    """Return the start and end of a slice; it ends at the end of its axis at the latest."""
     begin, end = item.parts
     begin = begin or "0"
     if is_literal(begin) and int(begin) < 0:
@@ -145,7 +145,7 @@ def _ends(scope: Scope, length: str, item: Held) -> tuple[str, str]:
 
 
 def transposed(scope: Scope, value: Held) -> Held:
-    """Return an array with its axes the other way round."""
+    """Return an array with its axes in reverse order."""
     kind = value.array
     if kind.rank == 1:
         return value
@@ -155,7 +155,7 @@ def transposed(scope: Scope, value: Held) -> Held:
 
 @contextmanager
 def each(scope: Scope, lengths: Sequence[str]) -> Generator[list[str]]:
-    """Write loops over all elements; the indices are what the block receives."""
+    """Write loops over all elements; the block receives the indices."""
     if not lengths:
         yield []
         return
@@ -164,7 +164,7 @@ def each(scope: Scope, lengths: Sequence[str]) -> Generator[list[str]]:
 
 
 def mapped(scope: Scope, element: ScalarKind, operands: Sequence[Held], of: Callable[[Sequence[Held]], Held]) -> Held:
-    """Return a new array, each element computed from the operands' own; numbers serve every element."""
+    """Return a new array, computed element by element from the operands; a number serves every element."""
     shape = next(value for value in operands if isinstance(value.kind, ArrayKind)).lengths
     result = made(scope, element, shape, zero=False)
     with each(scope, shape) as indices:
@@ -174,13 +174,13 @@ def mapped(scope: Scope, element: ScalarKind, operands: Sequence[Held], of: Call
 
 
 def fill(scope: Scope, target: Held, source: Held) -> None:
-    """Set every element of an array to a number, or to what stands in the same place of another array."""
+    """Set every element of an array to a number, or to the corresponding element of another array."""
     with each(scope, target.lengths) as indices:
         store(scope, target, indices, load(scope, source, indices) if isinstance(source.kind, ArrayKind) else source)
 
 
 def copied(scope: Scope, value: Held) -> Held:
-    """Return a copy, packed."""
+    """Return a contiguous copy."""
     result = made(scope, value.array.element, value.lengths, zero=False)
     fill(scope, result, value)
     return result
@@ -195,7 +195,7 @@ def eye(scope: Scope, length: str) -> Held:
 
 
 def address(scope: Scope, value: Held) -> Held:
-    """Return an array's address as a whole number."""
+    """Return an array's address as an integer."""
     scope.written |= value.origin
     return Held(INT, (scope.op(f"ptrtoint ptr {value.parts[0]} to i64"),))
 
@@ -209,12 +209,12 @@ def size(scope: Scope, value: Held) -> Held:
 
 
 def shape_of(items: Sequence[Held]) -> list[str]:
-    """Return lengths from whole numbers."""
+    """Return lengths from integers."""
     return [integer(item) for item in items]
 
 
 def spilled(scope: Scope, value: Held) -> Held:
-    """Return a tuple of numbers as an array, so that its items can be counted; a function's parameter, once for all."""
+    """Return a tuple of numbers as an array, so that its items can be indexed; for a parameter, only once."""
     if value.parts in scope.spilled:
         return scope.spilled[value.parts]
     items = [convert(scope, item, FLOAT).parts[0] for item in value.items]

@@ -1,4 +1,4 @@
-"""Calls in a kernel: what Python, `math` and NumPy offer, and functions of the kernel itself."""
+"""Calls in a kernel: functions of Python, `math` and NumPy, and functions of the kernel itself."""
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
@@ -37,7 +37,7 @@ INSTRUCTIONS: Mapping[str, str] = {
     "expm1": "expm1",
     "atan": "atan",
 }
-"""Functions of one number, and how LLVM or the C library names them."""
+"""Functions of one number, and their names in LLVM or the C library."""
 
 DTYPES: Mapping[str, ScalarKind] = {
     **SCALARS,
@@ -54,7 +54,7 @@ def call(scope: Scope, node: ast.Call, read: Read) -> Held:
     Raises
     ------
     KernelError
-        If the function is not one that is compiled.
+        If the function is not supported.
     """
     name, module = _named(node.func)
     if module == "np" and name in _MAKERS:

@@ -1,4 +1,4 @@
-"""A compiled kernel as Python calls it: arguments are checked and laid out, results are copied out."""
+"""A compiled kernel as Python calls it: arguments are checked and laid out, results are copied."""
 
 import ctypes
 import struct
@@ -37,20 +37,20 @@ def _code(kind: AnyKind) -> str:
 
 @dataclass
 class _Given:
-    """Arguments while they are laid out.
+    """Arguments during their layout.
 
     Parameters
     ----------
     numbers : list
         Their parts.
     arrays : list of (str, int, int, bool)
-        Arguments that are not empty, their ends in memory, and whether they are changed.
+        Arguments that are not empty: name, start and end in memory, and whether the kernel changes them.
     back : list of (ndarray, ndarray)
-        Copies whose changes go back to where they were made from.
+        Copies, and the arrays to which their changes are copied back.
     copies : list of ndarray
         All copies, which must live while the kernel runs.
     lengths : dict
-        What named lengths are, and the argument that said so.
+        Values of named lengths, and the argument that set each.
     """
 
     numbers: list[Any]
@@ -74,7 +74,7 @@ class Entry:
     written : frozenset of str
         Arguments whose arrays it changes.
     call, release : callable
-        The machine code, and what frees the arrays that it made.
+        The machine code, and the function that frees the arrays that it allocated.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class Entry:
         self._room = ctypes.c_char * (self._results.size + 8)
 
     def __call__(self, *given: Any) -> Any:
-        """Run the kernel; Python's lock is not held meanwhile.
+        """Run the kernel without Python's lock.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class Entry:
         return result
 
     def again(self, *given: Any) -> Callable[[], None]:
-        """Return a call on these arguments, laid out once: for a loop that fills the same arrays again and again.
+        """Return a call on these arguments, laid out only once: for a loop that fills the same arrays again and again.
 
         Raises
         ------
@@ -133,7 +133,7 @@ class Entry:
         return call
 
     def _laid_out(self, given: Sequence[Any]) -> tuple[_Given, bytes]:
-        """Return arguments as they are laid out for the machine code."""
+        """Return arguments in the layout of the machine code."""
         if len(given) != len(self._takes):
             names = ", ".join(argument.name for argument in self._takes)
             raise TypeError(f"{self.__name__} takes {len(self._takes)} arguments ({names}), got {len(given)}")
@@ -189,7 +189,7 @@ class Entry:
         self._place(argument, array, laid, changed=changed)
 
     def _place(self, argument: Argument, array: Any, laid: _Given, *, changed: bool) -> None:
-        """Lay out an array that is as it should be, but for its shape."""
+        """Lay out an array that is valid except for its shape, which is checked here."""
         shape, name = array.shape, argument.name
         if len(shape) != len(argument.lengths):
             self._fail(name, f"an {argument.kind.name}", f"{len(shape)}-dimensional")
@@ -208,7 +208,7 @@ class Entry:
             laid.arrays.append((name, address, address + size, changed))
 
     def _apart(self, laid: _Given) -> None:
-        """Check that arrays that are changed share no memory with others, as the machine code assumes."""
+        """Check that arrays that are changed do not share memory with others, as the machine code assumes."""
         for name, begin, end, changed in laid.arrays:
             if not changed:
                 continue
@@ -218,7 +218,7 @@ class Entry:
 
 
 def _through_object(array: Any) -> int:
-    """Return the address of an array's data, which NumPy keeps right behind Python's object header."""
+    """Return the address of an array's data, which NumPy stores directly after Python's object header."""
     return _WORD.from_address(id(array) + object.__basicsize__).value
 
 
@@ -232,7 +232,7 @@ _address: Callable[[Any], int] = (
 
 
 def _dtype(kind: AnyKind) -> Any:
-    """Return the data type of an array's elements; None of any other kind."""
+    """Return the data type of an array's elements; None for any other kind."""
     return _DTYPES[kind.element] if isinstance(kind, ArrayKind) else None
 
 
@@ -249,7 +249,7 @@ def _result(kind: AnyKind, parts: Any) -> Any:
 
 
 def _copied(address: int, shape: Sequence[int], dtype: Any) -> Any:
-    """Return an array of its own from memory that is about to be freed."""
+    """Return an independent array, copied from memory that is about to be freed."""
     result = np.empty(shape, dtype)
     ctypes.memmove(result.ctypes.data, address, result.nbytes)
     return result

@@ -34,7 +34,7 @@ def read(scope: Scope, node: ast.expr) -> Held:
     Raises
     ------
     KernelError
-        If the expression, or what it does to these kinds of values, is none that is compiled.
+        If the expression, or its operation on these kinds of values, is not supported.
     """
     writer = _WRITERS.get(type(node))
     if writer is None:
@@ -90,7 +90,7 @@ def _compare(scope: Scope, node: ast.Compare) -> Held:
 
 
 def _logical(scope: Scope, node: ast.BoolOp) -> Held:
-    """Write ``and`` and ``or``: what stands behind is not looked at where the front decides."""
+    """Write ``and`` and ``or``: the second operand is evaluated only if the first does not decide."""
     both = isinstance(node.op, ast.And)
     place, done = scope.room("i1"), scope.fresh("decided")
     outside = scope.known
@@ -143,7 +143,7 @@ def _merged(scope: Scope, ends: Sequence[tuple[Held, int]], done: str, outside: 
 
 
 def _plain(node: ast.expr) -> bool:
-    """Return whether an expression can be computed in any case: it reads no memory and calls nothing."""
+    """Return whether an expression can always be computed safely: it reads no memory and calls nothing."""
     looked = (ast.Subscript, ast.Call, ast.FloorDiv, ast.Mod, ast.IfExp, ast.BoolOp, ast.Attribute)
     return not any(isinstance(part, looked) and not _known_attribute(part) for part in ast.walk(node))
 
@@ -182,7 +182,7 @@ def _subscript(scope: Scope, node: ast.Subscript) -> Held:
 
 
 def _item(scope: Scope, value: Held, index: Held) -> Held:
-    """Return an item of a tuple; of one with an index that is not known, a number."""
+    """Return an item of a tuple; if the index is not known, the item is a number."""
     part = integer(index)
     if is_literal(part):
         return value.items[int(part)]

@@ -1,4 +1,4 @@
-"""Kinds of values that a kernel computes with, and how each is spelt in LLVM's intermediate representation."""
+"""Kinds of values that a kernel computes with, and their spelling in LLVM's intermediate representation."""
 
 import struct
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from typing import TypeAlias
 
 
 class KernelError(Exception):
-    """A kernel cannot be compiled; the message names the line, what was wanted and what was found."""
+    """A kernel cannot be compiled; the message names the line, what was expected and what was found."""
 
     placed = False
 
     def within(self, place: str) -> "KernelError":
-        """Return the error with the innermost place at which it arose."""
+        """Return the error with the innermost location at which it occurred."""
         if self.placed:
             return self
         error = KernelError(f"{place}: {self}")
@@ -21,16 +21,16 @@ class KernelError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class ScalarKind:
-    """A single number; there is one of each kind.
+    """A single number; each kind has one instance.
 
     Parameters
     ----------
     parts : tuple of str
-        LLVM types of what it consists of, in registers.
+        LLVM types of its parts, in registers.
     stored : str
-        LLVM type that it has in an array.
+        Its LLVM type in an array.
     size : int
-        Its bytes there.
+        Its size in an array [bytes].
     """
 
     name: str
@@ -48,7 +48,7 @@ SCALARS = {kind.name: kind for kind in (FLOAT, INT, BOOL, COMPLEX)}
 
 @dataclass(frozen=True)
 class ArrayKind:
-    """An array: a pointer, its lengths and, unless it is packed row by row, its strides [elements].
+    """An array: a pointer, its lengths and, unless it is contiguous row by row, its strides [elements].
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class ArrayKind:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """LLVM types of what it consists of."""
+        """LLVM types of its parts."""
         return ("ptr", *["i64"] * (self.rank if self.packed else 2 * self.rank))
 
     @property
@@ -73,7 +73,7 @@ class ArrayKind:
 
 @dataclass(frozen=True)
 class Slice:
-    """A part of an axis, by its ends."""
+    """A part of an axis, by its start and end."""
 
     parts: tuple[str, ...] = ("i64", "i64")
     name: str = "slice"
@@ -81,7 +81,7 @@ class Slice:
 
 @dataclass(frozen=True)
 class Range:
-    """Range of a loop: begin, end, step."""
+    """Range of a loop: start, end, step."""
 
     parts: tuple[str, ...] = ("i64", "i64", "i64")
     name: str = "range"
@@ -94,7 +94,7 @@ class Several:
     Parameters
     ----------
     names : tuple of str
-        By which its items are read too, of a named tuple.
+        Names of its items, for a named tuple.
     """
 
     items: tuple["AnyKind", ...]
@@ -102,7 +102,7 @@ class Several:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """LLVM types of what it consists of."""
+        """LLVM types of its parts."""
         return tuple(part for item in self.items for part in item.parts)
 
     @property
@@ -114,7 +114,7 @@ class Several:
 AnyKind: TypeAlias = ScalarKind | ArrayKind | Slice | Range | Several
 
 NOTHING = Several(())
-"""What a function without a result returns."""
+"""Result of a function that returns nothing."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class Held:
     Parameters
     ----------
     origin : frozenset of str
-        The function's parameters in whose memory an array may lie.
+        The function's parameters whose memory may contain the array.
     """
 
     kind: AnyKind
@@ -133,7 +133,7 @@ class Held:
 
     @property
     def array(self) -> ArrayKind:
-        """Its kind, of an array."""
+        """Its kind, for an array."""
         if not isinstance(self.kind, ArrayKind):
             raise KernelError(f"an array is wanted, got {self.kind.name}")
         return self.kind
@@ -199,7 +199,7 @@ def number(value: object) -> Held:
 
 
 def is_literal(part: str) -> bool:
-    """Return whether a whole number is a constant when the kernel is compiled."""
+    """Return whether an integer is a constant at compile time."""
     return part.lstrip("-").isdigit()
 
 

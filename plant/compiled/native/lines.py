@@ -1,6 +1,6 @@
 """Straight lines of a kernel as instructions, on one number or on several side by side.
 
-The same lines serve one filter and many side by side, and give both the same bits.
+The same lines serve one filter and many side by side, and both give the same bits.
 """
 
 import ast
@@ -25,7 +25,7 @@ class Lines:
     width : int
         Numbers side by side.
     known : Mapping[str, str]
-        Registers of what the lines take.
+        Registers of the lines' inputs.
     """
 
     def __init__(self, scope: Scope, width: int, known: Mapping[str, str]) -> None:
@@ -100,7 +100,7 @@ class Lines:
         return self._op(f"call {kind} @llvm.{name}.{short}({', '.join(f'{kind} {one}' for one in given)})")
 
     def _each(self, name: str, x: str) -> str:
-        """Return a function of the C library, number by number."""
+        """Return a function of the C library, applied number by number."""
         function = INSTRUCTIONS["tanh"] if name == "tanh" else name
         self._scope.program.declare(f"declare double @{function}(double)")
         if self._width == 1:
@@ -112,7 +112,7 @@ class Lines:
         return x
 
     def _packed(self, name: str, columns: Sequence[Sequence[str]]) -> list[str]:
-        """Return quotients or roots; of single numbers, by one instruction."""
+        """Return quotients or roots; those of single numbers are computed by one instruction."""
         if self._width > 1:
             if name == "roots":
                 return [self._called("sqrt", [one]) for one in columns[0]]
@@ -137,7 +137,7 @@ def ast_tuple(node: ast.expr) -> ast.Tuple:
     Raises
     ------
     KernelError
-        If it is none.
+        If it is not a tuple.
     """
     if not isinstance(node, ast.Tuple):
         raise KernelError(f"a tuple is wanted, got {ast.unparse(node)}")

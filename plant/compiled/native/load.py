@@ -1,4 +1,4 @@
-"""Compiles a kernel's text, or recalls what an earlier run has compiled."""
+"""Compiles a kernel's text, or loads the result of an earlier run."""
 
 import hashlib
 import logging
@@ -36,23 +36,24 @@ def load_native(
     Parameters
     ----------
     name : str
-        What the kernel is, for its file's name.
+        Name of the kernel, for its file's name.
     text : str or callable
-        Its source: functions, constants, and operations made of lines; or what writes it, if it is needed.
+        Its source: functions, constants, and operations made of lines; or a function that writes it, called only if
+        needed.
     entries : Mapping[str, Signature]
-        The functions that Python calls, and what they take: one signature each.
+        The functions that Python calls, and the signature of each.
     made_of : object, optional
-        All that the text is written from, see `plant.compiled.native.recipes.recipe`.
+        Everything from which the text is written, see `plant.compiled.native.recipes.recipe`.
 
     Returns
     -------
     NativeKernel
-        The functions by name; calling one does not hold Python's lock.
+        The functions by name; a call does not hold Python's lock.
 
     Raises
     ------
     KernelError
-        If the text holds what is not compiled.
+        If the text has unsupported code.
 
     Examples
     --------
@@ -87,7 +88,7 @@ def load_native(
 
 
 def _key(text: str, takes: str) -> str:
-    """Return a hash of all that machine code depends on."""
+    """Return a hash of everything that determines the machine code."""
     digest = hashlib.sha256()
     for part in (_compiler(), machine.target(), text, takes):
         digest.update(f"{len(part)}\n{part}".encode())
@@ -108,7 +109,7 @@ def _recalled(name: str, entries: Mapping[str, Signature], key: str) -> NativeKe
 
 
 def _made(name: str, text: str, entries: Mapping[str, Signature], key: str) -> NativeKernel:
-    """Compile a kernel, and keep it."""
+    """Compile a kernel and keep it."""
     logger.info("compiling the kernel %s", name)
     description, code = _compiled(name, text, entries)
     store.kept(name, key, description, code)
@@ -145,7 +146,7 @@ def _compiled(name: str, text: str, entries: Mapping[str, Signature]) -> tuple[d
 
 
 def _kind(text: Any) -> AnyKind:
-    """Return a kind from what JSON holds."""
+    """Return a kind from its JSON form."""
     match text:
         case str():
             return SCALARS[text]

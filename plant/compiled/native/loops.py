@@ -1,4 +1,4 @@
-"""Plain loops of a module, compiled at their first call with all the loops that they call."""
+"""Plain loops of a module, compiled at their first call together with all loops that they call."""
 
 import functools
 from collections.abc import Callable, Collection
@@ -13,14 +13,14 @@ Result = TypeVar("Result")
 
 
 class Loop(Generic[Parameters, Result]):
-    """A loop that is compiled when it is first called.
+    """A loop that is compiled at its first call.
 
     Parameters
     ----------
     function : callable
-        As it is written; ``__wrapped__``, to be run in Python.
+        The Python function, available as ``__wrapped__``, to be run in Python.
     freely : collection of str
-        How freely LLVM may rearrange its arithmetic.
+        Flags that say how freely LLVM may rearrange its arithmetic.
     """
 
     __wrapped__: Callable[Parameters, Result]
@@ -31,7 +31,7 @@ class Loop(Generic[Parameters, Result]):
         self._kernel: Callable[..., Any] | None = None
 
     def __call__(self, *args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
-        """Run the machine code; the documentation's shapes are checked."""
+        """Run the machine code; the documented shapes are checked."""
         if self._kernel is None:
             self._kernel = self._compiled()
         return self._kernel(*args, **kwargs)
@@ -51,7 +51,7 @@ def text_of(loop: Loop[..., Any]) -> str:
 
 
 def needed(loop: Loop[..., Any]) -> tuple[list[Loop[..., Any]], dict[str, object]]:
-    """Return a loop and all that it calls, and the constants of their modules that they read.
+    """Return a loop and all loops that it calls, and the constants of their modules that they read.
 
     Raises
     ------
@@ -74,12 +74,12 @@ def needed(loop: Loop[..., Any]) -> tuple[list[Loop[..., Any]], dict[str, object
 
 
 def natively(*, freely: Collection[str] = ()) -> Callable[[Callable[Parameters, Result]], Loop[Parameters, Result]]:
-    """Return a decorator that compiles a loop when it is first called, with the loops that it calls.
+    """Return a decorator that compiles a loop at its first call, together with the loops that it calls.
 
     Parameters
     ----------
     freely : collection of str
-        How freely LLVM may rearrange arithmetic, as it names it: ``reassoc`` lets sums vectorise.
+        How freely LLVM may rearrange arithmetic, by LLVM's names: ``reassoc`` lets sums vectorise.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""LLVM: from its intermediate representation to machine code, and from there to addresses that can be called."""
+"""LLVM: from its intermediate representation to machine code, and then to addresses that can be called."""
 
 import ctypes
 import threading
@@ -7,15 +7,16 @@ from functools import cache
 from typing import Any
 
 LEVEL = 1
-"""How hard LLVM optimises: at 0 a kernel runs half as fast, at 2 no faster, and it takes a tenth more to compile."""
+"""LLVM's optimisation level: at 0 a kernel runs half as fast; at 2 it runs no faster and takes a tenth more to
+compile."""
 
 UNROLLED = False
-"""Whether LLVM unrolls loops: a step is hundreds of instructions by then, and twice as many run 7 % slower, for they
-leave the processor's cache of decoded instructions; they take a third more to compile."""
+"""Whether LLVM unrolls loops: a step already has hundreds of instructions, and twice as many run 7 % slower, because
+they exceed the processor's cache of decoded instructions; they take a third more to compile."""
 
 _LINKING = threading.Lock()
 _LOADED: list[Any] = []
-"""What keeps machine code in memory."""
+"""References that keep machine code in memory."""
 
 
 @cache
@@ -30,7 +31,7 @@ def binding() -> Any:
 
 @cache
 def target() -> str:
-    """Return what machine code depends on beside its kernel: LLVM, processor and optimisation level."""
+    """Return what machine code depends on besides its kernel: LLVM, processor and optimisation level."""
     llvm = binding()
     features = llvm.get_host_cpu_features().flatten()
     version = ".".join(map(str, llvm.llvm_version_info))
@@ -93,7 +94,7 @@ def linked(name: str, code: bytes, symbols: Sequence[str]) -> Mapping[str, int]:
     Parameters
     ----------
     name : str
-        A name that no other code has.
+        A unique name of the code.
     code : bytes
         An object file.
     symbols : sequence of str
@@ -109,5 +110,5 @@ def linked(name: str, code: bytes, symbols: Sequence[str]) -> Mapping[str, int]:
 
 
 def entered(address: int) -> Any:
-    """Return a function at an address, which takes two pointers, as what Python calls without holding its lock."""
+    """Return a Python callable for the function at an address; it takes two pointers and releases Python's lock."""
     return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(address)

@@ -1,4 +1,4 @@
-"""Operations on numbers in memory that a kernel makes of its lines: steps, copies, transposes."""
+"""Operations on numbers in memory that a kernel builds from its lines: steps, copies, transposes."""
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
@@ -12,25 +12,25 @@ from plant.compiled.source import ROWS, Slot
 
 Functions = Mapping[str, ast.FunctionDef]
 Operation = Callable[[Scope, Sequence[Held]], Held]
-"""Writes the operation on values that are given."""
+"""Writes the operation on given values."""
 
 NONE = Held(NOTHING, ())
 
 
 def place(scope: Scope, address: str, distance: int | str) -> str:
-    """Return a pointer to what stands at a distance in bytes from an address."""
+    """Return a pointer at a distance in bytes from an address."""
     return scope.op(f"inttoptr i64 {scope.op(f'add i64 {address}, {distance}')} to ptr")
 
 
 def operation_of(node: ast.Call, functions: Functions, constants: Mapping[str, object]) -> Operation | None:
-    """Return the operation that a call in a kernel's text makes, if it makes one.
+    """Return the operation that a call in a kernel's text creates, if it creates one.
 
     Parameters
     ----------
     functions : Mapping[str, ast.FunctionDef]
-        The kernel's functions, among them lines.
+        The kernel's functions, including lines.
     constants : Mapping[str, object]
-        What names stand for.
+        Values of names.
     """
 
     def value(part: ast.expr) -> Any:
@@ -57,10 +57,10 @@ def operation_of(node: ast.Call, functions: Functions, constants: Mapping[str, o
 
 
 def stepping(slots: Mapping[str, Slot], width: int, parts: Sequence[ast.FunctionDef]) -> Operation:
-    """Return ``step(address, j, *others)``: lines one after the other, each from what stands and from those before.
+    """Return ``step(address, j, *others)``: lines in sequence, each from numbers in memory and from earlier lines.
 
-    Numbers stand at the address, or at one of the others, see `plant.compiled.source.Slot`. It is a function of its
-    own, for its lines are many and may be called from several places.
+    The numbers are at the address, or at one of the others, see `plant.compiled.source.Slot`. It is a separate
+    function, because its lines are many and may be called from several places.
     """
     kind = vector(width)
 
@@ -100,7 +100,7 @@ def stepping(slots: Mapping[str, Slot], width: int, parts: Sequence[ast.Function
 
 
 def _spread(scope: Scope, number: str, width: int) -> str:
-    """Return a vector that holds a number in each place."""
+    """Return a vector with the same number in each place."""
     if width == 1:
         return number
     kind = vector(width)
@@ -109,7 +109,7 @@ def _spread(scope: Scope, number: str, width: int) -> str:
 
 
 def moving(width: int) -> Operation:
-    """Return ``move(source, target)``, which copies a fixed count of numbers."""
+    """Return ``move(source, target)``, which copies a fixed number of numbers."""
     kind = vector(width)
 
     def operation(scope: Scope, given: Sequence[Held]) -> Held:
@@ -121,7 +121,7 @@ def moving(width: int) -> Operation:
 
 
 def complete(width: int, count: int, stride: int) -> Operation:
-    """Return ``complete(address)``: whether a fixed count of vectors, a stride in bytes apart, hold no NaN."""
+    """Return ``complete(address)``: whether a fixed number of vectors, a stride in bytes apart, contain no NaN."""
     kind, truths = vector(width), "i1" if width == 1 else f"<{width} x i1>"
 
     def operation(scope: Scope, given: Sequence[Held]) -> Held:
@@ -140,7 +140,7 @@ def complete(width: int, count: int, stride: int) -> Operation:
 
 
 def loading(count: int) -> Operation:
-    """Return ``load(address)``: a tuple of a fixed count of numbers that stand one after the other."""
+    """Return ``load(address)``: a tuple of a fixed number of consecutive numbers."""
 
     def operation(scope: Scope, given: Sequence[Held]) -> Held:
         places = [place(scope, given[0].parts[0], 8 * k) for k in range(count)]
@@ -150,7 +150,7 @@ def loading(count: int) -> Operation:
 
 
 def store(scope: Scope, given: Sequence[Held]) -> Held:
-    """Write a tuple's numbers, one after the other: ``store(numbers, address)``."""
+    """Write a tuple's numbers consecutively: ``store(numbers, address)``."""
     for k, number in enumerate(given[0].items):
         register = convert(scope, number, FLOAT).parts[0]
         scope.line(f"store double {register}, ptr {place(scope, given[1].parts[0], 8 * k)}")
@@ -184,8 +184,8 @@ def function_of(part: ast.FunctionDef) -> Operation:
 def transpose(scope: Scope, given: Sequence[Held]) -> Held:
     """Copy 8 numbers from each of 8 places into 8 rows of 8: ``transpose(places, offset, ahead, target, stride)``.
 
-    All in bytes: the address of the places' addresses, what is added to each, how far ahead of there is fetched into
-    the cache, the address of the first row, and that from row to row.
+    All are in bytes: the address of the places' addresses, the offset added to each, the distance ahead at which data
+    are prefetched into the cache, the address of the first row, and the distance between rows.
     """
     places, offset, ahead, target, stride = (one.parts[0] for one in given)
     kind, every = vector(ROWS), range(ROWS)

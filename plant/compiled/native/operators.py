@@ -104,7 +104,7 @@ def arithmetic(scope: Scope, operator: ast.operator, a: Held, b: Held) -> Held:
 
 
 def _divided(scope: Scope, a: str, b: str, *, rest: bool) -> str:
-    """Return quotient or rest of whole numbers, rounded down; by zero, zero, for a processor would stop there."""
+    """Return quotient or remainder of integers, rounded down; zero for a division by zero, which would trap."""
     if is_literal(a) and is_literal(b) and int(b) != 0:
         return str(int(a) % int(b) if rest else int(a) // int(b))
     none = "false"
@@ -122,7 +122,7 @@ def _divided(scope: Scope, a: str, b: str, *, rest: bool) -> str:
 
 
 def power(scope: Scope, base: Held, exponent: Held) -> Held:
-    """Return a power: of a whole number that is known, by products; of one half, no root, to round as Python does."""
+    """Return a power: a known integer power by products; a power of one half not by a root, to round as Python does."""
     part = exponent.parts[0]
     if exponent.kind == INT and is_literal(part) and int(part) >= 0:
         result, square, left = number(1) if base.kind == INT else number(1.0), base, int(part)
@@ -140,7 +140,7 @@ def power(scope: Scope, base: Held, exponent: Held) -> Held:
 
 
 def _complex(scope: Scope, kind: type[ast.operator], a: Held, b: Held) -> Held:
-    """Return a sum, difference or product, of which one number may be real; a quotient by a real number."""
+    """Return a sum, difference or product, of which one number may be real; or a quotient by a real number."""
     if kind in (ast.Add, ast.Sub):
         pairs = zip(*(convert(scope, value, COMPLEX).parts for value in (a, b)), strict=True)
         return Held(COMPLEX, tuple(_floating(scope, FLOATING[kind], x, y) for x, y in pairs))
@@ -157,7 +157,7 @@ def _complex(scope: Scope, kind: type[ast.operator], a: Held, b: Held) -> Held:
 
 
 def negative(scope: Scope, value: Held) -> Held:
-    """Return a number with the other sign."""
+    """Return a number with the opposite sign."""
     if value.kind == COMPLEX:
         return Held(COMPLEX, tuple(scope.op(f"fneg {scope.flags}double {part}") for part in value.parts))
     if value.kind == FLOAT:
@@ -170,7 +170,7 @@ def negative(scope: Scope, value: Held) -> Held:
 
 
 def compared(scope: Scope, operator: ast.cmpop, a: Held, b: Held) -> str:
-    """Return the register that says how two numbers compare."""
+    """Return the register with the result of a comparison of two numbers."""
     floating, whole = COMPARED[type(operator)]
     if FLOAT in (a.kind, b.kind):
         x, y = (convert(scope, value, FLOAT).parts[0] for value in (a, b))
@@ -180,6 +180,6 @@ def compared(scope: Scope, operator: ast.cmpop, a: Held, b: Held) -> str:
 
 
 def chosen(scope: Scope, condition: str, a: Held, b: Held) -> Held:
-    """Return one of two values of one kind."""
+    """Return one of two values of the same kind."""
     pairs = zip(a.kind.parts, a.parts, b.parts, strict=True)
     return Held(a.kind, tuple(scope.op(f"select i1 {condition}, {t} {x}, {t} {y}") for t, x, y in pairs))

@@ -1,4 +1,4 @@
-"""A kernel's text as LLVM's intermediate representation: the functions that it enters at, and all that they call."""
+"""A kernel's text as LLVM's intermediate representation: its entry functions, and all functions that they call."""
 
 import ast
 from collections.abc import Callable, Sequence
@@ -59,9 +59,9 @@ class Compiled:
     written : frozenset of str
         Parameters whose arrays it changes.
     origin : frozenset of str
-        Parameters in whose memory an array that it returns may lie.
+        Parameters whose memory may contain an array that it returns.
     lends : bool
-        Whether it returns arrays of its own making, which its caller frees.
+        Whether it returns arrays that it allocates and its caller frees.
     """
 
     symbol: str
@@ -77,7 +77,7 @@ def _has_array(kind: AnyKind) -> bool:
 
 @dataclass
 class Module:
-    """A kernel while it is written.
+    """A kernel during its translation.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Module:
         return symbol
 
     def call(self, name: str, given: Sequence[Held], scope: Scope) -> Held:
-        """Write a call of another function, which is written by itself for the kinds that it is given."""
+        """Write a call of another function, which is translated for the kinds of its arguments."""
         if name in self._operations:
             return self._operations[name](scope, given)
         given = self._filled(name, given)
@@ -168,7 +168,7 @@ class Module:
         return Held(compiled.returns, registers, origin)
 
     def _filled(self, name: str, given: Sequence[Held]) -> list[Held]:
-        """Return arguments with defaults."""
+        """Return arguments completed with defaults."""
         node = self._functions[name]
         missing = len(node.args.args) - len(given)
         if not 0 <= missing <= len(node.args.defaults):
@@ -177,12 +177,12 @@ class Module:
         return [*given, *(number(ast.literal_eval(one)) for one in defaults)]
 
     def function(self, name: str, kinds: tuple[AnyKind, ...], *, enters: bool = False) -> Compiled:
-        """Write a function for parameters of these kinds, unless it is written.
+        """Write a function for parameters of these kinds, unless it exists already.
 
         Parameters
         ----------
         enters : bool
-            Whether the kernel is entered here, with arrays that do not overlap.
+            Whether it is an entry of the kernel, with arrays that do not overlap.
         """
         key = name, kinds, enters
         if key not in self._made:
@@ -227,7 +227,7 @@ class Module:
         return Compiled(symbol, returns, scope.written, scope.origin, scope.heap)
 
     def _pass(self, before: Scope, node: ast.FunctionDef, given: list[tuple[str, Held]]) -> Scope:
-        """Write a function once, with what the pass before has found out about its variables."""
+        """Write a function once, with the kinds of its variables that the previous pass has found."""
         scope = Scope(self, before.kinds, before.origins, before.flags)
         scope.returned, scope.heap, scope.mixed = before.returned, before.heap, before.mixed
         scope.owner = "%lender" if scope.heap else "%owned"
@@ -241,10 +241,7 @@ class Module:
         return scope
 
     def enter(self, name: str, kinds: tuple[AnyKind, ...]) -> Compiled:
-        """Write ``name``, to be called with addresses of its arguments' parts and of room for its results' parts.
-
-        Every part takes 8 bytes; after the results' stands the list of the arrays that it has made.
-        """
+        """Write ``name``, to be called with the addresses of its arguments' parts and of memory for its results."""
         compiled = self.function(name, kinds, enters=True)
         if _has_array(compiled.returns) and not _packed(compiled.returns):
             raise KernelError(f"{name} returns a view that is not packed")

@@ -1,8 +1,8 @@
-"""Which kernel a model gives, remembered: the text of a large one takes a tenth of a second to write.
+"""Remembers which kernel a model gives: the text of a large kernel takes a tenth of a second to write.
 
-A model's text follows from the sources of the packages and from what it is made of. Where both are what they were, the
-text is, and is not written again. Only a process that changes nothing in the packages while it runs may rely on that:
-the command line says so, tests and notebooks do not.
+A model's text follows from the sources of the packages and from its inputs. If neither has changed, the text has not
+changed, and is not written again. Only a process that changes nothing in the packages while it runs may rely on that:
+the command line declares so, tests and notebooks do not.
 """
 
 import os
@@ -14,7 +14,7 @@ from pathlib import Path
 from types import FunctionType
 
 PACKAGES = ("plant", "estimation", "faults")
-"""All that a kernel's text can follow from."""
+"""Packages that determine a kernel's text."""
 
 _ROOT = Path(__file__).resolve().parents[3]
 
@@ -22,7 +22,7 @@ _trusted: list[bool] = []
 
 
 def trust_sources() -> None:
-    """Rely on what the packages' files say: nothing changes in them while this process runs."""
+    """Rely on the packages' files: nothing changes in them while this process runs."""
     _trusted.append(True)
 
 
@@ -32,11 +32,12 @@ def recipe(name: str, made_of: object, machine: str) -> str | None:
     Parameters
     ----------
     name : str
-        What the kernel is.
+        Name of the kernel.
     made_of : object
-        What its text is written from: functions and classes of the packages, dataclasses, numbers, tuples of them.
+        Everything from which its text is written: functions and classes of the packages, dataclasses, numbers, tuples
+        of them.
     machine : str
-        What it is compiled by and for.
+        Compiler and target of the kernel.
     """
     import hashlib  # which a call for help need not wait for
 
@@ -49,7 +50,7 @@ def recipe(name: str, made_of: object, machine: str) -> str | None:
 
 @cache
 def _sources() -> str | None:
-    """Return a hash of all sources' stamps, or None where they are no files, as in an archive."""
+    """Return a hash of all sources' stamps, or None if they are not files, as in an archive."""
     import hashlib
 
     try:
@@ -60,9 +61,9 @@ def _sources() -> str | None:
 
 
 def _stamps(folder: str) -> Iterator[str]:
-    """Yield place, size and times of each source below a folder; to read them takes 20 ms.
+    """Yield path, size and times of each source below a folder; reading them takes 20 ms.
 
-    The time of its last change is that of its installation, whatever a package says that it was written at.
+    The time of a file's last status change is the time of its installation, whatever modification time a package gives.
     """
     with os.scandir(folder) as found:
         for one in sorted(found, key=lambda one: one.name):
@@ -74,7 +75,7 @@ def _stamps(folder: str) -> Iterator[str]:
 
 
 def identity(thing: object) -> str | None:
-    """Return a text that only this thing has, or None of what is not known by the packages' sources.
+    """Return a text that is unique to this thing, or None if the packages' sources do not determine it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A function of a kernel while it is written: its instructions, its variables, and what is known of them."""
+"""A function of a kernel during its translation: its instructions, its variables, and what is known of them."""
 
 import ast
 from collections.abc import Callable, Generator, Sequence
@@ -11,7 +11,7 @@ from plant.compiled.native.kinds import BOOL, INT, AnyKind, Held, KernelError, i
 
 
 class Program(Protocol):
-    """Interface of a kernel to its functions."""
+    """Interface of a kernel for its functions."""
 
     constants: dict[str, Held]
 
@@ -20,11 +20,11 @@ class Program(Protocol):
         ...
 
     def declare(self, text: str) -> None:
-        """Declare what is not of the kernel: a function of the C library, an operation of the processor."""
+        """Declare an external function: of the C library, or an operation of the processor."""
         ...
 
     def separate(self, name: str, parameters: str, body: "Callable[[Scope], None]") -> str:
-        """Write a function of its own from its instructions, and return its name."""
+        """Write a separate function from its instructions, and return its name."""
         ...
 
     def has(self, name: str) -> bool:
@@ -33,7 +33,7 @@ class Program(Protocol):
 
 
 def family(kind: AnyKind) -> str:
-    """Return the lasting kind of a variable: boolean, number, array, slice or tuple."""
+    """Return the permanent kind of a variable: Boolean, number, array, slice or tuple."""
     return type(kind).__name__ + (kind.name if kind == BOOL else "")
 
 
@@ -52,22 +52,22 @@ def assigned_in(nodes: Sequence[ast.AST]) -> set[str]:
 
 @dataclass
 class Scope:
-    """A function while it is written.
+    """A function during its translation.
 
-    A variable has a place on the stack, which LLVM does away with; while the program runs straight on, its value is
-    also known by the register that was assigned last, and the place is not read. A name that is once a truth and once a
-    number has no place: it may be used again for something else, but not beyond a branch or a loop.
+    A variable has a place on the stack, which LLVM optimises away. Within straight-line code its value is also known by
+    the register that was assigned last, and the place is not read. A name that holds first a Boolean and then a number
+    has no place: it may be reused, but not across a branch or a loop.
 
     Parameters
     ----------
     kinds : dict[str, AnyKind]
-        Of variables, as far as a former pass has found them.
+        Kinds of variables, as far as an earlier pass has found them.
     origins : dict[str, frozenset of str]
-        Likewise, parameters in whose memory a variable's array may lie.
+        Likewise, parameters whose memory may contain a variable's array.
     flags : str
         How freely LLVM may rearrange arithmetic.
     owner : str
-        Register with the list of arrays that this function makes.
+        Register with the list of the arrays that this function allocates.
     """
 
     program: Program
@@ -115,13 +115,13 @@ class Scope:
         self.ended = False
 
     def jump(self, target: str) -> None:
-        """Go on at a block, unless the one before has ended."""
+        """Jump to a block, unless the current block has ended."""
         if not self.ended:
             self.line(f"br label %{target}")
             self.ended = True
 
     def branch(self, condition: str, yes: str, no: str) -> None:
-        """Go on at one of two blocks."""
+        """Jump to one of two blocks."""
         self.line(f"br i1 {condition}, label %{yes}, label %{no}")
         self.ended = True
 
@@ -173,13 +173,13 @@ class Scope:
         raise KernelError(f"{name} is used before it is assigned, and is no constant of the kernel")
 
     def forget(self, names: set[str]) -> None:
-        """Know variables by their places alone, for a block may be reached from several sides."""
+        """Forget the registers of variables and use only their places: a block may be reached from several sides."""
         for name in names:
             self.known.pop(name, None)
 
     @contextmanager
     def counting(self, begin: str, end: str, step: str = "1", *, forget: set[str] | None = None) -> Generator[str]:
-        """Write a loop; its counter is what the block receives."""
+        """Write a loop; the block receives its counter."""
         place, head, body, after, done = (self.fresh(name) for name in ("count.", "head", "body", "next", "done"))
         self.begin.append(f"%{place} = alloca i64")
         self.line(f"store i64 {begin}, ptr %{place}")
@@ -206,7 +206,7 @@ class Scope:
         self.forget(forget or set())
 
     def whole(self, operation: str, a: str, b: str) -> str:
-        """Return a sum, difference or product of whole numbers, at once where both are known."""
+        """Return a sum, difference or product of integers, computed at once if both are known."""
         if is_literal(a) and is_literal(b):
             return str({"add": int(a) + int(b), "sub": int(a) - int(b), "mul": int(a) * int(b)}[operation])
         if operation == "mul" and "1" in (a, b):
@@ -225,12 +225,12 @@ class Scope:
 
 
 def integer(value: Held) -> str:
-    """Return the register of a whole number.
+    """Return the register of an integer.
 
     Raises
     ------
     KernelError
-        If the value is none.
+        If the value is not an integer.
     """
     if value.kind != INT:
         raise KernelError(f"a whole number is wanted, got {value.kind.name}")

@@ -1,6 +1,6 @@
 """Signature of a kernel, read from its documentation: kinds of its arguments, and their checked shapes.
 
-The parameters' section of a numpydoc text says it all: ``drive : ndarray, shape (n,)``. So shapes are said once.
+The parameters section of a numpydoc text gives everything: ``drive : ndarray, shape (n,)``. So shapes are stated once.
 """
 
 import ast
@@ -14,7 +14,7 @@ from typing import Any, TypeAlias, get_type_hints
 from plant.compiled.native.kinds import BOOL, COMPLEX, FLOAT, INT, AnyKind, ArrayKind, ScalarKind, Several
 
 Length: TypeAlias = int | str | None
-"""Of an axis: a number, a name that has one value in all arguments, or nothing that is checked."""
+"""Length of an axis: a number, a name that has the same value in all arguments, or None for no check."""
 
 _ENTRY = re.compile(r"^(\w[\w, ]*?) : (.+)$")
 _SHAPED = re.compile(r"^ndarray(?: of (int|bool|complex))?, shapes? (\(.*\))")
@@ -30,9 +30,9 @@ class Argument:
     Parameters
     ----------
     lengths : tuple
-        Of an array's axes.
+        Lengths of an array's axes.
     items : tuple of Argument
-        Of a tuple.
+        Items of a tuple.
     """
 
     name: str
@@ -45,15 +45,15 @@ Signature: TypeAlias = tuple[Argument, ...]
 
 
 def signature(documentation: str, known: Collection[str] = ()) -> Signature:
-    r"""Read a kernel's arguments off the parameters of a numpydoc text.
+    r"""Read a kernel's arguments from the parameters of a numpydoc text.
 
     Parameters
     ----------
     documentation : str
-        Entries such as ``drive : ndarray, shape (n, 2)``; a whole number or a name as a length is checked, what else
-        stands there (``up to lanes``) is not. What begins with white space is an explanation.
+        Entries such as ``drive : ndarray, shape (n, 2)``; a length that is an integer or a name is checked, any other
+        text (``up to lanes``) is not. Lines that begin with white space are explanations.
     known : collection of str
-        Arguments that are left out, since what they are is known.
+        Arguments that are omitted because they are already known.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def signature(documentation: str, known: Collection[str] = ()) -> Signature:
 
 
 def _argument(name: str, text: str, place: int = 0) -> Argument:
-    """Read one argument; of several shapes it has the one in its place."""
+    """Read one argument; if several shapes are given, take the one at its position."""
     if text.startswith("tuple ("):
         items = tuple(_argument(f"{name}[{k}]", one) for k, one in enumerate(text[7:-1].split("; ")))
         return Argument(name, Several(tuple(item.kind for item in items)), items=items)
@@ -106,9 +106,9 @@ def signature_of(function: Callable[..., object], **lengths: int) -> Signature:
     Parameters
     ----------
     function : callable
-        A function of a module, whose numpydoc text has all arrays; one named ``kernel`` is left out.
+        A function of a module, whose numpydoc text has all arrays; a parameter named ``kernel`` is omitted.
     **lengths : int
-        Values of names that stand for lengths in it.
+        Values of named lengths in it.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def signature_of(function: Callable[..., object], **lengths: int) -> Signature:
 
 
 def _named_tuple(name: str, of: Any) -> Argument:
-    """Return an argument that is a named tuple, of numbers or of arrays whose shapes its documentation has."""
+    """Return an argument that is a named tuple of numbers or of arrays whose shapes its documentation gives."""
     shown, hints = _documented(of), get_type_hints(of)
     items = [shown.get(field) or Argument(field, _HINTED[hints[field]]) for field in of._fields]
     kind = Several(tuple(item.kind for item in items), of._fields)
@@ -153,7 +153,7 @@ def _named_tuple(name: str, of: Any) -> Argument:
 
 
 def _documented(what: Any, known: Collection[str] = ()) -> dict[str, Argument]:
-    """Return the documented arguments of a function or a named tuple that are not known yet, by name."""
+    """Return the documented arguments of a function or a named tuple that are not yet known, by name."""
     text = inspect.getdoc(what) or _documentation(what)
     section = text.partition("Parameters\n----------\n")[2]
     section = re.split(r"\n\n\w+\n-{3,}\n", section)[0]
@@ -166,14 +166,14 @@ def _with(argument: Argument, lengths: dict[str, int]) -> Argument:
 
 
 def _documentation(what: Any) -> str:
-    """Return the documentation of a function or a class where Python has thrown it away (``python -OO``)."""
+    """Return the documentation of a function or a class if Python has discarded it (``python -OO``)."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(what)))
     node = tree.body[0]
     return (ast.get_docstring(node) if isinstance(node, ast.FunctionDef | ast.ClassDef) else None) or ""
 
 
 def spelt(kind: AnyKind) -> object:
-    """Return a kind as JSON holds it."""
+    """Return the JSON form of a kind."""
     match kind:
         case ScalarKind():
             return kind.name

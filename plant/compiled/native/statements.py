@@ -16,7 +16,7 @@ def write(scope: Scope, statements: Sequence[ast.stmt]) -> None:
     Raises
     ------
     KernelError
-        If one of them is none that is compiled; it names the line.
+        If one of them is not supported; the message names the line.
     """
     for node in statements:
         if scope.ended:
@@ -37,7 +37,7 @@ def _assign(scope: Scope, node: ast.Assign) -> None:
 
 
 def put(scope: Scope, target: ast.expr, value: Held) -> None:
-    """Give a name, an element, a view or several of them a value."""
+    """Assign a value to a name, an element, a view or several of them."""
     match target:
         case ast.Name():
             scope.assign(target.id, value, convert)
@@ -83,7 +83,7 @@ def _augmented(scope: Scope, node: ast.AugAssign) -> None:
 
 
 def _change(scope: Scope, target: Held, operator: ast.operator, by: Held) -> None:
-    """Change an array in its place."""
+    """Change an array in place."""
     with arrays.each(scope, target.lengths) as indices:
         other = arrays.load(scope, by, indices) if isinstance(by.kind, ArrayKind) else by
         changed = combined(scope, operator, arrays.load(scope, target, indices), other)
@@ -138,7 +138,7 @@ def _for(scope: Scope, node: ast.For) -> None:
 
 
 def _positive(scope: Scope, step: str) -> str:
-    """Return a step that is not known: it is taken to lead upward, and by one at least."""
+    """Return an unknown step; it is assumed to be positive, and is at least one."""
     small = scope.op(f"icmp slt i64 {step}, 1")
     return scope.op(f"select i1 {small}, i64 1, i64 {step}")
 

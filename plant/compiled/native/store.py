@@ -1,4 +1,4 @@
-"""Machine code in the cache folder: written whole, and run only if it is ours, undamaged and of this very kernel."""
+"""Machine code in the cache folder: written atomically, and run only if it is ours, undamaged and of this kernel."""
 
 import hashlib
 import json
@@ -18,7 +18,7 @@ logger = logging.getLogger("hydrostate")
 MAGIC = b"hydrostate machine code 1\n"
 
 LARGEST = 1 << 26
-"""No kernel's machine code is larger [bytes]."""
+"""Largest size of a kernel's machine code [bytes]."""
 
 
 def path_of(name: str, key: str) -> Path:
@@ -27,17 +27,18 @@ def path_of(name: str, key: str) -> Path:
     Parameters
     ----------
     name : str
-        What the kernel is.
+        Name of the kernel.
     key : str
-        Hash of all that its machine code depends on.
+        Hash of everything that determines its machine code.
     """
     return cache_folder() / f"hydrostate_{name}_{key[:16]}.machine"
 
 
 def recalled(name: str, key: str) -> tuple[Mapping[str, Any], bytes] | None:
-    """Return description and machine code of a kernel, or None if they must be made.
+    """Return description and machine code of a kernel, or None if they must be compiled.
 
-    A file that is empty, cut off, damaged, of another kernel, no regular file, or another user's, is as good as none.
+    A file is ignored if it is empty, truncated, damaged, of another kernel, not a regular file, or owned by another
+    user.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def recalled(name: str, key: str) -> tuple[Mapping[str, Any], bytes] | None:
 
 
 def _own(path: Path) -> bytes | None:
-    """Return the content of a regular file that belongs to this user and that no other may write to."""
+    """Return the content of a regular file that belongs to this user and that nobody else may write to."""
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     try:
         handle = os.open(path, flags)
@@ -90,14 +91,14 @@ def _refused(folder: Path) -> bool:
 
 
 def kept(name: str, key: str, description: Mapping[str, Any], code: bytes) -> None:
-    """Keep a kernel for later runs; where the folder cannot be written, say so once and do without.
+    """Keep a kernel for later runs; if the folder cannot be written, warn once and continue without it.
 
     Parameters
     ----------
     name, key : str
         See `path_of`.
     description : Mapping[str, Any]
-        What belongs to the machine code.
+        Data that belong to the machine code.
     code : bytes
         An object file.
     """
