@@ -22,8 +22,11 @@ RESCALED = 3
 """Most often that an optimum is replaced by a better one found in this way."""
 
 BETTER = 5.0
-"""Fall of the cost from which a better optimum is left in its turn [dimensionless], if its bulk modulus is so far away
-that the two would disagree: nearer to the last one, the same places are searched again."""
+"""Fall of the cost from which a better optimum is left in its turn [dimensionless]."""
+
+ELSEWHERE, SHORT = 0.005, 4.0
+"""Relative difference in bulk modulus from which the same [fraction], in logs up to this length [s]. In longer logs, the
+two optima must disagree: if they are nearer, the same places are searched again, which takes 1 s and changes little."""
 
 ALMOST, NEARBY = 1e-3, 0.3
 """Relative difference in bulk modulus, and the same over its deviation, up to which a nearby optimum counts as the
@@ -98,6 +101,8 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
         The best optimum, and the bulk moduli of all others that explain the log [Pa].
     """
     found, moduli = [best], list[float]()
+    short = len(problem.log.measured) * problem.log.sample_time <= SHORT
+    far = ELSEWHERE if short else np.log(1.0 + LARGEST_DISAGREEMENT)
     for _ in range(RESCALED):
         for moved in _moved(problem.model.values(best.theta)):
             found += _ended(problem, best, moved, way)
@@ -107,7 +112,7 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
         moved = abs(np.log(bulk_modulus(problem, lowest) / bulk_modulus(problem, best)))
         over, best = lowest.cost > best.cost - BETTER, lowest
         moduli = [bulk_modulus(problem, one) for one in found if one is not best and one.cost < way.explained]
-        if over or moved < np.log(1.0 + LARGEST_DISAGREEMENT) or disagree([bulk_modulus(problem, best), *moduli]):
+        if over or moved < far or disagree([bulk_modulus(problem, best), *moduli]):
             break
     return best, moduli
 
