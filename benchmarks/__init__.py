@@ -1,5 +1,6 @@
-"""Acceptance and speed, measured: `python -m benchmarks` runs all scripts, `python -m benchmarks NAME` one.
+"""Acceptance and speed measurements: `python -m benchmarks` runs all scripts, `python -m benchmarks NAME` runs one.
 
-They stand in folders by subject; a name needs no folder. `benchmarks.targets` says whether a figure is met,
-`benchmarks.history` keeps figures, and `benchmarks.peers` has code in other tools beside which ours is measured.
+The scripts are in folders by subject; a name needs no folder. `benchmarks.targets` compares each figure with its
+target, `benchmarks.history` stores figures, and `benchmarks.peers` has code for the other tools that ours is compared
+with.
 """

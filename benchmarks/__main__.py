@@ -46,22 +46,22 @@ NAMES = (
     "many_logs.fleet",
     "server.server",
 )
-"""Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
+"""Every benchmark that needs only the project, in the order of `make benchmark`."""
 
 FITS = ("diagnosis.fit_diagnosis",)
-"""Those that write numbers which ship with the package."""
+"""Those that write numbers that ship with the package."""
 
 WITH_PEERS = ("identification.identification_peers", "watching.streaming")
 """Those that need environments of other tools, which `make peers` sets up."""
 
 OF_TESTS = ("mutants.mutants",)
-"""Those that ask the tests themselves, and take minutes to hours."""
+"""Those that evaluate the tests themselves, and take minutes to hours."""
 
 OF_RUNS = ("history",)
 """Those that compare earlier runs of the others."""
 
 ALL = {module.rpartition(".")[2]: module for module in (*NAMES, *FITS, *WITH_PEERS, *OF_TESTS, *OF_RUNS)}
-"""The module of each, by the name that the command takes."""
+"""The module of each benchmark, by its name on the command line."""
 
 
 def run(name: str, arguments: list[str], *, recorded: bool) -> int:

@@ -1,9 +1,9 @@
-"""What the benchmarks measured before, so that a regression shows.
+"""Earlier figures of the benchmarks, so that regressions show.
 
 `python -m benchmarks --record NAME ...` adds every figure of that run to `benchmarks/history.jsonl`, with the date, the
-commit and the kind of machine. `python -m benchmarks history` compares the newest figure of each with those before it
-on the same kind of machine, and ends with a non-zero exit where one got worse; `--plot FOLDER` draws one figure a
-benchmark.
+commit and the kind of machine. `python -m benchmarks history` compares the newest figure of each with the earlier ones
+on the same kind of machine, and ends with a non-zero exit status if one got worse. `--plot FOLDER` draws one plot for
+each benchmark.
 """
 
 import argparse
@@ -23,13 +23,14 @@ from typing import Any
 from benchmarks.targets import Check
 
 HISTORY = Path(__file__).with_name("history.jsonl")
-"""Where figures are kept, one a line."""
+"""File of the figures, one on each line."""
 
 NOTICED = 0.25
-"""A change for the worse that is always noticed, share of the earlier median. Two shared cores scatter by some 10 %."""
+"""Change for the worse that is always reported, as a share of the earlier median. Two shared cores scatter by some 10
+%."""
 
 SCATTERS = 3.0
-"""How many median absolute deviations of the earlier figures a change must exceed as well [dimensionless]."""
+"""Number of median absolute deviations of the earlier figures that a change must also exceed [dimensionless]."""
 
 
 @dataclass(frozen=True)
@@ -40,19 +41,19 @@ class Entry:
     commit: str
     machine: str
     benchmark: str
-    """Its name and arguments, as they were given."""
+    """Name and arguments of the benchmark, as given."""
 
     check: Check
 
     def line(self) -> str:
-        """Return the entry as one line of JSON; an open end of the range is null."""
+        """Return the entry as one line of JSON; an open limit of the range is null."""
         least, most = (limit if isfinite(limit) else None for limit in (self.check.least, self.check.most))
         where = {"date": self.date, "commit": self.commit, "machine": self.machine, "benchmark": self.benchmark}
         return json.dumps({**where, "what": self.check.what, "value": self.check.value, "least": least, "most": most})
 
 
 def entry_of(line: str) -> Entry:
-    """Return the entry that a line holds."""
+    """Return the entry on a line."""
     held: dict[str, Any] = json.loads(line)
     least, most = held["least"], held["most"]
     check = Check(held["what"], held["value"], -inf if least is None else least, inf if most is None else most)
@@ -70,7 +71,7 @@ def machine() -> str:
 
 
 def commit() -> str:
-    """Return the commit that is checked out, with a plus sign where files differ from it."""
+    """Return the checked-out commit, with a plus sign if files differ from it."""
     said = [
         subprocess.run(["git", *words], capture_output=True, text=True, check=False, cwd=HISTORY.parent).stdout.strip()  # noqa: S603, S607 -- git, our own words
         for words in (("rev-parse", "--short", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
@@ -79,7 +80,7 @@ def commit() -> str:
 
 
 def record(benchmark: str, checks: Iterable[Check], path: Path = HISTORY) -> int:
-    """Add the figures of a run to the history; return how many. A figure that is not finite is left out."""
+    """Add the figures of a run to the history; return how many. Figures that are not finite are skipped."""
     now, where, kind = datetime.now(UTC).date().isoformat(), commit(), machine()
     lines = [Entry(now, where, kind, benchmark, check).line() for check in checks if isfinite(check.value)]
     with path.open("a", encoding="utf-8") as file:
@@ -88,7 +89,7 @@ def record(benchmark: str, checks: Iterable[Check], path: Path = HISTORY) -> int
 
 
 def series_of(entries: Iterable[Entry]) -> dict[tuple[str, str, str], list[Entry]]:
-    """Return the entries of each figure in the order in which they were recorded, by machine, benchmark and name."""
+    """Return the entries of each figure in recorded order, by machine, benchmark and name."""
     series: dict[tuple[str, str, str], list[Entry]] = defaultdict(list)
     for entry in entries:
         series[entry.machine, entry.benchmark, entry.check.what].append(entry)
@@ -96,10 +97,11 @@ def series_of(entries: Iterable[Entry]) -> dict[tuple[str, str, str], list[Entry
 
 
 def regression(checks: Sequence[Check]) -> str | None:
-    """Say how the newest figure is worse than those before it, or return None.
+    """Describe how the newest figure is worse than the earlier ones, or return None.
 
-    Worse is to miss a range that the figure before it met; and, for a figure with one limit, to have moved towards
-    that limit by more than `NOTICED` of the earlier median and more than `SCATTERS` of the earlier scatter.
+    A figure is worse if it misses a range that the previous figure met. A figure with one limit is also worse if it
+    moved towards that limit by more than `NOTICED` of the earlier median and more than `SCATTERS` of the earlier
+    scatter.
 
     Examples
     --------
@@ -124,7 +126,7 @@ def regression(checks: Sequence[Check]) -> str | None:
 
 
 def draw(series: dict[tuple[str, str, str], list[Entry]], folder: Path) -> list[Path]:
-    """Draw the figures of each benchmark over the runs, each as a share of its first; return the files."""
+    """Plot the figures of each benchmark over the runs, relative to its first one; return the files."""
     import matplotlib.pyplot as plt
 
     by_benchmark: dict[tuple[str, str], list[list[Entry]]] = defaultdict(list)
@@ -149,7 +151,7 @@ def draw(series: dict[tuple[str, str, str], list[Entry]], folder: Path) -> list[
 
 
 def main(arguments: list[str]) -> int:
-    """Print the newest figure of each beside the one before it; return how many are worse."""
+    """Print the newest figure of each with the previous one; return how many are worse."""
     parser = argparse.ArgumentParser(prog="history", description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--file", type=Path, default=HISTORY, help="another history")
     parser.add_argument("--plot", type=Path, help="folder for one figure a benchmark")

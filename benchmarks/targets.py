@@ -1,4 +1,4 @@
-"""Figures beside their targets: the one printer of all benchmarks, which also keeps them for the history."""
+"""Figures with their targets: the common output of all benchmarks, which also keeps figures for the history."""
 
 import time
 from collections.abc import Callable
@@ -11,10 +11,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Check:
-    """One figure and the range in which it is wanted."""
+    """One figure and its target range."""
 
     what: str
-    """What was measured, with its unit."""
+    """Measured quantity, with its unit."""
 
     value: float
 
@@ -39,7 +39,7 @@ class Check:
 
 
 misses: list[str] = []
-"""What fell short since a benchmark began."""
+"""Figures that missed their target since a benchmark began."""
 
 kept: list[Check] = []
 """Every figure since the benchmarks began, for the history."""
@@ -58,14 +58,14 @@ def printed(checks: list[Check]) -> list[Check]:
 
 
 def say(what: str, value: float, bound: float, *, most: bool = True) -> None:
-    """Print a figure beside its target, and note it if it falls short."""
+    """Print a figure with its target, and record a miss."""
     [check] = printed([Check(what, value, most=bound) if most else Check(what, value, least=bound)])
     if not check.met:
         misses.append(what)
 
 
 def timed(work: Callable[[], T]) -> tuple[float, T]:
-    """Return the processor time that some work took [s], and its result."""
+    """Return the processor time of some work [s], and its result."""
     start = time.process_time()
     found = work()
     return time.process_time() - start, found

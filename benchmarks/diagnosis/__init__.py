@@ -1,1 +1,1 @@
-"""Estimates and diagnoses of logs: populations, classes, severities, intervals, logs of others, own classes."""
+"""Estimates and diagnoses of logs: populations, classes, severities, intervals, foreign logs, user-defined classes."""

@@ -1,4 +1,4 @@
-"""Classification by smallest RMSE over seeds and conditions, and Table 5's comparison: each against its tolerance."""
+"""Classification by smallest RMSE over seeds and conditions, and Table 5, each against its tolerance."""
 
 import argparse
 
@@ -14,7 +14,7 @@ WANTED = {
     ("mathematical, pressure logged", "spread"): 0.95,
     ("mathematical", "spread"): 0.95,
 }
-"""Least accuracy of the mathematical bank; the transfer functions' figures stand beside without one."""
+"""Minimum accuracy of the mathematical bank; the transfer functions' figures are printed without a target."""
 
 
 def main(arguments: list[str]) -> int:

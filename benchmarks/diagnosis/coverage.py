@@ -1,12 +1,12 @@
-"""How often 95 % intervals cover, and whether they are as wide as they need be, given that the rig file is right.
+"""Coverage of 95 % intervals, and whether their width is appropriate, if the rig file is right.
 
-A line for each plant, form and rate: our lumped plant and our circuit in the nine conditions, each under steps and a
-binary signal of 10 s with the bench's sensors, and plain logs of the open benchmark's validation split, whose physics
-no form here was written for. Every log of our own plants is of another actuator: its rig is drawn, which the rig file
-says, and about its condition leakage, friction, bulk modulus and seals are drawn, which it does not, so that no search
-begins at the truth. ``z`` is the error over its standard deviation, by root mean square: 1 where intervals are
-right. Bulk modulus is asked by the flow form and, where equation 5.8 holds, by the pressure form with noise tuned to
-the log; ``--severities`` adds those of `diagnose`.
+Prints one line for each plant, form and rate: our lumped plant and our circuit in the nine conditions, each under steps
+and a binary signal of 10 s with the bench's sensors, and plain logs of the open benchmark's validation split, whose
+physics no form here was written for. Every log of our own plants is of another actuator. Its rig is drawn, and the rig
+file states it. Leakage, friction, bulk modulus and seals are drawn about its condition, and the rig file does not state
+them, so no search begins at the truth. ``z`` is the error divided by its standard deviation, as root mean square: 1 if
+intervals are right. Bulk modulus is estimated by the flow form and, where equation 5.8 holds, by the pressure form with
+noise tuned to the log; ``--severities`` adds the severities of `diagnose`.
 """
 
 import argparse
@@ -44,29 +44,29 @@ from plant.sensors.sensors import BENCH
 HEALTHY = EhaParameters()
 
 OPEN = "open benchmark"
-"""The plant that is none of ours."""
+"""Name of the plant that is not ours."""
 
 DRIVES = ("steps", "prbs")
 
 RIG_SPREAD = 0.1
-"""Half width of area, displacement, chamber volume and mass, which the rig file says [fraction]."""
+"""Half-width of area, displacement, chamber volume and mass, which the rig file states [fraction]."""
 
 SPREAD = 0.2
-"""Half width of leakage, flow bias, friction, bulk modulus and presliding, which it does not [fraction]."""
+"""Half-width of leakage, flow bias, friction, bulk modulus and presliding, which it does not state [fraction]."""
 
 DURATION = 10.0
-"""Of a log of our own plants [s]."""
+"""Length of a log of our own plants [s]."""
 
 COVERED = (90.0, 98.0)
-"""Wanted of each line [%]."""
+"""Required coverage on each line [%]."""
 
 WIDTH = (0.8, 1.3)
-"""Wanted of z on our own plants, by root mean square [dimensionless]."""
+"""Required root mean square of z on our own plants [dimensionless]."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A log, and which estimate is made of it."""
+    """A log, and the estimate to make from it."""
 
     plant: str
     form: str
@@ -77,7 +77,7 @@ class Case:
 
 
 class Log(NamedTuple):
-    """What was logged, the true actuator, and the healthy one that the rig file says."""
+    """The logged record, the true actuator, and the healthy actuator that the rig file describes."""
 
     record: Record
     true: EhaParameters
@@ -85,7 +85,7 @@ class Log(NamedTuple):
 
 
 def logged(case: Case) -> Log:
-    """Return a log of an actuator that is drawn."""
+    """Return a log of a randomly drawn actuator."""
     if case.plant == OPEN:
         return _foreign(case)
     rng = stream(case.seed, "coverage", case.plant, case.drive, case.condition, case.rate)
@@ -122,7 +122,7 @@ def _foreign(case: Case) -> Log:
 
 
 def asked(case: Case) -> list[dict[str, object]]:
-    """Return a row for each quantity of a log: its z, and whether the interval covers."""
+    """Return one row for each quantity of a log: its z, and why it has no usable interval, if so."""
     warnings.simplefilter("ignore")
     log = logged(case)
     try:
@@ -178,7 +178,7 @@ def summarised(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def cases_of(options: argparse.Namespace) -> list[Case]:
-    """Return the cases: each log with the estimate that is made of it."""
+    """Return the cases: each log with the estimate to make from it."""
     forms = ["flow", *(["severities"] if options.severities else [])]
     cases: list[Case] = []
     for plant, rate in product(options.plants, options.rates):
@@ -195,7 +195,7 @@ def cases_of(options: argparse.Namespace) -> list[Case]:
 
 
 def main(arguments: list[str]) -> int:
-    """Print a line for each plant, form, rate and quantity; return how many are outside what is wanted."""
+    """Print one line for each plant, form, rate and quantity; return how many miss their target."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=2, help="logs a condition; 20 is the acceptance")
     parser.add_argument("--rates", type=int, nargs="+", default=[1000, 10000], help="samples a second")

@@ -1,8 +1,8 @@
 """Diagnosis against its targets: accuracy, calibration, severity, unknowns, foreign logs, speed.
 
 The population is `benchmarks.diagnosis.population`: the circuit plant, rig sensors, nine steps and a random binary
-signal of 10 s, test seeds alone. ``--seeds`` and ``--draws`` make it smaller, no draws leave the limit out. Foreign
-logs are read from ``$HYDROSTATE_SHARED/bench``.
+signal of 10 s, test seeds only. ``--seeds`` and ``--draws`` make it smaller; zero draws skip the limit. Foreign logs
+are read from ``$HYDROSTATE_SHARED/bench``.
 """
 
 import argparse
@@ -38,10 +38,10 @@ from plant.eha.model import EhaParameters
 PRESSURE = "differential_pressure_pa"
 
 SHIPPED = ("models", "innovations", "parameters")
-"""Evidences that a diagnosis weighs."""
+"""Kinds of evidence that a diagnosis weighs."""
 
 LUMPED_SEEDS = 5
-"""Seeds on which the paper's lumped models are scored too."""
+"""Seeds on which the paper's lumped models are also scored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Judged:
 
 
 def main(arguments: list[str]) -> int:
-    """Print every figure beside its target; return how many fall short."""
+    """Print every figure with its target; return how many fall short."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=50)
     parser.add_argument("--draws", type=int, default=2000)
@@ -83,12 +83,12 @@ def main(arguments: list[str]) -> int:
 
 
 def which(pressure: bool) -> str:
-    """Return how a set of logs is called."""
+    """Return the name of a set of logs."""
     return "with dp" if pressure else "without dp"
 
 
 def judge(logs: Iterable[Drawn], actuator: Actuator, *, pressure: bool) -> Iterable[Judged]:
-    """Diagnose logs and hold them against what was true."""
+    """Diagnose logs and compare the results with the truth."""
     for log in logs:
         record = log.record if pressure else log.record.replace(**{PRESSURE: None})
         found = diagnose_log(record, PAPER)
@@ -97,7 +97,7 @@ def judge(logs: Iterable[Drawn], actuator: Actuator, *, pressure: bool) -> Itera
 
 
 def other_circuits(actuator: Actuator, seeds: int, *, pressure: bool) -> list[Check]:
-    """Return class and coverage on circuits that are not of the kind that is fitted."""
+    """Return accuracy and coverage on circuits of a different kind from the fitted one."""
     judged = list(judge(draw_logs(range(TEST + 300, TEST + 300 + seeds), like=False), actuator, pressure=pressure))
     name = f"{len(judged)} logs of other circuits {which(pressure)}"
     right = 100.0 * float(np.mean([one.found.condition == one.log.condition for one in judged]))
@@ -111,7 +111,7 @@ def other_circuits(actuator: Actuator, seeds: int, *, pressure: bool) -> list[Ch
 
 
 def confusions(judged: list[Judged]) -> pd.DataFrame:
-    """Return the pairs that were confused, true against found."""
+    """Return the confused pairs, true against found."""
     wrong = [(one.log.condition, one.found.condition) for one in judged if one.log.condition != one.found.condition]
     return pd.DataFrame(wrong, columns=["true", "found"]).value_counts().rename("count").reset_index()
 
@@ -146,7 +146,7 @@ def population_checks(judged: list[Judged], name: str, wanted: float) -> list[Ch
 
 
 def lumped_accuracy(judged: list[Judged], name: str) -> float:
-    """Return how often the smallest error of the lumped models is the true condition's."""
+    """Return the share of logs for which the true condition's lumped model has the smallest error."""
     bank = mathematical_bank(EhaParameters())
     some = [one.log for one in judged if int(one.log.record.metadata["seed"]) < TEST + LUMPED_SEEDS]
     hits = [score_mathematical(log.record, bank, pressure=name == "with dp").condition == log.condition for log in some]

@@ -1,4 +1,4 @@
-"""The diagnosis benchmark beyond its population: the limit, unknowns, foreign logs, sticking, speed."""
+"""Further checks of the diagnosis benchmark: the limit, unknowns, foreign logs, sticking, speed."""
 
 import os
 import time
@@ -42,17 +42,17 @@ from plant.solvers.steps import parameter_row
 PRESSURE = "differential_pressure_pa"
 
 WIDE = 0.2
-"""Spread at which the limit is asked for [dimensionless]."""
+"""Spread at which the limit is computed [dimensionless]."""
 
 PAPER = Rig(EhaParameters())
-"""The rig of the paper, as a user who gives no rig file has it."""
+"""The paper's rig, which a user without a rig file gets."""
 
 CHUNK = 64
-"""Draws that are simulated at a time."""
+"""Number of draws simulated at a time."""
 
 
 def told(found: Finding, true: Mapping[str, float]) -> dict[str, bool]:
-    """Return whether each severity that a diagnosis gives an interval covers what it truly is."""
+    """Return, for each severity with an interval, whether the interval covers the true value."""
     names = [name for name, one in found.severities.items() if name in true and one.ci95 is not None]
     return {name: found.severities[name].covers(true[name]) for name in names if name != "entrained_air"}
 
@@ -133,7 +133,7 @@ def foreign_logs(folder: Path) -> Iterator[tuple[str, EhaParameters, Record]]:
 
 
 def foreign_checks(actuator: Actuator) -> list[Check]:
-    """Class, severity and flags on the foreign logs."""
+    """Check class, severity and flags on the foreign logs."""
     folder = Path(os.environ.get("HYDROSTATE_SHARED", "../shared")) / "bench"
     if not (folder / "truth.csv").exists():
         print(f"skipped: no logs in {folder}")
@@ -155,7 +155,7 @@ def foreign_checks(actuator: Actuator) -> list[Check]:
 
 
 def onset_checks(seeds: int) -> list[Check]:
-    """Diagnose logs of an actuator that was healthy until some time within the log."""
+    """Diagnose logs of an actuator whose fault begins within the log."""
     names = [name for name in CONDITIONS if name != "normal"]
     checks: list[Check] = []
     logs: list[tuple[str, float, Record]] = []
@@ -186,7 +186,7 @@ def onset_checks(seeds: int) -> list[Check]:
 
 
 def stuck_checks() -> list[Check]:
-    """Diagnose a 10 Hz sine that leaves the piston stuck: leakage is found, friction is left open."""
+    """Diagnose a 10 Hz sine that leaves the piston stuck: leakage is found, friction stays undecided."""
     right, widest = 0, 0.0
     for seed, (name, condition) in enumerate(CONDITIONS.items()):
         p = draw_parameters(name, np.random.default_rng([TEST, seed]), 0.0)
@@ -211,7 +211,7 @@ def stuck_checks() -> list[Check]:
 
 
 def speed_checks() -> list[Check]:
-    """Time one diagnosis by all four evidences, after start-up."""
+    """Time one diagnosis with all four kinds of evidence, after start-up."""
     checks: list[Check] = []
     for duration, sample_time, most in ((20.0, 1e-3, 0.5), (10.0, 1e-4, 2.0)):
         taken: list[float] = []

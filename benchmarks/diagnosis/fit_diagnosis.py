@@ -1,9 +1,10 @@
-"""Fit what diagnosis ships: weights of the evidences and widths of the intervals, on simulated training logs alone.
+"""Fit what diagnosis ships: weights of the evidence and widths of the intervals, on simulated training logs only.
 
-A quarter of them are of the open benchmark, whose physics no estimator shares: on the circuit's own logs hardly a class
-is wrong, and weights learnt there would be too sure elsewhere. Writes ``faults/diagnosis/calibration.json`` (``--out``
-another file). Test seeds, other splits of the benchmark and foreign logs are never looked at. ``--widths`` fits the
-widths with pressure alone, which needs nothing but the fitted circuits, and leaves all else as it is.
+A quarter of the logs are from the open benchmark, whose physics no estimator shares: on the circuit's own logs hardly
+any class is wrong, and weights learnt there would be too confident elsewhere. Writes
+``faults/diagnosis/calibration.json`` (or the file given by ``--out``). Test seeds, other splits of the benchmark and
+foreign logs are never used. ``--widths`` fits only the widths with pressure, which need only the fitted circuits, and
+leaves everything else unchanged.
 """
 
 import argparse
@@ -38,17 +39,18 @@ from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
 RIDGE = 1e-3
-"""Penalty on squared weights [dimensionless]: where training logs are all right, weights would grow for ever."""
+"""Penalty on squared weights [dimensionless]: if all training logs are right, weights would otherwise grow without
+bound."""
 
 HELD, HELD_ALIKE = 0.96, 0.95
-"""Shares of all training logs, and of those of the first population, whose interval shall hold the truth."""
+"""Shares of all training logs, and of those of the first population, whose interval must contain the truth."""
 
 FAR, TWICE = 0.995, 2.0
-"""Share of all training logs whose error shall be within so many half-widths: tails are longer than a Gaussian's."""
+"""Share of all training logs whose error must be within this many half-widths: tails are longer than a Gaussian's."""
 
 POPULATIONS = ((0.1, True), (0.2, True), (0.1, False))
-"""Spread, and whether the circuits are of the kind that is fitted: weights see the first two, widths all three; both
-see the open benchmark's logs, as many as one population has."""
+"""Spread, and whether the circuits are of the fitted kind. Weights use the first two populations, widths all three;
+both use the open benchmark's logs, as many as in one population."""
 
 PRESSURE = "differential_pressure_pa"
 
@@ -85,7 +87,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _only_widths(seeds: int, out: Path) -> int:
-    """Fit the widths with pressure and write them beside what is there; return 0."""
+    """Fit the widths with pressure and add them to the existing file; return 0."""
     actuator = actuator_of(EhaParameters())
     ratios = _no_ratios()
     for _, log in _training(range(TRAINING, TRAINING + seeds)):
@@ -105,7 +107,7 @@ def _only_widths(seeds: int, out: Path) -> int:
 
 
 def fitted(seeds: int, pressure: bool) -> dict[str, dict[str, float]]:
-    """Return the weights and the widths, with pressure or without."""
+    """Return the weights and the widths, with or without pressure."""
     odds, truths, ratios = gathered(range(TRAINING, TRAINING + seeds), pressure=pressure)
     weights = fitted_weights(odds, truths)
     return {
@@ -119,7 +121,7 @@ def _widths(ratios: dict[str, list[float]]) -> dict[str, float]:
 
 
 def gathered(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np.int64], dict[str, list[float]]]:
-    """Return log-odds (logs, evidences, 9), true conditions, and errors over half-widths by severity."""
+    """Return log-odds (logs, evidences, 9), true conditions, and errors divided by half-widths for each severity."""
     actuator, library = actuator_of(EhaParameters()), read_library()
     odds: list[Array] = []
     truths: list[int] = []
@@ -135,7 +137,7 @@ def gathered(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np
 
 
 def _training(seeds: Sequence[int]) -> Iterator[tuple[bool, "Drawn | OpenLog"]]:
-    """Yield each training log, and whether weights see it."""
+    """Yield each training log, and whether the weights use it."""
     for width, like in POPULATIONS:
         for log in draw_logs(seeds, width=width, like=like):
             yield like, log
@@ -148,7 +150,7 @@ def _no_ratios() -> dict[str, list[float]]:
 
 
 def _add_ratios(ratios: dict[str, list[float]], fits: ClassFits, p: EhaParameters, actuator: Actuator) -> None:
-    """Add a log's errors over half-widths, by severity."""
+    """Add a log's errors divided by half-widths, for each severity."""
     true = severities_at(coordinates_of(p, actuator.rated), actuator)
     for name, one in severities(fits, actuator).items():
         if name in ratios and one.value is not None and one.ci95 is not None:
@@ -157,7 +159,7 @@ def _add_ratios(ratios: dict[str, list[float]], fits: ClassFits, p: EhaParameter
 
 
 class OpenLog(NamedTuple):
-    """A log of the open benchmark: what was true, and what was logged."""
+    """A log of the open benchmark: the truth and the record."""
 
     condition: str
     parameters: EhaParameters
@@ -165,7 +167,7 @@ class OpenLog(NamedTuple):
 
 
 def open_logs(count: int) -> Iterator[OpenLog]:
-    """Yield the first plain logs of the open benchmark's training split, read as a user reads them."""
+    """Yield the first plain logs of the open benchmark's training split, read as a user would read them."""
     with tempfile.TemporaryDirectory() as folder:
         truth = write_set("plain", "training", count, Path(folder))
         for row in rows_of(read_truth(truth.parent)):
@@ -175,9 +177,9 @@ def open_logs(count: int) -> Iterator[OpenLog]:
 
 
 def fitted_width(ratios: Sequence[float]) -> float:
-    """Return by what an interval is stretched to hold its shares; the populations follow on each other, alike long.
+    """Return the factor that stretches an interval to its coverage; populations follow in order, of equal length.
 
-    None is made narrower than its own theory says: how rare a far error is, a few hundred logs do not tell.
+    No interval becomes narrower than its own theory says: a few hundred logs do not show how rare a large error is.
     """
     first = ratios[: len(ratios) // (len(POPULATIONS) + 1)]
     far = float(np.quantile(ratios, FAR)) / TWICE
@@ -185,7 +187,7 @@ def fitted_width(ratios: Sequence[float]) -> float:
 
 
 def fitted_weights(odds: Array, truths: NDArray[np.int64]) -> Array:
-    """Return the weights, none negative, that make the true conditions most probable."""
+    """Return the non-negative weights that make the true conditions most probable."""
 
     def loss(weights: Array) -> tuple[float, Array]:
         total = np.einsum("e,lec->lc", weights, odds)

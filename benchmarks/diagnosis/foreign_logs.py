@@ -1,8 +1,7 @@
-"""Logs that this project did not make: bulk modulus and class against the truth that came with them.
+"""Logs that this project did not make: bulk modulus and class against the truth supplied with them.
 
-Every form is given the healthy actuator and no condition. Reads ``$HYDROSTATE_SHARED/bench`` (default
-``../shared/bench``). The online filter is one of `ONLINE`, where the project has one; ``--class`` scores the nine
-conditions as well.
+Every form gets the healthy actuator and no condition. Reads ``$HYDROSTATE_SHARED/bench`` (default ``../shared/bench``).
+The online filter is one of `ONLINE`, if the project has one; ``--class`` also scores the nine conditions.
 """
 
 import os
@@ -24,17 +23,17 @@ from plant.log.record import Record
 HEALTHY = EhaParameters()
 
 SAFE_PERCENT = 10.0
-"""Error above which the gate must object [%]."""
+"""Error above which the gate must reject the estimate [%]."""
 
 Online = Callable[[Record], float]
-"""Effective bulk modulus [Pa] where an online filter ended, condition unknown."""
+"""Final effective bulk modulus [Pa] of an online filter, condition unknown."""
 
 ONLINE: Mapping[str, Online] = {}
-"""Online filters by name; each adds a column and a count. The flow form's belongs here."""
+"""Online filters by name; each adds a column and a count. The flow form's filter belongs here."""
 
 
 def main(arguments: list[str]) -> int:
-    """Print one line a log and the counts beside what is wanted; return how many counts fall short."""
+    """Print one line for each log, and the counts with their targets; return how many counts fall short."""
     folder = Path(os.environ.get("HYDROSTATE_SHARED", "../shared")) / "bench"
     if not (folder / "truth.csv").exists():
         print(f"skipped: no logs in {folder}")
@@ -58,13 +57,13 @@ def main(arguments: list[str]) -> int:
 
 
 def warmed_up(record: Record) -> None:
-    """Compile every kernel, so that no log is timed with it."""
+    """Compile every kernel, so that no timing includes compilation."""
     for log in (record, record.replace(differential_pressure_pa=None)):
         estimate_bulk_modulus(log, HEALTHY)
 
 
 def judged(record: Record, true: float, which: str) -> dict[str, object]:
-    """Return error, half interval, whether it covers, the gate and the time of one estimate, in percent and seconds."""
+    """Return error, half-width, coverage, gate and time of one estimate, in percent and seconds."""
     began = time.process_time()
     found = estimate_bulk_modulus(record, HEALTHY)
     seconds = time.process_time() - began
@@ -79,12 +78,12 @@ def judged(record: Record, true: float, which: str) -> dict[str, object]:
 
 
 def error(found: BulkModulusEstimate, true: float) -> float:
-    """Return the error in percent; infinite where no number is given."""
+    """Return the error in percent; infinite if there is no estimate."""
     return float("inf") if found.value is None else 100.0 * (found.value / true - 1.0)
 
 
 def counted(table: pd.DataFrame) -> int:
-    """Print every count beside what is wanted; return how many fall short."""
+    """Print every count with its target; return how many fall short."""
     pressure, motion = table["with_dp_%"].abs(), table["without_dp_%"].abs()
     believed = motion[table["without_gate"] & np.isfinite(motion)]
     slowest = max(table["with_s"].max(), table["without_s"].max())

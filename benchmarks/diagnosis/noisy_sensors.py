@@ -1,8 +1,8 @@
-"""Rigs whose sensors are worse than the reference bench's: bulk modulus within its interval, classes with honest odds.
+"""Rigs with worse sensors than the reference bench: coverage of bulk modulus, and calibration of class probabilities.
 
-Bulk modulus is estimated with pressure on 10 s of the circuit plant under sensors of position of 10 to 50 um. The hard
-population is 1 s under sensors so coarse that one log in five to twenty is taken for another condition: there a
-probability can be wrong, so that calibration is a test. ``--seeds`` makes both larger or smaller.
+Bulk modulus is estimated with pressure on 10 s of the circuit plant with position sensors of 10 to 50 um. The hard
+population has logs of 1 s with sensors so coarse that one log in five to twenty is assigned to the wrong condition.
+Probabilities can be wrong there, so calibration is a real test. ``--seeds`` makes both larger or smaller.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from plant.errors import LogWarning
 from plant.sensors.sensors import RIG, Sensors
 
 FIRST = TEST + 900
-"""First seed, away from those of other benchmarks."""
+"""First seed, separate from those of other benchmarks."""
 
 SENSORS: Mapping[str, Sensors] = MappingProxyType(
     {
@@ -40,17 +40,17 @@ SENSORS: Mapping[str, Sensors] = MappingProxyType(
         ),
     }
 )
-"""Sensors, beside the rig's."""
+"""Sensors to compare, including the rig's."""
 
 HARD = replace(RIG, position_noise=2e-4, position_quantum=2e-4, pressure_noise=1e5, speed_noise=1.0)
 """Position to 0.2 mm, pressure to 1 bar, speed to 1 rad/s."""
 
 SURE = 0.9
-"""Probability from which a wrong class is a broken promise [probability]."""
+"""Probability above which a wrong class counts as overconfident [probability]."""
 
 
 def main(arguments: list[str]) -> int:
-    """Print every figure beside its target; return how many fall short."""
+    """Print every figure with its target; return how many fall short."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=10)
     options = parser.parse_args(arguments)
@@ -65,7 +65,7 @@ def main(arguments: list[str]) -> int:
 
 
 def moduli(name: str, sensors: Sensors, seeds: int) -> list[Check]:
-    """Return how bulk modulus is estimated under some sensors."""
+    """Return the errors and coverage of bulk modulus for some sensors."""
     began = time.process_time()
     logs, passed, errors, sizes = 0, 0, list[float](), list[float]()
     for log in draw_logs(range(FIRST, FIRST + seeds), sensors=sensors):
@@ -88,7 +88,7 @@ def moduli(name: str, sensors: Sensors, seeds: int) -> list[Check]:
 
 
 def odds(seeds: int) -> list[Check]:
-    """Return how far the probabilities of classes hold on logs that are hard to tell."""
+    """Return the calibration of class probabilities on logs that are hard to classify."""
     sure, right, unknown, silent = list[float](), list[bool](), 0, 0
     for log in draw_logs(range(FIRST, FIRST + 2 * seeds), sensors=HARD, duration=1.0):
         found = diagnose_log(log.record, PAPER)

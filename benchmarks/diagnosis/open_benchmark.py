@@ -1,9 +1,9 @@
-"""What ships, on the open benchmark: a line a kind of log, with pressure and without.
+"""The shipped estimators on the open benchmark: one line for each kind of log, with pressure and without.
 
-Logs are made of the split that is asked for; ``--folder`` scores sets that are there. Silent errors and false unknowns
-are wanted to be none with pressure. A log without pressure takes long, so few of them are scored. ``--pairs`` scores
-logs in which two kinds are at once, drawn at random: log k is number k of its pair; ``--usual-pairs`` those of
-`USUAL_PAIRS`, ``--count`` of each.
+Logs are made from the selected split; ``--folder`` scores existing sets instead. With pressure, the target is no silent
+errors and no false unknowns. A log without pressure takes long, so few of them are scored. ``--pairs`` scores logs with
+two kinds at once, drawn at random: log k is number k of its pair; ``--usual-pairs`` those of `USUAL_PAIRS`, ``--count``
+of each.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from experiments.open_benchmark.kinds import KINDS, SPLITS, VERSION, drawn_pairs
 from experiments.open_benchmark.score import coverage, score_set, summary
 
 NONE_WANTED = ("silent_beta", "silent_class", "false_unknown", "false_since")
-"""Counts that are wanted to be zero where pressure is logged."""
+"""Counts that should be zero if pressure is logged."""
 
 USUAL_PAIRS = (
     *("pressure_lags_2_ms+position_zero_at_stop", "pressure_1_bar_off+worn_pump", "clock_jitters+constant_load"),
@@ -28,12 +28,12 @@ USUAL_PAIRS = (
     *("logged_at_5_kHz+pressure_behind_30_hz", "position_zero_at_stop+worn_pump", "speed_offset+worn_pump"),
     *("pressure_1_bar_off+position_zero_at_stop", "pressure_5_ms_late+makeup_check_leaks"),
 )
-"""Two strange things that a bench is likely to have at once: a fault, or what its rig file leaves out, beside what its
-logger adds."""
+"""Two disturbances that a bench is likely to have at once: a fault or an omission of its rig file, and one effect of
+its logger."""
 
 
 def main(arguments: list[str]) -> int:
-    """Print a line a kind, and the counts that shall be none; return how many are not."""
+    """Print one line for each kind, and the counts that should be zero; return how many are not."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kind", nargs="+", default=list(KINDS), choices=list(KINDS), metavar="KIND")
     parser.add_argument("--split", default="validation", choices=SPLITS)
@@ -60,7 +60,7 @@ def main(arguments: list[str]) -> int:
 
 
 def scored(options: argparse.Namespace, made: Path) -> Sequence[dict[str, Any]]:
-    """Return a row a log, printing each set's line as it comes."""
+    """Return one row for each log, and print each set's line as it is finished."""
     rows: list[dict[str, Any]] = []
     for folder, count in sets(options, made):
         for pressure, logs in ((True, count), (False, min(count, options.without))):
@@ -73,7 +73,7 @@ def scored(options: argparse.Namespace, made: Path) -> Sequence[dict[str, Any]]:
 
 
 def sets(options: argparse.Namespace, made: Path) -> Iterator[tuple[Path, int]]:
-    """Yield the folder of each set, made when it is its turn, with the count of logs to score."""
+    """Yield the folder of each set, made on demand, with the number of logs to score."""
     if options.folder:
         yield from ((folder, options.count) for folder in options.folder)
     elif options.pairs:

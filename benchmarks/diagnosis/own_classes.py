@@ -1,4 +1,4 @@
-"""The hydraulic test rig of ZeMA, whose faults are not those of Table 1, judged by what a user gets for own classes."""
+"""The hydraulic test rig of ZeMA, whose faults are not those of Table 1, scored with the user-defined classes."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 BLOCKS = 10
-"""Contiguous blocks of runs, each judged by what the others teach."""
+"""Contiguous blocks of runs; each is scored by a classifier trained on the others."""
 
 COMPONENTS = ("pump_leak", "valve_pct", "cooler_pct", "accumulator_bar")
-"""Columns of labels: internal leakage of the pump (0 none, 1 weak, 2 severe), how far the valve switches [%], the
-cooler's efficiency [%], and the accumulator's pressure [bar]."""
+"""Label columns: internal leakage of the pump (0 none, 1 weak, 2 severe), how far the valve switches [%], the cooler's
+efficiency [%], and the accumulator's pressure [bar]."""
 
 FALSE_UNKNOWN = 0.01
-"""Share of runs of known classes that may be called unknown [fraction]."""
+"""Allowed share of runs of known classes that are called unknown [fraction]."""
 
 
 def read_rig_cycles(folder: Path) -> tuple[Array, pd.DataFrame]:
@@ -32,7 +32,7 @@ def read_rig_cycles(folder: Path) -> tuple[Array, pd.DataFrame]:
     Parameters
     ----------
     folder : Path
-        With ``uci_hydraulic_1hz.npz`` (entry ``X``) and ``profile.csv`` (one row of labels a cycle).
+        Folder with ``uci_hydraulic_1hz.npz`` (entry ``X``) and ``profile.csv`` (one row of labels for each cycle).
 
     Returns
     -------
@@ -62,12 +62,12 @@ def read_rig_cycles(folder: Path) -> tuple[Array, pd.DataFrame]:
 
 
 def rig_verdicts(features: pd.DataFrame, labels: pd.DataFrame) -> "Mapping[str, Verdicts]":
-    """Judge every component of the ZeMA test rig in contiguous blocks.
+    """Score every component of the ZeMA test rig in contiguous blocks.
 
     Parameters
     ----------
     features : pandas.DataFrame
-        A row a cycle.
+        One row for each cycle.
     labels : pandas.DataFrame
         See `read_rig_cycles`.
     """
@@ -75,19 +75,19 @@ def rig_verdicts(features: pd.DataFrame, labels: pd.DataFrame) -> "Mapping[str, 
 
 
 def found_unknown(features: pd.DataFrame, labels: pd.Series) -> dict[str, float]:
-    """Return which share of each class is called unknown by a classifier that learnt the other classes alone.
+    """Return the share of each class that is called unknown by a classifier trained on only the other classes.
 
     Parameters
     ----------
     features : pandas.DataFrame
-        A row a cycle.
+        One row for each cycle.
     labels : pandas.Series
         Class of each cycle.
 
     Returns
     -------
     dict of str to float
-        By the class that was left out [fraction].
+        Share for each left-out class [fraction].
     """
     shares: dict[str, float] = {}
     for left_out in np.unique(labels):

@@ -1,4 +1,4 @@
-"""The population that diagnosis is judged and calibrated on: circuits that differ, drives that differ, rig sensors."""
+"""The population for scoring and calibrating diagnosis: varying circuits, varying drives, rig sensors."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,12 +28,12 @@ SAMPLE_TIME = 1e-3
 """Time between samples [s]."""
 
 TRAINING, TEST = 1_000_000, 2_000_000
-"""First seeds of what calibrations may see and of what they are judged on."""
+"""First seeds for calibration and for evaluation."""
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """One log of the population and what was true.
+    """One log of the population with its truth.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Drawn:
     record : Record
         What the sensors logged.
     drive : ndarray, shape (n,)
-        What was asked of the motor [rad/s].
+        Commanded motor speed [rad/s].
     """
 
     condition: str
@@ -56,7 +56,7 @@ class Drawn:
 def draw_parameters(
     condition: str, rng: np.random.Generator, width: float, rig: EhaParameters | None = None
 ) -> CircuitParameters:
-    """Return one actuator in a condition: leakage, flow bias, friction and presliding spread, geometry and pump fixed.
+    """Return one actuator in a condition: leakage, flow bias, friction and presliding vary; geometry and pump do not.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def draw_parameters(
     Returns
     -------
     CircuitParameters
-        The circuit, with what the pump leaks kept at its share of the whole.
+        The circuit; the pump's share of the total leakage is unchanged.
 
     Examples
     --------
@@ -87,10 +87,10 @@ def draw_parameters(
 
 
 def unlike(p: CircuitParameters, rng: np.random.Generator) -> CircuitParameters:
-    """Return an actuator whose circuit is not the one that a diagnosis fits.
+    """Return an actuator whose circuit differs from the one that a diagnosis fits.
 
     Seals, make-up valves, motor, moving mass, accumulator and the pump's share of the leakage are drawn at random from
-    wide ranges; what a diagnosis looks for, and geometry and pump, stay.
+    wide ranges. The quantities that a diagnosis estimates, geometry and pump are unchanged.
 
     Examples
     --------
@@ -115,7 +115,7 @@ UNLIKE: Mapping[str, float] = MappingProxyType(
         "accumulator_pressure": 1.5,
     }
 )
-"""Factors by which `unlike` multiplies or divides at most [dimensionless], judged: what a rig file seldom knows."""
+"""Largest factors by which `unlike` multiplies or divides [dimensionless], judged: a rig file seldom states these."""
 
 
 def draw_logs(
@@ -128,7 +128,7 @@ def draw_logs(
     duration: float = DURATION,
     sample_time: float = SAMPLE_TIME,
 ) -> Iterator[Drawn]:
-    """Yield nine logs, one a condition, for every seed and drive; the nine of a seed share its drive.
+    """Yield nine logs, one for each condition, for every seed and drive; the nine logs of a seed share its drive.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def draw_logs(
     drives : sequence of str
         Names of drives.
     sensors : Sensors
-        What the bench sees.
+        Sensors of the bench.
     duration, sample_time : float
         Length of a log and time between samples [s].
 
@@ -162,7 +162,7 @@ def draw_logs(
 
 
 def _faulty_sensor(record: Record, channel: str, kind: Kind, size: float = 0.0, start: float = 0.0) -> Record:
-    """Return the log with a faulty sensor; velocity that comes from the encoder is faulty with it."""
+    """Return the log with a faulty sensor; velocity derived from the encoder has the same fault."""
     faulty = with_fault(record, SensorFault(channel=channel, kind=kind, size=size, start=start))
     if channel != "position_m":
         return faulty
@@ -211,10 +211,10 @@ OUT_OF_MODEL: Mapping[str, Callable[[Drawn], Record]] = MappingProxyType(
         ),
     }
 )
-"""Logs in none of the nine conditions, by kind: from a log that is in one to what would have been logged."""
+"""Logs in none of the nine conditions, by kind: each function maps a log in a condition to one outside them."""
 
 
 def _again(log: Drawn, parameters: CircuitParameters) -> Record:
-    """Return the log as another circuit would have given it under the same drive."""
+    """Return the log that another circuit would give under the same drive."""
     rng = np.random.default_rng(int(log.record.metadata["seed"]))
     return simulate(CIRCUIT, log.drive, log.record.sample_time, parameters, sensors=RIG, rng=rng)

@@ -1,7 +1,7 @@
-"""Both verbs on actuators that they have never met: a line a log of a random realistic rig, and what is right of all.
+"""Both verbs on unseen actuators: one line for each log of a random realistic rig, and summary figures.
 
-The rig file is right, or with ``--wrong`` its displacement, area, volume, mass and bulk modulus are off by the usual
-errors, all at once. Intervals given the rig are judged where the file is right alone.
+The rig file is right. With ``--wrong``, its displacement, area, volume, mass and bulk modulus have the usual errors,
+all at once. Intervals conditional on the rig are scored only if the file is right.
 """
 
 import argparse
@@ -24,11 +24,11 @@ from plant.errors import HydrostateError, LogWarning
 FAILED = {"outcome": "failed"}
 
 USUAL = {"known_as_the_rig", "nothing"}
-"""Codes of notes that say nothing of a log: what limits the total interval, and that no advice is needed."""
+"""Codes of notes that say nothing about the log: the limit of the total interval, and that no advice is needed."""
 
 
 def main(arguments: list[str]) -> int:
-    """Print a line a log, and every figure beside its target; return how many fall short."""
+    """Print one line for each log, and every figure with its target; return how many fall short."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", default="1000:1019", metavar="A:B", help="first and last seed, both drawn")
     parser.add_argument("--wrong", action="store_true", help="give both verbs a wrong rig file")
@@ -45,22 +45,22 @@ def main(arguments: list[str]) -> int:
 
 
 def scored(seed: int, *, wrong: bool, pressure: bool) -> dict[str, Any]:
-    """Return what both verbs say of one rig, against its truth.
+    """Return the results of both verbs for one rig, compared with its truth.
 
     Parameters
     ----------
     seed : int
-        Of the rig.
+        Seed of the rig.
     wrong : bool
-        Whether the rig file is.
+        Whether the rig file is wrong.
     pressure : bool
-        Whether it may be used.
+        Whether pressure may be used.
 
     Returns
     -------
     dict[str, Any]
-        Entries of `judge_bulk_modulus` and `judge_class`; ``z``, the error over its deviation; ``notes``, their codes;
-        ``seconds`` of processor time.
+        Entries of `judge_bulk_modulus` and `judge_class`; ``z``, the error divided by its standard deviation;
+        ``notes``, their codes; ``seconds`` of processor time.
     """
     bench = draw_bench(seed)
     rig = Rig("drawn", wrong_file(bench.healthy, seed) if wrong else bench.healthy)
@@ -70,39 +70,39 @@ def scored(seed: int, *, wrong: bool, pressure: bool) -> dict[str, Any]:
 
 
 def row_of(log: Log, truth: dict[str, Any], *, pressure: bool) -> dict[str, Any]:
-    """Return what both verbs say of a log, against its truth.
+    """Return the results of both verbs for a log, compared with its truth.
 
     Parameters
     ----------
     log : Log
         The log with its rig.
     truth : dict
-        True ``bulk_modulus`` [Pa] and ``condition``, or what stands in a row of `truth.csv` in their place.
+        True ``bulk_modulus`` [Pa] and ``condition``, or the equivalent entries of a row of `truth.csv`.
     pressure : bool
-        Whether it may be used.
+        Whether pressure may be used.
 
     Returns
     -------
     dict[str, Any]
-        As of `scored`, without what it says of the rig.
+        As from `scored`, without the entries about the rig.
     """
     return row_of_answers(_asked(log, "estimate", pressure), _asked(log, "diagnose", pressure), truth)
 
 
 def row_of_answers(estimate: dict[str, Any], diagnosis: dict[str, Any], truth: dict[str, Any]) -> dict[str, Any]:
-    """Return what two answers are worth.
+    """Return the scores of two answers.
 
     Parameters
     ----------
     estimate, diagnosis : dict
         Entries of the JSON contract.
     truth : dict
-        As of `row_of`.
+        As for `row_of`.
 
     Returns
     -------
     dict[str, Any]
-        As of `row_of`.
+        As from `row_of`.
     """
     modulus = truth["bulk_modulus"]
     judged = {"beta_lo": modulus, "beta_hi": modulus, "accept": truth["condition"], **truth}

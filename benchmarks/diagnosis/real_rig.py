@@ -1,6 +1,6 @@
-"""A real rig's own classes: four components of the ZeMA test rig, judged in ten contiguous blocks of runs.
+"""User-defined classes on a real rig: four components of the ZeMA test rig, scored in ten contiguous blocks of runs.
 
-Beside ours, in the same blocks on the same features: scikit-learn's random forest. The data are sought in
+Scikit-learn's random forest runs on the same blocks and features for comparison. The data are read from
 ``$HYDROSTATE_SHARED/data/uci_hydraulic`` (default ``../shared``).
 """
 
@@ -19,7 +19,7 @@ from faults.own_classes.groups import folds
 from plant.errors import HydrostateError
 
 LEAST = {"pump_leak": 0.97, "valve_pct": 0.97}
-"""Balanced accuracy that is wanted [fraction]; the documents of the other two say what is to be expected."""
+"""Required balanced accuracy [fraction]; for the other two components, see the documents."""
 
 
 def main(arguments: list[str]) -> int:
@@ -55,7 +55,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _forest(x: Any, labels: Any) -> float:
-    """Return the balanced accuracy of a random forest, with nothing tuned."""
+    """Return the balanced accuracy of an untuned random forest."""
     from sklearn.ensemble import RandomForestClassifier
 
     true = np.unique(labels, return_inverse=True)[1]

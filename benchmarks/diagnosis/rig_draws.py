@@ -1,8 +1,8 @@
-"""Random realistic rigs: actuators of other sizes, oils, motors, sensors and loads, and what their benches log.
+"""Random realistic rigs: actuators of various sizes, oils, motors, sensors and loads, and the logs of their benches.
 
-Sizes are drawn over the range that such actuators are built in, and what hangs together is drawn together: the pump
-goes with piston and velocity, the oil with the stroke, leakage with the pump's flow, friction with pressure, sensors
-with the ranges they see. A rig that nobody would build or run is drawn again (see `_drive` and `is_sound`).
+Sizes cover the range in which such actuators are built, and related quantities are drawn together: the pump with piston
+and velocity, the oil with the stroke, leakage with the pump's flow, friction with pressure, sensors with their ranges.
+A rig that nobody would build or run is drawn again (see `_drive` and `is_sound`).
 """
 
 from collections.abc import Mapping
@@ -29,34 +29,34 @@ from plant.sensors.sensors import Sensors
 DRIVES = ("steps", "sine", "chirp", "prbs", "multisine")
 
 SAMPLE_TIMES = (2e-4, 5e-4, 1e-3, 2e-3)
-"""Times between samples that loggers offer [s]; the slowest that still sees a period of the ring six times or more is
-the upper limit of a draw."""
+"""Sample times that loggers offer [s]; a draw is limited to those that give at least six samples in each period of the
+resonance."""
 
 MOST_SAMPLES = 30_000
-"""Samples of a log at most: a bench that logs fast logs for a shorter time."""
+"""Maximum samples of a log: a fast logger records for a shorter time."""
 
 SPREAD = 0.1
-"""Half width of leakage, friction and presliding about their condition, of bulk modulus twice that [fraction]."""
+"""Half-width of leakage, friction and presliding about their condition; bulk modulus has twice that [fraction]."""
 
 BULK_MODULUS_DOUBT = 0.3
-"""How far a file's bulk modulus is off, as a standard deviation of its logarithm: air and hoses are seldom counted."""
+"""Standard deviation of the logarithm of a file's bulk modulus: air and hoses are seldom considered."""
 
 WRONG = ("pump_displacement", "piston_area", "chamber_volume", "moving_mass")
-"""Entries of a wrong rig file that are off as far as `plant.eha.doubts` doubts them, all at once."""
+"""Entries of a wrong rig file that are off by the uncertainties of `plant.eha.doubts`, all at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A log of a rig that was drawn, and what is true.
+    """A log of a randomly drawn rig, and its truth.
 
     Parameters
     ----------
     condition : str
         Its true condition.
     true : CircuitParameters
-        The actuator that was logged.
+        The logged actuator.
     healthy : EhaParameters
-        The same when nothing is wrong with it: what the right rig file says.
+        The same actuator without fault, as the right rig file describes it.
     drive : str
         Name of the drive.
     record : Record
@@ -71,7 +71,7 @@ class Bench:
 
     @property
     def about(self) -> str:
-        """The rig in a line."""
+        """One-line description of the rig."""
         p = self.true
         sides = "single rod" if p.area_difference else "through rod"
         loaded = " load" * bool(p.load_force) + " spring" * bool(p.load_stiffness)
@@ -88,7 +88,7 @@ def draw_bench(seed: int) -> Bench:
     Parameters
     ----------
     seed : int
-        Of every draw.
+        Seed of every draw.
     """
     rng = stream(seed, "random rigs")
     while True:
@@ -182,19 +182,19 @@ def draw_rig(rng: np.random.Generator) -> CircuitParameters:
 
 
 def file_of(rig: EhaParameters) -> EhaParameters:
-    """Return what a rig file says of an actuator: of its circuit nothing but the accumulator's gas."""
+    """Return the content of an actuator's rig file: of its circuit, only the gas volume of the accumulator."""
     return EhaParameters(**{name: getattr(rig, name) for name in PARAMETER_NAMES})
 
 
 def wrong_file(right: EhaParameters, seed: int) -> EhaParameters:
-    """Return a rig file whose entries are off by the usual errors, all at once.
+    """Return a rig file whose entries have the usual errors, all at once.
 
     Parameters
     ----------
     right : EhaParameters
-        What it should say.
+        The correct entries.
     seed : int
-        Of the errors.
+        Seed of the errors.
     """
     rng = stream(seed, "random rigs", "file")
     spreads: Mapping[str, float] = MappingProxyType({name: DOUBTS[name].usual.down for name in WRONG})
@@ -203,12 +203,12 @@ def wrong_file(right: EhaParameters, seed: int) -> EhaParameters:
 
 
 def _between(least: float, most: float, rng: np.random.Generator) -> float:
-    """Return a number whose logarithm is uniform: sizes of machines come in ratios."""
+    """Return a log-uniform number: sizes of machines vary by ratios."""
     return float(least * (most / least) ** rng.random())
 
 
 def is_sound(p: CircuitParameters) -> bool:
-    """Return whether the actuator bears its own moves: its mass, stopped at once, takes half its pressure, no more."""
+    """Return whether the actuator withstands its own moves: an instant stop takes at most half its pressure."""
     velocity = p.pump_displacement * p.rated_speed / p.piston_area
     ringing = velocity * p.moving_mass * 2.0 * pi * natural_frequency(p)
     held = abs(load_on_rod(0.5 * (p.stroke or 0.0), p))
@@ -218,7 +218,7 @@ def is_sound(p: CircuitParameters) -> bool:
 def _drive(p: CircuitParameters, rng: np.random.Generator) -> tuple[str, Array, float]:
     """Return a drive's name, motor speed [rad/s] and sample time [s]; no samples if the stroke is too short.
 
-    The way that the pump would move the piston stays within 90 % of the stroke.
+    The pumped piston travel stays within 90 % of the stroke.
     """
     frequency, velocity, stroke = natural_frequency(p), p.pump_displacement * p.rated_speed / p.piston_area, p.stroke
     assert stroke is not None  # noqa: S101 -- every rig that is drawn has one
@@ -248,7 +248,7 @@ def _drive(p: CircuitParameters, rng: np.random.Generator) -> tuple[str, Array, 
 
 
 def _sensors(p: CircuitParameters, sample_time: float, rng: np.random.Generator) -> Sensors:
-    """Return sensors of the ranges that the rig needs."""
+    """Return sensors with the ranges that the rig needs."""
     velocity = p.pump_displacement * p.rated_speed / p.piston_area
     quantum = _between(5e-7, 5e-6, rng)  # linear encoders of 0.5 to 5 um
     return Sensors(
@@ -264,5 +264,5 @@ def _sensors(p: CircuitParameters, sample_time: float, rng: np.random.Generator)
 
 
 def moves(record: Record, sensors: Sensors) -> bool:
-    """Return whether the piston goes a way that its encoder sees: 100 of its steps."""
+    """Return whether the piston travels more than 100 encoder steps."""
     return float(np.ptp(record["position_m"])) > 100.0 * sensors.position_quantum

@@ -1,4 +1,4 @@
-"""Scores of a watch and of a diagnosis, each with its interval: false alarms, delays, shares, calibration."""
+"""Scores of a watch and of a diagnosis, each with an interval: false alarms, delays, shares, calibration."""
 
 from collections.abc import Sequence
 
@@ -17,9 +17,9 @@ def alarm_rate(alarms: int, hours: float, confidence: float = 0.95) -> tuple[flo
     alarms : int
         Alarms counted.
     hours : float
-        In so much healthy running [h].
+        Duration of healthy running [h].
     confidence : float
-        Of the interval [fraction].
+        Confidence level of the interval [fraction].
 
     Returns
     -------
@@ -55,9 +55,9 @@ def median_delay(delays: Sequence[float], confidence: float = 0.95) -> tuple[flo
     Parameters
     ----------
     delays : sequence of float
-        From fault to alarm [s], infinite where there was none.
+        Delay from fault to alarm [s], infinite if there was no alarm.
     confidence : float
-        Least confidence of the interval, where there are enough delays for it [fraction].
+        Minimum confidence of the interval, if there are enough delays [fraction].
 
     Returns
     -------
@@ -92,16 +92,16 @@ def calibration_error(confidence: NDArray[np.float64], right: NDArray[np.bool_],
     Parameters
     ----------
     confidence : ndarray, shape (n,)
-        Probability given to each answer [probability].
+        Probability assigned to each answer [probability].
     right : ndarray, shape (n,)
-        Whether it was right.
+        Whether each answer was right.
     bins : int
-        Count of bins.
+        Number of bins.
 
     Returns
     -------
     float
-        Mean gap between confidence and share right [probability].
+        Mean gap between confidence and share of right answers [probability].
 
     Examples
     --------
@@ -120,14 +120,14 @@ def share_interval(hits: int, count: int, level: float = 0.95) -> tuple[float, f
     Parameters
     ----------
     hits, count : int
-        How many of how many.
+        Number of hits, and total number.
     level : float
-        Confidence [probability].
+        Confidence level [probability].
 
     Returns
     -------
     tuple of float
-        Its ends [fraction].
+        Lower and upper end of the interval [fraction].
 
     Examples
     --------

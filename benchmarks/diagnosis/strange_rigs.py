@@ -1,10 +1,10 @@
-"""Both verbs on strange logs of rigs that are not the paper's: kinds of the open benchmark, in sizes of the rig.
+"""Both verbs on strange logs of rigs other than the paper's: kinds of the open benchmark, scaled to the rig.
 
-The rigs are typed ones and random ones; their files are right but where a kind says otherwise. What the open benchmark
-adds in units of the paper's rig, a bar or a kilonewton, is added here in parts of the rig's relief pressure, speed,
-stroke and force. Slips of units, frozen sensors and lost rows are made of a log that was written. Each rig takes the
-kinds in turn. A line a log, and what is right of all. A relief valve that opens early is left out: it stays shut in
-most logs of these rigs.
+The rigs are the typed ones and random ones; their files are right unless a kind says otherwise. The open benchmark adds
+disturbances in units of the paper's rig, such as a bar or a kilonewton. Here they are fractions of the rig's relief
+pressure, speed, stroke and force. Unit mistakes, frozen sensors and lost rows are introduced into a written log. Each
+rig takes the kinds in turn. Prints one line for each log, and summary figures. A relief valve that opens early is left
+out: it stays shut in most logs of these rigs.
 """
 
 import argparse
@@ -37,15 +37,15 @@ from plant.eha.scales import natural_frequency
 from plant.errors import HydrostateError, LogWarning
 
 RANDOM = "random "
-"""What names of random rigs begin with, before their seed."""
+"""Prefix of the names of random rigs, before their seed."""
 
 RIGS = (*USES, *(f"{RANDOM}{seed}" for seed in (1780, 1783, 1785, 1786, 1791, 1793, 1795, 1797)))
 
 SAMPLED = (*SAMPLE_TIMES, 5e-3)
-"""Times between samples that loggers offer [s]; the slowest that sees a period of the ring six times is the limit."""
+"""Sample times that loggers offer [s]; the limit is the slowest with six samples in each period of the resonance."""
 
 DURATION = 6.0
-"""Of a log [s]."""
+"""Length of a log [s]."""
 
 AS_THEY_ARE = (
     *("plain", "no_velocity", "chamber_pressures", "clock_jitters", "clock_stalls", "begins_in_motion"),
@@ -56,10 +56,10 @@ AS_THEY_ARE = (
     *("worn_pump", "makeup_check_stuck_shut", "intermittent_friction", "entrained_air"),
     *("air_midway", "oil_warms", "pressure_gauges_differ"),
 )
-"""Kinds of the open benchmark whose draws hold for a rig of any size."""
+"""Kinds of the open benchmark whose draws suit a rig of any size."""
 
 Change = Callable[[pd.DataFrame, np.random.Generator], pd.DataFrame]
-"""From a log as it was written to one with a mistake."""
+"""Maps a written log to one with a mistake."""
 
 
 def _times(channel: str, factor: float) -> Change:
@@ -67,7 +67,7 @@ def _times(channel: str, factor: float) -> Change:
 
 
 def _frozen(channel: str) -> Change:
-    """Return a change after which a channel stays where it is, from 40 to 60 % of the log."""
+    """Return a change that freezes a channel from 40 % to 60 % of the log."""
 
     def change(table: pd.DataFrame, _: np.random.Generator) -> pd.DataFrame:
         first, last = (int(share * len(table)) for share in (0.4, 0.6))
@@ -83,7 +83,7 @@ def _lost(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
 
 
 FROZEN = r"fr[eo]ze|\bdead\b|\bheld\b"
-"""Words for a sensor that stays where it is."""
+"""Words for a frozen sensor."""
 
 WRITTEN: Mapping[str, tuple[Change, Kind]] = {
     "rows_lost": (_lost, Kind("rows_lost", "2 % of the rows are lost")),
@@ -95,16 +95,16 @@ WRITTEN: Mapping[str, tuple[Change, Kind]] = {
     "position_reversed": (_times(POSITION, -1.0), Kind("", "", accept=(UNKNOWN,), named=REVERSED)),
     "speed_in_degrees": (_times(SPEED, 6.0 * RPM), Kind("", "", accept=(UNKNOWN,), named=r"deg/s")),
 }
-"""Mistakes that are made of a written log, and what is right of one."""
+"""Mistakes introduced into a written log, and the right answer for each."""
 
 
 def _either(low: float, high: float, rng: np.random.Generator) -> float:
-    """Return a number between two, of either sign."""
+    """Return a number between two limits, of random sign."""
     return float(rng.choice((-1.0, 1.0)) * rng.uniform(low, high))
 
 
 def sized(healthy: EhaParameters) -> Mapping[str, Draw]:
-    """Return draws of kinds of the open benchmark in the size of a rig."""
+    """Return draws of kinds of the open benchmark, scaled to a rig."""
     p, force = healthy, healthy.relief_pressure * healthy.piston_area
     stroke = healthy.stroke or 0.0
     major = parameters_for(CONDITIONS["major_leakage"], healthy).leakage_coefficient
@@ -144,12 +144,12 @@ NAMES = (*AS_THEY_ARE, *sized(EhaParameters(stroke=0.5)), *WRITTEN)
 
 
 def rig_of(name: str) -> tuple[EhaParameters, Use]:
-    """Return what the right file of a rig says, and how the rig is used.
+    """Return the content of a rig's right file, and how the rig is used.
 
     Parameters
     ----------
     name : str
-        Of a typed rig, or a random one's.
+        Name of a typed rig or of a random one.
     """
     if name in USES:
         return read_rig(FILES / f"{name}.toml").parameters, USES[name]
@@ -161,19 +161,19 @@ def rig_of(name: str) -> tuple[EhaParameters, Use]:
 
 
 def made(rig: str, kind: str, seed: int) -> tuple[pd.DataFrame, dict[str, Any], Setup]:
-    """Return a strange log of a rig, what is true of it, and what it was made of.
+    """Return a strange log of a rig, its truth, and its setup.
 
     Parameters
     ----------
     rig, kind : str
-        One of `RIGS`, or any random one; and one of `NAMES`.
+        One of `RIGS` or any random rig, and one of `NAMES`.
     seed : int
-        Of the log.
+        Seed of the log.
 
     Returns
     -------
     tuple of (pandas.DataFrame, dict, Setup)
-        The log as its file has it; the truth as `row_of` takes it; the setup.
+        The log as in its file; the truth as `row_of` takes it; the setup.
     """
     (healthy, use), rng = rig_of(rig), stream(seed, "strange rigs", rig, kind)
     change, one = WRITTEN.get(kind) or (None, KINDS[kind])
@@ -197,7 +197,7 @@ def made(rig: str, kind: str, seed: int) -> tuple[pd.DataFrame, dict[str, Any], 
 
 
 def scored(rig: str, kind: str, seed: int) -> dict[str, Any]:
-    """Return what both verbs say of one log, against its truth.
+    """Return the results of both verbs for one log, compared with its truth.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def scored(rig: str, kind: str, seed: int) -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        As of `benchmarks.diagnosis.random_rigs.scored`.
+        As from `benchmarks.diagnosis.random_rigs.scored`.
     """
     (table, truth, setup), began = made(rig, kind, seed), time.process_time()
     try:
@@ -222,7 +222,7 @@ def scored(rig: str, kind: str, seed: int) -> dict[str, Any]:
 
 
 def main(arguments: list[str]) -> int:
-    """Print a line a log, and every figure beside its target; return how many fall short."""
+    """Print one line for each log, and every figure with its target; return how many fall short."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", default="0:2", metavar="A:B", help="first and last seed of each rig")
     parser.add_argument("--rigs", default=",".join(RIGS), metavar="NAME,NAME")

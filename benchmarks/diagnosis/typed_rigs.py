@@ -1,9 +1,9 @@
 """Both verbs on rigs of other makers: ten rig files as an engineer types them, logs by the open benchmark's physics.
 
-The files in `typed_rigs/` were put together by hand, with sizes as catalogues of such units have them: actuators of a
-flight control, a drone, an excavator's boom, a press, a robot's knee, a compact unit, a blade's pitch, a steering gear,
-a laboratory's bench and a strut. They are right, and some do not say how much gas the accumulator holds. Each rig is
-driven as such a rig is: by a position loop, by sines, or by steps. A line a log, and what is right of all.
+The files in `typed_rigs/` were written by hand, with sizes as in catalogues of such units: actuators of a flight
+control, a drone, an excavator's boom, a press, a robot's knee, a compact unit, a blade's pitch, a steering gear, a
+laboratory's bench and a strut. They are right, but some do not state the accumulator's gas volume. Each rig has the
+drive typical of its use: a position loop, sines, or steps. Prints one line for each log, and summary figures.
 """
 
 import argparse
@@ -40,18 +40,18 @@ FILES = Path(__file__).parent / "typed_rigs"
 
 @dataclass(frozen=True)
 class Use:
-    """How a rig is used, and what its file need not say.
+    """How a rig is used, and data that its file may omit.
 
     Parameters
     ----------
     drives : tuple of str
         Names of `experiments.open_benchmark.drives.DRIVES`.
     sample_time : float
-        Of its logger [s].
+        Sample time of its logger [s].
     gas : float
-        Of its accumulator [m^3].
+        Gas volume of its accumulator [m^3].
     travel : float
-        Share of half the stroke that its drives use [fraction].
+        Fraction of half the stroke that its drives use [fraction].
     """
 
     drives: tuple[str, ...]
@@ -72,23 +72,24 @@ USES: Mapping[str, Use] = {
     "steering_gear": Use(("posn", "sines"), 2e-3, 5e-3),
     "suspension": Use(("sines", "multisine"), 1e-3, 5e-5),
 }
-"""By name of the file; gas where a file gives it is the same."""
+"""Use of each rig, by name of its file; the gas volume agrees with the file if the file states it."""
 
 SPREAD = 0.05
-"""Half width of leakage, friction and bulk modulus about the file's [fraction]."""
+"""Half-width of leakage, friction and bulk modulus about the file's values [fraction]."""
 
 SINGLE_PILOT = 3.0
-"""How many pascals a pascal in the other chamber opens a single rod's make-up valves by, as the open benchmark's."""
+"""Pilot ratio of a single rod's make-up valves: opening pressure per pressure in the other chamber, as the open
+benchmark's."""
 
 DURATION = 10.0
-"""Of a log [s]."""
+"""Length of a log [s]."""
 
 UNSTABLE = 0.3
-"""Most that a step of Heun's method may be of the shortest time constant of a chamber [dimensionless]."""
+"""Largest step of Heun's method, as a fraction of a chamber's shortest time constant [dimensionless]."""
 
 
 def main(arguments: list[str]) -> int:
-    """Print a line a log, and every figure beside its target; return how many fall short."""
+    """Print one line for each log, and every figure with its target; return how many fall short."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", default="0:2", metavar="A:B", help="first and last seed of each rig")
     parser.add_argument("--rigs", default=",".join(USES), metavar="NAME,NAME")
@@ -105,19 +106,19 @@ def main(arguments: list[str]) -> int:
 
 
 def scored(name: str, seed: int) -> dict[str, Any]:
-    """Return what both verbs say of one log of a rig, against its truth.
+    """Return the results of both verbs for one log of a rig, compared with its truth.
 
     Parameters
     ----------
     name : str
-        Of its file.
+        Name of the rig's file.
     seed : int
-        Of the log.
+        Seed of the log.
 
     Returns
     -------
     dict[str, Any]
-        As of `benchmarks.diagnosis.random_rigs.scored`.
+        As from `benchmarks.diagnosis.random_rigs.scored`.
     """
     rig = read_rig(FILES / f"{name}.toml")
     setup, record = logged(name, rig, seed)
@@ -129,16 +130,16 @@ def scored(name: str, seed: int) -> dict[str, Any]:
 
 
 def logged(name: str, rig: Rig[EhaParameters], seed: int) -> tuple[Setup, Record]:
-    """Return what was true of a log of a rig, and the log.
+    """Return the true setup of a log of a rig, and the log.
 
     Parameters
     ----------
     name : str
-        Of its file.
+        Name of the rig's file.
     rig : Rig
-        The file.
+        Content of the file.
     seed : int
-        Of the log.
+        Seed of the log.
 
     Returns
     -------
@@ -153,20 +154,20 @@ def logged(name: str, rig: Rig[EhaParameters], seed: int) -> tuple[Setup, Record
 
 
 def plain_setup(healthy: EhaParameters, use: Use, condition: str, turn: int, rng: np.random.Generator) -> Setup:
-    """Return what is true of a log with nothing strange.
+    """Return the true setup of a log without disturbances.
 
     Parameters
     ----------
     healthy : EhaParameters
-        What the rig's file says.
+        Healthy actuator, as the rig's file states it.
     use : Use
         How the rig is used.
     condition : str
         One of the nine.
     turn : int
-        Which of its drives comes, in turn.
+        Index into its drives, taken in turn.
     rng : numpy.random.Generator
-        Source of all that differs from log to log.
+        Source of all that varies between logs.
     """
     drive = use.drives[turn % len(use.drives)]
     machine = _machine(healthy, condition, use, rng)
@@ -179,12 +180,12 @@ def plain_setup(healthy: EhaParameters, use: Use, condition: str, turn: int, rng
 
 
 def table_of(setup: Setup, rng: np.random.Generator) -> pd.DataFrame:
-    """Return the log of a setup as its file has it, shape (samples, 1 + channels).
+    """Return the log of a setup as in its file, shape (samples, 1 + channels).
 
     Parameters
     ----------
     setup : Setup
-        What the log is made of.
+        Setup of the log.
     rng : numpy.random.Generator
         Source of the drive and of noise.
     """
@@ -195,7 +196,7 @@ def table_of(setup: Setup, rng: np.random.Generator) -> pd.DataFrame:
 
 
 def _machine(healthy: EhaParameters, condition: str, use: Use, rng: np.random.Generator) -> Machine:
-    """Return the actuator of a rig file in a condition, with what no file says sized as its flow asks."""
+    """Return the actuator of a rig file in a condition; what no file states is sized to suit its flow."""
     p = parameters_for(CONDITIONS[condition], healthy)
     (area_a, area_b), made = piston_areas(p), machine_of(p)
     flow, uneven = p.rated_flow, p.area_difference != 0.0
@@ -231,7 +232,7 @@ def _machine(healthy: EhaParameters, condition: str, use: Use, rng: np.random.Ge
 
 
 def _sensors(p: EhaParameters) -> Mapping[str, Sensor]:
-    """Return sensors of the ranges that a rig needs: of the pressure of its relief valve, and of its speeds."""
+    """Return sensors with the ranges that a rig needs, given its relief pressure and its speeds."""
     sensors, velocity = dict(Logger().sensors), p.rated_flow / p.piston_area
     return sensors | {
         SPEED: Sensor(noise=4e-4 * p.rated_speed),
@@ -242,7 +243,7 @@ def _sensors(p: EhaParameters) -> Mapping[str, Sensor]:
 
 
 def _held(m: Machine) -> Array:
-    """Return the states at rest in mid-stroke, the load held by the chamber that it pushes on."""
+    """Return the states at rest in mid-stroke, with the load held by the loaded chamber."""
     states = at_rest(m)
     states[4] += max(m.load, 0.0) / m.area_a
     states[5] += max(-m.load, 0.0) / m.area_b
@@ -250,7 +251,7 @@ def _held(m: Machine) -> Array:
 
 
 def _refined(m: Machine) -> int:
-    """Return by how many times steps must be finer than usual: small chambers settle through their valves in little."""
+    """Return the factor by which steps must be finer than usual: small chambers settle quickly through their valves."""
     filled = max(m.check_a / sqrt(PRELOAD), m.relief_slope) * m.bulk_modulus / (0.5 * min(m.volume_a, m.volume_b))
     ringing = sqrt(4.0 * m.bulk_modulus * max(m.area_a, m.area_b) ** 2 / (min(m.volume_a, m.volume_b) * m.mass))
     usual = RECORD / substeps_for(m, m.speed_limit)

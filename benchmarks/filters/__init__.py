@@ -1,1 +1,1 @@
-"""Filters: bulk modulus from many first guesses, bounds, speed, C and FMUs, and filters begun again."""
+"""Filters: bulk modulus from many first guesses, bounds, speed, C and FMUs, and restarted filters."""

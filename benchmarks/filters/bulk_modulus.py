@@ -1,7 +1,7 @@
 """Effective bulk modulus over conditions, first guesses and noise seeds: every cell against its tolerance.
 
-Cells: the paper's sine and the nine steps, 10 s at 10 kHz, sensors of the bench; final value is the mean over the last
-20 % of the run. ``--seeds`` sets the noise seeds (8 is the acceptance).
+Cells: the paper's sine and the nine steps, 10 s at 10 kHz, sensors of the bench. The final value is the mean over the
+last 20 % of the run. ``--seeds`` sets the number of noise seeds (8 for acceptance).
 """
 
 import argparse
@@ -27,7 +27,7 @@ CELLS = (
     ("lumped", "pressure", "steps", False, 3.0),
     ("lumped", "pressure", "sine", False, None),
 )
-"""Plant, form, drive, pressure logged, tolerance in percent: none where "not observable" is the right answer."""
+"""Plant, form, drive, pressure logged, tolerance in percent; no tolerance if "not observable" is the right answer."""
 
 Cell = tuple[str, str, str, bool, float | None]
 
@@ -62,7 +62,7 @@ def run_case(case: tuple[Cell, str, int]) -> list[dict[str, object]]:
 
 
 def main(arguments: list[str]) -> int:
-    """Print one line a cell, then every miss; return the count of misses."""
+    """Print one line for each cell, then every miss; return the number of misses."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=8)
     parser.add_argument("--csv", help="write every estimate to this file")

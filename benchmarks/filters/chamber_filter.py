@@ -1,7 +1,7 @@
-"""The modelled-chamber filter on the circuit plant, condition unknown: errors, their deviations, and the gate.
+"""The modelled-chamber filter on the circuit plant, condition unknown: errors, standard deviations, and the gate.
 
-Nine conditions, each over some seeds: ten seconds of nine steps at 1 kHz with the bench's sensors. The filter is what
-`hydrostate estimate --method chamber-ekf` runs.
+Nine conditions, several seeds each: ten seconds of nine steps at 1 kHz with the bench's sensors. This is the filter of
+`hydrostate estimate --method chamber-ekf`.
 """
 
 import argparse
@@ -45,7 +45,7 @@ def judged(case: tuple[str, int]) -> dict[str, object]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Print a row a condition, and the counts beside what is wanted; return how many fall short."""
+    """Print one row for each condition, and the counts with their targets; return how many fall short."""
     parser = argparse.ArgumentParser(prog="chamber_filter", description=(__doc__ or "").partition("\n\n")[0])
     parser.add_argument("--seeds", type=int, default=20, help="logs of each condition (default: %(default)s)")
     options = parser.parse_args(arguments)

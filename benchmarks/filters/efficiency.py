@@ -1,19 +1,19 @@
 """Bulk modulus and its interval against the Cramér-Rao bound, along a run of the lumped plant.
 
 Nine steps and PRBS, 10 s at 1 kHz. The bound is the posterior one (Tichavský, Muravchik and Nehorai 1998) for the same
-sensors, at the truth, with what is known known. It presumes Gaussian noise, so the sensors here are the bench's with
-noise of 1 um in the place of the encoder's quantum: an encoder at rest repeats one rounding error, which no number of
-samples averages away, and a bound of 0.001 % would be beaten by it.
+sensors, at the truth, with all known quantities known. It assumes Gaussian noise, so the sensors here are the bench's
+with noise of 1 um in place of the encoder's quantum: an encoder at rest repeats one rounding error, which no number of
+samples averages away and which could beat a bound of 0.001 %.
 
-- `stated`: the pressure form's EKF, condition and noise levels known, beside the bound for just that;
-- `smoothed`: the iterated smoother in its place, which is what `hydrostate estimate --form pressure` takes where
-  pressure is not logged;
-- `tuned`: noise levels found from the log, as `hydrostate estimate --form pressure --tune` does;
-- `unknown`, the default: what `hydrostate estimate` does with a log and no options, by the flow form or, without
-  pressure, by the motion form; it knows neither condition nor friction nor noise. Its bound is that of a model that
-  knows friction's structure and estimates leakage, flow bias and friction along with bulk modulus.
+- `stated`: the pressure form's EKF with known condition and noise levels, against the bound for the same knowledge;
+- `smoothed`: the iterated smoother in its place, which `hydrostate estimate --form pressure` uses if pressure is not
+  logged;
+- `tuned`: noise levels estimated from the log, as by `hydrostate estimate --form pressure --tune`;
+- `unknown`, the default: `hydrostate estimate` on a log without options, by the flow form or, without pressure, by the
+  motion form; condition, friction and noise are unknown. Its bound is for a model with known friction structure that
+  estimates leakage, flow bias and friction along with bulk modulus.
 
-A wish that chance alone may have met or missed counts as not met: more seeds decide it.
+A target that may have been met or missed by chance alone counts as not met: more seeds decide it.
 """
 
 import argparse
@@ -54,14 +54,14 @@ PRESSURE = "differential_pressure_pa"
 MOTION = ("position_m", "velocity_m_s")
 
 MODEL = replace(PRESSURE_FORM, longest_step=1e-4 / LUMPED.substeps)
-"""The form at the simulator's own step: at a bound of 0.001 %, steps of 0.1 ms show a bias of 0.0013 %."""
+"""The form at the simulator's own step: relative to a bound of 0.001 %, steps of 0.1 ms show a bias of 0.0013 %."""
 
 DEGREES = {True: (1.0, 1.0), False: (1e4, 1e2, 1.0, 1.0)}
-"""Process noise of the filter's passes over its own, with and without pressure; each begins at the bulk modulus that
-the last one found."""
+"""Factor on the process noise in each pass of the filter, with and without pressure; each pass begins at the bulk
+modulus that the previous one found."""
 
 WANTED_RATIO = {True: 1.2, False: 1.5}
-"""RMSE over the bound, with and without pressure."""
+"""Ratio of RMSE to bound, with and without pressure."""
 
 WANTED_POOLED = (93.5, 96.5)
 WANTED_CELL = (90.0, 99.0)
@@ -70,7 +70,7 @@ WANTED_CELL = (90.0, 99.0)
 
 @dataclass(frozen=True)
 class Case:
-    """One run: which, how it is estimated, and whether pressure is logged."""
+    """One run, its estimator, and whether pressure is logged."""
 
     drive: str
     condition: str
@@ -80,12 +80,12 @@ class Case:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What is measured."""
+        """Measured channels."""
         return (*MOTION, PRESSURE) if self.pressure else MOTION
 
 
 def speed_noise(p: EhaParameters) -> Mapping[str, float]:
-    """Return the process noise that the noise of measured speed makes, by state: white flow noise at the log's rate."""
+    """Return the process noise due to noise in measured speed, by state: white flow noise at the log's rate."""
     stiffness = p.bulk_modulus / p.chamber_volume
     density = (stiffness * p.pump_displacement * SENSORS.speed_noise) ** 2 * SAMPLE_TIME
     return {**{state.name: 0.0 for state in MODEL.states}, PRESSURE: density}
@@ -102,7 +102,7 @@ def bound_of(case: Case, record: Record, p: EhaParameters) -> float:
 
 
 def by_degrees(case: Case, record: Record, p: EhaParameters) -> tuple[float, float]:
-    """Return bulk modulus and its standard deviation [Pa] by a filter that is told the noise levels."""
+    """Return bulk modulus and its standard deviation [Pa] by a filter with known noise levels."""
     variances = {name: noise_variances(SENSORS)[name] for name in case.channels}
     value, std = FIRST_GUESS, START_STD
     for factor in DEGREES[case.pressure]:
@@ -114,7 +114,7 @@ def by_degrees(case: Case, record: Record, p: EhaParameters) -> tuple[float, flo
 
 
 def by_the_smoother(case: Case, record: Record, p: EhaParameters) -> tuple[float, float]:
-    """Return bulk modulus and its standard deviation [Pa] by the iterated smoother, which is told the noise levels."""
+    """Return bulk modulus and its standard deviation [Pa] by the iterated smoother with known noise levels."""
     variances = {name: noise_variances(SENSORS)[name] for name in case.channels}
     prior, noise = first_belief(MODEL, record, FIRST_GUESS, START_STD), speed_noise(p)
     found = run_filter(
@@ -124,7 +124,7 @@ def by_the_smoother(case: Case, record: Record, p: EhaParameters) -> tuple[float
 
 
 def by_the_verb(case: Case, record: Record, p: EhaParameters) -> tuple[float, float]:
-    """Return bulk modulus and its standard deviation [Pa] as `hydrostate estimate` does; NaN where it gives none."""
+    """Return bulk modulus and its standard deviation [Pa] as `hydrostate estimate` does; NaN if it gives none."""
     log = Record(record.sample_time, {name: record[name] for name in ("motor_speed_rad_s", *case.channels)})
     if case.estimator == "unknown":
         found = estimate_bulk_modulus(log, EhaParameters(), start=FIRST_GUESS)
@@ -137,7 +137,7 @@ ESTIMATE: Mapping[str, Callable[[Case, Record, EhaParameters], tuple[float, floa
     "stated": by_degrees,
     "smoothed": by_the_smoother,
 }
-"""Estimators that are told the noise levels; the others do as the verb does."""
+"""Estimators with known noise levels; the others use the verb."""
 
 
 def run_case(case: Case) -> dict[str, object]:
@@ -166,7 +166,7 @@ def _rms(values: Iterable[float]) -> float:
 
 
 def summarised(rows: pd.DataFrame) -> dict[str, float]:
-    """Return error, bound, coverage and NEES of some runs, with the 95 % range that chance allows NEES."""
+    """Return error, bound, coverage and NEES of some runs, with the 95 % range of NEES by chance."""
     n = len(rows)
     low, high = (float(chi2.ppf(level, n)) / n for level in (0.025, 0.975))
     return {
@@ -191,7 +191,7 @@ def coverage_range(covered: int, runs: int) -> tuple[float, float]:
 
 
 def coverage_verdict(covered: int, runs: int, wanted: tuple[float, float]) -> str:
-    """Return whether the coverage is within what is wanted, out of it, or out of it by no more than chance."""
+    """Return whether the coverage is met, missed, or undecided because chance could explain the miss."""
     if wanted[0] <= 100.0 * covered / runs <= wanted[1]:
         return "met"
     low, high = coverage_range(covered, runs)
@@ -199,12 +199,12 @@ def coverage_verdict(covered: int, runs: int, wanted: tuple[float, float]) -> st
 
 
 def judged(met: bool) -> str:
-    """Return the word for a wish."""
+    """Return the word for a met or missed target."""
     return "met" if met else "missed"
 
 
 def main(arguments: list[str]) -> int:
-    """Print one line a cell and the pooled figures; return how many wishes are not shown to be met."""
+    """Print one line for each cell, and the pooled figures; return how many targets are not shown to be met."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--conditions", nargs="+", choices=list(CONDITIONS), default=list(CONDITIONS))

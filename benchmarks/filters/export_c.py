@@ -1,7 +1,7 @@
-"""Exported C beside the kernels that Python runs: agreement in nine conditions, cost of a step, float's error, jitter.
+"""Exported C against the Python kernels: agreement in nine conditions, cost of a step, error of float, jitter.
 
-Every filter runs over 100,000 samples. Costs are CPU time, medians over rounds in which C and Python's kernel take
-turns. The real-time part wakes every 0.1 ms, alone and beside processes that keep every core busy.
+Every filter runs over 100,000 samples. Costs are CPU times: medians over rounds in which C and Python's kernel
+alternate. The real-time part wakes every 0.1 ms, first alone and then with other processes that keep every core busy.
 """
 
 import argparse
@@ -48,18 +48,18 @@ BUILDS = {
     "clang": ("clang", ("-march=native", "-fno-math-errno", "-fno-slp-vectorize")),
     "clang, no fma": ("clang", ()),
 }
-"""Compilers with their flags beside ``-std=c99 -O2``: as the Makefile has it, with choices that the compiler may make
-without branches, for any x86-64 processor, and where the compiler may fuse by itself."""
+"""Compilers with their flags in addition to ``-std=c99 -O2``: as in the Makefile, with branch-free choices by the
+compiler, for any x86-64 processor, and with the compiler's own contraction of multiply-adds allowed."""
 
 AGREEING = ("gcc", "gcc, choices", "gcc, no fma", "gcc, contracting", "clang", "clang, no fma")
-"""Builds that are compared with Python over every form and condition."""
+"""Builds compared with Python in every form and condition."""
 
 BINS = (50, 100, 200, 300, 500, 1000, 2000, 5000, 10_000, 100_000, 1_000_000, 10_000_000)
-"""Edges of the histogram of steps [ns]."""
+"""Edges of the histogram of step times [ns]."""
 
 
 def task(form: str, condition: str, samples: int) -> FilterProblem:
-    """Return a filter in a condition, told the condition's leakage and friction, on a log of the plant that it models.
+    """Return a filter with the condition's leakage and friction, on a log of the plant that it models.
 
     Parameters
     ----------
@@ -74,12 +74,13 @@ def task(form: str, condition: str, samples: int) -> FilterProblem:
 
 
 def difference(c: CFilter, method: str) -> tuple[float, Array]:
-    """Return how far C is from Python.
+    """Return the difference between C and Python.
 
     Returns
     -------
     tuple of (float, ndarray of shape (states,))
-        Largest difference of any state at any sample, over the largest size of that state; and the same of each state.
+        Largest difference of any state at any sample, relative to the largest magnitude of that state; and the same for
+        each state.
     """
     problem = replace(c.problem, every=1)
     trace = METHODS[method](problem)
@@ -90,7 +91,7 @@ def difference(c: CFilter, method: str) -> tuple[float, Array]:
 
 
 def agreement(folder: Path, samples: int) -> Iterator[tuple[str, str, str, float]]:
-    """Yield form, method, condition and the worst difference of any compiler, and of float."""
+    """Yield form, method, condition, and the worst difference over the compilers and of float."""
     for form in EXPORTED_FORMS:
         for condition in CONDITIONS:
             problem = task(form, condition, samples)
@@ -110,7 +111,7 @@ def agreement(folder: Path, samples: int) -> Iterator[tuple[str, str, str, float
 
 
 def costs(folder: Path, form: str) -> dict[str, float]:
-    """Return medians of CPU nanoseconds a step: Python's kernel, and C by compiler."""
+    """Return median CPU nanoseconds per step: Python's kernel, and C for each compiler."""
     problem = problems(form, 1, SAMPLES)[0]
     libraries = {
         name: built(problem, "ekf", folder / f"cost_{form}_{i}", compiler=compiler, flags=flags)

@@ -1,13 +1,13 @@
-"""Cost of one filter step: compiled filters, alone and in lanes, beside the same filter in other tools.
+"""Cost of one filter step: compiled filters, alone and in lanes, compared with the same filter in other tools.
 
-Every peer runs in the same run, interleaved with ours, CPU time, medians over the rounds. "Lanes" is the verb, from
-separate logs to separate results; "lanes, kernel" finds the logs side by side already, as the C++ kernel and JAX do, so
-their ratios are to it. filterpy is written as its users write it (`benchmarks.peers.filterpy_user`), C++ and JAX as
-an expert would (`ekf_simd.cpp`, `jax_lanes.py`); C++ is built in several ways, and the fastest counts. "Bridge" is
-filterpy with our compiled model. JAX has one thread and runs in the environment that ``--jax`` names (a Python that
-imports jax), since it is no dependency of this project. ``--processor avx2`` compiles ours and C++ for a processor that
-has AVX2 and no AVX-512. The arithmetic floor is the time of a step's operations at the rate of fused multiply-adds that
-a core is measured to do in the same run, a fused one counted once; divisions, loads and stores are free in it.
+All peers are measured in the same run, interleaved with ours, by CPU time, as medians over the rounds. "Lanes" is the
+verb, from separate logs to separate results. "Lanes, kernel" gets logs that are already side by side, as the C++ kernel
+and JAX do, so their ratios refer to it. filterpy is written as its users write it (`benchmarks.peers.filterpy_user`),
+C++ and JAX as an expert would (`ekf_simd.cpp`, `jax_lanes.py`); C++ is built in several ways, and the fastest counts.
+"Bridge" is filterpy with our compiled model. JAX has one thread and runs in the environment given by ``--jax`` (a
+Python that imports jax), since it is no dependency of this project. ``--processor avx2`` compiles ours and C++ for a
+processor with AVX2 and without AVX-512. The arithmetic floor is the time for a step's operations at the rate of fused
+multiply-adds measured on a core in the same run. A fused operation counts once; divisions, loads and stores are free.
 """
 
 import argparse
@@ -61,21 +61,22 @@ WANTED = {
     "pressure bridge": 1000.0,
 }
 SAME = 1e-4
-"""Largest relative difference of states that are taken for equal: the peer's Jacobian is of differences [fraction]."""
+"""Largest relative difference between states that count as equal: the peer's Jacobian uses finite differences
+[fraction]."""
 
 CPP = "C++ SIMD, "
-"""How the C++ builds begin their names."""
+"""Prefix of the names of C++ builds."""
 
 
 def cost(work: Callable[[], object], steps: int) -> float:
-    """Return CPU nanoseconds a filter-step."""
+    """Return CPU nanoseconds per filter step."""
     begin = time.process_time_ns()
     work()
     return (time.process_time_ns() - begin) / steps
 
 
 def problems(form: str, count: int, samples: int) -> list[FilterProblem]:
-    """Return filters with noise of their own on one run of the reduced plant."""
+    """Return filters on one run of the reduced plant, each with its own noise."""
     p, rng = EhaParameters(), np.random.default_rng(1)
     drive = make_drive("sine", samples * SAMPLE_TIME, SAMPLE_TIME, p, rng)
     record = simulate(REDUCED, drive, SAMPLE_TIME, p, sensors=BENCH, rng=rng)
@@ -95,7 +96,7 @@ def problems(form: str, count: int, samples: int) -> list[FilterProblem]:
 
 
 def scaled(problem: FilterProblem) -> tuple[tuple[float, float, float], Array, Array, Array]:
-    """Return steps, process noise, variances and measurements in the scaled units of the peers written by hand."""
+    """Return steps, process noise, variances and measurements in the scaled units of the hand-written peers."""
     scale = np.array([state.scale for state in ACCELERATION_FORM.states])
     T = problem.sample_time
     steps = (T, T * scale[1] / scale[0], T * scale[2] / scale[1])
@@ -103,7 +104,7 @@ def scaled(problem: FilterProblem) -> tuple[tuple[float, float, float], Array, A
 
 
 def kernel_work(batch: list[FilterProblem]) -> Callable[[], None]:
-    """Return our kernel's work alone, on logs that lie side by side already, as the C++ kernel's do."""
+    """Return the work of our kernel alone, on logs that are already side by side, as for the C++ kernel."""
     places, first = layout(EKF, batch[0].model, batch[0].channels), batch[0]
     kernel = compile_kernel(EKF, first.model, first.channels, LANES, separate=False)
     blocks = [batch[i : i + LANES] for i in range(0, len(batch), LANES)]
@@ -150,7 +151,7 @@ def _lanes(arrays: list[Array]) -> Array:
 
 
 def jax_costs(python: str, batch: list[FilterProblem], rounds: int) -> tuple[list[float], Array]:
-    """Return JAX's CPU nanoseconds of every round, and its final means."""
+    """Return JAX's CPU nanoseconds in every round, and its final means."""
     steps, noise, variances, _ = scaled(batch[0])
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "in.npz", Path(folder) / "out.npy"
@@ -198,7 +199,7 @@ def filterpy_work(problem: FilterProblem) -> Callable[[], None]:
 
 
 def filterpy_pressure(problem: FilterProblem) -> tuple[Callable[[], None], Array]:
-    """Return the work of a user's own loop on the pressure form, and where its last mean ends up."""
+    """Return the work of a user's own loop on the pressure form, and its final mean."""
     scale = np.array([state.scale for state in problem.model.states])
     speed, measured = problem.drives[:, 0], problem.measured / scale[:2]
     ended = np.empty(4)
@@ -255,7 +256,7 @@ def pressure_table(count: int, samples: int) -> Iterator[tuple[str, float]]:
 
 
 def operations() -> int:
-    """Return the arithmetic instructions of a filter-step in lanes, no sample missing, on the acceleration form."""
+    """Return the number of arithmetic instructions of a filter step in lanes, acceleration form, no sample missing."""
     halves = halves_of(EKF, ACCELERATION_FORM, CHANNELS)
     update = all_present(counting_missing(halves.update))
     kept = layout(EKF, ACCELERATION_FORM, CHANNELS).carried
@@ -264,7 +265,7 @@ def operations() -> int:
 
 
 def only_avx2() -> None:
-    """Compile our kernels for a processor that has AVX2 and no AVX-512, into a cache of their own."""
+    """Compile our kernels for a processor with AVX2 and without AVX-512, into a separate cache."""
     llvm = machine.binding()
     features = llvm.get_host_cpu_features()
     for name in features:

@@ -1,7 +1,7 @@
 """Exported FMUs: FMPy's validation, and the native trajectory in FMPy, in libcosim (FMI Library) and in Ecos (fmi4c).
 
-The three plants as FMI 2.0 and 3.0. The tools beside FMPy run in the Python that ``--tools`` names, with ``libcosimpy``
-and ``ecospy``; libcosim knows FMI 2.0 alone.
+The three plants as FMI 2.0 and 3.0. The other tools run in the Python given by ``--tools``, with ``libcosimpy`` and
+``ecospy``; libcosim supports only FMI 2.0.
 """
 
 import argparse
@@ -29,7 +29,7 @@ WORKER = Path(__file__).parents[1] / "peers" / "fmu_tools.py"
 
 
 def native(plant: Plant, parameters: EhaParameters, speeds: Array) -> Array:
-    """Return the velocity where the drive is held from sample to sample, shape (samples + 1,) [m/s]."""
+    """Return the velocity for a drive held between samples, shape (samples + 1,) [m/s]."""
     row = parameter_row(plant.complete(parameters))
     run = compile_trajectory(plant.name, plant.step, len(plant.states), plant.parameter_class)
     states = [np.asarray(plant.start(row), dtype=np.float64)]
@@ -39,7 +39,7 @@ def native(plant: Plant, parameters: EhaParameters, speeds: Array) -> Array:
 
 
 def by_fmpy(path: Path, speeds: Array) -> tuple[list[str], Array]:
-    """Return what FMPy's validation objects to, and the velocity that it finds, shape (samples + 1,) [m/s]."""
+    """Return the complaints of FMPy's validation, and its velocity, shape (samples + 1,) [m/s]."""
     import fmpy
     from fmpy.validation import validate_fmu
 
@@ -53,7 +53,7 @@ def by_fmpy(path: Path, speeds: Array) -> tuple[list[str], Array]:
 
 
 def by_tool(python: Path, tool: str, path: Path, speeds: Array) -> Array:
-    """Return the velocity that a tool finds, shape (samples + 1,) [m/s]."""
+    """Return the velocity computed by a tool, shape (samples + 1,) [m/s]."""
     command = [str(python), str(WORKER), tool, str(path), repr(STEP)]
     given = "\n".join(map(repr, speeds.tolist()))
     done = subprocess.run(command, input=given, capture_output=True, text=True, check=False)  # noqa: S603  our own
@@ -63,7 +63,7 @@ def by_tool(python: Path, tool: str, path: Path, speeds: Array) -> Array:
 
 
 def main(arguments: list[str]) -> int:
-    """Print each plant, version and tool; return how many are farther from the native run than is wanted."""
+    """Print each plant, version and tool; return how many deviate from the native run by more than allowed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tools", type=Path, help="a Python with libcosimpy and ecospy")
     python: Path | None = parser.parse_args(arguments).tools

@@ -1,4 +1,4 @@
-"""A study's worth of filters: 9 conditions x 11 first guesses x 16 seeds x 100,000 steps, with simulation and noise.
+"""All filters of a study: 9 conditions x 11 first guesses x 16 seeds x 100,000 steps, with simulation and noise.
 
 CPU time on one core after compilation, and peak memory.
 """
@@ -30,7 +30,7 @@ WANTED_SECONDS, WANTED_BYTES = 6.0, 1e9
 
 
 def problems(seeds: int, samples: int) -> Iterator[FilterProblem]:
-    """Yield the filters of one condition after the other; a run's noise is shared by its first guesses."""
+    """Yield the filters, condition by condition; all first guesses of a run share its noise."""
     for number, condition in enumerate(CONDITIONS.values()):
         p = parameters_for(condition)
         speed = make_drive("sine", samples * SAMPLE_TIME, SAMPLE_TIME, p, np.random.default_rng(1))[:samples]

@@ -1,7 +1,7 @@
-"""Filters of a stream that are saved, ended and begun again from their file: how many continue to the last bit.
+"""Stream filters that are saved, stopped and restarted from their file: how many continue bit-identically.
 
-Every form under every method that filters streams, with five restarts at random samples of a log of the plant, cut at
-random; what is compared with the filter that ran through is its whole memory, not what it shows.
+Every form with every method that filters streams, with five restarts at random samples of a log of the plant, cut at
+random. The comparison with the uninterrupted filter covers its entire memory, not only its outputs.
 """
 
 import argparse
@@ -25,7 +25,7 @@ SAMPLE_TIME, RESTARTS = 1e-3, 5
 
 
 def filter_on(filtered: OnlineFilter, record: Record, begin: int, end: int) -> None:
-    """Filter samples of a log, cut at random."""
+    """Filter the samples of a log, cut at random."""
     rng, task = np.random.default_rng(begin), filtered.problem
     drives, measured = (np.column_stack([record[one] for one in names]) for names in (task.model.drives, task.channels))
     while begin < end:
@@ -35,13 +35,13 @@ def filter_on(filtered: OnlineFilter, record: Record, begin: int, end: int) -> N
 
 
 def same(ours: OnlineFilter, wanted: OnlineFilter) -> bool:
-    """Return whether two filters remember the same bits."""
+    """Return whether the memories of two filters are bit-identical."""
     kept, other = ours.remembered(), wanted.remembered()
     return all(kept[name].tobytes() == other[name].tobytes() for name in kept)
 
 
 def main(arguments: list[str]) -> int:
-    """Print each form and method; return how many do not continue to the last bit."""
+    """Print each form and method; return how many do not continue bit-identically."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=5000)
     samples: int = parser.parse_args(arguments).samples

@@ -1,7 +1,7 @@
-"""Bulk modulus from logs with missing samples, gross outliers, a drop-out, or a sensor that no longer tells the truth.
+"""Bulk modulus from logs with missing samples, gross outliers, a drop-out, or a faulty sensor.
 
-Lumped plant, PRBS, 10 s at 1 kHz, sensors of the bench. The flow form knows nothing of the condition, the pressure form
-knows leakage and friction. Wanted: at most twice the error of the clean log, and every broken sensor reported.
+Lumped plant, PRBS, 10 s at 1 kHz, sensors of the bench. The flow form does not know the condition; the pressure form
+knows leakage and friction. Target: at most twice the error of the clean log, and every faulty sensor reported.
 """
 
 import argparse
@@ -28,10 +28,10 @@ FIRST_GUESS = 3e8
 WANTED_RATIO = 2.0
 
 SHARE = 0.01
-"""Share of each channel's samples that is missing or an outlier [fraction]."""
+"""Share of each channel's samples that are missing or outliers [fraction]."""
 
 OUTLIER = 20.0
-"""Size of an outlier, either way, in standard deviations of the channel [dimensionless]."""
+"""Size of an outlier, of either sign, in standard deviations of the channel [dimensionless]."""
 
 GAP = 0.1
 """Length of the drop-out of all channels [s]."""
@@ -90,7 +90,7 @@ BROKEN: Mapping[str, Callable[[Record, np.random.Generator], Record]] = {
 
 
 def run_case(case: tuple[str, int]) -> list[dict[str, object]]:
-    """Estimate from one noisy run, sound, disturbed in every way and measured by every broken sensor."""
+    """Estimate from one noisy run: clean, with each disturbance, and with each faulty sensor."""
     condition, seed = case
     rng = stream(seed, "robustness benchmark", condition)
     p = parameters_for(CONDITIONS[condition])
@@ -119,7 +119,7 @@ def run_case(case: tuple[str, int]) -> list[dict[str, object]]:
 
 
 def accuracy(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the error of each estimator on each disturbed log, and its ratio to the clean one's."""
+    """Return the error of each estimator on each disturbed log, and its ratio to the error on the clean log."""
     disturbed = table[table["log"].isin(list(DISTURBANCES))]
     summary = disturbed.groupby(["estimator", "log"], sort=False).agg(
         runs=("ok", "size"),
@@ -139,7 +139,7 @@ def accuracy(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def main(arguments: list[str]) -> int:
-    """Print errors and what was reported; return how many lines of the two tables miss what is wanted."""
+    """Print errors and reports; return how many lines of the two tables miss their target."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--conditions", nargs="+", choices=list(CONDITIONS), default=list(CONDITIONS))

@@ -1,1 +1,1 @@
-"""Identification: statistics, public sets, peers, bent inputs, state space, frequency response, own equations."""
+"""Identification: statistics, public sets, peers, nonlinear inputs, state space, frequency response, own equations."""

@@ -1,7 +1,7 @@
-"""A dead zone, a saturation and a backlash planted at a plant's input: whether they are found, and intervals cover.
+"""A dead zone, a saturation and a backlash at a plant's input: whether they are found, and interval coverage.
 
-Each log has fresh inputs and noise. `identify_channels` is told the order of the linear part (2, one sample of dead
-time) and nothing of the nonlinearity, unless `--order auto` leaves that to the data as well, which takes longer.
+Each log has fresh inputs and noise. `identify_channels` is given the order of the linear part (2, one sample of dead
+time) but nothing about the nonlinearity. `--order auto` leaves the order to the data as well, which takes longer.
 """
 
 import argparse
@@ -22,15 +22,15 @@ from estimation.identification.model.recursion import filtered
 
 SAMPLES = 1500
 NOISE = 0.05
-"""Deviation of the sensor's noise over that of the output."""
+"""Standard deviation of the sensor's noise relative to that of the output."""
 
 LEVEL, OFFSET = 2.0, 5.0
-"""Of the input, in the middle, and of the output at rest [their units]."""
+"""Mean level of the input, and output at rest [their units]."""
 
 
 @dataclass(frozen=True)
 class Planted:
-    """A nonlinearity with its values in the unit of the input."""
+    """A nonlinearity with its values in units of the input."""
 
     kind: str
     values: Mapping[str, float]
@@ -64,7 +64,7 @@ def logged(planted: Planted, seed: int) -> Channels:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Count what is found and covered, and return how many wishes are missed."""
+    """Count what is found and covered; return how many targets are missed."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seeds", type=int, default=100)
     options.add_argument("--order", default="2")
@@ -84,7 +84,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _found(planted: Planted, seed: int, form: Mapping[str, Any]) -> dict[str, float]:
-    """Return the errors over their deviations; nothing where another kind is found."""
+    """Return the errors divided by their standard deviations; empty if another kind is found."""
     model = identify_channels(logged(planted, seed), structure="hammerstein", **form).model
     if not isinstance(model.dynamics, HammersteinDynamics) or model.dynamics.at_input != planted.kind:
         return {}

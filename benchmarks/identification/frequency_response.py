@@ -1,10 +1,10 @@
-"""Frequency responses: whether intervals cover, and whether the level of a planted cubic's distortion is found.
+"""Frequency responses: interval coverage, and whether the distortion level of a known cubic is found.
 
-The local polynomial method is given one log of a lightly damped linear plant under noise, with transients; the
-multisine method some periods of odd multisines, one line in four left out at random, through a filter and a cubic, one
-log for each of six realisations. The truth of the distortion is the variance of the output's lines over noiseless
-realisations. A level from one log alone scatters more, the more so behind a resonance, where few lines hold all the
-power; that is printed beside, with how often its interval holds the truth and the period that it asks for.
+The local polynomial method gets one log of a lightly damped linear plant with noise and transients. The multisine
+method gets several periods of odd multisines, with one line in four left out at random, through a filter and a cubic,
+one log for each of six realisations. The true distortion is the variance of the output's lines over noiseless
+realisations. A level from a single log scatters more, in particular behind a resonance, where few lines hold all the
+power. Its scatter is printed too, with how often its interval covers the truth and the period that it recommends.
 """
 
 import argparse
@@ -20,20 +20,20 @@ from estimation.identification.signals.local_polynomial import local_polynomial_
 
 NUMERATOR, DENOMINATOR = [0.0, 0.1, 0.05], [1.0, -1.6, 0.75]
 DAMPED = [1.0, -1.1, 0.4]
-"""Denominator of the plant with the cubic; the other one is tried beside it."""
+"""Denominator of the plant with the cubic; the other one is tried too."""
 
 PERIOD, PERIODS, HIGHEST = 8192, 5, 3200
-"""Samples a period, periods of which the first settles, and the highest line."""
+"""Samples in a period, number of periods, of which the first settles, and the highest line."""
 
 CUBIC, NOISE = 0.3, 0.02
-"""Of the cubic over the filter's power, and deviation of the noise over the output's [fraction]."""
+"""Coefficient of the cubic on the normalised filter output, and relative standard deviation of the noise [fraction]."""
 
 SAMPLES, LOGS = 4096, 6
-"""Samples of a log under noise, and logs of multisines that a level is told from."""
+"""Samples of a log with noise, and number of multisine logs for estimating a level."""
 
 
 def odd_lines(rng: np.random.Generator) -> IntArray:
-    """Return odd lines of a multisine, of every four one left out at random."""
+    """Return the odd lines of a multisine, with one in every four left out at random."""
     groups = np.arange(1, HIGHEST, 2)[: HIGHEST // 8 * 4].reshape(-1, 4)
     kept = np.ones(groups.shape, dtype=bool)
     kept[np.arange(len(groups)), rng.integers(0, 4, len(groups))] = False
@@ -41,7 +41,7 @@ def odd_lines(rng: np.random.Generator) -> IntArray:
 
 
 def multisine(lines: IntArray, rng: np.random.Generator) -> Array:
-    """Return a period of unit power."""
+    """Return one period with unit power."""
     spectrum = np.zeros(PERIOD // 2 + 1, dtype=np.complex128)
     spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
     one = np.fft.irfft(spectrum)
@@ -56,7 +56,7 @@ def bent(u: Array, denominator: Sequence[float]) -> Array:
 
 
 def _true_level(realisations: int, denominator: Sequence[float]) -> float:
-    """Return the variance of the output's excited lines over realisations, the mean over lines."""
+    """Return the variance of the output's excited lines over realisations, averaged over lines."""
     rng = np.random.default_rng(99)
     lines = odd_lines(rng)
     ratios = np.empty((realisations, len(lines)), dtype=np.complex128)
@@ -69,7 +69,7 @@ def _true_level(realisations: int, denominator: Sequence[float]) -> float:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Count, and return how many wishes are missed."""
+    """Count, and return how many targets are missed."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seeds", type=int, default=50)
     options.add_argument("--realisations", type=int, default=400)
@@ -109,7 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _levels(seed: int, log: int, denominator: Sequence[float]) -> tuple[float, ...]:
-    """Return the odd and even levels that one log tells, the odd one's interval, and the period that it asks for."""
+    """Return the odd and even levels from one log, the odd one's interval, and the recommended period."""
     rng = np.random.default_rng([seed, log])
     y = bent(u := np.tile(multisine(odd_lines(rng), rng), PERIODS), denominator)
     told = best_linear_approximation(u, y + NOISE * y.std() * rng.normal(size=len(u)), 1.0)

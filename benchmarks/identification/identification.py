@@ -22,7 +22,7 @@ from plant.errors import LogWarning
 
 FORM = {"n_numerator": 3, "n_denominator": 2}
 WORSE = 1e-6
-"""Relative excess of the cost over that of a fit started at the truth, above which the optimum was missed."""
+"""Excess cost relative to a fit started at the truth, above which the optimum counts as missed."""
 
 
 def main(arguments: list[str]) -> int:
@@ -73,7 +73,7 @@ def table6_figures(seeds: int) -> int:
 
 
 def one_case(name: str, noise: float, seeds: int) -> dict[str, float]:
-    """Return the figures of one truth at one noise level, over seeds."""
+    """Return the figures for one true model at one noise level, over seeds."""
     distance, covered, gains, missed, flagged, profiles, spent = [], [], [], 0, [], [], []
     for seed in range(seeds):
         case = table6_case(name, noise, seed)
@@ -106,7 +106,7 @@ def coefficients(model: LinearModel) -> np.ndarray:
 
 
 def information(case: Case) -> np.ndarray:
-    """Return the Fisher information of the coefficients at the truth, the initial state known."""
+    """Return the Fisher information of the coefficients at the truth, with known initial state."""
     form = Structure(case.truth.numerator.size, case.truth.denominator.size - 1, 0, estimate_initial_state=False)
     jacobian = sensitivities(form, coefficients(case.truth), case.u)
     return jacobian.T @ jacobian / case.noise_std**2
@@ -119,7 +119,7 @@ def cost_of(model: LinearModel, case: Case) -> float:
 
 
 def cost_from_truth(case: Case) -> float:
-    """Return the least cost that a fit started at the truth finds."""
+    """Return the smallest cost of a fit started at the truth."""
     n_b, n_f = case.truth.numerator.size, case.truth.denominator.size - 1
     size_u, size_y = float(np.sqrt(np.mean(case.u**2))), float(np.sqrt(np.mean(case.y**2)))
     start = coefficients(case.truth)

@@ -8,7 +8,7 @@ from estimation.identification import LinearModel
 from experiments.published import load
 
 NOISES = (0.01, 0.1, 0.5)
-"""Standard deviation of the output noise, as a share of that of the output."""
+"""Standard deviation of the output noise relative to that of the output."""
 
 _PUBLISHED = load("transfer_functions").set_index("condition")
 
@@ -42,7 +42,7 @@ def table6_case(name: str, noise: float, seed: int, n: int = 20_000) -> Case:
 
 
 def random_binary(rng: np.random.Generator, n: int, hold: int = 50) -> np.ndarray:
-    """Return +-125.66 rad/s, each value held for some samples."""
+    """Return +-125.66 rad/s, each value held for a number of samples."""
     return 125.66 * np.repeat(rng.choice([-1.0, 1.0], n // hold + 1), hold)[:n]
 
 
@@ -54,10 +54,10 @@ def noisy(truth: LinearModel, u: np.ndarray, share: float, rng: np.random.Genera
 
 
 def random_system(seed: int, n: int = 2_000) -> Case:
-    """Return a record of a random stable system of order 2 to 4, 10 to 30 dB above its noise.
+    """Return a record of a random stable system of order 2 to 4, with a signal-to-noise ratio of 10 to 30 dB.
 
-    Poles are real or in pairs, moduli 0.3 to 0.98; zeros are drawn likewise within 1.2; the input is random binary,
-    held for 1 to 10 samples.
+    Poles are real or in pairs, with moduli from 0.3 to 0.98; zeros are drawn likewise within 1.2. The input is random
+    binary, held for 1 to 10 samples.
     """
     rng = np.random.default_rng([200, seed])
     order = 2 + seed % 3

@@ -1,4 +1,4 @@
-"""Simulated machines and circuits with train and test records, to judge defaults as a stranger's logs would."""
+"""Simulated machines and circuits with train and test records, for judging defaults on unfamiliar logs."""
 
 from collections.abc import Callable, Mapping
 
@@ -9,22 +9,22 @@ from estimation.arrays import Array
 from estimation.identification.model.recursion import filtered
 
 SIZES = {"train": (600, 2500), "test": (400, 1200)}
-"""Samples, from and to."""
+"""Number of samples, from and to."""
 
 FINE = 10
-"""Steps of the simulation in one sample."""
+"""Simulation steps in one sample."""
 
 NOISE = (0.003, 0.03)
-"""Deviation of the sensor's noise over that of the output, from and to."""
+"""Standard deviation of the sensor's noise relative to that of the output, from and to."""
 
 
 def machine_sets(seed: int = 0) -> list[PublicSet]:
-    """Return one set a machine, with sizes, input, values and noise drawn from a seed; none where Euler's steps fail.
+    """Return one set for each machine, all drawn from a seed; no set if Euler's method fails.
 
     Parameters
     ----------
     seed : int
-        Of all that is random.
+        Seed of everything random.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         made = [_set(name, make, seed) for name, make in MACHINES.items()]
@@ -42,7 +42,7 @@ def _set(name: str, make: Callable[[Array, np.random.Generator], Array], seed: i
 
 
 def _input(n: int, rng: np.random.Generator) -> Array:
-    """Return steps of random height, low-passed noise, or a multisine, of deviation one about a level of its own."""
+    """Return random steps, low-passed noise, or a multisine, with unit standard deviation about a level of its own."""
     kind = rng.integers(3)
     if kind == 0:
         hold = int(rng.integers(5, 40))
@@ -58,7 +58,7 @@ def _input(n: int, rng: np.random.Generator) -> Array:
 
 
 def _stepped(u: Array, state: Array, slope: Callable[[Array, float], Array], output: Callable[[Array], float]) -> Array:
-    """Return what is measured of a state that Euler's steps carry on, its input held over each sample."""
+    """Return the measured output of a state integrated by Euler steps, with the input held over each sample."""
     out = np.zeros(u.size)
     for t, value in enumerate(u):
         out[t] = output(state)
@@ -68,7 +68,7 @@ def _stepped(u: Array, state: Array, slope: Callable[[Array, float], Array], out
 
 
 def _damper(u: Array, rng: np.random.Generator) -> Array:
-    """Return the force of a controllable damper over its speed: it saturates, lags and has some stiffness."""
+    """Return the force of a controllable damper against speed: it saturates, lags and has some stiffness."""
     yielding, lag, stiff = rng.uniform(0.8, 2.0), rng.uniform(0.1, 0.5), rng.uniform(0.0, 0.05)
 
     def slope(x: Array, v: float) -> Array:
@@ -90,7 +90,7 @@ def _crane(u: Array, rng: np.random.Generator) -> Array:
 
 
 def _cylinder(u: Array, rng: np.random.Generator) -> Array:
-    """Return the position of a pneumatic cylinder on a spring, with friction that holds it."""
+    """Return the position of a pneumatic cylinder with a spring and static friction."""
     rub, spring, fill = rng.uniform(0.1, 0.5), rng.uniform(0.0, 0.05), rng.uniform(0.05, 0.3)
 
     def slope(x: Array, v: float) -> Array:
@@ -103,7 +103,7 @@ def _cylinder(u: Array, rng: np.random.Generator) -> Array:
 
 
 def _drive(u: Array, rng: np.random.Generator) -> Array:
-    """Return the speed of two pulleys joined by a belt, as a sensor without a sign tells it, or with one."""
+    """Return the speed of two pulleys joined by a belt, from a sensor with or without sign."""
     rub, belt, blind = rng.uniform(0.0, 0.4), rng.uniform(0.05, 0.3), bool(rng.integers(2))
 
     def slope(x: Array, v: float) -> Array:
@@ -115,7 +115,7 @@ def _drive(u: Array, rng: np.random.Generator) -> Array:
 
 
 def _position(u: Array, rng: np.random.Generator) -> Array:
-    """Return the angle of a motor with friction, which nothing brings back."""
+    """Return the angle of a motor with friction and no restoring torque."""
     rub, damp = rng.uniform(0.1, 0.6), rng.uniform(0.05, 0.3)
 
     def slope(x: Array, v: float) -> Array:
@@ -125,7 +125,7 @@ def _position(u: Array, rng: np.random.Generator) -> Array:
 
 
 def _circuit(u: Array, rng: np.random.Generator) -> Array:
-    """Return the voltage of a resonant circuit whose capacitor stiffens, or is loaded by a diode."""
+    """Return the voltage of a resonant circuit with a stiffening capacitor or a diode load."""
     hard, damp, diode = rng.uniform(0.0, 0.5), rng.uniform(0.05, 0.4), rng.uniform(0.0, 0.5) * rng.integers(2)
 
     def slope(x: Array, v: float) -> Array:
@@ -136,7 +136,7 @@ def _circuit(u: Array, rng: np.random.Generator) -> Array:
 
 
 def _tank(u: Array, rng: np.random.Generator) -> Array:
-    """Return the level of the lower of two tanks, of which the upper one may run over."""
+    """Return the level of the lower of two tanks; the upper one may overflow."""
     hole, rim = rng.uniform(0.03, 0.1), rng.uniform(2.0, 6.0)
 
     def slope(x: Array, v: float) -> Array:
@@ -156,4 +156,4 @@ MACHINES: Mapping[str, Callable[[Array, np.random.Generator], Array]] = {
     "circuit": _circuit,
     "two tanks": _tank,
 }
-"""What is measured of each machine."""
+"""Measured output of each machine."""

@@ -1,4 +1,4 @@
-"""Runs in a peer's own environment, which knows nothing of this project: fits records, writes time and model.
+"""Runs in a peer's own environment, without this project: fits records, writes time and model.
 
 ``python identification_peer_worker.py PEER DATA.npz RESULT.json``
 """
@@ -38,7 +38,7 @@ def pysid(u, y):
 
 
 def jax_sysid(u, y):
-    """State space of order 2 by simulation error, as jax-sysid's documentation does."""
+    """State space of order 2 by simulation error, as in jax-sysid's documentation."""
     import jax
     from jax_sysid.models import LinearModel
 

@@ -1,9 +1,9 @@
-"""Output error beside SIPPY, jax-sysid, pysid and pysib: time and success on the same records, in one run.
+"""Output error against SIPPY, jax-sysid, pysid and pysib: time and success on the same records, in one run.
 
-Each peer runs as a subprocess of a Python environment of its own, ``.peers/NAME`` (`make peers`), or of the folder
-that ``HYDROSTATE_PEERS`` names, since they need versions of their own. Signals are handed over of order one. A fit
-succeeds if its simulated cost is within 0.1 % of that of a fit started at the truth; the fitted
-values' chance share of that cost is 0.03 %. Processor seconds are compared, each with one thread for linear algebra.
+Each peer runs as a subprocess in a Python environment of its own, ``.peers/NAME`` (`make peers`), or in the folder
+given by ``HYDROSTATE_PEERS``, since they need different versions. Signals are scaled to order one. A fit succeeds if
+its simulated cost is within 0.1 % of that of a fit started at the truth; the chance share of that cost due to the
+fitted values is 0.03 %. Processor seconds are compared, with one thread for linear algebra each.
 """
 
 import argparse
@@ -25,10 +25,10 @@ from benchmarks.identification.identification_data import TABLE_6, Case, table6_
 from estimation.identification import fit_output_error
 
 WANTED = {"sippy": 100.0, "jax-sysid": 30.0, "pysib": 20.0, "pysid": 100.0}
-"""Times faster than each."""
+"""Required speed-up over each peer."""
 
 SUCCESS = 1e-3
-"""Relative excess of the cost that counts as success."""
+"""Relative excess of the cost up to which a fit succeeds."""
 
 NOISE = 0.1
 
@@ -77,7 +77,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _unit(case: Case) -> Case:
-    """Return a record of order one, which spares the peers a scaling that they do not do."""
+    """Return a record scaled to order one, since the peers do not scale."""
     size_u, size_y = float(np.abs(case.u).max()), float(np.std(case.y))
     truth = type(case.truth)(
         case.truth.numerator * size_u / size_y, case.truth.denominator, case.truth.sample_time, "u", "y"
@@ -111,7 +111,7 @@ def _run(name: str, python: Path, data: Path, result: Path, timeout: float) -> l
 
 
 def _succeeds(row: dict[str, Any], case: Case, least: float) -> bool:
-    """Return whether a model from rest costs no more than the optimum, but for chance."""
+    """Return whether a model started from rest has the optimal cost, up to chance."""
     f = np.array(row["f"])
     if row["error"] or f.size == 0 or not np.isfinite(f).all() or (np.abs(np.roots(f)) >= 1.0).any():
         return False

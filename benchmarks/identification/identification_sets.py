@@ -1,18 +1,19 @@
-"""Public sets with their authors' splits: what ours, a first-order model, scipy and peers leave on the test data.
+"""Public sets with their authors' splits: test errors of ours, of a first-order model, of scipy and of peers.
 
-Ours as a stranger would run it: ``default`` chooses order and dead time of a linear model, ``auto`` the structure too,
-``narx`` is the polynomial one. Every figure is the root-mean-square error of the free run on the test data, over that
-of the mean (0 is perfect, 1 as good as the mean), initial states estimated for all alike. ``first`` is a first-order
-model with offset, ``scipy`` output error of orders 1 to 4 from ARX, by BIC, both by `scipy.optimize.least_squares`.
-Peers run in environments of their own (`make peers`), each size chosen on the last third of the training data; they are
-skipped where there are none. ``--simulated 0 3`` takes our own sets of seeds 0 to 2 instead, each with a nonlinearity,
-``--machines 0 3`` simulated machines and circuits, ``--stand-ins 0 3`` those that stand in for sets that are kept back.
-How often the default loses to the better baseline is said at the end. ``--begun 0.2`` estimates initial states from the
-first fifth of the test alone: a model with an unstable pole, whose state is fitted to the whole test, follows the
-output without its inputs; a peer's that grows a hundredfold over the test is shown and not compared. Where a peer is
-ahead by more than the targets allow, the ratio of errors comes with its 95 % interval over blocks of the test drawn
-anew. ``--again 16`` makes as many other records of each stand-in, and says of which models the default and ``auto`` are
-worse there: one test of a machine that bends decides little.
+Ours runs as a new user would run it: ``default`` chooses order and dead time of a linear model, ``auto`` also the
+structure, and ``narx`` is the polynomial one. Every figure is the root-mean-square error of the free run on the test
+data, relative to that of the mean (0 is perfect, 1 is as good as the mean), with initial states estimated for all
+alike. ``first`` is a first-order model with offset, ``scipy`` is output error of orders 1 to 4 from ARX, by BIC; both
+use `scipy.optimize.least_squares`. Peers run in environments of their own (`make peers`), each with its size chosen on
+the last third of the training data; missing ones are skipped. ``--simulated 0 3`` uses our own sets of seeds 0 to 2
+instead, each with a nonlinearity, ``--machines 0 3`` simulated machines and circuits, ``--stand-ins 0 3`` those that
+stand in for held-back data. How often the default loses to the better baseline is printed at the end. ``--begun 0.2``
+estimates initial states from only the first fifth of the test: a model with an unstable pole and a state fitted to the
+whole test follows the output without its inputs. If a peer's state grows a hundredfold over the test, its error is
+shown but not compared. If a peer is ahead by more than the targets allow, the ratio of errors is printed with its 95 %
+interval over resampled blocks of the test. ``--again 16`` makes that many other records of each stand-in, and reports
+whether the default is worse there than ``first``, and ``auto`` worse than the default: one test of a nonlinear machine
+decides little.
 """
 
 import argparse
@@ -46,7 +47,7 @@ PEERS = {
     "jax-sysid-nonlinear": "jax-sysid",
     "sysidentpy": "sysidentpy",
 }
-"""The environment that each peer runs in."""
+"""Environment of each peer."""
 
 PUBLISHED = {
     "cascaded tanks": "best linear 0.75 V, Volterra 0.54, state space with GP 0.45, NL-SS 0.34, grey box 0.18 "
@@ -54,22 +55,22 @@ PUBLISHED = {
     "Bouc-Wen multisine": "PNLSS degrees 2-3 -90.4 dB, 3-5-7 -98.3 dB (arXiv 1610.09138); dynoNet 4.52e-5 m",
     "EMPS position": "best linear fit 25.4 %, dynoNet 96.8 % (dynoNet, table)",
 }
-"""Figures of others, with their source."""
+"""Published figures, with their source."""
 
 MOST_PEER = 10_000
-"""Samples that peers are given at most, so that they end."""
+"""Maximum samples given to peers, so that they finish."""
 
 LOSES = 1.05
-"""From so many times the better baseline's error on, the default counts as losing."""
+"""Ratio to the better baseline's error from which the default counts as losing."""
 
 BEHIND = {"default": (("sippy", "jax-sysid"), 1.02), "nonlinear": (("sysidentpy", "jax-sysid-nonlinear"), 1.10)}
-"""Peers that the default, and the best of ours that may be nonlinear, are held to, and how far they may be behind."""
+"""Peers that the default, and our best possibly nonlinear model, are compared with, and the allowed error ratio."""
 
 LOOKS_AHEAD = 100.0
-"""From so many times its start on that a peer's state grows over the test, its start tells outputs and not inputs."""
+"""Growth of a peer's state over the test from which its start encodes outputs instead of inputs."""
 
 OURS = {"default": "output-error", "auto": "auto", "narx": "narx", "hammerstein": "hammerstein"}
-"""Columns of ours with their structures."""
+"""Our columns and their structures."""
 
 
 def main(arguments: list[str]) -> int:
@@ -126,7 +127,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _no_set(wanted: list[str]) -> str:
-    """Return why there is nothing to compare: no data, or no set whose name has one of these parts."""
+    """Return why there is nothing to compare: no data, or no set with one of these parts in its name."""
     known = ", ".join(one.name for one in public_sets())
     if not known:
         return f"no public set in {DATA}"
@@ -134,7 +135,7 @@ def _no_set(wanted: list[str]) -> str:
 
 
 def _behind(one: PublicSet, test: str, runs: dict[str, dict[str, Array]]) -> list[str]:
-    """Return lines on peers that are ahead of ours by more than they may be, and how sure the test is of it."""
+    """Return lines on peers that are ahead of ours by more than allowed, with the confidence from the test."""
     y = one.tests[test][1][one.skipped :]
     left = {name: run[test][one.skipped :] - y for name, run in runs.items() if test in run}
     errors = {name: float(np.sqrt(np.mean(value**2))) for name, value in left.items() if np.isfinite(value).all()}
@@ -158,7 +159,7 @@ def _python(peer: str) -> Path:
 
 
 def _begun(one: PublicSet, share: float) -> PublicSet:
-    """Return a set whose tests tell runs only a first share of their outputs."""
+    """Return a set whose tests give the runs only an initial share of their outputs."""
 
     def begun(parts: dict[str, Part]) -> dict[str, Part]:
         return {test: (u, np.where(np.arange(y.size) < share * y.size, y, np.nan)) for test, (u, y) in parts.items()}
@@ -220,7 +221,7 @@ def _with_start(theta: Array, n: int, part: Part, scale: tuple[Array, Array, flo
 
 
 def _fitted(one: PublicSet, n: int) -> tuple[Array, float, tuple[Array, Array, float, float]]:
-    """Return an output-error model of scipy's from ARX, its BIC and its scale."""
+    """Return scipy's output-error model started from ARX, its BIC and its scale."""
     u, y = one.train
     scale = (u.mean(axis=0), u.std(axis=0), float(y.mean()), float(y.std()))
     u, y = (u - scale[0]) / scale[1], (y - scale[2]) / scale[3]
@@ -252,7 +253,7 @@ def _scipy(one: PublicSet) -> dict[str, Array]:
 
 
 def _peer(name: str, one: PublicSet, timeout: float) -> tuple[dict[str, Array], float]:
-    """Return a peer's runs of the tests, and how many times its model's state grows over one."""
+    """Return a peer's runs of the tests, and the growth factor of its model's state over one test."""
     python, worker = _python(name), Path(__file__).with_name("identification_sets_peer.py")
     single = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with tempfile.TemporaryDirectory() as folder:

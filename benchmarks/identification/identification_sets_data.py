@@ -1,4 +1,4 @@
-"""Public input/output sets with the splits of their authors, or of the set's README where there are none."""
+"""Public input/output sets with the splits of their authors, or of the set's README if the authors give none."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -10,7 +10,7 @@ import numpy as np
 from estimation.arrays import Array
 
 DATA = Path(os.environ.get("HYDROSTATE_SHARED", "../shared")) / "data"
-"""Where the sets lie; they are read there and never copied."""
+"""Folder of the sets; they are read there and never copied."""
 
 Part = tuple[Array, Array]
 """Inputs, shape (n, m), and one output, shape (n,)."""
@@ -23,17 +23,17 @@ class PublicSet:
     Parameters
     ----------
     name : str
-        What the table calls it.
+        Name in the table.
     nonlinear : bool
         Whether its authors made it to be nonlinear.
     sample_time : float
         Seconds between samples [s].
     train : tuple
-        Inputs and output fitted.
+        Inputs and output for fitting.
     tests : mapping
         Inputs and output of each test, by name.
     skipped : int
-        Samples at the start of a test that do not count.
+        Samples at the start of a test that are excluded.
     again : mapping
         Other records of the same plant, each like the test, by name.
     """
@@ -53,12 +53,12 @@ class PublicSet:
 
 
 def public_sets(wanted: Sequence[str] = ()) -> list[PublicSet]:
-    """Return the sets that are there.
+    """Return the available sets.
 
     Parameters
     ----------
     wanted : sequence of str
-        Parts of names; all sets unless told.
+        Parts of names; all sets if not given.
     """
     found = [one for make in (_tanks, _bouc_wen, _emps, _daisy) for one in _present(make)]
     return [one for one in found if not wanted or any(part in one.name for part in wanted)]
@@ -116,7 +116,7 @@ DAISY: Sequence[tuple[str, tuple[str, ...], tuple[str, ...], float]] = (
         3.0,
     ),
 )
-"""File, inputs, outputs, sample time [s]; no split of the authors': the first half is fitted, the second tested."""
+"""File, inputs, outputs, sample time [s]. The authors give no split: the first half is fitted, the second tested."""
 
 
 def _daisy() -> list[PublicSet]:

@@ -1,6 +1,6 @@
-"""Runs in a peer's own environment, which knows nothing of this project: fits a set, writes the free run on its tests.
+"""Runs in a peer's own environment, without this project: fits a set, writes the free run on its tests.
 
-``python identification_sets_peer.py PEER SET.npz RESULT.npz SECONDS``, which end it when its processor time has passed.
+``python identification_sets_peer.py PEER SET.npz RESULT.npz SECONDS``; it stops after SECONDS of processor time.
 """
 
 import resource
@@ -11,7 +11,7 @@ import numpy as np
 
 
 def state_space_run(A, B, C, D, u, y):
-    """Return the free run from the initial state that suits the measured output best."""
+    """Return the free run from the initial state that fits the measured output best."""
     n = A.shape[0]
     x, free, driven = np.zeros(n), np.zeros((len(u), n)), np.zeros(len(u))
     power = np.eye(n)
@@ -26,14 +26,14 @@ def state_space_run(A, B, C, D, u, y):
 
 
 def growth(A, tests):
-    """Return how many times a state grows over the longest test: what grows much follows outputs, not inputs."""
+    """Return the growth factor of a state over the longest test: if large, it follows outputs, not inputs."""
     radius = float(np.abs(np.linalg.eigvals(A)).max())
     with np.errstate(over="ignore"):
         return radius ** max(len(u) for u, _ in tests)
 
 
 def held_out(fit, run, sizes, u, y):
-    """Return the size that best runs free on the last third, fitted to the rest."""
+    """Return the size with the best free run on the last third, fitted to the rest."""
     cut = 2 * len(y) // 3
     errors = {}
     for size in sizes:
@@ -48,7 +48,7 @@ def held_out(fit, run, sizes, u, y):
 
 
 def sippy(u, y, tests):
-    """N4SID of sippy-unipi, its order, and whether it is forced to be stable, by the last third."""
+    """N4SID of sippy-unipi; its order, and whether it is forced to be stable, are chosen on the last third."""
     from sippy_unipi import system_identification
 
     def fit(u, y, size):
@@ -69,7 +69,7 @@ def sippy(u, y, tests):
 
 
 def jax_sysid(u, y, tests):
-    """Linear state space of jax-sysid by simulation error, its order by the last third."""
+    """Linear state space of jax-sysid by simulation error; the order is chosen on the last third."""
     import jax
     from jax_sysid.models import LinearModel
 
@@ -90,7 +90,7 @@ def jax_sysid(u, y, tests):
 
 
 def jax_sysid_nonlinear(u, y, tests):
-    """Nonlinear state space of jax-sysid: a linear part and a layer of tanh, its states by the last third."""
+    """Nonlinear state space of jax-sysid: a linear part and a layer of tanh; states are chosen on the last third."""
     import jax
     import jax.numpy as jnp
     from jax_sysid.models import Model
@@ -131,7 +131,7 @@ def jax_sysid_nonlinear(u, y, tests):
 
 
 def sysidentpy(u, y, tests):
-    """Polynomial NARX of SysIdentPy by FROLS, lags and degree by the last third."""
+    """Polynomial NARX of SysIdentPy by FROLS; lags and degree are chosen on the last third."""
     from sysidentpy.basis_function import Polynomial
     from sysidentpy.model_structure_selection import FROLS
     from sysidentpy.parameter_estimation import LeastSquares
@@ -168,7 +168,7 @@ PEERS = {
 
 
 def main(name, data, result, seconds):
-    """Fit one set with one peer, in the scale of order one."""
+    """Fit one set with one peer, scaled to order one."""
     resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds) + 5))
     warnings.simplefilter("ignore")
     stored = np.load(data)

@@ -1,4 +1,4 @@
-"""Simulated input/output sets with one nonlinearity each, beside linear ones, to judge what is chosen by default."""
+"""Simulated input/output sets with one nonlinearity each, and linear ones, for judging the default choice."""
 
 from collections.abc import Callable, Mapping
 
@@ -9,19 +9,19 @@ from estimation.arrays import Array
 from estimation.identification.model.recursion import filtered
 
 TRAIN, TEST = 1200, 800
-"""Samples fitted and tested."""
+"""Number of samples for fitting and for testing."""
 
 NOISE = 0.03
-"""Deviation of the sensor's noise over that of the output."""
+"""Standard deviation of the sensor's noise relative to that of the output."""
 
 
 def simulated_sets(seed: int = 0) -> list[PublicSet]:
-    """Return one set a plant, its noise and input drawn from a seed.
+    """Return one set for each plant, with noise and input drawn from a seed.
 
     Parameters
     ----------
     seed : int
-        Of all that is random.
+        Seed of everything random.
     """
     return [_set(name, make, seed) for name, make in PLANTS.items()]
 
@@ -92,7 +92,7 @@ def _position(u: Array, rng: np.random.Generator) -> Array:
 
 
 def _valve(u: Array, _: np.random.Generator) -> Array:
-    """Return a pressure behind a valve whose flow follows the square root of the drop."""
+    """Return a pressure behind a valve whose flow is proportional to the square root of the pressure drop."""
     p, out = 0.0, np.zeros(u.size)
     for t in range(u.size):
         out[t] = p
@@ -113,7 +113,7 @@ def _wiener(u: Array, _: np.random.Generator) -> Array:
 
 
 def _hysteretic(u: Array, _: np.random.Generator) -> Array:
-    """Return the force of a damper: viscous, with a hysteretic part that saturates."""
+    """Return the force of a damper: viscous, plus a saturating hysteretic part."""
     z, out = 0.0, np.zeros(u.size)
     smooth = filtered([0.1], [1.0, -0.9], u)
     for t in range(u.size):
@@ -139,4 +139,4 @@ PLANTS: Mapping[str, Callable[[Array, np.random.Generator], Array]] = {
     "saturated sensor": _wiener,
     "hysteretic damper": _hysteretic,
 }
-"""What the output of each plant is."""
+"""Output of each plant."""

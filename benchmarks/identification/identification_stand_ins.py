@@ -1,8 +1,8 @@
-"""Stand-ins of sets that are kept back: machines simulated after their equations, their last two fifths the test.
+"""Stand-ins for held-back sets: machines simulated from their equations, with the last two fifths as the test.
 
-Outputs of one machine share a run. Values, sizes and noise are drawn from a seed. One test says little of a machine
-that bends. So other records of it are made on demand: other inputs of the same kind from rest, of which the same last
-two fifths are tests.
+Outputs of one machine share a run. Values, sizes and noise are drawn from a seed. One test says little about a
+nonlinear machine, so other records are made on demand: other inputs of the same kind from rest, with the same last two
+fifths as tests.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,45 +16,45 @@ from estimation.arrays import Array
 from estimation.identification.model.recursion import filtered
 
 SIZES = (420, 2000)
-"""Samples of a log, from and to."""
+"""Number of samples of a log, from and to."""
 
 TRAINED = 0.6
-"""Share of a log that is fitted."""
+"""Share of a log for fitting."""
 
 NOISE = (0.004, 0.01)
-"""Deviation of the sensor's noise over that of the output, from and to."""
+"""Standard deviation of the sensor's noise relative to that of the output, from and to."""
 
 SKIPPED = 5
-"""Samples at the start of a test that do not count."""
+"""Samples at the start of a test that are excluded."""
 
 ATMOSPHERE, SUPPLY = 1.0, 6.0
-"""Pressures of a pneumatic cylinder [bar]."""
+"""Ambient and supply pressure of a pneumatic cylinder [bar]."""
 
 CRITICAL = 0.528
-"""Ratio of pressures below which air flows at its own speed of sound [dimensionless]."""
+"""Critical pressure ratio, below which air flow is choked [dimensionless]."""
 
 CELLS = 8
-"""Of each side of the heat exchanger."""
+"""Number of cells on each side of the heat exchanger."""
 
 Outputs = dict[str, Array]
-"""What is measured, by name, shape (n,)."""
+"""Measured signals by name, shape (n,)."""
 
 Drive = Callable[[np.random.Generator], Array]
 """Draws one input of a kind, shape (n,)."""
 
 OTHERS = 78
-"""Tells what is drawn of other records from all else."""
+"""Seed part that separates the draws of other records from all other draws."""
 
 
 def stand_in_sets(seed: int = 0, again: int = 0) -> list[PublicSet]:
-    """Return one set an output of every stand-in.
+    """Return one set for each output of every stand-in.
 
     Parameters
     ----------
     seed : int
-        Of all that is random.
+        Seed of everything random.
     again : int
-        Other records of each machine; the circuit, whose test is of another kind, has none.
+        Number of other records of each machine; the circuit has none, because its test is of another kind.
     """
     return [one for name in MACHINES for one in _sets(name, seed, again)] + [_duffing(seed)]
 
@@ -93,13 +93,13 @@ def _noisy(y: Array, rng: np.random.Generator) -> Array:
 
 
 def _steps(n: int, rng: np.random.Generator) -> Drive:
-    """Return what draws levels from -1 to 1, each held for a random time."""
+    """Return a function that draws levels from -1 to 1, each held for a random time."""
     longest = int(rng.integers(15, 60))
     return lambda rng: np.repeat(rng.uniform(-1.0, 1.0, n), rng.integers(5, longest, n))[:n]
 
 
 def _noise(n: int, rng: np.random.Generator) -> Drive:
-    """Return what draws low-passed noise that reaches 1."""
+    """Return a function that draws low-passed noise with a peak of 1."""
     pole = float(rng.uniform(0.8, 0.97))
 
     def drawn(rng: np.random.Generator) -> Array:
@@ -110,7 +110,7 @@ def _noise(n: int, rng: np.random.Generator) -> Drive:
 
 
 def _flow(opening: float, above: float, below: float) -> float:
-    """Return the flow of air through an opening, choked or not, from the higher pressure to the lower one."""
+    """Return the air flow through an opening, choked or not, from the higher pressure to the lower one."""
     if above < below:
         return -_flow(opening, below, above)
     ratio = below / above
@@ -118,7 +118,7 @@ def _flow(opening: float, above: float, below: float) -> float:
 
 
 def _pneumatic(u: Array, rng: np.random.Generator) -> Outputs:
-    """Return position, speed and pressures of a cylinder behind a valve with overlap, sticking (LuGre), with stops."""
+    """Return position, speed and pressures of a cylinder with an overlapped valve, LuGre friction and end stops."""
     overlap, conductance, mass = rng.uniform(0.02, 0.1), rng.uniform(0.5, 1.5), rng.uniform(2.0, 6.0)
     coulomb, extra, viscous = rng.uniform(5.0, 25.0), rng.uniform(2.0, 15.0), rng.uniform(20.0, 80.0)
     area, half, dead = 5e-4, 0.15, 0.03  # m^2, m, m
@@ -145,7 +145,7 @@ def _pneumatic(u: Array, rng: np.random.Generator) -> Outputs:
 
 
 def _motor(u: Array, rng: np.random.Generator) -> Outputs:
-    """Return what is measured of a motor with armature lag, stiction and cogging: position and speed."""
+    """Return the measured position and speed of a motor with armature lag, stiction and cogging."""
     rub, extra, damping = rng.uniform(0.05, 0.3), rng.uniform(0.02, 0.15), rng.uniform(0.02, 0.1)
     cogging, lag, inertia = rng.uniform(0.0, 0.08), rng.uniform(0.005, 0.03), rng.uniform(0.01, 0.05)
     steps, dt = 20, 0.01 / 20
@@ -164,7 +164,7 @@ def _motor(u: Array, rng: np.random.Generator) -> Outputs:
 
 
 def _boom(u: Array, rng: np.random.Generator) -> Outputs:
-    """Return what is measured of a boom behind a pressure-compensated valve, held by a counterbalance valve."""
+    """Return the measured signals of a boom with a pressure-compensated valve and a counterbalance valve."""
     dead, weight, stiff = rng.uniform(0.05, 0.2), rng.uniform(0.5, 1.5), rng.uniform(20.0, 80.0)
     pilot, damping, lag = rng.uniform(0.1, 0.3), rng.uniform(0.05, 0.4), rng.uniform(0.03, 0.15)
     steps, dt = 20, 0.02 / 20
@@ -185,7 +185,7 @@ def _boom(u: Array, rng: np.random.Generator) -> Outputs:
 
 
 def _damper(u: Array, rng: np.random.Generator) -> Outputs:
-    """Return the force of a magnetorheological damper over its speed, after the modified law of Bouc and Wen."""
+    """Return the force of a magnetorheological damper against its speed, by the modified Bouc-Wen law."""
     inner, outer, spring = rng.uniform(0.5, 2.0), rng.uniform(5.0, 30.0), rng.uniform(0.0, 1.0)
     share, bend, grow = rng.uniform(2.0, 6.0), rng.uniform(20.0, 80.0), rng.uniform(10.0, 40.0)
     steps, dt = 20, 0.005 / 20
@@ -203,7 +203,7 @@ def _damper(u: Array, rng: np.random.Generator) -> Outputs:
 
 
 def _drives(u: Array, rng: np.random.Generator) -> Outputs:
-    """Return the speed of two drives coupled by a belt, measured without its sign."""
+    """Return the speed of two drives coupled by a belt, measured without sign."""
     belt, damping, rub = rng.uniform(20.0, 80.0), rng.uniform(0.5, 2.0), rng.uniform(0.0, 0.1)
     steps, dt = 10, 0.02 / 10
     first, second, twist = 0.0, 0.0, 0.0
@@ -219,7 +219,7 @@ def _drives(u: Array, rng: np.random.Generator) -> Outputs:
 
 
 def _exchanger(u: Array, rng: np.random.Generator) -> Outputs:
-    """Return the temperature of a counterflow exchanger's cold side over the flow of its hot side."""
+    """Return the cold-side temperature of a counterflow exchanger against its hot-side flow."""
     gain, cold, wall = rng.uniform(0.5, 2.0), rng.uniform(0.5, 1.0), rng.uniform(2.0, 6.0)
     steps, dt = 5, 1.0 / 5
     hot, warm, metal = np.zeros(CELLS), np.zeros(CELLS), np.zeros(CELLS)
@@ -241,7 +241,7 @@ def _exchanger(u: Array, rng: np.random.Generator) -> Outputs:
 
 
 def _duffing(seed: int) -> PublicSet:
-    """Return a circuit whose spring stiffens: a multisine is fitted, an arrow of growing amplitude tested beside."""
+    """Return a circuit with a stiffening spring: fitted to a multisine, tested on an arrow of growing amplitude too."""
     rng = np.random.default_rng([seed, 3000])
     n, arrow = 8192, 4096
     hard, damping = rng.uniform(0.5, 2.0), rng.uniform(0.01, 0.04)
@@ -273,4 +273,4 @@ MACHINES: Mapping[str, tuple[float, Callable[[Array, np.random.Generator], Outpu
     "coupled drives": (0.02, _drives),
     "heat exchanger": (1.0, _exchanger),
 }
-"""Sample time [s] and what is measured of each machine."""
+"""Sample time [s] and measured outputs of each machine."""

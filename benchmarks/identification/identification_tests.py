@@ -1,4 +1,4 @@
-"""What surrounds a fit: order, spectra's bands, test sizes and power, robust intervals, and three measured records.
+"""Tools around a fit: order, bands of spectra, size and power of tests, robust intervals, and three measured records.
 
 `--share 0.1` runs a tenth of the full size. The measured records are read from ``$HYDROSTATE_SHARED/data``.
 """
@@ -36,10 +36,10 @@ from plant.errors import LogWarning
 
 FORM = {"n_numerator": 3, "n_denominator": 2}
 SHOWN = ("normal", "minor_friction", "major_leakage", "major_leakage_minor_friction")
-"""Conditions whose spectra are looked at: slow poles and resonances from 22 to 32 Hz."""
+"""Conditions whose spectra are evaluated: slow poles and resonances from 22 to 32 Hz."""
 
 NEWTONS_PER_VOLT = 35.15065
-"""Of the EMPS motor and its drive; upstream's scripts."""
+"""Force constant of the EMPS motor and its drive; from upstream's scripts."""
 
 Line = tuple[str, bool]
 
@@ -99,7 +99,7 @@ def spectra_lines(seeds: int) -> list[Line]:
 
 
 def nine_frequencies(truth: LinearModel) -> np.ndarray:
-    """Return frequencies that include the slow pole and the resonance, or 25 Hz where there is none [Hz]."""
+    """Return frequencies that include the slow pole and the resonance, or 25 Hz if there is none [Hz]."""
     natural = np.log(truth.poles.astype(complex)) / (2.0 * np.pi * truth.sample_time)
     resonance = float(abs(natural[np.argmax(truth.poles.imag)])) if truth.poles.imag.any() else 25.0
     fixed = [0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0]
@@ -114,7 +114,7 @@ def _bands_cover(estimate: FrequencyResponse, truth: LinearModel) -> np.ndarray:
 
 
 def size_lines(seeds: int) -> list[Line]:
-    """Return how often the tests reject a right model at 5 %."""
+    """Return how often the tests reject a correct model at the 5 % level."""
     white, crossed = [], []
     truth = TABLE_6["major_leakage"]
     for seed in range(seeds):
@@ -147,7 +147,7 @@ def power_lines(seeds: int) -> list[Line]:
 
 
 def robust_lines(seeds: int) -> list[Line]:
-    """Return the coverage of robust 95 % intervals, pooled over coefficients, and of the gain's."""
+    """Return the coverage of robust 95 % intervals of the coefficients, pooled, and of the gain."""
     lines: list[Line] = []
     for label, spoil in (("both filtered", _filtered), ("AR(1) noise", _ar1), ("differentiated encoder", _encoder)):
         for name in ("strictly proper 30 Hz", "major_leakage", "major_leakage_major_friction"):
@@ -224,7 +224,7 @@ def measured_records() -> list[Line]:
 
 
 def positioning_lines(folder: Path) -> list[Line]:
-    """Return mass and friction of the EMPS positioning system beside the published values."""
+    """Return mass and friction of the EMPS positioning system with the published values."""
     if not (folder / "train.csv").exists():
         print(f"skipped: no measured records in {folder}")
         return []

@@ -1,4 +1,4 @@
-"""Whether a default is worse than a baseline on other records of the same plant, and how sure that is."""
+"""Whether a default is worse than a baseline on other records of the same plant, and with what confidence."""
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping
@@ -10,10 +10,10 @@ from benchmarks.identification.paired_blocks import records_ratio
 from estimation.arrays import Array
 
 WORSE = 1.02
-"""A default may be so many times a baseline's error on the test data."""
+"""Allowed ratio of a default's error to a baseline's on the test data."""
 
 PAIRS = (("default", "first"), ("auto", "default"))
-"""Models that are compared: of which none may be worse than the other."""
+"""Pairs of models to compare: the first must not be worse than the second."""
 
 
 class OtherRecords:
@@ -24,12 +24,12 @@ class OtherRecords:
         self.verdicts: dict[str, Counter[str]] = defaultdict(Counter)
 
     def told(self, one: PublicSet, runs: Mapping[str, Mapping[str, Array]]) -> list[str]:
-        """Return a line a pair of models, and count what it says.
+        """Return one line for each pair of models, and count its result.
 
         Parameters
         ----------
         one : PublicSet
-            With other records; without, there are no lines.
+            Set with other records; without them, there are no lines.
         runs : mapping
             Output of each model on each test and other record, shape (n,).
         """
@@ -53,7 +53,7 @@ class OtherRecords:
         return lines
 
     def summary(self) -> list[str]:
-        """Return a line a pair of models over all sets."""
+        """Return one line for each pair of models over all sets."""
         lines = list[str]()
         for pair, ratios in self.ratios.items():
             found, mean = self.verdicts[pair], float(np.exp(np.mean(np.log(ratios))))
@@ -66,7 +66,7 @@ class OtherRecords:
 
 
 def _verdict(ratio: float, low: float, high: float) -> str:
-    """Return whether a model is worse than another by over 2 %: surely where the interval says so."""
+    """Return whether a model is worse than another by over 2 %, and whether the interval confirms it."""
     if ratio > WORSE:
         return "worse" if low > 1.0 else "perhaps"
     return "better" if high < 1.0 else "as good"

@@ -1,9 +1,9 @@
-"""A user's own equations beside the usual way: SciPy's least_squares around solve_ivp, in one run.
+"""A user's own equations against the usual way: SciPy's least_squares around solve_ivp, in one run.
 
 Three models of the tutorial (pendulum, tank, friction after Stribeck) are fitted to the same simulated logs from the
-same starts. The peer integrates the same derivative on floats, LSODA or RK45, at tolerances that make the answers
-equal, and differentiates by finite differences; by its default difference step it would stay at the start, for that
-is lost in the integrator's error, so it is given one that suits. Then intervals are counted on logs with fresh noise.
+same starts. The peer integrates the same derivative on floats with LSODA or RK45, at tolerances that make the answers
+equal, and differentiates by finite differences. Its default difference step is lost in the integrator's error and would
+leave it at the start, so it gets a suitable one. Then interval coverage is counted on logs with fresh noise.
 """
 
 import argparse
@@ -25,13 +25,13 @@ from estimation.arrays import Array
 from estimation.equations.kernel import compile_equations
 
 WANTED_RATIO = 20.0
-"""Of the peer's processor time to ours."""
+"""Ratio of the peer's processor time to ours."""
 
 EQUAL = 0.1
-"""Distance from the peer's own optimum up to which answers are equal, in standard deviations."""
+"""Distance from the peer's own optimum within which answers count as equal, in standard deviations."""
 
 SETTINGS: Mapping[str, Any] = {"diff_step": 1e-5, "xtol": 1e-12, "ftol": 1e-12}
-"""Of the peer: relative step of its finite differences [fraction], and when it ends."""
+"""Settings of the peer: relative step of its finite differences [fraction], and stopping tolerances."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def cases(samples: int) -> list[Case]:
 
 
 def logged(case: Case, seed: int) -> pd.DataFrame:
-    """Return the log of a case under fresh noise."""
+    """Return the log of a case with fresh noise."""
     truth = case.model.simulate(case.log, case.truth, initial=case.first)
     (output,) = truth.columns
     noise = case.noise * np.random.default_rng(seed).standard_normal(len(truth))
@@ -133,7 +133,7 @@ def logged(case: Case, seed: int) -> pd.DataFrame:
 
 
 def residual_of(case: Case, log: pd.DataFrame) -> Callable[[Array], Array]:
-    """Return the peer's residual over the noise, of parameters over their starts, then initial states."""
+    """Return the peer's residual over the noise, from parameters over their starts, then initial states."""
     model = case.model.equations
     time, (source,), (output,) = log.index.to_numpy(), model.inputs, model.outputs
     driven, measured = log[source].to_numpy(), log[output].to_numpy()
@@ -167,7 +167,7 @@ def _sizes(case: Case) -> Array:
 
 
 def peer(case: Case, log: pd.DataFrame) -> Array:
-    """Return what least_squares around solve_ivp finds: parameters over their starts, then initial states."""
+    """Return the solution of least_squares around solve_ivp: parameters over their starts, then initial states."""
     model, count = case.model.equations, len(case.model.equations.parameters)
     (output,) = model.outputs
     first = [log[output].iloc[0] if name == output else 0.0 for name in model.states]
@@ -210,7 +210,7 @@ def _covered(case: Case, seeds: int) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the comparison and return how many wishes are missed."""
+    """Run the comparison; return how many targets are missed."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--samples", type=int, default=600)
     options.add_argument("--seeds", type=int, default=100)

@@ -1,4 +1,4 @@
-"""How sure tests are that a model is better than another: blocks or records drawn anew, the same ones for both."""
+"""Confidence that one model is better than another: paired resampling of blocks or records."""
 
 from collections.abc import Sequence
 
@@ -7,23 +7,23 @@ import numpy as np
 from estimation.arrays import Array
 
 BLOCKS = 15
-"""Blocks that a test is made of: judged, longer than errors stay alike, and enough to scatter."""
+"""Blocks in a resampled test: judged, each longer than the correlation of errors, and enough of them to vary."""
 
 DRAWS = 4000
-"""Tests drawn anew."""
+"""Number of resampled tests."""
 
 
 def error_ratio(one: Array, other: Array, *, blocks: int = BLOCKS, seed: int = 0) -> tuple[float, float, float]:
-    """Return the root-mean-square error of one model over that of another on the same test, and its 95 % interval.
+    """Return the ratio of two models' root-mean-square errors on the same test, and its 95 % interval.
 
     Parameters
     ----------
     one, other : ndarray, shape (n,)
-        Errors of each on the same samples, NaN nowhere.
+        Errors of each on the same samples, without NaN.
     blocks : int
-        Of which a test is made up: each begins at a sample by chance (moving blocks, Kuensch 1989).
+        Blocks in a resampled test; each begins at a random sample (moving blocks, Kuensch 1989).
     seed : int
-        Of what is drawn.
+        Seed of the resampling.
 
     Returns
     -------
@@ -41,17 +41,17 @@ def error_ratio(one: Array, other: Array, *, blocks: int = BLOCKS, seed: int = 0
 
 
 def records_ratio(one: Sequence[Array], other: Sequence[Array], *, seed: int = 0) -> tuple[float, float, float]:
-    """Return the ratio of two models' errors over several records, with its 95 % interval; records are drawn anew.
+    """Return the ratio of two models' errors over several records, with its 95 % interval by resampling the records.
 
-    A model that is better on one record of a plant that bends may be worse on the next; blocks of one say nothing of
+    A model that is better on one record of a nonlinear plant may be worse on the next; blocks of one record cannot show
     that.
 
     Parameters
     ----------
     one, other : sequence of ndarray, shape (n,)
-        Errors of each on the same records, NaN nowhere.
+        Errors of each on the same records, without NaN.
     seed : int
-        Of what is drawn.
+        Seed of the resampling.
 
     Returns
     -------

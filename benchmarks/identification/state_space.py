@@ -1,9 +1,9 @@
-"""A state space of two inputs and two outputs beside the Cramér-Rao bound: its error, and whether its deviations cover.
+"""A state space with two inputs and two outputs against the Cramér-Rao bound: errors, and coverage of its intervals.
 
-Each log has fresh inputs and fresh noise, correlated between the outputs. The error is that of what does not depend
-on the basis of the states: poles, steady gains, and the frequency response at eight frequencies. The bound is computed
-at the truth, with matrices, levels and first states unknown. ``--order auto`` counts instead how often the number of
-states is found.
+Each log has fresh inputs and fresh noise, correlated between the outputs. The error is evaluated on quantities that do
+not depend on the basis of the states: poles, steady gains, and the frequency response at eight frequencies. The bound
+is computed at the truth, with matrices, levels and initial states unknown. ``--order auto`` counts instead how often
+the number of states is found.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from estimation.identification.state_space.system import StateSpace
 
 SAMPLES, SAMPLE_TIME = 1000, 0.01
 NOISE = np.array([[0.02, 0.0], [0.012, 0.016]])
-"""Root of the noise's covariance between the outputs [output units]."""
+"""Square root of the noise covariance between the outputs [output units]."""
 
 A = np.array([[0.8, 0.3, 0.0], [-0.3, 0.8, 0.0], [0.0, 0.0, 0.9]])
 B = np.array([[0.2, 0.1], [0.0, -0.3], [0.1, 0.2]])
@@ -31,17 +31,17 @@ C = np.array([[1.0, 0.0, 0.5], [0.3, 1.0, -1.0]])
 LEVEL = np.array([5.0, -2.0])
 
 FREQUENCIES = np.array([0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 15.0, 30.0])
-"""At which responses are compared [Hz]."""
+"""Frequencies at which responses are compared [Hz]."""
 
 
 def plant() -> StateSpace:
-    """Return the plant, in its units, with no covariance."""
+    """Return the plant, in its units, without covariance."""
     none = np.zeros((9 + 6 + 6 + 2, 9 + 6 + 6 + 2))
     return StateSpace(A, B, C, np.zeros((2, 2)), LEVEL, (0, 0), False, SAMPLE_TIME, none)
 
 
 def logged(seed: int, samples: int = SAMPLES) -> list[Channels]:
-    """Return a log of the plant, one entry an output."""
+    """Return a log of the plant, one entry for each output."""
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], size=(samples // 4 + 1, 2)), 4, axis=0)[:samples]
     x, y = np.zeros(3), np.empty((samples, 2))
@@ -53,7 +53,7 @@ def logged(seed: int, samples: int = SAMPLES) -> list[Channels]:
 
 
 def bound(data: list[Channels]) -> StateSpace:
-    """Return the plant with the covariance that no unbiased estimate from one log goes below."""
+    """Return the plant with the covariance bound of unbiased estimates from one log."""
     together = Joint(SAMPLE_TIME, joined(data).u, tuple(np.full_like(y, np.nan) for y in joined(data).y))
     size = Size(3, 2, 2, direct=False)
     problem = Problem(size, together)
@@ -66,7 +66,7 @@ def bound(data: list[Channels]) -> StateSpace:
 
 
 def told(system: StateSpace) -> tuple[Array, Array]:
-    """Return poles, steady gains and responses of a model as real numbers, and their deviations."""
+    """Return poles, steady gains and responses of a model as real numbers, with their standard deviations."""
     order = np.lexsort((system.poles.imag, system.poles.real))
     poles, spread = system.poles[order], system.pole_std[order]
     values, slopes = [poles.real, poles.imag], [spread.real, spread.imag]
@@ -80,14 +80,14 @@ def told(system: StateSpace) -> tuple[Array, Array]:
 
 
 def identified(data: list[Channels], order: int | None) -> StateSpace:
-    """Return what is identified of a log, in its units."""
+    """Return the model identified from a log, in its units."""
     models = [one.model for one in identify_state_space(data, order=order, delay=None if order is None else 1)]
     outputs = [one.dynamics for one in models if isinstance(one.dynamics, StateSpaceDynamics)]
     return system_in_units(outputs, [one.scaling for one in models])
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Compare errors with the bound and with the deviations said, and return how many wishes are missed."""
+    """Compare errors with the bound and with the stated standard deviations; return how many targets are missed."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seeds", type=int, default=100)
     options.add_argument("--order", default="3")

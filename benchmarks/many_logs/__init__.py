@@ -1,1 +1,1 @@
-"""Many logs and long studies: archives, fleets, batches, and how long a verb takes to start."""
+"""Many logs and long studies: archives, fleets, batches, and start-up time of a verb."""

@@ -1,6 +1,6 @@
 """An archive of 1,000 CSV logs, three of them bad, diagnosed in one command; and how fast they are read.
 
-Reading is that of `plant.log.files`, checks included, beside pandas' `read_csv` as it comes, on the same files in turn.
+Reading uses `plant.log.files`, including its checks, and alternates with pandas' plain `read_csv` on the same files.
 """
 
 import argparse
@@ -29,7 +29,7 @@ BAD = ("empty.csv", "words.csv", "short.csv")
 
 
 def make_archive(folder: Path, logs: int, duration: float) -> None:
-    """Write logs of all nine conditions in turn, and three that no one can use."""
+    """Write logs of all nine conditions in turn, and three unusable ones."""
     names = list(CONDITIONS)
     for number in range(logs - len(BAD)):
         name, rng = names[number % len(names)], np.random.default_rng(number)
@@ -45,7 +45,7 @@ def make_archive(folder: Path, logs: int, duration: float) -> None:
 
 
 def reading(paths: list[Path]) -> tuple[float, float, float, float]:
-    """Return megabytes a second of ours and of pandas, by wall time, then by CPU time."""
+    """Return the read rates of ours and of pandas in megabytes per second, by wall time, then by CPU time."""
 
     def ours(path: Path) -> object:
         return read_record(path)
@@ -67,7 +67,7 @@ def _timed(read: Callable[[Path], object], paths: list[Path]) -> tuple[float, fl
 
 
 def diagnosed(folder: Path, workers: int) -> tuple[int, int]:
-    """Diagnose the archive in one command, and print how that went; return how many logs are done and how many fail."""
+    """Diagnose the archive in one command, and print the outcome; return how many logs succeed and how many fail."""
     (folder / "study.toml").write_text(
         'name = "archive"\n[[logs]]\nglob = "archive/**/*.csv"\nmethods = [{ verb = "diagnose" }]\n', encoding="utf-8"
     )
@@ -90,7 +90,7 @@ def diagnosed(folder: Path, workers: int) -> tuple[int, int]:
 
 
 def read_beside_pandas(folder: Path) -> float:
-    """Print how fast logs are read, short ones and a long one; return the least speed over pandas' by wall time."""
+    """Print read rates of short logs and a long one; return the smallest ratio to pandas' rate by wall time."""
     logs = sorted((folder / "archive").glob("actuator*/*.csv"))[:200]
     long = folder / "long.csv"
     rows = pd.concat([pd.read_csv(logs[0])] * 50, ignore_index=True)
@@ -109,7 +109,7 @@ def read_beside_pandas(folder: Path) -> float:
 
 
 def main(arguments: list[str]) -> int:
-    """Print how the archive went and how fast logs are read; return how many targets are missed."""
+    """Print the outcome of the archive and the read rates; return how many targets are missed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--logs", type=int, default=1000)
     parser.add_argument("--duration", type=float, default=2.0)

@@ -1,9 +1,10 @@
 """A study of 100,000 EKF runs of 10,000 steps, kept in a store: cost over the bare kernels, memory, cost by size.
 
-Four conditions; motion is shared by a condition's seeds, a series by ten first guesses. The bare run does the same
-simulation, noise and filters in a loop, with no keys, rows, tasks or store, on both workers at once as the study. What
-the workers take to begin, the project loaded and kernels found, is measured by a first small study beside a second, and
-counts as overhead. CPU time counts all processes; wall time is printed beside it. Needs Linux's /proc.
+Four conditions; all seeds of a condition share its motion, and ten first guesses share a series. The bare run does the
+same simulation, noise and filters in a loop, without keys, rows, tasks or store, on both workers at once as in the
+study. Start-up of the workers, including imports and finding kernels, is measured by the difference between a first and
+a second small study, and counts as overhead. CPU time counts all processes; wall time is printed too. Needs Linux's
+/proc.
 """
 
 import argparse
@@ -65,7 +66,7 @@ def plan_of(cases: int, samples: int) -> Plan:
 
 
 def bare(cases: int, samples: int) -> float:
-    """Run the same filters on the same kind of series with nothing around them; return CPU seconds [s]."""
+    """Run the same filters on the same kind of series without any overhead; return CPU seconds [s]."""
     begin = time.process_time()
     values = [float(trace.track[-1, 3]) for trace in filter_batch(_problems(cases, samples))]
     assert len(values) == cases  # noqa: S101 -- a benchmark of nothing would be fast
@@ -89,7 +90,7 @@ def _problems(cases: int, samples: int) -> Iterator[FilterProblem]:
 
 
 class Memory:
-    """Watches the memory that this process and its children hold together; pages they share count once a process."""
+    """Monitors the total memory of this process and its children; shared pages count once for each process."""
 
     def __init__(self) -> None:
         self.peak = self.now = 0.0
@@ -112,7 +113,7 @@ class Memory:
 
 
 def study(cases: int, samples: int, executor: Executor, width: int) -> tuple[float, float, Memory]:
-    """Run a study into a store; return CPU seconds of all processes, wall seconds, and memory on the way."""
+    """Run a study into a store; return CPU seconds of all processes, wall seconds, and memory during the run."""
     with tempfile.TemporaryDirectory() as folder, Memory() as memory:
         begin, wall = cpu_seconds(), time.perf_counter()
         plan, store = plan_of(cases, samples), open_store(Path(folder) / "store")
@@ -139,19 +140,19 @@ def cpu_seconds() -> float:
 
 
 def _processes() -> list[list[str]]:
-    """Return what Linux says of this process and its children, from the state on."""
+    """Return Linux's status fields of this process and its children, from the state on."""
     numbers = [os.getpid(), *(child.pid for child in multiprocessing.active_children())]
     return [Path(f"/proc/{number}/stat").read_text().rsplit(")", 1)[1].split() for number in numbers]
 
 
 def bare_side_by_side(executor: Executor, width: int, cases: int, samples: int) -> float:
-    """Return the CPU seconds of a bare case, on every worker at once as in a study."""
+    """Return the CPU seconds of a bare case, with every worker busy at once as in a study."""
     futures = [executor.submit(bare, cases, samples) for _ in range(width)]
     return statistics.mean(future.result() for future in futures) / cases
 
 
 def dispatch(executor: Executor, width: int, tasks: int) -> float:
-    """Return the seconds that the side that hands out work takes for one task that does nothing, as a batch is run."""
+    """Return the seconds that the dispatching side needs for one empty task, run as in a batch."""
     flying: set[Future[bytes]] = set()
     begin = time.perf_counter()
     for _ in range(tasks):
@@ -163,7 +164,7 @@ def dispatch(executor: Executor, width: int, tasks: int) -> float:
 
 
 def extrapolate(per_task: float, writing: float, cores: int) -> None:
-    """Print how long many machines would take if nothing but the measured overhead held them up."""
+    """Print the time on many machines if only the measured overhead limited them."""
     print(f"\nExtrapolation, not measured: {NIGHT_CASES:,} cases on machines of {cores} cores.")
     held = f"one scheduler, {1e3 * per_task:.2f} ms a task, and one writer, {1e3 * writing:.2f} ms a part"
     print(f"Held up by {held} (both measured).")
@@ -226,7 +227,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _dask_dispatch() -> float:
-    """Return what Dask's scheduler takes for a task, zero where it is not installed."""
+    """Return the scheduling time of Dask for one task, zero if it is not installed."""
     try:
         from distributed import LocalCluster
     except ImportError:
@@ -241,7 +242,7 @@ def _dask_dispatch() -> float:
 
 
 def _writing() -> float:
-    """Return the seconds that keeping a part of 2048 rows takes."""
+    """Return the seconds for storing a part of 2048 rows."""
     with tempfile.TemporaryDirectory() as folder:
         store, content = open_store(Path(folder) / "store"), os.urandom(200_000)
         begin = time.perf_counter()

@@ -1,10 +1,11 @@
-"""A fleet of 200 actuators x 60 logs: its page from the store, from raw logs, and whether the sick are its top rows.
+"""A fleet of 200 actuators x 60 logs: its page from the store and from raw logs, and whether faulty ones rank on top.
 
-One actuator in ten leaks more from log to log and ends past its limit or near it. The store is written with severities
-that scatter as those of logs do, and the shipped command makes its page, pages of the 20 sickest included. Raw logs are
-2 s at 1 kHz with pressure. By default 480 of them, and a quarter of them before, go through the shipped command. The
-time of all is reckoned from the difference, so that the start of the processes counts once and the pages once;
-``--raw-logs 12000`` measures it whole, on disk space of 4 GB; ``--raw-logs 0`` measures the page from the store alone.
+One actuator in ten leaks more from log to log and ends near or past its limit. The store is written with severities
+that scatter as those of real logs do. The shipped command makes its page, including pages of the 20 worst actuators.
+Raw logs are 2 s at 1 kHz with pressure. By default, a quarter of 480 of them, then all 480, go through the shipped
+command. The time for the whole fleet is extrapolated from the difference, so that process start and pages count once.
+``--raw-logs 12000`` measures it in full and needs 4 GB of disk space; ``--raw-logs 0`` measures only the page from the
+store.
 """
 
 import argparse
@@ -36,28 +37,28 @@ from plant.sensors.sensors import BENCH
 SAMPLE_TIME, DURATION = 1e-3, 2.0
 PATTERN = "{actuator}_{date}.csv"
 ONE_IN = 10
-"""Of so many actuators one is sick [count]."""
+"""One actuator in this many is faulty [count]."""
 
 HEALTHY, LIMIT, STD = 1.0, 3.0, 0.06
-"""Leakage of a healthy actuator, its limit, and the standard deviation of a log [L/min]."""
+"""Leakage of a healthy actuator, its limit, and the standard deviation of one log [L/min]."""
 
 PAGE_IN, WHOLE_IN = 5.0, 240.0
 """Time for the page from the store, and for all from raw logs [s]."""
 
 
 def is_sick(actuator: int) -> bool:
-    """Return whether an actuator is one of those that leak more and more."""
+    """Return whether an actuator has growing leakage."""
     return actuator % ONE_IN == ONE_IN // 2
 
 
 def name_of(actuator: int, log: int) -> str:
-    """Return the file of a log, one a week."""
+    """Return the file name of a log; there is one each week."""
     date = np.datetime64("2025-01-06") + 7 * log
     return f"A{actuator:03d}_{date}.csv"
 
 
 def courses(actuators: int, logs: int) -> Array:
-    """Return how far each actuator is to its limit after each log, shape (actuators, logs) [fraction]."""
+    """Return how close each actuator is to its limit after each log, shape (actuators, logs) [fraction]."""
     sick = np.array([is_sick(one) for one in range(actuators)])
     reached = np.linspace(0.95, 1.4, actuators)
     begin = logs // 3
@@ -65,7 +66,7 @@ def courses(actuators: int, logs: int) -> Array:
 
 
 def write_store(place: Path, course: Array) -> None:
-    """Write the rows that a batch would have written of these logs."""
+    """Write the rows that a batch would write for these logs."""
     rng = np.random.default_rng(4)
     rows: list[dict[str, Any]] = []
     for actuator, log in np.ndindex(course.shape):
@@ -106,25 +107,25 @@ def write_logs(folder: Path, course: Array, most: int) -> int:
 
 
 class Taken(NamedTuple):
-    """What the shipped command took: wall time, and processor time of all its processes [s]."""
+    """Time of the shipped command: wall time, and processor time of all its processes [s]."""
 
     wall: float
     used: float
 
 
 def _but(all_of: Taken, part: Taken) -> Taken:
-    """Return what one run took more than another."""
+    """Return the difference in time between two runs."""
     return Taken(all_of.wall - part.wall, all_of.used - part.used)
 
 
 def _used() -> float:
-    """Return the processor time of processes that were begun here and have ended [s]."""
+    """Return the processor time of child processes that have ended [s]."""
     all_so_far = resource.getrusage(resource.RUSAGE_CHILDREN)
     return all_so_far.ru_utime + all_so_far.ru_stime
 
 
 def fleet_of(place: Path, out: Path, *options: str) -> tuple[Taken, list[str]]:
-    """Return what the shipped command took, and its actuators from the top."""
+    """Return the time of the shipped command, and its actuators in ranked order."""
     command = [sys.executable, "-m", "experiments.cli", "fleet", str(place), "--pattern", PATTERN, "--out", str(out)]
     begin, before = time.perf_counter(), _used()
     subprocess.run([*command, *options], check=True, capture_output=True)  # noqa: S603 -- our own command
@@ -134,7 +135,7 @@ def fleet_of(place: Path, out: Path, *options: str) -> tuple[Taken, list[str]]:
 
 
 def wrong_rows(order: list[str]) -> int:
-    """Return how many of the top rows are actuators that are sound."""
+    """Return how many of the top rows are healthy actuators."""
     sick = {name for name in order if is_sick(int(name[1:]))}
     return len(sick - set(order[: len(sick)]))
 

@@ -1,6 +1,6 @@
-"""How long a verb takes on a single log: the first time ever, and from then on.
+"""Time of a verb on a single log: on the first run ever, and on later runs.
 
-Each run is a process of its own, as a user starts it; the first time means an empty cache of kernels.
+Each run is a process of its own, as a user starts it; the first run has an empty kernel cache.
 """
 
 import argparse
@@ -23,13 +23,13 @@ from plant.sensors.sensors import BENCH
 
 VERBS = ("estimate", "diagnose", "identify")
 FIRST = {"estimate": 4.0, "diagnose": 6.0, "identify": 6.0}
-"""CPU of a first run, at most [s]."""
+"""Maximum CPU time of a first run [s]."""
 
 WARM = {"estimate": 1.0, "diagnose": 1.3, "identify": 1.2}
-"""Wall time of a later run on a log at 1 kHz, at most [s]."""
+"""Maximum wall time of a later run on a log at 1 kHz [s]."""
 
 WARM_FAST = 2.0
-"""The same at 10 kHz [s]."""
+"""Maximum wall time of a later run on a log at 10 kHz [s]."""
 
 REPEATS = 3
 
@@ -56,7 +56,7 @@ def timed(verb: str, log: Path, cache: Path) -> tuple[float, float]:
 
 
 def main(argv: Sequence[str]) -> int:
-    """Print CPU and wall of the verbs."""
+    """Print CPU and wall time of the verbs."""
     parser = argparse.ArgumentParser(prog="start_up", description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0, help="length of the logs [s]")
     parser.add_argument("--log", type=Path, help="a log of your own in place of the simulated ones")

@@ -1,9 +1,9 @@
-"""Which tests can notice a fault at a line: read from what `make coverage` has recorded.
+"""Which tests can notice a fault at a line, from the data that `make coverage` recorded.
 
-A line of a function is executed by the tests that coverage.py names. What is executed once for all (constants,
-defaults, what a cache keeps) and what runs compiled (loops whose text is pasted into kernels) is not seen there; so the
-mirrored folder's kept numbers, the tests that execute the functions which use the name, the rest of the file, and the
-mirrored folder's tests come after them.
+A line of a function is executed by the tests that coverage.py names. Coverage does not see code that runs only once
+(constants, defaults, cached results) or compiled (loops pasted into kernels). So the next candidates are the mirrored
+folder's kept numbers, the tests that execute functions that use the name, the rest of the file, and the mirrored
+folder's tests.
 """
 
 import ast
@@ -28,7 +28,7 @@ class Executed:
     root : Path
         The project.
     data : Path
-        What coverage.py wrote, with a context a test.
+        Output of coverage.py, with one context for each test.
     """
 
     def __init__(self, root: Path, data: Path) -> None:
@@ -48,7 +48,7 @@ class Executed:
                     self._cost[test] += 1
 
     def of_file(self, path: str) -> Mapping[int, set[str]]:
-        """Return tests by line: none of a file that was edited since, whose lines stand elsewhere now."""
+        """Return tests by line; empty for a file edited since, because its lines have moved."""
         if path not in self._by_line:
             stands = path in self._files and (self.root / path).stat().st_mtime <= self.measured
             found = self._data.contexts_by_lineno(self._files[path]) if stands else {}
@@ -71,7 +71,7 @@ class Executed:
 
     @cached_property
     def _uses(self) -> Mapping[str, list[tuple[str, ast.stmt]]]:
-        """Where a name is read: functions, or statements of a module or class."""
+        """Where each name is read: functions, or statements of a module or class."""
         found: dict[str, list[tuple[str, ast.stmt]]] = defaultdict(list)
         for path, tree in self.trees.items():
             for place in _places(tree):
@@ -80,19 +80,19 @@ class Executed:
         return found
 
     def tests(self, path: str, line: int) -> list[str]:
-        """Return the tests that can notice a fault at a line, the most likely and the quickest first.
+        """Return the tests that can notice a fault at a line, with the most likely and fastest first.
 
         Parameters
         ----------
         path : str
-            File, from the project's folder.
+            File, relative to the project's folder.
         line : int
-            Where the fault is.
+            Line of the fault.
 
         Returns
         -------
         list of str
-            Names of tests. Within a group those that execute the fewest lines come first.
+            Names of tests. Within a group, tests that execute the fewest lines come first.
         """
         near = mirrored(self.root, path)
         groups = [self._at(path, line), self._kept_numbers(near), *self._later(path, line)]
@@ -103,7 +103,7 @@ class Executed:
         return [test for test in ordered if (self.root / test.partition("::")[0]).is_file()]
 
     def _kept_numbers(self, near: Sequence[str]) -> set[str]:
-        """Return the kept numbers of the mirrored folder, which take seconds and see constants."""
+        """Return the kept numbers of the mirrored folder, which take seconds and cover constants."""
         return {test for file in near if "test_numbers" in file for test in self.all_tests.get(file, ())}
 
     def _at(self, path: str, line: int) -> set[str]:
@@ -113,7 +113,7 @@ class Executed:
         return set().union(*(at.get(one, set()) for one in range(statement.lineno, max(end, line) + 1)))
 
     def _later(self, path: str, line: int) -> Iterator[set[str]]:
-        """Yield tests of what uses the name that the line defines, and of the rest of the file."""
+        """Yield tests of code that uses the name defined on the line, and of the rest of the file."""
         place = next((one for one in _places(self.trees[path]) if _spans(one, line)), None)
         names = _defined(place) if place is not None else set()
         seen = set(names)
@@ -148,9 +148,9 @@ def _test(context: str) -> str:
 
 
 def _far(test: str, near: Sequence[str]) -> int:
-    """Return how far a test is from a file: its own and its folder's kept numbers, its folder's, all others.
+    """Return the distance of a test from a file: its own and its folder's kept numbers, its folder's, all others.
 
-    The first alike: among them a quick test comes before kept numbers of a whole search.
+    The first two rank equally: a quick test among them comes before kept numbers of a whole search.
     """
     place = next((i for i, place in enumerate(near) if test.startswith(place)), len(near))
     return max(place - (len(near) - 2), 0)

@@ -1,7 +1,7 @@
-"""Runs tests in forks of a process that has imported what does not belong to the tree, which saves seconds a run.
+"""Runs tests in forks of a process that has imported everything outside the tree, which saves seconds in each run.
 
-`python -m benchmarks.mutants.forked` reads one task a line from standard input and answers each in one line, both JSON.
-It imports nothing of the packages itself, so that each fork reads their files as they are at that moment.
+`python -m benchmarks.mutants.forked` reads one task on each line of standard input and answers each on one line, both
+in JSON. It imports nothing of the packages itself, so each fork reads their files as they are at that moment.
 """
 
 import importlib
@@ -20,23 +20,23 @@ from typing import Any
 import pytest
 
 PATIENCE = 60
-"""A run hangs that takes so much more processor time than it is allowed [s]."""
+"""A run counts as hanging if it exceeds its allowed processor time by this much [s]."""
 
 SLEPT = 900
-"""A run hangs that lasts so long, however little it does [s]."""
+"""A run counts as hanging after this time, however little it does [s]."""
 
 OPTIONS = ("-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:terminalreporter", "-p", "no:xdist")
 QUIET = ("-W", "ignore::pytest.PytestAssertRewriteWarning")
-"""What is imported before pytest sees it keeps its assertions as they are written."""
+"""Modules imported before pytest sees them keep their assertions unrewritten; this silences the warning."""
 
 
 class Chosen:
-    """Keeps the chosen tests, in the order in which they are named, and stops when time is up.
+    """Keeps the chosen tests, in the given order, and stops when time is up.
 
     Parameters
     ----------
     tests : sequence of str
-        Their names; empty for all of the files.
+        Names of tests; empty for all tests of the files.
     allowed : float
         Processor time [s].
     """
@@ -50,20 +50,20 @@ class Chosen:
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Leave out what was not chosen."""
+        """Deselect tests that were not chosen."""
         if self.place:
             items[:] = sorted(
                 (item for item in items if item.nodeid in self.place), key=lambda item: self.place[item.nodeid]
             )
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Remember what failed."""
+        """Record failures."""
         self.tried += report.when == "call"
         if report.failed:
             self.failed.append(report.nodeid)
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """Remember what could not be imported."""
+        """Record import errors."""
         if report.failed:
             self.failed.append(report.nodeid)
 
@@ -83,12 +83,12 @@ def ran(task: Mapping[str, Any]) -> dict[str, Any]:
     ----------
     task : Mapping[str, Any]
         ``tests``: names, the first file's first; ``files``; ``seconds`` of processor time; ``all``: do not stop at the
-        first failure; ``collect``: run none, but say which modules were imported.
+        first failure; ``collect``: run no tests, but report which modules were imported.
 
     Returns
     -------
     dict
-        ``code`` of pytest, or None where it hung; ``failed`` tests; ``tried`` [count]; ``cut_short``; ``modules``.
+        ``code`` of pytest, or None if it hung; ``failed`` tests; ``tried`` [count]; ``cut_short``; ``modules``.
     """
     begin = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="forked-") as folder:
@@ -138,7 +138,7 @@ def _not_of_the_tree() -> list[str]:
 
 
 def main() -> int:
-    """Answer tasks until there are none."""
+    """Answer tasks until input ends."""
     for line in sys.stdin:
         task = json.loads(line)
         answer = ran(task)

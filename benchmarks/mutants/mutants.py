@@ -1,13 +1,13 @@
-"""Do the tests bite? Faults are planted in a copy of the tree, and the fast tests that can notice them are run on it.
+"""Mutation tests: faults are planted in a copy of the tree, and the fast tests that can notice them run on it.
 
 `make coverage` records which test executes which line. Then `python -m benchmarks mutants --sample 600 --results FILE`
 draws faults at random from the formulas of `plant`, `estimation` and `faults` (see `benchmarks.mutants.mutation`). Each
-is tried on the tests that execute its line, its own file's before the others, until one fails
-(`benchmarks.mutants.executed`). A fault that makes the tests hang counts as noticed. Faults come in random order, so
-that a part of a run is a fair sample too; what ``--results`` holds is not tried again. Without a record, or where a
-file was edited since, a fault is tried on the tests of the mirrored folder.
+fault runs against the tests that execute its line, its own file's tests first, until one fails
+(`benchmarks.mutants.executed`). A fault that makes the tests hang counts as noticed. Faults come in random order, so a
+partial run is a fair sample too; faults already in ``--results`` are skipped. Without coverage data, or if a file was
+edited since, a fault runs against the tests of the mirrored folder.
 
-Kernels go to ``HYDROSTATE_CACHE`` if that is set, so that a second run finds them.
+Kernels go to ``HYDROSTATE_CACHE`` if it is set, so that a second run finds them.
 """
 
 import argparse
@@ -33,13 +33,13 @@ from benchmarks.mutants.mutation import Mutant, count_mutants, mirrored, mutants
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("plant", "estimation", "faults")
 LEAST_SCORE = 0.9
-"""Share of the faults that the fast tests are to notice [fraction]."""
+"""Minimum share of faults that the fast tests must notice [fraction]."""
 
 RECORD = "build/coverage/data"
-"""Where `make coverage` leaves which test executes which line."""
+"""Where `make coverage` stores which test executes which line."""
 
 FEW = 5
-"""Files of tests that are run before all others [count]."""
+"""Number of test files that run before all others [count]."""
 
 LEFT_BEHIND = (".git", ".venv", ".peers", "results", "build", "dist", ".hypothesis", ".ruff_cache", "__pycache__")
 
@@ -83,16 +83,16 @@ def _options() -> argparse.ArgumentParser:
 
 
 def draw(root: Path, folders: Sequence[str], sample: int, seed: int) -> list[Mutant]:
-    """Draw faults at random, each as likely as any other.
+    """Draw faults at random, all equally likely.
 
     Parameters
     ----------
     folders : sequence of str
-        Folders or files, from there.
+        Folders or files, relative to the root.
     sample : int
-        How many [count]; all if there are fewer.
+        Number of faults [count]; all if there are fewer.
     seed : int
-        Of the draw.
+        Seed of the draw.
     """
     files = sorted({path for folder in folders for path in _sources(root / folder)})
     texts = {path: path.read_text(encoding="utf-8") for path in files}
@@ -146,7 +146,7 @@ class Tree:
         self._stack.close()
 
     def ran(self, tests: Sequence[str], files: Sequence[str], seconds: float, **how: bool) -> dict[str, Any]:
-        """Run tests in the copy as it stands, see `benchmarks.mutants.forked.ran`."""
+        """Run tests in the current state of the copy, see `benchmarks.mutants.forked.ran`."""
         assert self._runner.stdin is not None  # noqa: S101  it is a pipe
         assert self._runner.stdout is not None  # noqa: S101  likewise
         print(
@@ -157,7 +157,7 @@ class Tree:
         return json.loads(self._runner.stdout.readline())
 
     def verdict(self, mutant: Mutant, tests: Sequence[str], seconds: float) -> dict[str, Any]:
-        """Plant a fault, run tests until one fails that passes without it, and take the fault out.
+        """Plant a fault, run tests until one fails that passes without the fault, then remove the fault.
 
         Returns
         -------
@@ -182,7 +182,7 @@ class Tree:
                 return {"noticed": noticed or by is not None, "by": by, **told, "seconds": round(spent, 1)}
 
     def _of(self, tests: Sequence[str], seconds: float) -> dict[str, Any]:
-        """Run tests of a few files first, because to import a hundred takes longer than most faults live."""
+        """Run the tests of a few files first: importing a hundred files takes longer than most faults survive."""
         files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
         told = {"code": 5, "failed": [], "tried": 0, "cut_short": False, "seconds": 0.0}
         for some in (files[:FEW], files[FEW:]):
@@ -202,12 +202,12 @@ class Tree:
 
 
 class Results:
-    """Verdicts, kept in a file as they come.
+    """Verdicts, saved to a file as they arrive.
 
     Parameters
     ----------
     file : Path or None
-        One verdict a line; none keeps them in memory alone.
+        File with one verdict on each line; None keeps them only in memory.
     """
 
     def __init__(self, file: Path | None) -> None:
@@ -221,7 +221,7 @@ class Results:
         return self._known.get(_id(mutant))
 
     def add(self, mutant: Mutant, verdict: dict[str, Any]) -> None:
-        """Keep and print a verdict."""
+        """Save and print a verdict."""
         with self._lock:
             self._known[_id(mutant)] = one = {"id": _id(mutant), "fault": _name(mutant), **verdict}
             said = "noticed " if verdict["noticed"] else "SURVIVES"
@@ -232,7 +232,7 @@ class Results:
 
 
 def _id(mutant: Mutant) -> str:
-    """Return what tells a fault from all others, those of the file's earlier texts included."""
+    """Return a key that distinguishes a fault from all others, including those of earlier versions of the file."""
     return hashlib.sha256(f"{mutant.path}\n{mutant.source}".encode()).hexdigest()[:16]
 
 

@@ -1,7 +1,7 @@
 """Faults planted in source text: signs, operators, comparisons, constants and connectives, one at a time.
 
-Our own operators, because the tests that matter here are of formulas: mutmut leaves decorated functions and constants
-of modules alone, and cosmic-ray changes the tree that it is run in.
+The operators are our own, because the tests of interest are of formulas: mutmut skips decorated functions and module
+constants, and cosmic-ray changes the tree that it runs in.
 """
 
 import ast
@@ -18,7 +18,7 @@ OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
     ast.FloorDiv: ast.Mult,
     ast.Pow: ast.Mult,
 }
-"""What stands in for an arithmetic operator."""
+"""Replacement of each arithmetic operator."""
 
 COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.GtE,
@@ -32,17 +32,17 @@ COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Is: ast.IsNot,
     ast.IsNot: ast.Is,
 }
-"""What stands in for a comparison."""
+"""Replacement of each comparison."""
 
 FACTORS = (2, 100)
-"""By what constants are multiplied [dimensionless]; zero becomes one."""
+"""Factors by which constants are multiplied [dimensionless]; zero becomes one."""
 
 WHAT_IS_LEFT = "reshape"
-"""Method for which any negative length is the same: NumPy then takes what is left. To change the size of such a length
-plants no fault; its sign does."""
+"""Method that treats all negative lengths alike: NumPy then infers the length. Changing the magnitude of such a length
+is no fault; changing its sign is."""
 
 SPARED = (ast.Raise, ast.Assert, ast.JoinedStr, ast.Import, ast.ImportFrom)
-"""Statements and expressions that hold no formula: messages, imports."""
+"""Statements and expressions without formulas: messages, imports."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,11 @@ class Mutant:
     Parameters
     ----------
     path : str
-        File, from the project's folder.
+        File, relative to the project's folder.
     line : int
-        Where.
+        Line of the fault.
     change : str
-        What was changed, as text before and after.
+        The change, as text before and after.
     source : str
         The whole file with the fault.
     """
@@ -69,7 +69,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class _Edit:
-    """One change of a tree that can be taken back: an attribute, or an entry of a list."""
+    """One reversible change of a tree: an attribute, or an entry of a list."""
 
     node: ast.expr
     owner: Any
@@ -77,7 +77,7 @@ class _Edit:
     value: Any
 
     def swap(self) -> Any:
-        """Put the value in its place and return the one that stood there."""
+        """Put the value in its place and return the previous one."""
         if isinstance(self.key, int):
             old, self.owner[self.key] = self.owner[self.key], self.value
         else:
@@ -97,9 +97,9 @@ def mutants_of(path: str, text: str, chosen: Sequence[int]) -> Iterator[Mutant]:
     Parameters
     ----------
     text : str
-        Its source.
+        Source text of the file.
     chosen : sequence of int
-        Which faults, from 0 to `count_mutants` - 1.
+        Indices of faults, from 0 to `count_mutants` - 1.
     """
     tree = ast.parse(text)
     edits = list(_edits(tree))
@@ -139,7 +139,7 @@ def _below(node: ast.AST) -> Iterator[_Edit]:
 
 
 def _is_length(call: ast.AST, name: str) -> bool:
-    """Return whether what stands in a field of a node is a length that an array is given by its method."""
+    """Return whether a field of a node is a length passed to an array's method."""
     match call:
         case ast.Call(func=ast.Attribute(attr=method)):
             return name == "args" and method == WHAT_IS_LEFT
@@ -195,12 +195,12 @@ def mirrored(root: Path, path: str) -> list[str]:
     Parameters
     ----------
     path : str
-        A file, from there.
+        A file, relative to the root.
 
     Returns
     -------
     list of str
-        Paths from the project's folder; the nearest folder of tests that there is.
+        Paths relative to the project's folder; the nearest existing folder of tests.
     """
     own = Path("tests") / Path(path).parent / f"test_{Path(path).name}"
     folder = own.parent

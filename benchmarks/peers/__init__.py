@@ -1,1 +1,1 @@
-"""What the filters are measured against: the same filter as an expert, or a user, of another tool would write it."""
+"""Reference implementations of the filters: the same filter as an expert or a user of another tool would write it."""

@@ -1,7 +1,6 @@
-"""Coefficients of the acceleration form in the filter's scaled units, for peers that are written by hand.
+"""Coefficients of the acceleration form in the filter's scaled units, for hand-written peers.
 
-With states in units ``s``, equation 5.14 (errata E3, E8) reads
-``a' = b pull + (damping + 2 quadratic |v|) a`` with
+With states in units ``s``, equation 5.14 (errata E3, E8) reads ``a' = b pull + (damping + 2 quadratic |v|) a`` with
 ``pull = pumped - bias + velocity v + square v |v| + coulomb sign(v) + acceleration a``.
 """
 
@@ -13,7 +12,7 @@ from plant.eha.model import EhaParameters
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Coefficients of the acceleration's rate, scaled: what multiplies bulk modulus, then what does not [any unit]."""
+    """Scaled coefficients of the acceleration's rate: those multiplied by bulk modulus, then the others [any unit]."""
 
     pumped: float
     bias: float
@@ -26,7 +25,7 @@ class Coefficients:
 
 
 def coefficients(p: EhaParameters) -> Coefficients:
-    """Return the coefficients of an actuator; a motor speed u pumps ``sign(u) max(pumped |u| - bias, 0)``."""
+    """Return the coefficients of an actuator; motor speed u pumps ``sign(u) max(pumped |u| - bias, 0)``."""
     _, v, a, b = (state.scale for state in ACCELERATION_FORM.states)
     A, L, M = p.piston_area, p.leakage_coefficient, p.moving_mass
     gain = A * b / (M * p.chamber_volume) / a

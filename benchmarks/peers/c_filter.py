@@ -1,4 +1,4 @@
-"""An exported filter, compiled and loaded: what Python's kernel is compared with."""
+"""An exported filter, compiled and loaded, for comparison with Python's kernel."""
 
 import ctypes
 import subprocess
@@ -17,7 +17,7 @@ from plant.arrays import Array
 SOURCE = Path(__file__).with_suffix(".c")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
 FUSING = ("-mfma", "-mavx2")
-"""The instructions that Python's kernels use too, where the processor has them."""
+"""Instructions that Python's kernels use too, if the processor supports them."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class CFilter:
     kind: type[np.float64] | type[np.float32]
 
     def logs(self) -> tuple[Any, Any]:
-        """Return the log's drives and measurements in its precision."""
+        """Return the log's drives and measurements in the filter's precision."""
         return tuple(np.ascontiguousarray(one, self.kind) for one in (self.problem.drives, self.problem.measured))
 
     def run(self) -> tuple[Array, Array, Array, float, int]:
@@ -44,7 +44,7 @@ class CFilter:
         Returns
         -------
         tuple of (ndarray, ndarray, ndarray, float, int)
-            Estimates and their deviations (samples, states), mean NIS of each channel, log-likelihood, gate.
+            Estimates and their standard deviations (samples, states), mean NIS of each channel, log-likelihood, gate.
         """
         drives, measured = self.logs()
         values, deviations = (np.empty((len(drives), self.problem.model.width), self.kind) for _ in range(2))
@@ -54,13 +54,13 @@ class CFilter:
         return values.astype(float), deviations.astype(float), sums[:-1].astype(float), float(sums[-1]), gate
 
     def worked(self) -> None:
-        """Filter the log and keep nothing."""
+        """Filter the log and discard the results."""
         drives, measured = self.logs()
         places = (ctypes.c_void_p(one.ctypes.data) for one in (drives, measured))
         self.library.work(ctypes.c_long(len(drives)), *places)
 
     def clocked(self) -> NDArray[np.int64]:
-        """Return how long each step takes, shape (samples,) [ns]."""
+        """Return the duration of each step, shape (samples,) [ns]."""
         drives, measured = self.logs()
         times = np.empty(len(drives), np.int64)
         places = (ctypes.c_void_p(one.ctypes.data) for one in (drives, measured, times))
@@ -68,7 +68,7 @@ class CFilter:
         return times
 
     def paced(self, period: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Take a sample every period.
+        """Process one sample in every period.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class CFilter:
         Returns
         -------
         tuple of ndarray, each shape (samples,)
-            How late each waking was, and how long its step took [ns].
+            Lateness of each wake-up, and duration of its step [ns].
         """
         drives, measured = self.logs()
         late, times = np.empty(len(drives), np.int64), np.empty(len(drives), np.int64)
@@ -101,11 +101,11 @@ def built(
     Parameters
     ----------
     folder : Path
-        Where its files go.
+        Folder for its files.
     compiler : str
         ``gcc`` or ``clang``.
     flags : sequence of str
-        Beside the strict ones.
+        Flags in addition to the strict ones.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for file, text in filter_in_c(problem, method, name="exported", precision=precision).items():

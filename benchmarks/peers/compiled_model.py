@@ -1,4 +1,4 @@
-"""A model's rates and their analytic Jacobian, compiled for the stiff solvers of others."""
+"""A model's rates and their analytic Jacobian, compiled for third-party stiff solvers."""
 
 from collections.abc import Callable
 from functools import cache
@@ -17,7 +17,7 @@ from plant.solvers.steps import Derivative, Parameters, parameter_names, paramet
 
 
 class ModelKernel(Protocol):
-    """What the kernel of a model has: its rates and slopes from ``(*state, drive)`` and the parameters in memory."""
+    """Functions of a model's kernel: its rates and slopes from ``(*state, drive)`` and the parameters in memory."""
 
     load: Callable[[int], Any]
     store: Callable[[Any, int], None]
@@ -26,12 +26,12 @@ class ModelKernel(Protocol):
 
 
 def rates(kernel: ModelKernel, state: Array, u: float, parameters: Array, result: Array) -> None:
-    """Put the rates of a state into a result.
+    """Write the rates of a state into a result array.
 
     Parameters
     ----------
     state, result : ndarray, shape (states,)
-        State, and room for its rates [SI].
+        State, and array for its rates [SI].
     parameters : ndarray, shape (parameters,)
         Parameter row [SI].
     """
@@ -40,7 +40,7 @@ def rates(kernel: ModelKernel, state: Array, u: float, parameters: Array, result
 
 
 def slopes(kernel: ModelKernel, state: Array, u: float, parameters: Array, result: Array) -> None:
-    """Put the Jacobian of the rates by the state into a result.
+    """Write the Jacobian of the rates with respect to the state into a result array.
 
     Parameters
     ----------
@@ -49,14 +49,14 @@ def slopes(kernel: ModelKernel, state: Array, u: float, parameters: Array, resul
     parameters : ndarray, shape (parameters,)
         Parameter row [SI].
     result : ndarray, shape (states, states)
-        Room for the Jacobian [SI].
+        Array for the Jacobian [SI].
     """
     numbers = (*kernel.load(state.ctypes.data), u)
     kernel.store(kernel.slopes_of(numbers, parameters.ctypes.data), result.ctypes.data)
 
 
 def drive_at(t: float, speed: Array, piece: NDArray[np.int64], sample_time: float) -> float:
-    """Return the drive at a time, the piece's line going on beyond its ends."""
+    """Return the drive at a time; the line of the piece extends beyond its ends."""
     place = t / sample_time
     k = min(max(int(place), piece[0]), piece[1] - 1)
     return speed[k] + (place - k) * (speed[k + 1] - speed[k])
@@ -72,12 +72,12 @@ def rates_at(
     parameters: Array,
     result: Array,
 ) -> None:
-    """Put the rates at a time into a result.
+    """Write the rates at a time into a result array.
 
     Parameters
     ----------
     at : ndarray, shape (1,)
-        The time [s].
+        Time [s].
     state : ndarray, shape (states,)
         State [SI].
     speed : ndarray, shape (samples,)
@@ -87,7 +87,7 @@ def rates_at(
     parameters : ndarray, shape (parameters,)
         Parameter row [SI].
     result : ndarray, shape (states,)
-        Room for it [SI].
+        Array for the rates [SI].
     """
     rates(kernel, state, drive_at(at[0], speed, piece, sample_time), parameters, result)
 
@@ -102,12 +102,12 @@ def slopes_at(
     parameters: Array,
     result: Array,
 ) -> None:
-    """Put the Jacobian at a time into a result.
+    """Write the Jacobian at a time into a result array.
 
     Parameters
     ----------
     at : ndarray, shape (1,)
-        The time [s].
+        Time [s].
     state : ndarray, shape (states,)
         State [SI].
     speed : ndarray, shape (samples,)
@@ -117,7 +117,7 @@ def slopes_at(
     parameters : ndarray, shape (parameters,)
         Parameter row [SI].
     result : ndarray, shape (states, states)
-        Room for it [SI].
+        Array for the Jacobian [SI].
     """
     slopes(kernel, state, drive_at(at[0], speed, piece, sample_time), parameters, result)
 
@@ -134,9 +134,9 @@ def compiled_model(derivative: Derivative, width: int, parameter_class: type[Par
     derivative : callable
         ``derivative(state, speed, parameters)``.
     width : int
-        Count of states.
+        Number of states.
     parameter_class : type
-        What a parameter row holds, field by field.
+        Class that defines the fields of a parameter row.
     """
     names = [f"x{i}" for i in range(width)]
     state = tuple(map(symbol, names))

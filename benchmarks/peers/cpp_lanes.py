@@ -18,7 +18,7 @@ from benchmarks.peers.acceleration_form import Coefficients
 Array = NDArray[np.float64]
 
 PROCESSORS: Mapping[str, str] = MappingProxyType({"own": "native", "avx2": "haswell"})
-"""What g++ calls the instructions: this machine's, or those of one that has AVX2 and no AVX-512."""
+"""Names for g++ of the instruction sets: this machine's, or those of one with AVX2 and without AVX-512."""
 
 VECTORS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -27,14 +27,15 @@ VECTORS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "wide vectors": ("-fno-math-errno", "-fno-trapping-math", "-mprefer-vector-width=512"),
     }
 )
-"""What an expert tries: with AVX2 g++ takes no vectors unless comparisons may not trap, with AVX-512 half of them."""
+"""Options that an expert tries. With AVX2, g++ vectorises only if comparisons may not trap; with AVX-512, it uses
+half-width vectors by default."""
 
 CHAINS, ROUNDS = 12, 10_000_000
-"""Fused multiply-adds a round, and rounds, of `arithmetic_peak.cpp` [count]."""
+"""Fused multiply-adds in a round, and number of rounds, of `arithmetic_peak.cpp` [count]."""
 
 
 def build(source: str, *flags: str) -> ctypes.CDLL | None:
-    """Return a compiled library, or None where there is no C++ compiler."""
+    """Return a compiled library, or None without a C++ compiler."""
     compiler = shutil.which("g++") or shutil.which("clang++")
     if compiler is None:
         return None
@@ -50,14 +51,14 @@ def build(source: str, *flags: str) -> ctypes.CDLL | None:
 
 
 def builds(processor: str) -> dict[str, ctypes.CDLL]:
-    """Return the filter built in each way that an expert tries; none where there is no C++ compiler."""
+    """Return the filter built in each way that an expert tries; empty without a C++ compiler."""
     march = f"-march={PROCESSORS[processor]}"
     found = {name: build("ekf_simd.cpp", march, *flags) for name, flags in VECTORS.items()}
     return {name: library for name, library in found.items() if library is not None}
 
 
 def peak(processor: str) -> float | None:
-    """Return the additions and multiplications that a core does, the best of three tries [1/s]; None without C++."""
+    """Return the additions and multiplications of a core, the best of three tries [1/s]; None without C++."""
     march, best = PROCESSORS[processor], 0.0
     wide = processor == "own" and "avx512f" in Path("/proc/cpuinfo").read_text(encoding="utf-8")
     size = 64 if wide else 32

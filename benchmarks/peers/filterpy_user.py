@@ -9,14 +9,14 @@ from plant.eha.model import EhaParameters
 
 
 class AccelerationFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy carries no types
-    """filterpy's filter with the nonlinear prediction that it lacks (equations 7.1 to 7.4)."""
+    """filterpy's filter plus the nonlinear prediction that it lacks (equations 7.1 to 7.4)."""
 
     def __init__(self, p: EhaParameters, step: float) -> None:
         super().__init__(dim_x=4, dim_z=2)
         self.p, self.step = p, step
 
     def predict_x(self, u: float = 0.0) -> None:
-        """Move the mean by one step at motor speed u."""
+        """Advance the mean by one step at motor speed u."""
         self.F, self.x = self.linearised(self.x, u)
 
     def linearised(self, state: Array, u: float) -> tuple[Array, Array]:
@@ -70,7 +70,7 @@ class PressureFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy ca
         return np.array([float(one) for one in found]) / self.scale
 
     def predict_x(self, u: tuple[float, float] = (0.0, 0.0)) -> None:
-        """Move the mean by one step between two motor speeds."""
+        """Advance the mean by one step between two motor speeds."""
         here = self.moved(self.x, u)
         self.F = np.column_stack([(self.moved(self.x + 1e-6 * one, u) - here) / 1e-6 for one in np.eye(4)])
         self.x = here

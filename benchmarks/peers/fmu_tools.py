@@ -1,6 +1,7 @@
-"""Runs an FMU of a plant in a tool that is not FMPy. Needs ``libcosimpy`` (FMI Library, FMI 2.0) or ``ecospy`` (fmi4c).
+"""Runs an FMU of a plant in a tool other than FMPy. Needs ``libcosimpy`` (FMI Library, FMI 2.0) or ``ecospy`` (fmi4c).
 
-``python fmu_tools.py TOOL FMU STEP < speeds.txt`` prints the velocity before the first step and after each, one a line.
+``python fmu_tools.py TOOL FMU STEP < speeds.txt`` prints the velocity before the first step and after each, one on each
+line.
 """
 
 # its packages are in an environment of their own
@@ -10,7 +11,7 @@ import sys
 
 
 def by_ecos(path: str, step: float, speeds: list[float]) -> list[float]:
-    """Return velocities as Ecos sees them [m/s]."""
+    """Return the velocities in Ecos [m/s]."""
     from ecospy import EcosSimulation, EcosSimulationStructure
 
     with EcosSimulationStructure() as structure:
@@ -27,7 +28,7 @@ def by_ecos(path: str, step: float, speeds: list[float]) -> list[float]:
 
 
 def by_libcosim(path: str, step: float, speeds: list[float]) -> list[float]:
-    """Return velocities as libcosim sees them [m/s]; it takes no step before inputs are set."""
+    """Return the velocities in libcosim [m/s]; it takes no step before inputs are set."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimManipulator import CosimManipulator
     from libcosimpy.CosimObserver import CosimObserver

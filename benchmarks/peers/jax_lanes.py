@@ -1,6 +1,6 @@
-"""The acceleration form's filter as an expert of JAX would write it: unrolled, one array a quantity, one scan.
+"""The acceleration form's filter as a JAX expert would write it: unrolled, one array for each quantity, one scan.
 
-Run as a script in an environment that has JAX: it reads a NumPy archive, prints CPU nanoseconds a filter-step of every
+Run it as a script in an environment with JAX: it reads a NumPy archive, prints CPU nanoseconds per filter step of every
 round, and writes the final means.
 """
 

@@ -1,7 +1,7 @@
 """Stiff solvers of scipy and SUNDIALS on a compiled model with its analytic Jacobian: the peers of our kernels.
 
-Finite-difference Jacobians across ``sign(v)`` give grossly wrong runs from rest, so none are used. A solver stops at
-the drive's corners or takes no step longer than ten samples, lest it miss one.
+Finite-difference Jacobians across ``sign(v)`` give grossly wrong runs from rest, so none are used. To avoid missing a
+corner of the drive, a solver stops at each corner or takes no step longer than ten samples.
 """
 
 from collections.abc import Callable
@@ -21,15 +21,15 @@ from plant.errors import HydrostateError
 from plant.solvers.steps import Derivative, Parameters, parameter_row
 
 Method: TypeAlias = Literal["LSODA", "Radau", "BDF", "odeint", "CVODE"]
-"""Scipy's ``solve_ivp`` by its three stiff methods, its ``odeint`` (LSODA without its overhead), SUNDIALS' CVODE."""
+"""Scipy's three stiff methods of ``solve_ivp``, its ``odeint`` (LSODA without the overhead), SUNDIALS' CVODE."""
 
 CORNER = 1e-2
-"""Bend of the drive, relative to its largest value, at which a solver may be told to stop."""
+"""Bend of the drive, relative to its largest value, at which a solver may stop."""
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """A run for a stiff solver; while it works on one piece of the drive it sees that piece's line go on forever."""
+    """A run for a stiff solver; during one piece of the drive, the line of that piece extends without limit."""
 
     kernel: NativeKernel
     initial: Array
@@ -88,19 +88,19 @@ def reference_trajectory(
     initial : ndarray, shape (states,)
         Initial state in SI.
     speed : ndarray, shape (n,)
-        Motor speed at the samples [rad/s], linear between.
+        Motor speed at the samples [rad/s], linearly interpolated.
     parameters : dataclass
         The plant's parameters, as the derivative reads them.
     sample_time : float
         Seconds between samples [s].
     scale : ndarray, shape (states,)
-        How much each state changes [SI]; the absolute tolerance is the relative one times this.
+        Typical change of each state [SI]; the absolute tolerance is the relative one times this.
     relative_tolerance : float
         Local error, relative [dimensionless].
     method : {"LSODA", "Radau", "BDF", "odeint", "CVODE"}
         Which solver; CVODE needs the package scikit-sundae.
     stop_at_corners : bool
-        Whether the solver stops and starts anew where the drive bends sharply, instead of taking short steps only.
+        Whether the solver stops and restarts at sharp corners of the drive, instead of only taking short steps.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def reference_trajectory(
 
 
 Pieces: TypeAlias = Callable[[Array, Array], Array]
-"""``solve(times, state at the first)``: the states at the times."""
+"""``solve(times, state at the first)``: returns the states at the times."""
 
 
 def _by_pieces(problem: _Problem, solve: Pieces) -> Array:
@@ -223,4 +223,4 @@ def _cvode_pieces(problem: _Problem) -> Pieces:
 
 
 _MOST_STEPS = 100_000
-"""Steps between two samples after which a solver gives up."""
+"""Maximum steps between two samples before a solver gives up."""

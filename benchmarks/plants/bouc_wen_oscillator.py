@@ -23,14 +23,14 @@ from plant.units import si
 BENCHMARK = "Noël and Schoukens 2016, Table 1"
 
 OVERSAMPLING = 20
-"""Steps between the benchmark's samples, as its authors integrated it."""
+"""Integration steps between the benchmark's samples, as its authors used."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OscillatorParameters:
     """The benchmark's oscillator, ``m y'' + c y' + k y + z = u``; its true values by default.
 
-    Only the products beta gamma and beta delta act, so they are the parameters.
+    Only the products beta gamma and beta delta have an effect, so they are the parameters.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def oscillator_derivative(state: tuple[Scalar, ...], force: Scalar, p: Any) -> t
     Returns
     -------
     tuple of float or Expression
-        Rates, each a second.
+        Rates per second.
 
     Examples
     --------
@@ -89,7 +89,7 @@ oscillator_step = rk4_step(oscillator_derivative)
 def fit_oscillator(
     force: Array, displacement: Array, sample_time: float, start: OscillatorParameters, periodic: bool = True
 ) -> HysteresisFit:
-    """Fit the benchmark's oscillator to force and displacement, all six parameters together.
+    """Fit all six parameters of the benchmark's oscillator together to force and displacement.
 
     Parameters
     ----------
@@ -100,9 +100,9 @@ def fit_oscillator(
     sample_time : float
         Seconds between samples [s].
     start : OscillatorParameters
-        First guess, as `linear_start` gives it.
+        First guess, as from `linear_start`.
     periodic : bool
-        Whether the force is one period of a signal on which the oscillator has settled; else it starts at rest.
+        Whether the force is one period of a signal with the oscillator in steady state; otherwise it starts at rest.
     """
     names = [field.name for field in fields(OscillatorParameters)]
     run = _oscillator_run(tuple(names))
@@ -155,7 +155,7 @@ def linear_start(force: Array, displacement: Array, sample_time: float) -> Oscil
     Returns
     -------
     OscillatorParameters
-        A guess from which `fit_oscillator` converges.
+        First guess from which `fit_oscillator` converges.
     """
     u, y = np.fft.rfft(force), np.fft.rfft(displacement)
     omega = 2.0 * np.pi * np.fft.rfftfreq(len(force), sample_time)
@@ -186,7 +186,7 @@ def _oscillator_run(names: tuple[str, ...]) -> Callable[..., Array]:
 def _settled_run(
     run: Callable[..., Array], force: Array, sample_time: float, theta: Array, width: int, periodic: bool
 ) -> Array:
-    """Run on the force, interpolated by its spectrum; where it is periodic, a second time round."""
+    """Run on the force, interpolated by its spectrum; a periodic force runs for a second period."""
     from scipy.signal import resample, resample_poly
 
     fine: Any = (
@@ -201,4 +201,4 @@ def _settled_run(
 
 
 _LEAD_IN = 750
-"""Samples before a period begins, in which the oscillator settles: it decays within 0.4 s."""
+"""Settling samples before a period: the oscillator decays within 0.4 s."""

@@ -1,8 +1,8 @@
-"""The circuit plant: nine conditions at 10 kHz in error-controlled steps, beside scipy's and SUNDIALS' solvers.
+"""The circuit plant: nine conditions at 10 kHz in error-controlled steps, against scipy's and SUNDIALS' solvers.
 
-All run in this process on the same drives, to equal error. The peers get compiled rates and the analytic Jacobian; each
+All run in this process on the same drives, to equal error. The peers get compiled rates and the analytic Jacobian. Each
 is tried with and without stops at the drive's corners, and with the loosest tolerance of a ladder whose error does not
-exceed ours. Errors are relative RMS against LSODA at 1e-11. Times are of the processor. CVODE takes part if the package
+exceed ours. Errors are relative RMS against LSODA at 1e-11. Times are processor times. CVODE takes part if the package
 scikit-sundae is installed (the extra "peers").
 """
 
@@ -35,7 +35,7 @@ SLOWER = 3.0
 
 
 def timed(work: Callable[[], Array], repeats: int = 1) -> tuple[float, Array]:
-    """Return the least processor time that some work took [s], and its result."""
+    """Return the shortest processor time of some work [s], and its result."""
     least, result = np.inf, np.empty(0)
     for _ in range(repeats):
         start = time.process_time()
@@ -45,12 +45,12 @@ def timed(work: Callable[[], Array], repeats: int = 1) -> tuple[float, Array]:
 
 
 def together(circuits: list[CircuitParameters], speed: Array) -> Array:
-    """Return the states of circuits side by side by our kernel."""
+    """Return the states of circuits computed side by side by our kernel."""
     return run_plant(CIRCUIT, speed, SAMPLE_TIME, np.array([parameter_row(p) for p in circuits])[None])
 
 
 def peer(p: CircuitParameters, speed: Array, method: Method, tolerance: float, *, stops: bool) -> Array:
-    """Return the states by one of the peers."""
+    """Return the states computed by one of the peers."""
     return reference_trajectory(
         circuit_derivative,
         CIRCUIT.start(parameter_row(p)),
@@ -74,7 +74,7 @@ def error(states: Array, truth: Array, p: CircuitParameters) -> float:
 def best_peer(
     p: CircuitParameters, speed: Array, truth: Array, ours: float, methods: list[Method]
 ) -> tuple[str, float, float]:
-    """Return the fastest peer among those as accurate as ours: name and tolerance, time [s], error."""
+    """Return the fastest peer with an error no larger than ours: name and tolerance, time [s], error."""
     best = ("none", np.inf, np.inf)
     for method, stops in product(methods, (True, False)):
         for tolerance in LADDER:
@@ -91,7 +91,7 @@ def best_peer(
 
 
 def compare(chosen: list[str], seconds: float, methods: list[Method]) -> pd.DataFrame:
-    """Return one row a drive and condition: a ninth of our time for nine, our time for one, the best peers'."""
+    """Return one row for each drive and condition: a ninth of our time for nine, our time for one, the best peers'."""
     rows: list[dict[str, object]] = []
     circuits = {n: circuit_of(parameters_for(c, CircuitParameters())) for n, c in CONDITIONS.items()}
     for drive in DRIVES:
@@ -112,7 +112,7 @@ def compare(chosen: list[str], seconds: float, methods: list[Method]) -> pd.Data
 
 
 def nine_conditions(drive: str) -> float:
-    """Return the time of nine conditions, 10 s each at 10 kHz, once compiled [s]."""
+    """Return the time for nine conditions, 10 s each at 10 kHz, after compilation [s]."""
     circuits = [circuit_of(parameters_for(condition, CircuitParameters())) for condition in CONDITIONS.values()]
     speed = make_drive(drive, 10.0, SAMPLE_TIME, CircuitParameters(), np.random.default_rng(1))
     return timed(lambda: together(circuits, speed), REPEATS)[0]

@@ -1,8 +1,8 @@
-"""The diaphragm motor's faults: isolation over seeds, leakage and load, load steps, and what cannot be told apart.
+"""The diaphragm motor's faults: isolation over seeds, leakage and load, load steps, and indistinguishable faults.
 
-Prints every figure with what is wanted of it. Logs are of the same model as the curves they are laid beside. The second
-isolation is of motors that differ from it by the tolerance, each in its own way; the third and fourth are of motors
-that differ by four times as much, without and with a healthy run of each to calibrate on.
+Prints every figure with its target. Logs come from the same model as the curves they are compared with. In the second
+isolation, each motor differs from the model by the tolerance, each in its own way. In the third and fourth, motors
+differ by four times as much, without and with a healthy run of each for calibration.
 """
 
 import argparse
@@ -43,10 +43,10 @@ SINGLE: Mapping[str, float] = {
     "clogged_ports": 0.3,
     "slow_valves": 0.5,
 }
-"""Fourteen single faults and their severities; those of one place are at a place drawn anew for each seed."""
+"""Fourteen single faults and their severities; faults of one place are moved to a random place for each seed."""
 
 TOGETHER = frozenset({"friction", "load"})
-"""What no sensor of the motor tells apart."""
+"""Faults that no sensor of the motor can distinguish."""
 
 
 def logged(motor: DiaphragmMotorParameters | Schedule, seed: int, seconds: float = 0.2) -> Record:
@@ -63,13 +63,13 @@ def spread_motor(rng: np.random.Generator, factor: float) -> DiaphragmMotorParam
 
 
 def placed(name: str, rng: np.random.Generator) -> str:
-    """Return the same kind of fault at a place drawn anew."""
+    """Return the same kind of fault at a random place."""
     alike = [fault.name for fault in MOTOR_FAULTS.values() if fault.kind == MOTOR_FAULTS[name].kind]
     return str(rng.choice(alike))
 
 
 def right(found: MotorDiagnosis, name: str) -> bool:
-    """Return whether a diagnosis names the fault, or its group where it has one, and calls it known."""
+    """Return whether a diagnosis names the fault, or its group if it has one, and calls it known."""
     names = {match.name for match in found.group}
     if name in TOGETHER:
         return not found.unknown and names == TOGETHER
@@ -77,7 +77,7 @@ def right(found: MotorDiagnosis, name: str) -> bool:
 
 
 def isolate(seeds: int, factor: float, *, calibrated: bool) -> tuple[float, float, float, Counter[str], float]:
-    """Return the shares of right, of unknown, of intervals that cover, what was wrong, seconds a log [fractions, s]."""
+    """Return shares of right, unknown, and intervals that cover; the wrong results; seconds per log [fractions, s]."""
     hits = unknown = covered = total = 0
     wrong: Counter[str] = Counter()
     spent = 0.0
@@ -101,7 +101,7 @@ def isolate(seeds: int, factor: float, *, calibrated: bool) -> tuple[float, floa
 
 
 def isolation(seeds: int) -> None:
-    """Name 14 single faults over seeds, on the model's own motor and on others."""
+    """Isolate 14 single faults over seeds, on the model's own motor and on others."""
     cases = (
         ("the model's own motor", 0.0, False, True),
         ("motors within tolerance", 1.0, False, True),
@@ -127,7 +127,7 @@ def isolation(seeds: int) -> None:
 
 
 def pairs() -> None:
-    """Say which faults are told apart, by how much, and which look alike."""
+    """Print which faults can be distinguished, by how much, and which look alike."""
     sizes = {**SINGLE, "soft_clamp": 0.2}
     apart = separations(MOTOR, FREQUENCY, SWING, sizes)
     close = [
@@ -147,7 +147,7 @@ def pairs() -> None:
 
 
 def estimates(seeds: int) -> None:
-    """Estimate leakage and load without pressure or flow, and keep quiet on a load step."""
+    """Estimate leakage and load without pressure or flow; a load step must raise no alarm."""
     leaks, loads = [0.0], [0.0]
     missed = 0
     for seed in range(seeds):
@@ -186,7 +186,7 @@ def bulk_modulus() -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Run it; returns how many targets were missed."""
+    """Run everything; return how many targets are missed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=30)
     seeds = parser.parse_args(arguments).seeds

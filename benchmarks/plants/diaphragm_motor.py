@@ -1,8 +1,8 @@
-"""The diaphragm motor: published flow, balances, speed, and scipy's solvers beside us on the same rates.
+"""The diaphragm motor: published flow, balances, speed, and scipy's solvers on the same rates.
 
-Peers run in this process, on the plant's rates as they are written and on its compiled rates with their analytic
-Jacobian. Errors are those of the electrodes' deflections and of the mean flow, over the settled cycles, against LSODA
-at 1e-9. A peer counts at the loosest tolerance whose error is no larger than ours. Times are of the processor.
+Peers run in this process, on the plant's rates as written and on its compiled rates with their analytic Jacobian.
+Errors are those of the electrodes' deflections and of the mean flow, over the settled cycles, against LSODA at 1e-9. A
+peer counts at the loosest tolerance whose error is no larger than ours. Times are processor times.
 """
 
 import argparse
@@ -33,7 +33,7 @@ PEAK, SWING = 480.0, 200.0
 ML_MIN = 1e-6 / 60.0
 TIME = 0.12
 SCALE = np.array([2e4] * 7 + [10.0] + [2e-6] * 8 + [1.0] * 8 + [1e4, 1e4, 5e-3, 1e-4])
-"""How much each state changes [SI]."""
+"""Typical change of each state [SI]."""
 
 LADDER = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-6)
 """Tolerances of a peer, loosest first."""
@@ -43,7 +43,7 @@ METHODS: tuple[Method, ...] = ("odeint", "LSODA")
 
 
 def physics() -> None:
-    """Compare with what the paper quotes, and check balances."""
+    """Compare with the figures that the paper quotes, and check balances."""
     point = operate(PUMP, PEAK, SWING)
     flow = point.outlet_flow / ML_MIN
     frequencies = np.arange(400.0, 561.0, 5.0)
@@ -68,7 +68,7 @@ def speed(repeats: int) -> None:
 
 
 def rates(state: tuple[Any, ...], rate: Any, flat: Any) -> tuple[Any, ...]:
-    """Return the plant's rates as a solver sees them."""
+    """Return the plant's rates in the form that a solver needs."""
     return motor_derivative(state, rate, gathered(flat))
 
 

@@ -1,8 +1,8 @@
-"""The piezo-stack actuator: published flows, numerics beside LSODA, hysteresis, estimation, and mismatch.
+"""The piezo-stack actuator: published flows, numerics against LSODA, hysteresis, estimation, and model mismatch.
 
-Prints every figure with what is wanted of it. LSODA has the same compiled rates and their analytic Jacobian, in this
-process; times are of the processor. Estimates are on logs of the same model, but for the mismatch, whose actuator has
-other lines, reeds and discharge. The public benchmark takes part where its data is (HYDROSTATE_SHARED).
+Prints every figure with its target. LSODA has the same compiled rates and their analytic Jacobian, in this process;
+times are processor times. Estimates use logs of the same model, except in the mismatch test, whose actuator has other
+lines, reeds and discharge. The public benchmark takes part if its data are available (HYDROSTATE_SHARED).
 """
 
 import argparse
@@ -44,13 +44,13 @@ PEAK = 275.0
 SCALE = np.array(
     [1e-5, 0.02, 2e3, 1e-6, 1e-9, 1e-4, 0.1, 1e-4, 0.1, 1e-9, 1e-5, 1e-9, 1e-3, 0.1, 1e-9, 1e-5, 1e-9, 1e-5, 1e-9, 70.0]
 )
-"""How much each state changes, the drive last [SI]."""
+"""Typical change of each state, then of the drive [SI]."""
 
 KEPT: Mapping[str, tuple[str, ...]] = {
     "frequency of the maximum at 1.0 MPa": ("not reproduced",),
     "frequency of the maximum at 0.6 MPa": ("not reproduced",),
 }
-"""Quoted numbers that do not come back, and the verdict on each; any other comes back."""
+"""Quoted numbers that are not reproduced, and the verdict on each; all others are reproduced."""
 
 
 def flows() -> None:
@@ -67,7 +67,7 @@ def flows() -> None:
 
 
 def numerics() -> None:
-    """Check conservation, step halving, and LSODA beside us."""
+    """Check conservation, step halving, and LSODA against ours."""
 
     def augmented(state: tuple[Any, ...], rate: Any, p: Any) -> tuple[Any, ...]:
         return (*stack_derivative(state[:-1], state[-1], rate, p), rate)
@@ -151,7 +151,7 @@ DRIVE = sine_drive(PEAK, 140.0, 0.1, SAMPLE_TIME)
 
 
 def log_of(p: PiezoStackParameters, seed: int) -> Record:
-    """Return 0.1 s at 20 kHz by the bench's sensors."""
+    """Return a log of 0.1 s at 20 kHz with the bench's sensors."""
     return simulate_stack(p, DRIVE, SAMPLE_TIME, sensors=BENCH_SENSORS, rng=np.random.default_rng(seed))
 
 

@@ -1,4 +1,4 @@
-"""Requests that no honest client sends, over bare sockets: what a server answers to each, counted."""
+"""Requests that no honest client sends, over bare sockets: the server's answers to each, counted."""
 
 import random
 import socket
@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 PATIENCE = 40.0
-"""How long an answer is waited for [s]."""
+"""Maximum wait for an answer [s]."""
 
 HUGE = 1 << 30
-"""Bytes of a body that is too large."""
+"""Size of an oversized body [bytes]."""
 
 LINE = b"\r\n"
 
@@ -72,12 +72,12 @@ GARBAGE = (
 
 
 class Hostile:
-    """Clients of a server that mean harm.
+    """Hostile clients of a server.
 
     Parameters
     ----------
     host, port : str, int
-        Where the server listens.
+        Address where the server listens.
     """
 
     def __init__(self, host: str, port: int) -> None:
@@ -87,16 +87,16 @@ class Hostile:
         self._lock = threading.Lock()
 
     def attack(self, count: int, clients: int, shares: Mapping[str, float], seed: int = 0) -> None:
-        """Send requests of many kinds, many at once; `answers` counts what came back.
+        """Send requests of many kinds, many at once; `answers` counts the answers.
 
         Parameters
         ----------
         count : int
-            Requests.
+            Number of requests.
         clients : int
-            How many are open at once.
+            Number of clients at once.
         shares : Mapping[str, float]
-            How often each kind comes, relative to the others.
+            Relative frequency of each kind.
         """
         kinds: Mapping[str, Callable[[random.Random], bytes]] = {
             "traversal": self._traversal,
@@ -164,7 +164,7 @@ class Hostile:
         return self._ask(head, bytes(chance.randrange(1 << 16)))
 
     def _chunked(self, _: random.Random) -> bytes:
-        """Send a body of a gigabyte whose length is not told, until the server answers."""
+        """Send a body of a gigabyte without stating its length, until the server answers."""
         head = self._head(b"/api/logs?name=huge.csv", b"Transfer-Encoding: chunked", method=b"POST")
         block = b"%x\r\n" % (1 << 20) + bytes(1 << 20) + LINE
         with socket.create_connection(self._place, PATIENCE) as connection:
@@ -188,7 +188,7 @@ class Hostile:
             return b"taken whole"
 
     def _slow(self, _: random.Random) -> bytes:
-        """Send a header a letter at a time, until the server has had enough."""
+        """Send a header one letter at a time, until the server gives up."""
         with socket.create_connection(self._place, PATIENCE) as connection:
             for letter in self._head(b"/"):
                 try:
@@ -201,7 +201,7 @@ class Hostile:
 
 
 def first_line(connection: socket.socket) -> bytes:
-    """Return the first line of an answer, empty where the server closed without one."""
+    """Return the first line of an answer, empty if the server closed without one."""
     said = b""
     while LINE not in said:
         part = connection.recv(4096)
@@ -212,7 +212,7 @@ def first_line(connection: socket.socket) -> bytes:
 
 
 def status_of(answer: bytes) -> str:
-    """Return the HTTP status of an answer, its first signs if it has none, or ``closed`` if it is empty.
+    """Return the HTTP status of an answer, its first characters if it has none, or ``closed`` if it is empty.
 
     Examples
     --------
@@ -246,4 +246,4 @@ MIX: Mapping[str, float] = {
     "slow": 1.0,
     "polite": 10.0,
 }
-"""How often each kind comes."""
+"""Relative frequency of each kind."""

@@ -1,6 +1,6 @@
-"""The server under hostile clients, killed in the middle of its work, and with a stream of 10 kHz.
+"""The server under hostile clients, killed during its work, and with a stream of 10 kHz.
 
-`python -m benchmarks server --requests 10000 --clients 200 --seconds 600` is the whole of it; the defaults are shorter.
+`python -m benchmarks server --requests 10000 --clients 200 --seconds 600` is the full test; the defaults are shorter.
 """
 
 import argparse
@@ -16,7 +16,7 @@ MB = 1 << 20
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Print what was measured beside its targets; return how many fell short."""
+    """Print the measurements with their targets; return how many fell short."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks server")
     parser.add_argument("--requests", type=int, default=2000)
     parser.add_argument("--clients", type=int, default=200)

@@ -1,4 +1,4 @@
-"""A server in a process of its own, for benchmarks and tests: started, asked, measured, killed."""
+"""A server in its own process, for benchmarks and tests: started, queried, measured, killed."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from typing import Any, Self
 from urllib.parse import quote, urlsplit
 
 STARTED_IN = 60.0
-"""How long a server may take to listen [s]."""
+"""Time limit for a server to start listening [s]."""
 
 
 class Server:
@@ -22,9 +22,9 @@ class Server:
     Parameters
     ----------
     folder : Path
-        Where it keeps things.
+        Folder for its data.
     *options : str
-        More of the command line.
+        Additional options of the command line.
     """
 
     def __init__(self, folder: Path, *options: str) -> None:
@@ -51,7 +51,7 @@ class Server:
             self.process.stdout.close()
 
     def kill(self) -> None:
-        """End it as a power cut does."""
+        """End it abruptly, as a power cut would."""
         self.process.kill()
         self.process.wait()
 
@@ -66,14 +66,14 @@ class Server:
             connection.close()
 
     def json(self, path: str) -> Any:
-        """Return what a path answers, as JSON."""
+        """Return the JSON answer of a path."""
         status, body = self.ask("GET", path)
         if status != 200:
             raise RuntimeError(f"{path}: {status} {body[:200]!r}")
         return json.loads(body)
 
     def drop(self, name: str, content: bytes, verb: str = "estimate") -> str:
-        """Drop a log, again while the server is busy; return its identity."""
+        """Upload a log, retrying while the server is busy; return its identity."""
         while True:
             status, body = self.ask("POST", f"/api/logs?name={quote(name)}&verb={verb}", content)
             if status == 202:
@@ -83,7 +83,7 @@ class Server:
             time.sleep(0.5)
 
     def finished(self, identity: str, seconds: float = 120.0) -> Any:
-        """Return a log once the work on it is over."""
+        """Return a log once its processing is over."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             log = self.json(f"/api/logs/{identity}")
@@ -93,7 +93,7 @@ class Server:
         raise TimeoutError(f"the work on {identity} is not over after {seconds:g} s")
 
     def memory(self) -> int:
-        """Return the memory of the process that answers [bytes]."""
+        """Return the memory of the answering process [bytes]."""
         pages = int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE")
 

@@ -1,4 +1,4 @@
-"""What a server is tried with: hostile clients, a kill in the middle of uploads, a fast stream."""
+"""Trials of a server: hostile clients, a kill during uploads, a fast stream."""
 
 import socket
 import threading
@@ -24,16 +24,16 @@ from plant.sensors.sensors import BENCH
 HEADER = "time_s,motor_speed_rad_s,position_m,differential_pressure_pa\n"
 
 ROOM = ("--largest", "64", "--room", "2048")
-"""Of a server under attack."""
+"""Limits of a server under attack."""
 
 
 def moving(seconds: float, sample_time: float, seed: int = 0) -> Record:
-    """Return a log of a healthy actuator that reverses at random, of physics simple enough to be made fast.
+    """Return a log of a healthy actuator that reverses at random, with physics simple enough to compute quickly.
 
     Parameters
     ----------
     seconds : float
-        Its length [s].
+        Length of the log [s].
     sample_time : float
         Time between samples [s].
     """
@@ -56,7 +56,7 @@ def bench_log(path: Path, seconds: float = 4.0) -> bytes:
     Parameters
     ----------
     seconds : float
-        Its length [s].
+        Length of the log [s].
     """
     healthy, rng = EhaParameters(), np.random.default_rng(3)
     drive = make_drive("prbs", seconds, 1e-3, healthy, rng)
@@ -71,19 +71,19 @@ class Attacked:
     Parameters
     ----------
     answers : Mapping[str, int]
-        Kind of request and status, counted.
+        Counts by kind of request and status.
     polite : tuple of int
-        Statuses that an honest client got meanwhile, one a question.
+        Statuses that an honest client got meanwhile, one for each request.
     slowest : float
-        Longest that it waited for one [s].
+        Its longest wait for an answer [s].
     memory : tuple of int
-        Of the process that answers: before, and after each quarter of the requests [bytes].
+        Memory of the answering process: before, and after each quarter of the requests [bytes].
     most : int
-        The same at its height [bytes].
+        Peak memory of the answering process [bytes].
     strange : tuple of str
-        Files outside the server's folder that were not there before.
+        New files outside the server's folder.
     seconds : float
-        How long it took [s].
+        Duration of the attack [s].
     """
 
     answers: Mapping[str, int]
@@ -96,14 +96,14 @@ class Attacked:
 
 
 def attack(place: Path, count: int, clients: int, mix: Mapping[str, float] = MIX) -> Attacked:
-    """Attack a new server, with an honest client beside.
+    """Attack a new server while an honest client uses it too.
 
     Parameters
     ----------
     place : Path
-        An empty folder, in which the server's folder lies.
+        An empty folder that will contain the server's folder.
     count, clients : int
-        Hostile requests, and how many are open at once.
+        Number of hostile requests, and number of clients at once.
     """
     polite: list[tuple[int, float]] = []
     heights: list[int] = []
@@ -140,7 +140,7 @@ def attack(place: Path, count: int, clients: int, mix: Mapping[str, float] = MIX
 
 
 def names_around(place: Path) -> set[str]:
-    """Return the files where a log could have escaped to: beside the server's folder, above it, and in /tmp."""
+    """Return the files in places a log could have escaped to: beside the server's folder, above it, and in /tmp."""
     found = {str(one) for one in place.rglob("*") if place / "kept" not in one.parents}
     above = [*place.parents[:2], Path("/tmp"), Path.cwd()]  # noqa: S108 -- looked at, not written
     return found | {str(one) for folder in above for one in folder.iterdir() if "escaped" in one.name}
@@ -148,16 +148,16 @@ def names_around(place: Path) -> set[str]:
 
 @dataclass(frozen=True)
 class Killed:
-    """What a server knew before and after it was killed.
+    """State of a server before and after it was killed.
 
     Parameters
     ----------
     accepted, finished : int
-        Logs that it had taken, and that were done, at the kill [count].
+        Logs that were accepted, and that were finished, at the kill [count].
     lost : tuple of str
-        Finished ones whose result or page was another afterwards, or gone.
+        Finished logs whose result or page was changed or gone afterwards.
     unfinished : tuple of str
-        Accepted ones that the next server neither finished nor said to be interrupted.
+        Accepted logs that the next server neither finished nor reported as interrupted.
     """
 
     accepted: int
@@ -167,16 +167,16 @@ class Killed:
 
 
 def kill(place: Path, uploads: int, after: int) -> Killed:
-    """Kill a server in the middle of uploads and start it again.
+    """Kill a server during uploads and start it again.
 
     Parameters
     ----------
     place : Path
         An empty folder.
     uploads : int
-        Logs that are dropped, several at once.
+        Number of uploaded logs, several at once.
     after : int
-        Finished logs at which it is killed.
+        Number of finished logs at which it is killed.
     """
     content = bench_log(place / "run.csv")
     accepted: list[str] = []
@@ -213,22 +213,23 @@ def kill(place: Path, uploads: int, after: int) -> Killed:
 
 
 def result_of(server: Server, identity: str) -> tuple[Any, bytes]:
-    """Return result and page of a log, what went wrong where there is none."""
+    """Return result and page of a log, or the error if there is none."""
     return server.ask("GET", f"/api/logs/{identity}/result"), server.ask("GET", f"/logs/{identity}")[1]
 
 
 @dataclass(frozen=True)
 class Streamed:
-    """What a server made of a stream.
+    """Results of a server with a stream.
 
     Parameters
     ----------
     sent, taken, gaps : int
-        Rows that were sent and that came, and gaps that were seen [count].
+        Rows sent, rows received, and gaps detected [count].
     share : float
-        Processor time of the server and its processes over time [fraction of a core], after the first ten seconds.
+        Processor time of the server and its processes relative to elapsed time [fraction of a core], after the first
+        ten seconds.
     behind : float
-        How long after the last row it had taken all [s].
+        Delay from the last row until all were processed [s].
     """
 
     sent: int
@@ -239,14 +240,14 @@ class Streamed:
 
 
 def stream(place: Path, seconds: float, rate: float) -> Streamed:
-    """Send a stream to a server in real time, with a view of it open.
+    """Send a stream to a server in real time, with a viewer connected.
 
     Parameters
     ----------
     seconds : float
-        For how long [s].
+        Duration [s].
     rate : float
-        Rows a second [1/s].
+        Rows per second [1/s].
     """
     with feeding(seconds, rate) as (address, sent), Server(place / "kept", "--watch", f"bench={address}") as server:
         looking = threading.Thread(target=look_on, args=(server,), daemon=True)
@@ -264,7 +265,7 @@ def stream(place: Path, seconds: float, rate: float) -> Streamed:
 
 
 def settled(server: Server, rows: int) -> Any:
-    """Return the last gauges once all rows have come, or nothing more does."""
+    """Return the last gauges once all rows have arrived, or no more arrive."""
     until = time.monotonic() + 20.0
     gauges = server.json("/api/streams/bench")["gauges"]
     while (gauges is None or gauges["rows"] < rows) and time.monotonic() < until:
@@ -283,7 +284,7 @@ def look_on(server: Server) -> None:
 
 @dataclass
 class Sent:
-    """How far a bench is: rows sent, and when it began and ended [s]."""
+    """Progress of a bench: rows sent, and start and end time [s]."""
 
     rows: int = 0
     began: float = 0.0
@@ -292,7 +293,7 @@ class Sent:
 
 @contextmanager
 def feeding(seconds: float, rate: float) -> Iterator[tuple[str, Sent]]:
-    """Send rows in real time to the first who connects; yields the address and how far it is."""
+    """Send rows in real time to the first client that connects; yields the address and the progress."""
     record = moving(20.0, 1.0 / rate)
     columns = [record[name] for name in ("motor_speed_rad_s", "position_m", "differential_pressure_pa")]
     bodies = [f"{a:.6g},{b:.9g},{c:.7g}\n" for a, b, c in zip(*columns, strict=True)]

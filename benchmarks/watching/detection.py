@@ -1,8 +1,8 @@
-"""Detection in time on the circuit: delay after an abrupt fault, false alarms at a set rate, time a sample.
+"""Online detection on the circuit: delay after an abrupt fault, false alarms at a set rate, time per sample.
 
-A watch learns healthy running of one seed; faults and false alarms are judged on drive and noise of others. ``--hours``
-sets the healthy running that is judged (30 is the acceptance), ``--seeds`` the faults a condition, ``--streams`` the
-hours that are watched after two minutes.
+A watch learns the healthy running of one seed; faults and false alarms are evaluated with drive and noise of other
+seeds. ``--hours`` sets the healthy running to evaluate (30 for acceptance), ``--seeds`` the faults for each condition,
+``--streams`` the number of one-hour streams watched after two minutes.
 """
 
 import argparse
@@ -27,7 +27,7 @@ SEED = 2031
 
 
 def delays(seeds: int) -> int:
-    """Print the delay of every fault; return the count of misses."""
+    """Print the delay of every fault; return the number of misses."""
     running, watch = learnt(SEED, LEARNING_HOURS)
     misses = 0
     for condition in FAULTS:
@@ -46,7 +46,7 @@ def delays(seeds: int) -> int:
 
 
 def alarms(hours: float) -> int:
-    """Print the false alarms at one an hour; return whether they miss."""
+    """Print the false alarms at one per hour; return whether they miss the target."""
     running, watch = learnt(SEED + 1, LEARNING_HOURS)
     count = len(false_alarms(running, watch, hours))
     rate, (low, high) = alarm_rate(count, hours)
@@ -59,7 +59,7 @@ def alarms(hours: float) -> int:
 
 
 def cold(streams: int) -> None:
-    """Print the false alarms of streams of an hour that are watched after two minutes; no target is set."""
+    """Print the false alarms of one-hour streams watched after two minutes; there is no target."""
     counts, hours = {True: 0, False: 0}, streams * (1.0 - LEARNING / 3600.0)
     for seed in range(SEED + 2, SEED + 2 + streams):
         running = CircuitStream(seed)
@@ -77,7 +77,7 @@ def cold(streams: int) -> None:
 
 
 def speed() -> int:
-    """Print the CPU time a sample at 10 kHz, of a second at a time; return whether a core does not keep up."""
+    """Print the CPU time per sample at 10 kHz, in blocks of one second; return whether one core cannot keep up."""
     samples = np.repeat(CircuitStream(SEED).run(PIECE), round(SAMPLE_TIME / FAST), axis=0)
     watch = Watch(CircuitParameters(), FAST)
     watch.take(samples[:20000])

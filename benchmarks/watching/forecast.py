@@ -1,10 +1,10 @@
-"""Forecasts and alarms on simulated fleets: coverage of crossing times, lead of alarms, false alarms.
+"""Forecasts and alarms on simulated fleets: coverage of crossing times, lead time of alarms, false alarms.
 
-What grows does not grow as the filter believes: at a steady rate, exponentially, at a rate that wanders, in bursts, or
-until it stops short of the limit. Healthy actuators stay where they are, or wander as oil and weather do. Each log has
-a standard deviation of its own, scatters beyond it, and is grossly wrong once in a hundred. A forecast is judged every
-fifth log from the alarm to the crossing. An alarm is false where nothing has grown over the last ten logs. Alarms on
-what grows, and then stops short of the limit, are counted by themselves.
+Growth does not follow the filter's model: it is steady, exponential, of varying rate, in bursts, or stops short of the
+limit. Healthy actuators stay constant, or drift with oil and weather. Each log has its own standard deviation, scatters
+beyond it, and has a gross error once in a hundred. A forecast is evaluated every fifth log from the alarm to the
+crossing. An alarm is false if nothing has grown over the last ten logs. Alarms on growth that stops short of the limit
+are counted separately.
 """
 
 import argparse
@@ -20,10 +20,10 @@ from plant.arrays import Array
 GROWING = ("steady", "exponential", "wandering rate", "bursts", "stopping")
 SOUND = ("healthy", "wandering level")
 LOGS, AHEAD = 60, 240
-"""Logs that are seen, and logs to which the truth goes on [count]."""
+"""Observed logs, and further logs over which the truth continues [count]."""
 
 RECENT = 10
-"""Logs over which a true alarm has seen growth [count]."""
+"""Number of recent logs in which a true alarm must have seen growth [count]."""
 
 
 def level(kind: str, rng: np.random.Generator) -> Array:
@@ -52,7 +52,7 @@ def level(kind: str, rng: np.random.Generator) -> Array:
 
 
 def measured(truth: Array, rng: np.random.Generator) -> Series:
-    """Return what the logs say of a severity."""
+    """Return the logged values of a severity."""
     shape = LOGS
     stds = np.exp(rng.uniform(np.log(0.02), np.log(0.1)) + 0.3 * rng.standard_normal(shape))
     wrong = np.where(rng.random(shape) < 0.01, 0.7 * rng.standard_normal(shape), 0.0)
@@ -73,7 +73,7 @@ class Tally:
 
 
 def judge(kind: str, rng: np.random.Generator, tally: Tally) -> None:
-    """Watch one actuator until its limit is crossed, and add the result."""
+    """Watch one actuator until it crosses its limit, and add the result."""
     truth = level(kind, rng)
     crossed = _crossing(truth)
     alarm: int | None = None
@@ -95,7 +95,7 @@ def judge(kind: str, rng: np.random.Generator, tally: Tally) -> None:
 
 
 def _crossing(truth: Array) -> float:
-    """Return when the truth first reaches the limit [log], between two logs on a straight line."""
+    """Return when the truth first reaches the limit [log], with linear interpolation between two logs."""
     past = np.flatnonzero(truth >= 1.0)
     if not len(past):
         return np.inf

@@ -1,9 +1,9 @@
-"""Slow leakage beside warming oil: false alarms of healthy running, and delays where leakage grows to minor.
+"""Slow leakage with warming oil: false alarms in healthy running, and delays when leakage grows to minor.
 
-One healthy circuit runs on while its oil warms and cools, watched with and without pressure, at one false alarm an
-hour and one a day. Now and then it is copied, and in the copy leakage grows to minor over 1, 10 and 60 minutes.
-``--hours`` sets the healthy running after an hour learnt (30 is the acceptance), ``--seeds`` the copies spread over it
-(50).
+One healthy circuit runs while its oil warms and cools. It is watched with and without pressure, at one false alarm per
+hour and one per day. At intervals it is copied, and in the copy leakage grows to minor over 1, 10 and 60 minutes.
+``--hours`` sets the healthy running after one hour of learning (30 for acceptance), ``--seeds`` the number of copies
+spread over it (50).
 """
 
 import argparse
@@ -26,26 +26,26 @@ RATES = {"one an hour": 1.0, "one a day": 1.0 / 24.0}
 """Rates of false alarms [1/h]."""
 
 MINUTES = (1, 10, 60)
-"""Times in which leakage grows to minor [min]."""
+"""Times over which leakage grows to minor [min]."""
 
 LONGER = 10
-"""How long a leak that is minor is watched [min]."""
+"""How long a leak is watched after it has become minor [min]."""
 
 Watches = dict[tuple[bool, str], Watch]
 
 
 @dataclass(frozen=True)
 class Told:
-    """What a watch said of growing leakage.
+    """Reports of a watch on growing leakage.
 
     Parameters
     ----------
     delay : float
-        From the beginning of growth to the alarm of lost flow [s]; infinite if there was none.
+        Delay from the beginning of growth to the alarm of lost flow [s]; infinite if there was none.
     sooner : bool
-        Whether a balance had raised an alarm before.
+        Whether a balance raised an alarm earlier.
     covered : bool
-        Whether the interval of the beginning holds it.
+        Whether the interval for the beginning covers it.
     """
 
     delay: float = float("inf")
@@ -54,7 +54,7 @@ class Told:
 
 
 def growing(running: CircuitStream, watches: dict[bool, Watch], minutes: int, seed: int) -> dict[bool, Told]:
-    """Let leakage grow in a copy of a healthy stream, until every watch has told of it; return what they said."""
+    """Let leakage grow in a copy of a healthy stream until every watch has reported it; return the reports."""
     running, watches = deepcopy((running, watches))
     running.reseed(stream(seed, "growth", str(minutes)))
     running.growth = 1.0 / (60.0 * minutes)
@@ -76,7 +76,7 @@ def growing(running: CircuitStream, watches: dict[bool, Watch], minutes: int, se
 
 
 def healthy(count: int, rate: float, hours: float, balances: dict[str, int], which: str) -> int:
-    """Print false alarms beside the band that holds 95 % of counts at the rate; return whether they are outside."""
+    """Print false alarms with the band that holds 95 % of counts at the rate; return whether they are outside."""
     low, high = (int(end) for end in poisson.interval(0.95, rate * hours))
     right = keep(Check(f"{which}: false alarms in {hours:g} h", count, low, high)).met
     said = ", ".join(f"{name} {times}" for name, times in balances.items() if times) or "none"

@@ -1,7 +1,7 @@
-"""Rows at 10 kHz through a real broker into a watch, for ten minutes: how many are lost, how late, at what cost.
+"""Rows at 10 kHz through a real broker into a watch, for ten minutes: losses, delay, and cost.
 
-The publisher is a process of its own and sends batches of a tenth of a second, on time. The broker holds any number,
-so what is lost would be lost here.
+The publisher is a process of its own and sends batches of a tenth of a second, on time. The broker buffers any number,
+so any loss would occur here.
 """
 
 import argparse
@@ -52,7 +52,7 @@ def publish(port: int, seconds: float) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Print what came; return 1 if a row is missing."""
+    """Print what arrived; return 1 if a row is missing."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=600.0)
     seconds = parser.parse_args(arguments).seconds

@@ -1,4 +1,4 @@
-"""How soon a watch sees a fault, and how often it is wrong, on the circuit while its oil warms and cools."""
+"""Detection delay of a watch, and its errors, on the circuit while its oil warms and cools."""
 
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -23,36 +23,36 @@ SAMPLE_TIME = 1e-3
 """Time between samples of the log [s]."""
 
 PIECE = 60.0
-"""Time simulated at once; oil properties run linearly through it [s]."""
+"""Time simulated at once; oil properties vary linearly through it [s]."""
 
 PERIOD = 10.0
-"""Length of a random binary sequence, after which the piston is back [s]."""
+"""Length of a random binary sequence, after which the piston has returned [s]."""
 
 SWING = 15.0
-"""Largest departure of oil temperature from the one at which the parameters hold [K]."""
+"""Largest deviation of oil temperature from the one at which the parameters hold [K]."""
 
 DUTY = 1200.0
-"""Time for which the oil is drawn to one temperature [s]."""
+"""Time during which the oil approaches one temperature [s]."""
 
 THERMAL_LAG = 900.0
 """Time constant of the oil's temperature [s], judged: some litres with their metal."""
 
 VISCOSITY_SLOPE = 0.03
-"""Relative fall of viscosity a kelvin [1/K]: an ISO VG 46 oil has 46 mm^2/s at 40 degC and 6.8 at 100 degC."""
+"""Relative decrease of viscosity per kelvin [1/K]: an ISO VG 46 oil has 46 mm^2/s at 40 degC and 6.8 at 100 degC."""
 
 MODULUS_SLOPE = 0.005
-"""Relative fall of bulk modulus a kelvin [1/K], judged."""
+"""Relative decrease of bulk modulus per kelvin [1/K], judged."""
 
 
 def at_oil_temperature(base: CircuitParameters, warmer: float) -> CircuitParameters:
-    """Return the circuit with its oil warmer: leakage is inverse to viscosity, viscous friction proportional to it.
+    """Return the circuit with warmer oil: leakage is inverse to viscosity, viscous friction proportional to it.
 
     Parameters
     ----------
     base : CircuitParameters
         The circuit at its usual temperature.
     warmer : float
-        Temperature over that [K].
+        Temperature above the usual one [K].
 
     Examples
     --------
@@ -71,19 +71,19 @@ def at_oil_temperature(base: CircuitParameters, warmer: float) -> CircuitParamet
 
 
 class CircuitStream:
-    """The circuit under an endless random binary drive, its oil drawn to a new temperature now and then.
+    """The circuit under an endless random binary drive; its oil approaches a new temperature at intervals.
 
     Parameters
     ----------
     seed : int
         Seed of drive, temperatures and sensor noise.
     condition : str
-        Condition in which it begins.
+        Initial condition.
 
     Attributes
     ----------
     growth : float
-        By what the severity of leakage grows, up to minor, which is 1; from ``condition`` "normal" alone [1/s].
+        Growth rate of the severity of leakage, up to minor, which is 1; only from ``condition`` "normal" [1/s].
     """
 
     def __init__(self, seed: int, condition: str = "normal") -> None:
@@ -94,17 +94,17 @@ class CircuitStream:
         self._state: Array | None = None
 
     def run(self, seconds: float) -> Array:
-        """Run on.
+        """Continue the run.
 
         Parameters
         ----------
         seconds : float
-            For how long [s], at most `PIECE`.
+            Duration [s], at most `PIECE`.
 
         Returns
         -------
         ndarray, shape (n, 3)
-            Motor speed [rad/s], position [m] and differential pressure [Pa], as the rig's sensors have them.
+            Motor speed [rad/s], position [m] and differential pressure [Pa], as the rig's sensors measure them.
         """
         if not 0.0 < seconds <= PIECE:
             raise HydrostateError(f"a piece must be over 0 and at most {PIECE:g} s, got {seconds:g} s")
@@ -130,7 +130,7 @@ class CircuitStream:
         return np.column_stack([record[name] for name in names])
 
     def reseed(self, rng: np.random.Generator) -> None:
-        """Go on from here with other drive and noise."""
+        """Continue from here with different drive and noise."""
         self._rng = rng
 
     def _circuit(self) -> CircuitParameters:
@@ -155,7 +155,7 @@ class CircuitStream:
 
 @dataclass(frozen=True)
 class Found:
-    """What a watch made of an abrupt fault.
+    """Result of a watch for an abrupt fault.
 
     Parameters
     ----------
@@ -164,11 +164,11 @@ class Found:
     delay : float
         From the fault to the alarm [s]; infinite if there was none.
     balance : str
-        Balance that raised it, empty if none.
+        Balance that raised the alarm, empty if none.
     late : float
-        By how much the change time is after the fault [s].
+        Delay of the estimated change time after the fault [s].
     covered : bool
-        Whether its interval holds the fault.
+        Whether its interval covers the time of the fault.
     """
 
     condition: str
@@ -186,9 +186,9 @@ def learnt(seed: int, hours: float, false_alarms: float = 1.0) -> tuple[CircuitS
     seed : int
         Seed of the run.
     hours : float
-        How long it runs [h].
+        Length of the run [h].
     false_alarms : float
-        Rate set [1/h].
+        Set rate of false alarms [1/h].
     """
     running = CircuitStream(seed)
     watch = Watch(CircuitParameters(), SAMPLE_TIME, false_alarms=false_alarms, learning=3600.0 * hours)
@@ -203,27 +203,27 @@ def false_alarms(running: CircuitStream, watch: Watch, hours: float) -> list[Ala
     Parameters
     ----------
     watch : Watch
-        Its watch, which has learnt.
+        Watch of the stream, after learning.
     hours : float
-        How long it runs [h].
+        Length of the run [h].
     """
     events = [event for _ in range(round(3600.0 * hours / PIECE)) for event in watch.take(running.run(PIECE))]
     return [event for event in events if isinstance(event, Alarm)]
 
 
 def detect_fault(running: CircuitStream, watch: Watch, condition: str, seed: int, seconds: float = 5.0) -> Found:
-    """Let a fault come in a copy of a healthy stream, at a time of the seed's choosing.
+    """Introduce a fault into a copy of a healthy stream, at a time drawn from the seed.
 
     Parameters
     ----------
     running : CircuitStream
-        The healthy stream; it is not moved on.
+        The healthy stream; it is not advanced.
     watch : Watch
-        Its watch.
+        Watch of the stream.
     condition : str
-        The condition that comes.
+        The faulty condition.
     seed : int
-        Seed of when, and of drive and noise from here on.
+        Seed of the fault's time, and of drive and noise from here on.
     seconds : float
         How long to wait for an alarm [s].
     """

@@ -1,10 +1,10 @@
-"""A piezo diaphragm as a composite thin plate: what pressure and voltage bend, and how it would ring dry.
+"""A piezo diaphragm as a composite thin plate: bending by pressure and voltage, and dry natural modes.
 
-In place of the diaphragm-motor paper's finite elements and of its equation 14, a bimorph's formula (errata M14): a
-brass disc clamped at its rim with a smaller ceramic disc on it, Table 1. Thin-plate theory with stretching and bending
-coupled where the ceramic lies; within each of the two regions the solution is in closed form, and six constants join
-them. Source: Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd edition, sections 15 to 17; Reddy,
-Mechanics of Laminated Composite Plates and Shells, 2nd edition, section 3.3.
+It replaces the diaphragm-motor paper's finite elements and its equation 14, a bimorph's formula (errata M14). The model
+is a brass disc clamped at its rim with a smaller ceramic disc on it, Table 1. Thin-plate theory couples stretching and
+bending in the ceramic region. The solution in each of the two regions is in closed form, and six constants join them.
+Source: Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd edition, sections 15 to 17; Reddy, Mechanics
+of Laminated Composite Plates and Shells, 2nd edition, section 3.3.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ HANDBOOK = "handbook value, errata M22"
 
 @dataclass(frozen=True, kw_only=True)
 class PlateParameters:
-    """A brass disc with a ceramic disc on one face, clamped at a radius; the motor's by default.
+    """A brass disc with a ceramic disc on one face, clamped at a radius; the motor's diaphragm by default.
 
     Raises
     ------
@@ -64,18 +64,18 @@ class PlateParameters:
 
 
 class PlateCoefficients(NamedTuple):
-    """Coefficients of a diaphragm: volume and centre deflection by pressure and voltage.
+    """Coefficients of a diaphragm: displaced volume and centre deflection per pressure and per voltage.
 
     Parameters
     ----------
     compliance : float
-        Volume a pascal, C_d [m^3/Pa].
+        Volume per pascal, C_d [m^3/Pa].
     volume_a_volt : float
-        Volume a volt without pressure, d_V [m^3/V].
+        Volume per volt without pressure, d_V [m^3/V].
     deflection_a_pascal : float
-        Deflection of the centre a pascal, w_p [m/Pa].
+        Centre deflection per pascal, w_p [m/Pa].
     deflection_a_volt : float
-        Deflection of the centre a volt without pressure, w_V [m/V].
+        Centre deflection per volt without pressure, w_V [m/V].
     """
 
     compliance: float
@@ -90,7 +90,7 @@ class PlateMode(NamedTuple):
     Parameters
     ----------
     diameters, circles : int
-        Nodal diameters, nodal circles without the rim.
+        Number of nodal diameters, and of nodal circles excluding the rim.
     root : float
         lambda^2 of ``f = lambda^2 / (2 pi a^2) sqrt(D / m)`` [dimensionless].
     frequency : float
@@ -104,7 +104,7 @@ class PlateMode(NamedTuple):
 
 
 class _Region(NamedTuple):
-    """Stretching, coupling and bending stiffness about the brass's middle plane, and a volt's force and moment."""
+    """Stretching, coupling and bending stiffness about the brass's middle plane, and force and moment per volt."""
 
     stretch: float
     couple: float
@@ -130,9 +130,9 @@ def _regions(p: PlateParameters) -> tuple[_Region, _Region]:
 
 
 def _shares(region: _Region, nu: float, r: float, pressure: float) -> tuple[Array, Array, Array]:
-    """Return, at a radius, (u, slope, N, M) for the constants (c r, c/r, d r, d/r), for pressure, and for a volt.
+    """Return (u, slope, N, M) at a radius for the constants (c r, c/r, d r, d/r), for pressure, and for one volt.
 
-    Slope is -w'; pressure adds the slope ``-p r^3 / (16 D*)`` and the stretch that coupling asks for.
+    Slope is -w'. Pressure adds the slope ``-p r^3 / (16 D*)`` and the stretch that the coupling requires.
     """
     a, b, d = region.stretch, region.couple, region.bend
     swell, shrink = 1.0 + nu, -(1.0 - nu) / r**2
@@ -151,7 +151,7 @@ def _shares(region: _Region, nu: float, r: float, pressure: float) -> tuple[Arra
 
 
 class _Bent(NamedTuple):
-    """Constants of the two regions' closed forms: what grows with r, what falls with it, and what pressure adds."""
+    """Constants of the closed form in the two regions: terms that grow with r, that fall with r, and of pressure."""
 
     inner: float
     outer: float
@@ -161,7 +161,7 @@ class _Bent(NamedTuple):
 
 
 def _bent(p: PlateParameters, pressure: float, volts: float) -> _Bent:
-    """Return the bending of the plate under pressure on the ceramic's side and voltage."""
+    """Return the bending of the plate under a voltage and a pressure on the ceramic's side."""
     covered, bare = _regions(p)
     nu, b, a = p.poisson_ratio, p.ceramic_radius, p.clamp_radius
     inner, inner_load, inner_volt = _shares(covered, nu, b, pressure)
@@ -179,7 +179,7 @@ def _bent(p: PlateParameters, pressure: float, volts: float) -> _Bent:
 
 
 def _volume(p: PlateParameters, bent: _Bent) -> float:
-    """Return the volume [m^3]: pi times the integral of slope r^2."""
+    """Return the displaced volume [m^3]: pi times the integral of slope r^2."""
     b, a = p.ceramic_radius, p.clamp_radius
     outer = 0.25 * bent.outer * (a**4 - b**4) + 0.5 * bent.outer_inverse * (a**2 - b**2)
     outer += bent.turned_outer * (a**6 - b**6) / 6.0
@@ -192,11 +192,11 @@ def plate_deflection(p: PlateParameters, pressure: float, volts: float, radii: A
     Parameters
     ----------
     pressure : float
-        On the ceramic's side [Pa].
+        Pressure on the ceramic's side [Pa].
     volts : float
-        Across the ceramic [V].
+        Voltage across the ceramic [V].
     radii : ndarray, shape (n,)
-        Distances from the centre, at most the clamp's [m].
+        Distances from the centre, at most the clamp radius [m].
 
     Returns
     -------
@@ -243,7 +243,7 @@ def clamped_plate_roots(count: int) -> list[tuple[int, int, float]]:
     Returns
     -------
     list of tuple of int, int and float
-        Nodal diameters, nodal circles, lambda^2; rising.
+        Nodal diameters, nodal circles, lambda^2; in rising order.
 
     Examples
     --------
@@ -265,10 +265,10 @@ def clamped_plate_roots(count: int) -> list[tuple[int, int, float]]:
 
 
 def plate_modes(p: PlateParameters, count: int = 6) -> list[PlateMode]:
-    """Return the first modes of the dry diaphragm, as a uniform plate of its static stiffness and its mean mass.
+    """Return the first modes of the dry diaphragm, as a uniform plate with its static stiffness and mean mass.
 
-    In place of the paper's finite-element figures; liquid lowers them all. Source: Leissa, Vibration of Plates (1969),
-    section 2.1.
+    They replace the paper's finite-element figures; liquid lowers all frequencies. Source: Leissa, Vibration of Plates
+    (1969), section 2.1.
 
     Examples
     --------
@@ -284,21 +284,23 @@ def plate_modes(p: PlateParameters, count: int = 6) -> list[PlateMode]:
 
 
 def mode_shape(mode: PlateMode, radii: Array, angles: Array) -> Array:
-    """Return the shape in which a clamped round plate rings. Source: Leissa, Vibration of Plates (1969), section 2.1.
+    """Return the shape of a vibration mode of a clamped round plate.
+
+    Source: Leissa, Vibration of Plates (1969), section 2.1.
 
     Parameters
     ----------
     mode : PlateMode
-        Of `plate_modes`.
+        Mode from `plate_modes`.
     radii : ndarray, shape (n,)
-        Distances from the centre over the clamp's radius, 0 to 1 [dimensionless].
+        Distances from the centre divided by the clamp radius, 0 to 1 [dimensionless].
     angles : ndarray, shape (n,)
-        From the line along which it moves most [rad].
+        Angles from the line of largest deflection [rad].
 
     Returns
     -------
     ndarray, shape (n,)
-        Deflection over the largest of those asked for [dimensionless].
+        Deflection divided by the largest one returned [dimensionless].
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Steady operation of the diaphragm motor: mean flow, velocity, and each electrode's tone (section 7)."""
+"""Steady operation of the diaphragm motor: mean flow, velocity, and the phasor of each electrode (section 7)."""
 
 from dataclasses import dataclass, replace
 from math import ceil, pi
@@ -11,21 +11,21 @@ from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import LONGEST_STEP, motor_drive, run_motor
 
 SETTLING = 0.08
-"""Time that a run is given to settle, in whole cycles at least as long [s]."""
+"""Settling time of a run, rounded up to whole cycles [s]."""
 
 MEASURED = 0.04
-"""Time over which a settled run is averaged, in whole cycles at least as long [s]."""
+"""Averaging time after settling, rounded up to whole cycles [s]."""
 
 FEWEST_CYCLES = 10
-"""Fewest cycles that are averaged."""
+"""Minimum number of cycles in an average."""
 
 OPEN_PORT = 1e-3
-"""Conductance of a land that takes next to no pressure [m^3/(s Pa^0.5)]."""
+"""Conductance of a valve land with negligible pressure drop [m^3/(s Pa^0.5)]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OperatingPoint:
-    """Averages of a settled run over whole cycles.
+    """Averages over whole cycles of a settled run.
 
     Parameters
     ----------
@@ -34,11 +34,12 @@ class OperatingPoint:
     velocity : float
         Mean velocity of the piston [m/s].
     pressure : float
-        Mean of side A's pressure less side B's [Pa].
+        Mean pressure of side A minus side B [Pa].
     tones : ndarray of complex, shape (7,)
-        Electrodes' voltages at the drive's frequency, against the first diaphragm's drive: amplitude [V] and phase.
+        Phasors of the electrode voltages at the drive frequency: amplitude [V] and phase relative to the first
+        diaphragm's drive.
     second_tones : ndarray of complex, shape (7,)
-        The same at twice the frequency.
+        Phasors at twice the drive frequency.
     """
 
     inlet_flow: float
@@ -50,18 +51,18 @@ class OperatingPoint:
 
 
 def pump_alone(parameters: DiaphragmMotorParameters) -> DiaphragmMotorParameters:
-    """Return the motor with its pump running freely to tank, as its flow is measured (section 7.1).
+    """Return the motor with its pump running freely to tank, the condition in which flow is measured (section 7.1).
 
     Returns
     -------
     DiaphragmMotorParameters
-        The same with the directional valve at its centre and no pressure lost in it.
+        The same motor with a centred directional valve that causes no pressure drop.
     """
     return replace(parameters, spool=0.0, land_conductance=OPEN_PORT)
 
 
 def tone(values: Array, sample_time: float, frequency: float, start: float = 0.0) -> Tones:
-    """Return the sine of a frequency in whole cycles of a signal, by its Fourier coefficient (section 7.1).
+    """Return the phasor of one frequency over whole cycles of a signal, by its Fourier coefficient (section 7.1).
 
     Parameters
     ----------
@@ -70,9 +71,9 @@ def tone(values: Array, sample_time: float, frequency: float, start: float = 0.0
     sample_time : float
         Seconds between samples [s].
     frequency : float
-        Of the sine [Hz].
+        Frequency of the sine [Hz].
     start : float
-        Time of the first sample on the clock that phases are against [s].
+        Time of the first sample on the clock that defines the phase [s].
 
     Returns
     -------
@@ -102,11 +103,11 @@ def operate(
     Parameters
     ----------
     frequency : float
-        Of the drive [Hz].
+        Drive frequency [Hz].
     peak_to_peak : float
-        Swing of the drive [V].
+        Peak-to-peak drive voltage [V].
     longest_step : float
-        Longest step [s]; a whole count of steps makes a cycle.
+        Longest step [s]; each cycle has a whole number of steps.
     start : ndarray, shape (28,), optional
         Initial state; at rest if not given.
 

@@ -1,9 +1,9 @@
 """The seven-chamber piezo diaphragm motor: diaphragms in series, eight check valves, 4/3 valve, double-acting cylinder.
 
-Equations 1, 2, 15, 16, 20 and 21 of the diaphragm-motor paper with errata M1 to M22, as the physics that they stand
-for: each chamber's balance of volume, each port's momentum, the piston's motion. Neighbouring diaphragms are driven
-180 degrees apart. The law of hysteresis is odd, so that neighbours' loops are each other's mirror image and one state
-serves all seven. Pressures are above the tank's.
+Equations 1, 2, 15, 16, 20 and 21 of the diaphragm-motor paper with errata M1 to M22, written as the physics behind
+them: the volume balance of each chamber, the momentum of each port, and the motion of the piston. Neighbouring
+diaphragms are driven 180 degrees apart. The hysteresis law is odd: the loops of neighbours mirror each other, so one
+state serves all seven. Pressures are relative to the tank.
 """
 
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ STATES = (
     "velocity_m_s",
     "position_m",
 )
-"""The states; flows and openings of the check valves from the inlet on."""
+"""The states; flows and openings of the check valves are ordered from the inlet."""
 
 PRESSURES = slice(0, DIAPHRAGMS)
 HYSTERESIS = DIAPHRAGMS
@@ -47,7 +47,7 @@ POLARITY = tuple(1.0 if i % 2 == 0 else -1.0 for i in range(DIAPHRAGMS))
 """Sign of each diaphragm's drive: neighbours are 180 degrees apart (section 2)."""
 
 END_STIFFNESS, END_DAMPING = 1e6, 20.0
-"""Of the cylinder's ends [N/m], [s/m]."""
+"""Stiffness and damping of the cylinder's end stops [N/m], [s/m]."""
 
 _NAMES: Mapping[str, list[str]] = {
     field.name: [f"{field.name}_{i}" for i in range(1, ROWS[field.name] + 1)] if field.name in ROWS else [field.name]
@@ -55,7 +55,7 @@ _NAMES: Mapping[str, list[str]] = {
 }
 
 MotorRow = make_dataclass("MotorRow", [(name, float) for names in _NAMES.values() for name in names])
-"""The parameters as compiled kernels take them: each of a row's values has a name of its own."""
+"""The parameters as compiled kernels take them: each value of a row has its own name."""
 
 
 def motor_row(p: DiaphragmMotorParameters) -> Array:
@@ -64,30 +64,30 @@ def motor_row(p: DiaphragmMotorParameters) -> Array:
     Returns
     -------
     ndarray, shape (parameters,)
-        Their values in SI.
+        Parameter values in SI.
     """
     return np.concatenate([np.atleast_1d(np.asarray(getattr(p, field.name), np.float64)) for field in fields(p)])
 
 
 def gathered(flat: Any) -> SimpleNamespace:
-    """Return the parameters with their rows together again, from names such as ``valve_leak_3`` (Table 1).
+    """Return the parameters with their rows reassembled from names such as ``valve_leak_3`` (Table 1).
 
     Parameters
     ----------
     flat : namespace
-        Values or symbols by the names of `MotorRow`.
+        Values or symbols with the names of `MotorRow`.
 
     Returns
     -------
     namespace
-        The same by the names of `DiaphragmMotorParameters`.
+        The same values with the names of `DiaphragmMotorParameters`.
     """
     rows = {name: tuple(getattr(flat, one) for one in names) for name, names in _NAMES.items()}
     return SimpleNamespace(**{name: row if name in ROWS else row[0] for name, row in rows.items()})
 
 
 def _drops(pressures: State, outlet: Scalar) -> list[Scalar]:
-    """Return the pressure over each check valve, from the tank through the chambers to the fed side."""
+    """Return the pressure drop across each check valve, from the tank through the chambers to the supplied side."""
     nodes = [0.0, *pressures, outlet]
     return [before - behind for before, behind in pairwise(nodes)]
 
@@ -100,7 +100,7 @@ def _targets(drops: list[Scalar], p: Any) -> list[Scalar]:
 
 
 def _drags(openings: State, p: Any) -> list[Scalar]:
-    """Return each port's quadratic drag; the feeding land stands behind the last check valve."""
+    """Return the quadratic drag of each port; the supplying land is in series with the last check valve."""
     drags = [orifice_drag(s, p.port_area, p.discharge_coefficient, p.density) for s in openings]
     return [*drags[:-1], drags[-1] + 1.0 / (p.land_conductance * p.land_conductance)]
 
@@ -114,7 +114,7 @@ def _compliances(pressures: State, p: Any) -> list[Scalar]:
 
 
 def _side_inflows(feed: Scalar, velocity: Scalar, leaked: Scalar, p: Any) -> tuple[Scalar, Scalar]:
-    """Return the flows into sides A and B, but for what returns to tank."""
+    """Return the flows into sides A and B, excluding the return flow to tank."""
     swept = p.piston_area * velocity
     return fed_pressure(p.spool, feed, 0.0) - swept - leaked, fed_pressure(p.spool, 0.0, feed) + swept + leaked
 
@@ -124,7 +124,7 @@ def _side_compliance(p: Any) -> Scalar:
 
 
 def _force(side_a: Scalar, side_b: Scalar, velocity: Scalar, position: Scalar, p: Any) -> Scalar:
-    """Return the force on the piston: equation 2 with errata M2, without its inertia."""
+    """Return the force on the piston, excluding its inertia: equation 2 with errata M2."""
     rubbed = p.viscous_friction * velocity + p.coulomb_friction * tanh(velocity / p.friction_speed)
     sprung = p.spring_stiffness * position + p.cubic_stiffness * position * position * position
     stopped = end_stop_force(position, velocity, p.half_stroke, END_STIFFNESS, END_DAMPING)
@@ -144,12 +144,12 @@ def motor_derivative(state: State, rate: Scalar, p: Any) -> State:
     state : tuple of float or Expression
         As named in `STATES`, in SI.
     rate : float or Expression
-        Rate of the drive voltage [V/s]; the voltage itself acts through it alone.
+        Rate of the drive voltage [V/s]; the voltage acts only through its rate.
 
     Returns
     -------
     tuple of float or Expression
-        Rates of the states, each a second.
+        Rates of the states, per second.
     """
     pressures, flows, openings = state[PRESSURES], state[FLOWS], state[OPENINGS]
     side_a, side_b, velocity, position = state[SIDE_A:]
@@ -184,20 +184,20 @@ def motor_derivative(state: State, rate: Scalar, p: Any) -> State:
 
 
 def motor_step(state: State, voltages: tuple[Scalar, Scalar], flat: Any, h: Scalar) -> State:
-    """Return the state after a leapfrog step of `motor_derivative`: flows, openings and speed stand half a step early.
+    """Return the state after a leapfrog step of `motor_derivative`: flows, openings and speed are half a step earlier.
 
-    They are pushed by the pressures between them, pressures by the flows between, so that the scheme is of second
-    order and loses no energy of its own. Losses count as in `port_flow_after`, for a shut port is stiffer than any
-    step. Nothing falls below the least pressure.
+    Pressures drive flows and flows drive pressures at staggered times, so the scheme is second-order and adds no energy
+    loss of its own. Losses are treated as in `port_flow_after`, because a shut port is stiffer than any step. No
+    pressure falls below the least pressure.
 
     Parameters
     ----------
     state : tuple of Expression
         As named in `STATES`, in SI.
     voltages : tuple of Expression
-        Drive of the first diaphragm at the step's start and end [V].
+        Drive of the first diaphragm at the start and end of the step [V].
     flat : namespace of Expression
-        The motor, by the names of `MotorRow`.
+        The motor, with the names of `MotorRow`.
     h : Expression
         Step [s].
 
@@ -251,7 +251,7 @@ def motor_step(state: State, voltages: tuple[Scalar, Scalar], flat: Any, h: Scal
 
 
 def _chambers_after(pressures: State, displaced: list[Scalar], p: Any) -> list[Scalar]:
-    """Return the chambers' pressures after volumes were pressed in: stiffness is that at the middle of the way."""
+    """Return the chamber pressures after volumes were pressed in; stiffness is evaluated at the midpoint."""
     lowest = p.least_pressure - p.supply_pressure
     stiff = p.diaphragm_compliance + p.chamber_volume / p.bulk_modulus
     after: list[Scalar] = []
@@ -263,7 +263,7 @@ def _chambers_after(pressures: State, displaced: list[Scalar], p: Any) -> list[S
 
 
 def at_rest(p: Any) -> Array:
-    """Return the state without drive at the tank's pressure, valves shut (section 2).
+    """Return the undriven state at tank pressure, with valves shut (section 2).
 
     Returns
     -------

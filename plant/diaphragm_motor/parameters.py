@@ -1,8 +1,8 @@
 """Parameters of the seven-chamber piezo diaphragm motor, and the faults that are changes of them.
 
-The paper prints sizes and materials (Table 1) and the flow that its pump is to give; the rest was derived from those by
-plate theory, calibrated to that flow, or assumed. Each value says which (errata M22). The set is not unique: two hard
-targets, peak flow and its frequency, stand against six calibrated values.
+The paper prints sizes and materials (Table 1) and the pump's design flow. The other values were derived from those by
+plate theory, calibrated to that flow, or assumed; each value says which (errata M22). The set is not unique: two hard
+targets, peak flow and its frequency, constrain six calibrated values.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from plant.errors import RigError
 from plant.units import require_numbers, si
 
 DIAPHRAGMS = 7
-"""Diaphragms, and chambers, in series (section 2)."""
+"""Number of diaphragms, and of chambers, in series (section 2)."""
 
 VALVES = DIAPHRAGMS + 1
-"""Check valves: one before each chamber and one behind the last (section 2, errata M28)."""
+"""Number of check valves: one before each chamber and one after the last (section 2, errata M28)."""
 
 PLATE = "derived: composite plate of Table 1, clamped at 14 mm, errata M14"
 CALIBRATED = "calibrated to 110.11 ml/min at 480 Hz and 200 V peak to peak, section 7.1"
@@ -22,10 +22,10 @@ ASSUMED = "assumed, errata M22"
 FAULT = "a fault of ours"
 
 PerDiaphragm = tuple[float, ...]
-"""Seven values, from the inlet on."""
+"""Seven values, ordered from the inlet."""
 
 PerValve = tuple[float, ...]
-"""Eight values, from the inlet on."""
+"""Eight values, ordered from the inlet."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,18 +114,18 @@ ROWS = {
     "sensor_gain": DIAPHRAGMS,
     "gas_fraction": DIAPHRAGMS,
 }
-"""Parameters that hold a value for each valve or diaphragm, with how many."""
+"""Parameters with one value for each valve or diaphragm, and the number of values."""
 
 
 def changed(row: tuple[float, ...], place: int, value: float) -> tuple[float, ...]:
-    """Return a row of values with one of them changed: how a fault of one valve or diaphragm is written.
+    """Return a row of values with one of them changed, which represents a fault of one valve or diaphragm.
 
     Parameters
     ----------
     row : tuple of float
-        Seven or eight values, from the inlet on [any unit].
+        Seven or eight values, ordered from the inlet [any unit].
     place : int
-        Which, counted from 1 as the paper counts diaphragms A1 to A7.
+        Position to change, counted from 1 as the paper counts diaphragms A1 to A7.
     value : float
         The new value [any unit].
 

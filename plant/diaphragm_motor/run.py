@@ -1,4 +1,4 @@
-"""Runs of the diaphragm motor: its drive, its seven sensing electrodes, the encoder on its rod (sections 2 and 7)."""
+"""Runs of the diaphragm motor: its drive, its seven sensing electrodes, the rod's encoder (sections 2 and 7)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -20,38 +20,38 @@ from plant.solvers.trajectory import compile_trajectory
 from plant.units import si
 
 Schedule: TypeAlias = Sequence[tuple[float, DiaphragmMotorParameters]]
-"""From when on [s] which motor: a load that steps, a valve that is switched, a fault that comes. The first is at 0."""
+"""Start times [s] and the motor from then on: a load step, a switched valve, a fault. The first time is 0."""
 
 NAME = "diaphragm-motor"
-"""What the plant is called on the command line and in metadata."""
+"""Name of the plant on the command line and in metadata."""
 
 HIGHEST_VOLTAGE = 150.0
-"""Largest voltage of either sign [V]: 0.75 kV/mm on 0.2 mm, below the coercive field (errata M27)."""
+"""Largest voltage of either polarity [V]: 0.75 kV/mm on 0.2 mm, below the coercive field (errata M27)."""
 
 HIGHEST_FREQUENCY = 1000.0
 """Highest frequency of the drive [Hz]; the paper's range ends at 600 Hz (abstract)."""
 
 LONGEST_STEP = 1e-5
-"""Step of the integrator [s]; halved, it changes the mean flow by 0.02 %."""
+"""Step of the integrator [s]; halving it changes the mean flow by 0.02 %."""
 
 SAMPLE_TIME = 2e-5
 """Time between the samples of a log [s]: 104 in a cycle of 480 Hz."""
 
 FEWEST_SAMPLES = 20
-"""Fewest samples in a cycle: linear between them, a sine then errs by 1 %."""
+"""Minimum samples in a cycle: linear interpolation between them then errs by 1 % for a sine."""
 
 RAMP = 0.01
-"""Time over which a drive rises to its full swing [s]."""
+"""Time over which a drive rises to its full amplitude [s]."""
 
 ELECTRODES = tuple(f"electrode_{i}_v" for i in range(1, DIAPHRAGMS + 1))
-"""Channels of the sensing electrodes, from the inlet on."""
+"""Channels of the sensing electrodes, ordered from the inlet."""
 
 JUDGED = "judged, errata M22"
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotorSensors:
-    """Noise of the sensors, white and Gaussian, by standard deviation; the drive's voltage is known.
+    """Standard deviations of the sensors' white Gaussian noise; the drive voltage is known exactly.
 
     Raises
     ------
@@ -72,17 +72,17 @@ class MotorSensors:
 
 
 BENCH_SENSORS = MotorSensors()
-"""A bench."""
+"""Sensors of the bench."""
 
 IDEAL_SENSORS = MotorSensors(electrode_v=0.0, position_m=0.0)
-"""Sensors that change nothing."""
+"""Ideal sensors, without noise."""
 
 MOTOR_SENSORS: Mapping[str, MotorSensors] = {"bench": BENCH_SENSORS, "ideal": IDEAL_SENSORS}
 """The sensor sets by name."""
 
 
 def motor_drive(frequency: float, peak_to_peak: float, duration: float, sample_time: float) -> Array:
-    """Return a sine without bias that rises to its swing over `RAMP` (section 2; volts peak to peak, errata M27).
+    """Return an unbiased sine that rises to its amplitude over `RAMP` (section 2; volts peak to peak, errata M27).
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def motor_drive(frequency: float, peak_to_peak: float, duration: float, sample_t
 
 
 def _checked_drive(voltage: Array) -> Array:
-    """Return a drive [V], or refuse one that would depolarise the diaphragms (errata M27)."""
+    """Return the drive [V]; raise if it would depolarise the diaphragms (errata M27)."""
     drive = checked_series(voltage)
     most = float(np.max(np.abs(drive)))
     if most > HIGHEST_VOLTAGE * (1.0 + 1e-9):
@@ -143,7 +143,7 @@ def run_motor(
     Parameters
     ----------
     voltage : ndarray, shape (n,)
-        Drive of the first diaphragm at the samples [V], linear between.
+        Drive of the first diaphragm at the samples [V], linearly interpolated.
     sample_time : float
         Seconds between samples [s].
     longest_step : float
@@ -175,7 +175,7 @@ def electrode_voltages(bent: Array, parameters: DiaphragmMotorParameters, sample
     Parameters
     ----------
     bent : ndarray, shape (n, 7)
-        Deflections of the centres [m].
+        Centre deflections [m].
     sample_time : float
         Seconds between samples [s].
 
@@ -201,7 +201,7 @@ def run_schedule(schedule: Schedule, voltage: Array, sample_time: float) -> tupl
     Parameters
     ----------
     schedule : sequence of tuple of float and DiaphragmMotorParameters
-        From when on [s] which motor; the first at 0, times rising.
+        Start times [s] and the motor from then on; the first time is 0, times rise.
     voltage : ndarray, shape (n,)
         Drive of the first diaphragm [V].
     sample_time : float
@@ -249,15 +249,16 @@ def simulate_motor(
     Parameters
     ----------
     parameters : DiaphragmMotorParameters or sequence of tuple
-        The motor, or from when on [s] which motor, see `run_schedule`; the electrodes' gain and corner are the first's.
+        The motor, or start times [s] with the motor from then on, see `run_schedule`. Gain and corner of the electrodes
+        are those of the first motor.
     voltage : ndarray, shape (n,)
-        Drive of the first diaphragm at the samples [V], linear between.
+        Drive of the first diaphragm at the samples [V], linearly interpolated.
     sample_time : float
         Seconds between samples [s].
     rng : numpy.random.Generator, optional
-        Source of sensor noise; needed unless the sensors are ideal.
+        Source of sensor noise; required unless the sensors are ideal.
     keep_truth : bool
-        Whether the noiseless channels stand beside as ``true_...``.
+        Whether to add the noiseless channels as ``true_...``.
 
     Returns
     -------

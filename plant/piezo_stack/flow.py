@@ -1,4 +1,4 @@
-"""Results of a piezo-stack run: flow as a bench infers it, stages of a cycle, Reynolds number."""
+"""Results of a piezo-stack run: output flow as a test bench measures it, stages of the pump cycle, Reynolds number."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,13 @@ from plant.piezo_stack.run import FINE_TIME, sine_drive
 from plant.piezo_stack.trajectory import run_stack
 
 FLOW_TIME = 0.16
-"""Length of a run whose flow is measured [s]; its second half counts."""
+"""Duration of a run for measuring flow [s]; only its second half is evaluated."""
 
 STAGES = ("compression", "discharge", "expansion", "intake")
-"""The four stages of a pump cycle, in their order (Figure 2; equation 15 decides)."""
+"""The four stages of a pump cycle, in order (Figure 2; equation 15 decides)."""
 
 OPEN = 1e-5
-"""Lift from which a reed counts as open [m]; on its seat it still breathes by some micrometres."""
+"""Lift above which a reed counts as open [m]; on its seat it still moves by some micrometres."""
 
 
 def mean_flow(position: Array, sample_time: float, frequency: float, cylinder_area: float) -> float:
@@ -27,13 +27,13 @@ def mean_flow(position: Array, sample_time: float, frequency: float, cylinder_ar
     Parameters
     ----------
     position : ndarray, shape (n,)
-        Rod of the cylinder [m].
+        Position of the cylinder's rod [m].
     sample_time : float
         Seconds between samples [s].
     frequency : float
-        Of the drive [Hz].
+        Drive frequency [Hz].
     cylinder_area : float
-        A_cp [m^2].
+        Cylinder area A_cp [m^2].
 
     Returns
     -------
@@ -62,16 +62,16 @@ def mean_flow(position: Array, sample_time: float, frequency: float, cylinder_ar
 
 
 def output_flow(parameters: PiezoStackParameters, frequency: float, peak_to_peak: float) -> float:
-    """Return the flow of a run of `FLOW_TIME` on a sine, as Figures 11 to 14 (errata P15) show it.
+    """Return the flow under a sine drive of length `FLOW_TIME`, as Figures 11 to 14 (errata P15) show it.
 
     Parameters
     ----------
     parameters : PiezoStackParameters
         The actuator, with its load and bias pressure.
     frequency : float
-        Of the drive [Hz].
+        Drive frequency [Hz].
     peak_to_peak : float
-        Swing of the drive [V]; its bias is half of that.
+        Peak-to-peak drive voltage [V]; its bias is half of that.
 
     Returns
     -------
@@ -83,10 +83,10 @@ def output_flow(parameters: PiezoStackParameters, frequency: float, peak_to_peak
 
 
 def stages(states: Array, parameters: PiezoStackParameters) -> NDArray[np.int64]:
-    """Return which stage of the pump cycle each sample is in, by place in `STAGES` (Figure 2; equation 15 decides).
+    """Return the stage of the pump cycle at each sample, as an index into `STAGES` (Figure 2; equation 15 decides).
 
-    Discharge and intake are where the reed that stands open further passes oil forward; between them the chamber is
-    being compressed or expands.
+    In discharge and intake, the reed that is open further passes oil forward. In between, the chamber is in compression
+    or expansion.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The stack alone, free to move: what the displacement experiment of the piezo-stack paper drives (equation 2)."""
+"""The free, unloaded stack, as in the displacement experiment of the piezo-stack paper (equation 2)."""
 
 from math import ceil, pi, sqrt
 from typing import Any
@@ -19,7 +19,7 @@ FREE_STATES = ("stack_displacement_m", "stack_velocity_m_s", "linear_force_n", "
 """States of the free stack."""
 
 _STEPS_A_PERIOD = 30.0
-"""Steps in a period of the stack's own vibration."""
+"""Steps in one period of the stack's natural vibration."""
 
 
 def free_stack_derivative(state: State, voltage: Scalar, rate: Scalar, p: Any) -> State:
@@ -35,7 +35,7 @@ def free_stack_derivative(state: State, voltage: Scalar, rate: Scalar, p: Any) -
     Returns
     -------
     tuple of float or Expression
-        Rates, each a second.
+        Rates per second.
     """
     x, v, driven, h = state
     return (
@@ -55,7 +55,7 @@ def run_free_stack(parameters: PiezoStackParameters, voltage: Array, sample_time
     Parameters
     ----------
     voltage : ndarray, shape (n,)
-        Drive at the samples [V], linear between.
+        Drive at the samples [V], linearly interpolated.
     sample_time : float
         Seconds between samples [s].
 
@@ -87,9 +87,9 @@ def stack_loop(
     Parameters
     ----------
     frequency : float
-        Of the drive [Hz].
+        Drive frequency [Hz].
     peak_to_peak : float
-        Swing of the drive [V], on half of it as bias.
+        Peak-to-peak drive voltage [V]; its bias is half of that.
     samples : int
         Samples in a cycle.
 
@@ -106,14 +106,14 @@ def stack_loop(
 
 
 def loop_width(voltage: Array, displacement: Array) -> float:
-    """Return a loop's width at its middle voltage as a share of its stroke (equation 2).
+    """Return the width of a loop at its middle voltage as a fraction of its stroke (equation 2).
 
     Parameters
     ----------
     voltage : ndarray, shape (n,)
         One cycle from trough to trough [V].
     displacement : ndarray, shape (n,)
-        Over that cycle [m].
+        Displacement over that cycle [m].
 
     Returns
     -------

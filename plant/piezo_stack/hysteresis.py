@@ -1,4 +1,4 @@
-"""A stack driven so slowly that it is nothing but hysteresis: equation 27 of the piezo-stack paper with errata P2."""
+"""A stack driven so slowly that only hysteresis matters: equation 27 of the piezo-stack paper with errata P2."""
 
 from typing import Any
 
@@ -31,4 +31,4 @@ def _slow_derivative(state: State, _voltage: Scalar, rate: Scalar, p: Any) -> St
 
 
 slow_stack_step = rate_driven_step(_slow_derivative)
-"""The hysteresis [m] of a stack after a step of voltage, whatever the time it takes (equation 28, errata P1)."""
+"""The hysteresis [m] of a stack after a voltage step, regardless of its duration (equation 28, errata P1)."""

@@ -1,8 +1,8 @@
 """The piezo-stack electro-hydrostatic actuator: stack, pump chamber, two reeds, three lines, accumulator, cylinder.
 
-Equations 1 to 22 of the piezo-stack paper with errata P1 to P13 and P16. Oil is counted by mass, as its volume at
-atmospheric pressure, in six places: pressure follows from `plant.components.oil`, whose stiffness is equation 5, so
-that no mass is lost and the accumulator can be shut (errata P16).
+Equations 1 to 22 of the piezo-stack paper with errata P1 to P13 and P16. The states track the mass of oil in six
+places, expressed as its volume at atmospheric pressure. Pressure follows from `plant.components.oil`, whose stiffness
+is equation 5. Thus no mass is lost, and the accumulator can be shut (errata P16).
 """
 
 from types import SimpleNamespace
@@ -23,7 +23,7 @@ from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.solvers.steps import State, rate_driven_step
 
 StackValues: TypeAlias = PiezoStackParameters | SimpleNamespace
-"""What the model reads: the parameters, or a namespace of the same names holding expressions or arrays."""
+"""What the model reads: the parameters, or a namespace with the same names that holds expressions or arrays."""
 
 STATES = (
     "stack_displacement_m",
@@ -46,19 +46,19 @@ STATES = (
     "intake_flow_m3_s",
     "oil_intake_port_m3",
 )
-"""The states; oil as its volume at atmospheric pressure."""
+"""The states; oil is given as its volume at atmospheric pressure."""
 
 OIL = tuple(i for i, name in enumerate(STATES) if name.startswith("oil_"))
-"""Which states hold oil: their sum does not change."""
+"""Indices of the states that hold oil: their sum is constant."""
 
 SOFT_CONTACT = 1e-6
-"""Depth over which a seat's damping grows [m], a sixth of how far a closing reed presses in."""
+"""Penetration depth over which a seat's damping rises [m], a sixth of how far a closing reed presses in."""
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
 
 END_STIFFNESS, END_DAMPING = 1e7, 20.0
-"""Of the cylinder's ends [N/m], [s/m]; no run that counts reaches them."""
+"""Stiffness and damping of the cylinder's end stops [N/m], [s/m]; no run that counts reaches them."""
 
 
 class StackPressures(NamedTuple):
@@ -69,13 +69,13 @@ class StackPressures(NamedTuple):
     chamber : float, ndarray or Expression
         Pump chamber, p_c [Pa].
     delivery : float, ndarray or Expression
-        Between outlet reed and delivery line, p_th [Pa].
+        Pressure between outlet reed and delivery line, p_th [Pa].
     high, low : float, ndarray or Expression
-        The cylinder's two sides, p_ch and p_cl [Pa].
+        Pressures on the cylinder's two sides, p_ch and p_cl [Pa].
     accumulator : float, ndarray or Expression
-        Accumulator's port [Pa].
+        Pressure at the accumulator's port [Pa].
     intake : float, ndarray or Expression
-        Between intake line and inlet reed, p_tl [Pa].
+        Pressure between intake line and inlet reed, p_tl [Pa].
     """
 
     chamber: Scalar
@@ -92,9 +92,9 @@ def volumes(displacement: Scalar, position: Scalar, p: StackValues) -> tuple[Sca
     Parameters
     ----------
     displacement : float, ndarray or Expression
-        Piston of the pump, x_p [m].
+        Displacement of the pump's piston, x_p [m].
     position : float, ndarray or Expression
-        Rod of the cylinder, from its start [m].
+        Position of the cylinder's rod, from its start [m].
 
     Returns
     -------
@@ -108,7 +108,7 @@ def volumes(displacement: Scalar, position: Scalar, p: StackValues) -> tuple[Sca
 
 
 def stack_pressures(state: State, p: StackValues) -> StackPressures:
-    """Return the pressures, from where the oil is and the pistons stand: equation 5 with errata P4, P5 and P16.
+    """Return the pressures from the oil masses and piston positions: equation 5 with errata P4, P5 and P16.
 
     Parameters
     ----------
@@ -145,9 +145,9 @@ def _reed_acceleration(
 
 
 def _oil_flows(state: State, pressure: StackPressures, p: StackValues) -> State:
-    """Return the oil past the outlet and the inlet reed, along the delivery, return and intake line, and both leaks.
+    """Return the oil flows through outlet reed, inlet reed, delivery, return and intake line, and both leaks.
 
-    Every flow carries the density of the side it comes from.
+    Each flow has the density of its upstream side.
     """
     x, _, _, _, n_c, x_out, _, x_in, _, n_th, q_h, n_ch, position, _, n_cl, q_1, _, q_2, n_tl = state
     chamber, high, low = volumes(x, position, p)
@@ -191,12 +191,12 @@ def stack_derivative(state: State, voltage: Scalar, rate: Scalar, p: StackValues
     voltage : float or Expression
         Drive u [V].
     rate : float or Expression
-        Its rate [V/s].
+        Rate of the drive [V/s].
 
     Returns
     -------
     tuple of float or Expression
-        Rates of the states, each a second.
+        Rates of the states, per second.
     """
     x, v, driven, h, _, x_out, v_out, x_in, v_in, _, q_h, _, position, speed, _, q_1, _, q_2, _ = state
     pressure = stack_pressures(state, p)
@@ -232,16 +232,16 @@ def stack_derivative(state: State, voltage: Scalar, rate: Scalar, p: StackValues
 
 
 stack_step = rate_driven_step(stack_derivative)
-"""The state after a classical Runge-Kutta step of `stack_derivative`, equations 1 to 22, the drive linear over it."""
+"""The state after a classical Runge-Kutta step of `stack_derivative`, equations 1 to 22, with a linear drive."""
 
 
 def at_bias(p: StackValues, voltage: float = 0.0) -> NDArray[np.float64]:
-    """Return the state at rest at the bias pressure, the stack pressed in by it (equation 3, errata P3).
+    """Return the state at rest at the bias pressure, which compresses the stack (equation 3, errata P3).
 
     Parameters
     ----------
     voltage : float
-        Drive at the start [V]; the stack has settled to it, without hysteresis.
+        Initial drive [V]; the stack has settled to it, without hysteresis.
 
     Returns
     -------

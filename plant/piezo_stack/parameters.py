@@ -1,7 +1,7 @@
 """Parameters of the piezo-stack electro-hydrostatic actuator, and the faults that are changes of them.
 
-The paper's own Table 1 is a picture and lost (errata P17): each value says whether it was printed, comes from a
-catalogue, was calibrated to the published flows, or judged.
+The paper's own Table 1 is an image and is lost (errata P17). Each value is marked as printed, from a catalogue,
+calibrated to the published flows, or judged.
 """
 
 from dataclasses import dataclass
@@ -111,14 +111,14 @@ LONGEST_STEP = 2e-6
 """Step of the integrator [s]."""
 
 _STABLE = 1.4
-"""Rate times step that the integrator takes in a port, half of where the classical Runge-Kutta method is stable."""
+"""Product of rate and step that the integrator allows in a port: half the stability limit of classical Runge-Kutta."""
 
 
 def least_port(p: PiezoStackParameters) -> float:
     """Return the smallest port volume whose pressure the integrator follows (errata P10).
 
-    An open reed at no pressure drop passes ``c_d w x sqrt(2/rho/eps)`` a pascal, which empties a stiff port at that
-    rate times bulk modulus over volume. Too small a port gives flows that are finite and wrong.
+    An open reed at zero pressure drop passes ``c_d w x sqrt(2/rho/eps)`` per pascal. A stiff port therefore empties at
+    that rate times bulk modulus over volume. If a port is too small, flows are finite but wrong.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Runs of the piezo-stack actuator: its drive, its sensors, and the flow that a bench infers (test-bench section)."""
+"""Runs of the piezo-stack actuator: drive, sensors, and the flow that a test bench infers (test-bench section)."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -17,23 +17,23 @@ from plant.sensors.sensors import require_not_negative
 from plant.units import si
 
 HIGHEST_VOLTAGE = 150.0
-"""Rated voltage of the stack [V]; it cannot withstand reverse voltage either (output performance section)."""
+"""Rated voltage of the stack [V]; it does not withstand reverse voltage (output performance section)."""
 
 HIGHEST_FREQUENCY = 450.0
-"""Where the amplifier's power ends [Hz] (output performance section)."""
+"""Frequency limit set by the amplifier's power [Hz] (output performance section)."""
 
 SAMPLE_TIME = 5e-5
 """Time between the samples of a log [s]."""
 
 FINE_TIME = 1e-5
-"""Time between samples where the drive should be as good as a true sine [s]: linear between, it errs by 4e-5."""
+"""Time between samples for a nearly ideal sine drive [s]: linear interpolation errs by 4e-5."""
 
 OBSERVED = "the piezo-stack paper's test bench has these sensors; their noise is judged"
 
 
 @dataclass(frozen=True, kw_only=True)
 class StackSensors:
-    """Noise of the bench's sensors, white and Gaussian, by standard deviation; the drive's voltage is known.
+    """Standard deviations of the bench sensors' white Gaussian noise; the drive voltage is known exactly.
 
     Raises
     ------
@@ -56,10 +56,10 @@ class StackSensors:
 
 
 BENCH_SENSORS = StackSensors()
-"""The bench as it is."""
+"""Sensors of the bench."""
 
 IDEAL_SENSORS = StackSensors(stack_displacement_m=0.0, stack_force_n=0.0, position_m=0.0, chamber_pressure_pa=0.0)
-"""Sensors that change nothing."""
+"""Ideal sensors, without noise."""
 
 STACK_SENSORS: Mapping[str, StackSensors] = {"bench": BENCH_SENSORS, "ideal": IDEAL_SENSORS}
 """The sensor sets by name."""
@@ -68,7 +68,7 @@ STACK_SENSORS: Mapping[str, StackSensors] = {"bench": BENCH_SENSORS, "ideal": ID
 def sine_drive(
     frequency: float, peak_to_peak: float, duration: float, sample_time: float, bias: float | None = None
 ) -> Array:
-    """Return a sine on a bias from its lowest voltage on (Source: output performance section, 140 V on 70 V).
+    """Return a biased sine that starts at its lowest voltage (Source: output performance section, 140 V on 70 V).
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def sine_drive(
     duration, sample_time : float
         Length of the signal and time between samples [s].
     bias : float, optional
-        Mean voltage [V]; half the swing if not given.
+        Mean voltage [V]; half the peak-to-peak voltage if not given.
 
     Returns
     -------
@@ -105,19 +105,19 @@ def sine_drive(
 
 
 def checked_voltage(voltage: Array, overshoot: float = 0.0) -> Array:
-    """Return a drive that the stack withstands. Source: output performance section.
+    """Return the drive if the stack withstands it. Source: output performance section.
 
     Parameters
     ----------
     voltage : ndarray, shape (n,)
         Drive at the samples [V].
     overshoot : float
-        What it may leave its range by, as a measured one does by its noise [V].
+        Amount by which the drive may leave its range, as a measured one does because of noise [V].
 
     Returns
     -------
     ndarray, shape (n,)
-        The same.
+        The unchanged drive [V].
 
     Raises
     ------
@@ -140,7 +140,7 @@ def stack_channels(states: Array, parameters: StackValues) -> Mapping[str, Array
     states : ndarray, shape (n, 19)
         As named in `plant.piezo_stack.model.STATES`.
     parameters : PiezoStackParameters or namespace
-        The actuator; a namespace of the same names may hold what no actuator has, such as a negative leakage.
+        The actuator. A namespace with the same names may hold values that no actuator has, such as a negative leakage.
 
     Returns
     -------
@@ -171,13 +171,13 @@ def simulate_stack(
     Parameters
     ----------
     voltage : ndarray, shape (n,)
-        Drive at the samples [V], linear between.
+        Drive at the samples [V], linearly interpolated.
     sample_time : float
         Seconds between samples [s].
     rng : numpy.random.Generator, optional
-        Source of sensor noise; needed unless the sensors are ideal.
+        Source of sensor noise; required unless the sensors are ideal.
     keep_truth : bool
-        Whether the noiseless channels stand beside as ``true_...``.
+        Whether to add the noiseless channels as ``true_...``.
 
     Returns
     -------

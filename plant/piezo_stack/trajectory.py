@@ -12,10 +12,10 @@ from plant.solvers.fixed_step_kernel import compile_fixed_step
 from plant.solvers.steps import parameter_row
 
 NAME = "piezo-stack"
-"""What the plant is called on the command line and in metadata."""
+"""Name of the plant on the command line and in metadata."""
 
 LANES = 8
-"""Actuators that run side by side."""
+"""Number of actuators that run side by side."""
 
 
 def stack_row(parameters: StackValues) -> Array:
@@ -24,12 +24,12 @@ def stack_row(parameters: StackValues) -> Array:
     Parameters
     ----------
     parameters : PiezoStackParameters or namespace
-        The actuator; a namespace of the same names may hold what no actuator has, such as a negative leakage.
+        The actuator. A namespace with the same names may hold values that no actuator has, such as a negative leakage.
 
     Returns
     -------
     ndarray, shape (parameters,)
-        Their values in SI.
+        Parameter values in SI.
     """
     return parameter_row(parameters, PiezoStackParameters)
 
@@ -42,9 +42,9 @@ def run_stack(
     Parameters
     ----------
     parameters : PiezoStackParameters or namespace
-        The actuator; a namespace of the same names may hold what no actuator has, such as a negative leakage.
+        The actuator. A namespace with the same names may hold values that no actuator has, such as a negative leakage.
     voltage : ndarray, shape (n,)
-        Drive at the samples [V], linear between.
+        Drive at the samples [V], linearly interpolated.
     sample_time : float
         Seconds between samples [s].
     longest_step : float
@@ -68,14 +68,14 @@ def run_stack(
 def run_stacks(
     parameters: Sequence[StackValues], voltages: Array, sample_time: float, *, longest_step: float = LONGEST_STEP
 ) -> Iterator[Array]:
-    """Run several actuators from rest at their bias, eight side by side: each as `run_stack`, to the bit.
+    """Run several actuators from rest at their bias, eight side by side; results match `run_stack` to the last bit.
 
     Parameters
     ----------
     parameters : sequence of PiezoStackParameters or namespace
         The actuators, as in `run_stack`.
     voltages : ndarray, shape (n,) or (n, actuators)
-        Drive at the samples [V], one for all or one each.
+        Drive at the samples [V], one for all actuators or one for each.
     sample_time : float
         Seconds between samples [s].
     longest_step : float
@@ -99,16 +99,16 @@ def run_stacks(
 def run_rows(
     rows: Array, starts: Array, voltages: Array, sample_time: float, *, longest_step: float = LONGEST_STEP
 ) -> Array:
-    """Run actuators given as rows of parameters, eight side by side; one alone takes a kernel of its own.
+    """Run actuators given as parameter rows, eight side by side; a single actuator has its own kernel.
 
     Parameters
     ----------
     rows : ndarray, shape (actuators, parameters)
-        As `stack_row` gives them.
+        Parameter rows, as `stack_row` returns them.
     starts : ndarray, shape (19, actuators)
         Initial states.
     voltages : ndarray, shape (n, actuators)
-        Drive at the samples [V], linear between.
+        Drive at the samples [V], linearly interpolated.
     sample_time : float
         Seconds between samples [s].
     longest_step : float
@@ -117,7 +117,7 @@ def run_rows(
     Returns
     -------
     ndarray, shape (n, 19, actuators)
-        States at the samples; not finite where a run stopped being so.
+        States at the samples; not finite from where a run failed.
     """
     count = len(rows)
     lanes = LANES if count > 1 else 1
