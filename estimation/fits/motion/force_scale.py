@@ -25,7 +25,7 @@ BETTER = 5.0
 """Fall of the cost from which a better optimum is left in its turn [dimensionless]."""
 
 ELSEWHERE, SHORT = 0.005, 4.0
-"""Relative difference in bulk modulus from which the same [fraction], in logs up to this length [s]. In longer logs, the
+"""Relative difference in bulk modulus from which the same [fraction], in logs up to this length [s]. In longer logs the
 two optima must disagree: if they are nearer, the same places are searched again, which takes 1 s and changes little."""
 
 ALMOST, NEARBY = 1e-3, 0.3
