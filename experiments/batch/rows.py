@@ -155,7 +155,7 @@ def error_percent(value: float | None, truth: float | None) -> float | None:
     Parameters
     ----------
     value, truth : float or None
-        Estimate and truth, in the same unit.
+        Estimate and truth, in one unit.
 
     Returns
     -------

@@ -19,7 +19,15 @@ HERE = MODEL.theta({name: 2e8 if name == "bulk_modulus" else 1.0 for name in UNK
 FAR = np.full(len(UNKNOWNS), 40.0)
 
 
-def searched(at: Callable[[np.ndarray], Point], explained: float = np.inf) -> tuple[Point, list[float], list[Point]]:
+def problem_of(at_each: Callable[[list[np.ndarray]], list[Point]], duration: float = 20.0) -> FreedProblem:
+    """Return a misfit as the problem of a log at 1 kHz of a duration [s]."""
+    log = SimpleNamespace(measured=np.zeros(round(1e3 * duration)), sample_time=1e-3)
+    return cast("FreedProblem", SimpleNamespace(model=MODEL, at_each=at_each, log=log))
+
+
+def searched(
+    at: Callable[[np.ndarray], Point], explained: float = np.inf, duration: float = 20.0
+) -> tuple[Point, list[float], list[Point]]:
     """Return the best of a misfit's optima from the point `HERE`, the others' bulk moduli, and what was evaluated."""
     seen: list[Point] = []
 
@@ -27,7 +35,7 @@ def searched(at: Callable[[np.ndarray], Point], explained: float = np.inf) -> tu
         seen.extend(points := [at(theta) for theta in thetas])
         return points
 
-    problem = cast("FreedProblem", SimpleNamespace(model=MODEL, at_each=at_each))
+    problem = problem_of(at_each, duration)
     return *rescaled(problem, at(HERE), Way(problem, 12, 0.01, 25, 0.1, (-FAR, FAR), explained)), seen
 
 
@@ -100,13 +108,15 @@ def test_a_valley_that_goes_on_for_ever_is_left_after_three_rounds() -> None:
     assert best.theta[0] - HERE[0] == pytest.approx(3.0 * np.log(0.8))
 
 
-@pytest.mark.parametrize(("moved", "rounds"), [(0.04, 1), (0.07, 3)])
-def test_an_optimum_is_left_in_its_turn_only_where_it_is_another(
-    moved: float, rounds: int, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("moved", "duration", "rounds"), [(0.04, 20.0, 1), (0.07, 20.0, 3), (0.04, 4.1, 1), (0.04, 4.0, 3), (0.004, 4.0, 1)]
+)
+def test_an_optimum_is_left_in_its_turn_only_where_it_is_another_and_in_short_logs_where_it_is_near(
+    moved: float, duration: float, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(force_scale, "SCALES", ())
     monkeypatch.setattr(force_scale, "STIFFENED", (1.0 - moved,))
-    best, _, _ = searched(flat(lambda theta: 200.0 * theta[0]), explained=-np.inf)
+    best, _, _ = searched(flat(lambda theta: 2000.0 * theta[0]), explained=-np.inf, duration=duration)
     assert best.theta[0] - HERE[0] == pytest.approx(rounds * np.log(1.0 - moved))
 
 
@@ -135,7 +145,7 @@ def test_a_search_that_ends_close_by_goes_on_before_it_is_said_to_disagree() -> 
         return Point(theta, 50.0 * off**2, 10.0 * slopes[0] * off, 4.0 * slopes.T @ slopes)
 
     def each(at: Callable[[np.ndarray], Point]) -> FreedProblem:
-        return cast("FreedProblem", SimpleNamespace(model=MODEL, at_each=lambda thetas: [at(one) for one in thetas]))
+        return problem_of(lambda thetas: [at(one) for one in thetas])
 
     way = Way(each(flat(lambda _: 0.0)), 12, 0.01, 25, 0.1, (-FAR, FAR), np.inf)
     _, others = rescaled(each(slow), slow(HERE), way)
