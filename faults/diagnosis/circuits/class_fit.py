@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
@@ -91,10 +91,10 @@ class PointFit:
     slopes: Array
     ran: Array | None = None
 
-    @property
+    @cached_property
     def as_run(self) -> "PointFit":
-        """The circuit where its search ended."""
-        return self if self.ran is None else replace(self, coordinates=self.ran)
+        """The circuit where its search ended; one object, so that what is computed from it is remembered."""
+        return self if self.ran is None else replace(self, coordinates=self.ran, ran=None)
 
 
 @lru_cache(maxsize=2)
