@@ -61,9 +61,9 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "reasons": reasons_apart(result),
         "another_size": of_another_size(result),
         "library": library_sentence(result),
-        "not_told": [
-            sentence(said) for said in ([*refused_oil(result), *result["not_told"]] * (not is_doubted(result)))
-        ],
+        "not_told": []
+        if is_doubted(result)
+        else [sentence(said) for said in (*refused_oil(result), *result["not_told"])],
         "warnings": [sentence(said) for said in _beside(result)],
         "shares": [
             (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)
