@@ -16,6 +16,7 @@ from estimation.arrays import Array
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.notes import GuessCode
 from plant.eha.model import EhaParameters
+from plant.log.clock.stamps import seconds_from_first
 from plant.log.columns import CHANNELS, TIME, UNITS
 from plant.log.guess import Guess, guessed, points_by_name
 from plant.log.headings import Heading
@@ -310,7 +311,7 @@ def _unit_of_slope(velocity: Array, known: Mapping[str, Guess], columns: Mapping
         return None
     stamps: Any = columns[known[TIME].place]
     dated = stamps.dtype.kind == "M"
-    time = (stamps - stamps[:1]) / np.timedelta64(1, "s") if dated else stamps * _factor(known[TIME].unit or "s", "s")
+    time = seconds_from_first(stamps) if dated else stamps * _factor(known[TIME].unit or "s", "s")
     position = columns[known[POSITION].place] * _factor(known[POSITION].unit or "m", "m")
     if not len(time) == len(position) == len(velocity):
         return None

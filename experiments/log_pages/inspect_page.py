@@ -14,6 +14,7 @@ from experiments.page.sentences import sentence
 from experiments.page.style import BLUE, Margins, panels, styled
 from experiments.page.tables import Column
 from plant.arrays import Array
+from plant.log.clock.stamps import seconds_from_first
 from plant.log.columns import TIME
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def _time_of(facts: "TableFacts", told: Sequence[Mapping[str, Any]]) -> _Time | 
         if one.heading.name in names and one.values is not None:
             stamps: Any = one.values
             dated = stamps.dtype.kind == "M"
-            values: Array = (stamps - stamps[:1]) / np.timedelta64(1, "s") if dated else stamps
+            values: Array = seconds_from_first(stamps) if dated else stamps
             unit = "" if one.heading.name.endswith(("]", ")")) else _bracketed(one.heading.unit)
             label = "time since the first row [s]" if dated else f"{one.heading.name} {unit}"
             return _Time(one, values, label.rstrip()) if bool(np.all(np.diff(values) > 0.0)) else None

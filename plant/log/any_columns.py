@@ -5,12 +5,14 @@ import warnings
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError, LogWarning
 from plant.log.checks import Clock, trusted
+from plant.log.clock.stamps import seconds_from_first
 from plant.log.clock.uniform import MOST_MISSING
 from plant.log.columns import TIME, UNITS, Column, listed, resolve_columns
 from plant.log.formats.detect import open_tables
@@ -169,10 +171,6 @@ def _time_column(headings: Sequence[Heading]) -> Column | None:
     return None
 
 
-def _seconds(values: Array, column: Column) -> Array:
+def _seconds(values: Any, column: Column) -> Array:
     """Return time in seconds; dates count from the first one."""
-    if values.dtype.kind != "M":
-        return values * column.factor
-    missing = np.isnat(values)
-    elapsed = (values - values[~missing][0]) / np.timedelta64(1, "ns") * 1e-9
-    return np.where(missing, np.nan, elapsed)
+    return seconds_from_first(values) if values.dtype.kind == "M" else values * column.factor

@@ -8,6 +8,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.log.clock.jitter import usual_step
+from plant.log.clock.stamps import seconds_from_first
 from plant.log.clock.time_unit import unit_of_dates
 from plant.log.headings import Heading
 from plant.log.table import Table
@@ -137,11 +138,8 @@ def clock_facts(stamps: Any) -> ClockFacts | None:
     >>> facts.step, facts.gaps
     (1.0, 1)
     """
-    if stamps.dtype.kind == "M":
-        there = stamps[~np.isnat(stamps)]
-        time = (there - there[0]).astype(np.int64) * 1e-9 if len(there) else np.empty(0)
-    else:
-        time = stamps[np.isfinite(stamps)]
+    time = seconds_from_first(stamps) if stamps.dtype.kind == "M" else stamps
+    time = time[np.isfinite(time)]
     if len(time) < 3:
         return None
     with np.errstate(over="ignore", invalid="ignore"):

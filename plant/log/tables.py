@@ -11,6 +11,7 @@ from plant.arrays import Array
 from plant.errors import LogError, MissingColumnError, TextColumnError
 from plant.log.checks import alternatives, lacking
 from plant.log.clock.merging import Timed, merged
+from plant.log.clock.stamps import seconds_from_first
 from plant.log.clock.time_unit import likely_unit, unit_of_dates
 from plant.log.columns import TIME, TRUTH, Column, converted, listed, resolve_columns
 from plant.log.guess import SHOWN, guess_by_name, hint_of, missing_channels, overlooked
@@ -288,11 +289,6 @@ def _from_start(columns: Mapping[str, Any]) -> tuple[dict[str, Array], str | Non
     time: Any = out.get(TIME)
     if time is None or time.dtype.kind != "M":
         return out, None
-    there = ~np.isnat(time)
-    if not there.any():
-        out[TIME] = np.full(len(time), np.nan)
-        return out, None
-    first = time[int(np.argmax(there))]
-    seconds = (time - first).astype(np.int64) * 1e-9
-    out[TIME] = np.where(there, seconds, np.nan)
-    return out, str(np.datetime_as_string(first, unit="us")) + "Z"
+    out[TIME] = seconds_from_first(time)
+    there = time[~np.isnat(time)]
+    return out, str(np.datetime_as_string(there[0], unit="us")) + "Z" if len(there) else None

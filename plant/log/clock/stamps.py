@@ -238,3 +238,28 @@ def over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
     out = stamps.copy()
     out[there] = inside + _DAY * days
     return out
+
+
+def seconds_from_first(stamps: Stamps) -> NDArray[np.float64]:
+    """Return times as seconds from the first one.
+
+    Parameters
+    ----------
+    stamps : ndarray of datetime64[ns], shape (n,)
+        The times, some of which may be missing.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The seconds [s], NaN for a missing time.
+
+    Examples
+    --------
+    >>> seconds_from_first(np.array(["2026-03-01T12:00:00.5", "NaT", "2026-03-01T12:00:02"], "datetime64[ns]"))
+    array([0. , nan, 1.5])
+    """
+    there = ~np.isnat(stamps)
+    if not there.any():
+        return np.full(len(stamps), np.nan)
+    elapsed = (stamps - stamps[int(np.argmax(there))]).astype(np.int64) * 1e-9
+    return np.where(there, elapsed, np.nan)
