@@ -50,7 +50,7 @@ def enums() -> list[type[Code]]:
 
 def _below(kind: type[Code]) -> Iterator[type[Code]]:
     for enum in kind.__subclasses__():
-        if getattr(sys.modules.get(enum.__module__), enum.__name__, None) is enum:  # else of an example in a docstring
+        if getattr(sys.modules.get(enum.__module__), enum.__name__, None) is enum:  # otherwise a docstring's example
             yield enum
         yield from _below(enum)
 

@@ -61,7 +61,7 @@ def kind_of_rig(rig: "Rig[Any]", usual: str) -> "ActuatorKind":
 
 def actuators() -> "Iterator[ActuatorKind]":
     """Yield every kind of actuator, the project's own kinds first."""
-    from importlib.metadata import entry_points  # 20 ms, which a log of the project's own kind can do without
+    from importlib.metadata import entry_points  # takes 20 ms, and the project's own kinds do not need it
 
     yield from (_loaded(name, place) for name, place in ACTUATORS.items())
     installed = {one.name: one.value for one in entry_points(group=ENTRY_POINTS)}

@@ -154,7 +154,7 @@ def main() -> None:
     gc.set_threshold(OBJECTS_AT_START)
     _with_streams()
     trust_sources()
-    os.environ["MPLBACKEND"] = "agg"  # figures go to files; a notebook's name for its screen is an error elsewhere
+    os.environ["MPLBACKEND"] = "agg"  # figures go to files; a backend set by a notebook would fail here
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
     if ALONE.keys() & set(sys.argv[1:2]):
@@ -163,7 +163,7 @@ def main() -> None:
         keep_freed_memory()
     try:
         app_for(sys.argv[1:])()
-    except KeyboardInterrupt:  # while a command is loaded, which guards itself as soon as it is
+    except KeyboardInterrupt:  # while a command is loaded; a loaded command handles it itself
         emit("hydrostate: interrupted", err=True)
         os._exit(INTERRUPTED)
     except SystemExit as ended:
@@ -171,7 +171,7 @@ def main() -> None:
             raise
         for thread in threading.enumerate():
             if thread is not threading.current_thread() and not thread.daemon:
-                thread.join(LEFT_TO_END)  # libraries' own destructors would end the process while one runs
+                thread.join(LEFT_TO_END)  # otherwise destructors in libraries would abort the process
         atexit._run_exitfuncs()  # pyright: ignore[reportPrivateUsage]  as the interpreter would
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):

@@ -157,7 +157,7 @@ def require_known(
     """
     names = list(known)
     if name not in names:
-        from difflib import get_close_matches  # which no right name needs
+        from difflib import get_close_matches  # imported here, because a correct name does not need it
 
         near = get_close_matches(str(name), names, n=1)
         hint = f", did you mean {near[0]!r}?" if near else ""

@@ -111,7 +111,7 @@ def _description(path: Path) -> Any:
     fmpy = _package()
     try:
         return fmpy.read_model_description(str(path))
-    except Exception as error:  # whatever is wrong with a file of others
+    except Exception as error:  # a foreign file may be wrong in any way
         reason = (error.strerror if isinstance(error, OSError) else None) or error
         raise HydrostateError(f"{path}: an FMU is needed: {reason}") from error
 
@@ -144,7 +144,7 @@ def _run(
                 start_values=start,
                 fmi_type="CoSimulation",
             )
-    except Exception as error:  # the program of others may fail in any way
+    except Exception as error:  # a foreign program may fail in any way
         raise HydrostateError(f"{path}: the FMU stopped: {error}") from error
     if len(found) != len(speed):
         raise HydrostateError(f"{path}: {len(speed)} samples are needed, the FMU gave {len(found)}")

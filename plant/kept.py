@@ -63,11 +63,11 @@ def read_kept(path: Path, kind: str) -> dict[str, Array]:
     """
     wanted = f"a state of {kind.rpartition(' ')[0]} is needed"
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:  # NumPy leaves open what is damaged
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:  # NumPy leaves a damaged file open
             values = {name: kept[name] for name in kept.files}
     except OSError as error:
         raise HydrostateError(f"{path}: {wanted}: {error.strerror or error}") from error
-    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:  # NumPy's words speak of pickles
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:  # NumPy's own message is about pickles
         raise HydrostateError(f"{path}: {wanted}, the file holds none, or is damaged") from error
     if str(values.pop("format", "")) != kind:
         raise HydrostateError(f"{path}: {wanted}, the file is none of this version")

@@ -48,7 +48,7 @@ def begun(work: Callable[[], Found]) -> Callable[[], Found] | None:
         return None
     executor = ThreadPoolExecutor(max_workers=1)
     future: Future[Found] = executor.submit(copy_context().run, work)
-    executor.shutdown(wait=False)  # its thread ends with the work, wanted or not
+    executor.shutdown(wait=False)  # the thread ends when the work is done, even if nobody takes the result
     return future.result
 
 

@@ -125,7 +125,8 @@ def require_number(name: str, value: object, *, signed: bool = False, zero: bool
         raise RigError(f"{name} must be a finite number, got {value!r}")
     if not signed and (value < 0.0 or (value == 0.0 and not zero)):
         raise RigError(f"{name} must {'not be negative' if zero else 'be positive'}, got {value!r}")
-    if abs(value) > LARGEST or (value and abs(value) < SMALLEST and not (zero or signed)):  # squares are numbers still
+    # within these limits, squares neither overflow nor underflow
+    if abs(value) > LARGEST or (value and abs(value) < SMALLEST and not (zero or signed)):
         raise RigError(f"{name} must be from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}")
 
 

@@ -1,14 +1,14 @@
-"""Tests without spare processors, for a record of which test executes which line.
+"""Runs tests without spare processors, to record which test executes which line.
 
-A thread that outlives its test would have its lines recorded for the next one. `make coverage` loads this plugin, and
-leaves out the tests of the threads themselves.
+If a thread outlives its test, its lines are recorded for the next test. `make coverage` loads this plugin, and leaves
+out the tests of the threads themselves.
 """
 
 import pytest
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:  # noqa: ARG001  the hook's own name
-    """Find no spare processor from here on."""
-    import plant.spare_processors  # once lines are recorded
+    """Report that there are no spare processors, from here on."""
+    import plant.spare_processors  # imported only after recording has started
 
     plant.spare_processors.spare_processors = lambda: 0

@@ -1,4 +1,4 @@
-"""C compilers of this machine, and what they make of exported files."""
+"""The C compilers on this machine, and the programs that they build from exported files."""
 
 import contextlib
 import hashlib
@@ -15,14 +15,14 @@ import pytest
 
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
 PROGRAMS = Path(__file__).resolve().parents[1] / ".pytest_cache" / "programs"
-"""Beside compiled kernels, which outlive a run too."""
+"""Next to the compiled kernels, which also outlive a test run."""
 UNUSED = 30 * 86400
-"""Age at which a program that no test asked for is deleted [s]."""
+"""Age after which a program that no test has used is deleted [s]."""
 SANITIZED = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
 def compiler(name: str) -> str:
-    """The path of a compiler, or a skip where there is none."""
+    """Return the path of a compiler; skip the test if it is not installed."""
     found = shutil.which(name)
     if found is None:
         pytest.skip(f"{name} is not installed")
@@ -35,21 +35,21 @@ def _version(path: str) -> bytes:
 
 
 def _kept_as(files: Mapping[str, str], command: Sequence[str]) -> Path:
-    """Where the program is kept that this compiler makes of these files, from one run of the tests to the next."""
+    """Return the path under which the program that this compiler builds from these files is kept between test runs."""
     made_by = repr((_version(command[0]), command, sorted(files.items()), platform.machine()))
     return PROGRAMS / hashlib.sha256(made_by.encode()).hexdigest()[:32]
 
 
 def _forget() -> None:
-    """Delete programs that no test has asked for in a month: each change of an exported file leaves one behind."""
+    """Delete programs that no test has used for a month; each change of an exported file leaves an old one."""
     for one in PROGRAMS.iterdir():
-        with contextlib.suppress(FileNotFoundError):  # another worker may forget it meanwhile
+        with contextlib.suppress(FileNotFoundError):  # another worker may have just deleted it
             if one.stat().st_mtime < time.time() - UNUSED:
                 one.unlink()
 
 
 def compiled(folder: Path, files: Mapping[str, str], *flags: str, using: str = "gcc") -> Path:
-    """The program that exported files make, compiled without a warning; once, however often tests ask for it."""
+    """Return the program built from exported files without compiler warnings; later calls reuse it."""
     for file, text in files.items():
         (folder / file).write_text(text, encoding="utf-8")
     sources = [file for file in files if file.endswith(".c")]
@@ -68,7 +68,7 @@ def compiled(folder: Path, files: Mapping[str, str], *flags: str, using: str = "
 
 
 def ran(program: Path, lines: Sequence[str]) -> tuple[str, str]:
-    """What a program prints, and says on standard error, given lines on standard input."""
+    """Return what a program writes to standard output and standard error, given lines on standard input."""
     done = subprocess.run(  # noqa: S603 - our own program
         [str(program)], input="\n".join(lines) + "\n", capture_output=True, text=True, check=True
     )

@@ -1,4 +1,4 @@
-"""What every test stands on: raising floating point, a hypothesis profile, a kernel cache, shared data."""
+"""Set-up of all tests: floating-point errors raise, a hypothesis profile, a kernel cache, shared data."""
 
 import gc
 import os
@@ -30,7 +30,7 @@ settings.load_profile("ci")
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Give a worker whole files, and those that stand on the same in one go."""
+    """Give each worker whole files, and keep files that share costly fixtures on one worker."""
     from tests.together import WholeFiles  # needs xdist
 
     return WholeFiles(config, log) if config.getvalue("dist") == "loadfile" else None
@@ -53,7 +53,7 @@ def pytest_collect_directory() -> Generator[None, pytest.Collector | None, pytes
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put what workers have collected in one order, before any other order is made of it."""
+    """Sort the collected tests into the same order on all workers, before anything else reorders them."""
     if WORKER:
         from tests.together import in_one_order  # needs xdist
 
@@ -62,26 +62,29 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
-    """Look for no examples in files of claims, which have none: looking takes a second of each worker's start."""
+    """Skip doctests in ``test_*.py`` files, which have none; the search takes a second at each worker's start."""
     found = yield
     return [one for one in found if not (file_path.name.startswith("test_") and isinstance(one, DoctestModule))]
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Leave what is imported and collected, millions of objects, out of every search for garbage, then and later."""
+    """Exclude all imported and collected objects, millions of them, from every garbage collection from now on."""
     gc.disable()
     collected = yield
     gc.collect()
     gc.freeze()
-    gc.set_threshold(20_000, 20, 20)  # objects: a search each 700 takes a tenth of what reads or draws much
+    gc.set_threshold(20_000, 20, 20)  # objects; collecting every 700 takes a tenth of the time
     gc.enable()
     return collected
 
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_parser_of_commands() -> Iterator[None]:
-    """Typer makes all verbs' parsers anew each time that a test invokes one, which is most of a short answer's work."""
+    """Build Typer's command parser only once.
+
+    Otherwise each call in a test would rebuild the parsers of all verbs, which takes most of the time of a short call.
+    """
     made = WeakKeyDictionary[typer.Typer, Any]()
 
     def once(app: typer.Typer) -> Any:
@@ -96,7 +99,7 @@ def _one_parser_of_commands() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_thread_for_linear_algebra() -> Iterator[None]:
-    """Small matrices on busy cores: the library's own threads only get in each other's way."""
+    """Use one thread for linear algebra: the matrices are small and the cores busy, so threads would compete."""
     with threadpool_limits(limits=1, user_api="blas"):
         yield
 
@@ -109,7 +112,7 @@ def _raising_floating_point() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """Return the folder of shared read-only data (bench logs), or skip where there is none."""
+    """Return the folder of shared read-only data (bench logs); skip the test if there is none."""
     folder = Path(os.environ.get("HYDROSTATE_SHARED", ROOT.parent / "shared"))
     if not folder.is_dir():
         pytest.skip(f"no shared data in {folder}: set HYDROSTATE_SHARED to the folder that holds bench/")
@@ -118,7 +121,7 @@ def shared() -> Path:
 
 @pytest.fixture(scope="session")
 def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
-    """Return the port of a real broker, or skip where there is none."""
+    """Return the port of a real MQTT broker; skip the test if none is installed."""
     pytest.importorskip("paho.mqtt.client", reason="paho-mqtt is an extra")
     program = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
     if program is None:

@@ -1,10 +1,10 @@
-"""Where a verdict turns: the size of an input at which what is told of it changes, a number that a limit decides."""
+"""Finds the edge of a verdict: the size of an input at which the verdict changes."""
 
 from collections.abc import Callable
 from typing import Any
 
 STEPS = 24
-"""Halvings of the interval: an edge is found to some 1e-7 of it [count]."""
+"""Number of bisections of the interval [count]: the edge is accurate to about 1e-7 of it."""
 
 
 def edge(told: Callable[[float], Any], low: float, high: float, steps: int = STEPS) -> float | str:
@@ -13,16 +13,16 @@ def edge(told: Callable[[float], Any], low: float, high: float, steps: int = STE
     Parameters
     ----------
     told : callable
-        From a size [any unit] to a verdict that can be compared.
+        Returns the verdict, which can be compared, at a size [any unit].
     low, high : float
         Sizes between which the verdict changes once [the same unit].
     steps : int
-        Halvings [count].
+        Number of bisections [count].
 
     Returns
     -------
     float or str
-        The size; or that nothing changes.
+        The size; or a text if the verdict does not change.
 
     Examples
     --------

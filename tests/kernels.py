@@ -1,4 +1,4 @@
-"""Texts of kernels, caught as they are compiled, so that tests can run their parts in Python."""
+"""Captures the source text of kernels before it is compiled, so that tests can run its parts in Python."""
 
 import ast
 import ctypes
@@ -25,11 +25,11 @@ from plant.compiled.source import lines_source
 
 
 class _Caught(Exception):  # noqa: N818  nothing is wrong
-    """The text is known, and its machine code is not wanted."""
+    """Raised instead of compiling, once the text is captured."""
 
 
 def text_of(monkeypatch: pytest.MonkeyPatch, module: ModuleType, compile_it: Callable[[], object]) -> str:
-    """The text that a module hands to the compiler, which is not asked to compile it."""
+    """Return the text that a module passes to the compiler, without compiling it."""
     texts: list[str] = []
 
     def caught(name: str, text: Any, entries: Any, made_of: object = None) -> Any:  # noqa: ARG001  as `load_native`
@@ -45,14 +45,14 @@ def text_of(monkeypatch: pytest.MonkeyPatch, module: ModuleType, compile_it: Cal
 
 @contextmanager
 def loops_in_python() -> Iterator[None]:
-    """Run loops as they are written: quickly enough where series are short, and seen by coverage."""
+    """Run compiled loops as plain Python, so that coverage sees them; it is fast enough for short series."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Loop, "__call__", lambda loop, *args: loop.__wrapped__(*args))
         yield
 
 
 def functions_of(text: str) -> SimpleNamespace:
-    """A kernel's constants and functions, as Python; what was pasted has the lines of its file, for coverage."""
+    """Return a kernel's constants and functions as Python; pasted functions keep their files' lines for coverage."""
     tree = ast.parse(text)
     names: dict[str, Any] = {}
     for node in tree.body:
@@ -71,10 +71,10 @@ def functions_of(text: str) -> SimpleNamespace:
 
 
 def _as_in_its_file(pasted: ast.FunctionDef) -> str | None:
-    """Give a pasted function's statements the lines that they have in its file, which is returned."""
+    """Renumber the statements of a pasted function as in its own file, and return that file."""
     text = ast.unparse(pasted)
     for name, module in list(sys.modules.items()):
-        ours = name.partition(".")[0] in PACKAGES  # a library's module may answer to a name with a warning
+        ours = name.partition(".")[0] in PACKAGES  # other modules may warn if asked for a name
         function = vars(module).get(pasted.name) if ours else None
         if not isinstance(function, FunctionType) or function.__module__ != module.__name__ or _bare(function) != text:
             continue
@@ -98,7 +98,7 @@ def _bare(function: FunctionType) -> str | None:
 
 
 def _onto(statement: ast.stmt, line: int) -> None:
-    """Put a statement and its expressions, but not the statements in it, onto a line."""
+    """Set the line number of a statement and its expressions, but not of nested statements."""
     waiting: list[ast.AST] = [statement]
     while waiting:
         node = waiting.pop()
@@ -108,7 +108,7 @@ def _onto(statement: ast.stmt, line: int) -> None:
 
 
 def _of_a_tuple(lines: FunctionType) -> Callable[[tuple[float, ...]], tuple[float, ...]]:
-    """Lines of a kernel, as a function from a tuple to a tuple."""
+    """Return lines of a kernel as a function from a tuple to a tuple."""
     return lambda given: tuple(in_python(lines)(*given).values())
 
 
@@ -117,7 +117,7 @@ def _is_made(node: ast.stmt) -> bool:
 
 
 def fma(a: float, b: float, c: float) -> float:
-    """Rounded once."""
+    """Return a b + c, rounded once."""
     if not all(map(math.isfinite, (a, b, c))):
         return a * b + c
     exact = Fraction(a) * Fraction(b) + Fraction(c)
@@ -125,7 +125,7 @@ def fma(a: float, b: float, c: float) -> float:
 
 
 def where(condition: bool, a: float, b: float) -> float:
-    """Chosen after both are computed."""
+    """Return one of two values, both of which have been computed."""
     return a if condition else b
 
 
@@ -138,16 +138,16 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "ratios": lambda a, b: [x / y for x, y in zip(a, b, strict=True)],
     "roots": lambda values: [math.sqrt(x) for x in values],
 }
-"""What lines call (`plant.compiled.source.CALLED`), on floats."""
+"""The operations that lines may call (`plant.compiled.source.CALLED`), on floats."""
 
 
 def in_python(lines: FunctionType) -> Callable[..., Any]:
-    """Lines of a kernel, on floats."""
+    """Return lines of a kernel as a function of floats."""
     return FunctionType(lines.__code__, dict(OPERATIONS))
 
 
 def computed(outputs: Mapping[str, Expression], **inputs: float) -> dict[str, float]:
-    """What lines written for some outputs give, on floats."""
+    """Return the values of outputs, from the lines generated for them, on floats."""
     names: dict[str, Any] = {}
     exec(lines_source("lines", outputs), names)  # noqa: S102  our own text
     lines = names["lines"]
@@ -155,7 +155,7 @@ def computed(outputs: Mapping[str, Expression], **inputs: float) -> dict[str, fl
 
 
 def every_lane(work: NDArray[np.float64], *, step: Callable[[int, float], None], WIDTH: int) -> None:
-    """Step on slots of 8 numbers in memory.
+    """Call a step for all slots of 8 numbers in memory.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def every_lane(work: NDArray[np.float64], *, step: Callable[[int, float], None],
 def stepped(
     text: str, name: str, given: Mapping[str, NDArray[np.float64]], results: str, width: int
 ) -> dict[str, NDArray[np.float64]]:
-    """What lines of a name give of 8 numbers each, so many at a time; only what they give is returned."""
+    """Return what named lines compute for 8 numbers each, ``width`` at a time, without outputs that are all NaN."""
     slots = {one: 8 * i for i, one in enumerate((*given, *results))}
     step = f"SLOTS = {slots}\n\nstep = stepping(SLOTS, {width}, {name})"
     whole = kernel_text(f"{name}, {width} at a time", text, step, pasted(every_lane, constants={"WIDTH": width}))
@@ -181,7 +181,7 @@ def stepped(
 
 
 def on_memory(file: SimpleNamespace, *lines: FunctionType) -> Callable[..., None]:
-    """Lines of a kernel, one after the other, as an operation on numbers in memory, one at a time."""
+    """Return successive lines of a kernel as an operation on numbers in memory, one number at a time."""
 
     def operation(address: int, j: float, *others: int) -> None:
         def at(name: str) -> ctypes.c_double:

@@ -1,11 +1,11 @@
-"""Numbers that stand: what an engine makes of a small fixed input, kept in a file that a person can read.
+"""Regression tests on numbers: the results of an engine for a small fixed input are kept in a readable file.
 
-Codes of astronomers and chemists are tested against reference values; so is this one. A module ``test_numbers.py``
-names its cases, and ``numbers.json`` beside it keeps what they gave (``test_numbers_flow.py``: ``numbers_flow.json``).
-A number says no more than that nothing moved: where a formula has a claim that can be tested, test the claim.
+Astronomical and chemical codes are tested against reference values, and so is this one. A module ``test_numbers.py``
+defines cases, and ``numbers.json`` beside it keeps their results (``test_numbers_flow.py``: ``numbers_flow.json``). A
+kept number only shows that nothing moved. If a formula has a property that can be tested, test that property instead.
 
-`python -m tests.numbers` prints what moved, all of it or only that of the folders named; ``--write`` keeps what is
-found instead. Read what moved before you keep it: each line is a number that a user may see move.
+`python -m tests.numbers` prints the numbers that moved, in all folders or only in the named ones; with ``--write`` it
+keeps the new numbers. Read what moved before you keep it: users may see each of these numbers move.
 """
 
 import argparse
@@ -28,25 +28,27 @@ from plant.notes import Note
 ROOT = Path(__file__).resolve().parents[1]
 
 FORMULA = 1e-6
-"""How far a number may move that a formula gives, over its size [fraction]: other processors round otherwise."""
+"""Relative change allowed for the result of a formula [fraction]: other processors round differently."""
 
 ROUNDING = 1e-12
-"""How far a number in a list may move, over the largest of the list: what is left of larger ones [fraction]."""
+"""Change allowed for a number in a list, relative to the largest in the list [fraction]: larger numbers may have
+cancelled."""
 
 WITHIN, WIDTH = 0.03, 0.01
-"""How far the end of a search may move, over its deviation, and how far the deviation may, over itself [fraction]."""
+"""Change allowed for the result of a search, relative to its standard deviation, and relative change allowed for that
+deviation [fraction]."""
 
 KEPT_DIGITS = 10
 
 
 @dataclass(frozen=True)
 class Found:
-    """The end of a search: a value, and the deviation that says how well it is known.
+    """The result of a search: a value and its standard deviation.
 
     Parameters
     ----------
     value, std : float
-        In one unit.
+        Both in the same unit.
     """
 
     value: float
@@ -55,14 +57,14 @@ class Found:
 
 @dataclass(frozen=True)
 class Roughly:
-    """A number that other processors move: how often a search asks, the end of one along a valley.
+    """A number that differs between processors, such as the function calls of a search, or its end along a flat valley.
 
     Parameters
     ----------
     value : float
         In any unit.
     share : float
-        How far it may move, over its size [fraction].
+        Relative change allowed [fraction].
     """
 
     value: float
@@ -73,7 +75,7 @@ Case = Callable[[], Mapping[str, Any]]
 
 
 class Numbers:
-    """The cases of one module, and the file of what they gave.
+    """The cases of one module, and the file with their results.
 
     Parameters
     ----------
@@ -87,7 +89,7 @@ class Numbers:
 
     @property
     def cases(self) -> list[str]:
-        """What the cases are called."""
+        """Names of the cases."""
         return list(self.made)
 
     def case(self, relative: float = FORMULA) -> Callable[[Case], Case]:
@@ -96,7 +98,7 @@ class Numbers:
         Parameters
         ----------
         relative : float
-            How far its numbers may move, over their size [fraction].
+            Relative change allowed for its numbers [fraction].
         """
 
         def added(function: Case) -> Case:
@@ -106,37 +108,37 @@ class Numbers:
         return added
 
     def found(self, name: str) -> dict[str, Any]:
-        """Return what a case gives now, as the file keeps it."""
+        """Return the present result of a case, in the form of the file."""
         return _plain(self.made[name][0]())
 
     def kept(self) -> dict[str, Any]:
-        """Return what the file keeps."""
+        """Return the contents of the file."""
         return json.loads(self.file.read_text("utf-8")) if self.file.exists() else {}
 
     def moved(self, name: str) -> list[str]:
-        """Return a line for each number of a case that moved, came or went."""
+        """Return one line for each number of a case that moved, appeared or disappeared."""
         return list(_moved(name, self.kept().get(name, {}), self.found(name), self.made[name][1]))
 
     def check(self, name: str) -> None:
-        """Fail if a number of a case moved, came or went."""
+        """Fail if a number of a case moved, appeared or disappeared."""
         moved = self.moved(name)
         assert not moved, "see `python -m tests.numbers`:\n" + "\n".join(moved)
 
     def write(self) -> None:
-        """Keep what all cases give now."""
+        """Keep the present results of all cases."""
         kept = {name: self.found(name) for name in self.made}
         self.file.write_text(_lines(kept) + "\n", "utf-8")
 
 
 def some(values: Any, count: int = 5) -> list[Any]:
-    """Return so many values of an array, both ends among them, and the root mean square of all, which any moves.
+    """Return a few values of an array, including both ends, and the root mean square of all, so that any change shows.
 
     Parameters
     ----------
     values : array_like
         Real or complex [any unit].
     count : int
-        How many are picked, evenly spaced.
+        Number of values, evenly spaced.
 
     Examples
     --------
@@ -151,12 +153,12 @@ def some(values: Any, count: int = 5) -> list[Any]:
 
 
 def refused(call: Callable[[], Any]) -> str | None:
-    """Return why a call is refused, None where it is not.
+    """Return why a call is refused; None if it is not.
 
     Parameters
     ----------
     call : callable
-        What is tried.
+        The function to try.
     """
     try:
         call()
@@ -166,37 +168,37 @@ def refused(call: Callable[[], Any]) -> str | None:
 
 
 def or_refused(call: Callable[[], Any]) -> Any:
-    """Return what is made, or the kind of error and the beginning of its sentence.
+    """Return the result of a call, or the type of its error and the beginning of the message.
 
     Parameters
     ----------
     call : callable
-        What is tried.
+        The function to try.
     """
     try:
         return call()
-    except ValueError as error:  # ours are among them
+    except ValueError as error:  # our errors are among them
         return f"{type(error).__name__}: {str(error)[:90]}"
 
 
 def told(notes: Iterable[Note]) -> list[dict[str, Any]]:
-    """Return codes and data of notes.
+    """Return the codes and data of notes.
 
     Parameters
     ----------
     notes : iterable of Note
-        What was said.
+        The notes.
     """
     return [{"code": str(one.code), **one.data} for one in notes]
 
 
 def warned(call: Callable[[], Any]) -> list[str]:
-    """Return the sentences that a call warns with, and the file that they name where it is not the one that asked.
+    """Return the warnings of a call; one that points to a file other than the caller's includes that file's name.
 
     Parameters
     ----------
     call : callable
-        What is tried: a function of a test that asks, or what is asked itself with its arguments.
+        The function to try: one defined in the calling test, or the tested callable with its arguments.
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -208,7 +210,7 @@ def warned(call: Callable[[], Any]) -> list[str]:
 
 
 def _plain(value: Any) -> Any:
-    """Return what JSON can hold: numbers with `KEPT_DIGITS` digits, or names of those that are not finite."""
+    """Return a value as JSON can hold it: numbers with `KEPT_DIGITS` digits, or as text if they are not finite."""
     match value:
         case Found(value=middle, std=std):
             return {"value": _plain(middle), "std": _plain(std)}
@@ -259,7 +261,7 @@ def _moved(name: str, kept: Any, found: Any, relative: float) -> Iterator[str]:
 
 def _search_moved(name: str, kept: Mapping[str, Any], found: Mapping[str, Any]) -> Iterator[str]:
     if not (_is_number(kept["std"]) and _is_number(found["std"])):
-        if kept["std"] != found["std"]:  # nothing is known of the value, and it may end anywhere
+        if kept["std"] != found["std"]:  # without one the value may be anything
             yield f"{name}, deviation: {kept['std']!r} -> {found['std']!r}"
     elif not (_is_number(kept["value"]) and _is_number(found["value"])):
         if kept["value"] != found["value"]:  # one of them is not finite
@@ -275,7 +277,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _lines(value: Any, indent: str = "") -> str:
-    """Return JSON with a line a number or a list of numbers."""
+    """Return JSON text with one number or list of numbers per line."""
     if isinstance(value, dict) and set(value) not in ({"value", "std"}, {"value", "within"}):
         inner = indent + "  "
         entries = [
@@ -286,19 +288,19 @@ def _lines(value: Any, indent: str = "") -> str:
 
 
 def modules(folders: Sequence[str]) -> list[Numbers]:
-    """Return the cases of all modules below some folders of tests.
+    """Return the cases of all modules in some folders of tests.
 
     Parameters
     ----------
     folders : sequence of str
-        From the project's folder.
+        Relative to the project's folder.
     """
     files = sorted({file for folder in folders for file in (ROOT / folder).rglob("test_numbers*.py")})
     return [_imported(file).NUMBERS for file in files]
 
 
 def _imported(file: Path) -> Any:
-    name = "kept_" + "_".join(file.relative_to(ROOT).with_suffix("").parts)  # not what pytest calls it
+    name = "kept_" + "_".join(file.relative_to(ROOT).with_suffix("").parts)  # differs from pytest's name for it
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
@@ -309,7 +311,7 @@ def _imported(file: Path) -> Any:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Print what moved, or keep it; return whether anything did that was not kept."""
+    """Print what moved, or keep it; return 1 if something moved and was not kept."""
     parser = argparse.ArgumentParser(prog="python -m tests.numbers", description=__doc__)
     parser.add_argument("folders", nargs="*", default=["tests"], help="folders of tests; all if none is named")
     parser.add_argument("--write", action="store_true", help="keep what is found")

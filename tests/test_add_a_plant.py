@@ -24,12 +24,12 @@ REGISTRY = "experiments/actuators.py"
 
 
 def files() -> dict[str, str]:
-    """Return the files that the page gives, by path."""
+    """Return the files that the page contains, by path."""
     return dict(re.findall(r"^`([\w/]+\.py)`:\n\n```python\n(.*?)```", PAGE, re.DOTALL | re.MULTILINE))
 
 
 def blocks(language: str) -> list[str]:
-    """Return the page's blocks in a language."""
+    """Return the page's code blocks in a language."""
     return re.findall(rf"^```{language}\n(.*?)```", PAGE, re.DOTALL | re.MULTILINE)
 
 
@@ -39,7 +39,7 @@ def registry_line() -> str:
 
 
 def code_lines(text: str) -> int:
-    """Count lines of code: without docstrings, comments and blank lines."""
+    """Return the number of lines of code, without docstrings, comments and blank lines."""
     tokens = tokenize.generate_tokens(io.StringIO(DOCSTRINGS.sub("", text)).readline)
     return len(
         {line for token in tokens if token.type not in LAYOUT for line in range(token.start[0], token.end[0] + 1)}
@@ -48,7 +48,7 @@ def code_lines(text: str) -> int:
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the actuator in a copy of the packages."""
+    """Return a copy of the packages with the actuator added."""
     folder = tmp_path_factory.mktemp("checkout")
     for package in (*PACKAGES, "tests/contracts"):
         shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))

@@ -1,6 +1,6 @@
-"""The house holds: imports point left, filterpy has one importer, files are short, nothing below prints.
+"""Rules of the architecture: imports point left, filterpy has one importer, files are short, lower layers do not print.
 
-Each guard is a pure function from sources to offences, so that it is also shown to fire on an offender.
+Each guard is a pure function from sources to offences, so tests can also show that it finds an offender.
 """
 
 import ast
@@ -31,7 +31,7 @@ FAULT_NAME = re.compile(r"\b(?:minor|major)[ _-](?:leakage|friction)", re.IGNORE
 
 @dataclass(frozen=True)
 class Import:
-    """One imported name, dotted and absolute; `eager` if it runs when its module is loaded."""
+    """One imported name, dotted and absolute; `eager` if the import runs when its module is loaded."""
 
     target: str
     line: int
@@ -98,7 +98,7 @@ def _imports_below(node: ast.AST, source: Source, *, eager: bool) -> Iterator[Im
         above, at_once = waiting.pop()
         for child in ast.iter_child_nodes(above):
             if isinstance(child, ast.expr) and not calls:
-                continue  # most of a tree, and only a call among them may import
+                continue  # most of the tree; only calls among expressions can import
             if isinstance(child, ast.Import | ast.ImportFrom | ast.Call):
                 yield from (Import(target, child.lineno, at_once) for target in _targets(child, source))
             if isinstance(child, ast.If) and _is_type_checking(child.test):
@@ -121,7 +121,7 @@ def _below(name: str, package: str) -> bool:
 
 
 def imports_that_point_right(sources: Sequence[Source]) -> list[str]:
-    """A lower layer that imports a higher one, in code, under TYPE_CHECKING, or in a doctest."""
+    """Return imports of a higher layer in a lower one, in code, under TYPE_CHECKING, or in a doctest."""
     return [
         f"{source.path}:{found.line}: {source.layer} imports {found.target}, a layer above it"
         for source in sources
@@ -132,7 +132,7 @@ def imports_that_point_right(sources: Sequence[Source]) -> list[str]:
 
 
 def actuators_in_shared_rooms(sources: Sequence[Source]) -> list[str]:
-    """An import of an actuator, doctests aside, where what serves every actuator stands."""
+    """Return imports of an actuator, except in doctests, in packages that serve every actuator."""
     return [
         f"{source.path}:{found.line}: imports {found.target}, but serves every actuator"
         for source in sources
@@ -143,7 +143,7 @@ def actuators_in_shared_rooms(sources: Sequence[Source]) -> list[str]:
 
 
 def imports_of_the_workshop(sources: Sequence[Source]) -> list[str]:
-    """A package that imports tests or benchmarks, which are not installed."""
+    """Return imports of tests or benchmarks, which are not installed, in a package."""
     return [
         f"{source.path}:{found.line}: imports {found.target}, which is not installed with the packages"
         for source in sources
@@ -154,7 +154,7 @@ def imports_of_the_workshop(sources: Sequence[Source]) -> list[str]:
 
 
 def second_importers_of_filterpy(sources: Sequence[Source]) -> list[str]:
-    """Any import of filterpy outside the bridge."""
+    """Return imports of filterpy outside the bridge."""
     return [
         f"{source.path}:{found.line}: imports {found.target}, which only {FILTERPY_BRIDGE} may"
         for source in sources
@@ -165,7 +165,7 @@ def second_importers_of_filterpy(sources: Sequence[Source]) -> list[str]:
 
 
 def overlong_files(sources: Sequence[Source]) -> list[str]:
-    """A file past the length at which a room is split."""
+    """Return files that are too long and should be split."""
     return [
         f"{source.path}:{LONGEST_FILE + 1}: has {lines} lines, at most {LONGEST_FILE} are wanted"
         for source in sources
@@ -174,7 +174,7 @@ def overlong_files(sources: Sequence[Source]) -> list[str]:
 
 
 def prints_outside_experiments(sources: Sequence[Source]) -> list[str]:
-    """A call of print below the layer that talks to the user."""
+    """Return calls of print below the layer that talks to the user."""
     return [
         f"{source.path}:{node.lineno}: calls print, which only experiments may"
         for source in sources
@@ -185,7 +185,7 @@ def prints_outside_experiments(sources: Sequence[Source]) -> list[str]:
 
 
 def fault_names_in_estimation(sources: Sequence[Source]) -> list[str]:
-    """A fault's name, in code or words, in the layer that must not know faults."""
+    """Return names of faults, in code or words, in the layer that must not know them."""
     return [
         f"{source.path}:{number}: names the fault {found[0]!r}, which estimation must not know"
         for source in sources
@@ -196,7 +196,7 @@ def fault_names_in_estimation(sources: Sequence[Source]) -> list[str]:
 
 
 def import_cycles(sources: Sequence[Source]) -> list[str]:
-    """Modules of one package that need each other while they are being loaded."""
+    """Return modules that need each other while they are being loaded."""
     known = {source.module: source for source in sources}
     edges: dict[str, dict[str, int]] = {module: {} for module in known}
     for module, source in known.items():

@@ -1,4 +1,4 @@
-"""Programs that tests compile are kept from run to run, as long as a test asks for them."""
+"""Programs compiled by tests are kept from run to run, as long as a test uses them."""
 
 import os
 from pathlib import Path

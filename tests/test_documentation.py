@@ -1,9 +1,9 @@
-"""The public API says what it is: docstrings, arguments, units, shapes.
+"""The public API is documented: docstrings, arguments, units, shapes.
 
-The rules, each shown to fire on a made-up offender: whatever is public has a docstring; floats and arrays, and no
-strangers, stand under Parameters with unit or shape; more than one line about a function that returns floats or arrays
-has Returns. Protocol members with a body of ``...`` and methods that override another of ours need no sections, and
-commands are checked by their help.
+Each rule is also tested on an invented offender. Everything public has a docstring. Its floats and arrays, and no
+unknown names, are listed under Parameters with unit or shape. A docstring of more than one line on a function that
+returns floats or arrays has a Returns section. Protocol members with a body of ``...``, and methods that override
+another of ours, need no sections. Commands are checked by their help.
 """
 
 import ast
@@ -34,7 +34,7 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 @dataclass(frozen=True)
 class Entry:
-    """What a docstring says of one argument: the text behind its colon, and the lines below."""
+    """The description of one argument in a docstring: the type after the colon, and the lines below."""
 
     type_line: str
     description: str
@@ -55,7 +55,7 @@ def sections(docstring: str) -> dict[str, list[str]]:
 
 
 def entries(lines: Sequence[str]) -> dict[str, Entry]:
-    """Read the arguments of a Parameters section; ``a, b : float`` describes both."""
+    """Return the arguments of a Parameters section; ``a, b : float`` describes both."""
     found: dict[str, Entry] = {}
     names: list[str] = []
     for line in lines:
@@ -72,13 +72,13 @@ def entries(lines: Sequence[str]) -> dict[str, Entry]:
 def is_unit(text: str) -> bool:
     try:
         unit_registry().parse_units(text)
-    except Exception:  # pint raises errors of many kinds, all of which mean no
+    except Exception:  # pint raises many kinds of error, all of which mean no
         return False
     return True
 
 
 def has_unit(text: str) -> bool:
-    """Tell whether a description holds ``[a unit]``, or says in words that there is none, or whose it is."""
+    """Return whether a description holds ``[a unit]``, or states in words that there is none or whose it is."""
     brackets = re.findall(r"\[([^\[\]]+)\]", text)
     return bool(UNIT_WORDS.search(text)) or any(is_unit(said) or "unit" in said for said in brackets)
 
@@ -102,7 +102,7 @@ def _mentions(annotation: ast.expr | None, names: frozenset[str]) -> bool:
 
 @dataclass(frozen=True)
 class Page:
-    """One public module, and the aliases of float and array types that hold throughout the project."""
+    """One public module, and the project-wide aliases of float and array types."""
 
     path: str
     tree: ast.Module
@@ -129,7 +129,7 @@ def _aliases(tree: ast.Module, names: frozenset[str]) -> Iterator[str]:
 
 
 def pages(texts: dict[str, str]) -> list[Page]:
-    """Parse the public modules among files given by their path relative to the project."""
+    """Parse the public modules among files given by their paths relative to the project."""
     trees = {path: ast.parse(text, filename=path) for path, text in texts.items()}
     floats = FLOATS.union(*(_aliases(tree, FLOATS) for tree in trees.values()))
     arrays = ARRAYS.union(*(_aliases(tree, ARRAYS) for tree in trees.values()))
@@ -141,7 +141,7 @@ def pages(texts: dict[str, str]) -> list[Page]:
 
 
 def _pasted(tree: ast.Module) -> Iterator[str]:
-    """Yield the functions that are pasted into kernel files: parts of one loop, called by nobody else."""
+    """Yield the functions that are pasted into kernel files: parts of one loop, with no other caller."""
     named = {
         target.id: node.value
         for node in ast.walk(tree)
@@ -181,7 +181,7 @@ def _arguments(node: Function, *, method: bool) -> dict[str, ast.expr | None]:
 
 
 def _fields(node: ast.ClassDef) -> dict[str, ast.expr | None]:
-    """Return what a class's constructor takes: its fields without an SI note, or `__init__`'s arguments."""
+    """Return the arguments of a class's constructor: its fields without an SI note, or those of `__init__`."""
     if "dataclass" in _decorators(node) or _bases(node) & {"NamedTuple", "BaseModel"}:
         return {
             item.target.id: item.annotation
@@ -237,7 +237,7 @@ def _function_offences(page: Page, node: Function, name: str, owner: ast.ClassDe
 
 
 def documentation_offences(page: Page) -> Iterator[str]:
-    """Every missing docstring, argument, unit, shape and return of one public module."""
+    """Return every missing docstring, argument, unit, shape and Returns section of one public module."""
     if ast.get_docstring(page.tree) is None:
         yield page.offence(page.tree, "the module", "has no docstring")
     for node in page.tree.body:

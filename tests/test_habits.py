@@ -1,4 +1,4 @@
-"""What a contributor and a user are promised: names that stay, versions that agree, an index, files that are valid."""
+"""Promises to contributors and users: stable names, matching versions, a complete index, valid files."""
 
 import ast
 import importlib.util
@@ -22,7 +22,7 @@ FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
 
 
 def script(name: str) -> ModuleType:
-    """Import a script of the documents, which is in no package."""
+    """Import a script from docs, which is not in a package."""
     spec = importlib.util.spec_from_file_location(f"_{name}_page", ROOT / "docs" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
@@ -144,7 +144,7 @@ def _fixtures(file: Path) -> set[str]:
 
 
 def _asked(file: Path) -> set[str]:
-    """Return the names of fixtures and values that tests and fixtures of a file ask for."""
+    """Return the argument names of the tests and fixtures in a file."""
     functions, made = _functions(file), _fixtures(file)
     asking = [one for name, one in functions.items() if name in made or name.startswith("test_")]
     return {argument.arg for one in asking for argument in one.args.args}

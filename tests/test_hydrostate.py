@@ -1,4 +1,4 @@
-"""The module that a Python user imports: it says what a log holds, and answers a slip with the remedy."""
+"""The module that a Python user imports: it shows what a log contains, and answers a mistake with the remedy."""
 
 # ruff: noqa: ARG005 - every mistake is given the same two things
 
@@ -229,7 +229,7 @@ def test_a_log_of_anything_is_read_related_and_simulated(tmp_path: Path) -> None
 
 
 def test_a_log_under_other_names_says_how_to_name_its_columns_and_is_read_so(tmp_path: Path) -> None:
-    """The message named neither what was missing nor which column may be meant."""
+    """An earlier message named neither the missing channels nor the columns that may hold them."""
     table = hs.simulate(duration=1.0, sample_time=1e-3, seed=3).to_frame().reset_index()
     table = table[["time_s", "motor_speed_rad_s", "position_m", "differential_pressure_pa"]]
     table.columns = ["Zeit [s]", "Drehzahl [rad/s]", "Weg [m]", "Druckdifferenz [Pa]"]

@@ -1,4 +1,4 @@
-"""Kept numbers: what moved is said, what other processors round otherwise is not."""
+"""Kept numbers: a number that moved is reported, but a rounding difference between processors is not."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -25,7 +25,7 @@ TOLD: Mapping[str, Any] = {
 
 
 def moved(folder: Path, **changes: Any) -> list[str]:
-    """Keep `TOLD`, and return what is said of it with some entries changed, ``_`` for blanks."""
+    """Keep `TOLD`, and return what is reported after some entries change; ``_`` in their names stands for a blank."""
     now = dict(TOLD)
     kept = Numbers(str(folder / "test_numbers.py"))
     kept.case()(_told(now))

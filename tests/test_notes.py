@@ -1,4 +1,4 @@
-"""Codes: no two alike, each raised somewhere with all that its sentence needs, each on the page docs/notes.md."""
+"""Codes are unique, raised somewhere with all the fields that their sentence needs, and listed on docs/notes.md."""
 
 import importlib.util
 import re
@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def load(path: Path) -> ModuleType:
-    """Import a script that is in no package."""
+    """Import a script that is not in a package."""
     spec = importlib.util.spec_from_file_location(f"_{path.stem}_page", path)
     assert spec is not None
     assert spec.loader is not None
@@ -108,7 +108,7 @@ def test_a_dictionary_that_is_made_elsewhere_is_refused() -> None:
 
 
 def test_a_number_that_is_converted_for_a_reader_has_its_unit_behind_it(enums: Mapping[str, type[Code]]) -> None:
-    """The unit follows the field, or the field with which it is a range, and no pressure is told in pascal."""
+    """The unit follows the field, or the range of which the field is an end; no pressure is shown in pascal."""
     for member in (member for enum in enums.values() for member in enum):
         for said in re.split(r"[:,;] ", member.template.replace(":.", "=").replace(":+.", "=")):
             units = re.findall(r"\{[a-z_]+=[0-9]g\|([^}]+)\}", said)

@@ -1,4 +1,4 @@
-"""README and the page of verbs run as printed, print what they quote, and quote no number that is not measured."""
+"""The README and the page of verbs run as printed, their quoted output is right, and their numbers are measured."""
 
 import json
 import re
@@ -29,20 +29,20 @@ def commands(page: Path) -> list[list[str]]:
 
 
 def quoted(page: Path) -> list[tuple[str, str]]:
-    """Return each command whose output is printed below it, and that output."""
+    """Return each command whose output is quoted below it, with that output."""
     blocks = BLOCK.findall(page.read_text(encoding="utf-8"))
     pairs = pairwise(blocks)
     return [(command.strip(), text) for (one, command), (two, text) in pairs if (one, two) == ("sh", "text")]
 
 
 def words(text: str) -> str:
-    """Return a text without its line breaks: the README wraps long lines."""
+    """Return a text without its line breaks, because the README wraps long lines."""
     return " ".join(text.split())
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], list[Run]]:
-    """Run a page's commands in order, in a folder of its own, once."""
+    """Return a function that runs a page's commands in order, once, in a folder of its own."""
 
     @cache
     def of(page: Path) -> list[Run]:
@@ -115,7 +115,7 @@ def test_the_readmes_script_runs_as_printed(
 
 
 def rows(page: Path, columns: int) -> list[list[str]]:
-    """Return the cells of a page's tables with so many columns, without headings."""
+    """Return the cells of a page's tables that have the given number of columns, without headings."""
     lines = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     return [row for row in cells if len(row) == columns and row[0] != "what"]

@@ -1,4 +1,4 @@
-"""What is cited exists: a plant's sources, notes on parameters, errata, and the tables of nomenclature."""
+"""What the documents cite exists: sources of plants, notes on parameters, errata, and the tables of nomenclature."""
 
 import ast
 import importlib
@@ -33,7 +33,7 @@ ERRATA_ROW = re.compile(r"^\| ([EPM]\d+) \|.*\| (code departs|noted only) \|$", 
 
 @dataclass(frozen=True)
 class Cited:
-    """One erratum, where it is cited."""
+    """A citation of one erratum."""
 
     path: str
     line: int
@@ -41,13 +41,13 @@ class Cited:
 
 
 def read_texts(*folders: str) -> dict[str, str]:
-    """Return the text of every source, template and page below these folders, by path."""
+    """Return the text of every source, template and page in these folders, by path."""
     paths = [path for folder in folders for path in sorted((ROOT / folder).rglob("*")) if path.suffix in TEXTS]
     return {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in paths}
 
 
 def citations(texts: Mapping[str, str]) -> Iterator[Cited]:
-    """Find every ``errata E1, E2 and E3``, also where it runs over a line's end."""
+    """Find every ``errata E1, E2 and E3``, even across a line break."""
     for path, text in texts.items():
         for found in CITATION.finditer(text):
             line = text.count("\n", 0, found.start()) + 1
@@ -55,7 +55,7 @@ def citations(texts: Mapping[str, str]) -> Iterator[Cited]:
 
 
 def unknown_errata(texts: Mapping[str, str], errata: str) -> list[str]:
-    """A citation of an erratum that the list does not have."""
+    """Return citations of errata that are not in the list."""
     known = {number for number, _ in ERRATA_ROW.findall(errata)}
     return [
         f"{cited.path}:{cited.line}: cites errata {cited.number}, which docs/errata.md does not have"
@@ -65,7 +65,7 @@ def unknown_errata(texts: Mapping[str, str], errata: str) -> list[str]:
 
 
 def uncited_departures(texts: Mapping[str, str], errata: str) -> list[str]:
-    """An erratum on which the code is said to depart, and which no code cites."""
+    """Return errata from which the code is said to depart, but which no code cites."""
     cited = {found.number for found in citations(texts)}
     departs = [number for number, mark in ERRATA_ROW.findall(errata) if mark == "code departs"]
     return [
@@ -76,7 +76,7 @@ def uncited_departures(texts: Mapping[str, str], errata: str) -> list[str]:
 
 
 def unsourced_physics(path: str, text: str) -> list[str]:
-    """A public function of a plant that cites nothing, in a module that cites nothing for it."""
+    """Return public functions of a plant that cite no source, unless their module does."""
     tree = ast.parse(text, filename=path)
     if not path.startswith(PHYSICS) or SOURCE.search(ast.get_docstring(tree) or ""):
         return []
@@ -89,7 +89,7 @@ def unsourced_physics(path: str, text: str) -> list[str]:
 
 
 def is_parameters(found: object) -> bool:
-    """Tell whether this is a dataclass with a note on at least one of its fields."""
+    """Return whether an object is a dataclass with a note on at least one of its fields."""
     if not (isinstance(found, type) and is_dataclass(found)):
         return False
     hints = inspect.get_annotations(found)
@@ -97,7 +97,7 @@ def is_parameters(found: object) -> bool:
 
 
 def bad_notes(parameter_class: type) -> list[str]:
-    """A parameter without a note, or a note with an unknown unit, no meaning, or no source."""
+    """Return parameters without a note, or whose note has an unknown unit, no meaning, or no source."""
     where = f"{inspect.getsourcefile(parameter_class)}: {parameter_class.__name__}"
     try:
         noted = notes(parameter_class)
@@ -118,7 +118,7 @@ def bad_notes(parameter_class: type) -> list[str]:
 
 
 def parameter_table(parameter_class: type) -> str:
-    """Write the notes on a parameter dataclass as a Markdown table."""
+    """Return the notes on a parameter dataclass as a Markdown table."""
     given = {field.name: field.default for field in fields(parameter_class)}
     defaults = {name: "none" if value is None else f"{value:g}" for name, value in given.items()}
     rows = [
@@ -129,7 +129,7 @@ def parameter_table(parameter_class: type) -> str:
 
 
 def rows_below(heading: str, page: str) -> list[tuple[str, ...]]:
-    """Return the cells of the Markdown table under a heading, without its own heading row."""
+    """Return the cells of the Markdown table under a heading, without its header row."""
     section = page.split(f"\n## {heading}\n", 1)[1].split("\n## ", 1)[0]
     rows = re.findall(r"^\| `.*\|$", section, re.MULTILINE)
     return [tuple(cell.strip(" `") for cell in row.strip("|").split(" | ")) for row in rows]

@@ -1,4 +1,4 @@
-"""The site: links lead somewhere, every name of a face is documented, the drawing is of the code, and it builds."""
+"""The site: links are valid, every public name is documented, the diagram matches the code, and the site builds."""
 
 import importlib
 import re
@@ -21,12 +21,12 @@ LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
 def anchor_of(heading: str) -> str:
-    """Return the anchor that a heading of Markdown gets: small letters, hyphens for spaces, nothing else but digits."""
+    """Return the anchor of a Markdown heading: lower-case letters and digits, with hyphens for spaces."""
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 def prose(page: Path) -> str:
-    """Return a page without its blocks of code and its code in line."""
+    """Return a page without its code blocks and inline code."""
     return re.sub(r"```.*?```|`[^`\n]*`", "`", page.read_text("utf-8"), flags=re.DOTALL)
 
 
@@ -65,8 +65,8 @@ def test_every_test_that_a_page_names_is_there() -> None:
 
 
 def test_every_python_file_that_a_page_names_is_there() -> None:
-    records = {DOCS / "decisions.md"}  # of their day
-    made = {DOCS / "add-a-plant.md"}  # the reader writes its files
+    records = {DOCS / "decisions.md"}  # may name files that no longer exist
+    made = {DOCS / "add-a-plant.md"}  # its files are written by the reader
     folders = ("plant", "estimation", "faults", "experiments", "benchmarks", "tests", "docs")
     known = ["/hydrostate.py", *(file.as_posix() for folder in folders for file in (ROOT / folder).rglob("*.py"))]
     for page in (page for page in PAGES if page not in records | made):

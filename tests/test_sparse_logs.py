@@ -1,4 +1,4 @@
-"""A log that lacks up to half of its samples relates its channels in Python as on the command line, and no more."""
+"""A log that lacks up to half of its samples can be identified, as on the command line; other verbs refuse it."""
 
 import json
 import re
@@ -27,7 +27,7 @@ def run() -> pd.DataFrame:
 
 @pytest.fixture
 def holed(run: pd.DataFrame, tmp_path: Path) -> Path:
-    """Return a log whose logger stopped for a tenth of the time."""
+    """Return the file of a log whose logger stopped for a tenth of the time."""
     path = tmp_path / "holed.csv"
     run.drop(index=range(700, 900)).to_csv(path, index=False)
     return path

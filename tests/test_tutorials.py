@@ -1,4 +1,4 @@
-"""Every block of every tutorial runs, in turn, in one folder; the site names each of them once."""
+"""Every block of every tutorial runs, in order, in one folder; the site lists each tutorial once."""
 
 import ast
 import json

@@ -1,4 +1,4 @@
-"""The look-up table of the documents tells the truth."""
+"""Every entry of the look-up table in docs/where.md is correct."""
 
 import re
 from pathlib import Path

@@ -7,14 +7,14 @@ import pytest
 
 
 def thinned(cases: Iterable[Any], fast: Collection[Any]) -> list[Any]:
-    """Return cases for `pytest.mark.parametrize`: those that are not ``fast`` wait for `make test-slow`.
+    """Return cases for `pytest.mark.parametrize`; those that are not ``fast`` run only in `make test-slow`.
 
     Parameters
     ----------
     cases : iterable
-        Cases of one parameter that show the same claim.
+        Values of one parameter that all show the same claim.
     fast : collection
-        Those that `make test` runs.
+        The cases that `make test` runs.
 
     Returns
     -------

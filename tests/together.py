@@ -1,4 +1,4 @@
-"""How workers share tests: whole files, in one go where they stand on the same; and each rewrites half the asserts."""
+"""Distributes tests to workers: whole files, grouped by costly fixtures; each worker rewrites half the asserts."""
 
 import pytest
 from xdist.scheduler import LoadFileScheduling
@@ -20,7 +20,7 @@ SHOW_A_STUDY = frozenset(
         "piezo_stack/test_figures",
     )
 )
-"""Files that ask for the studies of `tests/experiments/conftest.py`, which two workers would both make."""
+"""Files that use the studies of `tests/experiments/conftest.py`; on two workers, both would compute them."""
 
 MOTORS = "tests/faults/diaphragm_motor"
 
@@ -35,15 +35,15 @@ DIAGNOSE_A_MOTOR = frozenset(
         f"{MOTORS}/test_numbers.py",
     }
 )
-"""Files that lay logs of a diaphragm motor beside the curves of its faults, some hundred runs of the model, which
-`faults.diaphragm_motor.diagnose` keeps while the process lives."""
+"""Files that compare logs of a diaphragm motor with the curves of its faults, some hundred runs of the model;
+`faults.diaphragm_motor.diagnose` keeps these curves while the process lives."""
 
 IN_ONE_GO = dict.fromkeys(SHOW_A_STUDY, STUDIES) | dict.fromkeys(DIAGNOSE_A_MOTOR, MOTORS)
-"""What a worker takes as one, by file."""
+"""The group of files that one worker takes together, by file."""
 
 
 class WholeFiles(LoadFileScheduling):
-    """Whole files to a worker, most tests first, and those that stand on the same together."""
+    """Scheduler that gives workers whole files, those with most tests first; files that share fixtures go together."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
@@ -51,21 +51,21 @@ class WholeFiles(LoadFileScheduling):
 
 
 def backwards(folder: pytest.Collector) -> None:
-    """Let a folder be collected last entry first.
+    """Let a folder be collected in reverse order.
 
-    Pytest rewrites the asserts of each file once and keeps the result. In a fresh clone that is more than half of
-    collecting. Workers that go through the files in one order rewrite most of them twice; one that begins at the other
-    end meets its neighbour halfway, and each reads what the other has kept.
+    Pytest rewrites the asserts of each file once and caches the result. In a fresh clone, this is more than half of the
+    time for collecting. If all workers go through the files in the same order, they rewrite most of them twice. If one
+    begins at the other end, the two meet halfway, and each reads the other's cached results.
     """
     collect = folder.collect
     folder.collect = lambda: reversed(list(collect()))
 
 
 def from_its_end(worker: str) -> bool:
-    """Return whether a worker collects folders from their ends: every second one, by the number in its name."""
+    """Return whether a worker collects folders in reverse: every second one, by the number in its name."""
     return worker.startswith("gw") and int(worker.removeprefix("gw")) % 2 == 1
 
 
 def in_one_order(items: list[pytest.Item]) -> None:
-    """Sort tests by file, since workers must have collected the same in the same order."""
+    """Sort tests by file, because all workers must collect the same tests in the same order."""
     items.sort(key=lambda item: item.nodeid.partition("::")[0])

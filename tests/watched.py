@@ -1,4 +1,4 @@
-"""What a function is asked for: noted as it is called, in a test's own process."""
+"""Records the arguments with which a function is called, in the test's own process."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,7 +11,7 @@ import pytest
 def watched(
     place: Any, name: str, told: Callable[..., Any], instead: Callable[..., Any] | None = None
 ) -> Iterator[list[Any]]:
-    """Note what a function is called with, and call it, or another in its place."""
+    """Record the arguments of each call of a function, and call it, or another one instead."""
     asked: list[Any] = []
     real = getattr(place, name)
 

@@ -185,7 +185,7 @@ def cases_of(options: argparse.Namespace) -> list[Case]:
         if plant == OPEN:
             cases += [Case(plant, form, rate, "", "", seed) for form in forms for seed in range(9 * options.seeds)]
             continue
-        # the pressure form is equation 5.8, which is the lumped plant's
+        # the pressure form is equation 5.8, which describes the lumped plant
         own = [*forms, *(["pressure"] if plant == "lumped" and options.pressure else [])]
         cases += [
             Case(plant, form, rate, DRIVES[seed % len(DRIVES)], condition, seed)

@@ -102,7 +102,7 @@ def draw_bench(seed: int) -> Bench:
         sensors = _sensors(healthy, sample_time, rng)
         try:
             record = simulate(CIRCUIT, speed, sample_time, true, sensors=sensors, rng=rng)
-        except HydrostateError:  # the run left what the circuit describes: an empty accumulator
+        except HydrostateError:  # the run left the range of the circuit model, for example with an empty accumulator
             continue
         if moves(record, sensors):
             kept = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
@@ -130,16 +130,16 @@ def draw_rig(rng: np.random.Generator) -> CircuitParameters:
     rated = _between(120.0, 420.0, rng)  # 1,150 to 4,000 rpm
     relief = _between(35e5, 250e5, rng)
     oil = _between(2e8, 1.4e9, rng)  # effective: hoses and air below 1 GPa, steel lines above
-    volume = 0.25 * area * stroke * (1.0 + _between(0.15, 1.0, rng))  # swept, and ports and lines beside it
+    volume = 0.25 * area * stroke * (1.0 + _between(0.15, 1.0, rng))  # the swept volume, plus ports and lines
     stiffness = oil * area**2 / volume
     mass = stiffness / (2.0 * pi * _between(15.0, 350.0, rng)) ** 2
     flow = area * velocity
     leak = flow * _between(0.005, 0.05, rng) / relief  # volumetric efficiency of 95 to 99.5 % at the relief pressure
-    healthy_pressure = min(_between(1e5, 8e5, rng), 0.13 * relief)  # seals and lines at rated velocity
+    healthy_pressure = min(_between(1e5, 8e5, rng), 0.13 * relief)  # taken by seals and lines at rated velocity
     shares = rng.dirichlet((6.0, 3.0, 2.0))  # Coulomb, linear, quadratic
     push = area * healthy_pressure * shares
     single = bool(rng.random() < 0.3)
-    uneven = float(rng.uniform(0.1, 0.3)) if single else 0.0  # rods of 0.43 to 0.68 of the bore
+    uneven = float(rng.uniform(0.1, 0.3)) if single else 0.0  # rod diameters of 0.43 to 0.68 of the bore
     needed = (1.0 + uneven) * area * stroke / (3.79 * volume) - 1.0  # else the larger side has no room for the stroke
     loaded, sprung = rng.random() < 0.3, rng.random() < 0.15
     most = area * relief
@@ -177,7 +177,7 @@ def draw_rig(rng: np.random.Generator) -> CircuitParameters:
         accumulator_gas=1.0,
         accumulator_oil=1.0,
     )
-    taken = 2.0 * oil_demand(made) + 4.0 * area * uneven * stroke  # compression, and the rod's own volume
+    taken = 2.0 * oil_demand(made) + 4.0 * area * uneven * stroke  # for compression, and for the rod's own volume
     return replace(made, accumulator_gas=taken, accumulator_oil=taken)
 
 
@@ -254,7 +254,7 @@ def _sensors(p: CircuitParameters, sample_time: float, rng: np.random.Generator)
     return Sensors(
         speed_noise=_between(2e-4, 1e-3, rng) * p.rated_speed,
         velocity_noise=_between(2e-3, 2e-2, rng) * velocity,
-        pressure_noise=_between(3e-4, 2e-3, rng) * p.relief_pressure,  # of transmitters of that range
+        pressure_noise=_between(3e-4, 2e-3, rng) * p.relief_pressure,  # for transmitters of that range
         pressure_quantum=2.0**-14 * p.relief_pressure,
         position_noise=float(rng.uniform(0.0, 1.0)) * quantum,
         position_quantum=quantum,

@@ -236,7 +236,8 @@ def main(arguments: list[str]) -> int:
         for place, rig in enumerate(rigs):
             rows.append(scored(rig, kinds[(seed + place) % len(kinds)], seed))
             print(line_of(rows[-1]), flush=True)
-    judged = [{**row, "verdict": "right"} if row["right"] else row for row in rows]  # unknown is right of many kinds
+    # for many kinds, "unknown" is the right verdict
+    judged = [{**row, "verdict": "right"} if row["right"] else row for row in rows]
     checks = printed(summarised(judged, wrong=True))
     told = [row["named"] for row in rows if row["named"] is not None]
     print(f"causes named: {sum(told)} of {len(told)}")

@@ -204,7 +204,7 @@ def _machine(healthy: EhaParameters, condition: str, use: Use, rng: np.random.Ge
     def about(value: float) -> float:
         return value * float(rng.uniform(1.0 - SPREAD, 1.0 + SPREAD))
 
-    opening = flow / sqrt(float(rng.uniform(0.3e5, 1e5)))  # the pump's flow at a drop of 0.3 to 1 bar
+    opening = flow / sqrt(float(rng.uniform(0.3e5, 1e5)))  # passes the pump's flow at a drop of 0.3 to 1 bar
     return made._replace(
         **{name: about(getattr(made, name)) for name in ("leakage", "quadratic", "linear", "coulomb", "bulk_modulus")},
         flow_bias=about(made.flow_bias),

@@ -174,7 +174,7 @@ def summarised(rows: pd.DataFrame) -> dict[str, float]:
         "rmse_percent": _rms(rows["error_percent"]),
         "reported_percent": _rms(rows["std_percent"]),
         "bound_percent": _rms(rows["bound_percent"]),
-        # each error over its own run's bound, so that runs of another drive weigh alike
+        # each error is divided by its own run's bound, so that runs with different drives weigh alike
         "over_bound": _rms(rows["error_percent"] / rows["bound_percent"]),
         "coverage": 100.0 * float(rows["covered"].mean()),
         "nees": float(np.nanmean(np.square(rows["z"]))),

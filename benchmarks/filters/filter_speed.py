@@ -167,7 +167,7 @@ def jax_costs(python: str, batch: list[FilterProblem], rounds: int) -> tuple[lis
             measured=_lanes([scaled(one)[3] for one in batch]),
         )
         script = str(Path(__file__).parents[1] / "peers" / "jax_lanes.py")
-        # one thread, as every other engine here; XLA's pool would spend processor time on waiting
+        # one thread, as for every other engine here: XLA's thread pool would spend processor time on waiting
         alone = {
             "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
             "OMP_NUM_THREADS": "1",

@@ -132,7 +132,7 @@ def accuracy(table: pd.DataFrame) -> pd.DataFrame:
     summary["ratio_to_clean"] = (
         summary["rmse_percent"] / clean.reindex(summary.index.get_level_values("estimator")).to_numpy()
     )
-    # a log that gives no value is not within any multiple of the clean error
+    # a log that gives no value does not count as within the limit
     kept = (summary["ratio_to_clean"] <= WANTED_RATIO) & (summary["with_value"] == summary["runs"])
     summary["within"] = kept
     return summary

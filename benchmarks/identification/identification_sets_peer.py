@@ -63,7 +63,7 @@ def sippy(u, y, tests):
     try:
         model = fit(u, y, (n, stable))
         return [run(model, *test) for test in tests], growth(model[0], tests)
-    except np.linalg.LinAlgError:  # stable on two thirds, and on all beyond what numbers hold
+    except np.linalg.LinAlgError:  # stable when fitted to two thirds, but overflows when fitted to all
         model = fit(u, y, (n, True))
         return [run(model, *test) for test in tests], growth(model[0], tests)
 
@@ -122,7 +122,7 @@ def jax_sysid_nonlinear(u, y, tests):
         return model
 
     def run(model, u, y):
-        known = int(np.isfinite(y).sum())  # outputs are missing at the end alone
+        known = int(np.isfinite(y).sum())  # outputs are missing only at the end
         x0 = model.learn_x0(u[:known], y[:known].reshape(-1, 1), RTS_epochs=10, verbosity=False)
         return np.ravel(np.asarray(model.predict(np.asarray(x0), u)[0], dtype=float))
 

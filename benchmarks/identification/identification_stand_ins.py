@@ -175,7 +175,7 @@ def _boom(u: Array, rng: np.random.Generator) -> Outputs:
         for _ in range(steps):
             spool += dt * (raw - spool) / lag
             flow = copysign(max(abs(spool) - dead, 0.0), spool)
-            if flow < 0.0:  # lowering: the counterbalance opens with the pressure of the other side
+            if flow < 0.0:  # lowering: the pressure of the other side opens the counterbalance valve
                 flow *= min(max((p - 0.6 * weight) / pilot, 0.0), 1.0)
             p = max(p + dt * stiff * (flow - v), 0.0)
             stops = 2.0 * min(angle + 1.0, 0.0) + 5.0 * max(angle - 1.2, 0.0)

@@ -38,7 +38,7 @@ class OtherRecords:
             if not (one.again and runs.get(name) and runs.get(than)):
                 continue
             errors = [
-                # a run without an end is infinitely wrong
+                # a run that diverges has an infinite error
                 [
                     np.nan_to_num(runs[model][key] - y, nan=np.inf, posinf=np.inf, neginf=np.inf)[one.skipped :]
                     for key, (_, y) in one.again.items()

@@ -216,7 +216,7 @@ def main(arguments: list[str] | None = None) -> int:
     options.add_argument("--seeds", type=int, default=100)
     chosen = options.parse_args(arguments)
     misses.clear()
-    with TemporaryDirectory() as empty:  # so that compilation is counted
+    with TemporaryDirectory() as empty:  # an empty cache, so that compilation is counted
         os.environ["HYDROSTATE_CACHE"] = empty
         for case in cases(chosen.samples):
             _beside(case, logged(case, 1))

@@ -60,7 +60,7 @@ def records_ratio(one: Sequence[Array], other: Sequence[Array], *, seed: int = 0
     """
     squares = np.array([[float(np.sum(errors**2)) for errors in errors_of] for errors_of in (one, other)])
     drawn = squares[:, np.random.default_rng(seed).integers(0, len(one), (DRAWS, len(one)))].sum(axis=2)
-    # between an endless error and another there is no value
+    # this method does not interpolate, which infinite errors would not allow
     low, high = np.quantile(np.sqrt(drawn[0] / drawn[1]), (0.025, 0.975), method="inverted_cdf")
     ratio = np.sqrt(squares[0].sum() / squares[1].sum())
     return float(ratio), float(low), float(high)

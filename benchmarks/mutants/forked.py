@@ -100,7 +100,7 @@ def ran(task: Mapping[str, Any]) -> dict[str, Any]:
         signal.alarm(SLEPT)
         os.waitpid(child, 0)
         signal.alarm(0)
-        _end(child)  # and what it started
+        _end(child)  # also ends the processes that it started
         hung = {"code": None, "failed": [], "tried": 0, "cut_short": False}
         told = json.loads(answer.read_text()) if answer.exists() else hung
     return {**told, "seconds": time.monotonic() - begin}
@@ -113,7 +113,7 @@ def _end(child: int) -> None:
 
 def _in_the_fork(task: Mapping[str, Any], answer: Path) -> None:
     os.setsid()
-    # A fault of the same size within a second of the last one would be taken for it, from the bytecode left behind.
+    # With bytecode left behind, a fault of the same size within a second of the last one would be taken for that one.
     sys.dont_write_bytecode = True
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
     limit = int(task["seconds"] + time.process_time()) + PATIENCE

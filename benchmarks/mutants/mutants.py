@@ -137,7 +137,8 @@ class Tree:
         )
         self._sound: dict[str, bool] = {}
         self._planted = 0
-        self.ran([], ["tests/plant/eha", "tests/faults/diagnosis"], 300.0, collect=True)  # imports what is imported
+        # collects these tests, so that the runner has imported their modules
+        self.ran([], ["tests/plant/eha", "tests/faults/diagnosis"], 300.0, collect=True)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -170,7 +171,7 @@ class Tree:
             self._planted += 1
             chosen = [test for test in tests if self._sound.get(test, True)]
             place.write_text(mutant.source, encoding="utf-8")
-            os.utime(place, (self._planted, self._planted))  # no two faults share compiled code
+            os.utime(place, (self._planted, self._planted))  # so that no two faults share compiled code
             found = self._of(chosen, seconds)
             place.write_text(sound, encoding="utf-8")
             os.utime(place, ns=(dated.st_atime_ns, dated.st_mtime_ns))

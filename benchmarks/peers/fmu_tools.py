@@ -4,7 +4,7 @@
 line.
 """
 
-# its packages are in an environment of their own
+# its packages are in a separate environment
 # pyright: basic, reportMissingImports=false
 
 import sys

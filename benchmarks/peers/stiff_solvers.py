@@ -171,7 +171,7 @@ def _ivp_pieces(problem: _Problem, method: Literal["LSODA", "Radau", "BDF"]) -> 
 def _by_odeint(problem: _Problem) -> Array:
     from scipy import integrate
 
-    odeint: Any = integrate.odeint  # the stubs take no array of tolerances
+    odeint: Any = integrate.odeint  # the stubs do not accept an array of tolerances
     times = problem.sample_time * np.arange(len(problem.speed))
     states, notes = odeint(
         problem.rates,

@@ -82,7 +82,7 @@ def peers(repeats: int) -> None:
     rate = 2.0 * np.pi * PEAK * swing * np.minimum(moments / RAMP, 1.0) * np.cos(angle)
     rate += np.where(rising, swing / RAMP * np.sin(angle), 0.0)
     start = at_rest(HEALTHY)
-    start[SIDE_B] = 1.0  # the root in the return land has no slope at zero
+    start[SIDE_B] = 1.0  # the square root in the return land's flow has no slope at zero
     row = MotorRow(*motor_row(HEALTHY))
     settled = round(0.5 * TIME / LONGEST_STEP)
 
@@ -96,7 +96,7 @@ def peers(repeats: int) -> None:
             return [float(value) for value in motor_derivative(tuple(x), np.interp(t, moments, rate), HEALTHY)]
 
         absolute = tolerance * SCALE
-        odeint: Any = integrate.odeint  # the stubs take no array of tolerances
+        odeint: Any = integrate.odeint  # the stubs do not accept an array of tolerances
         return odeint(slope, start, moments, rtol=tolerance, atol=absolute, hmax=10.0 * LONGEST_STEP, mxstep=100000)
 
     def seen(states: np.ndarray) -> tuple[np.ndarray, float]:

@@ -129,7 +129,7 @@ class Hostile:
             try:
                 for part in parts:
                     connection.sendall(part)
-            except ConnectionError:  # refused before all was sent: the answer may be there
+            except ConnectionError:  # refused before all was sent: the answer may have arrived
                 pass
             return first_line(connection) if wait else b"left"
 

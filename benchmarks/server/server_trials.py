@@ -110,7 +110,7 @@ def attack(place: Path, count: int, clients: int, mix: Mapping[str, float] = MIX
     over = threading.Event()
     with Server(place / "kept", *ROOM) as server:
         hostile = Hostile(server.host, server.port)
-        hostile.attack(count // 20, clients, mix, seed=-1)  # buffers and threads are there from here on
+        hostile.attack(count // 20, clients, mix, seed=-1)  # warm-up: buffers and threads exist from here on
         hostile.answers.clear()
         memory, listed = [server.memory()], names_around(place)
 

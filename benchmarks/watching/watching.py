@@ -124,7 +124,7 @@ class CircuitStream:
             CIRCUIT.name, CIRCUIT.control, start, drive, rows[:, None], SAMPLE_TIME, CIRCUIT.parameter_class
         )
         self._state, self._command = states[-1:].copy(), float(drive[-1])
-        seen = CIRCUIT.channels(states[1:], rows[1:])  # the first sample was the last of the piece before
+        seen = CIRCUIT.channels(states[1:], rows[1:])  # the first sample repeats the last of the previous piece
         record = measure(Record(SAMPLE_TIME, dict(seen)), RIG, self._rng)
         names = ("motor_speed_rad_s", "position_m", "differential_pressure_pa")
         return np.column_stack([record[name] for name in names])

@@ -310,7 +310,7 @@ def require_channels(record: Record) -> None:
     length = len(record) * record.sample_time
     if length <= SETTLED:
         raise LogError(f"a log must be longer than the {SETTLED:g} s in which the motor settles, got {length:.3g} s")
-    require_live(record, [POSITION])  # of an electrode that is dead, a gain is told
+    require_live(record, [POSITION])  # an electrode may be dead: its gain is estimated
 
 
 _REFINEMENTS = 4

@@ -176,7 +176,7 @@ def motor_blocks(record: Record, drive: Drive) -> list[Block]:
         spreads.append(np.array([sqrt(2.0 / count) * noise[0], sqrt(12.0 / count) / length * noise[1]]))
         amplitude = float(np.hypot(found[2, 0], found[3, 0]))
         blocks.append(Block((start + count) * between, length, amplitude, velocity, spreads[-1]))
-    usual = np.median(spreads, axis=0)  # a step within a block is no noise
+    usual = np.median(spreads, axis=0)  # the median ignores blocks that contain a step, which is not noise
     return [replace(block, deviations=usual) for block in blocks]
 
 

@@ -83,6 +83,7 @@ def unless_another_rig(found: BulkModulusEstimate, log: CleanLog, p: EhaParamete
         return found
     if not (said := rig_contradicted(log.record, p)):
         return found
-    spared = [one for one in reasons if one.code != EstimateCode.BOUND_TOO_WIDE]  # a bound of another actuator
+    # the bound is left out: it was computed for the wrong actuator
+    spared = [one for one in reasons if one.code != EstimateCode.BOUND_TOO_WIDE]
     gate = replace(found.gate, reasons=(*said, *spared))
     return replace(found, outcome=Outcome.MISMATCH, value=None, std=None, others={}, gate=gate)

@@ -219,8 +219,9 @@ def _fit(
     traits = LogTraits(loaded, begins_in_motion(record), log.filtered, log.speed_held)
     fit = fit_flow(record, parameters, guess, doubted, log.variances, traits)
     ended = any(note.code == EstimateCode.SEARCH_ENDED for note in fit.reasons)
-    plain = not fit.reasons  # to the noise: a load that leaks off at once leaves nothing strange
-    return None if loaded and fit.explanation is None and not (ended or plain) else fit  # a filter needs no rest
+    plain = not fit.reasons  # explained down to the noise: a load that leaks off at once leaves no trace
+    # None leaves the log to a filter, which need not begin at rest
+    return None if loaded and fit.explanation is None and not (ended or plain) else fit
 
 
 def _filtered(

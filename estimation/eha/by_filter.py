@@ -110,7 +110,7 @@ def estimate_by_filter(
     """
     require_known("method", options.method, ["auto", *METHODS, *NAMED])
     record = log.record
-    if options.tuned:  # the noise that is told of any rig is wide enough for an encoder at rest
+    if options.tuned:  # the noise levels used without tuning are large enough for an encoder at rest
         record = told_once(record)
         longest = max(record.sample_time / STEPS_A_SAMPLE, SHORTEST_STEP)
         model = replace(model, longest_step=min(model.longest_step, longest))
@@ -148,7 +148,7 @@ def estimate_by_filter(
     value, _ = estimate.settled(BULK_MODULUS)
     nominal = parameters.bulk_modulus
     bound = max(bound_at(nominal), bound_at(max(value, 1e-3 * nominal))) if np.isfinite(value) else float("inf")
-    # an interval as narrow as a tuned one is of the belief after the last sample, and the mean scatters by 4 % more
+    # a tuned interval is as narrow as the belief after the last sample; the mean over the end scatters by 4 % more
     share = 0.5 / len(estimate.mean) if options.tuned else 0.2
     concluded = conclude(estimate, log.record, bound, model.name, names, fraction=share)
     return replace(concluded, first_pass=first, tuning=found, method=options.method if named.noise else method)

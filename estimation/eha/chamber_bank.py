@@ -194,7 +194,7 @@ def _apart(members: Sequence[Member], near: tuple[int, ...]) -> list[Member]:
 
 def _same(one: Member, other: Member, near: tuple[int, ...]) -> bool:
     places = list(near)
-    deviation = np.sqrt(np.maximum(np.diag(other.covariance)[places], 0.0))  # rounding may leave less
+    deviation = np.sqrt(np.maximum(np.diag(other.covariance)[places], 0.0))  # rounding may make a variance negative
     return bool(np.all(np.abs(one.mean - other.mean)[places] < NEAR * deviation))
 
 

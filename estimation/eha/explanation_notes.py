@@ -85,7 +85,7 @@ def _input_late(channel: str) -> Callable[[Explanation, EhaParameters], Note]:
 
 def _speed_early(found: Explanation, p: EhaParameters) -> Note:
     width, early = 1e3 * _half_width(found, LAGS[SPEED]), -1e3 * lateness(found, SPEED)
-    if early <= 0.0:  # the search began with a delay that its lag more than took back
+    if early <= 0.0:  # the fitted lag is longer than the lead with which the search began
         return _input_late(SPEED)(found, p)
     return RigCode.INPUT_EARLY.note(channel=SPEED, early_ms=early, half_width_ms=width)
 
@@ -188,7 +188,7 @@ def _turbulent(found: Explanation, _: EhaParameters) -> Note:
 
 def _compresses(found: Explanation, _: EhaParameters) -> Note:
     value, half_width = found.values["pump_compression"][0], _half_width(found, "pump_compression")
-    if value < 0.0:  # no pump does so, but pressure that rises with motor speed looks like it
+    if value < 0.0:  # no pump delivers more under pressure, but a pressure that rises with motor speed looks like it
         return RigCode.PRESSURE_TAPPED.note()
     return RigCode.PUMP_COMPRESSES.note(share=value, half_width=half_width)
 

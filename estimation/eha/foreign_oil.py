@@ -95,7 +95,7 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     unlike = abs(ln(ratio))
     doubted = gone.stuck or unlike > UNLIKE
     said = (EstimateCode.PISTON_STANDS_STILL.note(moved_m=gone.piston, pumped_m=gone.pump),) if doubted else ()
-    most = ln(KIN) if found.explanation is None else UNLIKE  # an offset takes up half of what tells the scale
+    most = ln(KIN) if found.explanation is None else UNLIKE  # an offset absorbs half of the information about the scale
     if unlike < most and not is_vague(found.value, found.std, VAGUE_STILL):
         return replace(found, remarks=(*found.remarks, *said))
     return _without(found, Outcome.NOT_OBSERVABLE, *said, EstimateCode.STILL_AND_FOREIGN.note(ratio=ratio))

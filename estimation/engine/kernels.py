@@ -93,7 +93,7 @@ def compile_kernel(
     logs, seen = f"ndarray, shape ({len(channels)}, {lanes})", "ndarray, shape (samples, seen)"
     results = f"results : tuple ({'; '.join((track, track, logs, seen, seen))})"
     takes = {"steps": _STEPS, "run": _RUN.format(lanes=lanes)}
-    entry = "run" if lanes > 1 and separate else "steps"  # what is entered at two places is compiled twice
+    entry = "run" if lanes > 1 and separate else "steps"  # code with two entry points would be compiled twice
     entries = {entry: signature(f"{takes[entry]}\n{results}")}
     made_of = rule, model, channels, lanes
     return load_native(f"{rule.name}_{model.name}_{lanes}", lambda: kernel_source(*made_of), entries, made_of)

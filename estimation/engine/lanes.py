@@ -114,7 +114,7 @@ def steps(
                 keep(kernel, here, means + place, spreads + place)
         if kept:
             row += 1
-        if k < residuals.shape[0]:  # of a single filter
+        if k < residuals.shape[0]:  # only a single filter stores its innovations
             for c in range(kernel.CHANNELS):
                 residuals[k, c], variances[k, c] = work[kernel.SEEN + 2 * c], work[kernel.SEEN + 2 * c + 1]
         if k % FLUSH == FLUSH - 1:

@@ -142,7 +142,7 @@ def read_off(
     covariance[:, rows, columns] = covariance[:, columns, rows] = carried[width : width + len(rows)].T
     nis, count, product = (places.sums(carried, name) for name in ("nis", "count", "product"))
     variances = np.array([one.variances for one in lanes]).T
-    with np.errstate(invalid="ignore", divide="ignore"):  # the score of a filter that diverged is not a number
+    with np.errstate(invalid="ignore", divide="ignore"):  # a diverged filter scores NaN
         spread = logs + np.log(product) + count * np.log(2.0 * math.pi * variances)
     score = -0.5 * np.sum(nis + spread, axis=0)
     final = zip(carried[:width].T.copy(), covariance, nis.T.copy(), count.T.copy(), map(float, score), strict=True)

@@ -191,7 +191,7 @@ def simulated(
     theta = _theta(problem, {**starts, **values}, initial)
     bare = Part(part.inputs, np.zeros_like(part.measured), part.sample_time)
     rough = Problem(equations, (bare,), "rk4", 1, np.ones(len(equations.outputs)))
-    for _ in range(2):  # once by the size of what comes out, which is then known
+    for _ in range(2):  # the second pass chooses its steps by the size of the outputs, which the first one finds
         rough = stepped(rough, theta)
         size = np.maximum(np.ptp(rough.predicted(theta)[0], axis=1), np.finfo(float).tiny)
         rough = rough.with_noise(EXACT * size)

@@ -240,7 +240,7 @@ class Problem:
                 return Point(theta, np.inf, np.zeros(len(theta)), np.eye(len(theta)))
             size = np.abs(errors)
             weight = np.minimum(1.0, OUTLIER / np.maximum(size, OUTLIER)) if self.robust else np.ones_like(size)
-            with np.errstate(all="ignore"):  # finite numbers may have squares that are not
+            with np.errstate(all="ignore"):  # squares of finite numbers may overflow
                 cost += float(np.sum((1.0 - 0.5 * weight) * weight * errors**2))
                 gradient += jacobian.T @ (weight * errors)
                 gram += (jacobian * weight[:, None]).T @ jacobian if self.robust else jacobian.T @ jacobian
@@ -287,7 +287,7 @@ class Problem:
             own = np.concatenate([values[:fitted], values[fitted + number * free : fitted + (number + 1) * free]])
             predicted = np.empty(part.measured.shape)
             slopes = np.empty((*part.measured.shape, len(own)) if sloped else (0, 0, len(own)))
-            with np.errstate(all="ignore"):  # a try that runs away is stepped back from
+            with np.errstate(all="ignore"):  # the search rejects a trial that diverges
                 run(own, known, part.inputs, part.sample_time, self.substeps, predicted, slopes)
             found.append((predicted, slopes))
         return found

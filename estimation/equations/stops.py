@@ -81,7 +81,7 @@ def standing(channels: Sequence[Array], noise: float) -> Iterator[Standing]:
         return
     for end, sign in (("least", -1.0), ("largest", 1.0)):
         extreme = float((sign * seen).max())
-        level = sign * (extreme - reach)  # where noise lifts the largest sample above the level at which it stands
+        level = sign * (extreme - reach)  # noise lifts the extreme sample above the level at which the channel stays
         near = [np.abs(one - level) <= 1.001 * reach for one in channels]
         where = [in_long_stretches(one, RUN) for one in near]
         share = float(np.mean(np.concatenate(where)))

@@ -77,7 +77,7 @@ def traced(
         result = function(state, inputs, parameters)
     except TypeError as error:
         said = str(error)
-        if "Expression" in said:  # what math and float say of a symbol
+        if "Expression" in said:  # the message of math functions and float for a symbol
             said = f"{said.replace('Expression', 'a symbol')}; it may call NumPy's {KNOWN}, and no function of math"
         raise HydrostateError(f"{name} cannot be traced: {said}") from error
     except HydrostateError as error:

@@ -43,7 +43,7 @@ def ekf_predict(model: ProcessModel) -> Outputs:
     prior, P = belief_symbols(model)
     mean = moved(model, prior)
     held = bounded(model, mean)
-    # what has not moved is within its bounds: the update before saw to that
+    # a state that the model does not move is within its bounds already, from the previous update
     outputs = {f"z{i}": z if z.operation == "symbol" else held[i] for i, z in enumerate(mean)}
     after = spread(mean, prior, P) if waypoints_of(mean) else _transformed(scaled_step(model)[1], P)
     for (i, j), value in after.items():
@@ -190,7 +190,7 @@ def _linearised(model: ProcessModel, point: Mean, mean: Mean, channels: Sequence
     """Return the prediction of a channel from a mean, with the model linearised about a point."""
     predicted = observed(model, point, channels)[c]
     row = jacobian([predicted], point)[0]
-    if all(slope.operation == "constant" for slope in row):  # it is linear
+    if all(slope.operation == "constant" for slope in row):  # a linear channel
         return observed(model, mean, channels)[c]
     return predicted + total([slope * (new - old) for slope, new, old in zip(row, mean, point, strict=True)])
 

@@ -44,10 +44,10 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
     H, bounds = _observation_matrix(problem), _bounds(problem.model)
     kalman = _filter(problem)
     with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", LinAlgWarning)  # a covariance is ill-conditioned long before it is of no use
+        warnings.simplefilter("ignore", LinAlgWarning)  # an ill-conditioned covariance stays usable for a long time
         try:
             log_likelihood = sum(_sample(kalman, problem, trace, H, bounds, k) for k in range(len(problem.measured)))
-        except (np.linalg.LinAlgError, ValueError):  # what numpy and scipy raise of a covariance that is none any more
+        except (np.linalg.LinAlgError, ValueError):  # numpy and scipy raise these if the covariance is no longer valid
             lost = np.full_like(problem.mean, np.nan)
             return trace._replace(mean=lost, covariance=np.outer(lost, lost), log_likelihood=math.nan)
     return trace._replace(mean=kalman.x, covariance=kalman.P, log_likelihood=log_likelihood)

@@ -232,7 +232,7 @@ def in_si(problem: FilterProblem, trace: Trace, start_time: float) -> Estimate:
 def _final_belief(model: ProcessModel, trace: Trace) -> Gaussian | None:
     mean, slope = model.to_si(trace.mean)
     covariance = trace.covariance * np.outer(slope, slope)
-    impossible = trace.log_likelihood == -np.inf  # an innovation's variance overflowed, and what it met was not used
+    impossible = trace.log_likelihood == -np.inf  # an innovation's variance overflowed, so its sample was not used
     if impossible or not (np.all(np.isfinite(mean)) and np.all(np.isfinite(covariance))):
         return None
     rounding = np.maximum(np.diag(covariance), 0.0) - np.diag(covariance)

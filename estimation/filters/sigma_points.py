@@ -100,7 +100,7 @@ def root(P: Covariance, n: int) -> Matrix:
     L: Matrix = [[ZERO] * n for _ in range(n)]
     for j in range(n):
         pivot = P[j, j] - total([L[j][k] * L[j][k] for k in range(j)])
-        empty = pivot <= SMALLEST_PIVOT * P[j, j]  # false of what is not a number, so that it shows
+        empty = pivot <= SMALLEST_PIVOT * P[j, j]  # false for NaN, so that NaN propagates
         L[j][j] = where(empty, 0.0, unary("sqrt", pivot))
         inverse = where(empty, 0.0, 1.0 / L[j][j])
         for i in range(j + 1, n):

@@ -75,7 +75,7 @@ def sliding_update(model: ProcessModel, channels: Sequence[str], share: Share) -
         inverse = select(innovation.spread > 0.0, ONE / innovation.spread, ZERO)
         part = select(present, share(innovation), ZERO)
         step = select(present, residual, ZERO) * part * inverse
-        # the covariance of any gain, multiplied out for K = P C' (C P C')^-1 part
+        # the covariance update for any gain, multiplied out for K = P C' (C P C')^-1 part
         loss = (2.0 * part - part * part * innovation.variance * inverse) * inverse
         mean, covariance = corrected(mean, covariance, PH, step, loss)
         outputs |= {f"e{c}": residual, f"s{c}": innovation.variance}

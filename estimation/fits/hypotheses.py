@@ -257,7 +257,7 @@ deviations [Pa]. A valve that opens far later than the other may never open."""
 HYPOTHESES = (
     PRESSURE_LATE,
     SPEED_LATE,
-    Hypothesis(  # position and pressure lag it alike, or it is what the motor was told
+    Hypothesis(  # position and pressure lag equally, or the channel is the motor's command
         "speed_early",
         ("speed_lag",),
         ({"speed_lag": 2e-4},),

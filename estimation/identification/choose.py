@@ -105,7 +105,7 @@ def choose_model(
     order, table, compared = orders[0], None, None
     if len(orders) > 1:
         table = order_table(inputs, outputs, sample_time, orders=tuple(orders), delay=lag)
-        # a pole that a zero nearly cancels is there for a nonlinearity or drift, not for the order
+        # a pole that a zero nearly cancels fits a nonlinearity or drift; it does not show the order
         clean = table[table["cancellations"] == 0]
         kept = table if clean.empty else clean
         order = int(kept.index[int(np.argmin(kept["bic"]))])

@@ -258,7 +258,7 @@ def _differences(means: Array) -> list[tuple[int, int, int]]:
         one = (by_first * own[second] - by_second * between) / determinant
         other = (by_second * own[first] - by_first * between) / determinant
         left = own[row] - one * by_first - other * by_second
-        # a column that is like one of two is no difference
+        # a column that resembles only one of two is not their difference
         shares = np.minimum(one**2 * own[first], other**2 * own[second])
         fits = (left < 0.02**2 * own[row]) & (one * other < 0.0) & (shares > LEAST_SHARE**2 * own[row])
         fits &= (first != row) & (second != row)
@@ -281,7 +281,7 @@ def _with_units(
     p: EhaParameters,
 ) -> tuple[ChannelGuess, ...]:
     made: list[ChannelGuess] = []
-    for one in sorted(found, key=lambda one: one.channel == VELOCITY):  # position's unit tells that of velocity
+    for one in sorted(found, key=lambda one: one.channel == VELOCITY):  # velocity last: its unit follows from position
         notes = list(why.get((one.channel, one.place), ()))
         heading = headings[one.place]
         if heading.stamped:

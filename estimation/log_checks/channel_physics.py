@@ -175,7 +175,7 @@ def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameter
         times = abs(ratio) if guilty == POSITION else 1.0 / abs(ratio)
         slip = factor if guilty == POSITION else min(LENGTHS, key=lambda one: abs(np.log(one * factor)))
         found.append(_unit(guilty, other, times, LENGTHS[slip]))
-    elif not 1.0 / APART <= abs(ratio) <= APART:  # a furlong read as a metre: which is wrong only a pump can tell
+    elif not 1.0 / APART <= abs(ratio) <= APART:  # such as a furlong read as a metre: only a pump shows which is wrong
         large, small = (POSITION, VELOCITY) if abs(ratio) > 1.0 else (VELOCITY, POSITION)
         too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
         guilty = large if too_far else f"{large} or {small}"
@@ -213,7 +213,8 @@ def _reversed(
         apart = apart or (together < 0.0 and balance.swept < -max(TOLD * balance.swept_std, 0.3))
         goes_along = balance.swept > max(TOLD * balance.swept_std, 0.3)
         with_pump = with_pump or goes_along
-        apart = apart and not goes_along  # a spring drives a piston back while a pump that leaks it all goes on
+        # a spring drives the piston back while the pump, whose whole flow leaks, goes on
+        apart = apart and not goes_along
     moved = _moved(record)
     if apart:
         channel = SPEED if opposed else moved if with_pressure else f"{SPEED} or {moved}"
@@ -271,7 +272,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         turn, length = (_near(gone, slips, LOST) for slips in (TURNS, LENGTHS))
         believed, alike = (True, True), {one for one in TURNS if LOST <= gone / one <= NEAR}
         if length is not None and length < 100.0 and " and " in _moved(record):
-            length = None  # two that agree: a piston that drifts as it sticks makes as much of a slip of the speed
+            length = None  # two channels agree: a piston that drifts while stuck makes a slip of speed look as large
     fast = float(np.nanmax(np.abs(record[SPEED]))) / p.motor_speed_limit if SPEED in record else 0.0
     too_fast = fast > FARTHEST and least < NEAR * min(TURNS)
     if too_fast and (together > FOLLOWS or length is not None or degrees):
@@ -282,13 +283,12 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         said = " or ".join(TURNS[one] for one in TURNS if one == turn or one in alike)
         degrees = degrees or (fast > FAST * RPM and least * DEGREES < SIX**0.5)
         slips.append((SPEED, IN_DEGREES, DEGREES) if degrees and turn == min(TURNS) else (SPEED, said, 1.0 / turn))
-    if (
-        length is not None and believed[1] and least < NEAR * length and not (slips and " and " in moved)
-    ):  # two that agree are right
+    # position and velocity that agree are right
+    if length is not None and believed[1] and least < NEAR * length and not (slips and " and " in moved):
         slips.append((moved, LENGTHS[length], length))
     unlike = not slips and far and together > FOLLOWS and (balance is None or balance.swept * FARTHEST < 1.0)
     if unlike and _swept_more(long, p):
-        lossy = 100.0 * NEAR < gone < 1e3  # too far for cm, and for any unit of speed
+        lossy = 100.0 * NEAR < gone < 1e3  # too far for cm read as m, and for any unit of speed
         channel = SPEED if " and " in moved and not lossy else f"{moved} or {SPEED}"
         times = 1.0 / gone if channel == SPEED else gone
         return (_unit(channel, moved if channel == SPEED else SPEED, times, LOSSY if lossy else UNKNOWN_RIG),)

@@ -107,7 +107,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
         sound, clipped = without_saturated(sound, parameters)
     sound, beyond = without_position_beyond_range(sound)
     mended, steps = (sound, ()) if changes else without_discontinuities(sound)
-    if steps and not (changes := channel_mistakes(sound, parameters)):  # channels of another meaning may jump
+    if steps and not (changes := channel_mistakes(sound, parameters)):  # a channel of wrong sign, unit or name may jump
         sound = mended
     sound, hum = without_hum(sound)
     sound, offset = without_velocity_offset(sound)
@@ -115,11 +115,11 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     known = [name for name in MEASURED if name in sound]
     objections = (*sensor_objections(sound, parameters), *logged_on_change(sampled))
     accused = {note.data["channel"] for note in objections}
-    stale = PRESSURE in accused  # froze, or was logged on change
+    stale = PRESSURE in accused  # frozen, or logged on change
     mistakes = changes or channel_mistakes(sound.replace(**{PRESSURE: None}) if stale else sound, parameters)
-    if mistakes:  # a sensor cannot be judged by channels of another meaning
+    if mistakes:  # a sensor cannot be judged by mistaken channels
         objections = steps = ()
-    if VELOCITY in accused:  # of a dead sensor an offset says nothing
+    if VELOCITY in accused:  # the offset of a dead sensor says nothing
         offset = ()
     every, (sound, filtered) = sound, without_correlated_noise(sound, natural_frequency(parameters))
     as_logged = (*digits, *held, *twice, *dropouts, *alone)

@@ -244,7 +244,7 @@ def pressure_strays(record: Record, *, noisy: bool = False) -> Array:
     course, left, kept = np.where(whole, rise, 0.0), rise, whole
     gram, pull = known @ known.T, known @ course
     for _ in range(3):
-        out = known[:, whole & ~kept]  # few: what they are part of is taken off, and not summed anew
+        out = known[:, whole & ~kept]  # few rows: they are subtracted from the sums, which are not computed anew
         inner, toward = gram - out @ out.T, pull - out @ course[whole & ~kept]
         sizes = np.sqrt(np.diag(inner))
         sizes[sizes == 0.0] = 1.0
@@ -259,7 +259,7 @@ def pressure_strays(record: Record, *, noisy: bool = False) -> Array:
 def _places(strayed: Array, least: float) -> list[int]:
     """Return rows after which a channel steps farther than anywhere else, and stays; empty if there are none."""
     sizes = np.nan_to_num(np.abs(strayed))
-    sizes[:APART] = sizes[-APART:] = 0.0  # a log may begin within a jerk
+    sizes[:APART] = sizes[-APART:] = 0.0  # a log may begin during a jerk
     found: list[tuple[int, float]] = []
     for _ in range(MOST_PLACES + 1):
         k = int(np.argmax(sizes))

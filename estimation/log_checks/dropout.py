@@ -50,7 +50,7 @@ def without_dropouts(record: Record) -> tuple[Record, tuple[Note, ...]]:
     first, behind = first[long], behind[long]
     if not len(first):
         return record, ()
-    # a motor may leave rest from one row to the next, which neither piston nor oil does
+    # a motor may leave rest from one row to the next; neither the piston nor the pressure does
     ended = np.any([_jumps(record[name], behind) for name in asked if name != SPEED], axis=0)
     dropped = np.zeros(len(record), dtype=np.bool_)
     for begin, end in zip(first[ended], behind[ended], strict=True):
@@ -116,4 +116,4 @@ def long_gaps(values: Array) -> NDArray[np.bool_]:
         return np.zeros(len(values), dtype=np.bool_)
     apart, _ = gaps(values)
     usual = median(apart) if len(apart) else 1.0
-    return in_long_stretches(within_gaps(values), max(LONG_GAP, usual))  # a slow channel's end is shorter
+    return in_long_stretches(within_gaps(values), max(LONG_GAP, usual))  # at its end a slow channel lacks fewer rows

@@ -71,9 +71,9 @@ def without_correlated_noise(record: Record, rings_at: float = 0.0) -> tuple[Rec
         if name not in record or (rows := independent_rows(record[name], record.sample_time)) == 1:
             continue
         if (independent_variance(record[name]) or 0.0) <= SMALLEST_VARIANCE[PRESSURE]:
-            continue  # a simulation without noise, whose spectrum is the actuator's
+            continue  # a simulation without noise: the spectrum is the actuator's
         if is_white_when_quiet(record[name]):
-            continue  # the teeth of a pump that turns fast, or a chirp, and no filter: that one is there at any time
+            continue  # pump teeth at high speed, or a chirp; a filter would act at all times
         values = np.full(len(record), np.nan)
         values[::rows] = record[name][::rows]
         changed[name] = values
@@ -107,7 +107,7 @@ def independent_rows(values: Array, sample_time: float) -> int:
         return 1
     most = min(MOST_ROWS, int(1.0 / (SLOWEST * sample_time)))
     rows = next((rows for rows in range(2, most) if is_white(values[::rows])), 0)
-    return rows + 1  # a spectrum of few windows leaves some correlation between samples unseen
+    return rows + 1  # a spectrum of few windows misses some correlation between samples
 
 
 def is_white(values: Array) -> bool:
@@ -203,7 +203,7 @@ def independent_variance(values: Array) -> float | None:
     windows = _windows(values[np.isfinite(values)])
     if len(windows) < FEWEST_WINDOWS:
         return None
-    # the median of an exponential variable, as a spectrum's power is one, is its mean times log 2
+    # a spectrum's power is exponentially distributed, so its median is its mean times log 2
     return _powers(windows)[-1] / float(np.log(2.0) * np.sum(_TAPER**2))
 
 

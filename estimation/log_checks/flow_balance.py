@@ -98,7 +98,7 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
     parts += [np.ones_like(flow)]
     noises = [p.piston_area**2 * spread * noise_x, compliance**2 * window.of_slope * noise_p]
     noises += [window.of_mean * noise_p, 0.0]
-    sign = window.mean(np.sign(speed))  # a block in which the pump turns round has both
+    sign = window.mean(np.sign(speed))  # a block in which the pump reverses has both signs
     return _whatever_the_bias(flow, sign, parts, np.array(noises), MOST_LOST * p.rated_flow)
 
 
@@ -193,7 +193,7 @@ def _whatever_the_bias(
     told = factors[:2] @ without
     mean = told @ weights
     std = np.sqrt((variance + (told - mean[:, None]) ** 2) @ weights)
-    std[absent[:2]] = np.inf  # of what stands still nothing is known
+    std[absent[:2]] = np.inf  # a part that stands still determines nothing
     (swept, compressed), (swept_std, compressed_std) = ((one / sizes[:2]).tolist() for one in (mean, std))
     explained = 1.0 - float(left @ weights) / float(np.var(flow))
     moving = float(np.std(parts[0])) / float(np.std(flow))

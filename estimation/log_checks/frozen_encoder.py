@@ -120,7 +120,8 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     if PRESSURE not in record or SPEED not in record:
         return False
     there = np.isfinite(record[PRESSURE])
-    if not np.any(there) or np.mean(there[hold]) <= 0.5 * np.mean(there):  # it may have been any
+    # pressure within the hold may have had any value
+    if not np.any(there) or np.mean(there[hold]) <= 0.5 * np.mean(there):
         return False
     size = max(2, round(BLOCK / record.sample_time))
     span, count = size * record.sample_time, (len(record) - 1) // size

@@ -150,7 +150,7 @@ def held_rows(values: Array) -> int:
     (1, 4)
     """
     steps = np.abs(np.diff(values))
-    moved = np.flatnonzero(steps > 0.0)  # a step to or from a missing sample is none
+    moved = np.flatnonzero(steps > 0.0)  # a step to or from a missing sample is NaN and does not count
     if len(moved) < LEAST_STEPS or np.count_nonzero(np.isnan(values)):
         return 1
     sizes = steps[moved]

@@ -70,7 +70,7 @@ _remembered: dict[tuple[object, ...], float] = {}
 
 
 def _variance(values: Array, channel: str) -> float:
-    values = values[np.isfinite(values)]  # a slow sensor has no three samples in a row
+    values = values[np.isfinite(values)]  # a slow sensor never has three samples in a row
     bends = np.diff(values, n=2)
     rounded = rounded_variance(values)
     smallest = max(SMALLEST_VARIANCE.get(channel, 0.0), rounded)
@@ -250,13 +250,13 @@ def struck_variance(values: Array) -> float:
 
 def _struck_variance(values: Array) -> float:
     bends = np.diff(values, n=SMOOTH)
-    bends = bends[np.isfinite(bends)]  # a difference across a missing sample holds the ringing
+    bends = bends[np.isfinite(bends)]  # differences across missing samples would include the ringing
     found = _squared(bends, _step(values[np.isfinite(values)]), comb(2 * SMOOTH, SMOOTH)) if len(bends) else 0.0
     return max(found if found > 0.0 else np.inf, rounded_variance(values))
 
 
 def _position_variance(position: Array) -> float:
-    position = position[np.isfinite(position)]  # a slow sensor has no seven samples in a row
+    position = position[np.isfinite(position)]  # a slow sensor never has seven samples in a row
     bends, steps = np.diff(position, n=SMOOTH), np.abs(np.diff(position))
     moved = steps[steps > 0.0]
     if not (len(bends) and len(moved)):

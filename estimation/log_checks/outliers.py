@@ -77,7 +77,7 @@ def without_outliers(values: Array, noise: float = 0.0) -> Array:
         if len(seen) <= 2 * ENDS:
             break
         below, distance, spread = _running_ranks(seen, window, [window // 2 + k for k in (-ranks, 0, ranks)])
-        spread -= below  # in place: a long log's channel is large
+        spread -= below  # in place, since the channel of a long log is large
         distance -= seen
         np.abs(distance, out=distance)
         spread *= BENDS
@@ -218,7 +218,7 @@ def _within_range(seen: Array, noise: float) -> Array:
     low, high = float(np.nanmin(inner)), float(np.nanmax(inner))
     reach = high - low + GROSS * noise
     for end in (seen[: ENDS + 2][::-1], seen[-ENDS - 2 :]):
-        values = end.tolist()  # some numbers, which Python compares sooner than NumPy
+        values = end.tolist()  # a few numbers, which Python compares faster than NumPy
         for at in range(2, ENDS + 2):
             before, step = values[at - 1] - values[at - 2], values[at] - values[at - 1]
             led = before * step > 0.0 and abs(step) <= BENDS * abs(before)
@@ -249,7 +249,7 @@ def without_gross_outliers(record: Record, channels: Sequence[str]) -> tuple[Rec
     for name in [name for name in channels if name in record]:
         values = record[name]
         shown = record
-        if name in PRESSURES:  # one that clips shows its noise only while it moves
+        if name in PRESSURES:  # a clipped pressure shows its noise only while it changes
             shown = record.replace(**{name: np.where(np.diff(values, prepend=np.nan) == 0.0, np.nan, values)})
         variance = measurement_variances(shown, (name,))[name]
         noise = max(variance, rounded_variance(values)) ** 0.5
@@ -258,7 +258,8 @@ def without_gross_outliers(record: Record, channels: Sequence[str]) -> tuple[Rec
             span = max(CONFIRMING, 2.0 * record.sample_time)
             moved = differentiated(bridged(record[POSITION]), record.sample_time, span)
             sound = np.where(np.isnan(without_outliers(values - moved, noise)), sound, values)
-        if name in PRESSURES:  # nothing hangs on a sample of what is compared, as it does on one of what drives
+        # pressure is only compared with the model: unlike a driving channel, it can spare samples
+        if name in PRESSURES:
             sound = without_bursts(values, sound, noise)
         sound = without_written_for_lost(values, sound, noise)
         lost = _missing(sound) - _missing(values)

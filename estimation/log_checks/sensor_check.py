@@ -217,7 +217,8 @@ def shows_motion(record: Record, stretch: slice) -> tuple[bool, bool]:
     velocity = velocity[np.isfinite(velocity)]
     if len(velocity) < FEWEST_HELD:
         return False, False
-    alike = independent_rows(record[VELOCITY], record.sample_time)  # an average adds up like fewer, longer rows
+    # averaged noise adds up like that of fewer, longer rows
+    alike = independent_rows(record[VELOCITY], record.sample_time)
     noise = float(np.std(velocity[alike:] - velocity[:-alike])) / 2.0**0.5 if len(velocity) > 2 * alike else 0.0
     step = 0.5 * (stretch.stop - stretch.start) * record.sample_time / len(velocity)
     travelled = np.cumsum(velocity) * step

@@ -38,7 +38,8 @@ def sliding_pressure(record: Record, p: EhaParameters) -> float:
         return 1.0
     size = np.abs(blocks.slope)
     slides = size > SLIDING * size.max()
-    speed = np.minimum(size[slides], p.rated_flow / p.piston_area)  # beyond it position is in another unit
+    # clipped: a faster piston means that position has another unit
+    speed = np.minimum(size[slides], p.rated_flow / p.piston_area)
     rubs = quadratic_friction(speed, 1.0, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
     return median(np.abs(blocks.pressure[slides]) * p.piston_area / rubs) if np.all(rubs > 0.0) else 1.0
 

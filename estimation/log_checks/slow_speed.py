@@ -49,6 +49,7 @@ def was_repeated(record: Record, *, others: bool) -> bool:
 
 def _left(known: Array, turned: Array, rise: Array) -> float:
     """Return the residual of the pressure's rise after pump, piston and leakage, a sum of squares [Pa squared]."""
-    pumped = np.column_stack([known, turned, np.sign(turned) * known[:, -1]])  # all that it turns, less what slips
+    # all that the pump turns, less its flow bias
+    pumped = np.column_stack([known, turned, np.sign(turned) * known[:, -1]])
     pumped /= np.maximum(np.max(np.abs(pumped), axis=0), np.finfo(np.float64).tiny)
     return float(np.sum((rise - pumped @ np.linalg.lstsq(pumped, rise)[0]) ** 2))

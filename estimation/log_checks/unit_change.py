@@ -63,7 +63,7 @@ def _noise(values: Array, size: int, count: int) -> Array:
     bends = np.abs(np.diff(values[: size * count], 4, append=4 * [np.nan])).reshape(count, size)
     bends[bends <= ROUNDED * np.nanmax(np.abs(values), initial=0.0)] = np.nan
     there = np.count_nonzero(np.isfinite(bends), axis=1)
-    small = np.sort(bends, axis=1)[np.arange(count), (LOW * there).astype(np.int64)]  # missing ones come last
+    small = np.sort(bends, axis=1)[np.arange(count), (LOW * there).astype(np.int64)]  # NaN is sorted to the end
     return np.where(there < size // 4, np.nan, small)
 
 

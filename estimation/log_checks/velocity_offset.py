@@ -45,7 +45,7 @@ def without_velocity_offset(record: Record) -> tuple[Record, tuple[Note, ...]]:
     if len(mean) < LEAST_PARTS or size == 0.0:
         return record, ()
     sides = np.column_stack([np.ones(len(gained)), gained])
-    if np.linalg.matrix_rank(sides) < sides.shape[1]:  # a piston that stands tells no gain, and needs none
+    if np.linalg.matrix_rank(sides) < sides.shape[1]:  # a piston at rest determines no gain, and needs none
         sides = sides[:, :1]
     found = np.linalg.lstsq(sides, mean, rcond=None)[0]
     left = mean - sides @ found

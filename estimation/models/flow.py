@@ -116,7 +116,7 @@ def chamber_rates(
     into_1, into_2 = inner_flows(pressures, p, cracks, bend)
     stiffness_1 = beta - (p1 - ATMOSPHERE) if by_mass else beta
     stiffness_2 = beta - (p2 - ATMOSPHERE) if by_mass else beta
-    # density goes with the inverse of that stiffness
+    # density is inversely proportional to that stiffness
     swelling = (dp / stiffness_1, dp / stiffness_2) if by_mass else (0.0, 0.0)
     at_1, at_2 = port_flows(pumped, leaked_flow(dp, p.leakage_coefficient, p), dp, swelling)
     return (

@@ -166,7 +166,7 @@ class ProcessModel:
         """
         scale = np.array([state.scale for state in self.states])
         rising = np.array([state.logarithmic for state in self.states])
-        with np.errstate(over="ignore", invalid="ignore"):  # a filter that diverges overflows, and must show it
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverging filter overflows, and must show it
             grown = scale * np.exp(np.where(rising, mean, 0.0))
             return np.where(rising, grown, scale * mean), grown
 

@@ -146,7 +146,7 @@ def wide_rates(
     at_1, at_2 = port_flows(pumped, leaked, dp, swellings(p1, p2, air, p, quick=quick))
     rise = tangent_stiffness(p1, air, p, quick=quick) * (at_1 - area_1 * velocity + into_1) / volume_1
     fall = tangent_stiffness(p2, air, p, quick=quick) * (area_2 * velocity - at_2 + into_2) / volume_2
-    # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
+    # `behind` stays small if the sensor's lag is short; a stiff step resolves it
     lagging = rise - fall - (behind + misread((p1, p2), elapsed, p)) / (p.pressure_lag + SHORTEST_LAG)
     return rise, fall, lagging, accumulator_rate(into_1 + into_2, supply, p)
 

@@ -104,7 +104,7 @@ def estimate_stack(
         theta, left = _coarsely_descended(part, guess)
         if left < lowest:
             lowest, best = left, min(best, _descended(runs, theta), key=_cost)
-    if _UNEXPLAINED <= best.spread < _HOPELESS:  # what is slow shows in the whole log alone
+    if _UNEXPLAINED <= best.spread < _HOPELESS:  # slow effects show only in the whole log
         theta, _ = _coarsely_descended(runs, best.theta)
         best = min(best, _descended(runs, theta), key=_cost)
     return _concluded(runs, best, runs.count + part.count)

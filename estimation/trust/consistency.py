@@ -79,7 +79,8 @@ def mean_chi_square_bounds(degrees: int, count: int, confidence: float = 0.95) -
     from scipy.special import gammaincinv
 
     tail = 0.5 * (1.0 - confidence)
-    low, high = (2.0 * float(gammaincinv(0.5 * degrees * count, p)) / count for p in (tail, 1.0 - tail))  # chi-square's
+    # chi-square quantiles
+    low, high = (2.0 * float(gammaincinv(0.5 * degrees * count, p)) / count for p in (tail, 1.0 - tail))
     return low, high
 
 

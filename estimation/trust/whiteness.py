@@ -121,7 +121,7 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
     around = np.max([np.roll(np.pad(drive, 1), shift)[1:-1] for shift in (-1, 0, 1)], axis=0)
     driven = (around >= 0.1 * np.max(drive)) & bool(np.max(drive) > 0.0)
     beside = ~driven[:band]
-    beside[0] = False  # a mean is no beat
+    beside[0] = False  # the mean is no beat
     quantile = float(chdtri(2 * SEGMENTS, FALSE_ALARMS / (len(kept) * band)))
     found: list[Whiteness] = []
     for c in kept:
@@ -131,7 +131,7 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
         if steps is not None:
             unrounded = np.mean(np.abs(_spectra(steps, length)) ** 2, axis=0)[:band] * (len(values) / count)
             power = np.where(beside, np.minimum(power, unrounded), power)
-        power[0] *= 0.5  # a mean is real, with half the degrees of freedom, and is held to the same threshold
+        power[0] *= 0.5  # the mean is real, with half the degrees of freedom; halved, it has the same threshold
         peak = int(np.argmax(power))
         lags = _autocorrelations(values)
         pattern = _quantisation(record[estimate.channels[c]]) / float(
@@ -159,7 +159,7 @@ def _normalised(estimate: Estimate, first: int) -> tuple[Array, BoolArray]:
     """Return innovations over their deviations after settling, 0 if a sample is missing; and which are present."""
     residuals, variances = estimate.residuals[first:], estimate.residual_variances[first:]
     present = ~np.isnan(residuals)
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # a filter that diverged gives no numbers
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # a diverged filter gives NaN
         return np.where(present, residuals / np.sqrt(variances), 0.0), present
 
 

@@ -153,7 +153,7 @@ class _Search:
             row[coordinate.place], directions[coordinate.place, k] = coordinate.value(float(u[k]))
         found = innovation_sensitivity(problem_with(self._problem, row), directions)
         held = np.array([coordinate.spread**-2 for coordinate in self._coordinates])
-        with np.errstate(all="ignore"):  # a step too far may overflow: it is then refused
+        with np.errstate(all="ignore"):  # too large a step may overflow; it is then rejected
             loss = -found.log_likelihood + 0.5 * float(held @ u**2)
             slope = held * u - found.scores.sum(axis=0)
             curvature = found.information + np.diag(held)

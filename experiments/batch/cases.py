@@ -255,7 +255,7 @@ def _works(methods: tuple[Method, ...], starts: tuple[float, ...]) -> tuple[Work
 def _content(series: Series) -> list[Any]:
     """Return the identity of a series; the folder of a log is not part of it."""
     if isinstance(series, Log):
-        given = [] if series.sample_time_s is None else [series.sample_time_s]  # keys of older stores stay
+        given = [] if series.sample_time_s is None else [series.sample_time_s]  # keys of older stores stay valid
         return ["log", series.file, series.content, series.columns, *given]
     return ["simulated", *(getattr(series, one.name) for one in fields(series))]
 

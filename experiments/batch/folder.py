@@ -82,7 +82,7 @@ class Folder:
                 raise HydrostateError(
                     f"store {self.name} is being written by another process: wait until it is done, or choose another"
                 ) from error
-            yield  # the lock goes with the process, whatever ends it
+            yield  # the system releases the lock however the process ends
 
 
 def _lock(number: int) -> None:

@@ -56,7 +56,7 @@ class Lanes:
         padded = problems + problems[-1:] * max(0, FEWEST_IN_LANES - len(problems))
         try:
             write_filtered(self._rows, waiting, list(filter_batch(padded))[: len(waiting)])
-        except Exception as error:  # one block must not cost the others their results
+        except Exception as error:  # an error in one block must not lose the results of the others
             self._rows.fail([one.place for one in waiting], error)
 
 
@@ -71,13 +71,13 @@ def write_filtered(rows: Rows, ran: Sequence[Waiting], traces: Sequence[Trace]) 
     problem = ran[0].problem
     model, state = problem.model, problem.model.index(BULK_MODULUS)
     first = int(np.floor(len(traces[0].track) * (1.0 - SETTLED)))
-    with np.errstate(all="ignore"):  # a filter that diverged shows in its row
+    with np.errstate(all="ignore"):  # the row of a diverged filter says so
         ends, _ = model.to_si(np.array([trace.track[first:] for trace in traces]))
         values = ends[..., state].mean(axis=1)
         _, slopes = model.to_si(np.array([trace.mean for trace in traces]))
         stds = np.sqrt([trace.covariance[state, state] for trace in traces]) * slopes[:, state]
         nis = np.array([trace.nis for trace in traces]) / np.array([trace.count for trace in traces])
-        # no number where an innovation's variance lost its sign, less than all where it overflowed
+        # NaN if an innovation's variance became negative, minus infinity if it overflowed
         finite = np.isfinite(values + stds + [trace.log_likelihood for trace in traces])
     columns = {
         "outcome": ["ok"] * len(ran),

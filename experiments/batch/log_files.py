@@ -56,7 +56,7 @@ def _folders(top: str) -> Iterator[str]:
             if (folder / CASES).is_file() and (folder / PARTS).is_dir():
                 continue
             entries = [one for one in folder.iterdir() if not one.name.startswith(".") and one.is_dir()]
-        except (OSError, RuntimeError):  # a folder that nobody may read, a link to itself
+        except (OSError, RuntimeError):  # the folder cannot be read, or is a link to itself
             continue
         seen.add(itself)
         yield str(folder)

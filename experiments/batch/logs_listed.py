@@ -60,7 +60,7 @@ def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any
         )
     there = [_log(Path(name), folder, logs, rigs) for name in found]
     itself = folder.resolve()
-    there.sort(key=lambda one: one.path != str(itself / one.file))  # the file's own name before any link to it
+    there.sort(key=lambda one: one.path != str(itself / one.file))  # a file before any link to it
     counted: dict[tuple[object, ...], Log] = {}
     links: dict[str, str] = {}
     for one in there:
@@ -75,7 +75,7 @@ def _log(path: Path, folder: Path, logs: Logs, rigs: Mapping[str, Rig[Any]]) -> 
     file, itself = spelt(relative.as_posix()), path.resolve()
     try:
         size = itself.stat().st_size
-    except OSError:  # it has just gone, which becomes a failed case
+    except OSError:  # the file was just deleted, so its case will fail
         size = 0
     columns = tuple(sorted(logs.columns.items()))
     return Log(file, str(itself), content_of(itself), size, columns, logs.sample_time_s, nearest_folder(file, rigs))

@@ -192,11 +192,11 @@ class PartStore:
         for name in self._parts():
             try:
                 yield self._read(name, columns)
-            except (pa.ArrowException, OSError, KeyError):  # another process may set it aside at this moment
+            except (pa.ArrowException, OSError, KeyError):  # another process may have just set it aside
                 continue
 
     def _read(self, name: str, columns: list[str] | None) -> pa.Table:
-        schema = None if columns is None else SCHEMA  # a part that is older than a column holds nothing in it
+        schema = None if columns is None else SCHEMA  # a part older than a column has no values in it
         content = self.folder.read(f"{PARTS}/{name}")
         return _table(content, columns=columns, schema=schema, page_checksum_verification=True)
 
@@ -248,7 +248,7 @@ def _placed(table: pa.Table, place: Mapping[str, int]) -> pa.Table:
 
 
 def _table(content: bytes, **how: Any) -> pa.Table:
-    # of several threads one may still hold the bytes when the process ends, and Python aborts it (apache/arrow#33975)
+    # with threads, one may still hold the bytes when the process ends, and Python then aborts (apache/arrow#33975)
     return pq.read_table(BytesIO(content), use_threads=False, **how)
 
 

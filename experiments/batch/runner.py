@@ -147,7 +147,7 @@ def _drained(batch: _Batch, executor: Executor, width: int) -> bool:
                 raise HydrostateError("the cluster went away; run the same command again to go on") from error
             except Exception as error:
                 broken = isinstance(error, BrokenExecutor)
-                if not broken and type(error).__name__ != "KilledWorker":  # Dask's word, which need not be installed
+                if not broken and type(error).__name__ != "KilledWorker":  # Dask's error; Dask need not be installed
                     raise
                 whole = whole and not broken
                 batch.suspect(task, alone=alone)

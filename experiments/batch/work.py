@@ -96,7 +96,7 @@ def run_task(task: Task) -> Part:
         places = range(after, after := after + len(keys))
         try:
             prepared = replace(_prepared(series, task), usual=sum(map(_is_usual, works)))
-        except Exception as error:  # whatever a series brings up must not cost the others their results
+        except Exception as error:  # an error in one series must not lose the results of the others
             rows.fail(places, _told_of(series, error))
             continue
         rows.describe(number, prepared.entries)

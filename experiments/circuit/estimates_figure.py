@@ -64,5 +64,5 @@ def _estimates_of(axis: Axes, rows: pd.DataFrame, heights: Mapping[str, float], 
             told = axis.annotate(words, (0.5, height), xycoords=place, ha="center", va="center", color=GREY, fontsize=8)
             told.set_bbox(
                 {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
-            )  # the truth's line ends before the words
+            )  # so that the line of the true value does not cross the words
         draw_intervals(axis, values, height, 3.0, lambda _: colour)

@@ -46,7 +46,7 @@ def plain(value: object) -> Any:
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, Sequence | set | frozenset):
         return [plain(item) for item in value]
-    if hasattr(value, "tolist"):  # NumPy's arrays and scalars, without importing it for a help text
+    if hasattr(value, "tolist"):  # a NumPy array or scalar; help texts need not import NumPy
         return plain(value.tolist())  # pyright: ignore[reportAttributeAccessIssue] -- asked for above
     return str(value)
 

@@ -144,7 +144,7 @@ def _worked(log: Path, work: Work, blank: Result) -> Result:
         except HydrostateError as error:
             names_a_file = error.source not in {None, str(log)}
             result = _failure(blank, str(error) if names_a_file else error.message)
-        except Exception as error:  # whatever a log brings up must not cost the others their results
+        except Exception as error:  # an error in one log must not lose the results of the others
             result = _failure(blank, unexpected(error))
     result = with_remarks(result, said_of_it)
     for sentence in result["warnings"]:
@@ -178,7 +178,7 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None, los
     elif batch.done:
         emit(rendered(*screen(batch.done)))
     code = batch.exit_code or (SOME_FAILED if lost else 0)
-    if out is not None and batch.results:  # an interruption before the first leaves earlier results as they are
+    if out is not None and batch.results:  # if interrupted before the first log, keep the earlier results
         try:
             note(f"written: {', '.join(str(path) for path in write_results(batch.results, out))}")
         except HydrostateError as error:

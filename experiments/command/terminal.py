@@ -104,7 +104,7 @@ def clauses(parts: Iterable[str]) -> str:
 
 
 def _to_nowhere(stream: TextIO) -> None:
-    with suppress(OSError):  # a stream in memory has no number
+    with suppress(OSError):  # a stream in memory has no file descriptor
         number, nowhere = stream.fileno(), os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, number)
         os.close(nowhere)
@@ -271,7 +271,7 @@ def guarded(run: Callable[[], object]) -> int:
         return USAGE
     except OSError as error:
         _to_nowhere(sys.stdout)
-        place = f"{error.filename}: " if error.filename else ""  # none of standard output and of connections
+        place = f"{error.filename}: " if error.filename else ""  # errors of stdout and of connections have none
         note(f"hydrostate: {place}{error.strerror or error}")
         return SOME_FAILED
     except Exception as error:

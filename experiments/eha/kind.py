@@ -69,7 +69,7 @@ def _how(options: Options) -> "EstimateOptions":
 
     form, method, robust, start = (options[name] for name in ("form", "method", "robust", "start"))
     require_known("--form", form, ["auto", *FITTED, *FORMS])
-    if method not in ("auto", LEAST_SQUARES):  # else no filter is imported
+    if method not in ("auto", LEAST_SQUARES):  # otherwise no filter need be imported
         from estimation.eha.named_methods import NAMED
         from estimation.filters.methods import METHODS
 
@@ -189,7 +189,7 @@ def _diagnosed(
     from faults.notes import ClassCode
     from plant.spare_processors import begun
 
-    require_fast_enough(record.sample_time)  # before the transfer functions take the log to their own sample time
+    require_fast_enough(record.sample_time)  # checked before the transfer functions resample the log
     no_pressure, linear = asked
     if no_pressure:
         record = record.replace(**{PRESSURE: None})
@@ -200,7 +200,7 @@ def _diagnosed(
     waiting = scored if linear is None else begun(scored) or scored
     seen = None if kept is None else _seen(record, rig, kept)
     found = diagnose_log(record, rig, seen)
-    if kept is not None and seen is None:  # circuits ran beside the estimate, which has checked the log for itself
+    if kept is not None and seen is None:  # the diagnosis made its own estimate in parallel: keep it
         kept[tuple(record)] = rig, (None, found.evidence.estimate)
     wrong = any(one.code is ClassCode.VELOCITY_CONTRADICTED for one in found.notes)
     try:

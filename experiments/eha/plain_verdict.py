@@ -270,7 +270,7 @@ def what_to_do(result: Mapping[str, Any]) -> list[str]:
         give the same result, work on the actuator last.
     """
     advice = [sentence(one) for one in result["advice"]]
-    if of_another_size(result):  # a wrong sensor or rig file would look alike, and is looked for first
+    if of_another_size(result):  # a wrong sensor or rig file would look the same, so check for it first
         return [*left_unread(result), *advice, *work_on(result)]
     return [*work_on(result), *left_unread(result), *advice]
 

@@ -50,7 +50,7 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
         The verdict, the same for a mechanic, the severity of leakage, friction and oil, whether it is reliable, what to
         do next, and the result of the library of transfer functions if there is one.
     """
-    from experiments.eha.plain_verdict import is_doubted, verdict  # here, since an estimate needs nothing of it
+    from experiments.eha.plain_verdict import is_doubted, verdict  # here, since estimates do not need it
 
     library = library_sentence(result)
     return [
@@ -132,7 +132,7 @@ def equally_likely(result: Mapping[str, Any]) -> list[str]:
     list[str]
         Conditions in the order of `CONDITIONS`; only the likeliest if the log separates it from the others.
     """
-    from faults.conditions import CONDITIONS  # here, since an estimate needs nothing of it
+    from faults.conditions import CONDITIONS  # here, since estimates do not need it
 
     shares = result["probabilities"]
     least = ALIKE * max(shares.values())
@@ -141,7 +141,7 @@ def equally_likely(result: Mapping[str, Any]) -> list[str]:
 
 def _what_is_told(conditions: Sequence[str], shares: Mapping[str, float]) -> list[str]:
     """Return the fault that equally likely conditions share, its probability, and the open part."""
-    from faults.conditions import CONDITIONS  # here, since an estimate needs nothing of it
+    from faults.conditions import CONDITIONS  # here, since estimates do not need it
 
     levels = {axis: [getattr(CONDITIONS[one], axis) for one in conditions] for axis in ("leakage", "friction")}
     told = {axis: LEVELS_IN_WORDS[found[0]] for axis, found in levels.items() if len(set(found)) == 1}
@@ -223,7 +223,7 @@ def amount(one: Mapping[str, Any]) -> str:
         beyond = f" ({wider})" if wider and max(map(abs, total)) >= 0.5 * least else ""
         return f"under {least:.{MOST_DECIMALS}f} {unit}{beyond}"
     shown = f"{value:z.{decimals_of(low, high, MOST_DECIMALS)}f}"
-    narrow = said == f"{shown} to {shown}"  # under the last digit that is shown, so the ends would say nothing
+    narrow = said == f"{shown} to {shown}"  # so narrow that both ends show the same digits as the value
     return f"{shown} {unit} ({'; '.join(one for one in ('' if wider and narrow else said, wider) if one)})"
 
 
@@ -253,7 +253,7 @@ def refused_oil(result: Mapping[str, Any]) -> list[str]:
     gate, estimated = result["gate"], result["bulk_modulus_pa"]
     if result["unknown"] or gate is None or gate["passed"] or estimated is None or estimated["value"] is None:
         return []
-    if result["severity"]["bulk_modulus"]["value"] != estimated["value"]:  # the circuit's, which has its own interval
+    if result["severity"]["bulk_modulus"]["value"] != estimated["value"]:  # it is the circuit's, with its own interval
         return []
     return [f"do not rely on bulk modulus: {'; '.join(gate['reasons'])}"]
 

@@ -77,7 +77,7 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
     worst = row.outlook
     every = (worst if worst and worst.name == name else outlook_of(row.logs, name, row.maintained) for name in SHOWN)
     outlooks = [one for one in every if one is not None]
-    outlooks.sort(key=lambda one: worst is None or one.name != worst.name)  # what decides is read first
+    outlooks.sort(key=lambda one: worst is None or one.name != worst.name)  # the deciding severity comes first
     counted = max((len(one.logs) for one in outlooks), default=0)
     charts = _charts(outlooks, row.name)
     last = [*row.logs][-MOST_LOGS:][::-1]
@@ -166,7 +166,7 @@ def _forecast(one: Outlook, newest: LogRow) -> dict[str, str]:
     shown, low, high = (fixed(each, decimals) for each in (scale * level, *ends))
     growth, growth_std = (scale * each for each in (growth, growth_std))
     growth = growth if abs(growth) > ROUNDING * growth_std else 0.0
-    places = decimals_of(0.0, 5.0 * growth_std, 6)  # one digit of the deviation, two of one below 0.2 of a digit
+    places = decimals_of(0.0, 5.0 * growth_std, 6)  # one digit of the deviation, or two if the first is 1
     return {
         "severity": SHOWN[one.name],
         "level": f"{shown} {unit} ({low} to {high}){_as_of(one, newest)}",
@@ -221,7 +221,7 @@ def _panel(one: Outlook, x: Array, ahead: int) -> Panel:
     )
     marks = (Mark("y", scale * one.series.limit, "limit"), Mark("x", float(x[count - 1]), "last log"))
     ends = scale * np.array([*one.series.values, one.series.healthy, one.series.limit])
-    room = ROOM * float(np.ptp(ends))  # a forecast that leaves it would leave no height for the logs
+    room = ROOM * float(np.ptp(ends))  # the axis cuts off forecasts beyond this, which would squeeze the logs
     told = (float(ends.min()) - room, float(ends.max()) + room)
     return Panel(SHOWN[one.name], unit, curves, marks, [(2, 3)], told)
 

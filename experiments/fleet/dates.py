@@ -130,7 +130,7 @@ def told_dates(places: Iterable[float], ahead: Iterable[float]) -> str:
     (low, high), (first, last) = places, ahead
     if low == float("inf"):
         return OUT_OF_SIGHT
-    begin = told_date(low, max(first, min(last, HOURS)))  # an interval of days needs no hour
+    begin = told_date(low, max(first, min(last, HOURS)))  # no hour if the end of the interval has none
     if high == float("inf"):
         return f"not before {begin}"
     end = told_date(high, last)

@@ -232,7 +232,7 @@ def actuator_in_name(name: str, pattern: str | None) -> str:
         return _by_date(f"/{name}").actuator or _stem(name)
     try:
         return by_pattern([name], pattern)[name].actuator
-    except HydrostateError:  # a date that is none
+    except HydrostateError:  # the date in the name is invalid
         return ""
 
 

@@ -99,16 +99,16 @@ class Outlook:
             return REACHED
         growth, std = self.trend.growth
         if math.copysign(1.0, self.series.size) * growth + std < 0.0:
-            return OUT_OF_SIGHT  # futures may turn round, but no reader looks for that in a severity that recedes
+            return OUT_OF_SIGHT  # it recedes; some futures may still turn round, but readers do not ask for those
         if self.days_apart is None:
             return f"{span_of(*ends)} logs" if low != high else f"{ends[0]:.0f} log{'' if round(ends[0]) == 1 else 's'}"
         hours = any(len(one.named.shown) > len(one.named.day) for one in self.logs)
-        ahead = [max(self.days_apart * end, 0.0 if hours else HOURS) for end in ends]  # no hour where names have none
+        ahead = [max(self.days_apart * end, 0.0 if hours else HOURS) for end in ends]  # no hour if file names have none
         places = [(self.logs[-1].named.place or 0.0) + self.days_apart * end for end in ends]
         if low != high:
             return told_dates(places, ahead)
         farthest = self.days_apart * float(self.trend.crossing.quantiles[-1])
-        return told_date(places[0], max(ahead[0], min(farthest, HOURS)))  # of an interval of days, no hour
+        return told_date(places[0], max(ahead[0], min(farthest, HOURS)))  # no hour if the interval is one of days
 
     @property
     def words(self) -> str:
@@ -117,7 +117,7 @@ class Outlook:
             return self.past
         if len(self.logs) - self.trend.begin < FEWEST:
             return "too few logs"
-        if self.left is None and self.alarm:  # the last log alone may lie within it
+        if self.left is None and self.alarm:  # the last log alone may still be within the limit
             return "the trend is past the limit"
         if self.left is None:
             return "growing" if self.trend.certain else "no certain growth"

@@ -136,7 +136,7 @@ def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:
         The sickest first.
     """
     sick = [row.name for row in rows if row.state in SICK]
-    if not rig_hint(rows):  # one actuator beside the nine has a fault; many have another rig file
+    if not rig_hint(rows):  # a few outside the nine conditions are faulty; many mean that the rig file is wrong
         sick += [row.name for row in rows if row.state == "unknown" and row.last.beside and _past(row.last)]
     return (sick or [row.name for row in rows if row.state == "alarm"])[:MOST_NAMED]
 
@@ -207,7 +207,7 @@ def row_cells(row: ActuatorRow) -> list[Any]:
         Text, numbers, or None if unknown.
     """
     last = row.last
-    told = last.told  # the amounts of a model that does not fit are none of the actuator's
+    told = last.told  # if no model fits, the severities are not the actuator's
     share = round(100.0 * last.worst.share, 1) if last.worst is not None and told else None
     outlook = row.outlook
     left = None if outlook is None or outlook.left is None or not told else round(outlook.left[1], 1)

@@ -144,7 +144,7 @@ def _row(row: Mapping[str, Any], named: Named, limits: Mapping[str, float]) -> L
     amounts = _amounts(row["quantities"], limits)
     code, between = _placed(row.get("against"))
     state = _state(row, amounts)
-    if state == "unknown" and code == BETWEEN:  # never surely: a sensor with a wrong gain would look alike
+    if state == "unknown" and code == BETWEEN:  # never certain: a sensor with a wrong gain would look the same
         state = "likely" if any(one.share > 1.0 for one in amounts.values()) else "open"
     beside = code == BESIDE
     return LogRow(

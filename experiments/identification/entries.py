@@ -117,7 +117,7 @@ def column_entries(found: "Identified") -> dict[str, Any]:
 
 def _transfer_entries(model: "FreeRunModel", gain_std: Sequence[float]) -> dict[str, Any]:
     """Return transfer functions without covariance: in the form of `linear_entries` for one input, else by inputs."""
-    import numpy as np  # late: help waits for no heavy import
+    import numpy as np  # here, so that help texts appear without a slow import
 
     transfer = model.transfer_functions()
     f = transfer[0][1]

@@ -109,7 +109,7 @@ def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out
             pages.write(output, _page(about, found, data))
         return result
 
-    columns = {Path(output): output for output in fit.outputs}  # a path drops parts of some names, such as "x/."
+    columns = {Path(output): output for output in fit.outputs}  # Path shortens some names, such as "x/."
     pages = Pages(own_paths(page_place(fit.report), fit.outputs))
     batch = run_logs(list(columns), work, BLANK, "identifying")
     named = ", ".join(str(log) for log in logs)

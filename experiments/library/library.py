@@ -80,7 +80,7 @@ def build_library(seed: int) -> dict[str, Any]:
         Table 6.
     """
     rig = CircuitParameters()
-    with warnings.catch_warnings(action="ignore", category=LogWarning):  # a fit's doubts stand in its covariance
+    with warnings.catch_warnings(action="ignore", category=LogWarning):  # the covariance expresses the doubts
         bank = identify_bank(rig, np.random.default_rng(seed), duration=LIBRARY_DURATION)
 
     def described_entry(name: str) -> dict[str, Any]:
@@ -89,7 +89,7 @@ def build_library(seed: int) -> dict[str, Any]:
         models = {"model": bank[name].to_dict(), "around_mean": around.to_dict()}
         return {**models, **described(bank[name]), "table_6": printed_model(name)}
 
-    # one after the other: filters of warnings are the process's, and threads would undo each other's
+    # not in threads: warning filters belong to the process, so threads would undo each other's
     entries = {name: described_entry(name) for name in CONDITIONS}
     return {
         "format": FORMAT,
@@ -122,7 +122,7 @@ def _determined_model(speeds: list[Array], velocities: list[Array]) -> LinearMod
     found: list[tuple[float, LinearModel]] = []
     names = dict(zip(("input_name", "output_name"), CHANNELS, strict=True))
     for order in range(1, HIGHEST_ORDER + 1):
-        with warnings.catch_warnings(action="ignore", category=LogWarning):  # of models that are not kept
+        with warnings.catch_warnings(action="ignore", category=LogWarning):  # about models that are not kept
             form: Any = {"n_numerator": order + 1, "n_denominator": order, **names}
             model = fit_output_error(speeds, velocities, SAMPLE_TIME, covariance="coloured", **form)
         slowest = -SAMPLE_TIME / float(np.log(np.abs(model.poles[0])))

@@ -122,7 +122,7 @@ def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[s
         if len(known) == 2:
             row["difference"] = known[1]["value"] - known[0]["value"]
             halves = [one for one in map(_halves_of, known) if one is not None]
-            if len(halves) == 2:  # each end of the difference from the ends that make it so
+            if len(halves) == 2:  # add in quadrature the ends that move the difference the same way
                 (below_first, above_first), (below, above) = halves
                 low = row["difference"] - math.hypot(below, above_first)
                 high = row["difference"] + math.hypot(above, below_first)

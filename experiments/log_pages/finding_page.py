@@ -78,7 +78,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "doubts": [
             sentence(one)
             for one in against
-            if one not in message  # the page opens with it
+            if one not in message  # the message is already at the top of the page
         ],
         "doubted": bool(against),
         "duration": f"{record.duration:g}",

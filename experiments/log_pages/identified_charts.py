@@ -85,7 +85,7 @@ def measured_curve(view: IdentifiedView) -> MeasuredCurve | None:
             one = measured_response(u, y, view.sample_time).response
             return MeasuredCurve(one.frequency, one.response, one.radius())
         except HydrostateError:
-            pass  # the input leaves bands out, which smoothing can do without
+            pass  # the input lacks some bands; smoothing does not need them
     try:
         filled = y if known.all() else np.interp(np.arange(y.size), np.flatnonzero(known), y[known])
         found = automatic_response(u, filled, view.sample_time)
@@ -241,7 +241,7 @@ def bode_charts(view: IdentifiedView, measured: MeasuredCurve | None, stem: str)
             phases.append(Curve(name, _degrees(response), COLOURS[k % len(COLOURS)]))
     if view.linear is not None:
         band = view.linear.frequency_response(frequency, ci=0.95)
-        least = 1e-2 * np.abs(band.response)  # a gain of nothing has no decibels: 40 dB below are enough
+        least = 1e-2 * np.abs(band.response)  # a gain of zero has no decibels, so stop at 40 dB below
         if np.isfinite(band.gain_low).all():
             gains += [
                 Curve("95 % from", _decibels(scale * np.maximum(band.gain_low, least)), COLOURS[0], "edge"),

@@ -180,7 +180,7 @@ def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[
         bad.append("Inputs beyond that range: the log says nothing about them.")
         if wanders(view):
             bad.append(f"The level of {view.output.name}: it also moves by itself.")
-    # the measured response holds samples at the limits, and the transfer function is that of the plant without
+    # the measured response includes samples at limits, but the transfer function describes the plant without them
     compared = usable and view.is_linear and not has_limits(view)
     band = told_band(measured) if compared else None
     if band is not None and measured is not None:

@@ -88,7 +88,7 @@ def _mean_square(axis: Axes, time: np.ndarray, normalised: np.ndarray, estimate:
         squares = normalised[: count * window, i].reshape(count, window) ** 2
         present = np.isfinite(squares)
         sums = np.where(present, squares, 0.0).sum(axis=1)
-        with np.errstate(invalid="ignore", divide="ignore"):  # a window without a sample shows as a gap
+        with np.errstate(invalid="ignore", divide="ignore"):  # a window without samples is a gap
             axis.plot(centres, sums / present.sum(axis=1), color=COLOURS[i % 3], label=NAMES.get(channel, channel))
     low, high = mean_chi_square_bounds(1, window)
     axis.axhspan(low, high, color=GREY, alpha=0.25, lw=0)

@@ -54,7 +54,7 @@ def looked_into(
     guesses = _guessed(tables, kind)
     if plant is None and lacking(kind.required, {one.guess.channel for one in guesses}):
         names = [column.heading.name for facts in tables for column in facts.columns]
-        kinds = kinds_by_columns(names)  # imports every kind of actuator
+        kinds = kinds_by_columns(names)  # imports all kinds of actuator
         if len(kinds) == 1 and kinds[0] != kind.name:
             kind = actuator(kinds[0])
             guesses = _guessed(tables, kind)

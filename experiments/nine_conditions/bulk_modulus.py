@@ -92,7 +92,7 @@ def bulk_modulus_study(
         p = parameters_for(CONDITIONS[name], rig)
         rng = stream(settings.seed, "bulk modulus", experiment.plant, experiment.drive, name)
         record = experiment.record(p, settings, rng)
-        flow = experiment.form == "flow"  # which tries starts of its own beside one, so the lowest guess is enough
+        flow = experiment.form == "flow"  # the estimator adds starts of its own, so the lowest guess is enough
         results: list[tuple[dict[str, object], pd.DataFrame]] = []
         for start in settings.starts[:1] if flow else settings.starts:
             found = estimate_bulk_modulus(

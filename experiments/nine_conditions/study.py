@@ -46,7 +46,7 @@ RIG = EhaParameters()
 
 
 def _find(settings: StudySettings, track: Track) -> Found:
-    # what a fit says of itself stands beside it in the tables; set here, since threads share the filters
+    # the tables state each fit's doubts; ignored here, because threads share the warning filters
     with warnings.catch_warnings(action="ignore", category=LogWarning):
         return _parts(settings, track)
 

@@ -30,7 +30,7 @@ def truth_of(made: MadeLog, split: str, index: int) -> dict[str, Any]:
     condition, states = CONDITIONS[setup.condition], made.states
     low, high = made.bulk_modulus
     accept, named, difference = kind.accepted(setup.condition), kind.named, np.max(np.abs(states[:, 4] - states[:, 5]))
-    if difference < m.relief < Machine().relief:  # a valve that is set low and never opened leaves no trace
+    if difference < m.relief < Machine().relief:  # a low-set valve that never opened leaves no trace
         accept, named = tuple(dict.fromkeys((*accept, setup.condition))), ""
     return {
         "file": f"run{index:03d}.csv",
@@ -111,7 +111,7 @@ def write_set(kind: str, split: str, count: int, out: Path, first: int = 0) -> P
             if made.setup.rig:
                 (folder / RIG).write_text(_rig_text(kind, made.kind.strange, made.setup.rig), "utf-8")
             rows.append(row)
-        with replacing(folder / TRUTH) as file:  # a folder with its truth is whole
+        with replacing(folder / TRUTH) as file:  # written last, so a folder with this file is complete
             file.write(pd.DataFrame(rows).to_csv(index=False, lineterminator="\n").encode())
     except OSError as error:
         raise HydrostateError(f"{folder}: cannot be written: {error.strerror or error}") from error

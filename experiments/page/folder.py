@@ -177,7 +177,7 @@ def _swap(temporary: Path, target: Path) -> None:
             except OSError as error:
                 if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
                     raise
-                shutil.rmtree(old, ignore_errors=True)  # another study took the name first, and this was before it
+                shutil.rmtree(old, ignore_errors=True)  # another study took the name, so the earlier result can go
             else:
                 return
         raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
@@ -242,6 +242,6 @@ def held(folder: Path) -> Generator[bool]:
             free = True
         except OSError:
             free = False
-        yield free  # the lock goes with the process, whatever ends it
+        yield free  # the system releases the lock however the process ends
     finally:
         os.close(number)

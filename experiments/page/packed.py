@@ -42,7 +42,7 @@ def packed(values: Array) -> Mapping[str, Any]:
     quantum = (high - low) / (2.0 * CODES) or 1.0
     scaled = np.rint((np.where(there, values, middle) - middle) / quantum)
     codes = np.where(there, np.clip(scaled, -CODES, CODES), MISSING).astype("<i2")
-    with np.errstate(over="ignore"):  # steps wrap, and are summed with wrapping again
+    with np.errstate(over="ignore"):  # steps overflow; so does their sum in the page, which restores the codes
         steps = np.diff(codes, prepend=np.zeros(1, codes.dtype))
     deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     data = deflate.compress(steps.astype("<i2").tobytes()) + deflate.flush()

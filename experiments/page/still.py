@@ -147,7 +147,7 @@ def _panel(
     if label:
         yield f'<text x="{wide / 2:g}" y="{high + 25:g}" text-anchor="middle">{escape(label)}</text>'
     if len(panel.curves) >= LEGEND_FROM:
-        yield from _legend([curve for curve in panel.curves if curve.look != "edge"], wide)  # captions tell bands
+        yield from _legend([curve for curve in panel.curves if curve.look != "edge"], wide)  # captions explain bands
 
 
 def _place(at: float, axis: str, log: bool) -> float:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.page.words import in_words
 
-if TYPE_CHECKING:  # half a second, which a page without figures does not need
+if TYPE_CHECKING:  # imports take half a second, and a page without figures does not need them
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 

@@ -155,7 +155,7 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bo
 
 def _worded(cell: Markup) -> Markup:
     """Return a cell of a text column, which must not be narrow."""
-    text = str(cell)  # markup would escape what it is given
+    text = str(cell)  # a plain string, since Markup would escape the replacements
     if ' class="' in text.split(">", 1)[0]:
         return Markup(text.replace(' class="', ' class="words ', 1))  # noqa: S704 - it is markup already
     return Markup(text.replace("<td", '<td class="words"', 1))  # noqa: S704

@@ -184,7 +184,7 @@ def _on_circuit(estimates: pd.DataFrame) -> Mapping[str, Ours]:
 
 def _modelled_chambers(estimates: pd.DataFrame) -> Mapping[str, Ours]:
     z = float(np.sqrt(np.mean(estimates["z"] ** 2)))
-    # a number that is not let out is no number
+    # NaN if the gate withholds any estimate
     worst = float(estimates["error_percent"].abs().max(skipna=False))
     return {"chambers_worst": Ours(worst, said=f"{_gate(estimates)}, errors {z:.2f} of their deviations rms")}
 

@@ -194,7 +194,7 @@ def _library_gain(ours: pd.DataFrame, condition: str) -> Row:
 def _library_bandwidth(ours: pd.DataFrame, condition: str) -> Row:
     published = cell(ours, condition, "published_bandwidth_hz")
     width = cell(ours, condition, "bandwidth_hz")
-    there = published == published  # NaN where the printed model never falls 3 dB
+    there = published == published  # NaN if the printed model never falls 3 dB
     return _library_row(
         claim=f"3 dB down, {in_words(condition)}, of the printed model at the inferred 1 ms",
         printed=f"{published:.3g}" if there else "never falls 3 dB",

@@ -116,7 +116,7 @@ def _moved(position: pd.Series) -> float:
 
 def _linear(paper: Tables) -> Mapping[str, Ours]:
     poles = paper["poles"]
-    # one of each pair is listed
+    # the table has one pole of each complex pair
     swinging = poles[~poles["stable"].astype(bool)]["model"]
     tuning = paper["tuning"].set_index(["changed", "factor"])["frequency_hz"]
     width = paper["hysteresis"].set_index(["law", "frequency_hz"])["width_percent"]

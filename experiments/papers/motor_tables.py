@@ -79,7 +79,7 @@ def _relations(ours: pd.DataFrame) -> Iterator[Row]:
         for k, text in enumerate(printed[column].tolist()):
             base = physical.get((k, column), float(text))
             off = cell(ours, k, ratio) / constants[ratio]
-            # the piston's area falls as the velocity rises, the other constants rise with their column
+            # the velocity falls as the piston's area rises; the other constants rise with their column
             value = base * off if ratio == "piston_area_cm2" else base / off
             claim, note = f"{words}, row {k + 1}", notes.get(ratio, "")
             yield _row("Table 2", claim, text, unit, accept, Ours(float(value)), errata=errata, note=note)

@@ -136,7 +136,7 @@ def gather(folder: Path, settings: PapersSettings, track: Track) -> Evidence:
     """
     sources = sources_digest()
     for name, make in PARTS.items():
-        # read back as JSON has it, so that it equals what a manifest keeps
+        # through JSON, so that it equals a stored manifest
         manifest = json.loads(json.dumps(_manifest(name, settings, sources)))
         if _kept(folder / name) != manifest:
             check_target(folder / name)

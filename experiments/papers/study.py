@@ -97,10 +97,10 @@ def _ours(row: Row) -> Cell:
     if value is None or value != value:
         return right(MISSING)
     powers = re.fullmatch(r"-?\d\.?(\d*)e(-?\d+)", str(row["printed"]))
-    if powers is not None:  # in the power of ten that is printed, with one digit more, so that both can be compared
+    if powers is not None:  # the printed power of ten and one more digit, so that both can be compared
         decimals, exponent = len(powers[1]) + 1, int(powers[2])
         return right(_in_powers(f"{value / float(f'1e{exponent}'):.{decimals}f}e{exponent}"))
-    # one digit more than is printed, so that both can be compared
+    # one digit more than printed, so that both can be compared
     digits = max(5, 1 + len(re.sub(r"e.*|\D", "", str(row["printed"])).lstrip("0")))
     return right(exact(float(f"{value:.{min(digits, 10)}g}")))
 

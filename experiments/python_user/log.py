@@ -92,7 +92,7 @@ class Log(Shown):
         self._kept: tuple[Record, dict[Any, Any]] = record, {}
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_kept": (self.record, {})}  # copies find anew what verbs left for each other
+        return {**self.__dict__, "_kept": (self.record, {})}  # copies share no intermediate results
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -161,7 +161,7 @@ class Log(Shown):
                 f"log's, which is from {ends}"
             )
         sparse = self._sparse
-        if sparse is not None:  # it may begin earlier, where a channel begins late
+        if sparse is not None:  # it may begin earlier, if a channel begins late
             ahead = round((self.record.start_time - sparse.start_time) / self.sample_time)
             sparse = sparse.slice(first + ahead, last + 1 + ahead)
         kept: dict[str, Any] = {"sparse": sparse, "refusal": self._refusal, "name": self._name}
@@ -292,7 +292,7 @@ class Log(Shown):
             sure = [one for one in guess_by_name(cleaned(self.channels)) if one.sure >= SHOWN]
             meant = {one.channel: one.spec if one.unit else f"{one.spec}:UNIT" for one in sure}
             if not any(name in meant for one in REQUIRED for name in alternatives(one)):
-                meant = {"motor_speed_rad_s": "N:rpm"}  # a channel that nobody asked for is no example
+                meant = {"motor_speed_rad_s": "N:rpm"}  # only channels that the verb needs are useful examples
             refuse(
                 f"{verb} needs {' and '.join(REQUIRED)}, the log has {', '.join(self.channels)}: name them by "
                 f"read(..., columns={meant}), or relate them by "

@@ -101,7 +101,7 @@ def open_executor(workers: int = 1, cluster: str | None = None) -> Generator[tup
     executor = process_pool(workers)
     try:
         yield executor, workers
-    except KeyboardInterrupt:  # the user will not wait for what is in flight
+    except KeyboardInterrupt:  # the user does not want to wait for tasks in flight
         for process in multiprocessing.active_children():
             if process not in others:
                 process.terminate()

@@ -171,7 +171,7 @@ def _answer_errors(app: FastAPI) -> None:
     async def strange(_: Request, error: Exception) -> Response:
         said = unexpected(error)
         note(f"serve: {said}")
-        # it does not pass the guard any more, which sets them
+        # this response bypasses the guard, which normally sets these headers
         every = {name.decode(): value.decode() for name, value in HEADERS.items()}
         return JSONResponse({"detail": said}, 500, every)
 

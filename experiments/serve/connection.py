@@ -75,7 +75,7 @@ class PatientProtocol(H11Protocol):
         except h11.LocalProtocolError:
             self.transport.abort()
         cycle: Any = self.cycle
-        if cycle is not None and not cycle.response_complete:  # whoever works on an answer has nobody to tell it to
+        if cycle is not None and not cycle.response_complete:  # tell the application that the client is gone
             cycle.disconnected = True
             cycle.message_event.set()
 

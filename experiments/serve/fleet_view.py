@@ -78,7 +78,7 @@ def _actuators(
     files = {identity: name if counts[name] == 1 else f"{name} ({identity[:6]})" for identity, name, _ in rows}
     try:
         told = by_pattern(counts, pattern) if pattern else by_dates(counts)
-    except HydrostateError:  # no date is one
+    except HydrostateError:  # a date in a file name is invalid
         told = {}
     names = {files[identity]: told[name] for identity, name, _ in rows if name in told}
     blank = dict.fromkeys(("outcome", "found_condition", "reason", "quantities", "against"))

@@ -143,7 +143,7 @@ def watch_stream(out: Connection, server: int, task: StreamTask) -> None:
             outcome = "ok"
         except HydrostateError as error:
             said = str(error)
-        except Exception as error:  # the server goes on, and says why this stream does not
+        except Exception as error:  # the server goes on, and reports why this stream stopped
             said = unexpected(error)
         if told.watch is not None:
             told.flush(told.watch.last, {})

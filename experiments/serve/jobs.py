@@ -165,7 +165,7 @@ class Jobs:
             worked = self._lost(f"it took longer than {self._settings.seconds:g} s and was stopped", log)
         except ProcessExpired as error:
             worked = self._lost(_why_expired(error.exitcode, self._settings.memory // MB), log)
-        except Exception as error:  # what a worker could not even report
+        except Exception as error:  # the worker could not report its error
             worked = self._lost(unexpected(error), log)
         try:
             state = FAILED if worked.result["outcome"] == "failed" else DONE

@@ -186,7 +186,7 @@ class _Exchange:
         await self._send(message)
 
     async def answer(self, status: int, detail: str, headers: list[tuple[bytes, bytes]], page: bool = False) -> None:
-        if self._status:  # an answer is under way, and can no longer be another one
+        if self._status:  # an answer has begun and cannot be replaced
             return
         body = (refusal_page(detail) if page else json.dumps({"detail": detail})).encode()
         kind = b"text/html; charset=utf-8" if page else b"application/json"
@@ -229,7 +229,7 @@ class FreeSpace:
 def _size(entry: "os.DirEntry[str]") -> int:
     try:
         return entry.stat(follow_symlinks=False).st_size
-    except FileNotFoundError:  # deleted since it was listed
+    except FileNotFoundError:  # deleted after it was listed
         return 0
 
 

@@ -58,7 +58,7 @@ class Stream:
 
     def close(self) -> None:
         """End the watch and its process; the next watch continues from its saved state."""
-        with self._lock:  # a process is either begun before, and ended here, or not begun
+        with self._lock:  # a process that has started is ended here; no other starts afterwards
             self._closed.set()
             if self._process is not None and self._process.is_alive():
                 self._process.terminate()
@@ -91,9 +91,9 @@ class Stream:
         while not self._closed.is_set():
             try:
                 self._watch_once()
-            except OSError as error:  # no process or pipe could be had; the next attempt may get them
+            except OSError as error:  # no process or pipe was available; the next attempt may get them
                 self._fail(f"it cannot be watched: {error.strerror or error}")
-            except HydrostateError as error:  # its rig file is gone
+            except HydrostateError as error:  # its rig file was deleted
                 self._fail(f"it cannot be watched: {error}")
             self._closed.wait(AGAIN_AFTER)
 

@@ -43,7 +43,7 @@ def run_server(settings: Settings, say: Callable[[str], None]) -> None:
     HydrostateError
         If it cannot listen there, or cannot use the folder.
     """
-    logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # what goes wrong is told by the application
+    logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # the application reports errors
     gc.freeze()
     gc.set_threshold(OBJECTS)
     refusals: list[HydrostateError] = []

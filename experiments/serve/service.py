@@ -55,7 +55,7 @@ class Service:
         except OSError as error:
             self._lock.close()
             raise HydrostateError(f"{settings.folder}: must be free, another server works in it") from error
-        with ExitStack() as undone:  # what is open already is closed where the rest cannot be had
+        with ExitStack() as undone:  # closes what is already open if a later step fails
             undone.callback(self._lock.close)
             self.store = undone.enter_context(closing(Store(settings.database)))
             self.room = FreeSpace(settings)
@@ -198,7 +198,7 @@ class Service:
             rows = await asyncio.to_thread(lambda: list(self.store.diagnosed()))
             if not rows:
                 raise RefusedError(404, "no log was diagnosed yet")
-            # another request may have begun it meanwhile
+            # another request may have started it meanwhile
             page = self._page_of(revision) or self._begun(revision, rows, repairs)
         try:
             return await asyncio.shield(page)

@@ -91,7 +91,7 @@ class Store:
     def __init__(self, path: Path) -> None:
         self._lock = threading.Lock()
         with refused(f"{path}: the server's database cannot be opened"):
-            # results are for the server's own user; SQLite gives its other files the same mode
+            # only the server's own user may read results; SQLite gives its other files the same mode
             os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
         self._connection = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
         try:
@@ -244,5 +244,5 @@ class Store:
             except sqlite3.Error as error:
                 raise HydrostateError(f"the server's database cannot be written: {error}") from error
             finally:
-                if self._connection.in_transaction:  # SQLite itself rolls back where the disk is full
+                if self._connection.in_transaction:  # if the disk is full, SQLite itself rolls back
                     self._connection.execute("ROLLBACK")

@@ -108,7 +108,7 @@ def begin_worker(server: int, memory: int) -> None:
         Largest memory that the process may request [bytes].
     """
     bind_to_server(server)
-    os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"  # the others reserve 1 GiB ahead, which the limit counts
+    os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"  # other pools reserve 1 GiB, which counts towards the limit
     if sys.platform == "linux":
         import resource
 
@@ -137,7 +137,7 @@ def work_on(task: Task) -> LogResult:
             worked = _failed(task, blank, f"{error.bare}; {OTHER_NAMES}")
         except HydrostateError as error:
             worked = _failed(task, blank, error.message if error.source == str(task.log) else str(error))
-        except Exception as error:  # whatever a log brings up is told to whoever sent it
+        except Exception as error:  # report any error of a log to its sender
             worked = _failed(task, blank, unexpected(error))
     result = plain({"file": task.name, **with_remarks(worked.result, said)})
     said = worked.said or plain_words(result) or sentence(str(result.get("message") or ""))
@@ -186,7 +186,7 @@ def _rig(task: Task) -> Path | None:
 def _tools(task: Task, rig: Path | None) -> "_Tools":
     try:
         changed = 0 if rig is None else rig.stat().st_mtime_ns
-    except OSError:  # reading it says why it cannot be read
+    except OSError:  # reading it will report the reason
         changed = 0
     return _prepared(task.plant, rig, task.rig, changed, task.verb)
 
@@ -219,7 +219,7 @@ def _failed(task: Task, blank: Mapping[str, Any], message: str) -> LogResult:
 def _write(task: Task, page: str) -> None:
     with replacing(task.page) as file:
         file.write(page.encode())
-    if not task.log.exists():  # deleted meanwhile, with all that came of it
+    if not task.log.exists():  # the log and its results were deleted meanwhile
         task.page.unlink(missing_ok=True)
 
 

@@ -54,7 +54,7 @@ def stop_at_signals() -> None:
         return
     for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores it; keep that
             signal.signal(number, signal.default_int_handler)
 
 

@@ -52,10 +52,10 @@ def metrics_offered(where: str, told: Watched) -> Generator[int]:
     HydrostateError
         If no server can listen there.
     """
-    from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer  # which no other verb needs
+    from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer  # no other verb needs it
 
     class Answer(BaseHTTPRequestHandler):
-        timeout = 10.0  # a client that says nothing holds no thread for longer [s]
+        timeout = 10.0  # a silent client holds a thread no longer than this [s]
 
         def do_GET(self) -> None:
             """Answer one request."""

@@ -37,7 +37,7 @@ class Watched(WatchEvents):
 
     def _send(self, entries: dict[str, Any]) -> None:
         told = plain(entries)
-        with self._lock:  # a line is whole before the next begins
+        with self._lock:  # so that lines do not mix
             self.doing = STATES.get(told["event"], self.doing)
             if told["event"] == "end" and told["outcome"] != "ok":
                 self.doing = told["outcome"]

@@ -196,7 +196,7 @@ def _begun(
     else:
         watch.interrupt()
         note(f"{source}: warning: the stream does not continue at {watch.last:g} s, so learning starts again")
-        watch.clock_reads(start)  # else the watch would tell the time of the stream before
+        watch.clock_reads(start)  # otherwise times would continue from the previous stream
     return watch, travelled
 
 

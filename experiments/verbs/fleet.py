@@ -88,7 +88,7 @@ def fleet(
     require_folder(out)
     require_positive("--sample-time", sample_time, "s")
     limits, repairs = limits_of_options(limit or []), read_maintenance(maintenance)
-    _names((), pattern, names)  # what is wrong there, and in names of files, is said before any log is diagnosed
+    _names((), pattern, names)  # report errors here and in file names before any log is diagnosed
     if Path(place).is_file():
         raise HydrostateError(f"{place}: must be a folder with logs or a store, got a file")
     store = open_store(place)
@@ -165,7 +165,7 @@ def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
     """
     if not texts:
         return {}
-    from faults.diagnosis.severity import UNITS  # which a fleet without such limits need not load
+    from faults.diagnosis.severity import UNITS  # not needed without such limits
 
     found: dict[str, float] = {}
     for text in texts:
@@ -311,7 +311,7 @@ def _page_writer(
         log = paths.get(file, base / file)
         if not log.exists():
             return False
-        from experiments.command.log_verb import page_of  # which pages of a store alone need not load
+        from experiments.command.log_verb import page_of  # not needed for pages of a store alone
         from experiments.command.logs import caught, read_log
 
         bench = own.get(nearest_folder(file, own), common)

@@ -90,7 +90,7 @@ def watch(
         told.to(say_line)
     stop_at_signals()
 
-    with ExitStack() as outputs, end_told(told):  # they hear of the end before they are closed
+    with ExitStack() as outputs, end_told(told):  # outputs receive the end before they are closed
         _opened(told, outputs, publish, metrics, view)
         settings = WatchSettings(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
         with beating(told, heartbeat):

@@ -72,6 +72,6 @@ def _around(log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosi
         board,
         told_by,
     )
-    # a log that drifts is diagnosed again, where it does
+    # if leakage drifts, `over_drift` diagnoses the log again, and weighs other faults then
     drifts = board.drift is not None or board.blocks.course is not None
     return found if drifts else whatever_fault(found, actuator, numbers)

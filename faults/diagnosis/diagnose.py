@@ -101,12 +101,12 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         If the log has neither position nor velocity, or cannot be estimated.
     """
     log = clean_log(record, rig.parameters) if seen is None else seen[0]
-    asked = seen is None and not log.mistakes  # else it is not wanted, or known what is wrong
+    asked = seen is None and not log.mistakes  # otherwise not needed, or the mistake is known
     plain = _begun(log, rig.parameters) if asked else _Plain(log, rig.parameters, None, None)
     estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
     found, case = finding_of(log, estimate, rig), _set_right(log, rig, estimate)
     again, cleaned = partial(diagnose_log, record, rig), log
-    if (sound := without_wrong_velocity(cleaned, (), estimate, case.strange)) is not None:  # it froze, or reads 0
+    if (sound := without_wrong_velocity(cleaned, (), estimate, case.strange)) is not None:  # it froze or reads 0
         return again((sound, estimate))
     log, rig = case.log, case.rig
     scores = plain.scores_of(log, case.as_a_whole)
@@ -114,7 +114,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
     unsure = (*doubtful_entries(plain.parameters), *estimate.rig_notes)
     strange = case.strange
-    if verdict.outcome is Outcome.NOT_OBSERVABLE:  # a worn pump would change numbers that the log does not determine
+    if verdict.outcome is Outcome.NOT_OBSERVABLE:  # the log does not determine what a worn pump would change
         strange = tuple(note for note in strange if note.code is not RigCode.WEAR_NOT_EXCLUDED)
     notes = (*log.left_out, *strange, *verdict.notes, *absent, *unsure)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
@@ -138,10 +138,11 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     if stands is not None:
         left, found = (), replace(found, notes=(*found.notes, stands))
     still = stands_still(log.record, case.healthy, diagnosis.not_told)
-    # a piston that stands still shows no friction that could lie beside the nine
+    # a piston that stands still shows no friction, so friction cannot be outside the nine conditions
     follow = tuple(note for note in diagnosis.against if not (still and note.code in BESIDE))
     against = distinct((*still, *left, *follow))
-    if against and not still:  # nominal models are no judges of another oil, but say what is off if a piston moves
+    # other oil also makes the nominal models misfit, so their misfit is no objection by itself, but it supports others
+    if against and not still:
         against = distinct((*against, *verdict.against))
     likelier = likelier_fault(diagnosis.probabilities, diagnosis.not_told)
     return _with_class(found, case, diagnosis, distinct((*against, *likelier)))

@@ -48,8 +48,8 @@ def innovation_scores(record: Record, rig: EhaParameters) -> Array:
     slow = record.slice(0, None, max(1, round(STEP / record.sample_time)))
     prior = first_belief(model, slow, rig.bulk_modulus, SPREAD * rig.bulk_modulus)
     first, *others = mathematical_bank(rig).values()
-    begun = replace(filter_problem(model, prior, slow, first), every=len(slow))  # nobody asks for the track
-    if begun.model is model:  # else what gaps in the drive leave open is another in each condition
+    begun = replace(filter_problem(model, prior, slow, first), every=len(slow))  # the track is not used
+    if begun.model is model:  # otherwise gaps in the drive give each condition its own model
         problems = [begun, *(replace(begun, parameters=parameter_row(one, model.parameters)) for one in others)]
     else:
         problems = [begun, *(replace(filter_problem(model, prior, slow, one), every=len(slow)) for one in others)]

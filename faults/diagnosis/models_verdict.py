@@ -91,7 +91,7 @@ def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
         size = float(np.sqrt(np.nanmean(measured_velocity(record) ** 2)))
         unexplained = unexplained / size if size > 0.0 else 0.0
     poor = unexplained > POOR_FIT
-    if poor:  # far from a log two unlike models may err alike
+    if poor:  # if no model is near the log, two different ones may have equal errors
         finite = [score for score in scores.by_condition.values() if math.isfinite(score)]
         ratio = max(finite) / min(finite)
     if ratio < TOLD_APART:

@@ -51,7 +51,7 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
     if "bulk_modulus" in blind:
         said.append(ClassCode.BULK_MODULUS_NOT_VISIBLE.note())
     flow, speed = found["leakage_flow"], found["velocity_lost"]
-    lost = [] if unseen else _velocity_lost(speed)  # which hangs on friction too
+    lost = [] if unseen else _velocity_lost(speed)  # it depends on friction too
     if not pressure:
         said += [ClassCode.ONE_SCALE.note(), *lost]
     elif _width(flow) > VAGUE * extent(speed) / 100.0 and _width(flow) > 0.3:
@@ -92,7 +92,7 @@ def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -
     held = float(np.percentile(np.abs(pressure), HELD))
     rubs = parameters_for(CONDITIONS["major_friction"], p).friction_coulomb + abs(p.load_force)
     yields = rubs / p.piston_area
-    if not held >= BLOCKED * yields:  # nor where gaps leave no number
+    if not held >= BLOCKED * yields:  # also true for NaN, which gaps leave
         return ()
     return (AgainstCode.ROD_BLOCKED.note(moved_m=gone.piston, held_pa=held, yields_pa=yields),)
 
@@ -117,7 +117,7 @@ def not_determined(codes: Collection[object]) -> frozenset[str]:
     """
     said = set(map(str, codes))
     friction = str(ClassCode.FRICTION_NOT_VISIBLE) in said
-    # without pressure, a piston that yields on its seals shows bulk modulus over friction alone
+    # without pressure, a piston that yields on its seals shows only the ratio of bulk modulus to friction
     oil = str(ClassCode.BULK_MODULUS_NOT_VISIBLE) in said or (friction and str(ClassCode.ONE_SCALE) in said)
     return (OF_FRICTION if friction else frozenset()) | (OF_OIL if oil else frozenset())
 

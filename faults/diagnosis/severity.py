@@ -108,7 +108,7 @@ def _of_circuits(points: Array, actuator: Actuator, forces: Array | None = None)
         values["friction_coulomb"] = rest
         values["friction_linear"] = (whole - rest - bent) / actuator.rated
         values["friction_quadratic"] = bent / actuator.rated**2
-    p = SimpleNamespace(**{**vars(healthy), **values})  # few of the parameters are read
+    p = SimpleNamespace(**{**vars(healthy), **values})  # only a few of the parameters are read
     velocity, pressure = steady_state(healthy.rated_speed, p)
     sound_velocity, sound_pressure = _settled(healthy)
     rubbing, sound = (
@@ -204,7 +204,7 @@ def _under(
     if rubbing is not None:
         known, covariance = rubbing
         forces = np.vstack([known + draws[:, FORCES] @ np.linalg.cholesky(covariance).T, known])
-    with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
+    with np.errstate(all="ignore"):  # NaN if friction falls so fast that no steady state exists
         table = _of_circuits(circuits, actuator, forces)
     found: dict[str, Quantity] = {}
     unresolved = _unresolved(actuator)
@@ -217,11 +217,11 @@ def _under(
             continue
         finite = drawn[~np.isnan(drawn)]
         low, high = percentiles(finite, (2.5, 97.5)) if len(finite) else (np.nan, np.nan)
-        of_forces = rubbing is not None and name in OF_FRICTION  # factors were fitted to errors of circuits
+        of_forces = rubbing is not None and name in OF_FRICTION  # the factors are for errors of circuits only
         stretch = 1.0 if of_forces else widths.get(name, 1.0)
         least = unresolved.get(name, 0.0)
         ends = value - stretch * (value - low) - least, value + stretch * (high - value) + least
-        if name == "bulk_modulus" and stretch != 1.0:  # never negative, however wide
+        if name == "bulk_modulus" and stretch != 1.0:  # in logarithms, so never negative
             ends = value * (low / value) ** stretch, value * (high / value) ** stretch
         found[name] = Quantity(value, UNITS[name], ends)
     if "entrained_air" not in asked:

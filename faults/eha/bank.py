@@ -159,7 +159,7 @@ def identify_bank(
     for (name, condition), stream in zip(CONDITIONS.items(), rng.spawn(len(CONDITIONS)), strict=True):
         record = identification_run(rig, condition, stream, duration=duration, plant=CIRCUIT)
         with warnings.catch_warnings():
-            # the structure is Table 6's whatever the condition, and the bank asks for predictions, not for intervals
+            # the structure is that of Table 6 in every condition, and the bank needs predictions, not intervals
             warnings.simplefilter("ignore", CovarianceWarning)
             models[name] = identify_record(record, sample_time=IDENTIFICATION_TIME, covariance="coloured")
     return MappingProxyType(models)

@@ -237,7 +237,7 @@ def condition_distances(
         for row, true in enumerate(runs.values()):
             away = true - runs[name]
             explained = moves.T @ away
-            # rounding leaves a share of the power where both runs are alike
+            # if both runs are alike, only a rounding error is left, which may be negative
             distances[row, column] = 0.5 * max(away @ away - explained @ np.linalg.solve(normal, explained), 0.0)
     return Distances(tuple(bank), distances, sample_time * len(speed))
 

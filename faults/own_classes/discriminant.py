@@ -122,7 +122,7 @@ def _factor(covariance: Array, shrinkage: float) -> Array:
     """Return the lower Cholesky factor of a covariance that is shrunk towards a multiple of the unit matrix."""
     level = float(np.trace(covariance)) / len(covariance)
     shrunk = (1.0 - shrinkage) * covariance
-    # a covariance of fewer runs than features, or of constant ones, still needs an inverse
+    # ensures an inverse even with fewer runs than features, or with constant features
     shrunk[np.diag_indices_from(shrunk)] += shrinkage * level + 1e-9 * (1.0 + level)
     return np.tril(np.asarray(cho_factor(shrunk, lower=True)[0], dtype=np.float64))
 

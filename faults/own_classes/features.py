@@ -80,7 +80,7 @@ def channel_features(names: Sequence[str], runs: Sequence[Array], sample_time: f
             f"parts must lie between 1 and the samples of the shortest run, {shortest}, got {recipe.parts}"
         )
     bands = _bands(recipe, shortest, sample_time)
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below
+    with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused below
         rows = np.stack([_row(run, sample_time, recipe.parts, bands) for run in runs])
     if not np.isfinite(rows).all():
         where = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])

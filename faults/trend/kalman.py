@@ -208,7 +208,7 @@ def _step(step: float, paces: tuple[float, ...]) -> tuple[Array, Array, Array]:
     moves = np.tile([[1.0, step, 0.5 * step**2], [0.0, 1.0, step], [0.0, 0.0, 1.0]], (len(paces), 1, 1))
     bent, jerked = np.tile(_gained(step, 2), (len(paces), 1, 1)), _gained(step, 3)
     for move, turned, pace in zip(moves, bent, paces, strict=True):
-        if pace:  # such settings have no curvature
+        if pace:  # settings with a pace have no curvature
             move[:2, 1], turned[:2, :2] = exponential_growth(step, pace)
     return moves, bent, jerked
 
@@ -232,10 +232,10 @@ def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
     ndarray, shape (2, 2)
         Covariance of level and slope.
     """
-    if pace * step < SMALLEST_GROWTH:  # the limit of what follows, which is lost in the digits there
+    if pace * step < SMALLEST_GROWTH:  # the limit for small growth; the formulas below would lose all digits
         return np.array([step, 1.0]), _gained(step, 2)[:2, :2]
     once, twice = np.expm1(pace * step) / pace, np.expm1(2.0 * pace * step) / (2.0 * pace)
-    # integrals of the squares and the product of expm1(pace t) / pace and exp(pace t) from 0 to the step
+    # integrals from 0 to the step of expm1(pace t) / pace and exp(pace t): of their squares and of their product
     level, both = (twice - 2.0 * once + step) / pace**2, (twice - once) / pace
     return np.array([once, 1.0 + pace * once]), np.array([[level, both], [both, twice]])
 

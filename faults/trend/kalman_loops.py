@@ -85,7 +85,7 @@ def fill_predicted(
         next_mean[k, 0] = level + rise * slope + bow * curvature
         next_mean[k, 1] = growth * slope + turn * curvature
         next_mean[k, 2] = curvature
-        # the covariance is symmetric: a name has the two states that it is of
+        # the covariance is symmetric; each name states the two states of its entry
         slope_slope, slope_bend, bend_bend = covariance[k, 1, 1], covariance[k, 1, 2], covariance[k, 2, 2]
         level_slope = covariance[k, 0, 1] + rise * slope_slope + bow * slope_bend
         level_bend = covariance[k, 0, 2] + rise * slope_bend + bow * bend_bend

@@ -130,7 +130,7 @@ class Trend:
         """Whether it certainly grows and will probably reach its limit within `AHEAD`, or has passed it with `SURE`."""
         mean, std = moments(self.belief, settings())
         if self._short or (not self.certain and mean + 3.0 * std < 1.0):
-            return False  # before futures are drawn, which is what takes the time
+            return False  # before futures are drawn, which is slow
         return self._future.within(0.0) >= SURE or (self.certain and self._future.within(AHEAD) >= 0.5)
 
 

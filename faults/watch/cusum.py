@@ -61,7 +61,7 @@ def threshold(peaks: Array, alarms: float, width: float, expected: float) -> flo
         return place * width
     mean = excess / gathered
     if below > 0.0:
-        # an alarm ends its excursion at the threshold: its peak is at least that (censored exponential)
+        # an alarm cuts its excursion off at the threshold, so the peak is at least that (censored exponential)
         for _ in range(3):
             level = gathered * mean * ((above / expected) ** (1.0 / gathered) - 1.0)
             mean = (excess + below * level) / gathered

@@ -320,8 +320,8 @@ class Watch:
         lost = float(before[GAIN_QP] / before[GAIN_WP]), float(after[GAIN_QP] / after[GAIN_WP])
         resistance = before[GAIN_PV] / before[GAIN_VV], after[GAIN_PV] / after[GAIN_VV]
         resisted = float(resistance[1] / resistance[0] - 1.0)
-        over_pressure = after[GAIN_QP] / after[GAIN_PP] * before[GAIN_PP] / before[GAIN_WP]  # as under the load before
-        if min(lost[1], over_pressure) - lost[0] > oil_allows(lost[0]):  # told here: the loss must not tell it again
+        over_pressure = after[GAIN_QP] / after[GAIN_PP] * before[GAIN_PP] / before[GAIN_WP]  # as under the earlier load
+        if min(lost[1], over_pressure) - lost[0] > oil_allows(lost[0]):  # so that the slow alarm does not repeat it
             learn_loss_again(self._known)
         return [Change(self.time, alarm, lost, resisted)]
 

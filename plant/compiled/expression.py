@@ -149,7 +149,7 @@ def node(
     """
     known = tuple(id(one) for pair in slopes for one in pair)
     key = (operation, tuple(id(argument) for argument in arguments), value, known)
-    known_as = _NODES.get(key)  # most are met again
+    known_as = _NODES.get(key)  # most nodes exist already
     return _NODES.setdefault(key, Expression(operation, arguments, value, slopes)) if known_as is None else known_as
 
 

@@ -45,7 +45,7 @@ def hoisted(
         if id(item) not in rewritten:
             if item.operation == "constant":
                 rewritten[id(item)] = item
-            elif item.operation in COMPARISONS:  # not a number: there is no place to keep it
+            elif item.operation in COMPARISONS:  # a comparison gives no number that could be kept
                 rewritten[id(item)] = Expression(item.operation, tuple(map(needed, item.arguments)), item.value)
             else:
                 name = f"{prefix}{len(constants)}"

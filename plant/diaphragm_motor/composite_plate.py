@@ -210,7 +210,7 @@ def plate_deflection(p: PlateParameters, pressure: float, volts: float, radii: A
     [83.8, 60.3, 0.0]
     """
     bent, b, a = _bent(p, pressure, volts), p.ceramic_radius, p.clamp_radius
-    # the slope's integral from the rim inwards
+    # the slope, integrated from the rim inwards
     r = np.maximum(radii, b)
     outer = 0.5 * bent.outer * (a**2 - r**2) + bent.outer_inverse * np.log(a / r)
     outer += 0.25 * bent.turned_outer * (a**4 - r**4)

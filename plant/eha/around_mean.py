@@ -36,6 +36,6 @@ def break_frequency_about(speed: float, p: EhaValues) -> float:
     damping = slope / M + oil * leakage
     stiffness = oil * (A * A + leakage * slope) / M
     part = 2.0 * stiffness - damping * damping
-    # |stiffness / (stiffness - w^2 + j w damping)|^2 = 1/2, for w^2
+    # |stiffness / (stiffness - w^2 + j w damping)|^2 = 1/2, solved for w^2
     square = 0.5 * (part + sqrt(part * part + 4.0 * stiffness * stiffness))
     return sqrt(square) / (2.0 * pi)

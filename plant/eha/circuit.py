@@ -158,9 +158,9 @@ def circuit_flows(speed: Scalar, densities: tuple[Scalar, Scalar], pressures: Pr
         + (p.pump_crossport_leakage + p.bypass_conductance) * dp
         + relief_flow(dp, p.relief_pressure, p.relief_conductance)
     )
-    # the drain's check valve: the case stands at the accumulator's pressure, or floats below it
+    # because of the drain's check valve, the case is at the accumulator's pressure or floats below it
     case = minimum(pressures.supply, 0.5 * (pressures.a + pressures.b))
-    # a chamber below the case takes what the other one leaks into it, and so the upstream oil
+    # a chamber below the case pressure takes in oil that the other one leaks, which has the upstream density
     drained_a = drain * (pressures.a - case) * where(pressures.a > case, density_a, upstream)
     drained_b = drain * (pressures.b - case) * where(pressures.b > case, density_b, upstream)
     made_up_a, made_up_b = (

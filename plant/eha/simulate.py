@@ -105,7 +105,7 @@ class Plant:
         Mapping[str, ndarray], each of shape (n,)
             Channels by name.
         """
-        # rows of a circuit begin with those of the lumped actuator, and go on
+        # a circuit's row begins with the columns of the lumped actuator, followed by its own
         values = {name: rows[:, i] for i, name in enumerate(parameter_names(self.parameter_class))}
         seen = dict(self.observe(tuple(states.T), SimpleNamespace(**values)))
         if np.all(values.get("motor_lag", 0.0) > 0.0):

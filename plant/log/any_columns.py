@@ -96,7 +96,7 @@ def read_any(
         clock = Clock(assumed if step is None else step, 0.0)
         columns[TIME] = clock.sample_time * np.arange(len(next(iter(columns.values()))), dtype=np.float64)
     checked = trusted(columns, source=source, required=tuple(names or ()), clock=clock, most_missing=most_missing)
-    # nobody knows what these columns are, so no unit of theirs looks wrong
+    # the meaning of these columns is unknown, so notes on implausible units are left out
     amiss = implausible(checked.sample_time, checked.channels)
     for note in (one for one in checked.notes if one not in amiss):
         warnings.warn(LogWarning(note, source), stacklevel=2)

@@ -65,7 +65,7 @@ def trusted(
     0.001
     """
     notes: list[Note] = []
-    with np.errstate(over="ignore", invalid="ignore"):  # a hostile 1e308 is refused or noted like others
+    with np.errstate(over="ignore", invalid="ignore"):  # a hostile 1e308 is refused or noted like other values
         complete = _derived(columns, notes)
         _present(complete, [TIME, *required], source)
         long_enough(complete, source)

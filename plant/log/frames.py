@@ -41,7 +41,7 @@ def by_name(given: object) -> "Mapping[str, Any] | None":
     if (fields := getattr(getattr(given, "dtype", None), "names", None)) and getattr(given, "ndim", 0) == 1:
         records: Any = given
         return {name: records[name] for name in fields}
-    if hasattr(given, "collect"):  # a query, whose rows are not there yet
+    if hasattr(given, "collect"):  # a query that has not been run yet
         return None
     names = getattr(given, "column_names", getattr(given, "columns", None))
     if not isinstance(names, list) or not hasattr(given, "__getitem__"):
@@ -106,7 +106,7 @@ def _time(index: "pd.Index[Any]") -> dict[str, Any]:
     name = "" if index.name is None else str(index.name)
     if index.dtype.kind in "iuf" and (_is_time(name) or index.dtype.kind == "f"):
         return {name if _is_time(name) else TIME: _plain(index)}
-    starts: Any = getattr(index, "to_timestamp", None)  # of periods, as a table that was resampled has
+    starts: Any = getattr(index, "to_timestamp", None)  # an index of periods, as in a resampled table
     index = index if starts is None else starts()
     return {TIME: _plain(index)} if index.dtype.kind in "mM" else {}
 
@@ -130,7 +130,7 @@ def _of_quantity(name: str, quantity: Any) -> tuple[Any, str | None]:
         if named and not named[0].channel.startswith(TRUTH):
             column = named[0]
             return (quantity.to(UNITS[column.channel]).magnitude - column.offset) / column.factor, None
-    except TypeError as error:  # what units that do not convert are in pint
+    except TypeError as error:  # raised by pint for units that do not convert
         raise LogError(f"column {name[:80]!r}: {error}", SOURCE) from error
     return quantity.magnitude, f"{quantity.units:~C}" or "1"
 

@@ -135,7 +135,7 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
     fits = unit is not None and converts(unit, UNITS[channel])
     if unit is not None and not fits:
         return None
-    name = heading.stem.removesuffix("_pa") if unit == "Pa" else heading.stem  # a unit, not a chamber A
+    name = heading.stem.removesuffix("_pa") if unit == "Pa" else heading.stem  # "_pa" is the unit, not chamber A
     own = channel.removesuffix(unit_ending(UNITS[channel]))
     if name == own or heading.name == channel:
         said = 6.0
@@ -304,13 +304,15 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
         Channels that could do without, but are better named with the others.
     """
     shown = {one.channel: option for one, option in _shown(headings, [*channels, *more])}
-    if set(CHAMBERS) <= {*channels, *more} and len(set(CHAMBERS) & set(shown)) == 1:  # of no use without the other
+    # one chamber pressure is of no use without the other
+    if set(CHAMBERS) <= {*channels, *more} and len(set(CHAMBERS) & set(shown)) == 1:
         shown = {name: option for name, option in shown.items() if name not in CHAMBERS}
     options = [shown[name] for name in in_order(shown)] if set(shown) & set(channels) else []
     may = f"; perhaps --columns '{','.join(options)}'" if options else ""
     put = ", with the unit of each for UNIT" if any(one.endswith(":UNIT") for one in options) else ""
     timeless = "; to read a log without time, give --sample-time" if TIME in channels and TIME not in shown else ""
-    volts = not options and sum(one.unit is not None and converts(one.unit, "V") for one in headings) > 1  # one drives
+    # one of the columns in V is probably the drive
+    volts = not options and sum(one.unit is not None and converts(one.unit, "V") for one in headings) > 1
     scale = (
         "; a column in V needs its sensor's scale: --columns 'position_m=NAME:20 mm/V', for example" if volts else ""
     )

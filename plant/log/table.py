@@ -111,7 +111,7 @@ class Table:
     def _tried(self, column: Column) -> Array | None:
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # what is to be said is said when all are read
+                warnings.simplefilter("ignore")  # warnings are given when all columns are read
                 return self.read([column]).get(column)
         except NoMemoryError:
             raise

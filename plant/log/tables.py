@@ -96,7 +96,7 @@ def gathered(
             raise LogError("a log needs rows of numbers below its header line, this file has none", source)
         wanted = [TIME] * timeless + missing
         raise missing_channels(wanted, headings, source, found)
-    with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number is refused or noted later
+    with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused or noted later
         notes: list[Note] = []
         parts = [(table, _without_text(table, columns, found, required, notes)) for table, columns in chosen]
     timed = [_timed(table, values, parts, sample_time, source) for table, values in parts]
@@ -198,7 +198,7 @@ def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, s
         )
     _once(chosen, source)
     if any(table.step is None and all(one.channel != TIME for one in columns) for table, columns in chosen):
-        chosen += clocks  # of a group of its own, for tables that have none
+        chosen += clocks  # clocks in groups of their own serve tables without one
     return chosen or [(table, ()) for table in tables[:1]]
 
 

@@ -125,7 +125,7 @@ def run_rows(
     states = np.empty((len(voltages), len(STATES), count))
     substeps = steps_a_sample(sample_time, longest_step)
     for first in range(0, count, lanes):
-        lane = np.minimum(np.arange(first, first + lanes), count - 1)  # copies of the last fill what is left
+        lane = np.minimum(np.arange(first, first + lanes), count - 1)  # spare lanes get copies of the last run
         initial, drive = (np.ascontiguousarray(values[:, lane], dtype=np.float64) for values in (starts, voltages))
         part = states if count <= lanes else np.empty((len(voltages), len(STATES), min(lanes, count - first)))
         run(initial, drive, rows[lane], sample_time, substeps, part)

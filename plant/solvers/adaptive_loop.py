@@ -75,7 +75,7 @@ def run_controlled(
     n, block = states.shape[0], kernel.WIDTH * kernel.LANES
     shared = 7 * block + kernel.LANES
     room = np.empty(kernel.NUMBERS + 8)
-    work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
+    work = room[-room.ctypes.data % 64 // 8 :]  # a vector that spans two cache lines takes twice as long
     slots, vectors = work.ctypes.data, range(0, 8 * kernel.LANES, 8 * kernel.VECTOR)
     lay(kernel, work, 0, initial, kernel.WIDTH)
     share(kernel, work, 6 * block, weights)
@@ -86,7 +86,7 @@ def run_controlled(
     while True:
         if place >= reach and end < n - 1:
             if sample < end and parameters.shape[0] > 1 and not same(parameters[end], parameters[row]):
-                # samples before a change lie on the curve of the parameters before it
+                # samples before a parameter change are interpolated with the parameters before it
                 driven = along(lift, ramp, curvature, reach, reach, taken)
                 share(kernel, work, shared, (*driven, taken * sample_time, taken * sample_time))
                 for first in vectors:
@@ -111,10 +111,12 @@ def run_controlled(
         if left <= 0.0:
             break
         error = _largest(kernel, work, 7 * block, lost)
-        if not error <= 1.0 and NEARLY * size > shortest:  # else what is left is asked for again and again
+        # a step of nearly the shortest size is accepted; otherwise it would be retried for ever
+        if not error <= 1.0 and NEARLY * size > shortest:
             size = max(size * (0.5 if error < 64.0 else 0.25), shortest)
             continue
-        if error == np.inf:  # no shorter step brings a run back that has no numbers: the others go on without it
+        # a shorter step cannot repair a run whose states are NaN: the other runs go on without it
+        if error == np.inf:
             lost = _unknown(kernel, work, 7 * block)
         start, taken = here, size
         place = reach if size == left else place + size

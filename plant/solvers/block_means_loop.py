@@ -38,7 +38,7 @@ def average_blocks(kernel: ShowingKernel, states: Array, parameters: Array, bloc
         Output array for the means.
     """
     room = np.zeros(kernel.NUMBERS + 8)
-    work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
+    work = room[-room.ctypes.data % 64 // 8 :]  # a vector that spans two cache lines takes twice as long
     slots, shown, row = work.ctypes.data, kernel.WIDTH * kernel.LANES, -1
     for b in range(means.shape[0]):
         for lane in range(means.shape[1]):

@@ -155,7 +155,7 @@ def run_side_by_side(
         Output array for the states.
     """
     room = np.empty(kernel.NUMBERS + 8)
-    work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
+    work = room[-room.ctypes.data % 64 // 8 :]  # a vector that spans two cache lines takes twice as long
     slots = work.ctypes.data
     drives = kernel.WIDTH * kernel.LANES
     rises, paces, known = drives + kernel.LANES, drives + 2 * kernel.LANES, drives + 3 * kernel.LANES

@@ -47,7 +47,7 @@ def test_a_figure_that_falls_short_says_so(capsys: pytest.CaptureFixture[str]) -
         ((20.0,), False),
         ((20.0, 24.0), False),  # within a quarter
         ((20.0, 26.0), True),
-        ((20.0, 30.0, 21.0, 29.0, 32.0), False),  # the earlier ones scatter as much
+        ((20.0, 30.0, 21.0, 29.0, 32.0), False),  # earlier values scatter as much
         ((20.0, 10.0), False),  # better
         ((40.0, 51.0), True),  # misses its limit
         ((60.0, 61.0), False),  # missed it before

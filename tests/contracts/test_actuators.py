@@ -1,4 +1,4 @@
-"""What every kind of actuator of the registry promises, whichever it is (docs/add-a-plant.md)."""
+"""The contract of every kind of actuator in the registry (docs/add-a-plant.md)."""
 
 import json
 import math
@@ -35,13 +35,14 @@ SHORT: Mapping[str, Mapping[str, Any]] = {
     "eha": {"duration": 4.0, "sample_time": 1e-3},
     "diaphragm-motor": {"duration": 0.15},
 }
-"""What makes a run short, where the kind's own is long."""
+"""Options that shorten a run of a kind whose default run is long."""
 
 LOADED: Mapping[str, Mapping[str, Any]] = {"diaphragm-motor": {"load": 10.0}}
-"""The load under which other tests lay logs beside the curves of a motor's faults, which take seconds to simulate."""
+"""Load on the motor in these runs [N]; other tests use the same load, so its fault curves, which take seconds to
+simulate, are computed only once."""
 
 FOREIGN = {"eha": ("--load", "3")}
-"""An option that a kind does not understand."""
+"""An option that the kind does not accept."""
 
 
 def run_of(kind: ActuatorKind, seed: int = 3) -> Run:
@@ -53,7 +54,7 @@ def run_of(kind: ActuatorKind, seed: int = 3) -> Run:
 
 @dataclass(frozen=True)
 class Looked:
-    """What a kind says of a log of its healthy actuator, as read from its file."""
+    """The findings of a kind on a log of its healthy actuator, read from a file."""
 
     kind: ActuatorKind
     log: Path

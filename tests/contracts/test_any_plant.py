@@ -1,4 +1,4 @@
-"""Solvers, filters and grey-box fits serve a plant that none of them knows: a mass on a spring and a damper."""
+"""Solvers, filters and grey-box fits work on a plant unknown to them: a mass on a spring and a damper."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, make_dataclass, replace
@@ -46,7 +46,7 @@ NOISE = {"position_m": 1e-3, "velocity_m_s": 2e-2}
 
 
 def exact(p: Suspension) -> Array:
-    """The states under a force that is linear between samples, by matrix exponentials."""
+    """Return the exact states under a force that is linear between samples, from matrix exponentials."""
     A = np.zeros((4, 4))
     A[0, 1] = A[2, 3] = 1.0
     A[1, :3] = np.array([-p.stiffness, -p.damping, 1.0]) / p.mass
@@ -169,7 +169,7 @@ def test_a_grey_box_fit_finds_two_parameters_with_their_intervals(record: Record
     for name in GREY.unknowns:
         off, std = abs(fit.values[name] - getattr(TRUTH, name)), fit.std[name]
         assert off < 2.0 * NORMAL_95 * std < 0.02 * getattr(TRUTH, name)
-    # all that a force shows is in proportion to the mass, which is known to 2 %
+    # a force shows only ratios to the mass, and the mass is known to 2 %
     assert fit.rig_slopes["mass"]["stiffness"] / fit.values["stiffness"] < 1.0
     assert fit.chi_square == pytest.approx((1.0, 1.0), abs=0.1)
 

@@ -1,4 +1,4 @@
-"""What every condition of `CONDITIONS` promises to the layers that run over all of them."""
+"""The contract of every condition of `CONDITIONS`, on which the layers above rely."""
 
 from itertools import combinations
 

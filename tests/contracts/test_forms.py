@@ -1,4 +1,4 @@
-"""What every process model of `FORMS` and every filter of `METHODS` promises."""
+"""The contract of every process model of `FORMS` and every filter of `METHODS`."""
 
 from functools import cache
 
@@ -23,19 +23,20 @@ from tests.thinned import thinned
 
 EVERY_FORM = pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
 EVERY_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
-WITHOUT_CHANCE = pytest.mark.parametrize(  # what particles do instead is said in test_particle
+WITHOUT_CHANCE = pytest.mark.parametrize(  # test_particle tests what particles do instead
     "method",
     [method for name, method in METHODS.items() if name != "particle"],
     ids=[n for n in METHODS if n != "particle"],
 )
 ROUNDING = {METHODS["imm"]: 1e-9}
-"""Of a log-likelihood of nothing: a bank's probabilities sum to one to rounding."""
+"""Tolerance of a log-likelihood that should be zero [dimensionless]: a bank's probabilities sum to one except for
+rounding."""
 RIG = EhaParameters()
 
 
 @cache
 def bench_log(parameters: EhaParameters = RIG, duration: float = 0.1) -> Record:
-    """One whole period, of 1000 samples, or a part of it."""
+    """Return a log of 1000 samples, one whole period, or of a part of it."""
     drive = sine(duration, 1e-4, parameters.rated_speed, 10.0)
     return simulate(LUMPED, drive, 1e-4, parameters, sensors=BENCH, rng=np.random.default_rng(0))
 
@@ -119,7 +120,7 @@ def test_a_filter_that_diverges_returns_that_and_raises_nothing(method: Method) 
     parameters = parameters_for(CONDITIONS["major_friction"])
     drive = sine(0.5, 1e-3, parameters.rated_speed, 2.0)
     record = simulate(LUMPED, drive, 1e-3, parameters, sensors=BENCH, rng=np.random.default_rng(0))
-    estimate = filtered(method, FORMS["acceleration"], record, parameters)  # explicit Euler, four times too long a step
+    estimate = filtered(method, FORMS["acceleration"], record, parameters)  # explicit Euler, step four times too long
     assert not np.isfinite(estimate.settled(BULK_MODULUS)[0])
 
 

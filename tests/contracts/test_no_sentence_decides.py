@@ -1,4 +1,4 @@
-"""No sentence decides: with every sentence put as "x", everything but text stays as it was."""
+"""No decision depends on a sentence: if every sentence is replaced by "x", everything but text stays the same."""
 
 import importlib
 import json
@@ -25,7 +25,7 @@ from plant.sensors.sensors import BENCH
 
 PACKAGES = ("plant", "estimation", "faults", "experiments")
 TEXT = frozenset({"message", "reasons", "warnings", "not_told", "advice", "findings", "text"})
-"""Entries that hold sentences: that there are some may not change, what they say may."""
+"""Entries that contain sentences: whether there are any must not change, but their words may."""
 
 T = 2e-3
 """Sample time of the logs [s]."""
@@ -37,8 +37,8 @@ LONG = {
     ),
     "diagnose": ("dead_pressure", "far_off", "frozen_pressure"),
 }
-"""Logs that take seconds each, or of which a verb says what it says of another: a call of the slow tests consists of
-them. The others bring up every kind of note."""
+"""Logs that take seconds each, or that repeat what a verb says of another log; only slow tests use them. The other logs
+raise every kind of note."""
 
 SPEED, POSITION, VELOCITY, PRESSURE = "motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa"
 
@@ -81,7 +81,7 @@ def logs() -> dict[str, Record]:
 
 
 def codes() -> Iterator[Code]:
-    """Yield every code of the packages."""
+    """Yield every code in the packages."""
     for package in PACKAGES:
         for found in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
             if not found.name.endswith("__main__"):
@@ -109,7 +109,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def as_written() -> dict[str, tuple[int, list[dict[str, Any]]]]:
-    """Keep what calls print with their own sentences."""
+    """Return a dictionary for what calls print with their original sentences."""
     return {}
 
 
@@ -119,7 +119,7 @@ def printed(*arguments: object) -> tuple[int, list[dict[str, Any]]]:
 
 
 def without_text(value: Any, name: str = "") -> Any:
-    """Return a result with whether there is text, in place of the text."""
+    """Return a result with each text replaced by whether there is one."""
     if name in TEXT:
         return bool(value)
     if isinstance(value, dict):
@@ -128,7 +128,7 @@ def without_text(value: Any, name: str = "") -> Any:
 
 
 def swept(call: tuple[str, ...], folder: Path) -> list[object]:
-    """Return the arguments of a call, ``*`` for the logs that are not long and paths for the names of files."""
+    """Return the arguments of a call: ``*`` becomes all logs that are not in `LONG`, and file names become paths."""
     every = [one for one in sorted(folder.glob("*.csv")) if one.stem not in LONG.get(call[0], ())]
     return [one for word in call for one in (every if word == "*" else [folder / word] if "." in word else [word])]
 

@@ -1,4 +1,4 @@
-"""One log, one answer: estimate and diagnose give the same bulk modulus, interval and gate."""
+"""Estimate and diagnose give the same bulk modulus, interval and gate for the same log."""
 
 import warnings
 from pathlib import Path
@@ -19,10 +19,10 @@ from plant.log.columns import parse_columns
 from tests.thinned import thinned
 
 FEW = ("bench/run002.csv", "strange/makeup_check_stuck_shut/run002.csv", "strange/speed_sign_reversed/run001.csv")
-"""A sound log, one of which the class alone is doubted, and one from which nothing follows."""
+"""A sound log, one of which only the class is doubted, and one from which nothing can be concluded."""
 
 ENOUGH = 1500
-"""Samples from which the same follows of each of them [samples]."""
+"""Number of samples that gives the same conclusions for each of them [samples]."""
 
 
 SETS = (
@@ -55,11 +55,11 @@ SETS = (
         )
     ),
 )
-"""The folders of logs that nobody here made."""
+"""Folders of logs that were made outside this project."""
 
 
 def answers(log: Path, samples: int | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return what the two verbs print of a log, or of its beginning, with the rig and columns that its set names."""
+    """Return what the two verbs print for a log or its beginning, with the rig and columns that its set specifies."""
     truth = pd.read_csv(log.parent / "truth.csv", dtype=str, keep_default_na=False)
     row = truth[truth["file"] == log.name].iloc[0]
     rig = read_rig(log.parent / row["rig"]) if row.get("rig") else Rig()
@@ -71,7 +71,7 @@ def answers(log: Path, samples: int | None = None) -> tuple[dict[str, Any], dict
 
 
 def disagreement(log: Path, estimated: dict[str, Any], diagnosed: dict[str, Any]) -> str:
-    """Say in what the verbs differ on a log; nothing where they agree."""
+    """Return where the verbs differ on a log; empty if they agree."""
     said = [name for name in ("bulk_modulus_pa", "gate") if estimated[name] != diagnosed[name]]
     modulus = estimated["bulk_modulus_pa"]
     ends = {name: modulus[name] or [None, None] for name in ("ci95", "ci95_total")}

@@ -1,4 +1,4 @@
-"""What every plant of `PLANTS` promises, whichever it is."""
+"""The contract of every plant of `PLANTS`."""
 
 from dataclasses import asdict
 

@@ -13,7 +13,7 @@ from plant.eha.model import EhaParameters, EhaValues
 
 
 def _step(state: tuple[Scalar, ...], speeds: tuple[Scalar, Scalar], p: EhaValues, h: Scalar) -> tuple[Scalar, ...]:
-    """A mass on a damper, pushed by the mean motor speed; a disturbance force is the third state."""
+    """The step of a mass on a damper, pushed by the mean motor speed; a disturbance force is the third state."""
     del p
     x, v, force = state
     push = 0.01 * (speeds[0] + speeds[1])
@@ -47,11 +47,11 @@ def linear() -> ProcessModel:
 
 @pytest.fixture(scope="session")
 def transition() -> Array:
-    """F of the linear model for a step of 10 ms, in SI."""
+    """Return F of the linear model for a step of 10 ms, in SI."""
     return np.array([[1.0, 0.01, 0.0], [0.0, 0.97, 0.01], [0.0, 0.0, 1.0]])
 
 
 @pytest.fixture(scope="session")
 def observation() -> Array:
-    """H of the linear model, in SI."""
+    """Return H of the linear model, in SI."""
     return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.25]])

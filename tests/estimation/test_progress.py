@@ -1,4 +1,4 @@
-"""What a search tells of the models that it tries."""
+"""What a search reports about the models that it tries."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Stretches hold every sample for which something holds, and no other."""
+"""Stretches contain every sample that satisfies a condition, and no other."""
 
 import numpy as np
 import pytest

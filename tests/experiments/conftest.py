@@ -1,4 +1,4 @@
-"""One small study a session: its shape is what figures, report and store stand on. A browser, where there is one."""
+"""One small study per session, for tests of figures, report and store; and a browser, if one is installed."""
 
 import shutil
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ SMALL = StudySettings(
 
 @pytest.fixture(scope="session", autouse=True)
 def _few_dots() -> Iterator[None]:
-    """Draw PNG figures of few pixels: what is asked of them is asked of these too."""
+    """Draw PNG figures with few pixels: no test needs more."""
     with pytest.MonkeyPatch.context() as patch:
         for resolution in ("PNG_DOTS_PER_INCH", "LOG_DOTS_PER_INCH"):
             patch.setattr(figure_files, resolution, 20)
@@ -49,7 +49,7 @@ def study() -> Found:
 
 
 class Drawn(dict[str, Figure]):
-    """Figures of the small study, each drawn and laid out when it is first asked for."""
+    """Figures of the small study, each drawn and laid out at its first use."""
 
     def __init__(self, study: Found) -> None:
         super().__init__()
@@ -68,12 +68,12 @@ def drawn(study: Found) -> Drawn:
 
 
 WRITTEN = "forms_on_sticking_plant"
-"""The figure that the written study shows; the others are empty there, since writing all of them takes 5 s."""
+"""The figure that the written study contains; the others are empty, since writing all of them takes 5 s."""
 
 
 @pytest.fixture(scope="session")
 def written(study: Found, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of the written study, with one figure as it is drawn and the others empty."""
+    """Return the folder of the written study, with one real figure and the others empty."""
     folder = tmp_path_factory.mktemp("results") / "study"
     figures = {name: FIGURES[name] if name == WRITTEN else lambda _: Figure(figsize=(1.0, 1.0)) for name in FIGURES}
     write_result(replace(NINE_CONDITIONS, figures=figures), SMALL, study, folder)
@@ -85,7 +85,7 @@ STACK = StackSettings(seed=7, quick=True, voltage_limit_v=140.0, power_limit_w=1
 
 @pytest.fixture(scope="session")
 def stack_tables() -> Tables:
-    """Return the stack's tables but the one of figure 12 left out, which `test_left_out` asks for itself."""
+    """Return the stack's tables except that of figure 12 left out, which `test_left_out` makes itself."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stack_study, "figure_12_left_out", lambda *_: pd.DataFrame())
         frames = PIEZO_STACK.find(STACK, untracked).frames
@@ -94,7 +94,7 @@ def stack_tables() -> Tables:
 
 @pytest.fixture(scope="session")
 def motor_tables() -> Tables:
-    """Return the motor's tables but the one of other sets of plates, which takes as long as most others together."""
+    """Return the motor's tables except that of other sets of plates, which takes as long as most others together."""
     sweeps = {name: sweep for name, sweep in SWEEPS.items() if name != "other sets"}
     return claim_tables(RIG, 7, untracked, sweeps)
 

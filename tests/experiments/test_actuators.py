@@ -1,4 +1,4 @@
-"""Kinds of actuators: found by name or by a plant of theirs, and refused where they are registered wrongly."""
+"""Kinds of actuators: found by name or by one of their plants, and refused if they are registered wrongly."""
 
 from dataclasses import replace
 

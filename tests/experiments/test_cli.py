@@ -116,7 +116,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
 
 
 def test_a_log_that_is_fitted_waits_for_no_filter(tmp_path: Path) -> None:
-    """They and the tuning were a fifteenth of all imports, for the names of their options."""
+    """Before, filters and tuning took a fifteenth of all imports, only for the names of their options."""
     (tmp_path / "log.csv").write_text("time_s,motor_speed_rad_s\n0,1\n")
     code = (
         "import sys\nimport faults.diagnosis.diagnose\nfrom experiments.cli import app\n"

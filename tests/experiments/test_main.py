@@ -1,4 +1,4 @@
-"""How the command ends: with its code, after what still runs, and with every word out."""
+"""How the command ends: with its exit code, after all running work, and with all output written."""
 
 import atexit
 import gc

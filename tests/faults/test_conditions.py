@@ -54,7 +54,7 @@ def friction_force(p: EhaParameters, velocity: float) -> float:
 
 
 def steady_velocity(p: EhaParameters) -> float:
-    """Positive root of the flow balance 5.8 with the force balance 5.11, at rated speed."""
+    """Return the positive root of the flow balance 5.8 with the force balance 5.11, at rated speed."""
     A, L = p.piston_area, p.leakage_coefficient
     quadratic = L * p.friction_quadratic / A
     linear = A + L * p.friction_linear / A

@@ -1,4 +1,4 @@
-"""What conditions and severities change of an actuator, kept in `numbers.json`."""
+"""Effects of conditions and severities on an actuator, kept in `numbers.json`."""
 
 from dataclasses import asdict, replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""A confusion matrix counts every run once, and accuracy is its diagonal's share."""
+"""A confusion matrix counts every run once, and accuracy is the share on its diagonal."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
-"""One log as programs of benches lay it out, with what happens to logs on their way: that log, or a word, or a refusal.
+"""One log in the layouts of bench programs, with mishaps: it is read as that log, or with a warning, or refused.
 
-A header that comes again, a second table, a decimal comma that begins below the lines that are looked at, rows turned
-round, lines of messages: where rows or samples are lost, a warning says so, and no number is another one.
+Mishaps are a repeated header, a second table, a decimal comma that begins below the examined lines, reversed rows, and
+lines of messages. If rows or samples are lost, a warning says so, and no number is changed.
 
 Run it as ``python -m tests.fuzz.bench_layouts 3000``.
 """
@@ -23,7 +23,7 @@ from tests.fuzz.guard import limited
 from tests.fuzz.seeds import small_log
 
 N = 400
-"""Rows: more than are looked at for the layout [count]."""
+"""Rows: more than are examined for the layout [count]."""
 
 NAMES = ("Time", "Motor speed", "Position", "Velocity", "Differential pressure")
 UNITS = ("ms", "rpm", "um", "mm/s", "kPa")
@@ -70,7 +70,7 @@ LAYOUTS: Mapping[str, Callable[[Rows, str], Laid]] = {
 
 
 class Laying(NamedTuple):
-    """A log laid out, and where something happens to it."""
+    """A log in a layout, and the row of its mishap."""
 
     head: list[str]
     rows: list[str]
@@ -78,16 +78,16 @@ class Laying(NamedTuple):
     by: str
 
     def with_row(self, *lines: str) -> list[str]:
-        """Return the rows with others in the place of one."""
+        """Return the rows with others in place of that row."""
         return [*self.rows[: self.at], *lines, *self.rows[self.at + 1 :]]
 
     def with_more(self, *lines: str) -> list[str]:
-        """Return the rows with others before one."""
+        """Return the rows with others before that row."""
         return [*self.rows[: self.at], *lines, *self.rows[self.at :]]
 
     @property
     def row(self) -> str:
-        """The one to which something happens."""
+        """The row of the mishap."""
         return self.rows[self.at]
 
 
@@ -118,7 +118,7 @@ MISHAPS: Mapping[str, Callable[[Laying], list[str]]] = {
 
 
 def laid_out(log: pd.DataFrame, rng: np.random.Generator) -> tuple[str, bytes]:
-    """Return how the log is laid out and what happened to it, and the file."""
+    """Return a label of the layout and the mishap, and the file's content."""
     kind, mishap = (str(rng.choice(list(some))) for some in (LAYOUTS, MISHAPS))
     by, point = (str(rng.choice(some)) for some in ((";", "\t"), (".", ",")))
     columns = [[f"{scale * one:.10g}" for one in log[name]] for name, scale in zip(log.columns, SCALES, strict=True)]
@@ -131,7 +131,7 @@ def laid_out(log: pd.DataFrame, rng: np.random.Generator) -> tuple[str, bytes]:
 
 
 def difference(record: Record, log: pd.DataFrame, told: bool) -> str:
-    """Return how a record differs from the log, empty where it is the log; of what was told parts may be missing."""
+    """Return how a record differs from the log, or an empty string; with a warning, parts may be missing."""
     if abs(record.sample_time - 1e-3) > 1e-6:
         return f"a sample time of {record.sample_time:g} s"
     if not (len(record) == len(log) or (told and len(record) < len(log))):
@@ -150,7 +150,7 @@ def difference(record: Record, log: pd.DataFrame, told: bool) -> str:
 
 
 def run(count: int, first: int = 0) -> list[str]:
-    """Lay the log out so many times, and return what went wrong, by seed."""
+    """Write the log in a number of layouts, and return the failures with their seeds."""
     log, wrong = small_log(N), []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.csv"
@@ -171,7 +171,7 @@ def _require_the_log(path: Path, log: pd.DataFrame) -> None:
 
 
 def read_unspoilt(kind: str, folder: Path) -> Record:
-    """Return the log as it is read from a layout in which nothing happened to it."""
+    """Return the log as read from a layout without a mishap."""
     log = small_log(N)
     columns = [[f"{scale * one:.10g}" for one in log[name]] for name, scale in zip(log.columns, SCALES, strict=True)]
     head, lines = LAYOUTS[kind](list(zip(*columns, strict=True)), "\t")

@@ -1,4 +1,4 @@
-"""Mutations of a file's blocks: lines, members, segments and elements, wherever they begin."""
+"""Mutations of a file's blocks: lines, archive members, segments and elements."""
 
 import re
 
@@ -11,11 +11,11 @@ Generator = np.random.Generator
 MARKS = re.compile(
     rb"\n|PK[\1\3\5][\2\4\6]|TDSm|##[A-Z]{2}|TREE|HEAP|SNOD|OHDR|FRHP|BTHD|PAR1|\xff{4}|ARROW1|\x0e\0\0\0"
 )
-"""Where lines, members, segments, blocks and elements begin."""
+"""Patterns at which lines, members, segments, blocks and elements begin."""
 
 
 def boundaries(data: bytes) -> list[int]:
-    """Return where blocks of a file begin, its ends among them."""
+    """Return the places at which blocks of a file begin, with both ends of the file."""
     found = [one.start() for one in MARKS.finditer(data)]
     return sorted({0, *found, *(one + 4 for one in found), len(data)})
 
@@ -27,7 +27,7 @@ def _two(data: bytes, rng: Generator) -> tuple[int, int]:
 
 
 def cut(data: bytes, rng: Generator) -> bytes:
-    """Return the file up to a boundary, or a byte beside it."""
+    """Return the file up to a boundary, or up to a byte before or after it."""
     return data[: max(int(rng.choice(boundaries(data))) + int(rng.integers(-1, 2)), 0)]
 
 
@@ -37,33 +37,33 @@ def headless(data: bytes, rng: Generator) -> bytes:
 
 
 def doubled(data: bytes, rng: Generator) -> bytes:
-    """Return the file with a block written twice, or a thousand times."""
+    """Return the file with a block written twice, or about a thousand times."""
     first, last = _two(data, rng)
     block = data[first:last]
     return data[:last] + block * (1 + 999 * int(rng.random() < 0.1 and len(block) < 4000)) + data[last:]
 
 
 def exchanged(data: bytes, rng: Generator) -> bytes:
-    """Return the file with two blocks in each other's place."""
+    """Return the file with two adjacent blocks exchanged."""
     first, last = _two(data, rng)
     middle = (first + last) // 2
     return data[:first] + data[middle:last] + data[first:middle] + data[last:]
 
 
 def lost(data: bytes, rng: Generator) -> bytes:
-    """Return the file without a block."""
+    """Return the file without one block."""
     first, last = _two(data, rng)
     return data[:first] + data[last:]
 
 
 def blank(data: bytes, rng: Generator) -> bytes:
-    """Return the file with a block of one byte, as a disk leaves it whose sectors were lost."""
+    """Return the file with a block filled with one byte, as after the loss of disk sectors."""
     first, last = _two(data, rng)
     return data[:first] + bytes([int(rng.choice((0, 0xFF, 0x20)))]) * (last - first) + data[last:]
 
 
 def swapped(data: bytes, rng: Generator) -> bytes:
-    """Return the file with the bytes of a stretch swapped, as of the other order of bytes."""
+    """Return the file with the bytes of a part in reverse order, as in the other byte order."""
     size = int(rng.choice((2, 4, 8)))
     first = int(rng.choice(boundaries(data)))
     last = min(len(data), first + size * int(rng.integers(1, 40)))
@@ -73,7 +73,7 @@ def swapped(data: bytes, rng: Generator) -> bytes:
 
 
 def declared(data: bytes, rng: Generator) -> bytes:
-    """Return the file with a count or an offset that cannot be, where a block begins."""
+    """Return the file with impossible counts or offsets at the beginning of blocks."""
     made = bytearray(data)
     for _ in range(int(rng.integers(1, 4))):
         at, size = int(rng.choice(boundaries(data))) + 4 * int(rng.integers(0, 8)), int(rng.choice((2, 4, 8)))
@@ -83,7 +83,7 @@ def declared(data: bytes, rng: Generator) -> bytes:
 
 
 def rained(data: bytes, rng: Generator) -> bytes:
-    """Return the file with bits turned over all of it."""
+    """Return the file with bits flipped at random places."""
     made = np.frombuffer(data, "u1").copy()
     if len(made):
         at = rng.integers(len(made), size=int(rng.choice((1, 3, 30, 300))))
@@ -92,7 +92,7 @@ def rained(data: bytes, rng: Generator) -> bytes:
 
 
 def anywhere(data: bytes, rng: Generator) -> bytes:
-    """Return the file mutated as the other fuzzer does."""
+    """Return the file mutated as by the other fuzzer."""
     return mutated(data, rng, CELLS)
 
 

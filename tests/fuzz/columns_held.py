@@ -1,4 +1,4 @@
-"""Whole Parquet, HDF5, MAT and MDF files whose columns hold what loggers and scripts put there beside plain numbers.
+"""Complete Parquet, HDF5, MAT and MDF files whose columns contain what loggers and scripts write besides plain numbers.
 
 Run it as ``python -m tests.fuzz.columns_held 2000``.
 """
@@ -22,7 +22,7 @@ Make = Callable[["np.ndarray[Any, Any]"], Any]
 
 
 def halved(x: "np.ndarray[Any, Any]") -> "np.ndarray[Any, Any]":
-    """Return numbers of half precision; pressures are beyond its range and become infinite."""
+    """Return numbers in half precision; pressures exceed its range and become infinite."""
     with np.errstate(over="ignore"):
         return x.astype("f2")
 
@@ -117,7 +117,7 @@ WRITERS: Mapping[str, tuple[Callable[..., None], Sequence[str]]] = {
 
 
 def run(count: int, first: int = 0) -> list[str]:
-    """Write so many files, and return what went wrong, by seed."""
+    """Write a number of files, and return the failures with their seeds."""
     frame: pd.DataFrame = small_log()
     log, wrong = {str(name): frame[name].to_numpy() for name in frame}, list[str]()
     with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,6 @@
-"""Mutated files through the door of every verb: a record, or one sentence; never an internal error, a hang or a crash.
+"""Mutated files read as by every verb: a record, or an error in one sentence; no internal error, hang or crash.
 
-Run it as ``python -m tests.fuzz.files 5000``; what goes wrong is named by its kind and seed.
+Run it as ``python -m tests.fuzz.files 5000``; a failure is reported with its kind and seed.
 """
 
 import json
@@ -34,7 +34,7 @@ def inspect(path: Path) -> None:
 
 
 def run(count: int, first: int = 0) -> list[str]:
-    """Mutate so many files, and return what went wrong, by kind and seed."""
+    """Mutate a number of files, and return the failures with kind and seed."""
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         made = seeds(Path(folder))

@@ -1,4 +1,4 @@
-"""Runs one mutated input: what is wrong with what it brings up, if anything."""
+"""Runs one mutated input under a time limit, and returns what is wrong with the outcome."""
 
 import signal
 import warnings
@@ -8,11 +8,11 @@ from typing import NoReturn
 from plant.errors import HydrostateError
 
 LONGEST = 10.0
-"""Seconds of processor time that one input may take: a busy machine makes no input hang."""
+"""Processor time that one input may take [s]: on a busy machine, elapsed time would report false hangs."""
 
 
 class HangError(BaseException):
-    """It took too long."""
+    """The input took too long."""
 
 
 def _hang(*_: object) -> NoReturn:
@@ -20,7 +20,7 @@ def _hang(*_: object) -> NoReturn:
 
 
 def limited(use: Callable[[], object]) -> str:
-    """Use an input; return what is wrong, empty where it was accepted or refused in one sentence."""
+    """Use an input; return what is wrong, or an empty string if it is accepted or refused in one sentence."""
     before = signal.signal(signal.SIGPROF, _hang)
     signal.setitimer(signal.ITIMER_PROF, LONGEST)
     try:

@@ -1,6 +1,6 @@
-"""Whole files that are legal and odd: read as what was written, or refused with a sentence.
+"""Complete files that are valid but unusual: each is read as it was written, or refused in a sentence.
 
-Run it as ``python -m tests.fuzz.legal_files 2000 [FIRST]``; what is read wrongly is named by its format and seed.
+Run it as ``python -m tests.fuzz.legal_files 2000 [FIRST]``; a file read wrongly is reported with its format and seed.
 """
 
 import gzip
@@ -24,16 +24,16 @@ Later = Mapping[str, int]
 Make = Callable[[Channels, np.random.Generator, Path], tuple[Path, Later]]
 
 KEPT = (32, 42, 217)
-"""Seeds of TDMS where the first channel of a group says an offset, which was taken for the others' too."""
+"""Seeds of TDMS files in which the first channel of a group has an offset, which was once applied to the others."""
 
 
 def drawn(rng: np.random.Generator, *choices: Any) -> Any:
-    """Return one of some values."""
+    """Return one of several values at random."""
     return choices[int(rng.integers(len(choices)))]
 
 
 def text(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, Later]:
-    """Write text: signs between cells and decimals, forms of numbers, quotes, preambles, encodings, packing."""
+    """Write text: delimiters and decimal signs, number formats, quotes, preambles, encodings, compression."""
     cell, decimal = drawn(rng, (",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))
     form, style = drawn(rng, "{!r}", "{:.12e}", "{:.9f}", "{:+.12e}", "{:18.9f}"), drawn(rng, "[", "(", "suffix")
     columns = spelt(log, rng)
@@ -56,7 +56,7 @@ def text(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, L
     end = drawn(rng, "\n", "\r\n", "\r")
     content = (end.join(lines) + drawn(rng, end, "")).encode(drawn(rng, "utf-8", "utf-8-sig", "utf-16", "latin-1"))
     packed = rng.random() < 0.25
-    if packed:  # two members, and blocks of zeros behind them as a tape has
+    if packed:  # two gzip members, sometimes followed by zeros as on a tape
         half = len(content) // 3
         content = gzip.compress(content[:half]) + gzip.compress(content[half:]) + drawn(rng, b"", bytes(100))
     path = folder / ("log.csv.gz" if packed else "log.csv")
@@ -65,7 +65,7 @@ def text(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, L
 
 
 def arrow(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, Later]:
-    """Write Parquet or Feather: stamps, durations, decimals, texts and dictionaries, beside nested columns."""
+    """Write Parquet or Feather: timestamps, durations, decimals, texts and dictionaries, beside nested columns."""
     import pyarrow as pa
     from pyarrow.feather import write_feather
     from pyarrow.parquet import write_table
@@ -119,7 +119,7 @@ def arrow(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, 
 
 
 def tdms(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, Later]:
-    """Write TDMS: clocks of each kind, one channel that begins later, scaled numbers, two groups, segments."""
+    """Write TDMS: clocks of each kind, one channel that begins later, two groups, several segments."""
     from nptdms import ChannelObject, TdmsWriter
 
     clock, groups = drawn(rng, "channel", "step", "date", "offset", "later offset", "later date"), drawn(rng, 1, 1, 2)
@@ -148,7 +148,7 @@ def tdms(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, L
 
 
 def hdf5(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, Later]:
-    """Write HDF5: scaled whole numbers, byte order, units as attributes, links, references, other types beside."""
+    """Write HDF5: scaled integers, byte order, links, references, and other types beside."""
     import h5py
 
     with h5py.File(path := folder / "log.h5", "w") as file:
@@ -170,7 +170,7 @@ def hdf5(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, L
 
 
 def numbers(log: Channels, rng: np.random.Generator, folder: Path) -> tuple[Path, Later]:
-    """Write JSON of three kinds, an archive of NumPy, or MAT with structs and other variables beside."""
+    """Write JSON of three kinds, a NumPy archive, or MAT with structs and other variables beside."""
     from scipy.io import savemat
 
     held = {heading(one, "suffix"): one.values for one in spelt(log, rng)}
@@ -196,7 +196,7 @@ WRITERS: tuple[Make, ...] = (text, arrow, tdms, hdf5, numbers)
 
 
 def check(make: Make, seed: int, folder: Path, ends: Counter[str] | None = None) -> str:
-    """Write a file and read it; return what is wrong, empty where it is right or refused."""
+    """Write a file and read it; return what is wrong, or an empty string if it is right or refused."""
     rng = np.random.default_rng(seed)
     log = truth(rng)
     path, later = make(log, rng, folder)
@@ -216,7 +216,7 @@ def check(make: Make, seed: int, folder: Path, ends: Counter[str] | None = None)
 
 
 def run(count: int, first: int = 0, ends: Counter[str] | None = None) -> list[str]:
-    """Write so many files, and return what was read wrongly, by format and seed."""
+    """Write a number of files, and return those read wrongly, with format and seed."""
     with tempfile.TemporaryDirectory() as folder:
         cases = [(WRITERS[seed % len(WRITERS)], seed) for seed in range(first, first + count)]
         found = [check(make, seed, Path(folder), ends) for make, seed in cases]

@@ -1,4 +1,4 @@
-"""A log whose every sample is known, the names and units that it is written under, and how far what is read is off."""
+"""A log with known samples, the names and units in which it is written, and the error of the values read."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -19,14 +19,14 @@ UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "velocity_m_s": (("m/s", 1.0), ("mm/s", 1e-3)),
     "differential_pressure_pa": (("Pa", 1.0), ("bar", 1e5), ("MPa", 1e6), ("kPa", 1e3)),
 }
-"""Units of each channel with what one of it is in SI."""
+"""Units of each channel, with their size in SI units."""
 
 MOST = 3e-3
-"""Largest departure from what was written [fraction of the channel's range]."""
+"""Largest deviation from the written values [fraction of the channel's range]."""
 
 
 class Written(NamedTuple):
-    """A channel as it is written: its name in SI and in words, its unit, its values in that unit."""
+    """A channel as written: its SI name, its name in words, its unit, and its values in that unit."""
 
     channel: str
     words: str
@@ -35,7 +35,7 @@ class Written(NamedTuple):
 
 
 def truth(rng: np.random.Generator) -> Channels:
-    """Return a log of a moving actuator, each sample unlike its neighbours."""
+    """Return a log of a moving actuator in which neighbouring samples differ."""
     rows = int(rng.choice([400, 400, 60, 1200]))
     step = float(rng.choice([1e-3, 1e-3, 5e-4, 2e-3]))
     time = step * np.arange(rows)
@@ -49,7 +49,7 @@ def truth(rng: np.random.Generator) -> Channels:
 
 
 def spelt(log: Channels, rng: np.random.Generator) -> list[Written]:
-    """Return the channels in units that are drawn."""
+    """Return the channels in random units."""
     made: list[Written] = []
     for channel, values in log.items():
         unit, factor = UNITS[channel][int(rng.integers(len(UNITS[channel])))]
@@ -61,7 +61,7 @@ def spelt(log: Channels, rng: np.random.Generator) -> list[Written]:
 
 
 def heading(one: Written, style: str) -> str:
-    """Return a column's heading with its unit: ``[``, ``(`` around it, or as a suffix."""
+    """Return a column's heading with its unit: in ``[``, in ``(``, or as a suffix."""
     if style == "suffix":
         unit = one.unit if one.unit in ("MPa", "kPa") else one.unit.lower()
         return f"{one.words.lower().replace(' ', '_')}_{unit.replace('/', '_')}"
@@ -69,7 +69,7 @@ def heading(one: Written, style: str) -> str:
 
 
 def wrong(log: Channels, read: Record, later: Mapping[str, int]) -> str:
-    """Return what a record has otherwise than it was written; empty where nothing is.
+    """Return how a record differs from the written log, or an empty string.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Mutations of files and texts, each from a seed, so that what went wrong can be made again."""
+"""Mutations of files and texts, each from a seed, so that a failure can be reproduced."""
 
 from collections.abc import Sequence
 
@@ -6,16 +6,16 @@ import numpy as np
 
 Bytes = bytes
 INTERESTING = (0, 1, 0x7F, 0x80, 0xFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0xFFFFFFFFFFFFFFFF)
-"""Numbers at which counts and offsets go wrong."""
+"""Numbers at which counts and offsets often fail."""
 
 
 def mutated(content: Bytes, rng: np.random.Generator, pieces: Sequence[Bytes] = ()) -> Bytes:
-    """Return a file with one to four places changed: bits, counts, stretches cut or doubled, pieces put in."""
+    """Return a file with one to four mutations: flipped bits, changed counts, deleted, repeated or inserted bytes."""
     data = bytearray(content)
     for _ in range(int(rng.integers(1, 5))):
         if not data:
             break
-        # headers and footers are hit as often as all that is between
+        # header, footer and the whole file are hit equally often
         at = int(
             rng.choice(
                 [
@@ -97,4 +97,4 @@ CELLS: Sequence[Bytes] = tuple(
         ),
     )
 )
-"""Pieces of text that readers of logs trip over."""
+"""Pieces of text that often trip readers of logs."""

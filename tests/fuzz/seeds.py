@@ -1,4 +1,4 @@
-"""A small log in every format, from which files are mutated."""
+"""A small log in every format, the starting point of mutated files."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +10,7 @@ from tests.log_formats import more_written, written
 from tests.log_formats.written import SI
 
 N = 240
-"""Rows of each: of as many, two may be garbage [count]."""
+"""Rows of each: with so many, two may be garbage [count]."""
 
 KINDS: Mapping[str, str] = {
     "csv": "plain",
@@ -38,18 +38,18 @@ KINDS: Mapping[str, str] = {
     "json lines": "json_lines",
     "json": "json_columns",
 }
-"""What writes each, of `tests.log_formats`."""
+"""Function in `tests.log_formats` that writes each kind."""
 
 
 def small_log(rows: int = N) -> pd.DataFrame:
-    """Return a log of a sine at 1 kHz."""
+    """Return a log of a sine, sampled at 1 kHz."""
     time = 1e-3 * np.arange(rows)
     wave = np.sin(200.0 * time)
     return pd.DataFrame(dict(zip(SI, (time, 90.0 * wave, 1e-3 * (1.0 - wave), 0.03 * wave, 3e5 * wave), strict=True)))
 
 
 def seeds(folder: Path) -> dict[str, tuple[str, bytes]]:
-    """Return the name and the content of a log of every kind."""
+    """Return the name and the content of a log of each kind."""
     log = small_log()
     made: dict[str, tuple[str, bytes]] = {}
     for kind, name in KINDS.items():

@@ -1,4 +1,4 @@
-"""One log, its numbers, stamps and lines spelt in many ways: read as the log it is, or refused; never as another.
+"""One log with its numbers, timestamps and lines in many notations: it is read as that log, or refused.
 
 Run it as ``python -m tests.fuzz.spellings 3000``.
 """
@@ -20,7 +20,7 @@ from tests.fuzz.seeds import small_log
 
 RPM = 60.0 / (2.0 * np.pi)
 N = 400
-"""Rows: more than are looked at for the layout [count]."""
+"""Rows: more than are examined for the layout [count]."""
 
 SCALES: Mapping[str, float] = {
     "Motor speed [rpm]": RPM,
@@ -31,7 +31,7 @@ SCALES: Mapping[str, float] = {
 
 
 def grouped(value: float, between: str, point: str, digits: int) -> str:
-    """Return a number with its thousands apart."""
+    """Return a number with thousands separators."""
     return f"{value:,.{digits}f}".translate({ord(","): between, ord("."): point})
 
 
@@ -58,7 +58,7 @@ SPELLINGS: Mapping[str, Spell] = {
     "formula": lambda v: f'="{v:.9f}"',
     "full width": lambda v: f"{v:.9f}".translate({ord("0") + one: 0xFF10 + one for one in range(10)}),
 }
-"""Ways to spell a number; whole ones round."""
+"""Notations for a number; "whole" ones round it."""
 
 STAMPS: tuple[str, ...] = (
     *("%Y-%m-%dT%H:%M:%S.%fZ", "%d.%m.%Y %H:%M:%S.%f", "%m/%d/%Y %I:%M:%S.%f %p", "%d-%b-%Y %H:%M:%S.%f"),
@@ -71,7 +71,7 @@ MOMENTS = (
     "2026-03-29 00:59:59.9",
     "2026-03-01 12:59:59.9",
 )
-"""When a log begins: before 1970, at a turn of day, year and hour."""
+"""Start times of a log: before 1970, and at a change of day, year or hour."""
 
 LINES: Mapping[str, Callable[[list[str], str], list[str]]] = {
     "as they are": lambda lines, _: lines,
@@ -90,7 +90,7 @@ ENCODINGS = ("utf-8", "utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-32", "cp
 
 
 def spelt(log: pd.DataFrame, rng: np.random.Generator) -> tuple[str, bytes]:
-    """Return how the log is spelt, and the file."""
+    """Return a label of the notation, and the file's content."""
     how = str(rng.choice(list(SPELLINGS)))
     by, ends, lines_are = (str(rng.choice(some)) for some in ((",", ";", "\t", "|"), ("\n", "\r\n"), list(LINES)))
     time, stamps = log["time_s"].to_numpy(), [SPELLINGS[how](1e3 * one + 1.0) for one in log["time_s"]]
@@ -101,7 +101,7 @@ def spelt(log: pd.DataFrame, rng: np.random.Generator) -> tuple[str, bytes]:
         )
         heading, stamps = "Time", list(moments.strftime(str(rng.choice(STAMPS))))
     columns = [stamps, *([SPELLINGS[how](scale * one) for one in log[si]] for si, scale in _scaled(log))]
-    # a cell that holds the delimiter would be two, which no reader can know
+    # unquoted, a cell with the delimiter would be two cells, and no reader could know better
     kept = [[f'"{cell}"' if by in cell and '"' not in cell else cell for cell in column] for column in columns]
     lines = LINES[lines_are]([by.join([heading, *SCALES]), *map(by.join, zip(*kept, strict=True))], by)
     encoding = str(rng.choice(ENCODINGS))
@@ -114,7 +114,7 @@ def _scaled(log: pd.DataFrame) -> list[tuple[str, float]]:
 
 
 def difference(record: Record, log: pd.DataFrame, how: str) -> str:
-    """Return how a record differs from the log, empty where it is the log; a channel or a sample may be missing."""
+    """Return how a record differs from the log, or an empty string; channels or samples may be missing."""
     if abs(record.sample_time - 1e-3) > 1e-6:
         return f"a sample time of {record.sample_time:g} s"
     if not 0.97 * len(log) <= len(record) <= len(log):
@@ -129,7 +129,7 @@ def difference(record: Record, log: pd.DataFrame, how: str) -> str:
 
 
 def run(count: int, first: int = 0) -> list[str]:
-    """Spell the log so many times, and return what went wrong, by seed."""
+    """Write the log in a number of notations, and return the failures with their seeds."""
     log, wrong = small_log(N), []
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(first, first + count):

@@ -1,4 +1,4 @@
-"""Mutations that know where a file's structure is: its parts, its packing, its encoding, its name."""
+"""Mutations that use a file's structure: its parts, compression, encoding and name."""
 
 import gzip
 import io
@@ -66,7 +66,7 @@ HOSTILE_JSON: Sequence[bytes] = (
 
 
 def encoded_otherwise(data: bytes, rng: Generator) -> bytes:
-    """Return a text in another encoding, or from somewhere on in another."""
+    """Return a text in another encoding, from the start or from some place on."""
     text, names = (
         data.decode(errors="replace"),
         ("utf-16", "utf-16-be", "utf-32", "utf-7", "cp037", "shift_jis", "cp1252"),
@@ -76,14 +76,14 @@ def encoded_otherwise(data: bytes, rng: Generator) -> bytes:
 
 
 def ends_mixed(data: bytes, rng: Generator) -> bytes:
-    """Return a text with other ends of lines, mixed."""
+    """Return a text with two other kinds of line ends, mixed."""
     ends = (b"\n", b"\r\n", b"\r", b"\n\n", b"\n\r", b"\x85", b"\x0b", b"\0\n", b"\xe2\x80\xa8")
     some = [ends[int(rng.integers(len(ends)))] for _ in range(2)]
     return b"".join(line + some[int(rng.random() < 0.2)] for line in data.split(b"\n"))
 
 
 def cells_spoilt(data: bytes, rng: Generator) -> bytes:
-    """Return a text with a column, a few cells or the header replaced."""
+    """Return a text with a column, or some of its cells, replaced."""
     lines = data.split(b"\n")
     by = max((b",", b";", b"\t"), key=data.count)
     column, piece = int(rng.integers(5)), CELLS[int(rng.integers(len(CELLS)))]
@@ -97,7 +97,7 @@ def cells_spoilt(data: bytes, rng: Generator) -> bytes:
 
 
 def stretched(data: bytes, rng: Generator) -> bytes:
-    """Return a text with a row, a name or a number that is very long."""
+    """Return a text with a very long row, name or number."""
     lines = data.split(b"\n")
     at = int(rng.integers(min(len(lines), 4)))
     long = (b"9" * 200_000, b"," * 100_000, b'"' * 50_001, b"a;" * 100_000, b" " * 300_000, b"-" * 70_000)
@@ -121,7 +121,7 @@ TEXT = (
 
 
 def with_pieces(pieces: Sequence[bytes]) -> Callable[[bytes, Generator], bytes]:
-    """Return a mutation that puts such pieces where markup begins or ends."""
+    """Return a mutation that inserts such pieces at marks of the markup."""
 
     def put(data: bytes, rng: Generator) -> bytes:
         for _ in range(int(rng.integers(1, 4))):
@@ -139,7 +139,7 @@ def _one_of(some: Sequence[Callable[[bytes, Generator], bytes]], data: bytes, rn
 
 
 def in_zip(data: bytes, rng: Generator) -> bytes:
-    """Return an archive one of whose members is mutated, gone, double, or under another name."""
+    """Return an archive in which one member is mutated, missing, duplicated or renamed."""
     made = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as new:
         names = old.namelist()
@@ -160,7 +160,7 @@ def in_zip(data: bytes, rng: Generator) -> bytes:
 
 
 def in_gzip(data: bytes, rng: Generator) -> bytes:
-    """Return a packed text that is mutated, packed again or several times, or followed by something else."""
+    """Return a compressed text that is mutated, compressed again, written twice, or followed by something else."""
     text = gzip.decompress(data)
     match int(rng.integers(6)):
         case 0:
@@ -176,7 +176,7 @@ def in_gzip(data: bytes, rng: Generator) -> bytes:
 
 
 def in_mat(data: bytes, rng: Generator) -> bytes:
-    """Return a MAT 5 whose elements are packed after they were mutated."""
+    """Return a MAT 5 file whose elements are mutated and then compressed."""
     return data[:128] + _packed_element(_one_of(BINARY, data[128:], rng))
 
 
@@ -186,7 +186,7 @@ def _packed_element(content: bytes) -> bytes:
 
 
 def in_zstd(data: bytes, rng: Generator) -> bytes:
-    """Return a text packed by zstd after it was mutated."""
+    """Return a text that is mutated and then compressed with zstd."""
     import pyarrow as pa
 
     with pa.CompressedInputStream(io.BytesIO(data), "zstd") as file:
@@ -206,7 +206,7 @@ INSIDE: Mapping[str, Callable[[bytes, Generator], bytes]] = {
     ".json": with_pieces(HOSTILE_JSON),
     ".jsonl": with_pieces(HOSTILE_JSON),
 }
-"""What mutates a file behind its packing or its markup."""
+"""Mutations of a file's content behind its compression or markup, by suffix."""
 
 TEXTS = (".csv", ".txt", ".tsv", ".lvm", ".dat", ".asc", ".json", ".jsonl", ".ndjson")
 SUFFIXES = (
@@ -258,13 +258,13 @@ def struck(name: str, content: bytes, others: Mapping[str, tuple[str, bytes]], r
     Parameters
     ----------
     name : str
-        Name of the file, which says its kind.
+        Name of the file, whose suffix gives its kind.
     content : bytes
-        What it holds.
+        Its content.
     others : Mapping[str, (str, bytes)]
-        Files of other kinds, which may follow it.
+        Files of other kinds, which may be appended to it.
     rng : numpy.random.Generator
-        What decides.
+        Source of the random choices.
     """
     suffix = "." + name.rsplit(".", 1)[-1]
     inside: Any = INSIDE.get(suffix)

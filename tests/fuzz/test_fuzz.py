@@ -1,4 +1,4 @@
-"""A reduced run of the fuzzers, which are run at length as ``python -m tests.fuzz.files`` and ``tests.fuzz.texts``."""
+"""A short run of the fuzzers; for long runs, see ``python -m tests.fuzz.files`` and ``tests.fuzz.texts``."""
 
 from collections import Counter
 from pathlib import Path
@@ -25,7 +25,7 @@ def test_what_is_no_sentence_is_called_wrong() -> None:
 
 
 def test_a_few_mutated_files_and_texts_end_in_a_record_or_a_sentence() -> None:
-    assert files.run(len(KINDS), first=1_000_000) == []  # one of each format
+    assert files.run(len(KINDS), first=1_000_000) == []  # one file in each format
     assert texts.run(15, 0, first=1_000_000) == []
 
 
@@ -39,14 +39,15 @@ def test_a_few_files_of_columns_that_are_no_plain_numbers_end_in_a_record_or_a_s
 
 def test_a_few_legal_files_with_odd_content_are_read_as_what_was_written(tmp_path: Path) -> None:
     assert [legal_files.check(legal_files.tdms, seed, tmp_path) for seed in legal_files.KEPT] == [""] * 3
-    assert legal_files.run(5, first=1_000_000) == []  # one of each writer
+    assert legal_files.run(5, first=1_000_000) == []  # one file from each writer
 
 
 @pytest.mark.slow
 def test_many_legal_files_with_odd_content_are_read_as_what_was_written() -> None:
     ends: Counter[str] = Counter()
     assert legal_files.run(200, ends=ends) == []
-    assert sum(count for end, count in ends.items() if end.endswith("read")) > 160  # a refusal proves little
+    # refusals prove little, so most files must be read
+    assert sum(count for end, count in ends.items() if end.endswith("read")) > 160
 
 
 def test_logs_as_programs_of_benches_write_them_are_read(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
-"""Mutated rig files, study files, ``--columns`` texts and streams: accepted, or one sentence.
+"""Mutated rig files, study files, ``--columns`` texts and streams: accepted, or refused in one sentence.
 
-Run it as ``python -m tests.fuzz.texts 2000 500``: so many texts and streams.
+Run it as ``python -m tests.fuzz.texts 2000 500``, with the numbers of texts and of streams.
 """
 
 import json
@@ -68,7 +68,7 @@ ROWS = "time_s,motor_speed_rad_s,position_m,velocity_m_s\n" + "".join(
 
 
 def read_toml(content: bytes, path: Path) -> None:
-    """Read a rig and a study; plan the study where it is one."""
+    """Read a text as a rig or else as a study; plan the study if it is small."""
     path.write_bytes(content)
     try:
         read_rig(path)
@@ -79,13 +79,13 @@ def read_toml(content: bytes, path: Path) -> None:
 
 
 def read_columns(content: bytes, _: Path) -> None:
-    """Parse the option, and look the columns up."""
+    """Parse the option, and look up its columns."""
     text = content.decode(errors="replace")
     resolve_columns(["T", "POS, MM", "Motor speed [rpm]", "V"], load_columns([text]), "a.csv")
 
 
 def watch_stream(content: bytes, _: Path) -> None:
-    """Watch a stream; its last line must be one of JSON that says how it ended."""
+    """Watch a stream; its last line must be JSON that states how it ended."""
     from typer.testing import CliRunner
 
     from experiments.cli import app
@@ -99,7 +99,7 @@ def watch_stream(content: bytes, _: Path) -> None:
 
 
 def run(texts: int, streams: int, first: int = 0) -> list[str]:
-    """Mutate so many texts and streams, and return what went wrong, by kind and seed."""
+    """Mutate a number of texts and streams, and return the failures with kind and seed."""
     study = files("experiments.batch").joinpath("studies/eha-paper.toml").read_bytes()
     kinds: list[tuple[str, bytes, Callable[[bytes, Path], None]]] = [
         ("rig", rig_template().encode(), read_toml),
@@ -109,7 +109,7 @@ def run(texts: int, streams: int, first: int = 0) -> list[str]:
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "text.toml"
-        watch_stream(ROWS.encode(), path)  # its kernel is compiled here, which no single stream pays for
+        watch_stream(ROWS.encode(), path)  # compiles the kernel here, so that no single stream has to
         cases = [(seed, *kinds[seed % 3]) for seed in range(first, first + texts)]
         cases += [(seed, "stream", ROWS.encode(), watch_stream) for seed in range(first, first + streams)]
         for seed, kind, content, use in cases:

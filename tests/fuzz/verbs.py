@@ -1,6 +1,6 @@
-"""Mutated files given to the command itself, each in a process of its own: its exit code, its words, time and memory.
+"""Mutated files given to the command, each in its own process: exit code, messages, time and memory are checked.
 
-Run it as ``python -m tests.fuzz.verbs 5000 [FIRST]``; what goes wrong is named by its kind, seed and verb.
+Run it as ``python -m tests.fuzz.verbs 5000 [FIRST]``; a failure is reported with kind, seed and verb.
 """
 
 import json
@@ -43,7 +43,7 @@ VERBS: Sequence[tuple[float, Sequence[str]]] = (
     (0.3, ("fleet", "FOLDER", "--workers", "1", "--out", "fleet")),
     (0.3, ("batch", "STUDY", "--workers", "1", "--out", "store", "--json")),
 )
-"""Share of the runs, and what is typed; LOG stands for the mutated file, OTHER for one that is whole."""
+"""Weight of each command among the runs, and its words; LOG is the mutated file, OTHER an intact one."""
 
 STUDY = """
 name = "mutated"
@@ -65,7 +65,7 @@ class Run(NamedTuple):
 
 
 def prepare(whole: Path) -> None:
-    """Use each verb once on a whole log, so that each process begins with what it imports and compiles."""
+    """Run each verb once on an intact log, so that forked processes inherit its imports and compiled code."""
     from typer.testing import CliRunner
 
     from experiments.cli import app
@@ -92,7 +92,7 @@ def run(words: Sequence[str], folder: Path, stdin: bytes = b"") -> Run:
                 (err, 2, os.O_WRONLY | os.O_CREAT | os.O_TRUNC),
             ):
                 os.dup2(os.open(path, flags), number)
-            # pytest has put files and settings of its own in their place
+            # pytest replaced the standard streams and the floating-point settings
             np.seterr(all="warn", under="ignore")
             sys.stdin, sys.stdout, sys.stderr = (os.fdopen(k, mode, closefd=False) for k, mode in enumerate("rww"))
             resource.setrlimit(resource.RLIMIT_AS, (3 * MOST, 3 * MOST))
@@ -119,7 +119,7 @@ def _no_constant(name: str) -> float:
 
 
 def wrong_with(words: Sequence[str], ended: Run) -> str:
-    """Return what is wrong with how a run ended, empty where nothing is."""
+    """Return what is wrong with the end of a run, or an empty string."""
     if ended.signal or ended.code not in (0, 1, 2):
         return f"exit code {ended.code}, signal {ended.signal}: {ended.err[-300:]!r}"
     if ended.seconds > LONGEST:
@@ -149,17 +149,17 @@ def wrong_with(words: Sequence[str], ended: Run) -> str:
 
 
 def typed(words: Sequence[str], name: str, other: str) -> list[str]:
-    """Return what is typed for a file of this name."""
+    """Return the words of a command for a file with this name."""
     named = f"./logs/{name}"
     places = {"LOG": named, "OTHER": other, "FOLDER": "logs", "STUDY": "study.toml"}
     return [places.get(word, word) for word in words]
 
 
 def fuzz(count: int, first: int = 0, *, only: int | None = None) -> list[str]:
-    """Mutate so many files, give each to a verb, and return what went wrong, by kind and seed."""
+    """Mutate a number of files, run a verb on each, and return the failures with kind and seed."""
     shares = np.array([one for one, _ in VERBS])
     wrong: list[str] = []
-    home = Path(tempfile.mkdtemp())  # no TemporaryDirectory: each child would remove it as it exits
+    home = Path(tempfile.mkdtemp())  # not a TemporaryDirectory: each child would remove it at exit
     try:
         made = seeds(home)
         other = home / "whole.csv"

@@ -1,4 +1,4 @@
-"""More ways to write a log: what oscilloscopes, LabVIEW, dSPACE, catman, Fortran, NumPy and scripts leave."""
+"""More ways to write a log, as by oscilloscopes, LabVIEW, dSPACE, catman, Fortran, NumPy and scripts."""
 
 import json
 import pickle
@@ -215,4 +215,4 @@ MORE: Mapping[str, Way] = {
     "pickle": Way(pickled, refused="a pickle may run any program .* save the log as"),
     "OpenDocument": Way(open_document, refused="OpenDocument .* save it as"),
 }
-"""Each way by what it is."""
+"""Each way, by its description."""

@@ -1,4 +1,4 @@
-"""One log, written in 25 ways with the real writers, is one Record: read unaided, or by the block of `inspect`."""
+"""One log, written in 25 ways by the real libraries, gives one Record, read unaided or as `inspect` advises."""
 
 import json
 import warnings
@@ -40,7 +40,7 @@ def log() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def written(log: pd.DataFrame, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return the file of a way that is read, written once."""
+    """Return a function from the name of a way to a file written in it; each is written once."""
     return cache(lambda name: READ[name].write(log, tmp_path_factory.mktemp("way")))
 
 

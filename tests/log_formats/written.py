@@ -1,4 +1,4 @@
-"""25 ways to write one log, each with the library that benches and scripts write it with."""
+"""25 ways to write one log, each with the library that benches and scripts use for it."""
 
 import gzip
 from collections.abc import Callable, Mapping
@@ -21,7 +21,7 @@ SI = ("time_s", "motor_speed_rad_s", "position_m", "velocity_m_s", "differential
 
 @dataclass(frozen=True)
 class Way:
-    """A way to write a log: the file that is read, and what is said beside it."""
+    """A way to write a log: a function that writes it, and the options needed to read it."""
 
     write: Callable[[pd.DataFrame, Path], Path]
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -30,7 +30,7 @@ class Way:
 
 
 def benched(log: pd.DataFrame, names: tuple[str, ...] = ENGLISH) -> pd.DataFrame:
-    """Return the log in units of the bench."""
+    """Return the log in the units of a bench."""
     scale = (1.0, RPM, 1e3, 1e3, 1e-5)
     return pd.DataFrame({name: log[si] * by for name, si, by in zip(names, SI, scale, strict=True)})
 
@@ -214,7 +214,7 @@ def timeless(log: pd.DataFrame, folder: Path) -> Path:
 
 
 def timetable(_: pd.DataFrame, folder: Path) -> Path:
-    """A MATLAB object: its class is opaque, as `save` of a timetable leaves it."""
+    """Write a timetable as MATLAB's `save` does: an object whose class cannot be read."""
     from scipy.io import savemat
 
     savemat(folder / "timetable.mat", {"run": "a timetable"})
@@ -256,4 +256,4 @@ WAYS: Mapping[str, Way] = {
     "a timetable of MATLAB's": Way(timetable, refused="can only be read by MATLAB: save its columns as"),
     "a zip archive": Way(zipped, refused="a zip archive is no log: unpack it first"),
 }
-"""Each way by what it is; 23 are read, 2 refused."""
+"""Each way, by its description; 23 can be read, 2 are refused."""

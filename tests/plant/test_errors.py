@@ -1,4 +1,4 @@
-"""Names that a user gives are checked, each once, and the sentence says which are known."""
+"""Names given by a user are checked for being known and given only once, and the message lists the known ones."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A state comes back as it was kept; a file of another kind or a damaged one is refused."""
+"""A state is read back as it was kept; a damaged file or one of another kind is refused."""
 
 from pathlib import Path
 

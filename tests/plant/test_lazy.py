@@ -1,4 +1,4 @@
-"""A package's names are imported when they are asked for, and a name that it lacks is an attribute error."""
+"""A package's names are imported when they are first used, and an unknown name is an attribute error."""
 
 from pathlib import Path
 

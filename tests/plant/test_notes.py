@@ -1,4 +1,4 @@
-"""Notes that say the same are told once."""
+"""Notes that state the same thing are given once."""
 
 from plant.log.notes import LogCode
 from plant.notes import Code, distinct
@@ -27,7 +27,7 @@ def test_a_half_width_that_nothing_bounds_is_no_number() -> None:
 
 
 def test_notes_at_a_prompt_are_sentences() -> None:
-    """A tuple of notes showed templates with empty fields, and the numbers apart."""
+    """A tuple of notes used to show templates with empty fields, separate from their numbers."""
     note = LogCode.CLOCK_ASSUMED.note(sample_time_s=0.5)
     assert repr((note,)) == f"(<clock_assumed: {note}>,)"
     assert "{" not in repr(note)

@@ -1,4 +1,4 @@
-"""What units and runs of every actuator give on either side of their limits, kept in `numbers.json`."""
+"""Results of units and of runs of every actuator on either side of their limits, kept in `numbers.json`."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""Spare processors change when an answer comes, never what it is."""
+"""Spare processors change when an answer arrives, but never the answer."""
 
 import threading
 import time
@@ -14,7 +14,7 @@ from plant.spare_processors import begun, each
 
 @pytest.fixture
 def two(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine of two processors."""
+    """A machine with two processors."""
     monkeypatch.setattr(spare_processors, "spare_processors", lambda: 1)
 
 

@@ -121,7 +121,7 @@ def hypotheses_asked(
     """
     if len(log.drives) > MOST_ASKED:
         return (), ()
-    if loaded:  # a sensor that reads too much looks loaded at rest
+    if loaded:  # at rest a sensor that reads too high looks like a load
         return (BEGUN, OFFSET_AT_REST), ()
     if is_too_close(swinging, log.passes_on):
         return (), ()
@@ -140,9 +140,10 @@ def hypotheses_asked(
     delivery, zero, *hidden = _possible(promises, swinging)
     sought = ZERO_HIDDEN if is_far_stiffer(log, swinging.values) else ENCODER_ZERO
     shows_zero = best is swinging or homed_at_stop(log)
-    if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
+    # the fit with varying volumes may be wrong: its slopes then predict no gain
+    if best is not swinging and shows_zero:
         zero = max(zero, predicted_gain(log, parameters, best.values, ENCODER_ZERO))
-    if sought is ZERO_HIDDEN:  # else slopes promise what the accumulator leaves of a zero: nothing
+    if sought is ZERO_HIDDEN:  # the accumulator has absorbed the zero, so slopes beside it predict no gain
         zero = max(zero, predicted_gain(log, parameters, _unheld(swinging.values), ENCODER_ZERO, by_mass=by_mass))
     worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) * ZERO_SIZE > _least_zero(parameters)
@@ -158,7 +159,7 @@ def hypotheses_asked(
         return (BEGUN,) if moving else all_strange, remarks
     if not moving:
         return HYPOTHESES if not log.passes_on and doubted(swinging) else asked, remarks
-    # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any
+    # chambers shut in far above the accumulator draw no make-up flow for seconds; a search from rest then loses it
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
     lost = swinging is best and not fed and doubted(swinging)
     begun = predicted_gain(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)

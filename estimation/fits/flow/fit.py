@@ -192,7 +192,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
             return Answered(plain, asked, (*open_ends, *hints), None, ended=True)
         if (elsewhere := strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))) is None:
             return Answered(plain, asked, (*open_ends, *hints), strange)
-        start = elsewhere  # with the motor's course that was found
+        start = elsewhere  # keeps the course of the motor that was found
 
 
 def _misread(corrected: CorrectedLogs, plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> bool:
@@ -226,7 +226,7 @@ def _strange(
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=moving, astray=astray)
     if plain.best is not plain.swinging and explains(plain.best):
         near = [plain.best.values, *near]
-    alone = len(asked) == 1 and asked[0] in (*ALWAYS_ASKED, ZERO_HIDDEN)  # it has no rival
+    alone = len(asked) == 1 and asked[0] in (*ALWAYS_ASKED, ZERO_HIDDEN)  # no other hypothesis competes with it
     strange = explain(
         asked_for_ripple(plain.log),
         plain.start.parameters,
@@ -242,7 +242,7 @@ def _strange(
     if strange is None:
         return None
     lower = strange.fit.cost < wanted_in(strange.names, plain, traits, strange.fit.chi_square[0])
-    crossed = PLAY.name not in strange.names or not doubted(strange.fit)  # a play leaves sensor noise alone
+    crossed = PLAY.name not in strange.names or not doubted(strange.fit)  # beside a play only sensor noise may be left
     if lower and crossed and explains(strange.fit):
         return strange
     if hints is not None:

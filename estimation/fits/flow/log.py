@@ -125,7 +125,7 @@ def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array
     first, after = stretches(missing)
     speed, last, length = bridged(record["motor_speed_rad_s"]), len(missing) - 1, after - first
     before, further, behind = np.maximum(first - 1, 0), np.maximum(first - 2, 0), np.minimum(after, last)
-    # a straight line is right where the speed goes on as it did before the gap and does after it
+    # a straight line is right if the speed crosses the gap at the mean of its slopes before and after it
     slopes = 0.5 * (speed[before] - speed[further] + speed[np.minimum(after + 1, last)] - speed[behind])
     sudden = np.abs(speed[behind] - speed[before] - slopes * (length + 1))
     sudden = np.where(length < LONG_GAP, sudden, np.maximum(sudden, np.std(speed)))
@@ -168,7 +168,8 @@ def flow_log(
         Averaged if it is faster than the form needs.
     """
     sensed, record = record, without_pauses(record)
-    pressure = "differential_pressure_pa"  # a motor's blows stay in its noise: so intervals hold its course
+    # motor speed keeps its larger variance, with sudden changes, so that intervals cover its course
+    pressure = "differential_pressure_pa"
     quiet = {pressure: min(variances[pressure], struck_variance(sensed[pressure]))}
     log = greybox_log(
         FLOW_FORM,
@@ -176,7 +177,8 @@ def flow_log(
         flow_parameters(parameters),
         longest_step=LONGEST_STEP,
         variances={**variances, **quiet},
-        uncertainties={name: one for name, one in uncertainties.items() if name != GAS},  # its stiffness is fitted
+        # the accumulator's stiffness is fitted
+        uncertainties={name: one for name, one in uncertainties.items() if name != GAS},
     )
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
     drives = log.drives.copy()
@@ -188,8 +190,8 @@ def flow_log(
         log,
         noise=(replace(log.noise[0], passed_on=passed_on, passed_by="bulk_modulus"),),
         timed=FLOW_FORM.drives,
-        drive_std=(log.drive_std[0], 0.0),  # the residuals hold position's
-        # where the piston is within a gap of its position is not known, where it is after it is
+        drive_std=(log.drive_std[0], 0.0),  # the output noise includes position noise
+        # the piston's place is unknown within a gap of its position, but known after it
         drives=_balanced_across(open_gaps, record, drives, parameters),
         measured=np.where(within_gaps(record["position_m"])[:, None], np.nan, log.measured),
         gaps=open_gaps,
@@ -219,7 +221,7 @@ def _noisy(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:
     position, speed = record["position_m"], bridged(record["motor_speed_rad_s"])
     pumped = p.pump_displacement / p.piston_area * record.sample_time * np.cumsum(speed)
     rows = np.flatnonzero(np.isfinite(log.measured[:, 0]))
-    every = min(round(float(median(np.diff(rows)))), samples) if rows.size > 1 else 1  # a hole thins nothing
+    every = min(round(float(median(np.diff(rows)))), samples) if rows.size > 1 else 1  # the median ignores a single gap
     leaked = encoder_noise(position, pumped, position_variance(position), averaged_over, samples, every)
     noise = replace(
         log.noise[0],
@@ -319,7 +321,7 @@ def _balanced_across(open_gaps: Array, record: Record, drives: Array, p: EhaPara
     for first, behind, _ in open_gaps:
         before, after = int(first) - 1, int(behind)
         if before < 0 or missing[after]:
-            continue  # at an end of the log nothing is known of the other end of a gap
+            continue  # a gap at an end of the log has only one known end
         length = (after - before) * record.sample_time
         swept = p.piston_area * (drives[after, position] - drives[before, position])
         yielded = p.chamber_volume / p.bulk_modulus * (pressure[after] - pressure[before])

@@ -109,7 +109,8 @@ def with_lumped(
     left_out = (UNEVEN_SIDES if single else DISCRETISED) * p.rated_flow
     covariance[0, 0] += (left_out / (min(p.relief_pressure, pressure) if single else p.relief_pressure)) ** 2
     if single:
-        covariance[0, 0] += (OF_DRAIN * found[DRAIN][0]) ** 2  # a held side drains nothing: the two leaks look alike
+        # a side held at accumulator pressure drains nothing, so the two leaks look alike
+        covariance[0, 0] += (OF_DRAIN * found[DRAIN][0]) ** 2
         covariance[1, 1] += left_out**2
         found = {**found, BIAS: (found[BIAS][0], math.hypot(found[BIAS][1], left_out))}
     deviations = np.sqrt(np.diag(covariance))

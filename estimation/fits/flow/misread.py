@@ -126,7 +126,8 @@ class CorrectedLogs:
             The fit.
         """
         stiffer = found.values["bulk_modulus"] > self.rig.bulk_modulus
-        alike = self._beyond > 0.0 if stiffer else self._beyond < 0.0  # friction speaks for a pressure off as oil does
+        # whether friction and oil agree that pressure is off
+        alike = self._beyond > 0.0 if stiffer else self._beyond < 0.0
         times = KIN if alike else FOREIGN
         return _kin(found, self.rig, times, SURELY if plain.explains(found) else 0.0)
 
@@ -235,7 +236,7 @@ def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bo
     modulus = fit.values["bulk_modulus"]
     if modulus <= 0.0:
         return False
-    std = min(fit.std["bulk_modulus"] / modulus, 1.0)  # of a logarithm that is not held, lest any oil be the rig's
+    std = min(fit.std["bulk_modulus"] / modulus, 1.0)  # at most 1: an undetermined modulus must not match every rig
     return abs(ln(modulus / rig.bulk_modulus)) - surely * std < ln(times)
 
 

@@ -53,7 +53,7 @@ def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
     told = plain.best.slopes.size and not plain.log.gaps.size
     if plain.start.held or plain.unturned.sample_time >= SLOW or not told:
         return plain
-    noise_alone = plain.explains(plain.best)  # else a course may also lead to another minimum
+    noise_alone = plain.explains(plain.best)  # otherwise the other course may also lead to another minimum
     most = _gains_at_most(plain) if noise_alone else np.inf
     if most <= HELD_WORTH or _held_gains(logged, plain) <= HELD_WORTH:
         return plain
@@ -93,7 +93,7 @@ def _held_gains(logged: Logged, plain: PlainFits) -> float:
     """Return the first-order gain in log-likelihood of a held command, at the same noise."""
     log, best, smooth = plain.log, plain.best, plain.unturned.drives
     bare = logged.seen_at(plain.start.parameters, held=True).drives
-    if len(bare) != len(smooth):  # averaged over other samples: so fast that no course is felt
+    if len(bare) != len(smooth):  # averaged in other blocks: the log is so fast that the course has no effect
         return 0.0
     problem, theta = FreedProblem.of(best.model, log), best.model.theta(best.values)
     known, other = problem.disturbed(theta, [log.drives, log.drives + bare - smooth])

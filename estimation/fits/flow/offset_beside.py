@@ -51,7 +51,7 @@ def offset_settled(
     offset = taken + shown.value
     if taken and abs(offset) < NORMAL_95 * shown.std:
         offset = 0.0
-    # an offset of pressure looks like one of speed: `speed_offset_instead` tells a large one from it
+    # an offset of pressure looks like one of speed; `speed_offset_instead` distinguishes a large one
     alike = "pressure_offset" in strange.names
     most = MOST_OFFSET if alike else MOST_SHARE * plain.start.parameters.rated_speed
     if abs(offset) > max(most, 2.0 * abs(taken)):

@@ -80,7 +80,8 @@ def _led(
     block = round(means.sample_time / sample_time)
     speed, position = (FLOW_FORM.drives.index(name) for name in FLOW_FORM.drives)
     every = block * np.arange(len(means.drives))
-    turned = delivering(sampled, means.teeth, means.speed_offset, sample_time)  # as the means, which hold the teeth
+    # with the same ripple and offset as the means
+    turned = delivering(sampled, means.teeth, means.speed_offset, sample_time)
     lines = np.interp(np.arange(len(sampled)), every, means.drives[:, speed])
     drives = means.drives.copy()
     for factor, bias in biases:

@@ -110,7 +110,7 @@ def _led(
     begun = FreedProblem.of(forms[0], afar.beginning(_search(afar).screened).coarsened())
     guess, near = _guess(begun, afar, parameters, starts)
     screen = remembered(begun.at)
-    if not near:  # in a wrong valley the whole log takes all steps that there are
+    if not near:  # in a wrong valley a search of the whole log uses up all its steps
         first = _searched(forms[0], log, afar, starts, hopeful=True, screen=screen)
         if _explains(first):
             return [first, *_others(forms[1:], log, afar, first)]
@@ -165,7 +165,7 @@ def _guess(
 
 
 def _search(log: GreyBoxLog) -> Search:
-    # where the noise moves with bulk modulus, steps promise less than they give
+    # if the noise depends on bulk modulus, steps gain more than predicted
     near_enough = NEAR_ENOUGH if log.passes_on else ROUGH_ENOUGH
     return Search(screened=_screened(log), near_enough=near_enough)
 

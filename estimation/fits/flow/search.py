@@ -151,9 +151,9 @@ def balanced(
     behind = [one for one in rough if not (_held(one.problem) or one in likely)]
     bent = opens_wide(log, parameters)
     log = with_first_fit(log, parameters, near.values, stiffest)
-    first = rough[0] if rough[0] in likely else near  # whose kernel has fewer runs side by side
+    first = rough[0] if rough[0] in likely else near  # its kernel has fewer runs side by side
     steps = sparing_steps(first.problem.on(log), first.point.theta)
-    # the balance by mass, which has had an accumulator from the first
+    # the balance by mass leads, since it has had an accumulator from the start
     leader = min(likely, key=lambda one: STIFFNESS not in one.problem.model.unknowns)
     lead = _finished(leader, log, steps, bent=bent)
     valves = _valves(lead)

@@ -88,7 +88,7 @@ def turned_beside(speed: Array, sample_time: float, noise: float) -> Array:
     for k in turns:
         whole = rise[k] + rise[k + 1] / (1.0 - left)
         if whole * rise[k] <= 0.0 or abs(rise[k + 2] - left * rise[k + 1]) > loud + SHORT * abs(whole):
-            continue  # another command came
+            continue  # another command followed
         short = float(np.clip(1.0 - rise[k] / whole, left, 1.0))
         beside[k] += whole * (-lag * (np.log(short) + 1.0 - short) - 0.5 * sample_time * (1.0 - short))
         for j in range(k + 1, min(len(speed), k + SETTLING)):

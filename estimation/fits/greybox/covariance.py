@@ -101,7 +101,7 @@ def _autocovariance(residual: Array, n_used: int, lags: int) -> Array:
     """Return the autocovariance from lag zero up to a lag, under a Bartlett window."""
     if lags <= FEW_LAGS:
         shifted = np.array([float(residual[lag:] @ residual[: residual.size - lag]) for lag in range(lags + 1)])
-    else:  # a transform that holds the longest shift takes hundreds of lags at the price of a few
+    else:  # one long transform gives hundreds of lags at the cost of a few
         size = smooth_length(residual.size + lags, (2, 3, 5))
         shifted = np.fft.irfft(np.abs(np.fft.rfft(residual, size)) ** 2, size)[: lags + 1]
     return shifted / n_used * (1.0 - np.arange(lags + 1) / (lags + 1.0))

@@ -239,7 +239,8 @@ def search(
         The best.
     """
     best = yield np.clip(start, *bounds)
-    gained = np.inf  # by the last step; unknown before the first, and after one that broke its promise
+    # gain of the last step; infinite (unknown) before the first one, and after one that gained too little
+    gained = np.inf
     for left in range(evaluations - 1, 0, -1):
         curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
         step, promised, radius = _downhill(best, curvature, radius, bounds)

@@ -155,9 +155,9 @@ def covariance_of(
     covariance = kept + NOISE_DOUBT**2 * np.outer(tilt, tilt)
     if disturbed:
         covariance = covariance + drive_covariance(problem, theta, bread, slopes, undisturbed, moved)
-    if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor
+    if problem.log.course is not None and disturbed:  # with few turns the windowed estimate is poor
         covariance = covariance + np.diag(np.maximum(np.diag(bread - spread), 0.0))
         covariance = covariance + opened(problem, theta, told.errors, bread, slopes)
-    # the window's estimate need not be positive: then nothing is known
+    # the windowed estimate need not be positive; if it is not, the unknown is undetermined
     covariance[~(np.diag(spread) > 0.0), ~(np.diag(spread) > 0.0)] = np.inf
     return covariance[: len(felt), : len(felt)]

@@ -76,7 +76,8 @@ def moved_by_drives(problem: Problem, theta: Array, undisturbed: Array | None = 
     """
     log, rough = problem.log, problem.coarse
     if undisturbed is None:
-        (undisturbed,) = rough.disturbed(theta, [log.drives])  # by the kernel of the draws: no other is compiled
+        # uses the kernel of the draws, so that no other is compiled
+        (undisturbed,) = rough.disturbed(theta, [log.drives])
     if len(log.drives) <= SAMPLES_KEPT:
         moved = rough.disturbed_together(theta, _noisy_drives(log)) - undisturbed[..., None]
         return moved.reshape(-1, DRAWS)

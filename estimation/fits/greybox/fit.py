@@ -214,7 +214,7 @@ def roughly(
     points: list[Point] = []
     for guess in guesses:
         length = LENGTHENED * search.screened
-        while length < len(log.measured):  # on ever longer beginnings, so that the whole takes few steps
+        while length < len(log.measured):  # ever longer beginnings, so that the whole log takes few steps
             guess, length = descended(guess, length, search.evaluations).theta, LENGTHENED * length
         points.append(descended(guess, len(log.measured), search.evaluations))
         if explained(whole, points[-1]):
@@ -302,8 +302,9 @@ def concluded(
             by_noise = noise_shift(problem, theta, known_of)
             rig = dict(answers_by_rig(with_steps(problem, steps), theta, known_of))
             late, play = _late_and_play(problem, known_of, moved, effects[felt] > LEAST_EFFECT**2)
-    noise = np.where(effects > LEAST_EFFECT**2, np.sqrt(np.diag(whole)), np.inf)  # else it is not known from this log
-    # teeth that are taken up are not small, and the course of a slow log's motor looks like some
+    # infinite for unknowns that this log does not determine
+    noise = np.where(effects > LEAST_EFFECT**2, np.sqrt(np.diag(whole)), np.inf)
+    # fitted ripple is not small, and in a slow log the course of the motor looks like ripple
     asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
     sizes, values = dict(model.linear), model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])

@@ -62,7 +62,7 @@ class FreedProblem(Problem):
         ridge: Ridge | None = None,
     ) -> None:
         sizes = tuple((name, linear[name]) for name in free if name in linear)
-        if not log.gaps.size:  # what a gap leaves open costs as much again to follow
+        if not log.gaps.size:  # following the uncertainty of gaps doubles the cost
             model = replace(model, jump=())
         model = replace(model, stiff=log.stiff)
         super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_by_itself, model))
@@ -110,7 +110,7 @@ class FreedProblem(Problem):
         list of Point
             As of `Problem.at`.
         """
-        if self.log.passes_on or len(thetas) == 1:  # else they have one variance
+        if self.log.passes_on or len(thetas) == 1:  # otherwise all points share one variance
             return [self.at(theta) for theta in thetas]
         rows = np.vstack([self._rows(self._nudged(theta), self.log.parameters) for theta in thetas])
         found = self._residuals(rows, None, self._variances(thetas[0]))[..., : len(rows)]
@@ -135,7 +135,7 @@ class FreedProblem(Problem):
         names = self.model.unknowns
         asked = [place for place, name in enumerate(names) if name not in known]
         rows = self._rows(self._nudged(theta)[[0, *(1 + place for place in asked)]], self.log.parameters)
-        # what is asked beside it takes `MANY`, and a kernel takes longer to compile than this run
+        # padded to `MANY`, which the other runs need: compiling a smaller kernel takes longer than this run
         rows = np.concatenate([rows, np.repeat(rows[-1:], max(0, LANES + 1 - len(rows)), axis=0)])
         here, columns = self._differences(self._residuals(rows, None, self._variances(theta)), len(asked))
         slopes = np.empty((*here.shape, len(names)))
@@ -164,7 +164,8 @@ class FreedProblem(Problem):
         """
         points = np.array(thetas)
         groups = self._in_groups(self._rows(points, self.log.parameters), None, self._variances(points[0]), lanes)
-        misfit = np.concatenate([*map(_misfits, groups)])[: len(points)]  # all together would not stay in a cache
+        # all groups at once would not fit in the cache
+        misfit = np.concatenate([*map(_misfits, groups)])[: len(points)]
         return self.log.stands_for * misfit + 0.5 * (points - self.presumed) ** 2 @ self.prior
 
     def residuals_of(self, theta: Array, parameters: Sequence[Array]) -> list[Array]:
@@ -225,7 +226,7 @@ class FreedProblem(Problem):
         ndarray, shape (outputs, blocks, `LANES` or `MANY`)
             As of `residuals`.
         """
-        # as many as its slopes take: no kernel for the drives alone
+        # the same number of lanes as the slopes use, so that no further kernel is compiled
         most = LANES if len(theta) < LANES else self._most
         row, variance = self._rows(theta[None], self.log.parameters), self._variances(theta)
         parts = [drives[..., first : first + most] for first in range(0, drives.shape[-1], most)]
@@ -269,7 +270,7 @@ class FreedProblem(Problem):
         for away, here, columns in last[::-1]:
             if self.near > 0.0 and np.linalg.norm(moved := columns @ away) < self.near:
                 felt = np.linalg.norm(columns[..., self._logarithmic], axis=(0, 1))
-                bent = 0.5 * felt @ away[self._logarithmic] ** 2  # to second order, and nothing cancels
+                bent = 0.5 * felt @ away[self._logarithmic] ** 2  # second-order change, as if no terms cancelled
                 if bent < self.near:
                     return here + moved, columns
         return None, None
@@ -309,7 +310,7 @@ class FreedProblem(Problem):
 
     def _in_groups(self, rows: Array, drives: Array | None, variance: Array, most: int = MANY) -> list[Array]:
         """Return the same in groups of rows, of which ``most`` run side by side."""
-        if len(rows) == 1:  # cheaper alone
+        if len(rows) == 1:  # a single run is cheaper without lanes
             spend(self.log)
             return [self._alone(rows[0], drives, variance)[..., None]]
         most, shared = min(most, self._most), (self.log.drives if drives is None else drives)[..., None]
@@ -322,7 +323,7 @@ class FreedProblem(Problem):
         lanes = lanes_for(len(rows))
         found = self._room(lanes)
         filled = rows if len(rows) == lanes else np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
-        with np.errstate(all="ignore"):  # a try that runs away is stepped back from
+        with np.errstate(all="ignore"):  # the search rejects a trial that diverges
             gaps = (self.log.gaps,) if self._bare.jump else ()
             self._kernel_of(lanes)(filled, drives, self.log.measured, *self._course(variance), *gaps, found)
         return found

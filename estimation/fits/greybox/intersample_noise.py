@@ -134,5 +134,5 @@ def _without_offset(problem: Problem, theta: Array, most: int) -> tuple[Array, A
     columns = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
     squares, ways_out = np.linalg.eigh(columns.T @ columns)
     told = squares > ALIKE
-    basis = columns @ (ways_out[:, told] / np.sqrt(squares[told]))  # exactly none where a block is missing
+    basis = columns @ (ways_out[:, told] / np.sqrt(squares[told]))  # exactly zero for a missing block
     return errors - basis @ (basis.T @ errors), basis

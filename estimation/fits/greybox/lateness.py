@@ -68,7 +68,7 @@ def left_by(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[A
     callable
         ``left(change)``, both of shape (blocks,).
     """
-    if not np.all(told):  # the inverse of a part of a matrix, from the whole inverse
+    if not np.all(told):  # the inverse of a submatrix, from the inverse of the whole matrix
         across = bread[np.ix_(told, ~told)]
         bread = bread[np.ix_(told, told)] - across @ np.linalg.solve(bread[np.ix_(~told, ~told)], across.T)
         slopes = slopes[:, told]

@@ -137,7 +137,7 @@ def encoder_noise(
     step, block = _step(position), averaged * samples
     if not step or len(position) <= 2 * READ * block:
         return white_noise(samples, every)
-    of_steps = min(step**2 / (12.0 * variance), 1.0)  # of the variance
+    of_steps = min(step**2 / (12.0 * variance), 1.0)  # share of rounding in the variance
     blurred = (1.0 / of_steps - 1.0) / 12.0
     course = _course(bridged(position), pumped, READ * block) / step
     lags = min(LAGS * block, len(course) // 2)
@@ -148,7 +148,8 @@ def encoder_noise(
             alike += 12.0 * of_steps * share * _likeness(np.exp(2j * np.pi * k * course), lags)
     alike = (alike - alike[-1]) * (1.0 - np.arange(lags) / lags)
     alike[0] = 1.0
-    within = np.convolve(np.ones(averaged), np.ones(averaged)) / averaged  # means of samples
+    # triangular weights of the autocorrelation for means of samples
+    within = np.convolve(np.ones(averaged), np.ones(averaged)) / averaged
     both = np.convolve(np.concatenate([alike[:0:-1], alike]), within)
     return _leaked(both[len(both) // 2 :: averaged], samples, every)
 

@@ -222,7 +222,7 @@ def sensed_play(record: Record) -> ShownPlay:
     position = bridged(record[POSITION])
     stands = standings(position)
     force = smoothed(bridged(record[PRESSURE]), round(SMOOTHED / record.sample_time))
-    # the encoder's rate is over two sample times, so velocity is averaged over them too
+    # the encoder's rate spans two sample times, so velocity is averaged over them too
     velocity, rate = (
         np.convolve(record[VELOCITY], (0.25, 0.5, 0.25), mode="same"),
         np.gradient(force) / record.sample_time,

@@ -131,7 +131,7 @@ def standings(position: Array) -> Standings:
     steps = np.flatnonzero(np.diff(at)) + 1
     ways = np.sign(at[steps] - at[steps - 1])
     sure = np.flatnonzero(ways[1:] == ways[:-1]) + 1
-    # what is after the last movement ends with the log, at the side where it began
+    # the rest after the last movement ends with the log, on the side where it began
     places = np.concatenate([[0], steps[sure], [len(position) - 1]])
     sides = np.concatenate([[0.0], ways[sure], ways[sure][-1:] if len(sure) else [0.0]])
     before = np.searchsorted(places[:-1], np.arange(len(position)), side="right") - 1

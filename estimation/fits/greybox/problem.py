@@ -242,7 +242,7 @@ class Problem:
         variance: Array | None = None,
     ) -> tuple[float, Array, Array]:
         log = self.log
-        with np.errstate(all="ignore"):  # a try that runs away is stepped back from
+        with np.errstate(all="ignore"):  # the search rejects a trial that diverges
             return self._kernel(
                 theta,
                 log.drives if drives is None else drives,

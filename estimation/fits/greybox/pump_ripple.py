@@ -332,9 +332,9 @@ def _likeliest(problem: Problem, theta: Array, errors: Array, counts: Sequence[i
     for count, more in zip(counts, np.diff(counts, prepend=0).tolist(), strict=True):
         wave, passing = wave * (turn if more == 1 else turn**more), count * speed
         seen = np.abs(passing) * log.sample_time < 2.0 * MOST_BETWEEN
-        answer = passing * seen / (rate**2 + passing**2)  # times rate - 1j * passing: what real numbers can is quicker
+        answer = passing * seen / (rate**2 + passing**2)  # real factor, for speed; times rate - 1j * passing below
         power = float(np.sum(answer * passing * delivers[blocks]))
-        turns = MOST_OFFSET * count * length / (2.0 * np.pi)  # of the phase, by the largest offset
+        turns = MOST_OFFSET * count * length / (2.0 * np.pi)  # turns of the phase at the largest offset
         looks = min(len(errors), int(np.ceil(LOOKS_A_TURN * turns)))
         starts = np.arange(looks) * len(errors) // looks
         along = np.add.reduceat(wave * (weighed * answer * (rate - 1j * passing)), starts)

@@ -75,8 +75,8 @@ def residuals_side_by_side(
     errors : ndarray, shape (outputs, blocks, lanes)
         Output array for the residuals; those of missing blocks are not changed.
     """
-    room = np.zeros(kernel.NUMBERS + 8)  # what is at no time set, the share of a step at its start, is zero
-    work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
+    room = np.zeros(kernel.NUMBERS + 8)  # the share of a step at its start is never set, and must be zero
+    work = room[-room.ctypes.data % 64 // 8 :]  # aligned: a vector across two cache lines takes twice as long
     slots, lanes = work.ctypes.data, kernel.LANES
     shown = (kernel.WIDTH + 2 * kernel.DRIVES) * lanes
     pace = shown + kernel.OUTPUTS * lanes

@@ -48,7 +48,7 @@ def sign_constrained_covariance(
     wanted = point.theta[felt] - bread @ point.gradient[felt]
     ends = {place: (float(point.theta[felt[place]]), float(wanted[place])) for place in signed}
     kept = not_negative(spread, ends)
-    kept[signed, signed] = spread[signed, signed]  # by its own deviation is judged whether it is there at all
+    kept[signed, signed] = spread[signed, signed]  # its own deviation decides whether it exists at all
     return kept
 
 
@@ -79,10 +79,10 @@ def not_negative(spread: Array, found: dict[int, tuple[float, float]]) -> Array:
     for place, (here, wanted) in found.items():
         variance = float(kept[place, place])
         if 0.0 < variance < inf:
-            std, freely = sqrt(variance), wanted if wanted < 0.0 else here  # where a search ended counts as its optimum
+            std, freely = sqrt(variance), wanted if wanted < 0.0 else here  # the end of a search counts as its optimum
             share = min(square_about(-freely / std, (here - freely) / std), 1.0)
             most = np.sqrt(np.maximum(np.diag(kept), 0.0) * variance)
-            follows = np.clip(kept[place], -most, most)  # rounding makes correlations beyond one of unknowns alike
+            follows = np.clip(kept[place], -most, most)  # rounding may put the correlation of unknowns above 1
             kept -= np.outer(follows, follows) * ((1.0 - share) / variance)
     return kept
 

@@ -92,6 +92,7 @@ def with_shifts(
     for moved, variance in shifts:
         for name in (name for name in MOVED if name in moved and name in out):
             value, std = out[name]
-            step = moved[name] if abs(moved[name]) <= MOST_MOVED else 0.0  # no fit is linear so far: only uncertain
+            # no fit is linear beyond `MOST_MOVED`: there only the deviation grows
+            step = moved[name] if abs(moved[name]) <= MOST_MOVED else 0.0
             out[name] = value * math.exp(step), math.hypot(std, value * variance[name] ** 0.5)
     return out

@@ -127,7 +127,7 @@ def _long_step_errors(problem: Problem, theta: Array) -> Array:
 
 def _apart(problem: Problem, theta: Array, rough: GreyBoxLog, fine: GreyBoxLog) -> Array:
     """Return a log's residuals with some model steps minus those with others, shape (outputs, blocks)."""
-    # side by side, as a search has them: no kernel for these two
+    # side by side, as in a search, so that no further kernel is compiled for these two runs
     rows = [rough.parameters] * min(1 + len(theta), LANES)
     there, exact = (problem.on(one).residuals_of(theta, rows)[0] for one in (rough, fine))
     return there - exact

@@ -41,7 +41,7 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
     likely = tuple(prior_weight(log, one) for one in (best, *rivals) for _ in one.fits)
     values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()}
     values |= dict(weighed(fits, priors=likely))
-    if any(name in values for name in GROWTH):  # what is told of a leakage is what it is at the end
+    if any(name in values for name in GROWTH):  # the reported leakage is that at the end of the log
         ended = float(grown_leakage(1.0, *(values.get(name, (0.0, 0.0))[0] for name in GROWTH)))
         value, std = values["leakage_coefficient"]
         values["leakage_coefficient"] = ended * value, ended * std

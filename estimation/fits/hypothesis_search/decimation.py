@@ -70,7 +70,7 @@ def decimated(log: GreyBoxLog, every: int) -> GreyBoxLog:
     block = min(max(1, round(log.block / log.sample_time)), every)
     there = np.flatnonzero(np.isfinite(log.measured[:, 0]))
     first, apart = 0, float(np.median(np.diff(there))) if len(there) > 1 else 1.0
-    if apart > 1.0:  # else a block that lacks one, or a step beside them, leaves none
+    if apart > 1.0:  # otherwise blocks with missing pressures, or steps that miss their rows, would leave none
         block, every = 1, max(n for n in range(1, int(MOST_LONGER * every) + 1) if apart % n == 0)
         first = int(there[0]) % every
     rows = slice(first, None, every)

@@ -95,7 +95,7 @@ def explain(
     wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
     plain = _plain_point(wide, starts[0])
     likely, others, _ = by_predicted_gain(wide, (), starts[0], asked)
-    if homed and ENCODER_ZERO in others:  # far from the middle slopes promise nothing of it, nor do a few steps
+    if homed and ENCODER_ZERO in others:  # far from mid-travel neither slopes nor a few steps predict its gain
         likely, others = [ENCODER_ZERO, *likely], [one for one in others if one is not ENCODER_ZERO]
     left = cost_over_noise(wide, plain.cost)
     spared = Decimation(decimation_limit(wide, starts[0], decimation_for(wide, left)), left, starts)
@@ -155,7 +155,7 @@ def _alone(
     ended = ranked_optima(log, begun, spared=spared)
     finished = refined(log, ended, spared=spared._replace(starts=promising_starts(starts, begun)), useful=useful)
     if is_explained(finished[0], accepted) and finished[0].cost < plain - WORTH:
-        # a stuck valve was told as a small step of leakage, at 1.1 times the noise
+        # a stuck valve was reported as a small step of leakage, with residuals of 1.1 times the noise
         others = [one for one in others if one.far] if cost_over_noise(log, finished[0].cost) > NOISE else []
     if not others:
         return finished
@@ -183,7 +183,7 @@ def _paired(
     every = decimation_limit(log, first.coarse or first.values, decimation_for(log, left), first.together, first.delays)
     spared = Decimation(every, left, begun)
     long, useful = len(log.drives) >= FEW, min(first.cost, rivalled) - WORTH
-    if long:  # none is told that does not explain the log
+    if long:  # only pairs that explain the log are reported
         useful = min(useful, NEARLY * first.cost / left)
     at_first = [*likely, *(one for one in others if one.far)]
     nearer = [[*screen(late, (*first.together, one), begun, every=spared.every)] for one in at_first]

@@ -103,7 +103,7 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
     sound = best.meant and not is_too_close(first, log.passes_on)
-    if SETTLING in last:  # an even drift is better known as one
+    if SETTLING in last:  # an even drift is better determined if it is fitted as one
         even = tuple(replace(one, at_end=()) if one.at_end == (SETTLING,) else one for one in tried.together)
         evenly = final_fit(log, replace(tried, together=even), best.cost + WORTH, *details)
         if evenly.cost < best.cost + WORTH:
@@ -137,7 +137,7 @@ def with_details(log: GreyBoxLog, tried: Trial) -> Trial:
         return tried
     further = final_fit(log, tried, np.inf, STIFFNESS, *CRACKS)
     if "pilot_share" in further.values and further.fits and play_left(further.fit.play):
-        # among the corners of piloted valves a search ends early, and what it leaves looks like play
+        # corners of piloted valves end a search early, and its residuals then look like play
         again = final_fit(log, further, np.inf, STIFFNESS, *CRACKS)
         further = replace(again, coarse=tried.coarse) if again.cost < further.cost else further
     if further.cost > tried.cost:
@@ -169,7 +169,7 @@ def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
         return tried
     name, time = PRESSURE_FILTERED.free
     lag = tried.values[name]
-    late = delay + lag  # the same first and second moments of the response to an impulse
+    late = delay + lag  # the impulse response keeps its first and second moments
     values = {**tried.values, name: late, time: (0.5 * (late**2 - lag**2)) ** 0.5}
     together = tuple(PRESSURE_FILTERED if one == PRESSURE_LATE else one for one in tried.together)
     delays = {channel: one for channel, one in tried.delays.items() if channel != PRESSURE_LATE.late}

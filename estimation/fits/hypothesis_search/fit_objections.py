@@ -123,7 +123,7 @@ def is_too_close(fit: GreyBoxFit, noisy: bool) -> bool:
     noisy : bool
         Whether position noise matters.
     """
-    return noisy and 0.0 < fit.chi_square[0] < QUIET  # of a pressure that is 0 throughout nothing is left
+    return noisy and 0.0 < fit.chi_square[0] < QUIET  # residuals are 0 if pressure is 0 throughout
 
 
 def _alternates(fit: GreyBoxFit, noisy: bool) -> bool:

@@ -176,7 +176,7 @@ def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array,
     (basis, upper), then = np.linalg.qr(always / sizes), then / size
     known = basis.T @ lost
     left = lost - basis @ known
-    # sums over all pieces after each time: with what is left, with the basis, and with itself
+    # sums over all pieces after each time: products of `then` with the residual, with the basis, and with itself
     columns = np.column_stack([left, basis, then]) * then[:, None]
     after = np.cumsum(columns[::-1], axis=0)[::-1][splits]
     across, along, power = after[:, 0], after[:, 1:-1], after[:, -1]

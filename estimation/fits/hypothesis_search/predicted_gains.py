@@ -167,7 +167,7 @@ def _promises(
     problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)), *last)
     theta = problem.model.theta({**usual_values(log), **found})
     point = problem.at_beside(theta, slopes) if slopes else problem.at(theta)
-    # an unknown at its bound promises what only the hypothesis in its place can keep
+    # an unknown at its bound predicts a gain that only the hypothesis in its place can reach
     held = {name for one in asked for name in one.instead}
     own = [name for name in freed(log, together, *last).model.unknowns if name not in held]
 

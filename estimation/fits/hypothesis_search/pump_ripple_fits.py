@@ -208,7 +208,7 @@ def _shifted(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float)
     """
     found, offset, wanted = plain, plain.log.speed_offset, OFFSET_SETTLED if plain.log.speed_offset else OFFSET_WORTH
     for _ in range(ROUNDS):
-        likely = min(found.fits, key=lambda fit: fit.cost - fit.speed_offset.gain)  # each has an offset of its own
+        likely = min(found.fits, key=lambda fit: fit.cost - fit.speed_offset.gain)  # each fit shows its own offset
         shown = likely.speed_offset
         if shown.gain < wanted:
             break
@@ -239,7 +239,7 @@ def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted, *, needed: b
         worse = found is None and held.best.cost > begun.best.cost
         if worse or any(one.count not in left for one in taken):
             return found
-        if found is not None and held.best.cost > found.best.cost:  # an overtone that helps none
+        if found is not None and held.best.cost > found.best.cost:  # the overtone does not help
             break
         found = held._replace(remarks=_told(taken[0], offset, left[count]))
         new = _corrected(taken, left)
@@ -306,7 +306,8 @@ def _left(found: RippleFits) -> tuple[Note, ...]:
 def _corrected(taken: Sequence[Ripple], left: Mapping[int, ShownRipple]) -> list[Ripple]:
     """Return the ripple with the correction that residuals show; None if it no longer matters."""
     held = {one.count for one in taken}
-    near = all(left[count].gain < OVERTONE_WORTH for count in held)  # else their own phase may look like an overtone
+    # overtones count only near the optimum, since an error of phase may look like one
+    near = all(left[count].gain < OVERTONE_WORTH for count in held)
     new = [one.teeth for one in left.values() if near and one.teeth.count not in held and one.gain > OVERTONE_WORTH]
     if not new and all(left[count].gain < SETTLED for count in held):
         return []

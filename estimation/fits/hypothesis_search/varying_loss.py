@@ -139,7 +139,7 @@ def varying_loss(
         if loss.size > least and explains(loss.fit) and loss.fit.cost < wanted - WORTH:
             found.append(loss)
     best = min(found, key=lambda one: one.fit.cost, default=None)
-    # with another flow bias, a pump that fills badly from a low speed on does what a worn one does
+    # with another flow bias, a pump that fills badly from a low speed on looks like a worn one
     worn = [one for one in found if one.course.kind == WEAR and best and one.fit.cost < best.fit.cost + ALIKE]
     return worn[0] if worn else best
 
@@ -213,7 +213,7 @@ class _Search:
             best.setdefault(asked[i].kind, i)
         found = [(asked[i], float(size[i])) for i in best.values() if gain[i] > 0.0 and HOPE * gain[i] > needed]
         found = [*found[:TRIED], *(one for one in found[TRIED:] if one[0].kind == WEAR)]
-        if all(course.kind != ONE_WAY for course, _ in found):  # far from none, slopes say little of it
+        if all(course.kind != ONE_WAY for course, _ in found):  # slopes at no loss say little about a large one
             return [*found, *((course, ONE_WAY_TRIED) for course in asked if course.kind == ONE_WAY)]
         return found
 

@@ -303,7 +303,7 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     stiffest = stiffness * np.exp(MOST_DEVIATIONS * doubt)
     latest = 0.0 if log.course is None else -log.sample_time
     limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
-    peak = _peak(log)  # a valve that is set higher never opens, and no slope leads back
+    peak = _peak(log)  # a valve set higher never opens, so no slope leads back
     limits["relief_pressure"] = (LEAST_SETTING * peak, max(peak, rig["relief_pressure"]))
     limits[START_LEVEL] = (-rig["accumulator_pressure"], shut_in(log))
     place = model.unknowns.index("bulk_modulus")  # fitted as a logarithm

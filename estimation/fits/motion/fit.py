@@ -141,7 +141,7 @@ def fit_motion(
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     ended = likeliest([MotionSearch.of(form, log, starts) for form in MOTION_FORMS])
     found, spared = _concluded(ended, log, sparing=True)
-    if spared and not found.reasons:  # held after all: then it is looked for on other scales too
+    if spared and not found.reasons:  # bulk modulus is determined after all, so other scales are searched too
         found, _ = _concluded(ended, log, sparing=False)
     return found
 
@@ -232,7 +232,7 @@ def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:
     """Return the model steps up to each sample: short ones where the piston reverses or starts."""
     reach = max(1, round(5e-3 / sample_time))
     sums = np.cumsum(np.pad(drives[:, 1] - drives[0, 1], (reach + 1, reach), mode="symmetric"))
-    pace = np.gradient(sums[2 * reach + 1 :] - sums[: -2 * reach - 1])  # in proportion to the mean velocity
+    pace = np.gradient(sums[2 * reach + 1 :] - sums[: -2 * reach - 1])  # proportional to the mean velocity
     turning = np.abs(pace) < TURNING * np.sqrt(np.mean(pace**2))
     set_off = np.abs(np.diff(drives[:, 0], prepend=drives[0, 0])) > SET_OFF
     fine, coarse = (steps_a_sample(sample_time, step) for step in (FINEST_STEP, LONGEST_STEP))
@@ -306,7 +306,7 @@ def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
     Otherwise, and in short logs, any improvement counts.
     """
     samples = len(problem.log.measured)
-    chi_square = 2.0 * problem.at(begun.theta).cost / samples  # where the search begins: it is not run twice
+    chi_square = 2.0 * problem.at(begun.theta).cost / samples  # the search begins here and reuses this run
     spared = chi_square < share * SPARED_NIS or share_of_motion(chi_square, problem.log) < share * SPARED_SHARE
     return explained(problem) if spared and samples * problem.log.sample_time > SCREENED else np.inf
 
@@ -314,7 +314,7 @@ def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
 def _rival(second: Ended, whole: FreedProblem, best: Point, *, told: bool) -> list[GreyBoxFit]:
     """Return the fit of the other structure of friction to the whole log; None if it cannot matter."""
     own = second.search.whole
-    whole = own if whole.log is own.log else own.on(whole.log)  # the same steps, so that misfits compare
+    whole = own if whole.log is own.log else own.on(whole.log)  # the same model steps, so that costs are comparable
     bounds, thetas = second.search.bounds, [best.theta, second.point.theta]
     costs, wanted = whole.costs(thetas), explained(whole)
     begun = thetas[int(np.argmin(costs))]

@@ -154,7 +154,7 @@ class _Problem:
             up = values.copy()
             up[k] += step
             other_b, other_f, _ = self.discrete(up)
-            known = np.pad(other_b, (0, b.size))[: b.size]  # a dead time beyond a whole sample has one value more
+            known = np.pad(other_b, (0, b.size))[: b.size]  # a dead time that crosses a whole sample adds one value
             moved[: b.size - delay, k] = (known - b)[delay:] / step
             moved[b.size - delay :, k] = (other_f[1:] - f[1:]) / step
         return np.concatenate([at.main @ moved, at.initial], axis=1), at.residual
@@ -173,7 +173,7 @@ class _Problem:
             free, initial = columns[:, : values.size], columns[:, values.size :]
             return -(free - initial @ np.linalg.lstsq(initial, free, rcond=None)[0])
 
-        from scipy.optimize import least_squares  # takes longer to import than a discrete model to fit
+        from scipy.optimize import least_squares  # importing it takes longer than fitting a discrete model
 
         found = least_squares(
             residual, start, jac=jacobian, method="lm", x_scale="jac", xtol=1e-10, ftol=1e-10, max_nfev=MOST_EVALUATIONS
@@ -197,7 +197,7 @@ class _Problem:
     def _from_discrete(self, form: Structure, theta: Array, late: float) -> Array:
         b, f = theta[: form.n_numerator], np.concatenate([[1.0], theta[form.n_numerator :][: self.n_poles]])
         roots = np.roots(f).astype(np.complex128)
-        # a pole on the negative axis has no real counterpart: it becomes a fast real one
+        # a pole on the negative real axis has no real continuous counterpart; a fast real pole replaces it
         roots = np.where((roots.imag == 0.0) & (roots.real <= 0.0), 0.05, roots)
         a = np.real(np.poly(np.log(roots)))
         omega = np.geomspace(1e-3, 1.0, 60) * min(np.pi, 3.0 * np.abs(np.log(roots)).max())

@@ -29,7 +29,7 @@ def covariances(jacobian: Array, residual: Array, data: Experiments) -> tuple[Ar
         Whether the data tell the coefficients apart; otherwise both covariances are lower bounds.
     """
     scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
-    # an initial state whose samples are all missing has no effect, and takes nothing from the coefficients
+    # an initial state whose samples are all missing has no effect, and costs no degree of freedom
     felt = scale > 0.0
     scale[~felt] = 1.0
     columns = (jacobian / scale)[:, felt]
@@ -37,7 +37,7 @@ def covariances(jacobian: Array, residual: Array, data: Experiments) -> tuple[Ar
     n_parameters = columns.shape[1]
     determined = bool(np.linalg.matrix_rank(triangle) == n_parameters)
     inverse = inverse_of_triangle(triangle) if determined else np.linalg.pinv(triangle)
-    # orthonormal columns: the sandwich is then not squared, and stays positive where coefficients are nearly tied
+    # orthonormal columns avoid squaring, so that the sandwich stays positive if coefficients are nearly dependent
     upright = columns @ inverse
     freedom = data.n_used - n_parameters
     white = inverse @ inverse.T * float(residual @ residual) / freedom

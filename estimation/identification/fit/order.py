@@ -171,7 +171,7 @@ def order_table(
     rows: dict[int, dict[str, float]] = {}
     for order in orders:
         n_numerator = order + (1 if delay == 0 else 0)
-        with warnings.catch_warnings():  # the table says how often poles are cancelled
+        with warnings.catch_warnings():  # the table counts cancelled poles instead
             warnings.simplefilter("ignore", LogWarning)
             try:
                 model = fit_output_error(u, y, sample_time, n_numerator=n_numerator, n_denominator=order, delay=delay)

@@ -168,7 +168,7 @@ def _one_order_less(structure: Structure, data: Experiments) -> list[Array]:
     fewer = replace(structure, n_numerator=n_b, n_denominator=n_f)
     theta = minimise(fewer, data)
     b, f = theta[:n_b], np.concatenate([[1.0], theta[n_b : n_b + n_f]])
-    # a state answers with its polynomial over F, so it too is multiplied
+    # the response to an initial state is a polynomial over F, so that polynomial is multiplied too
     states = theta[n_b + n_f :].reshape(data.count, fewer.n_initial)
     starts: list[Array] = []
     for pole in CANCELLED:

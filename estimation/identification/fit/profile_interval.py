@@ -77,7 +77,7 @@ def dc_gain_interval(
     starts = [fitted, *starting_values(form, data, OTHER_STARTS if model.cancellations else 1)]
     least, best = min((descend_from(form, start, data, 100) for start in starts), key=lambda found: found[0])
     variance = least / (data.n_used - best.size)
-    # where a cancelled pole lies is chosen after the fact, among many places: one more degree of freedom each
+    # the fit chooses the place of a cancelled pole among many: one more degree of freedom for each
     freedom = 1 + len(model.cancellations)
     quantile = chi_square_quantile(level, freedom)
     allowed = least + quantile * variance * _stretch(model)

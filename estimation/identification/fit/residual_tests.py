@@ -73,12 +73,12 @@ def ljung_box(residual: ArrayLike, *, n_lags: int = DEFAULT_LAGS, n_parameters: 
     centred = np.where(known, values - values[known].mean(), 0.0)
     weight = known.astype(np.float64)
     variance = float(centred @ centred) / n
-    if variance == 0.0:  # nothing is left that could be coloured
+    if variance == 0.0:  # a zero residual cannot be coloured
         return _chi_square(0.0, n_lags - n_parameters)
     lags = np.arange(1, n_lags + 1)
     pairs = np.maximum([weight[k:] @ weight[:-k] for k in lags], 1.0)
     correlation = np.array([centred[k:] @ centred[:-k] for k in lags]) / (pairs * variance)
-    # with every sample there, pairs is n - k and this is n (n + 2) sum(r_k^2 / (n - k)), r_k divided by n
+    # without missing samples, pairs is n - k and this is n (n + 2) sum(r_k^2 / (n - k)), with r_k divided by n
     statistic = float((n + 2.0) / n * np.sum(pairs * correlation**2))
     return _chi_square(statistic, n_lags - n_parameters)
 
@@ -135,7 +135,7 @@ def cross_correlation_test(
     if jacobian is None:
         remaining = remaining - remaining.mean()
     variance = float(remaining @ remaining) / freedom
-    if variance == 0.0:  # nothing is left that could follow anything
+    if variance == 0.0:  # a zero residual follows nothing
         return _chi_square(0.0, rank)
     statistic = float(np.sum((left[:, :rank].T @ remaining) ** 2)) / variance
     return _chi_square(statistic, rank)

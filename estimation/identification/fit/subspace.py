@@ -116,7 +116,7 @@ def _projected(u: Array, y: Array, rows: int) -> tuple[Array, Array]:
 
     known = np.concatenate([block(u, rows), block(u, 0), block(y, 0), block(y, rows)], axis=1)
     triangle = np.asarray(np.linalg.qr(known, mode="r"), dtype=np.float64)
-    # future outputs, less what future inputs explain, on the past
+    # projection of future outputs, less what future inputs explain, onto the past
     projected = triangle[rows : 3 * rows, 3 * rows :].T / np.sqrt(width)
     left, values, _ = np.linalg.svd(projected, full_matrices=False)
     return left, values

@@ -99,7 +99,7 @@ def estimate_initial_state(model: LinearModel, u: ArrayLike, y: ArrayLike) -> Ar
     """
     outputs = np.asarray(y, dtype=np.float64)
     missing = outputs - model.simulate(u)
-    # beside a zero input only the initial state is free
+    # with a zero input only the initial state is free
     structure = Structure(1, model.denominator.size - 1, model.initial_state.size)
     known = np.isfinite(missing)
     theta = profile(structure, model.denominator, np.zeros(outputs.size), np.where(known, missing, 0.0), known)[1]

@@ -34,7 +34,7 @@ def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> 
     end = band_end(data)
     within = [one for one in candidates if not rings_beyond(one, data, end)]
     if within and rings_beyond(best, data, end):
-        # inputs of the blocks do not go there either: what rings above their band has to pay in it
+        # the blocks do not excite that range either, so a model that rings there must be better within the band
         other, said = _prompt_or_late(within, data, by)
         pays = other.price > (1.0 + NEARLY_AS_GOOD) * best.price
         if not (other.doubt or (pays and surely_better(best.block_errors, other.block_errors))):
@@ -47,7 +47,7 @@ def _prompt_or_late(candidates: Sequence[Candidate], data: Channels, by: Scaling
     best, notes = _believed(candidates, data, by)
     prompt = [one for one in candidates if max(one.form.delays) <= 1]
     if max(best.form.delays) > 1 and prompt:
-        # a dead time was looked for among many and with models of second order: it has to win by more than chance
+        # the dead time was selected among many, with second-order models, so it must win by more than chance
         other, said = _believed(prompt, data, by)
         slower = other.outlasts_block(data) and not best.outlasts_block(data)
         if not (other.doubt or slower or surely_better(best.block_errors, other.block_errors)):
@@ -59,12 +59,12 @@ def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> t
     """Return the same; a dead time is treated like any other size."""
     notes: list[Note] = []
     best = chosen(candidates)
-    # a time constant held at the record's length does nearly what an integrator does, and is no other explanation
+    # a time constant bounded by the record's length acts nearly like an integrator, so it is no alternative to one
     free = [one for one in candidates if not (one.fit.bounded or one.fit.integrates)]
     other = chosen(free or candidates)
     bar = BELIEVED if other.doubt else INTEGRATING * other.held_back
     beyond = [one for one in free if one.doubt == "time_constant"]
-    # where two poles are close to one, none can be given at one
+    # if two poles are close to 1, no model with one pole at 1 can be written
     alone = {one.form for one in beyond} - {one.form for one in candidates if one.fit.integrates}
     integrating = [one for one in candidates if one.fit.integrates and one.doubt != "no_fit"]
     integrating += [one for one in beyond if one.form in alone]
@@ -92,8 +92,8 @@ def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> t
             taken = min(clean, key=lambda one: one.price)
             notes.append(IdentificationCode.SIMPLER_MODEL_TAKEN.note(order=best.form.order, taken=taken.form.order))
             best = taken
-    # a block lies between outputs that pin a slower pole to the drift of this record: it has to win by more than
-    # chance, and halves of the record, which are pinned by nothing, are judged beside
+    # outputs on both sides of a block tie a slower pole to this record's drift: the slow model must win by more than
+    # chance, and halves of the record, which are not tied in this way, count too
     quick = [one for one in candidates if not (one.doubt or one.outlasts_block(data))]
     if quick and best.outlasts_block(data):
         taken, said = _believed(quick, data, by)

@@ -74,7 +74,7 @@ def absolute_candidates(data: Channels, by: Scaling, asked: Asked) -> list[Absol
     ]
     signs = signs_at_first(counted)
     first = [_told(fit_absolute(form, counted, signs)) for form in forms]
-    # signs that one order has found are where the others may begin too
+    # the other orders also start from the signs that the best one has found
     best = min(first, key=lambda fit: fit.cost)
     found = list[AbsoluteCandidate]()
     for fit in first:

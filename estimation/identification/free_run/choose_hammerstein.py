@@ -61,7 +61,7 @@ def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[
     for one in linear:
         if one.doubt != "time_constant":
             denominators.setdefault(one.form.order, []).append(one.fit.f)
-    # what leaves more of what it was fitted to than may be left of what was not has no chance there
+    # a model whose error on its own data exceeds the bar for held-back data has no chance there
     bar = (1.0 - BENT_MARGIN) * min(one.held_back for one in linear)
     found: list[HammersteinCandidate] = []
     for kind in NONLINEARITIES:

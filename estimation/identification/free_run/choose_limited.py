@@ -79,13 +79,13 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
         for order in orders
         for form in _forms(order, delays, one.task.asked.n_numerator)
     ]
-    # what is cut off and slow would go far behind the limit, and come back late: a stop is another thing
+    # a slow output behind a saturated sensor would go far beyond the limit and return late; at a stop it would not
     found = [each for each in found if each.limits.stops or not each.outlasts(data.told / (BLOCKS + 1.0))]
     if not found:
         return None
     taken = smallest(found, min(each.held_back for each in found))
-    # a run between stops may drift as a pole at 1 does, and is believed where that is: not if it leaves most of it;
-    # what is cut off leaves noise: an output that bends towards an end gains less, and goes beyond it in other logs
+    # a run between stops may drift as one with a pole at 1 does, and has the same bar: not to leave most of the output;
+    # saturation leaves only noise: an output that bends towards an end gains less, and exceeds it in other logs
     best, stops = one.best, taken.limits.stops
     if not _explains_more(taken, best):
         return None
@@ -97,7 +97,7 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     if taken.held_back < least and told_apart(taken.block_errors, best.block_errors):
         free = one.task.free
         return taken if free is None or _explains_more(taken, linear_comparison(free).best) else None
-    # where an input that stays at each end has other levels, too, these tell the gain: a staircase asks no one to check
+    # a staircase needs no check: input levels other than those at the ends determine the gain
     open_end = between_ends < 1.0 - NEARLY if settled else not stops
     if open_end:
         shown, share = told_limits(data, one.task.by, limits)
@@ -119,9 +119,9 @@ def _levels_at_ends(data: Channels, limits: Limits) -> tuple[bool, float]:
     If so, the output may have settled there. The share is that of samples whose input has the value of no end.
     """
     u, y = np.concatenate(data.u), np.concatenate(data.y)
-    at, middle = at_limits(y, limits), 0.5 * (limits.low + limits.high)  # infinite where one end alone is finite
+    at, middle = at_limits(y, limits), 0.5 * (limits.low + limits.high)  # infinite if only one end is finite
     ends = [at & end for end in (y > middle, y < middle) if np.any(at & end)]
-    most = ONE_LEVEL * np.std(u, axis=0)  # a constant input has one value too
+    most = ONE_LEVEL * np.std(u, axis=0)  # a constant input counts as one value too
     there = [np.all(np.abs(u - np.median(u[end], axis=0)) <= most, axis=1) for end in ends]
     settled = all(np.mean(one[end]) > NEARLY for one, end in zip(there, ends, strict=True))
     return settled, float(np.mean(~np.any(there, axis=0)))

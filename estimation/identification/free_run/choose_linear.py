@@ -85,7 +85,7 @@ def slowest_pole(f: Array) -> float:
 
 def candidate(fit: LinearFit, data: Channels) -> Candidate:
     """Return a fit with its held-back error, criteria, and doubts."""
-    # a dead time that was searched is one more value
+    # a dead time that was searched for counts as one more value
     values = fit.theta.size + sum(delay > 1 for delay in fit.form.delays) - fit.integrates
     bic, aic = criteria(fit.cost, values, data.n_samples)
     return Candidate(fit, aic, doubt_of(fit, data), block_errors=held_back_blocks(fit, data), bic=bic)
@@ -114,7 +114,7 @@ def doubt_of(fit: LinearFit, data: Channels) -> str:
     """Return why a linear model may not be chosen: ``time_constant``, ``no_fit``, or nothing."""
     output, n = np.concatenate(data.y), data.n_samples
     spread = float(np.nansum((output - np.nanmean(output)) ** 2))
-    if spread == 0.0:  # beside one huge value all others are rounded to one number
+    if spread == 0.0:  # beside one huge value rounding makes all others equal
         return "no_fit"
     gained = n * float(np.log(spread / max(fit.cost, 1e-300 * spread, np.finfo(float).tiny)))
     if gained < fit.theta.size * float(np.log(n)):

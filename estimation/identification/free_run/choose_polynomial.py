@@ -129,7 +129,7 @@ def _with_friction(linear: Sequence[Candidate], data: Channels) -> list["_Growth
     """Return growths from models with output friction, if friction explains much that linear models leave."""
     fits: list[PolynomialFit] = []
     for order in range(1, HIGHEST_RUBBING + 1):
-        # what rubs may integrate: a time constant beyond the record is no doubt here
+        # a plant with friction may integrate, so a time constant beyond the record is no objection here
         own = sorted((one for one in linear if one.form.order == order), key=lambda one: one.held_back)
         for base in own[:RUBBING_BASES]:
             for friction in ("velocity", "position")[:order]:

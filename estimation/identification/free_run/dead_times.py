@@ -108,7 +108,7 @@ def _longer(data: Channels, index: int, delays: Sequence[int], tried: int, most:
     far = left[tried + 1 :]
     if not far.min() < CLEARLY * left[: tried + 1].min():
         return delays[index]
-    # inputs that repeat themselves, or come back with the other sign, explain as much one turn later
+    # inputs that repeat themselves, with the same or the opposite sign, explain as much one period later
     first = tried + 1 + int(np.argmax(far <= NEARLY * far.min()))
     m, costs = len(data.inputs), dict[int, float]()
 
@@ -127,10 +127,10 @@ def _longer(data: Channels, index: int, delays: Sequence[int], tried: int, most:
     while step:
         for delay in (centre - step, centre + step):
             cost(int(np.clip(delay, tried + 1, most)))
-        # a dead time that is too long cannot be made up for by poles, one that is too short can
+        # poles can compensate for a dead time that is too short, but not for one that is too long
         moved, centre = centre, shortest()
         step = step // 2 if centre == moved else step
-    # what is best at the end of the search goes on beyond it, and is a drift
+    # if the last dead time searched is best, longer ones would be better still: it is a drift
     return centre if centre < most and cost(centre) < CLEARLY * cost(delays[index]) else delays[index]
 
 
@@ -162,7 +162,7 @@ def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -
             size = 2 ** int(np.ceil(np.log2(n + most + 2)))
             driven = rows[index] - rows[index].mean()
             crossed += _met(output, driven, size)[: most + 2]
-            # what an input does where the output is missing tells nothing; beyond the log's end none is missing
+            # inputs count only where an output is present; beyond the log's end none counts as missing
             there = np.concatenate([known, np.ones(size - n)])
             power += _met(there, driven**2, size)[: most + 2]
             beside += _met(there[1:], driven[1:] * driven[:-1], size)[: most + 1]
@@ -188,7 +188,7 @@ def _gained(crossed: Array, power: Array, beside: Array) -> Array:
     (now, later), (one, other) = ((x[:-1], x[1:]) for x in (crossed, power))
     alone = now**2 / np.maximum(one, 1e-300)
     apart = one * other - beside**2
-    # otherwise two neighbouring samples of the input are one but for rounding
+    # otherwise two neighbouring samples of the input differ only by rounding
     both = apart > 1e-6 * one * other
     together = (other * now**2 + one * later**2 - 2.0 * beside * now * later) / np.where(both, apart, 1.0)
     return np.where(both, together, alone)

@@ -59,7 +59,7 @@ def inputs_alike(data: Channels) -> list[Note]:
     together = np.concatenate(data.u)
     spread = together.std(axis=0)
     scaled = (together - together.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
-    for k in np.flatnonzero(spread > 0.0)[1:]:  # what is constant is no function of another
+    for k in np.flatnonzero(spread > 0.0)[1:]:  # a constant input is no function of others
         before, own = scaled[:, :k], scaled[:, k]
         shares = np.linalg.lstsq(before, own, rcond=1e-6)[0]
         if np.mean((own - before @ shares) ** 2) < ALIKE:
@@ -103,7 +103,7 @@ def more_than_noise(model: FreeRunModel, data: Channels) -> list[Note]:
     left = [(y - run)[begin:] for y, run, begin in zip(data.y, runs, begins, strict=True)]
     known = np.concatenate(left)
     known = known[np.isfinite(known)]
-    # of a slow sensor most rows are empty
+    # most rows of a slow sensor are empty
     changes = np.concatenate([np.diff(one[np.isfinite(one)]) for one in left])
     if not changes.size:
         return []
@@ -157,7 +157,7 @@ def follows(left: Array, drives: Array) -> bool:
     columns, known = np.column_stack([*late, np.ones(left.size)]), np.isfinite(left)
     if np.count_nonzero(known) < SAMPLES_EACH * columns.shape[1]:
         return False
-    # what is missing says nothing at any shift; of shifted functions only what they meet is shifted
+    # missing samples count at no shift; the residual is shifted instead of the functions, which is the same
     basis, there = np.linalg.svd(columns, full_matrices=False)[0], np.where(known, left, 0.0)
     shifts = np.linspace(0.0, left.size, OTHERS + 2)[:-1].astype(int)
     explained = [float(np.sum((basis.T @ np.roll(there, -shift)) ** 2)) for shift in shifts.tolist()]

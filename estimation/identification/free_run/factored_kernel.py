@@ -215,7 +215,7 @@ def pass_on(slope: Array, depth: int, rows: Array) -> None:
         Derivatives of the outputs before the first sample; below them those of `write_own`, which are added to.
     """
     values = rows.shape[1]
-    # built apart from the rows before it, so that the sums below vectorise
+    # the row is built in an array of its own, so that the sums below vectorise
     now = np.zeros(values)
     for t in range(slope.shape[0]):
         r = depth + t

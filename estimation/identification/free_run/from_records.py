@@ -80,12 +80,12 @@ def channels_of(
             said = IdentificationCode.LOG_INTERPOLATED.note(sample_time_s=record.sample_time, wanted_s=wanted)
             warnings.warn(LogWarning(said), stacklevel=2)
         parts = pieces(record, inputs) if split else [record]
-        for name in inputs:  # told once, however many parts there are
+        for name in inputs:  # one warning for each input, however many parts there are
             _tell_bridged([part[name] for part in parts], name, stacklevel=3)
         for part in parts:
             columns = [_on_clock(bridged(part[name]), part.sample_time, wanted) for name in inputs]
             answer = _on_clock(part[output], part.sample_time, wanted)
-            if part.start_time > record.start_time:  # it may still answer, after a dead time, to what is not known
+            if part.start_time > record.start_time:  # after a dead time the output may still respond to unknown inputs
                 answer[: min(LONGEST_ANSWER, answer.size // 20)] = np.nan
             u.append(np.column_stack(columns))
             y.append(answer)
@@ -198,7 +198,7 @@ def _unknown(values: Array) -> BoolArray:
 
 def _spoilt(values: Array, length: int) -> float:
     """Return the sum of squared errors of a line over a gap, over the input's variance [samples]."""
-    # at random, for evenly spaced stretches may keep step with the input's own clock
+    # at random, since evenly spaced stretches may be in step with the input's own clock
     starts = np.random.default_rng(0).integers(0, max(values.size - length - 1, 1), TRIED)
     stretches = values[np.minimum(starts[:, None] + np.arange(length + 2), values.size - 1)]
     stretches = stretches[np.isfinite(stretches).all(axis=1)]

@@ -255,6 +255,6 @@ def deviations(fit: HammersteinFit, data: Channels) -> Array:
     )[1]
     found = np.full(fit.theta.size, np.inf)
     variance = np.diag(spread)
-    # of a residual as slow as the log the window's estimate need not be positive: then nothing is known
+    # if the residual is as slow as the log, the windowed estimate may not be positive: nothing is then known
     found[felt] = np.sqrt(np.where(variance > 0.0, variance, np.inf))
     return found[: problem.n_static]

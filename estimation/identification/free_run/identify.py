@@ -130,7 +130,7 @@ def _with_doubts(found: Identified, data: Channels, structure: str, *, looked_fo
     fed = any(note.code == IdentificationCode.FEEDBACK for note in found.notes)
     if structure == "output-error" and found.sound and not (doubtful or walks or fed):
         notes += more_than_noise(found.model, data)
-        # without a sign a model stands in for a linear one that was not to be relied on: it has to do well
+        # a model without a sign replaces an unreliable linear one, so it must not leave more than noise
         doubtful = bool(notes) and found.model.structure != "output-error"
     return replace(found, notes=(*found.notes, *notes), sound=found.sound and not doubtful)
 
@@ -177,7 +177,7 @@ def _of_changes(task: Task) -> Identified | None:
     if walk is not None and free is not None and wandering(free.whole, free.part, free.orders, None, None) is None:
         return None
     found = None if walk is None else from_changes(walk, task.data, task.by)
-    # a controller that answers the output's noise bends a fit of changes more than one of levels
+    # a controller that responds to the output's noise biases a fit of changes more than one of levels
     return None if found is None or fed_back(found.model, task.data, changes=True) else found
 
 
@@ -216,7 +216,7 @@ def _or_nonlinear(found: Identified, linear: LinearComparison, structure: str, s
 def _nonlinear_or_linear(structure: str, linear: LinearComparison) -> Identified:
     """Return a nonlinear model, or the linear one if none was requested and none is better."""
     task = linear.task
-    # a whole period, where there is one: a shorter section would say nothing of what is slower than itself
+    # at least one period, if there is one: a shorter section says nothing about dynamics slower than itself
     most = max(MOST_COMPARED, task.part.told) if task.part.told < task.part.longest else MOST_COMPARED
     compared, judged, own = on_fewer(linear.candidates, linear.best, task.part, section(task.whole, most))
     bend = None
@@ -291,7 +291,7 @@ def _bent(taken: HammersteinCandidate, linear: LinearComparison, fallback: Fallb
     """Return a model with a nonlinearity at its input, fitted to all data."""
     data, whole, by = linear.task.data, linear.task.whole, linear.task.by
     part = section(whole, MOST_FITTED)
-    # on the data of the comparison a start elsewhere might lead to a model that no block has judged
+    # on the data of the comparison, other starts might lead to a model that no block has judged
     fit = finished(taken.fit, whole) if section(whole, MOST_COMPARED) is whole else refitted(taken.fit, part)
     dynamics = replace(HammersteinDynamics.of(fit, deviations(fit, part)), fallback=fallback)
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", by, dynamics)

@@ -119,7 +119,7 @@ def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> Lin
     gains = np.array([one.sum() for one in b]) / settled
     ramps = found.numerators[len(b) : len(b) + len(data.u)]
     slopes = [float(ramp[0]) / settled / data.longest for ramp in ramps]
-    # beside inputs at zero the output nears the offset by this share of its distance a sample
+    # with inputs at zero the output covers the share 1 - pole of its distance from the offset in each sample
     drift = [slope - float(gains @ u[0]) for slope, u in zip(slopes, data.u, strict=True)]
     offset = float(np.average(drift, weights=[y.size for y in data.y])) / (1.0 - pole)
     problem = Problem(form, data)
@@ -129,6 +129,6 @@ def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> Lin
     states = np.linalg.lstsq(free[used], (problem.y - driven)[used], rcond=None)[0]
     left = (problem.y - driven - free @ states)[used]
     cost = problem.share * float(left @ left)
-    # several logs have one offset, and had a ramp each
+    # several logs share one offset here, but had one ramp each
     cost = cost if len(data.u) > 1 or cost <= (1.0 + LOST) * found.cost else float("inf")
     return LinearFit(form, np.concatenate([*b, f[1:], [offset], states]), cost, integrates=True)

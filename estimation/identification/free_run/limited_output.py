@@ -103,14 +103,14 @@ def limits_of(data: Channels) -> Limits | None:
     data : Channels
         Scaled.
     """
-    # of outputs that are there alone: of a slow sensor most rows are empty
+    # only the outputs that are present: most rows of a slow sensor are empty
     known = [y[np.isfinite(y)] for y in data.y]
     known = [y for y in known if y.size]
     bends = np.concatenate([np.abs(np.diff(y, 2)) for y in known])
     if not bends.size:
         return None
     noise, exact = float(np.median(bends)) / SMOOTH, ROUNDING * float(np.ptp(np.concatenate(known)))
-    # behind a sensor's noise a limit is sharp, before it not
+    # a limit that acts after the sensor's noise is sharp, one that acts before it is not
     shares = SPARSE_SHARES if 2 * sum(y.size for y in known) < sum(y.size for y in data.y) else (1.0,)
     for band in (exact, *(max(share * NOISE_BAND * noise, exact) for share in shares)):
         high, low = _end(known, band), -_end([-y for y in known], band)
@@ -254,7 +254,7 @@ class LimitedProblem:
             for mask, share in zip(masks, BEGINNINGS, strict=False):
                 mask[first : first + max(int(share * (last - first)), 4 * self.form.order)] = True
                 mask[last:] = False
-            # behind a stop nothing is left of what came before it
+            # a stop erases the effect of everything before it
             stays = np.flatnonzero(known[first:last] & ~free[first:last])
             masks[-1][first : first + int(stays[0]) if stays.size else last] = True
         return [known & mask for mask in masks]

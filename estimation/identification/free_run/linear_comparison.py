@@ -70,7 +70,7 @@ class Task:
 
         What a given size that is too large or too small leaves may look like a limit or a walk.
         """
-        orders = list(range(1, max(COMPARED, *self.orders) + 1))  # each order's starts come from one less
+        orders = list(range(1, max(COMPARED, *self.orders) + 1))  # each order starts from the next lower one
         return None if self.asked == Asked() else replace(self, asked=Asked(), orders=orders, delays=None)
 
 
@@ -110,7 +110,7 @@ class LinearComparison:
         """Return the best model, fitted to all data."""
         data, by, whole, best = self.task.data, self.task.by, self.task.whole, self.best
         fit = refitted_linear(best.fit, whole)
-        # fitted on, a model with a pole at 1 may come where it cannot be written: what was judged stays
+        # a further fit may move a model with a pole at 1 to where it cannot be written: the judged one is then kept
         fit = best.fit if self.task.part is whole and not fit.cost <= best.fit.cost else fit
         alone = len(data.inputs) == 1
         transfer, spread = (

@@ -112,7 +112,7 @@ def _searched(problem: Problem) -> list[Array]:
     if len(form.sizes) > 1 or data.longest * len(data.y) > MOST_SEARCHED:
         return []
     found: list[Array] = []
-    # a log whose outputs are all left out tells nothing
+    # a log whose outputs are all left out has no information
     parts = [slice(*ends) for ends in pairwise(problem.bounds.tolist()) if problem.used[slice(*ends)].any()]
     bounds = np.cumsum([0, *(part.stop - part.start for part in parts)])
     used: BoolArray = np.concatenate([problem.used[part] for part in parts])
@@ -123,7 +123,7 @@ def _searched(problem: Problem) -> list[Array]:
         structure = Structure(size, form.order, delay)
         if delay > long_dead_time(data.longest) and pair.goes_on_behind(delay + form.order):
             pair, structure = pair.advanced(delay), Structure(size, form.order)
-        # what is found there is a start: the best after a few steps goes on alone
+        # the result is only a start, so only the best candidate after a few steps is continued
         begun = screened(structure, pair)[0][1]
         # the initial state of a section is not the record's
         begun = begun if liveliest_section(pair) is pair else begun[: structure.n_main]

@@ -78,7 +78,7 @@ def settles(coefficients: Array) -> bool:
     (True, False)
     """
     whole = np.concatenate([[1.0], coefficients])
-    # NumPy sums eight values or more in another order than the loop above
+    # NumPy sums eight values or more in another order than the loop in `decay_rows`
     return bool(stable(coefficients)) and min(float(whole.sum()), sum(whole.tolist())) > 0.0
 
 

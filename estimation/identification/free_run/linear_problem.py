@@ -163,7 +163,7 @@ class Problem:
         out[:, offset] = 1.0
         for index, u in enumerate(self.data.u):
             first, last = int(self.bounds[index]), int(self.bounds[index + 1])
-            # an input that stood at its first value before the log: lags are shifts, filtered or not
+            # before the log each input had its first value, so lags are shifts, filtered or not
             rows, levels = np.zeros((u.shape[1] + 1, last - first)), np.zeros(u.shape[1] + 1)
             rows[:-1], levels[:-1], rows[-1, 0] = u.T, u[0], 1.0
             decay_rows(f, rows, levels)
@@ -223,7 +223,7 @@ class Problem:
         output = jacobian[:, :n_b] @ theta[:n_b] + jacobian[:, n_b + n :] @ theta[n_b + n :]
         for index, first in enumerate(self.bounds[:-1]):
             part = slice(int(first), int(self.bounds[index + 1]))
-            # before the log the input stood at its first value, and so did what it drives
+            # before the log the input had its first value, and the output that it drives was steady
             before = float(self.first_columns(index) @ theta[:n_b]) / float(f.sum())
             level = theta[n_b + n] + (theta[index - 1 - self.n_own] if index and self.n_own else 0.0)
             moved = -(output[part] - level)[None, :]
@@ -255,7 +255,7 @@ class Problem:
             left = self._lay(values, jacobian) - self.y
             return self.counted.square(left), *self.counted.normal_equations(jacobian, left)
 
-        # poles within a circle are those of the polynomial stretched by its radius within the unit circle
+        # all poles are within radius r if those with the coefficients f_k r^-k are within the unit circle
         stretched = longest_pole(self.data.told) ** -np.arange(1.0, n + 1.0) if bounded else np.ones(n)
 
         poles = slice(n_b, n_b + n)

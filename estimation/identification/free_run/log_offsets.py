@@ -75,7 +75,7 @@ def levelled(data: Channels, orders: Sequence[int], delays: tuple[int, ...] | No
         form = Form(order, (order + 1,) * len(late), late)
         fit, more, n = fit_linear(form, apart, least_gain=COARSE), len(means) - 1, data.n_samples
         bic = criteria(fit.cost, fit.theta.size, n)[0]
-        # with the same poles: others may follow the steps from log to log
+        # compared at the same poles, since others may follow the steps from log to log
         if bic < criteria(Problem(form, together).profiled(fit.f)[0], fit.theta.size - more, n)[0] and bic < best:
             best, levels = bic, means + by.y_std * np.concatenate([[0.0], fit.theta[-more:]])
     if levels is None:

@@ -58,7 +58,7 @@ def without_sign(linear: LinearComparison, most: int, *, surely: bool) -> Absolu
     if not found:
         return None
     taken = chosen_absolute(found)
-    # a block that holds the only step of the inputs says little, so the fit of all of them has to agree
+    # a block with the only step of the inputs says little, so the fit to all blocks must agree
     explains = taken.bic / data.n_samples < linear.best.bic / linear.task.part.n_samples
     return None if surely and not (explains and taken.held_back < SIGNLESS * linear.best.held_back) else taken
 
@@ -91,7 +91,7 @@ def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
     fit = refitted_limited(taken, whole)
     kind = "stops" if limits.stops else "cut-off"
     linear.rows.append(form_row("output-error", taken, fit.form, nonlinearity=kind))
-    # behind a stop nothing is left of the transfer function's own run, so that it has no covariance from one
+    # a stop erases the transfer function's own run, so no covariance follows from that run
     transfer = None if limits.stops or len(data.inputs) > 1 else linear_model(fit, between(whole, limits), by)
     named = data.inputs, data.output, data.sample_time, "output-error"
     model = FreeRunModel(*named, by, LimitedDynamics.within(fit, limits), transfer)

@@ -96,7 +96,7 @@ class PolynomialDynamics:
         single, held = lagged_signals(self.variables, u, own)
         if np.array_equal(single, held):
             return told
-        # beyond what was seen, products go on where fits that left out a block agree on that, and not on their ends
+        # outside the fitted range, products are clipped farther out if fits without a block agree better on that run
         parts = (one._released() if isinstance(one, PolynomialDynamics) else one for one in self.fallback.parts)
         released, farther = self._released(), replace(self.fallback, parts=tuple(parts))
         freed = farther.judged(u, y, released.own_run(u, y), ends_of(released.variables, self.terms))
@@ -127,7 +127,7 @@ class PolynomialDynamics:
         begin = runs.begins[0] - self.variables.n_start
         if not begin or np.count_nonzero(runs.used) <= 4 * self.variables.n_start:
             return first
-        # what the inputs before the log did is forgotten: the state behind it is fitted for itself
+        # from here on, inputs before the log have no effect, and the state has its own fit
         return np.concatenate([first[:begin], self._begun(runs, y)[begin:]])
 
     def _begun(self, runs: Runs, y: Array) -> Array:
@@ -136,7 +136,7 @@ class PolynomialDynamics:
         if np.count_nonzero(runs.used) <= 4 * measured.size:
             return self._refined(runs, y, measured, 1)[0]
         best, cost = self._refined(runs, y, measured, START_STEPS)
-        # noise of the first outputs is a speed where sampling is fast, and may throw the run where nothing leads back
+        # with fast sampling, noise of the first outputs is a speed, and may throw the run where no step leads back
         smooth = smoothed_starts(y, runs.begins[0] - measured.size, measured.size)
         costs = [self._refined(runs, y, one, 1)[1] for one in smooth]
         if smooth and min(costs) < cost:
@@ -157,7 +157,7 @@ class PolynomialDynamics:
             if not now < cost * (1.0 - 1e-6):
                 break
             best, cost = ran, now
-            if step + 1 == steps:  # nothing follows that slopes would lead
+            if step + 1 == steps:  # no step follows that would need slopes
                 break
             moved = equations.start_slopes()[known]
             if not np.isfinite(moved).all():

@@ -194,10 +194,10 @@ class Runs:
                 return np.inf, *nowhere
             left = ran - self.target
             reached = float(np.sum(left[self.used] ** 2) + weight @ values**2)
-            if not reached < least:  # the step is rejected, and its slopes are not asked for
+            if not reached < least:  # the step is rejected, so its slopes are not needed
                 return reached, *nowhere
             gram, right = equations.sums(left)
-            # first values of a log whose outputs are held back have no effect
+            # the small diagonal term: first values of a log whose outputs are held back have no effect
             gram[np.diag_indices_from(gram)] += 1e-12 * max(float(np.diag(gram).max()), 1.0) + weight
             if not np.isfinite(gram).all():
                 return np.inf, *nowhere

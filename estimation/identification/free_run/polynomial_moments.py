@@ -60,7 +60,7 @@ def one_step_values(terms: IntArray, known: Moments, penalty: float) -> Array | 
         return None
     size = np.sqrt(np.diag(gram) / n)
     size[size == 0.0] = 1.0
-    # linear terms are free but for what keeps equations solvable
+    # linear terms are penalised only as far as keeps the equations solvable
     weight = np.where(terms[:, 1] >= 0, penalty, 1e-6 * penalty) + 1e-12
     unit = gram / np.outer(size, size) + n * np.diag(weight)
     return np.linalg.solve(unit, right / size) / size

@@ -108,13 +108,13 @@ def _gains(own: Array, shared: Array, square: Array, right: Array, explained: Ar
         size = np.where(usable, square, 1.0)
         scale = np.sqrt(np.diag(own))
         scale[scale == 0.0] = 1.0
-        # what the data do not tell of the values that are there is nothing to be beside
+        # directions of the present values that the data do not determine are left out
         powers, directions = np.linalg.eigh(own / np.outer(scale, scale))
         told = powers > DEPENDENT * powers[-1]
         basis = directions[:, told] / np.sqrt(powers[told]) / scale[:, None]
         shadow = basis.T @ np.where(usable, shared, 0.0)
         power = 1.0 - np.einsum("ij,ij->j", shadow, shadow) / size
         explained = explained - shadow.T @ (basis.T @ right)
-    # what is nearly a sum of those that are there only makes values undetermined
+    # a candidate that is nearly a sum of present terms would only make values undetermined
     fresh = usable & (power > 1e-6)
     return np.where(fresh, explained, 0.0) ** 2 / np.where(fresh, power * size, 1.0)

@@ -109,9 +109,9 @@ def wandering(
     if sum(known) < FEWEST or not all(known):
         return None
     changed, by = scaled(changes)
-    if not all(np.isfinite(y).any() for y in changed.y):  # of an output that always changes by the same
+    if not all(np.isfinite(y).any() for y in changed.y):  # the output always changes by the same amount
         return None
-    # a dead time that is estimated beside a walk may be wrong
+    # a random walk may spoil the estimate of the dead time, so zero is tried too
     late = {estimate_delays(changed), (0,) * len(data.inputs)} if delays is None else {delays}
     firsts = [fit_linear(Form(ORDER, (ORDER + 1,) * len(one), one), changed, least_gain=COARSE) for one in late]
     first = min(firsts, key=lambda fit: fit.cost)
@@ -287,7 +287,7 @@ def _correlations(changes: Array) -> Array:
 
 def _by_chance(correlations: Array, changes: Array) -> float:
     """Return the variance of autocorrelations at lags without correlation, for changes with memory of one sample."""
-    # Bartlett (1946), of a moving average of one term
+    # Bartlett (1946), for a moving average of one term
     return (1.0 + 2.0 * float(correlations[0]) ** 2) / changes.size
 
 

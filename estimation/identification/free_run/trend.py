@@ -55,7 +55,7 @@ def detrended(one: LinearComparison, orders: Sequence[int]) -> Detrended | None:
         return None
     quickest = float(np.exp(-(BLOCKS + 1.0) / task.part.told))
     delays = slow.form.delays
-    # a trend takes the place of the slow pole: of an order that is asked for, one less is left
+    # a trend replaces the slow pole, so one order less than requested is tried too
     fewer = sorted({max(orders[0] - 1, 1), *orders[:ORDER]})
     forms = [_beside(Form(order, (order + 1,) * len(delays), delays)) for order in fewer]
     settled = [fit for form in forms if slowest_pole((fit := fit_linear(form, part, least_gain=COARSE)).f) <= quickest]
@@ -67,7 +67,7 @@ def detrended(one: LinearComparison, orders: Sequence[int]) -> Detrended | None:
     alone = fit_linear(Form(best.form.order, sizes, late), task.part, [best.f], least_gain=COARSE)
     if not _bic(best, part) < min(_bic(beside, part), _bic(alone, task.part)):
         return None
-    # what a bend leaves is slow too, and no trend
+    # the residual of a nonlinearity is slow too, but it is no trend
     rest = longest_rest(best, part)
     if rest.size < FEWEST or remembers(rest):
         return None

@@ -65,7 +65,7 @@ def held_input_model(
 
 
 def _held(A: Array, B: Array, duration: float) -> tuple[Array, Array]:
-    from scipy.linalg import expm  # takes longer to import than a discrete model to fit
+    from scipy.linalg import expm  # importing it takes longer than fitting a discrete model
 
     n = A.shape[0]
     block = np.zeros((n + 1, n + 1))

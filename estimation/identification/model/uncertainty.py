@@ -129,9 +129,9 @@ def cancellations(
             apart = complex(pole) - complex(zero)
             distance = np.array([apart.real, apart.imag])
             spread = both @ covariance @ both.T
-            # on one another the Jacobian is singular, and what its covariance says of them is rounding
+            # if they coincide the Jacobian is singular, and the covariance of their distance is only rounding
             away = 0.0 if abs(apart) <= COINCIDE * abs(pole) else _deviations(distance, spread)
-            # a zero far away that is hardly determined is uncertain, but cancels nothing
+            # a distant zero that is hardly determined is uncertain, but cancels nothing
             near = abs(pole - zero) < NEAR * abs(pole - at_rest)
             if near and away < CANCELS and zero.imag >= 0.0:
                 found.append(Cancellation(complex(pole), complex(zero), away))

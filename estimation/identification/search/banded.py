@@ -54,7 +54,7 @@ def explained_power(
             value = 1.0 + 0.0j
             for j in range(n_f):
                 value += denominators[row, j] * shifts[k, j + 1]
-            # a pole on the circle at a band's very frequency would divide by zero
+            # a pole on the unit circle at a band's frequency would cause a division by zero
             inverse = np.conj(value) / max(value.real * value.real + value.imag * value.imag, 1e-300)
             weight = power[k] * (inverse.real * inverse.real + inverse.imag * inverse.imag)
             seen = inverse * np.conj(cross[k])
@@ -62,7 +62,7 @@ def explained_power(
                 terms[i] += weight * shifts[k, i].real
                 phase = shifts[k, delay + i]
                 target[i] += seen.real * phase.real - seen.imag * phase.imag
-        # a band-limited input makes the Gram matrix nearly singular; the ridge is far below what ranks candidates
+        # a band-limited input makes the Gram matrix nearly singular; the ridge is too small to affect the ranking
         for i in range(n_b):
             for j in range(i + 1):
                 total = terms[i - j] + (1e-12 * terms[0] if i == j else 0.0)

@@ -247,7 +247,7 @@ def descend(
         for i in range(p):
             slope -= gradient[i] * step[i]
             curvature += damping * gram[i, i] * step[i] * step[i]
-        # H step = -g - damping D step, so the quadratic model falls by (slope + curvature) / 2, in halves of the cost
+        # H step = -g - damping D step, so the quadratic model of half the cost falls by (slope + curvature) / 2
         promised = slope + curvature
         if promised <= tolerance * cost and (damping <= 1e-2 or promised <= 1e-15 * cost):
             return cost, theta, gram, True

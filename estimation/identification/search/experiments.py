@@ -220,7 +220,7 @@ def _excited(u: Array, wanted: int) -> int:
         return 0
     windows = np.lib.stride_tricks.sliding_window_view(u, wanted)
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(windows.T @ windows), 0.0))
-    # eigenvalues of the Gram matrix are exact to eps, their roots to sqrt(eps); below that the factor itself is asked
+    # eigenvalues of the Gram matrix are exact to eps, their roots to sqrt(eps); below that the factor's rank decides
     if spread[0] > 1e-7 * spread[-1]:
         return wanted
     return int(np.linalg.matrix_rank(windows))

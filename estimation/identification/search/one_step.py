@@ -59,7 +59,7 @@ def prediction_errors(
         signals, noise = np.zeros((3, n + pad)), np.zeros(n)
         n_pulse = impulse_response(f, n, n_s, pad, signals[0])
         respond(b, f, delay, theta[own : own + n_s], u[part], pad, signals, n_pulse, noise)
-        # minus the derivative of what the model leaves of the output
+        # minus the derivative of the output's residual
         for t in range(n):
             noise[t] = y[bounds[e] + t] - noise[t]
             for i in range(theta.size):
@@ -91,7 +91,7 @@ def _whiten(
     moved_noise, slope = np.zeros((deep, p)), np.zeros(p)
     cost = 0.0
     for t in range(noise.size):
-        # what the past says of the noise now, and how that moves with the parameters
+        # the noise expected from its past, and the derivatives of that by the parameters
         expected = 0.0
         slope[:] = 0.0
         for j in range(min(n_ar, t)):

@@ -77,7 +77,8 @@ def banded_spectra(pairs: list[tuple[Array, Array]]) -> BandedSpectra:
         omega = 2.0 * np.pi / u.size * np.arange(spectrum_u.size)
         band = np.zeros(omega.size, dtype=np.intp)
         band[1:] = 1 + np.floor((BANDS - 1) * np.log(omega[1:] / lowest) / np.log(np.pi / lowest) + 1e-9)
-        share = np.where(np.arange(omega.size) == 0, 0.5, 1.0)  # one side of a two-sided sum
+        # one side of a two-sided sum: zero frequency counts half
+        share = np.where(np.arange(omega.size) == 0, 0.5, 1.0)
         cross = share * spectrum_y * np.conj(spectrum_u)
         power = share * np.abs(spectrum_u) ** 2
         for row, values in enumerate((share, share * omega, power, cross.real, cross.imag)):

@@ -26,7 +26,7 @@ def impulse_response(f: Array, n: int, n_s: int, pad: int, pulse: Array) -> int:
         for j in range(f.size):
             value -= f[j] * pulse[pad + t - 1 - j]
         pulse[pad + t] = value
-        # a resonance passes through zero: the last whole order of samples must have died out
+        # a resonance passes through zero, so all of the last samples, one more than the order, must have died out
         alive = 0.0
         for j in range(f.size + 1):
             alive = max(alive, abs(pulse[pad + t - j]))

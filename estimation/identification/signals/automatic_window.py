@@ -65,10 +65,10 @@ def automatic_response(u: ArrayLike, y: ArrayLike, sample_time: float) -> Freque
     size = 2 * longest
     known = correlations(inputs, outputs)
     responses, deviations, coherences = _estimates(known, windows, size, inputs.size)
-    # one window longer than what is accepted: its bias is then small against its noise, as a band supposes
+    # one window longer than the accepted one: its bias is then small compared with its noise, as a band assumes
     chosen = np.maximum(_accepted(responses, deviations) - 1, 0)
     at = (chosen, np.arange(size // 2 + 1))
-    # what the chosen window differs from any longer one is bias or noise: it may not be left out of the band
+    # a difference between the chosen window and a longer one is bias or noise, so the band must include it
     apart = np.where(
         np.arange(len(windows))[:, None] < chosen, np.abs(np.abs(responses) - np.abs(responses[at])), 0.0
     ).max(axis=0)
@@ -94,7 +94,7 @@ def _estimates(
         squared = np.clip(np.abs(cross[usable]) ** 2 / (power_u[usable] * power_y[usable]), 0.0, 1.0)
         responses[row, usable] = cross[usable] / power_u[usable]
         coherences[row, usable] = squared
-        # near the ends of the axis fewer independent values are averaged: one there is real
+        # near the ends of the axis fewer independent values are averaged: values at the ends are real
         edge = np.ones(n_frequencies)
         width = int(size / (2 * window)) + 1
         edge[:width] = edge[-width:] = np.sqrt(2.0)

@@ -137,18 +137,18 @@ class Distortion:
         driven, lines = self.excited & kind, silent.copy()
         power, count = self.power[silent], int(silent.sum())
         if driven.any():
-            # the other kind of distortion would stand on excited lines, too, if even lines were driven
+            # if even lines were driven, the other kind of distortion would appear on excited lines too
             own = float(np.mean(np.abs(self.stray[driven]) ** 2))
             if not own <= ALIKE * float(power.mean()) or (self.excited & ~kind).any():
                 return float("nan")
             lines |= driven
         spectrum = np.zeros(self.period // 2 + 1, dtype=np.complex128)
         spectrum[1 + np.flatnonzero(lines)] = self.stray[lines]
-        # odd lines change their sign after half a period, even ones repeat themselves
+        # odd lines change sign after half a period, even ones repeat themselves: the first half suffices
         signal = np.fft.irfft(spectrum, self.period)[: self.period // 2]
         parts = np.array([float(np.mean(one**2)) for one in np.array_split(signal, PARTS)])
         share = float(np.var(parts, ddof=1)) / PARTS / float(parts.mean()) ** 2
-        # lines of one multisine are complex normal: their powers scatter by as much as they are
+        # lines of one multisine are complex normal: the standard deviation of a power equals its mean
         lost = float(np.sum(power**2)) / 2.0 / float(power.sum()) ** 2 * (1.0 - count / int(lines.sum()))
         return float(power.mean()) * float(np.sqrt(share + lost))
 
@@ -210,7 +210,7 @@ def best_linear_approximation(
     odd, frequency, power = number % 2 == 1, number / (length * sample_time), np.abs(mean) ** 2
     at = np.flatnonzero(excited)
     stray = _stray(excited, odd, power, at)
-    # the distortion holds the noise of the lines on which it is seen
+    # the distortion includes the noise of the lines on which it is measured
     variance = np.where(np.isnan(stray), noise[at], np.maximum(stray, noise[at])) / np.abs(inside[at]) ** 2
     freedom = periods - 1 if np.isnan(stray).all() else NEIGHBOURS
     response = FrequencyResponse(frequency[at], mean[at] / inside[at], variance, freedom)

@@ -91,9 +91,9 @@ def etfe(u: ArrayLike, y: ArrayLike, sample_time: float, *, lag_window: int | No
         raise HydrostateError(f"lag_window must lie between 2 and half the record ({n // 2}), got {lags}")
     frequency = np.arange(lags + 1) / (2.0 * lags * sample_time)
     power_u, power_y, cross = smoothed_spectra(correlations(inputs, outputs), lags, 2 * lags)
-    # the Hann window's spectrum has small negative lobes, which can win where a signal has next to no power
+    # the Hann window's spectrum has small negative lobes, which can dominate where a signal has hardly any power
     usable = (power_u > 0.0) & (power_y > 0.0)
-    averages = n / (0.75 * lags)  # a Hann lag window passes 3/4 of a rectangular window's variance, 2 * lags wide
+    averages = n / (0.75 * lags)  # the squares of a Hann lag window, 2 * lags wide, sum to 0.75 * lags
     spectra = power_u[usable], power_y[usable], cross[usable]
     return _response(frequency[usable], *spectra, averages, 1.0 / (lags * sample_time))
 

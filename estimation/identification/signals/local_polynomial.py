@@ -120,7 +120,7 @@ def local_polynomial_response(u: ArrayLike, y: ArrayLike, sample_time: float) ->
     columns = np.concatenate([powers * spectra[0][places][:, :, None], powers.astype(np.complex128)], axis=2)
     size = np.linalg.norm(columns, axis=1, keepdims=True)
     lines = np.abs(spectra[0])
-    # where most bands are empty the median, too, is what rounding leaves
+    # if most bands are empty, the median is only rounding too
     least = max(EMPTY[0] * float(np.median(lines)), EMPTY[1] * float(lines.max()))
     if (size[:, 0] < least).any() or not least > 0.0:
         raise HydrostateError(

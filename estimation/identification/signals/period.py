@@ -73,7 +73,7 @@ def common_period(u: Array) -> int | None:
         if not total > 0.0:
             continue
         change, power = _changes(values, longest)
-        # where both parts hardly move, that they are alike says nothing
+        # if both parts hardly move, their agreement says nothing
         moves = power >= OTHERWISE * total * (n - np.arange(1, longest + 1)) / n
         share = np.maximum(share, np.where(moves, change / np.maximum(2.0 * power, 1e-300), np.inf))
     other = np.flatnonzero((share > OTHERWISE) & np.isfinite(share))

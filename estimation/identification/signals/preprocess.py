@@ -162,15 +162,14 @@ def _low_pass(x: Array, sample_time: float, cutoff_hz: float, order: int) -> Arr
             f"filtering at {cutoff_hz:g} Hz, order {order}, needs more than {4 * ceil(order / 2) + 1} samples, "
             f"got {x.size}"
         )
-    # the filter rings for about its order in cutoff periods; odd extension over that keeps the ends usable
+    # the filter rings for about `order` cutoff periods; an odd extension of that length keeps the ends usable
     pad = min(ceil(order / (cutoff_hz * sample_time)), x.size - 1)
     longer = np.pad(bridged(x), pad, mode="reflect", reflect_type="odd")
     half = smooth_length(longer.size - 1, (2, 3, 5))
     there = np.pad(longer, (0, half + 1 - longer.size), mode="edge")
-    spectrum = np.fft.rfft(
-        np.concatenate([there, there[-2:0:-1]])
-    )  # forth and back again, so that no end meets another
-    # two passes of a Butterworth filter that the bilinear transform has made digital: its gain squared, and no phase
+    # forwards and backwards, so that the ends do not meet each other
+    spectrum = np.fft.rfft(np.concatenate([there, there[-2:0:-1]]))
+    # two passes of a Butterworth filter, made digital by the bilinear transform: its squared gain, and no phase
     ratio = np.tan(np.linspace(0.0, 0.5 * np.pi, spectrum.size)) / np.tan(np.pi * cutoff_hz * sample_time)
     with np.errstate(over="ignore"):
         gain = 1.0 / (1.0 + ratio ** (2 * order))

@@ -130,7 +130,7 @@ def _noise(problem: Problem, theta: Array) -> Array:
     noise = left.T @ left / np.maximum(used.T @ used, 1.0)
     size = np.sqrt(np.diag(noise)) + 1e-12
     together = noise / np.outer(size, size)
-    # few common samples may leave no covariance matrix
+    # with few common samples the result may not be a covariance matrix
     if np.linalg.eigvalsh(together).min() < 1e-6:
         together = np.eye(len(together))
     return together * np.outer(size, size)

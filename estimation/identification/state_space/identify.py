@@ -78,14 +78,14 @@ def identify_outputs(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", LogWarning)
-            together = _fitted_to_levels(data, order, delay)  # whether outputs wander has been asked
+            together = _fitted_to_levels(data, order, delay)  # random walks have been tested for already
     except HydrostateError:
-        # too few samples for so many values: a model an output needs fewer
+        # too few samples for so many values: one model for each output needs fewer
         return single
     rows = [(*one.candidates, *other.candidates) for one, other in zip(single, together, strict=True)]
     fewer = together[0].model.n_values < sum(one.model.n_values for one in single)
     bar = _left(single) * (1.0 if fewer else 1.0 - CLEARLY)
-    # what wanders by itself, or differs from log to log, a state space would follow with slow poles
+    # with slow poles a state space would follow outputs that wander by themselves or differ from log to log
     alone = (IdentificationCode.UNRELATED, IdentificationCode.RANDOM_WALK, IdentificationCode.OFFSETS_DIFFER)
     related = not any(note.code in alone for one in single for note in one.notes)
     better = related and all(one.sound for one in together) and _left(together) < bar
@@ -142,7 +142,7 @@ def _fitted_to_levels(data: Sequence[Channels], order: int | None, delay: int | 
     """Return the state-space model of a size for which the logs are long enough."""
     require_size(order, delay, None)
     for one in data:
-        require_room(one, None, delay, None)  # whether it is long enough for the order, the fit itself says
+        require_room(one, None, delay, None)  # the fit itself checks the length for the order
     with threadpool_limits(limits=1, user_api="blas"):
         return _identified(data, range(1, MOST_STATES + 1) if order is None else [order], delay)
 

@@ -49,7 +49,7 @@ def answers(a: Array, c: Array, source: Array, room: Array, out: Array) -> None:
     out : ndarray, shape (samples, k)
         Room for the outputs: output o of the run in which the source pushes state j stands at ``o n + j``.
     """
-    # a row for each output, ``w[t + 1] = w[t] A + source[t] c``, and not a state for each push: the sums are the same
+    # a row for each output, ``w[t + 1] = w[t] A + source[t] c``, instead of a state for each push; the sums are equal
     n, p = a.shape[0], c.shape[0]
     for t in range(source.size):
         for o in range(p):

@@ -130,7 +130,7 @@ class Problem:
             if size.direct:
                 by_d[o, :, o * size.m : (o + 1) * size.m] = self.u
         for k, part in enumerate(self.data.slices):
-            # a state at the first sample is one that was pushed by 1 a sample before
+            # an initial state is the effect of a unit push one sample earlier
             push = np.zeros(part.stop - part.start + 1)
             push[0] = 1.0
             powers = np.zeros((push.size, size.p * size.n))

@@ -161,7 +161,7 @@ class StateSpace:
         )
         gain, slopes = (one.real for one in self.response(1.0))
         turn = np.diag(factors)
-        # the level is that of inputs at zero, which lie as far from their means as gains say
+        # the level applies to zero inputs, so the response to the inputs' means is subtracted
         turn[-len(y_std) :] -= y_std[:, None] * np.tensordot(u_mean / u_std, slopes, axes=(0, 1))
         gain = gain * np.outer(y_std, 1.0 / u_std)
         return StateSpace(

@@ -39,7 +39,7 @@ def whatever_the_oil(diagnosed: Diagnosed, parameters: EhaParameters) -> Loaded:
         return Loaded(found, parameters)
     stiffer = replace(parameters, bulk_modulus=ratio * parameters.bulk_modulus)
     around = diagnosed(stiffer, 0.0)
-    if around.unknown and only_beside(found.against):  # then it is not the oil that lies beside the nine
+    if around.unknown and only_beside(found.against):  # then stiffer oil does not explain the objection
         return Loaded(found, parameters)
     return Loaded(around, stiffer, (ClassCode.OIL_STIFFER_CLASS.note(ratio=ratio),))
 

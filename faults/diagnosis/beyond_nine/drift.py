@@ -76,7 +76,7 @@ def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Se
     if drift is not None:
         actuator = actuator_of(last.parameters)
         found[0] = _followed(found, [1.0, *there], actuator, calibration)
-        # first whether the circuit lies in a condition there, then its evidence
+        # a circuit within one of the nine conditions ranks first, then the one with more evidence
         ranks = [(_is_placed(one), _evidence(one.scoreboard, calibration)) for one in found]
         likeliest = ranks.index(max(ranks))
         placed = found[likeliest] = whatever_fault(found[likeliest], actuator, calibration)

@@ -132,7 +132,7 @@ def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
         columns, push, np.append(np.zeros(count), believed), np.append(np.full(count, np.inf), spread)
     )
     values, std = found[:count], np.sqrt(np.maximum(np.diag(covariance)[:count], 0.0))
-    # two unlike areas turn that pressure into a force, and nothing measures it
+    # with unequal areas, the inner circuit's pressure exerts a force, and that pressure is not measured
     std = np.hypot(std, [p.piston_area * p.area_difference * _held(p), 0.0, LAGGING])
     size = p.piston_area * float(np.sqrt(np.mean(balance.pressure**2)))
     forces = np.abs(values) * [1.0, float(np.std(columns[:, 1])), float(np.std(columns[:, 2]))]
@@ -184,7 +184,7 @@ def _regressed(columns: Array, push: Array, centre: Array, doubt: Array) -> tupl
     scaled, pull = columns / sizes, 1.0 / (doubt * sizes) ** 2
     begun = centre * sizes
     noise, found, known = float(np.var(push)), begun, np.eye(len(sizes))
-    for _ in range(2):  # once for the size of what is left, once with it
+    for _ in range(2):  # the first pass finds the size of the residuals, the second uses it
         weight = 1.0 / (LASTING * max(noise, np.finfo(np.float64).tiny))
         known = weight * scaled.T @ scaled + np.diag(pull + 1e-12 * weight * len(push))
         found = begun + np.linalg.solve(known, weight * scaled.T @ (push - scaled @ begun))

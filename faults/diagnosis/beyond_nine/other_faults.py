@@ -165,7 +165,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     delivered = [one.score for one in worn]
     wear = odds_of_wear(delivered, sound.score)
     if found is not None and (found[0] > GAIN or wear > math.log(LIKELIER)):
-        # a search may end short of the best: the sound circuit is asked again from where the faulty one ended, and anew
+        # a search may end short of the optimum: fit the sound circuit from the faulty one's end, and anew
         _, fault, tried = found
         starts = (tried.fits.best.coordinates, None)
         again = [fit_classes(blocks, sound.actuator, runs=runs, start=start) for start in starts]
@@ -179,14 +179,14 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
     if WORN in odds:
         odds[WORN] = wear
-    if STUCK in odds:  # one that never has to open has the likelihood of a sound one, and keeps what is presumed of it
+    if STUCK in odds:  # a valve that never had to open fits like a sound one, so it keeps at least its prior odds
         odds[STUCK] = max(odds[STUCK], min(gains[STUCK], 0.0) + LEFT_UNSEEN)
     best, pressure = sound.fits.scores, largest_pressure(blocks, sound.fits.best, sound.actuator)
     hidden = odds_of_hidden_relief(pressure, sound.actuator.circuit.relief_pressure) - GAIN
-    likeliest[EARLY] = likeliest[EARLY] if odds.get(EARLY, -math.inf) > hidden else best  # none moves what it hides in
+    likeliest[EARLY] = likeliest[EARLY] if odds.get(EARLY, -math.inf) > hidden else best  # if hidden, no score changes
     odds[EARLY] = float(np.logaddexp(odds.get(EARLY, -math.inf), hidden))
     chances = probabilities_of(odds)
-    # a log that comes near the rig file's setting leaves but a few settings above, and saying so tells little
+    # if the pressure came near the rig file's setting, few settings remain above it, and a report would say little
     told = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
     above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"} if likeliest[EARLY] is best else {}
     open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
@@ -258,7 +258,7 @@ def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELE
 def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: float) -> Tried:
     """Return the best circuit with a fault, unless it is too far behind the sound one."""
     faulty = replace(sound.actuator, circuit=fault.circuit)
-    wanted = LASTING * (behind - sound.score)  # no region holds a circuit better than its misfit says
+    wanted = LASTING * (behind - sound.score)  # a region's score is never better than the misfit
     if not fault.elsewhere:
         start = sound.fits.best.coordinates
         return Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))

@@ -147,7 +147,7 @@ def _last_of(window: Record, actuator: Actuator) -> LastPart:
     if drift is not None and (two is None or drift.gain > two.gain):
         return LastPart(window, window, blocks, fits, None, drift=drift)
     against = () if two is None else softened(two)
-    drifts = blocks.pressure is None and blocks.course is not None  # which explained more than a change did
+    drifts = blocks.pressure is None and blocks.course is not None  # drift explains the log better than a change
     found = None if two is None or against or drifts else find_onset(blocks, two, actuator)
     if found is None:
         return LastPart(window, window, blocks, fits, None, against)
@@ -189,7 +189,8 @@ def parted(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Parted | None
     split = likeliest_split(blocks, fits.best)
     if split is None:
         return None
-    if blocks.pressure is not None and in_one_condition(split, blocks, actuator):  # without, the oil may have softened
+    # without pressure, the oil may have softened between parts in one condition
+    if blocks.pressure is not None and in_one_condition(split, blocks, actuator):
         return None
     place = split.place
     parts = [part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))]
@@ -220,7 +221,7 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
     (before, after), (first, last) = two.fits, two.conditions
     if two.gain < GAIN or first == last:
         return None
-    if unexplained(two.parts[0], before, actuator):  # what comes and goes has no last condition, but a quiet stretch
+    if unexplained(two.parts[0], before, actuator):  # a fault that comes and goes: the rest is a quiet stretch
         return None
     if not believed(blocks, two.parts, two.fits, two.whole, actuator):
         return None
@@ -232,7 +233,7 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
     onset = Change(best * step, (low * step, high * step), list(CONDITIONS)[first])
     rest = replace(part_of(blocks, best, len(blocks.velocity)), earlier=(best * blocks.block, row))
     fits = fit_classes(rest, actuator)
-    if unexplained(rest, fits, actuator):  # what no circuit follows began in no condition
+    if unexplained(rest, fits, actuator):  # no circuit follows it, so it is in no condition
         return None
     return onset, rest, fits
 

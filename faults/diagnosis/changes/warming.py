@@ -117,7 +117,7 @@ def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator, wanted: float 
     found = max(
         (_searched(blocks, none, *one, condition, actuator, wanted) for one in starts), key=lambda one: one.gain
     )
-    followed = found.fit.scales[0] <= most  # what follows the log no better than one must explains nothing
+    followed = found.fit.scales[0] <= most  # a drift must also make the circuit follow the log
     return found if found.shown and followed else None
 
 
@@ -200,7 +200,7 @@ def _step(blocks: Blocks, found: Drift, actuator: Actuator) -> tuple[float, floa
     """
     drift, fit, _ = found
     rows = parameter_rows((fit.coordinates + 0.5 * NUDGE * _LEAKS_MORE)[None], actuator.circuit, actuator.rated)
-    moved = predicted(drifting(blocks, drift + NUDGE), rows)[0]  # halfway its leakage is as before
+    moved = predicted(drifting(blocks, drift + NUDGE), rows)[0]  # leakage halfway through the log is unchanged
     slopes = np.concatenate([fit.slopes, ((moved - fit.fitted) / NUDGE)[None]])[:, blocks.first :] / fit.scales
     slopes = np.where(blocks.seen, slopes, 0.0).reshape(len(slopes), -1)
     uphill = slopes @ np.nan_to_num((blocks.outputs - fit.fitted)[blocks.first :] / fit.scales).ravel()

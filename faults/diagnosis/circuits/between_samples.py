@@ -172,7 +172,7 @@ def _step(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
     pull[-1] -= prior[-1, -1] * blocks.lead / sample_time
     try:
         return sample_time * float(np.linalg.solve(weighted @ weighted.T + prior, pull)[-1])
-    except np.linalg.LinAlgError:  # a circuit of no numbers
+    except np.linalg.LinAlgError:  # the circuit's outputs are not finite
         return float("nan")
 
 

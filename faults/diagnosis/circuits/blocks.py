@@ -223,7 +223,7 @@ def blocks_of(record: Record) -> Blocks:
     noise, course, opening = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _opening(whole, velocity)
     begun = opening if opening is not None and _pressed(opening[0], whole[PRESSURE]) else None
     if pressure is not None and rows > 1:
-        # a block holds fewer samples, and the lines between them have no noise of their own
+        # a block holds fewer samples of pressure, and interpolated values between them add no noise
         noise[-1] = (measurement_variances(record, [PRESSURE])[PRESSURE] * rows / (block * pooled)) ** 0.5
     return Blocks(
         speed,

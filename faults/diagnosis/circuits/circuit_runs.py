@@ -235,7 +235,7 @@ def _run(blocks: Blocks, starts: Array, rows: Array, span: slice = _WHOLE) -> tu
 
 def _allowed(blocks: Blocks) -> dict[str, float]:
     """Return the errors allowed in runs, and how motor speed changes between its samples: it has inertia."""
-    if blocks.between > 1:  # its lines have a curve's means
+    if blocks.between > 1:  # its straight lines have the means of the curve
         return {**ALLOWED, "bulge": STRAIGHT}
     return {**ALLOWED, "bulge": MEANS if blocks.averaged else SAMPLES}
 

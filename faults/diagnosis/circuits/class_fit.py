@@ -229,13 +229,13 @@ def fit_freely(
         best = _at(blocks, actuator, centre, centre if start is None else start, pull)
     step, promised, reach, last = centre, 0.0, 0.0, float("inf")
     least = least_misfit(blocks)
-    for left in range(ROUNDS, 0, -1):  # a step that gains nothing is taken a third as long
-        if best.cost - least < promising:  # the sensors' noise is all that is left
+    for left in range(ROUNDS, 0, -1):  # a step that gains nothing is shortened to 0.3 of its length
+        if best.cost - least < promising:  # only the sensors' noise is left
             break
         if reach == 0.0:
             step, reach = _step(blocks, best, centre, pull), 1.0
             promised = _promised(blocks, best, centre, pull, step)
-            # a circuit of no numbers is run for ever
+            # a circuit whose parameters are not finite would run for ever
             if promised < promising or not np.all(np.isfinite(step)):
                 break
             if best.cost - left * max(promised, last) > wanted:

@@ -186,7 +186,7 @@ def fit_classes(
     for name in [list(CONDITIONS)[place] for place in near or [int(order[0])]]:
         if not fits or not explains(blocks, fits[-1]):
             fits.append(fit_freely(blocks, actuator, name, start, gained, wanted, promising))
-        elif about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # the same circuit is nearer to this one
+        elif about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # this condition is nearer to that circuit
             fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
     stuck, first = is_stuck(blocks, actuator), min(fits, key=lambda fit: fit.cost)
     if start is None and blocks.pressure is not None and not stuck and creeps(blocks, first):
@@ -205,7 +205,7 @@ def fit_classes(
     held, unbent = (np.max(np.array(one) - worse[:, None], axis=0) - likeliest for one in (scores, straight))
     centre = actuator.conditions[np.argmax(unbent)]
     best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
-    # without pressure no balance of flows looks for another pump or other faults, so regions alone have to
+    # without pressure, no flow balance tests for another pump or other faults, so only the regions can
     lasting = 1.0 if blocks.pressure is None else max(1.0, lasting_misfit(best.fitted, blocks))
     if blocks.pressure is None:
         spreading = partial(spread_of, best, known[least], blocks, centre)

@@ -59,7 +59,7 @@ def bent_by(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
         Shift of the coordinates by each of `FADES` at one standard deviation [dimensionless].
     """
     speed = np.abs(fit.fitted[blocks.first :, 0][blocks.seen[:, 0]]) / actuator.rated
-    speed = np.append(speed[speed > SLIDES], 0.0)  # what breaks loose shows friction at rest
+    speed = np.append(speed[speed > SLIDES], 0.0)  # friction at rest shows when the piston breaks loose
     parts = np.stack([np.ones_like(speed), speed, speed**2], axis=1)
     bends = BEND * np.exp(-speed[:, None] / np.array(FADES))
     rest, linear, quadratic = np.linalg.solve(parts.T @ parts + RIDGE * len(speed) * np.eye(3), parts.T @ bends)

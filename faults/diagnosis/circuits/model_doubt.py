@@ -126,7 +126,7 @@ def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Ar
     unknowns = len(steps)
     if case > 0.0:
         steps.append((_CASE, -min(SELDOM_KNOWN[_CASE], case / leakage)))
-    rows = np.tile(row, (1 + len(steps), 1))  # circuits that run side by side share their steps' errors
+    rows = np.tile(row, (1 + len(steps), 1))  # circuits run side by side share the errors of the solver's steps
     for nudged, (name, step) in zip(rows[1:], steps, strict=True):
         at = COLUMN[name]
         if name == "load_force":
@@ -333,7 +333,7 @@ def doubt_of(
     pulls = (slopes.reshape(len(slopes), -1) @ (there / weight).ravel())[:, None]
     pulls = pulls + prior[:, :known] @ (centres - fit.coordinates).T
     whole = np.arange(len(slopes))
-    right = np.delete(whole, slice(known, known + len(SELDOM_KNOWN)))  # a force on the rod is open in any case
+    right = np.delete(whole, slice(known, known + len(SELDOM_KNOWN)))  # the force on the rod is unknown in either case
     shares = np.exp(odds - np.max(odds))
     shares /= np.sum(shares)
     evidence, found = list[float](), list[Array]()

@@ -200,7 +200,7 @@ def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
         gain = (without.cost - again.cost) / LASTING
         if gain > BIAS_GAIN:
             load = load_for_offset(blocks, actuator, nearest, without, offset, gain)
-        # with an offset that explains a log a circuit follows it
+        # if an offset explains the log, a circuit with it follows the log
         matters["motor_speed_rad_s"] = load is not None or (gain > BIAS_GAIN and follows(blocks, again, actuator))
     said = {name: _bias(name, pump if name == "pump" else found[name][0]) for name in found if matters[name]}
     return list((said if load is None else said | {"motor_speed_rad_s": load}).values())
@@ -246,7 +246,7 @@ def _outside(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator)
     stiffness = float(np.exp(fits.best.coordinates[COORDINATES.index("bulk_modulus")]))
     share = stiffness / actuator.circuit.bulk_modulus
     known = fits.covariance[5, 5] ** 0.5
-    # without pressure, a piston that yields on its seals shows bulk modulus over friction alone
+    # without pressure, a piston that yields on its seals shows only the ratio of bulk modulus to friction
     over_friction = blocks.pressure is None and not_shown(fits) >= FRICTION_LAW
     if not over_friction and (share < SOFT * np.exp(-2.0 * known) or share > np.exp(2.0 * known) / SOFT):
         return [(AgainstCode.OIL_SOFT if share < 1.0 else AgainstCode.OIL_STIFF).note(share=share)]

@@ -80,7 +80,7 @@ def _between_samples(record: Record, blocks: Blocks) -> float:
     rows = round(blocks.block * blocks.sample_time / record.sample_time)
     steps = np.diff(record["velocity_m_s"])
     steps = steps[np.isfinite(steps)]
-    if not len(steps):  # a channel slower than the rows: no two of its samples are neighbours
+    if not len(steps):  # the channel is slower than the rows, so no two samples are adjacent
         return 0.0
     changes = float(np.mean(steps**2)) - 2.0 * rows * float(blocks.noise[0]) ** 2
     return (max(changes, 0.0) / (3.0 * rows)) ** 0.5

@@ -70,7 +70,7 @@ class Body(Values):
         if not isinstance(found, Scalar):
             return self._copied(targets, found)
         lines: list[str] = []
-        for target in reversed(targets):  # the first one that is written is what the others receive
+        for target in reversed(targets):  # the last target is written first, and its value passed on
             place = self._place(target, found)
             if isinstance(place, Block):
                 lines += self._each(place, lambda _, found=found: found.text)
@@ -115,9 +115,8 @@ class Body(Values):
                 self.names |= dict(zip(names, found, strict=True))
                 return []
             lines = [line for pair in zip(targets, found, strict=True) for line in self._one_of(*pair)]
-            if {one.id for one in ast.walk(value) if isinstance(one, ast.Name)} & {
-                *names
-            }:  # it would read what was written before it
+            # a later value would read a target that is already overwritten
+            if {one.id for one in ast.walk(value) if isinstance(one, ast.Name)} & {*names}:
                 raise refused(value)
             return lines
         if found is not None or not isinstance(value, ast.Call):

@@ -197,7 +197,7 @@ class Entry:
             length = shape[axis]
             if wanted is None or wanted == length:
                 continue
-            # a name is as long as the first argument that has it
+            # the first argument with a named length sets that length
             known, by = laid.lengths.setdefault(wanted, (length, name)) if isinstance(wanted, str) else (wanted, "")
             if known != length:
                 of = f"{known} ({wanted}, as of {by})" if by else known
@@ -225,7 +225,7 @@ def _through_object(array: Any) -> int:
 _WORD = ctypes.c_size_t
 _PROBE = np.zeros(4)[1:]
 
-# ten times quicker than `ctypes.data`, which a log asks for hundreds of times; where it differs, that one is asked
+# ten times quicker than `ctypes.data`, which each log needs hundreds of times; used only if both give the same address
 _address: Callable[[Any], int] = (
     _through_object if _through_object(_PROBE) == _PROBE.ctypes.data else lambda array: array.ctypes.data
 )

@@ -128,7 +128,7 @@ def complete(width: int, count: int, stride: int) -> Operation:
         address = given[0].parts[0]
         found = [scope.op(f"load {kind}, ptr {place(scope, address, stride * k)}, align 8") for k in range(count)]
         every = ""
-        for a, b in zip(found[::2], [*found[1::2], found[-1]], strict=False):  # an ordered pair has no NaN
+        for a, b in zip(found[::2], [*found[1::2], found[-1]], strict=False):  # ordered: neither value is NaN
             ordered = scope.op(f"fcmp ord {kind} {a}, {b}")
             every = scope.op(f"and {truths} {every}, {ordered}") if every else ordered
         if width == 1:
@@ -194,9 +194,10 @@ def transpose(scope: Scope, given: Sequence[Held]) -> Held:
     for lane in every:
         begin = scope.op(f"add i64 {scope.op(f'load i64, ptr {place(scope, places, 8 * lane)}')}, {offset}")
         rows.append(scope.op(f"load {kind}, ptr {place(scope, begin, 0)}, align 8"))
-        # to read, into the second cache, data
+        # the last three arguments: for reading, into the second-level cache, data
         scope.line(f"call void @llvm.prefetch.p0(ptr {place(scope, begin, ahead)}, i32 0, i32 2, i32 1)")
-    for span in (1, 2, 4):  # exchange what stands off the diagonal of every 2 by 2 blocks of this size
+    # exchange the two off-diagonal blocks of each group of 2 by 2 blocks of this size
+    for span in (1, 2, 4):
         kept = [k + ROWS - span if k & span else k for k in every]
         for low in (lane for lane in every if not lane & span):
             pair = f"{kind} {rows[low]}, {kind} {rows[low + span]}"

@@ -269,7 +269,7 @@ class Module:
     def ir(self) -> str:
         """Return the whole kernel."""
         declared = [one for one in self._declared if one not in RELEASE]
-        # what registers cannot hold is put aside in whole cache lines
+        # values that do not fit into registers are stored in whole cache lines
         attributes = "attributes #0 = { nounwind alignstack=64 }\n"
         return "\n".join([*declared, RELEASE, *self._texts, attributes])
 

@@ -39,7 +39,7 @@ def recipe(name: str, made_of: object, machine: str) -> str | None:
     machine : str
         Compiler and target of the kernel.
     """
-    import hashlib  # which a call for help need not wait for
+    import hashlib  # imported here, so that a call for help does not wait for it
 
     known = identity(made_of) if _trusted and made_of is not None else None
     sources = _sources() if known is not None else None

@@ -41,7 +41,7 @@ def family(kind: AnyKind) -> str:
 def _assigned(node: ast.AST) -> frozenset[str]:
     if isinstance(node, ast.Name):
         return frozenset((node.id,)) if isinstance(node.ctx, ast.Store) else frozenset()
-    # a loop within a loop is asked again with it: what each part assigns is found once
+    # cached for each node, because an inner loop is looked at again as a part of its outer loop
     return frozenset().union(*map(_assigned, ast.iter_child_nodes(node)))
 
 

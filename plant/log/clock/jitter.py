@@ -160,7 +160,7 @@ def _slopes(t: Array, y: Array) -> tuple[Array, NDArray[np.bool_]]:
     normal = np.swapaxes(powers, 1, 2) @ powers
     right = np.swapaxes(powers, 1, 2) @ (y[rows] - y[:, None])[:, :, None]
     whole = np.ptp(t[rows], axis=1) <= GAP * (POINTS - 1) * usual
-    whole &= np.count_nonzero(np.diff(t[rows], axis=1) > TOGETHER * usual, axis=1) >= 3  # a cubic takes four
+    whole &= np.count_nonzero(np.diff(t[rows], axis=1) > TOGETHER * usual, axis=1) >= 3  # a cubic needs four stamps
     normal[~whole] = np.eye(4)
     slopes: Array = np.linalg.solve(normal, right)[:, 1, 0].astype(np.float64) / usual
     return slopes, whole
@@ -218,11 +218,11 @@ def rounded_clock(time: Array, slots: Array) -> tuple[float, float, float] | Non
     sample_time = float(centred @ time) / float(centred @ centred)
     if not sample_time > 0.0:
         return None
-    turns = slots[1:][quanta > 0]  # where a new stamp begins: few of them say little of a slope
+    turns = slots[1:][quanta > 0]  # slots at which the stamp changes; few of them give a poor slope
     between = float(quanta[quanta > 0][1:].sum())
     ticks = [one for one in ((turns[-1] - turns[0]) / max(between, 1.0), quantum / sample_time) if np.isfinite(one)]
     whole = [quantum / max(1.0, np.rint(one)) for one in ticks]
-    for tried in (*whole, sample_time):  # a whole number of samples a quantum, if the stamps allow it
+    for tried in (*whole, sample_time):  # a whole number of samples per quantum, if the stamps allow it
         left = time - tried * slots
         most = 1.0 + 1e-6 if tried is not sample_time else ROUNDED
         if np.ptp(left) <= most * quantum and np.std(left) >= FILLED * quantum:

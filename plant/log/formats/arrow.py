@@ -32,7 +32,8 @@ def from_arrow(column: "pa.ChunkedArray[Any]") -> Array:
     out, end = np.empty(len(column)), 0
     for chunk in column.chunks:
         begin, end = end, end + len(chunk)
-        there, values = (cast("Any", one) for one in chunk.buffers())  # of the buffer protocol, as stubs do not say
+        # Arrow's buffers support the buffer protocol, which its stubs do not state
+        there, values = (cast("Any", one) for one in chunk.buffers())
         if values is not None:
             out[begin:end] = np.frombuffer(values, dtype=np.float64)[chunk.offset : chunk.offset + len(chunk)]
         if chunk.null_count and there is not None:

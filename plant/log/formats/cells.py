@@ -50,11 +50,11 @@ def number(text: str) -> float:
     cell = text.strip()
     if cell in MISSING:
         return float("nan")
-    if "_" in cell:  # Python reads 1_000, no logger writes it
+    if "_" in cell:  # Python reads 1_000 as a number, but no logger writes it
         raise ValueError(cell)
     if _FORTRAN.fullmatch(cell):
         cell = cell.upper().replace("D", "E")
-    return float(cell.replace("\u2212", "-") if "\u2212" in cell else cell)  # as .NET writes a minus in Swedish
+    return float(cell.replace("\u2212", "-") if "\u2212" in cell else cell)  # .NET writes this minus sign in Swedish
 
 
 def numbers(values: NDArray[Any], name: str, source: str) -> Array:
@@ -140,7 +140,7 @@ def values_of(name: str, given: Any, source: str) -> Any:
         if values.dtype.kind == "M":
             return np.where(hidden, np.datetime64("NaT"), values)
         return np.where(hidden, np.nan if values.dtype.kind in "fiubc" else None, values)  # pyright: ignore[reportCallIssue, reportArgumentType]
-    # a matrix of one column or one row, as MATLAB's
+    # a matrix of one column or one row, as MATLAB writes it, becomes a vector
     return values.ravel() if values.ndim == 2 and 1 in values.shape else values
 
 

@@ -53,7 +53,8 @@ def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, 
     """Return columns as logged, NaN in empty cells. Refuse a row of another width, or a cell without a number."""
     found: dict[Column, Array] | None = None
     if layout.delimiter != BLANKS:
-        with suppress(pa.ArrowInvalid, UnicodeError, _NotFastError):  # stray bytes harm nobody outside their cell
+        # if this fails, the log is read line by line, and stray bytes spoil only their own cell
+        with suppress(pa.ArrowInvalid, UnicodeError, _NotFastError):
             found = _read_fast(path, layout, chosen)
     found = _read_cells(path, layout, chosen) if found is None else found
     for column, values in found.items():
@@ -113,7 +114,7 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
     source = _source(path, layout)
     table = _arrow_table(source, layout, kinds)
     if (lines := _lines_if_quoted(source, layout)) is not None and lines != table.num_rows:
-        raise _NotFastError  # a quote that is never closed makes one cell of all that follows
+        raise _NotFastError  # an unclosed quote turned all that follows into one cell
     out: dict[Column, Array] = {}
     for column, label in zip(chosen, wanted, strict=True):
         if label in texts:
@@ -121,7 +122,7 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
             out[column] = found
         else:
             out[column] = from_arrow(table.column(label))
-        table = table.drop_columns([label])  # hands each column's memory back before the next is copied
+        table = table.drop_columns([label])  # frees each column before the next one is copied
     return out
 
 
@@ -179,6 +180,6 @@ def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Co
 def _rows(path: Path, layout: Layout) -> Generator[Iterator[list[str]]]:
     """Open the lines below the header, as lists of cells."""
     with _text(path, layout) as text:
-        # files that were put behind each other have a mark of their order of bytes within
+        # concatenated files have byte order marks in the middle
         lines = (line.rstrip("\n").removeprefix("\ufeff") for line in islice(text, layout.skipped, None))
         yield (cells_of(line, layout.delimiter) if line else [] for line in lines)

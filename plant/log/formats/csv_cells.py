@@ -212,7 +212,7 @@ class _Body:
         last = self.rows[taken - 1][0] if taken else 0
         within = [one for one in self.strange if one.line < last]
         self._note_out_of_order(found)
-        # one line below the data says that it ends, however short the log is
+        # a single line below the data marks its end, however short the log is
         below = len(self.rows) - taken + len(self.strange) - len(within)
         self._refuse(found, within, taken, allowed, spared=below == 1)
         timeless = {row: said for row, said in self.timeless.items() if row < taken}
@@ -230,7 +230,7 @@ class _Body:
         if column.position not in self.layout.stamped:
             return np.frombuffer(cells.values, dtype=np.float64) if len(cells.values) else np.empty(0)
 
-        def refuse(row: int, cell: str) -> None:  # it has the shape of a stamp, but no day has the number 93
+        def refuse(row: int, cell: str) -> None:  # the cell looks like a stamp, but is no valid time, such as day 93
             cells.bad[row] = cell
             if column.channel == TIME:
                 self.timeless[row] = cell

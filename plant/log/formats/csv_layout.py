@@ -83,7 +83,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     """Return the cells of a line."""
     if delimiter == BLANKS:
         return line.split()
-    if line.count('"') % 2 or '"' not in line:  # a quote that is never closed is none
+    if line.count('"') % 2 or '"' not in line:  # an unclosed quote is an ordinary character
         return line.split(delimiter)
     try:
         return next(csv.reader([line], delimiter=delimiter))
@@ -110,7 +110,7 @@ def layout_of(path: Path) -> Layout:
     text = start.decode(encoding, errors="replace").removeprefix("\ufeff")
     lines = [line.rstrip("\n") for line in islice(io.StringIO(text, newline=None), LINES)]
     if len(start) == LOOKED_AT and len(lines) < LINES:
-        lines = lines[:-1] or lines  # the last one is cut
+        lines = lines[:-1] or lines  # the last line is incomplete
     layout = layout_of_lines(lines, encoding, str(path))
     remember(start, LINES, layout)
     return layout
@@ -135,7 +135,7 @@ def _encoding(start: bytes, source: str) -> str:
     try:
         start.decode("utf-8")
     except UnicodeDecodeError as error:
-        if len(start) - error.start >= 4:  # not the end of what was looked at, cut within a letter
+        if len(start) - error.start >= 4:  # more than a character that is cut off at the end
             return "cp1252"
     return "utf-8"
 
@@ -174,7 +174,7 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     if strange > 0.1 * len(head) or "\0" in head:
         raise LogError(NO_TEXT, source)
     absent = [one for one in DELIMITERS if one != BLANKS and not any(one in line for line in lines)]
-    # those that no line holds leave the same single cells: the first of them stands for all
+    # delimiters that occur in no line all give the same single cells: the first of them stands for all
     tried = [one for one in DELIMITERS if one not in absent[1:]]
     block = max((_block(lines, one) for one in tried), key=lambda one: one.score)
     if not block.score or _header_parts_at_commas(lines, block):
@@ -191,7 +191,8 @@ def _of_labview(lines: Sequence[str], encoding: str, source: str) -> Layout | No
     ends = [place for place, line in enumerate(lines) if line.startswith(HEADER_ENDS)]
     if not ends:
         return None
-    last = ends[:2][-1]  # a third ends the header of another segment, whose rows are none of this one
+    # a third one ends the header of another segment, whose rows do not belong to this segment
+    last = ends[:2][-1]
     layout = layout_of_lines(without_remarks(lines[last + 1 :]), encoding, source)
     told = with_labview_header(layout, [cells_of(line, layout.delimiter) for line in lines[:last]])
     return replace(told, skipped=layout.skipped + last + 1)
@@ -249,7 +250,7 @@ class _Block:
         for place, _ in self.rows[1:2]:
             beneath = cells_of(lines[place - 1], self.delimiter)
             if place == 2 and not first and is_unit_row(beneath):
-                first = place  # numbers of channels, whose units stand below them
+                first = place  # the row above the units holds channel numbers
         while first and _has_number(cells_of(lines[first - 1], self.delimiter), width):
             first -= 1
         closed = all(not row[-1] for _, row in self.rows)
@@ -261,7 +262,7 @@ class _Block:
             if one and _mostly_stamps([row[place] for _, row in self.rows[:9]])
         )
         clocks = {place for place in stamped if any(":" in row[place] for _, row in self.rows[:9])}
-        stamped = frozenset(clocks) or stamped  # a column of days beside one of times says nothing that is read
+        stamped = frozenset(clocks) or stamped  # beside a column of times, a column of days is not needed
         in_cells = self._units_in_cells()
         headings = tuple(
             Heading(name, None if place in stamped else in_cells.get(place, unit), place in stamped)
@@ -301,7 +302,7 @@ def _block(lines: Sequence[str], delimiter: str) -> _Block:
         if line.strip()
     ]
     judged = [(place, row, tuple(map(is_value, row))) for place, row in split if len(row) <= _WIDEST]
-    # a blank that parts thousands is told from one between two numbers only where something else parts the cells
+    # a blank separates thousands, rather than two numbers, only if something else separates the cells
     judged = [(place, row, values) for place, row, values in judged if len(row) > 1 or " " not in "".join(row)]
     judged = [one for one in judged if any(one[2])]
     widths = Counter(len(row) for _, row, _ in judged)

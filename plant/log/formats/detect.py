@@ -179,7 +179,7 @@ def refusal(error: BaseException, kind: str, path: Path) -> BaseException:
         The format.
     """
     if isinstance(error, HydrostateError) or not isinstance(error, Exception | MemoryError):
-        panicked = type(error).__name__ == "PanicException"  # how a library in Rust says that a file is damaged
+        panicked = type(error).__name__ == "PanicException"  # raised by a library in Rust for a damaged file
         return LogError(f"cannot be read as {kind}", str(path)) if panicked else error
     if isinstance(error, PermissionError):
         return LogError("there is no permission to read it", str(path))

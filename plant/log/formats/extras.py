@@ -33,7 +33,7 @@ def library(name: str, kind: str, source: str) -> Any:
     try:
         found = import_module(name)
         for logger in list(logging.root.manager.loggerDict):
-            if logger.split(".")[0] == name:  # what they say of a damaged file is in our sentence
+            if logger.split(".")[0] == name:  # our own message says what is wrong with a damaged file
                 logging.getLogger(logger).setLevel(logging.CRITICAL + 1)
         return found
     except ImportError as error:

@@ -57,7 +57,7 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
             for column, values in _columns(one, leaf).items():
                 groups[group][column] = values
                 said = next((said for key in UNITS if (said := _attribute(one, key))), None)
-                units[group][column] = said.split(" since ")[0] if said else None  # of a clock of netCDF
+                units[group][column] = said.split(" since ")[0] if said else None  # netCDF clocks: "s since 1970"
     if STRUCT in groups and STRUCT in texts:
         groups = defaultdict(dict, {STRUCT: groups[STRUCT]})
     if not any(groups.values()):
@@ -98,7 +98,7 @@ def _columns(one: Any, leaf: str) -> dict[str, Any]:
         return {name: values[name] for name in kind.names if kind[name].kind in "fiub" and kind[name].shape == ()}
     values = values.squeeze()
     if values.ndim == 2 and _attribute(one, "MATLAB_class"):
-        values = values.T  # MATLAB counts the other way
+        values = values.T  # MATLAB stores arrays in column order
     named = spread(leaf, values)
     names = _names(one)
     return dict(zip(names, named.values(), strict=True)) if len(names) == len(named) > 1 else named

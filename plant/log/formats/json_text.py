@@ -51,7 +51,7 @@ def _document(text: str, source: str) -> Any:
         try:
             rows.append(json.loads(line))
         except json.JSONDecodeError as error:
-            if place == len(lines) - 1 > 0:  # a logger that is switched off leaves its last line cut
+            if place == len(lines) - 1 > 0:  # a logger that is switched off leaves an incomplete last line
                 break
             raise LogError(f"{WANTED} (line {place + 1} is no JSON: {error.msg})", source) from error
     return rows

@@ -55,7 +55,7 @@ class _Reader:
             raise DamagedMatError("the file ends within an element")
         kind, count, start = self.integer(self.at), self.integer(self.at + 4), self.at + 8
         after = start + count + (0 if kind == COMPRESSED else -count % 8)
-        if kind >> 16:  # four bytes or fewer stand in the tag itself
+        if kind >> 16:  # up to four bytes of data are in the tag itself
             kind, count, start, after = kind & 0xFFFF, min(kind >> 16, 4), self.at + 4, self.at + 8
         if start + count > len(self.data):
             raise DamagedMatError("the file ends within an element")

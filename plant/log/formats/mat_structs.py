@@ -83,7 +83,8 @@ def _of_signals(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
         unit = said["unit"]
         label = f"{said['name']} [{unit}]" if isinstance(unit, str) and unit.strip() else said["name"]
         times = {field: np.ravel(value) for field, value in one.items() if _has_time({field: value})}
-        if times or label in together:  # a name that comes twice is for the reader of the log to choose from
+        # a repeated name gets a table of its own, and the reader of the log chooses between them
+        if times or label in together:
             found[f"{name}({place})"] = {**times, label: np.ravel(said["data"])}
         else:
             together[label] = np.ravel(said["data"])

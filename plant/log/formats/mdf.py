@@ -43,9 +43,11 @@ def open_mdf(path: Path) -> tuple[Table, ...]:
     """
     asammdf = library("asammdf", "MDF", str(path))
     hook, said = sys.unraisablehook, ""
-    sys.unraisablehook = lambda _: None  # a file that breaks off leaves objects that cannot be closed, and complain
+    # objects of a truncated file cannot be closed, and would print errors
+    sys.unraisablehook = lambda _: None
     try:
-        with redirect_stdout(StringIO()):  # asammdf prints what it makes of some damaged files, into our JSON
+        # asammdf prints remarks on some damaged files, which would end up in our JSON
+        with redirect_stdout(StringIO()):
             return _tables(asammdf, path)
     except HydrostateError:
         raise
@@ -76,7 +78,7 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
                     if formula is not None:
                         raise LogError(f"its clock {channel.name[:80]!r} is converted by a formula", str(path))
                     continue
-                # by itself it leaves invalid samples out, of each channel others
+                # by default asammdf leaves out invalid samples, different ones in each channel
                 signal = file.get(group=number, index=place, raw=False, ignore_invalidation_bits=True)
                 columns.setdefault(clock, signal.timestamps)
                 columns.setdefault(names[place], _valid(signal, formula, str(path)))

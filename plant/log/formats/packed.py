@@ -32,7 +32,7 @@ def require_regular(path: Path) -> None:
     except (FileNotFoundError, NotADirectoryError) as error:
         stream = "; a log is read from a file only, a stream by `hydrostate watch -`" if str(path) == "-" else ""
         raise LogError(f"there is no such file{stream}", str(path)) from error
-    except ValueError as error:  # a zero in the name
+    except ValueError as error:  # the name contains a null character
         raise LogError("there is no such file", repr(str(path))) from error
     if stat.S_ISDIR(mode):
         raise LogError("a file is needed, got a folder; `hydrostate fleet FOLDER` reads all logs of one", str(path))

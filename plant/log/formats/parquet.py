@@ -50,7 +50,7 @@ def open_parquet(path: Path) -> Table:
 
     def column(place: int) -> Any:
         name = schema.names[place]
-        return _named(file.read([name]), name, before[place])  # a.b is also the field b of a structure a
+        return _named(file.read([name]), name, before[place])  # a.b also selects field b of a structure a
 
     table = _table(path, schema, column)
     if len(schema.names) <= MANY:

@@ -41,7 +41,7 @@ def open_tdms(path: Path) -> tuple[Table, ...]:
                 alike = (group.name, len(channel), _number(said.get(STEP)))
                 began = _stamp(said.get(BEGAN))
                 if began is None:
-                    began = starts.get(alike)  # only the first of a group may say it
+                    began = starts.get(alike)  # perhaps only the first of a group states it
                 starts.setdefault(alike, began)
                 key = (*alike, began, _offset(said.get(OFFSET)))
                 groups[key][channel.name] = channel[:]

@@ -168,7 +168,7 @@ def require_ungrouped(rows: Sequence[Sequence[str]], names: Sequence[str], sourc
     LogError
         If a column does, by its name.
     """
-    for name, cells in zip(names, zip(*rows, strict=True), strict=False):  # no rows, no columns
+    for name, cells in zip(names, zip(*rows, strict=True), strict=False):  # without rows there are no columns
         require_none_grouped(cells, name, source)
 
 

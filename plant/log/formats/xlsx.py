@@ -178,9 +178,8 @@ def _table(path: Path, title: str, rows: Cells, uncomputed: bool = False) -> Tab
         return None
 
     below = rows[layout.skipped :]
-    lasting = {
-        place for row in below[:1] for place, cell in enumerate(row[:width]) if isinstance(cell, timedelta)
-    }  # written in seconds here
+    # durations, which were converted to seconds
+    lasting = {place for row in below[:1] for place, cell in enumerate(row[:width]) if isinstance(cell, timedelta)}
     headings = tuple(replace(one, said="s") if place in lasting else one for place, one in enumerate(layout.headings))
     numeric = [any(_is_number(row[place]) for row in below if place < len(row)) for place in range(width)]
 

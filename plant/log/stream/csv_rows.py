@@ -214,7 +214,7 @@ class CsvStream:
             cells = line.rstrip("\r\n").split(self._delimiter)
             if '"' in line:
                 cells = self._quoted(line) or []
-            if not line.endswith(("\n", "\r")):  # it may end in the middle of a digit
+            if not line.endswith(("\n", "\r")):  # it may be cut off within a number
                 self.cut = True
                 return
             place, self._row = self._row, self._row + 1

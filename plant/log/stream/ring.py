@@ -60,7 +60,7 @@ class RingWriter:
             raise HydrostateError(f"a ring needs a header of 1 to {ROWS_AT - HEADER_AT} bytes and two slots or more")
         columns = header.count(",") + 1
         try:
-            path.unlink(missing_ok=True)  # a reader of the old one keeps it
+            path.unlink(missing_ok=True)  # a reader of the old file keeps it
             with path.open("xb+") as file:
                 file.truncate(ROWS_AT + 8 * columns * slots)
                 self._held = mmap.mmap(file.fileno(), 0)
@@ -141,10 +141,11 @@ class RingReader:
     def take(self) -> NDArray[np.float64]:
         """Return the new rows, shape (n, columns); empty if there are none."""
         size, begin, written = len(self._slots), _whole(self._held, READ_AT), _whole(self._held, WRITTEN_AT)
-        oldest = max(begin, written - size + 1)  # the one before may just be written over
+        oldest = max(begin, written - size + 1)  # the row before may be in the middle of being overwritten
         end = min(written, oldest + MOST)
         rows = self._slots[np.arange(oldest, end) % size]
-        kept = min(end, max(oldest, _whole(self._held, WRITTEN_AT) - size + 1))  # older ones were, while they were read
+        # older rows were overwritten while they were read
+        kept = min(end, max(oldest, _whole(self._held, WRITTEN_AT) - size + 1))
         self.lost += kept - begin
         struct.pack_into("<Q", self._held, READ_AT, end)
         return rows[kept - oldest :]

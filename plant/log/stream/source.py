@@ -193,7 +193,7 @@ def _ring(address: str, received: BatchCounts) -> Iterator[str]:
     def count(taken: int, lost: int) -> None:
         received.batches, received.lost = taken, lost
 
-    from plant.log.stream.ring import ring_lines  # a call for help need not wait for arrays
+    from plant.log.stream.ring import ring_lines  # imported here, so that a call for help does not wait for arrays
 
     return ring_lines(Path(address.removeprefix("ring:")), count)
 

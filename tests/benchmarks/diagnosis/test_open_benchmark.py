@@ -1,4 +1,4 @@
-"""The pairs of kinds that a usual bench has."""
+"""The pairs of disturbances that a bench is likely to have."""
 
 from benchmarks.diagnosis.open_benchmark import USUAL_PAIRS
 from experiments.open_benchmark.kinds import kind_of

@@ -1,4 +1,4 @@
-"""The population that diagnosis is calibrated and judged on."""
+"""Tests of the population on which diagnosis is calibrated and judged."""
 
 import numpy as np
 import pytest

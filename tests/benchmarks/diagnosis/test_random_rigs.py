@@ -1,4 +1,4 @@
-"""What a population of random rigs is worth."""
+"""Tests of the figures and targets for a population of random rigs."""
 
 from typing import Any
 

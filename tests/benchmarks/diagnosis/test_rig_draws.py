@@ -1,4 +1,4 @@
-"""Random realistic rigs."""
+"""Tests of the random, realistic rigs."""
 
 from math import pi
 

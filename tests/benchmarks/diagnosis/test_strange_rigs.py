@@ -1,4 +1,4 @@
-"""Strange logs of rigs that are not the paper's: what is strange has the size of the rig."""
+"""Tests of strange logs of rigs other than the paper's: each strangeness is scaled to the size of the rig."""
 
 import numpy as np
 import pytest

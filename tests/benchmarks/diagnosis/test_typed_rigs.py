@@ -1,4 +1,4 @@
-"""Ten rigs of other makers, as an engineer types them."""
+"""Tests of ten rigs of other makers, with rig files as an engineer would type them."""
 
 import numpy as np
 import pytest

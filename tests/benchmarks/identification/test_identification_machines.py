@@ -1,4 +1,4 @@
-"""Simulated machines that judge the defaults of identification."""
+"""Tests of the simulated machines on which the defaults of identification are judged."""
 
 import numpy as np
 import pytest

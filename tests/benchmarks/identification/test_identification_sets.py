@@ -1,4 +1,4 @@
-"""The table of public sets says what it has where a name matches nothing."""
+"""Tests that the table of public sets lists the sets it has if a name matches none."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A peer's state that grows over the test follows its outputs: how much it grows is told from the model alone."""
+"""A peer's state that grows over the test follows the outputs; its growth is computed from the model alone."""
 
 import numpy as np
 import pytest

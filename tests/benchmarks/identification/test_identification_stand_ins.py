@@ -1,4 +1,4 @@
-"""Stand-ins of sets that are kept back, on which the defaults of identification are judged."""
+"""Tests of the stand-ins for withheld sets, on which the defaults of identification are judged."""
 
 import numpy as np
 import pytest

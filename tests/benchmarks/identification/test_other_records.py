@@ -1,4 +1,4 @@
-"""Other records of a plant: they tell a default that is worse than a baseline from one that a test has let down."""
+"""Other records of a plant tell a default that is worse than a baseline from one that was unlucky in one test."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from estimation.arrays import Array
 def of_records(
     count: int, sizes: dict[str, float], *, spread: float = 0.0
 ) -> tuple[PublicSet, dict[str, dict[str, Array]]]:
-    """Return a set with other records, and runs of models whose errors have these sizes."""
+    """Return a set with other records, and runs of models with errors of the given sizes."""
     rng = np.random.default_rng(0)
     parts: dict[str, Part] = {f"record {k}": (np.zeros((200, 1)), rng.normal(size=200)) for k in range(count)}
     runs = {

@@ -1,4 +1,4 @@
-"""The interval of a ratio of errors: it holds the truth where errors stay alike, and shrinks with what is tested."""
+"""The interval of a ratio of errors covers the truth for errors correlated in time, and shrinks with longer tests."""
 
 import numpy as np
 from scipy.signal import lfilter
@@ -8,7 +8,7 @@ from estimation.arrays import Array
 
 
 def errors(n: int, seed: int) -> Array:
-    """Return two errors of equal power that stay alike for some ten samples, and share a part, shape (2, n)."""
+    """Return two errors of equal power, correlated over about ten samples and with a common part, shape (2, n)."""
     drawn = np.random.default_rng(seed).normal(size=(3, n + 100))
     slow = np.asarray(lfilter([1.0], [1.0, -0.9], drawn, axis=1))[:, 100:]
     return slow[:2] + slow[2]

@@ -1,4 +1,4 @@
-"""The record of a run names the tests that a fault at a line can make fail."""
+"""The record of a run names the tests that a fault in a given line can make fail."""
 
 import os
 from pathlib import Path
@@ -28,12 +28,12 @@ RAN = {
     "tests/plant/test_b.py::test_doubled|setup": [12],
     "": [2, 5, 11],
 }
-"""What a run would record: the file's lines by test."""
+"""What a run would record: the lines of the file that each test executes."""
 
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    """A project of one file with two files of tests, and a record of their run."""
+    """A project with one source file and two test files, and a record of a run of its tests."""
     (tmp_path / "plant").mkdir()
     (tmp_path / "plant" / "a.py").write_text(SOURCE)
     for name in ("test_a.py", "test_b.py"):
@@ -48,7 +48,7 @@ def project(tmp_path: Path) -> Path:
 
 
 def first(project: Path, line: int, count: int) -> set[str]:
-    """The first tests that are tried."""
+    """Return the names of the tests that are tried first."""
     named = Executed(project, project / "data").tests("plant/a.py", line)[:count]
     return {test.partition("::")[2] for test in named}
 

@@ -1,4 +1,4 @@
-"""Tests run in forks: chosen ones alone, in order, on the files as they are, and never for ever."""
+"""Forks run only the chosen tests, in order and on the current files, and end after a limited time."""
 
 import json
 import os
@@ -32,7 +32,7 @@ def test_a_fork_sees_the_fault_and_the_next_one_does_not(tmp_path: Path) -> None
             f"import sys; sys.path[:0] = [{str(ROOT)!r}, '.']; import benchmarks.mutants.forked as f; f.main()",
         ],
         cwd=tmp_path,
-        env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},  # they take seconds to import
+        env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},  # plugins take seconds to import
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -1,4 +1,4 @@
-"""Planted faults change one thing each, leave what is no formula alone, and are tried on the tests of their folder."""
+"""Each planted fault changes one thing, only in formulas, and is tried on the tests of the file's folder."""
 
 import ast
 from pathlib import Path
@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 def faults(text: str) -> set[str]:
-    """Return the one line of a file, as each fault makes it."""
+    """Return the text of the file with each of the faults."""
     return {mutant.source for mutant in mutants_of("plant/x.py", text, range(count_mutants(text)))}
 
 
@@ -61,7 +61,7 @@ def test_what_is_no_formula_is_left_alone(text: str) -> None:
 
 @pytest.mark.parametrize("length", [-1, -2, -100])
 def test_any_negative_length_is_what_is_left(length: int) -> None:
-    """So a fault in its size would be no fault."""
+    """So a fault that changes only its size would have no effect."""
     values = np.arange(12.0)
     np.testing.assert_array_equal(values.reshape(length, 3), values.reshape(4, 3))
     assert values[:0].reshape(3, length).shape == (3, 0)

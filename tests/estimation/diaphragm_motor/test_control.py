@@ -1,4 +1,4 @@
-"""Figures of a run under velocity control."""
+"""Settling time of a run under velocity control."""
 
 import numpy as np
 

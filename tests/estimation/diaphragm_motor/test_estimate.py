@@ -1,4 +1,4 @@
-"""Leakage, load and gas of the diaphragm motor, and what of it cannot be known."""
+"""Leakage, load and gas of the diaphragm motor, and what cannot be determined."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""When a number of the diaphragm motor is told, and what speaks against all of them."""
+"""When a number of the diaphragm motor is reported, and objections to all of them."""
 
 from types import SimpleNamespace
 from typing import Any

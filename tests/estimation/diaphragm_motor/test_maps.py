@@ -1,4 +1,4 @@
-"""The averaged diaphragm motor against the fast plant, and its control on the fast plant."""
+"""The averaged diaphragm motor compared with the fast plant, and its control on the fast plant."""
 
 from dataclasses import replace
 
@@ -99,7 +99,7 @@ def test_a_motor_that_is_stopped_does_not_turn_back(maps: MotorMaps) -> None:
         [(0.0, HEALTHY)], lambda time: 3e-3 if time < 0.3 else 0.0, 0.4, PEAK, maps, np.random.default_rng(1)
     )
     stopping = run.time > 0.31
-    assert run.swing[stopping][0] > 0.0  # the integral lets go in some periods
+    assert run.swing[stopping][0] > 0.0  # the integral part takes some periods to unwind
     assert run.velocity[stopping].min() > -1e-4
 
 

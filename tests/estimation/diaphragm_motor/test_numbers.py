@@ -1,4 +1,4 @@
-"""What logs of the diaphragm motor say by tones and maps, kept in `numbers.json`."""
+"""Results from logs of the diaphragm motor, by tones and maps, kept in `numbers.json`."""
 
 from dataclasses import replace
 from functools import cache

@@ -1,4 +1,4 @@
-"""What maps and controllers of the diaphragm motor give, kept in `numbers_control.json`."""
+"""Results of maps and controllers of the diaphragm motor, kept in `numbers_control.json`."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""The sine of a drive is found to a small part of a spectral line, however long it lasted."""
+"""The frequency of a sinusoidal drive is found to a small part of a spectral line, whatever its duration."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def test_frequency_swing_and_phase_of_a_drive_between_two_spectral_lines(seconds
     voltage = 5.0 + 60.0 * np.sin(2.0 * np.pi * frequency * T * np.arange(size) + 0.4)
     voltage += 0.01 * np.random.default_rng(0).standard_normal(size)
     found = steady_drive(voltage, T)
-    # the deviation of a sine's frequency in white noise: sqrt(6) s / (pi a T sqrt(n)) over its length
+    # standard deviation of a sine's frequency in white noise: sqrt(6) s / (pi a T sqrt(n)), with its length T
     deviation = np.sqrt(6.0) * 0.01 / (np.pi * 60.0 * seconds * np.sqrt(size))
     assert found.frequency == pytest.approx(frequency, abs=6.0 * deviation)
     assert found.peak_to_peak == pytest.approx(120.0, rel=1e-3)

@@ -1,4 +1,4 @@
-"""A log of another actuator than the rig file's is told by where the pumped oil goes."""
+"""A log of an actuator other than the rig file's is recognised by where the pumped oil goes."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from plant.eha.rig import Rig
 from tests.estimation.fits.short_logs import PAPER, PRESSURE, WORN, log
 
 SMALL = replace(PAPER, piston_area=PAPER.piston_area / 3.0, chamber_volume=PAPER.chamber_volume / 30.0)
-"""A rig file of a smaller cylinder than the log's: with its pump the piston would go three times as far."""
+"""Rig file of a smaller cylinder than the log's: with the same pump, its piston would move three times as far."""
 
 
 @pytest.mark.parametrize("times", [0.3, 0.5, 2.0, 3.0])
@@ -62,7 +62,7 @@ def test_its_estimate_says_so_in_place_of_asking_for_pressure_that_is_logged() -
 def test_a_ratio_that_longer_blocks_do_not_confirm_is_none(
     longer: float, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a leaky rig whose file was right, blocks of 20 ms told 0.62 and those of 50 ms 0.87."""
+    """For a leaky rig with a correct rig file, blocks of 20 ms gave a ratio of 0.62 and those of 50 ms 0.87."""
     swept = {MIDDLE: 0.55, LONG: longer}
     balance = FlowBalance(0.0, 0.01, 1.0, 0.1, 0.9999, 0.5)
     monkeypatch.setattr(another_rig, "flow_balance", lambda _, __, length: balance._replace(swept=swept[length]))

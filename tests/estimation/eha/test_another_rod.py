@@ -1,4 +1,4 @@
-"""A single rod that explains a log is doubted where its areas are known no better than a rig file's."""
+"""A single rod that explains a log is doubted if its areas are known no better than a rig file's."""
 
 import numpy as np
 import pytest

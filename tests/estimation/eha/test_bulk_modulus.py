@@ -1,4 +1,4 @@
-"""Bulk modulus comes back from simulated and from foreign logs, or the outcome says why it cannot."""
+"""Bulk modulus is recovered from simulated and from foreign logs, or the outcome says why it cannot be."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -27,17 +27,17 @@ from tests.thinned import thinned
 
 TRUTH = 2.07e8
 STARTS = (0.0, 2e8, 5e8)
-SPARSE = 5e-4  # s; enough for a form that takes its own steps between samples
+SPARSE = 5e-4  # s; fine enough for a form that takes its own steps between samples
 WIDE_STARTS = (0.0, 0.5e8, 1e8, 2e8, 3e8, 4e8, 5e8)
 TWO = ("major_friction", "minor_leakage_minor_friction")
 EVERY_CONDITION = pytest.mark.parametrize("name", thinned(CONDITIONS, TWO))
 TWO_CONDITIONS = pytest.mark.parametrize("name", TWO)
-"""The slow suite asks all, from more starts, in `test_every_start_of_the_study_converges`."""
+"""The slow suite tests all conditions, from more starts, in `test_every_start_of_the_study_converges`."""
 
 
 @cache
 def bench_log(plant: str, drive: str, name: str, seed: int = 1, sample_time: float = 1e-4) -> Record:
-    """Five seconds with the sensors of the bench."""
+    """Return five seconds measured with the sensors of the bench."""
     parameters, rng = parameters_for(CONDITIONS[name]), np.random.default_rng(seed)
     speed = make_drive(drive, 5.0, sample_time, parameters, rng)
     return simulate(PLANTS[plant], speed, sample_time, parameters, sensors=BENCH, rng=rng)
@@ -48,7 +48,7 @@ def found(record: Record, name: str, form: str, start: float) -> BulkModulusEsti
 
 
 def largest_error(record: Record, name: str, form: str, starts: tuple[float, ...] = STARTS) -> float:
-    """Relative error of the worst start; infinite where one gives no number."""
+    """Return the relative error of the worst start; infinite if one gives no number."""
     values = [found(record, name, form, start).value for start in starts]
     return max(np.inf if value is None else abs(value / TRUTH - 1.0) for value in values)
 
@@ -204,7 +204,7 @@ def test_foreign_logs_give_bulk_modulus_within_ten_percent(every: int, shared: P
 @pytest.mark.slow
 @EVERY_CONDITION
 def test_every_start_of_the_study_converges(name: str) -> None:
-    seed = list(CONDITIONS).index(name)  # another one each; `benchmarks bulk_modulus` runs more
+    seed = list(CONDITIONS).index(name)  # a different seed for each condition; `benchmarks bulk_modulus` runs more
     reduced = bench_log.__wrapped__("reduced", "sine", name, seed)
     assert largest_error(reduced, name, "acceleration", WIDE_STARTS) < 0.03
     for drive in ("sine", "steps"):
@@ -217,7 +217,7 @@ PRESSURE = "differential_pressure_pa"
 
 
 def clipped(record: Record, share: float) -> Record:
-    """The log of a pressure sensor whose range ends at a share of the largest pressure."""
+    """Return the log with a pressure sensor whose range ends at a share of the largest pressure."""
     limit = 500.0 * round(share * float(np.max(np.abs(record[PRESSURE]))) / 500.0)
     return with_fault(record, SensorFault(channel=PRESSURE, kind="saturation", size=limit))
 
@@ -281,7 +281,7 @@ ASYNCHRONOUS: Mapping[str, tuple[float, tuple[str, ...]]] = {
     "pressure at 1 of 10 kHz": (1e-4, (PRESSURE,)),
     "pressure and encoder at 1 of 10 kHz, at different times": (1e-4, (PRESSURE, "position_m")),
 }
-"""Sample time, and channels that are logged every tenth row."""
+"""Sample time, and the channels that are logged only in every tenth row."""
 
 
 def asynchronous(rate: str, duration: float = 5.0) -> Record:

@@ -1,4 +1,4 @@
-"""A filter with noise levels tuned to the log says how far it may be off, at any rate."""
+"""A filter with noise levels tuned to the log reports at least how large its error may be."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -122,5 +122,5 @@ def test_of_two_passes_the_likelier_is_returned_with_the_first(second: float, ta
         return SimpleNamespace(name=name, log_likelihood=likelihood, settled=lambda _: (2e8, 1e6))
 
     found, first = _settled(filtered, 1e7)
-    assert begun == [1e7, 2e8]  # a first guess far below the answer, and then the answer
+    assert begun == [1e7, 2e8]  # a first guess far below the result, and then the result
     assert (found.name, first.name) == (taken, "first")

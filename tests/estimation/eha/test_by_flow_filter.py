@@ -1,4 +1,4 @@
-"""The modelled-chamber filter, online: without being told the condition it finds bulk modulus and leakage."""
+"""The modelled-chamber filter online: it finds bulk modulus and leakage without knowing the condition."""
 
 from dataclasses import replace
 from functools import cache, partial
@@ -84,7 +84,7 @@ def test_its_track_rests_on_what_came_before_alone() -> None:
     record = on_circuit("normal", 1, duration=1.0)
     spoilt = record["differential_pressure_pa"].copy()
     spoilt[750:] += 1e6
-    noise = measurement_variances(record, tuple(record.channels))  # of the whole log
+    noise = measurement_variances(record, tuple(record.channels))  # the noise of the whole log
     whole, later = (
         filter_flow(log, HEALTHY, variances=noise).online
         for log in (record, record.replace(differential_pressure_pa=spoilt))

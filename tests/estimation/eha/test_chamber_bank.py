@@ -1,4 +1,4 @@
-"""A bank of filters as one: moments of a mixture, who is one and the same, where blocks end."""
+"""A bank of filters as one estimate: moments of a mixture, filters that count as one, ends of blocks."""
 
 from dataclasses import replace
 
@@ -45,7 +45,8 @@ def test_what_diverged_has_no_weight(task: FilterProblem) -> None:
 def test_of_two_that_are_one_the_likelier_is_kept(task: FilterProblem) -> None:
     parts = [member(task, 0.0), member(task, 0.5), member(task, 3.0)]
     assert _apart(parts, (0,)) == [parts[0], parts[2]]
-    rounded = replace(parts[1], covariance=np.array([[-1e-30]]))  # no square root of it, so no warning
+    # a variance that rounding made negative causes no square-root warning
+    rounded = replace(parts[1], covariance=np.array([[-1e-30]]))
     assert _apart([rounded, parts[0]], (0,)) == [rounded, parts[0]]
 
 

@@ -1,4 +1,4 @@
-"""Air that explains a log: how much there is, the oil without it, and the actuator whose oil holds it."""
+"""Air that explains a log: its amount, the oil without it, and the actuator whose oil contains it."""
 
 import pytest
 
@@ -17,7 +17,7 @@ SHARE, LIQUID = 0.02, 2.5e8
 
 
 def explanation(share: float = SHARE, liquid: float = LIQUID, quickness: float = 0.0, **values: float) -> Explanation:
-    """Return air as a search finds it, in oil that is so stiff without it."""
+    """Return air as a search finds it, in oil of the given stiffness without air."""
     bubbles = share * (ATMOSPHERE / STATED) ** (1.0 - quickness)
     whole = 1.0 / (1.0 / liquid + (1.0 - quickness) * bubbles / STATED)
     found = {"air_softness": share * ATMOSPHERE, "bulk_modulus": whole, "air_quickness": quickness} | values

@@ -1,4 +1,4 @@
-"""What a log says of its oil, as a finding; and that its sensors are looked at once."""
+"""The finding on the oil of a log; its sensors are examined only once."""
 
 import sys
 from collections.abc import Sequence
@@ -118,7 +118,8 @@ def test_without_pressure_a_fit_that_is_near_speaks_against_bulk_modulus_alone()
     assert refused_with("motion", Outcome.NOT_OBSERVABLE, froze, wide, near) == [SensorCode.SENSOR_FROZE]
     far = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=38.0, motion_percent=6.1)
     assert refused_with("motion", Outcome.MISMATCH, wide, far) == [EstimateCode.POSITION_RESIDUALS_LARGE]
-    fine = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=38.0, motion_percent=5.9)  # of a fine encoder
+    # a fine encoder: large over its noise, small over the motion
+    fine = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=38.0, motion_percent=5.9)
     assert refused_with("motion", Outcome.MISMATCH, wide, fine) == []
     large = EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=1.9)
     assert refused_with("flow", Outcome.OK, large) == [EstimateCode.PRESSURE_RESIDUALS_LARGE]
@@ -126,7 +127,7 @@ def test_without_pressure_a_fit_that_is_near_speaks_against_bulk_modulus_alone()
 
 @pytest.fixture
 def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Record, tuple[str, ...]]]:
-    """Count how often the noise of a log is measured, wherever the function was imported."""
+    """Record each measurement of a log's noise, wherever the function was imported."""
     calls: list[tuple[Record, tuple[str, ...]]] = []
     original = measurement_noise.measurement_variances
 

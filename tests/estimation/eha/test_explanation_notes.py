@@ -1,4 +1,4 @@
-"""What explains a log is told in numbers that follow from what was fitted, and the log is set right by them."""
+"""The explanation of a log is reported in numbers that follow from the fit, and the log is corrected by it."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -86,7 +86,7 @@ def test_a_pump_that_delivers_far_less_is_worn(share: float, code: RigCode) -> N
 
 
 def test_a_pump_that_delivers_what_none_can_has_its_speed_in_another_unit() -> None:
-    """What is logged would have to be divided by as much as the pump seems to deliver too much."""
+    """The factor on the logged speed is the inverse of the pump's apparent delivery over its displacement."""
     d = P.pump_displacement
 
     def said(share: float) -> tuple[Note, ...]:
@@ -106,7 +106,7 @@ def test_a_pump_that_delivers_what_none_can_has_its_speed_in_another_unit() -> N
 def test_areas_of_another_single_rod_than_the_rig_files_are_doubted(
     rig: float, told_share: float, *, other: bool
 ) -> None:
-    """A displacement that was 6 % off was taken up by the rod, and the class was wrong at 99 %."""
+    """The areas of the rod absorbed a displacement that was 6 % off, and the class was wrong at 99 %."""
     rods = {"area_difference": (told_share, 0.01), "volume_difference": (0.2, 0.1), "pilot_share": (0.0, 0.1)}
     found = explanation("single_rod", **rods)
     (note,) = notes_of(found, replace(P, area_difference=rig))
@@ -175,7 +175,7 @@ def test_air_is_told_at_atmospheric_pressure_with_the_oil_without_it() -> None:
 @pytest.mark.parametrize(("factor", "code"), [(2.0, "DRIFTS"), (0.5, "DRIFTS"), (4.0, "GROWS"), (0.2, "GROWS")])
 def test_leakage_that_changes_by_more_than_oil_thins_is_a_fault(factor: float, code: str) -> None:
     assert WARMED == 3.0
-    growth = 2.0 * (factor - 1.0) / (factor + 1.0)  # a straight line, 1 halfway
+    growth = 2.0 * (factor - 1.0) / (factor + 1.0)  # a straight line that is 1 halfway
     note = told(
         "leakage_growth", leakage_growth=(growth, 0.0), leakage_bend=(0.0, 0.0), leakage_coefficient=(8e-12, 0.0)
     )
@@ -186,7 +186,7 @@ def test_leakage_that_changes_by_more_than_oil_thins_is_a_fault(factor: float, c
 def test_the_chamber_that_is_blocked_or_drains_is_named() -> None:
     assert told("makeup_blocked", makeup_share_b=(0.01, 0.0)).data["side"] == "B"
     assert told("makeup_blocked", makeup_share_b=(99.0, 0.0)).data["side"] == "A"
-    # one valve as free as the other is the border
+    # the border is an equal conductance of both valves
     for share, side in ((0.9, "B"), (1.1, "A")):
         assert told("makeup_blocked", makeup_share_b=(share, 0.0)).data["side"] == side
     for side in "ab":
@@ -198,7 +198,7 @@ def test_the_chamber_that_is_blocked_or_drains_is_named() -> None:
     ("share", "case", "leaks"), [(0.1, 4e-12, "B"), (0.1, 1e-12, ""), (1.8, 1e-12, "A"), (1.6, 1e-12, "")]
 )
 def test_the_port_that_drains_more_leaks_if_no_sound_pump_drains_so(share: float, case: float, leaks: str) -> None:
-    """A twentieth of the healthy leakage is presumed, and may be seven times as much."""
+    """The prior is a twentieth of the healthy leakage; the drain of a sound pump may be seven times as large."""
     note = told("port_a_drains", drain_share_a=(share, 0.0), case_leakage=(case, 0.0))
     assert note.code is (RigCode.PORT_DRAINS if leaks else RigCode.PORTS_DRAIN_APART)
     assert (note.code in OUTSIDE) == bool(leaks)
@@ -246,7 +246,7 @@ def test_a_late_pressure_that_comes_in_some_rows_alone_is_set_right_in_its_neare
     there = np.flatnonzero(np.isfinite(after))
     assert np.all(np.diff(there) == 4)
     assert len(there) >= len(rows) - 1
-    assert after[there[1:-1]] == pytest.approx(true[there[1:-1]], abs=3e-4)  # ends have a slope of one side
+    assert after[there[1:-1]] == pytest.approx(true[there[1:-1]], abs=3e-4)  # the slope at the ends is one-sided
 
 
 def test_a_course_of_leakage_is_one_at_the_end_and_never_nothing() -> None:

@@ -1,4 +1,4 @@
-"""A bulk modulus that no oil has is none, and a piston that stands still is told as that."""
+"""A bulk modulus that no oil has is not reported, and a piston at rest is named as such."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ RIG = EhaParameters()
 
 
 def seized() -> Record:
-    """Return two seconds of steps under a piston that no pressure moves."""
+    """Return two seconds of steps with a piston that no pressure moves."""
     rng, p = np.random.default_rng(8), replace(RIG, friction_coulomb=1e6)
     return simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
@@ -51,7 +51,7 @@ def test_a_pressure_that_drifts_while_nothing_moves_tells_no_bulk_modulus() -> N
 
 
 def test_a_vague_bulk_modulus_behind_a_still_piston_is_none() -> None:
-    """Two slips of scale that cancel passed with such a one, 36 % off: leakage that is not there explained them."""
+    """Two scale errors that cancel passed with a vague value, 36 % off: a nonexistent leakage explained them."""
     record = seized()
     whole = replace(estimate_bulk_modulus(record, RIG), value=0.7 * RIG.bulk_modulus)
     assert unless_foreign(replace(whole, std=0.02 * RIG.bulk_modulus), record, RIG).value == whole.value
@@ -62,7 +62,7 @@ def test_a_vague_bulk_modulus_behind_a_still_piston_is_none() -> None:
 
 @pytest.mark.parametrize(("times", "said"), [(1.1, False), (0.7, True)])
 def test_of_oil_unlike_the_rigs_behind_a_still_piston_the_units_are_doubted(times: float, said: bool) -> None:
-    """The pump need not turn far: rad/s read as rpm and bar read as psi passed with 29 % less, without a word."""
+    """The pump need not turn far: rad/s read as rpm and bar read as psi passed with 29 % less, without a note."""
     rng = np.random.default_rng(18813)
     log = simulate(CIRCUIT, make_drive("sine", 2.0, 1e-3, RIG, rng), 1e-3, RIG, sensors=BENCH, rng=rng)
     whole = replace(estimate_bulk_modulus(seized(), RIG), remarks=())
@@ -72,7 +72,7 @@ def test_of_oil_unlike_the_rigs_behind_a_still_piston_the_units_are_doubted(time
 
 @pytest.mark.parametrize("quantum", [0.0, 1e-4], ids=["dead", "coarse"])
 def test_a_position_that_never_changes_tells_no_bulk_modulus(quantum: float) -> None:
-    """A piston that stands still yields on its seals by 40 um: bulk modulus passed, 2 % too low at +-0.8 %."""
+    """A piston at rest yields on its seals by 40 um: bulk modulus passed, 2 % too low at +-0.8 %."""
     rng = np.random.default_rng(18813)
     log = simulate(CIRCUIT, make_drive("sine", 4.0, 1e-3, RIG, rng), 1e-3, RIG, sensors=BENCH, rng=rng)
     sound = estimate_bulk_modulus(log.replace(**{VELOCITY: None}), RIG)
@@ -84,7 +84,7 @@ def test_a_position_that_never_changes_tells_no_bulk_modulus(quantum: float) -> 
 
 
 def test_bulk_modulus_that_no_oil_has_is_a_mistake_of_a_channel() -> None:
-    """Bar read as Pa are less than any sensor's noise, so that no slip is tried; it passed with 820 Pa."""
+    """Bar read as Pa are smaller than any sensor's noise, so no unit error is tried; a value of 820 Pa passed."""
     whole = estimate_bulk_modulus(seized(), RIG)
     for times in (1e-5, 100.0):
         found = unless_foreign(replace(whole, value=times * RIG.bulk_modulus), seized(), RIG)
@@ -93,7 +93,7 @@ def test_bulk_modulus_that_no_oil_has_is_a_mistake_of_a_channel() -> None:
 
 
 def test_oil_is_not_judged_by_a_rig_file_with_a_catalogue_value() -> None:
-    """A file with 1.7 GPa, as mineral oil has without air, had right numbers of 200 MPa refused."""
+    """With a rig file of 1.7 GPa, the value of mineral oil without air, correct results of 200 MPa were refused."""
     rng = np.random.default_rng(3)
     log = simulate(CIRCUIT, make_drive("prbs", 2.0, 1e-3, RIG, rng), 1e-3, RIG, sensors=BENCH, rng=rng)
     found = estimate_bulk_modulus(log, replace(RIG, bulk_modulus=1.7e9))
@@ -104,7 +104,7 @@ def test_oil_is_not_judged_by_a_rig_file_with_a_catalogue_value() -> None:
     ("modulus", "kept"), [(1.5e9, True), (1.8e9, True), (3.5e9, False), (4e7, True), (1.7e7, False)]
 )
 def test_oil_that_is_stiffer_or_softer_than_any_has_another_unit_of_pressure(modulus: float, kept: bool) -> None:
-    """Psi read as bar, and bar read as psi, passed with 3,570 and 17 MPa where a piston hardly moves."""
+    """If the piston hardly moved, psi read as bar and bar read as psi passed with 3,570 and 17 MPa."""
     rng = np.random.default_rng(18814)
     log = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, RIG, rng), 1e-3, RIG, sensors=BENCH, rng=rng)
     told = replace(estimate_bulk_modulus(seized(), RIG), value=modulus, std=1e-3 * modulus)
@@ -113,4 +113,4 @@ def test_oil_that_is_stiffer_or_softer_than_any_has_another_unit_of_pressure(mod
     assert (ChannelCode.NO_SUCH_OIL in [note.code for note in found.gate.reasons]) is not kept
     assert (
         unless_foreign(replace(told, channels=(POSITION,)), log, RIG).value == modulus
-    )  # without pressure a mass is off
+    )  # without pressure, the mass may be wrong instead

@@ -1,4 +1,4 @@
-"""The published filter by name: on the plant that it assumes it converges, as printed it does not."""
+"""The published filter by name: it converges on the plant that it assumes, but not as printed."""
 
 from collections.abc import Mapping
 
@@ -54,7 +54,7 @@ def test_as_printed_the_filter_stays_where_its_first_guess_puts_it() -> None:
     record, p = sine("normal", 1.0)
     ends = [published(record, p, guess, PRINTED_FORM).settled(BULK_MODULUS)[0] for guess in GUESSES]
     mended = [published(record, p, guess).settled(BULK_MODULUS)[0] for guess in GUESSES]
-    # below 1e8 Pa its covariance loses its sign, and rounding decides where it ends
+    # below 1e8 Pa its covariance becomes negative, and rounding decides where it ends
     assert all(end > 2.0 * PUBLISHED for guess, end in zip(GUESSES, ends, strict=True) if guess >= 1e8)
     assert np.ptp(ends) > PUBLISHED > 20.0 * np.ptp(mended)
 

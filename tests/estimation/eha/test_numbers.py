@@ -1,4 +1,4 @@
-"""What explains a log, and what a result owes to the rig file, in numbers, kept in `numbers.json`."""
+"""Explanations of a log, and the rig file's share in a result, kept in `numbers.json`."""
 
 from dataclasses import replace
 from typing import Any

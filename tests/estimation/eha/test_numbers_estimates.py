@@ -1,4 +1,4 @@
-"""What estimates of a short log say by each method, kept in `numbers_estimates.json`."""
+"""Estimates of a short log by each method, kept in `numbers_estimates.json`."""
 
 from functools import cache
 from typing import Any

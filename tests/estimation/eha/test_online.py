@@ -1,4 +1,4 @@
-"""A filter of a stream begins from its first samples, takes noise from another log, and goes on where it was saved."""
+"""A stream's filter starts from its first samples, takes noise from another log, and resumes where it was saved."""
 
 from dataclasses import replace
 from pathlib import Path

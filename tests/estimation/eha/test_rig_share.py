@@ -1,4 +1,4 @@
-"""What a result owes to the rig: responses against refits, and total intervals that cover where the rig is wrong."""
+"""The rig's share in a result: responses agree with refits, and total intervals cover if the rig file is wrong."""
 
 import math
 from collections.abc import Mapping
@@ -36,14 +36,14 @@ def log(p: EhaParameters, drive: str = "steps", seed: int = 8, duration: float =
 
 
 def changed(record: Record, entry: str, factor: float) -> tuple[Record, EhaParameters]:
-    """Return a log and a rig whose entry is larger; a gain that is believed larger makes the pressure smaller."""
+    """Return a log and a rig with a larger entry; a larger assumed gain makes the pressure smaller."""
     if entry == PRESSURE_GAIN:
         return record.replace(**{PRESSURE: record[PRESSURE] / factor}), HEALTHY
     return record, replace(HEALTHY, **{entry: factor * asdict(HEALTHY)[entry]})
 
 
 NUDGED = 1.001
-"""Factor on an entry: a pump that delivers 1 % otherwise would be found by the fit."""
+"""Factor on an entry: the fit would detect a pump whose delivery differs by 1 %."""
 
 
 @pytest.mark.parametrize("entry", [*ENTRIES, PRESSURE_GAIN])
@@ -75,7 +75,7 @@ def test_a_filters_bulk_modulus_goes_with_the_volume_and_against_the_gain(form: 
 
 @pytest.mark.slow
 def test_without_pressure_the_mass_holds_the_scale() -> None:
-    # 4 s leave room for optima 4 % apart, and of 8 s the bound may exceed 3 %: no number is believed
+    # 4 s allow optima 4 % apart, and with 8 s the bound may exceed 3 %, so that no number is reported
     record = log(HEALTHY, duration=10.0).replace(**{PRESSURE: None})
     heavy = replace(HEALTHY, moving_mass=1.3 * HEALTHY.moving_mass)
     found = [estimate_bulk_modulus(record, rig, form="motion") for rig in (HEALTHY, heavy)]
@@ -91,7 +91,7 @@ def test_displacement_and_area_that_grow_together_scale_all_flows(pressure: bool
     oil, leakage = laws["bulk_modulus"], laws["leakage_coefficient"]
     assert oil["pump_displacement"] + oil.get("piston_area", 0.0) == -scale
     leaked = HEALTHY.leakage_coefficient * steady_state(HEALTHY.rated_speed, HEALTHY)[1]
-    not_scaled = HEALTHY.flow_bias / leaked  # the bias stays, so leakage takes what it would have grown by
+    not_scaled = HEALTHY.flow_bias / leaked  # the flow bias is not scaled, so leakage absorbs its share
     assert leakage["pump_displacement"] + leakage["piston_area"] == pytest.approx(scale + not_scaled)
 
 
@@ -116,7 +116,7 @@ def test_what_goes_against_an_entry_turns_its_sides_about() -> None:
 
 @pytest.mark.parametrize(("std", "doubt"), [(0.04, 0.0), (0.3, 0.15), (1.5, 0.5), (200.0, 0.5)])
 def test_a_positive_quantity_has_positive_intervals_however_little_a_log_tells(std: float, doubt: float) -> None:
-    """Bulk modulus was -300 to 700 MPa where its check had refused it."""
+    """The interval of a bulk modulus that its check had refused was -300 to 700 MPa."""
     one = Quantity(2e8, "Pa", positive_interval_95(2e8, std * 2e8), std * 2e8)
     one = with_total(one, {"moving_mass": 1.0}, {"moving_mass": Spread.of(doubt)} if doubt else {})
     assert one.ci95 is not None
@@ -138,7 +138,7 @@ def test_a_quantity_of_which_no_law_is_known_has_no_total_interval() -> None:
 
 
 EXACT = {name: 0.0 for name in DOUBTS if getattr(HEALTHY, name, 1.0) is not None}
-"""A rig file whose entries are all exact."""
+"""Uncertainties of a rig file whose entries are all exact."""
 
 
 def test_the_rig_widens_the_total_alone_and_decides_no_outcome_and_no_gate() -> None:
@@ -181,7 +181,7 @@ def test_total_intervals_cover_where_rigs_are_as_wrong_as_they_are_said_to_be() 
         record = log(true, ("steps", "prbs")[trial % 2], seed=trial)
         found = estimate_log(record.replace(**{PRESSURE: wrong[PRESSURE_GAIN] * record[PRESSURE]}), Rig())
         one = found.quantities["bulk_modulus"]
-        if one.ci95_total is not None:  # a rig that contradicts the log gets no number
+        if one.ci95_total is not None:  # a rig that contradicts the log gives no number
             covered.append(one.ci95_total[0] <= true.bulk_modulus <= one.ci95_total[1])
             given.append(one.covers(true.bulk_modulus))
     assert len(covered) >= 0.8 * logs

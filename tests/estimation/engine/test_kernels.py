@@ -1,4 +1,4 @@
-"""The unrolled covariance algebra is the matrix algebra."""
+"""The unrolled covariance algebra equals the matrix algebra."""
 
 import numpy as np
 import pytest
@@ -66,7 +66,8 @@ def test_a_step_that_begins_at_a_sample_is_the_first_sub_step(model: ProcessMode
     assert "j" in symbols_in(list(predict.values()))
     assert "j" not in symbols_in(list(begins.values()))
     values = {name: rng.uniform(0.5, 2.0) for name in symbols_in(list(predict.values()))}
-    values |= {name: 0.1 for name in values if name[0] == "P" and name[1] != name[3]}  # a covariance has a root
+    # small, so that the covariance has a root
+    values |= {name: 0.1 for name in values if name[0] == "P" and name[1] != name[3]}
     assert computed(begins, **values) == computed(predict, **{**values, "j": 0.0})
 
 

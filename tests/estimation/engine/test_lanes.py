@@ -1,4 +1,4 @@
-"""The loop of filters side by side is Python: run as it is written, it gives what its kernel gives, to the last bit."""
+"""The loop over filters side by side, run as plain Python, gives bitwise the same result as its kernel."""
 
 import ctypes
 import math
@@ -28,7 +28,8 @@ def test_one_filter_is_the_same_compiled_and_in_python(
     names = ("position_m", "velocity_m_s")
     seen = {name: np.where(rng.random(20) < 0.2, np.nan, rng.normal(size=20)) for name in names}
     record = Record(1e-3, {"motor_speed_rad_s": rng.normal(size=20), **seen})
-    prior = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e65, 1e-3, 1.0]))  # a product that goes into the logarithm
+    # so large that the product of innovation variances is moved into the logarithm
+    prior = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e65, 1e-3, 1.0]))
     variances = {"position_m": 1e-2, "velocity_m_s": 0.1}
     problem = filter_problem(linear, prior, record, EhaParameters(), variances=variances)
     problem = replace(problem, keep_innovations=kept, every=3)

@@ -1,4 +1,4 @@
-"""What a large innovation still moves, of what it would move if it were believed."""
+"""The correction that a large innovation still causes, as a share of the one without robust weighting."""
 
 import pytest
 

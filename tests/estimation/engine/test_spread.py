@@ -1,4 +1,4 @@
-"""Carried from waypoint to waypoint a covariance is ``F P F'``, whatever the piston and its valve do."""
+"""A covariance that is propagated from waypoint to waypoint is ``F P F'``, whatever the piston and its valve do."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What speaks against a fit of own equations, and what only should be known."""
+"""Objections to a fit of user equations, and notes for information only."""
 
 # ruff: noqa: ARG005 - every function is given the same three things
 
@@ -37,7 +37,7 @@ def equations(derivative: Any = lag, **changes: Any) -> Equations:
 
 
 def response(push: Any) -> Any:
-    """What a lag with a gain of one makes of an input, linear between samples: exact."""
+    """Return the exact response of a lag with a gain of one to an input that is linear between samples."""
     way, fall = np.zeros(len(push)), np.exp(-0.05)
     for k in range(1, len(push)):
         rise = (push[k] - push[k - 1]) / 0.05
@@ -96,7 +96,7 @@ def test_another_start_explains_a_log_as_well_within_two_of_log_likelihood(
     found: EquationsFit, worse: float, told: bool
 ) -> None:
     solution = found.solution
-    mirror = -solution.point.theta  # the gain is squared, so that its sign is open
+    mirror = -solution.point.theta  # the gain is squared, so its sign is undetermined
     other = replace(solution, others=(mirror,), point=replace(solution.point, cost=solution.point.cost - worse))
     notes = concluded(other, np.array([np.nan]))[0].notes
     assert ("starts_disagree" in codes(notes)) is told
@@ -153,7 +153,7 @@ def test_equations_that_run_away_from_every_start_are_refused(monkeypatch: pytes
 
 
 def test_steps_are_halved_until_the_solution_no_longer_moves(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("estimation.equations.search.STEPPED_WELL", 1e3)  # the first look finds all steps short enough
+    monkeypatch.setattr("estimation.equations.search.STEPPED_WELL", 1e3)  # the first check finds all steps short enough
     swinging = equations(
         lambda s, i, p: (s.pace, 40.0 * (i.push - s.way) - p.damping * s.pace),
         states={"way": "m", "pace": "m/s"},
@@ -185,7 +185,7 @@ def test_initial_states_are_sought_in_ten_steps_at_most() -> None:
 
 def linear(slopes: np.ndarray) -> Any:
     """Return a problem whose residuals are white and whose sensitivities are given."""
-    errors = 0.1 * np.tile([1.0, 1.0, -1.0, -1.0], len(slopes) // 4)  # neighbours do not correlate
+    errors = 0.1 * np.tile([1.0, 1.0, -1.0, -1.0], len(slopes) // 4)  # neighbours are uncorrelated
     part = SimpleNamespace(measured=np.zeros(len(slopes)))
     return SimpleNamespace(slopes=lambda _: slopes, residuals=lambda _: [errors], parts=[part])
 

@@ -1,4 +1,4 @@
-"""What is wrong with a user's equations is said before there is any log, by name."""
+"""Errors in a user's equations are reported by name, before there is any log."""
 
 # ruff: noqa: ARG005 - every function is given the same three things
 

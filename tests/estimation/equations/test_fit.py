@@ -1,4 +1,4 @@
-"""Equations of a user are fitted as least squares would, with intervals that cover and a gate that notices."""
+"""User equations are fitted by least squares, with intervals that cover and a gate that detects misfits."""
 
 # ruff: noqa: ARG001 - every function is given the same three things
 
@@ -39,7 +39,7 @@ def model(derivative: Callable[..., Any] = pendulum, **changes: Any) -> Equation
 
 @pytest.fixture(scope="module")
 def swing() -> np.ndarray[Any, Any]:
-    """The angle, by SciPy."""
+    """Return the angle, integrated by SciPy."""
 
     def rates(t: float, x: Any) -> Any:
         torque = np.interp(t, TIME, TORQUE)

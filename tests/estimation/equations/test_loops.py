@@ -1,4 +1,4 @@
-"""The loop of a user's equations is Python: run as it is written, it gives what its kernel gives."""
+"""The loop over a user's equations, run as plain Python, gives the same result as its kernel."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A user's equations on small logs: predictions, slopes, searches and what is concluded, kept in `numbers.json`."""
+"""A user's equations on small logs: predictions, slopes, searches and conclusions, kept in `numbers.json`."""
 
 # ruff: noqa: ARG001 - every function is given the same three things
 
@@ -59,7 +59,7 @@ def logged(noise: float = 0.02, last: int = N) -> Record:
 
 
 def parts(lost: bool = False) -> tuple[Part, ...]:
-    """Return two logs, of different lengths."""
+    """Return two logs of different lengths."""
     one = part_of(model(), logged())
     measured = one.measured.copy()
     if lost:

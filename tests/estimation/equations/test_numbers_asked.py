@@ -1,4 +1,4 @@
-"""What a search for a user's parameters asks for, kept in `numbers_asked.json`."""
+"""Effort of a search for a user's parameters, kept in `numbers_asked.json`."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -76,7 +76,7 @@ def descents() -> dict[str, Any]:
 
 @NUMBERS.case()
 def threads() -> dict[str, Any]:
-    """On how many threads matrices are multiplied: more make small ones slower."""
+    """Return the number of threads for matrix products: more threads make small products slower."""
     record = Record(0.05, {"push": PUSH, "way": problem().parts[0].measured[0]})
     with watched(fit, "threadpool_limits", lambda **given: given) as asked:
         fit.fit_equations(MODEL, [record])

@@ -1,4 +1,4 @@
-"""Where searches of own equations begin, and the noise that they are first given."""
+"""Starts of searches for parameters of user equations, and their first noise level."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ def test_other_starts_are_drawn_within_bounds_and_near_the_first_where_there_are
     assert problem.values(given) == pytest.approx([3.0, 0.5, -1.0, 0.3])
     assert len(others) == 399
     away = np.array(others) - given
-    for free in (0, 2):  # two units of the search to either side
+    for free in (0, 2):  # two units of the search on either side
         assert np.abs(away[:, free]).max() <= 2.0
         assert away[:, free].min() < -1.9
         assert away[:, free].max() > 1.9
@@ -41,7 +41,7 @@ def test_other_starts_are_drawn_within_bounds_and_near_the_first_where_there_are
     assert rates.max() <= 10.0
     assert rates.min() < 0.11 * 1.2
     assert rates.max() > 9.0
-    assert np.all(away[:, 3] == 0.0)  # initial states are fitted from where they are told to begin
+    assert np.all(away[:, 3] == 0.0)  # initial states start from their given values
     again = _guesses(problem, 2, seed=2)
     assert np.array_equal(again[1], others[0])
     assert not np.array_equal(_guesses(problem, 2, seed=3)[1], others[0])

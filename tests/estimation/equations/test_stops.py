@@ -1,4 +1,4 @@
-"""A channel at an end of its range is told from one that turns there."""
+"""A channel that stays at an end of its range is distinguished from one that turns there."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_whether_a_channel_stands_is_the_same_in_every_unit(unit: float) -> None
     values = unit * np.clip(np.sin(TIME), -0.7, 0.5)
     ends = {(one.end, round(one.value / unit, 9)) for one in standing([values], 0.0)}
     assert ends == {("least", -0.7), ("largest", 0.5)}
-    # three deviations of noise are a tenth of the range from 0.04 on: where it ends is hidden then
+    # from 0.04 on, three deviations of noise are a tenth of the range and hide its ends
     assert [one.end for one in standing([values], 0.039 * unit)] == ["largest"]
     assert list(standing([values], 0.041 * unit)) == []
 

@@ -26,7 +26,7 @@ from tests.thinned import thinned
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 SHORT, LONG = 3_000, 100_000
 EXACT = "-DEXPORTED_EXACT"
-"""Products are fused by the library, so that no test depends on the processor."""
+"""The library fuses products, so that no test depends on the processor."""
 
 
 def rows_of(problem: FilterProblem) -> list[str]:
@@ -35,7 +35,7 @@ def rows_of(problem: FilterProblem) -> list[str]:
 
 
 def in_c(folder: Path, problem: FilterProblem, method: str = "ekf", *flags: str, **how: str) -> tuple[np.ndarray, str]:
-    """Values, then deviations, shape (2, samples, states); and what is said in the end."""
+    """Return values, then deviations, shape (2, samples, states); and the text that is written at the end."""
     files = filter_in_c(problem, method, name="exported", precision=how.get("precision", "double"))
     out, said = ran(compiled(folder, files, *(flags or (EXACT,)), using=how.get("using", "gcc")), rows_of(problem))
     found = np.loadtxt(out.splitlines(), delimiter=",")
@@ -89,7 +89,7 @@ def test_a_compiler_that_may_fuse_by_itself_changes_no_bit(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(  # three of the nine conditions each; `benchmarks export_c` has every pair
+@pytest.mark.parametrize(  # three of the nine conditions for each form; `benchmarks export_c` has every pair
     ("form", "condition"),
     [(form, name) for i, form in enumerate(EXPORTED_FORMS) for name in list(CONDITIONS)[i % 3 :: 3]],
 )
@@ -203,7 +203,7 @@ def test_a_step_of_the_acceleration_form_takes_no_operation_that_its_jacobians_z
     header = filter_in_c(task("acceleration", "normal", 500), name="exported")["exported.h"]
     found = re.search(r"EXPORTED_OPERATIONS (\d+)", header)
     assert found is not None
-    assert int(found[1]) <= 156  # 163 where every entry of F P F' is summed over the column's terms
+    assert int(found[1]) <= 156  # 163 if every entry of F P F' is summed over the column's terms
 
 
 def test_what_cannot_be_exported_is_refused() -> None:

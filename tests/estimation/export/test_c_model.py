@@ -1,4 +1,4 @@
-"""An identified linear model in C and in a MAT file gives the output that Python gives."""
+"""An identified linear model, exported to C and to a MAT file, gives the same output as in Python."""
 
 from dataclasses import replace
 from io import BytesIO
@@ -22,7 +22,7 @@ from tests.c_compiler import compiled, ran
 
 
 def linear(denominator: tuple[float, ...]) -> FreeRunModel:
-    """Two inputs, the second late by three samples."""
+    """Return a model with two inputs, the second of which is delayed by three samples."""
     form = Form(len(denominator), (2, 1), (0, 3))
     scaling = Scaling(np.array([2.0, -1.0]), np.array([0.5, 3.0]), 10.0, 4.0)
     return FreeRunModel(

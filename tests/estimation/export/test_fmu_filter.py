@@ -17,7 +17,7 @@ def fmpy() -> Any:
 
 
 OTHERWISE = pytest.mark.slow
-"""The fast tests have one filter in one version of FMI."""
+"""The fast tests cover one filter in one version of FMI."""
 
 
 @pytest.mark.parametrize(
@@ -52,5 +52,5 @@ def test_it_passes_validation_and_believes_what_the_native_filter_believes(
     mean, slope = problem.model.to_si(METHODS[method](problem).track)
     assert slope.shape == mean.shape
     for i, state in enumerate(problem.model.states):
-        wanted = mean[:-1, i]  # what the sample at a step's beginning says stands at its end
+        wanted = mean[:-1, i]  # the output at the end of a step belongs to the sample at its beginning
         assert np.max(np.abs(found[f"estimated_{state.name}"][1:] - wanted)) < 1e-6 * np.max(np.abs(wanted))

@@ -1,4 +1,4 @@
-"""Numbers that stand in exported C, and how much of it there is, kept in `numbers.json`."""
+"""Numbers in exported C code, and the size of the code, kept in `numbers.json`."""
 
 import re
 from functools import cache
@@ -30,7 +30,7 @@ def log() -> Record:
 
 
 def told(files: dict[str, str]) -> dict[str, Any]:
-    """Return how many lines each file has, and its numbers with a point or a power, each once, in their order."""
+    """Return each file's number of lines, its numbers with a point or a power (each once, in order), and its sizes."""
     found: dict[str, Any] = {}
     for name, text in files.items():
         literals = dict.fromkeys(re.findall(r"(?<![\w.])\d+\.\d*(?:[eE][-+]?\d+)?|(?<![\w.])\d+[eE][-+]?\d+", text))

@@ -1,4 +1,4 @@
-"""A record filtered by several models that take turns, to test the bank with modes of one's own."""
+"""Filters a record by several models that take turns, to test the bank with modes of any kind."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ from plant.solvers.steps import Parameters
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One way that the plant may behave."""
+    """One possible behaviour of the plant."""
 
     name: str
     model: ProcessModel
@@ -96,5 +96,5 @@ def _log_start(probabilities: Sequence[float] | None, count: int) -> Array:
     values = np.full(count, 1.0 / count) if probabilities is None else np.array(probabilities, dtype=np.float64)
     if len(values) != count or np.any(values < 0.0) or not abs(float(np.sum(values)) - 1.0) < 1e-9:
         raise HydrostateError(f"{count} modes need as many probabilities that sum to 1, got {values.tolist()}")
-    with np.errstate(divide="ignore"):  # an impossible mode has the logarithm of nothing
+    with np.errstate(divide="ignore"):  # the log probability of an impossible mode is -inf
         return np.log(values)

@@ -1,4 +1,4 @@
-"""A filter gives the same bits alone and in a batch, whatever its rule and its neighbours."""
+"""A filter gives bitwise the same result alone and in a batch, whatever its rule and its neighbours."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -39,11 +39,11 @@ RULES: dict[str, tuple[Rule, str]] = {
     "sif": (SIF, "none"),
 }
 EVERY_RULE = pytest.mark.parametrize(("rule", "robust"), RULES.values(), ids=RULES)
-SAMPLES = 701  # not a whole count of what the batch lays side by side at a time
+SAMPLES = 701  # not a multiple of the number that the batch lays side by side at a time
 
 
 def problems(model: ProcessModel, count: int, samples: int = SAMPLES, robust: str = "none") -> list[FilterProblem]:
-    """Filters of one log with priors, noise and measurements of their own, one sample in ten missing."""
+    """Return filters of one log, each with its own prior, noise and measurements; one sample in ten is missing."""
     rig = EhaParameters()
     drive = sine(samples * 1e-4, 1e-4, rig.rated_speed, 5.0)
     record = simulate(LUMPED, drive, 1e-4, rig, sensors=BENCH, rng=np.random.default_rng(0))

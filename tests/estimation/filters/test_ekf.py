@@ -1,4 +1,4 @@
-"""On a linear model the extended Kalman filter is the Kalman filter; what is missing changes nothing."""
+"""On a linear model, the extended Kalman filter is the Kalman filter; missing samples change nothing."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def filtered(model: ProcessModel, record: Record) -> Estimate:
 
 
 def predicted(mean: Array, P: Array, start: float, end: float, steps: int) -> tuple[Array, Array]:
-    """Textbook prediction over one sample of the linear model, in sub-steps."""
+    """Return the textbook prediction over one sample of the linear model, in sub-steps."""
     h = SAMPLE_TIME / SUBSTEPS
     F = np.array([[1.0, h, 0.0], [0.0, 1.0 - 3.0 * h, h], [0.0, 0.0, 1.0]])
     Q = np.diag([1e-8, 1e-4, 1e-2]) * h
@@ -39,7 +39,7 @@ def predicted(mean: Array, P: Array, start: float, end: float, steps: int) -> tu
 
 
 def kalman(record: Record, H: Array) -> tuple[Array, Array, float]:
-    """Textbook Kalman filter with a joint update by matrix inversion."""
+    """Return the result of a textbook Kalman filter with a joint update by matrix inversion."""
     mean, P, log_likelihood = PRIOR.mean, PRIOR.covariance, 0.0
     speed, R = record["motor_speed_rad_s"], np.diag(list(VARIANCES.values()))
     for k in range(len(record)):

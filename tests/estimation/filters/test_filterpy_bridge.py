@@ -1,4 +1,4 @@
-"""filterpy, given the same model, says the same to 1e-9."""
+"""filterpy, given the same model, agrees to 1e-9."""
 
 import itertools
 
@@ -26,7 +26,7 @@ STEPS = 5_000
 
 
 def logged(form: str, parameters: EhaParameters, sample_time: float = 1e-4, samples: int = STEPS) -> Record:
-    """A bench log of the plant that the form describes, under 4 V at 4 Hz."""
+    """Return a bench log of the plant that the form describes, driven with 4 V at 4 Hz."""
     drive = sine(samples * sample_time, sample_time, parameters.rated_speed, 4.0)
     plant = {"acceleration": REDUCED, "pressure": LUMPED}[form]
     return simulate(plant, drive, sample_time, parameters, sensors=BENCH, rng=np.random.default_rng(2))

@@ -1,4 +1,4 @@
-"""The iterated filter is the plain one where the sensors are linear, and finds the most probable state where not."""
+"""The iterated filter is the plain one if the sensors are linear, and otherwise finds the most probable state."""
 
 from collections.abc import Mapping
 

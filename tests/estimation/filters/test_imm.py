@@ -1,4 +1,4 @@
-"""The bank of interacting models: equal models are one filter, unequal ones are told apart, nothing underflows."""
+"""The bank of interacting models: equal models act as one filter, different ones are separated, nothing underflows."""
 
 from dataclasses import asdict, replace
 
@@ -35,7 +35,7 @@ VARIANCES = {"position_m": 1e-4, "velocity_m_s": 1e-2}
 
 
 def _damped(state: tuple[Scalar, ...], speeds: tuple[Scalar, Scalar], p: EhaValues, h: Scalar) -> tuple[Scalar, ...]:
-    """The fixture's linear model with its damping a parameter."""
+    """The step of the fixture's linear model, with its damping as a parameter."""
     x, v, force = state
     return x + h * v, v + h * (0.01 * (speeds[0] + speeds[1]) + force - p.friction_linear * v), force
 
@@ -50,7 +50,7 @@ def modes(model: ProcessModel, dampings: tuple[float, ...]) -> list[Mode]:
 
 
 def unchecked(damping: float) -> EhaParameters:
-    """Return the rig with a damping that no rig file may have: a filter diverges at once under one that overflows."""
+    """Return the rig with a damping that rig files do not allow: one that overflows makes a filter diverge at once."""
     rig = replace(RIG)
     object.__setattr__(rig, "friction_linear", damping)
     return rig
@@ -67,7 +67,7 @@ def noisy_record(samples: int = 120, missing: float = 0.2) -> Record:
 
 
 def textbook(record: Record, dampings: tuple[float, ...], dwell: float) -> tuple[Array, Array, Array, float]:
-    """Mean, covariance, probabilities and log-likelihood as in section 11.6.6 of the book, in plain arithmetic."""
+    """Return mean, covariance, probabilities and log-likelihood by section 11.6.6 of the book, in plain arithmetic."""
     count, H = len(dampings), np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.25]])
     stay = 1.0 - STEP / dwell
     p = np.full((count, count), (1.0 - stay) / (count - 1)) + np.eye(count) * (stay - (1.0 - stay) / (count - 1))
@@ -78,7 +78,7 @@ def textbook(record: Record, dampings: tuple[float, ...], dwell: float) -> tuple
             c = p.T @ mu
             w = p * mu[:, None] / c
             x0 = w.T @ x
-            apart = x[:, None] - x0[None]  # from the mode mixed into another, by mode and by the other
+            apart = x[:, None] - x0[None]  # deviation of each mode (first axis) from each mixed mean (second axis)
             P0 = np.einsum("ji,jab->iab", w, P) + np.einsum("ji,jia,jib->iab", w, apart, apart)
             mu = c
             for i, d in enumerate(dampings):

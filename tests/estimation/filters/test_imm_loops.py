@@ -1,4 +1,4 @@
-"""The arithmetic of a bank's loops, run as Python, against mixtures written with whole matrices."""
+"""The arithmetic of a bank's loops, run as Python, compared with mixtures written with whole matrices."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The iterated smoother is the smoother where the model is linear, and finds what a filter loses where it is not."""
+"""The iterated smoother is the smoother if the model is linear, and otherwise finds what a filter loses."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def linear_task(linear: ProcessModel) -> FilterProblem:
     record = Record(0.01, {"motor_speed_rad_s": rng.normal(size=samples), **seen})
     prior = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 0.0, 1.0]))
     task = filter_problem(linear, prior, record, EhaParameters(), variances={"position_m": 1e-2, "velocity_m_s": 0.1})
-    return replace(task, substeps=1)  # it pushes once a sample, the smoother once a step
+    return replace(task, substeps=1)  # the iterated smoother pushes once a sample, the smoother once a step
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def smoothed(record: Record, guess: float, robust: str = "none") -> Estimate:
     prior = first_belief(form, record, guess, 3e8)
     stiffness = MINOR.bulk_modulus / MINOR.chamber_volume
     unseen = {"differential_pressure_pa": (stiffness * MINOR.pump_displacement * BENCH.speed_noise) ** 2 * 1e-3}
-    noise = {state.name: 0.0 for state in form.states} | unseen  # what the noise of measured motor speed makes
+    noise = {state.name: 0.0 for state in form.states} | unseen  # the effect of noise of the measured motor speed
     return run_filter(iterated_smoother, form, prior, record, MINOR, channels=MOTION, noise=noise, robust=robust)
 
 

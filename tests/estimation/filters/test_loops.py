@@ -1,4 +1,4 @@
-"""Loops are Python: run as they are written they give, to the last bit, what the kernels pasted from them give."""
+"""Loops run as plain Python give bitwise the same results as the kernels that are pasted from them."""
 
 from dataclasses import replace
 from typing import Any
@@ -115,11 +115,11 @@ def test_the_particle_filter_is_the_same_compiled_and_in_python(
     linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool
 ) -> None:
     problem = task(linear, every, kept=kept)
-    problem = replace(problem, noise=problem.noise * [1.0, 0.0, 1.0])  # a state without noise of its own
+    problem = replace(problem, noise=problem.noise * [1.0, 0.0, 1.0])  # a state without process noise
     compiled = particle.particle_filter(problem, 20, np.random.default_rng(1))
     compile_it = particle.compile_particles.__wrapped__
     run = functions_of(text_of(monkeypatch, particle, lambda: compile_it(problem.model, problem.channels))).run
     monkeypatch.setattr(particle, "compile_particles", lambda *_: run)
     plain = particle.particle_filter(problem, 20, np.random.default_rng(1))
-    for field in Trace._fields:  # powers and exponentials of Python may round the other way
+    for field in Trace._fields:  # powers and exponentials of Python may round differently
         np.testing.assert_allclose(getattr(plain, field), getattr(compiled, field), 1e-11, err_msg=field)

@@ -1,6 +1,6 @@
-"""What every filter, smoother and bank believes after one short log, kept in `numbers.json`.
+"""Results of every filter, smoother and bank for one short log, kept in `numbers.json`.
 
-The log lacks samples, has two outliers, and drives a curved model against a bound, so that each of a method's branches
+The log lacks samples, has two outliers, and drives a nonlinear model against a bound, so that each branch of a method
 is taken.
 """
 
@@ -43,7 +43,7 @@ PLACES = [0, 7, 20, 33, 59]
 
 
 def _step(state: tuple[Scalar, ...], speeds: tuple[Scalar, Scalar], p: EhaValues, h: Scalar) -> tuple[Scalar, ...]:
-    """A pendulum of unknown stiffness, pushed by the mean motor speed."""
+    """The step of a pendulum of unknown stiffness, pushed by the mean motor speed."""
     del p
     x, v, k = state
     return x + h * v, v + h * (0.5 * (speeds[0] + speeds[1]) - k * sin(x) - 0.4 * v * v), k

@@ -1,4 +1,4 @@
-"""Particles agree with the Kalman filter where it is exact, within what their number allows."""
+"""If the Kalman filter is exact, particles agree with it to the accuracy that their number allows."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ SEEDS, PARTICLES = 12, 1000
 
 
 def task(linear: ProcessModel, samples: int = 40) -> FilterProblem:
-    """The linear model with enough noise in every state, one sample in five missing."""
+    """Return a problem of the linear model with enough noise in every state; one sample in five is missing."""
     rng = np.random.default_rng(4)
     channels = {
         name: np.where(rng.random(samples) < 0.2, np.nan, rng.normal(0.0, size, samples))
@@ -51,7 +51,7 @@ def test_it_agrees_with_the_kalman_filter_within_monte_carlo_error(linear: Proce
         values = np.array([getattr(run, name) for run in runs])
         error = np.std(values, axis=0, ddof=1) / np.sqrt(SEEDS)
         off = (np.mean(values, axis=0) - getattr(exact, name)) / error
-        assert np.mean(off**2) < 3.0, name  # a t statistic of 11 degrees has 1.2
+        assert np.mean(off**2) < 3.0, name  # 1.2 is expected of a t statistic with 11 degrees of freedom
     likelihoods = np.array([run.log_likelihood for run in runs])
     error = np.std(likelihoods, ddof=1) / np.sqrt(SEEDS)
     assert abs(np.mean(likelihoods) - exact.log_likelihood) < 5.0 * error
@@ -108,7 +108,7 @@ def test_as_a_method_it_draws_from_its_seed(linear: ProcessModel) -> None:
     np.testing.assert_array_equal(first.track, again.track)
     assert not np.array_equal(first.track, other.track)
     drawn = particle_filter(problem, 50, np.random.default_rng(7))
-    np.testing.assert_array_equal(first.track, drawn.track)  # every state of this model has noise of its own
+    np.testing.assert_array_equal(first.track, drawn.track)  # every state of this model has process noise
 
 
 def test_as_a_method_it_lets_constants_walk_or_collapses(linear: ProcessModel) -> None:
@@ -124,7 +124,7 @@ def test_with_nothing_measured_its_cloud_stays_the_prior_within_bounds(linear: P
     blind = replace(problem, measured=np.full_like(problem.measured, np.nan), settings={"walk": 0.0})
     trace = particle(replace(blind, noise=np.array([*blind.noise[:2], 0.0])))
     m, s = blind.mean[2], np.sqrt(blind.covariance[2, 2])
-    believed = m * norm.cdf(m / s) + s * norm.pdf(m / s)  # what is below zero lies at zero
+    believed = m * norm.cdf(m / s) + s * norm.pdf(m / s)  # the part below zero is clipped to zero
     assert trace.mean[2] == pytest.approx(believed, abs=5.0 * s / np.sqrt(1000.0))
     assert trace.log_likelihood == 0.0
 

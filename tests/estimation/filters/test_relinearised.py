@@ -1,4 +1,4 @@
-"""The filter that reads a log again: right where the model is linear, surer of no more than the log holds."""
+"""The filter that processes a log again: correct for a linear model, and not more certain than the log allows."""
 
 import numpy as np
 import pytest

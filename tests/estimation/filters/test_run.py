@@ -1,4 +1,4 @@
-"""`run_filter` scales, sub-steps, fills in, and returns SI; it says what it cannot use."""
+"""`run_filter` scales, sub-steps, fills gaps, returns SI units, and reports what it cannot use."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The sliding innovation filter believes a large innovation whole and a small one in proportion."""
+"""The sliding innovation filter uses a large innovation fully and a small one in proportion."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def test_mean_and_covariance_are_those_of_the_published_gain(
     linear: ProcessModel, position: float, share: float
 ) -> None:
     H, P = np.array([1.0, 0.0, 0.0]), PRIOR.covariance
-    K = share * P @ H / (H @ P @ H)  # the layer is 0.05 m
+    K = share * P @ H / (H @ P @ H)  # the boundary layer is 0.05 m
     kept = np.eye(3) - np.outer(K, H)
     trace, scale = sif(task(linear, position)), np.array([state.scale for state in linear.states])
     np.testing.assert_allclose(trace.mean * scale, PRIOR.mean + K * position, rtol=1e-12)

@@ -1,4 +1,4 @@
-"""Sigma-point filters: filterpy's says the same, and on a linear model they are the Kalman filter."""
+"""Sigma-point filters agree with filterpy's, and with the Kalman filter on a linear model."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -41,7 +41,7 @@ def task(form: str, parameters: EhaParameters, samples: int = STEPS) -> FilterPr
 
 
 def filterpy_ukf(problem: FilterProblem, alpha: float, beta: float, kappa: float) -> tuple[Array, Array, Trace]:
-    """Run filterpy's filter with the model asked about physical states only; means, variances, and its end."""
+    """Return means, variances and end of filterpy's filter; the model is evaluated at physical states only."""
     model, n, m = problem.model, problem.model.width, len(problem.channels)
     lower, upper = np.array([state.scaled_bounds for state in model.states]).T
     step, h = compile_step(model).step, problem.sample_time
@@ -52,7 +52,7 @@ def filterpy_ukf(problem: FilterProblem, alpha: float, beta: float, kappa: float
 
     def moved(z: Array, dt: float, before: Array, after: Array) -> Array:
         result, _ = step(np.clip(z, lower, upper), before, after, problem.parameters, dt)
-        result[-1] = z[-1]  # bulk modulus is handed through
+        result[-1] = z[-1]  # bulk modulus is passed through
         return result
 
     points = MerweScaledSigmaPoints(n, alpha, beta, kappa)
@@ -102,7 +102,7 @@ def test_the_cubature_filter_is_the_unscented_one_of_alpha_1_and_beta_and_kappa_
 def _roundabout_step(
     state: tuple[Scalar, ...], speeds: tuple[Scalar, Scalar], p: EhaValues, h: Scalar
 ) -> tuple[Scalar, ...]:
-    """The linear model of the fixture, with each product of a state written so that it does not look linear."""
+    """The step of the fixture's linear model, with each product of a state written so that it does not look linear."""
     del p
     x, v, force = state
     push = 0.01 * (speeds[0] + speeds[1])
@@ -167,7 +167,7 @@ def test_a_squared_gaussian_is_predicted_with_its_exact_mean_and_variance() -> N
         RIG,
         variances={"position_m": 0.01},
         keep_innovations=True,
-        settings={"alpha": 1.0, "beta": 0.0, "kappa": 2.0},  # the points' fourth moment is then a Gaussian's
+        settings={"alpha": 1.0, "beta": 0.0, "kappa": 2.0},  # the points then have a Gaussian's fourth moment
     )
     assert estimate.residuals[0, 0] == pytest.approx(2.0 - (1.5**2 + 0.25), rel=1e-12)
     assert estimate.residual_variances[0, 0] == pytest.approx(4.0 * 1.5**2 * 0.25 + 2.0 * 0.25**2 + 0.01, rel=1e-12)

@@ -1,4 +1,4 @@
-"""The smoother is the textbook's, costs little memory, and is never less sure than the filter."""
+"""The smoother equals the textbook's, needs little memory, and is never less certain than the filter."""
 
 import tracemalloc
 from dataclasses import dataclass, replace
@@ -84,7 +84,7 @@ def inverse(P: Array) -> Array:
 
 
 def textbook(problem: FilterProblem, found: SmoothedStretch) -> tuple[Array, Array]:
-    """Rauch, Tung and Striebel backwards over the filter's beliefs, with one step a sample."""
+    """Return the Rauch-Tung-Striebel recursion backwards over the filter's beliefs, with one step for each sample."""
     step, h = compile_step(problem.model).step, problem.sample_time
     means, covariances = found.filtered_mean.copy(), found.filtered_covariance.copy()
     for k in range(len(means) - 2, -1, -1):
@@ -114,7 +114,7 @@ def test_on_a_linear_model_it_is_the_textbook_smoother_with_missing_samples(line
 def test_on_every_form_it_is_the_textbook_smoother_that_starts_from_what_the_filter_said(form: str) -> None:
     problem = bench_task(form, RIG)
     found = smoothed_stretch(problem)
-    assert np.min(found.filtered_mean[:, 3]) == 0.0 or form == "acceleration"  # a bound was met on the way
+    assert np.min(found.filtered_mean[:, 3]) == 0.0 or form == "acceleration"  # a bound was reached on the way
     assert_equal(found, *textbook(problem, found), 1e-6)
 
 
@@ -195,7 +195,7 @@ def test_a_long_log_needs_little_memory() -> None:
     smoother(problem)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert peak < 1e6  # the beliefs of every sample would be 45e6
+    assert peak < 1e6  # the beliefs of all samples would take 45e6
 
 
 def test_a_log_of_one_sample_is_the_filters_answer(linear: ProcessModel) -> None:

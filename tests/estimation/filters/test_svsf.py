@@ -1,4 +1,4 @@
-"""The smooth variable structure filter: Kalman's gain within its limit, the robust one beyond, a covariance always."""
+"""Smooth variable structure filter: the Kalman gain within its limit, the robust one beyond, always a covariance."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def task(linear: ProcessModel, position: Array, **settings: float) -> FilterProb
 
 
 def by_hand(first: float, second: float, gamma: float, limit: float) -> tuple[Array, Array]:
-    """Mean and covariance in SI after two samples of the position a step apart, from the published matrices."""
+    """Return mean and covariance in SI after two consecutive samples of the position, from the published matrices."""
     H, r = np.array([1.0, 0.0, 0.0]), VARIANCES["position_m"]
     mean, P, last = PRIOR.mean, PRIOR.covariance, 0.0
     for k, y in enumerate((first, second)):
@@ -67,7 +67,7 @@ def test_with_a_limit_that_nothing_reaches_it_is_the_kalman_filter(linear: Proce
 def test_it_follows_a_jump_that_the_kalman_filter_is_too_sure_to_see(linear: ProcessModel) -> None:
     position = np.concatenate([np.zeros(2000), np.full(20, 0.5)]) + np.random.default_rng(1).normal(0.0, 0.01, 2020)
     problem = task(linear, position, boundary_layer=10.0)
-    problem = replace(problem, noise=np.zeros(3))  # believes that nothing but the model moves it
+    problem = replace(problem, noise=np.zeros(3))  # assumes that nothing but the model moves the state
     late = 0.5 / linear.states[0].scale
     assert abs(svsf(problem).mean[0] - late) < 0.1 * late
     assert abs(ekf(replace(problem, settings={})).mean[0] - late) > 0.5 * late

@@ -1,4 +1,4 @@
-"""Short logs of one actuator, and fits that are made up, for the numbers of the fits."""
+"""Short logs of one actuator and made-up fits, for the recorded numbers of the fits."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -58,7 +58,7 @@ def log(
 
 @cache
 def at_one_speed(delivery: float = 0.85, speed: float = 100.0) -> Record:
-    """A pump that delivers a share of its displacement, to and fro at one speed; held for 50 ms or longer."""
+    """Return a log of a worn pump that runs to and fro at one speed, held for 50 ms or longer each time."""
     rng = np.random.default_rng(3)
     turned = speed * np.where(rng.random(40) < 0.5, -1.0, 1.0).repeat(50)
     worn = replace(PAPER, pump_displacement=delivery * PAPER.pump_displacement)
@@ -66,7 +66,7 @@ def at_one_speed(delivery: float = 0.85, speed: float = 100.0) -> Record:
 
 
 def lost_in_bias(delivery: float = 0.85, speed: float = 100.0) -> dict[str, float]:
-    """What a plain fit finds of such a log: the flow bias takes up what the pump loses [SI]."""
+    """Return the values of a plain fit of such a log [SI]: the flow bias absorbs the pump's loss."""
     start = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 3e7, "case_leakage": 4e-13}
     lost = (1.0 - delivery) * PAPER.pump_displacement * speed
     return {**start, "leakage_coefficient": PAPER.leakage_coefficient, "flow_bias": PAPER.flow_bias + lost}

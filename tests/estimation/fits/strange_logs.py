@@ -1,4 +1,4 @@
-"""Logs on which something may be strange, and what explains them."""
+"""Logs that may need a hypothesis, and the explanation that is found."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Air that is in the oil from the beginning does not get in midway."""
+"""Air that is in the oil from the beginning is not said to enter later."""
 
 import pytest
 
@@ -19,9 +19,10 @@ def test_air_that_gets_in_has_a_time_at_which_it_does() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [17003, 17009, 17101, 17109])
 def test_bulk_modulus_with_air_is_that_at_the_stated_pressure(index: int) -> None:
-    """Of two it was the oil's without air, 42 and 34 % above all that acted; two had no number or were refused.
+    """Two logs gave that of oil without air, 42 and 34 % above the acting one; two gave none or were refused.
 
-    Bubbles of 17101 are squeezed with an exponent under high pressure, and slopes promise too little of air in 17109.
+    The bubbles of 17101 are compressed with an exponent under high pressure, and slopes predict too little gain for air
+    in 17109.
     """
     made = make("entrained_air", "training", index)
     fit = fit_flow(Record.from_frame(made.log), EhaParameters(), EhaParameters().bulk_modulus)

@@ -1,4 +1,4 @@
-"""A log that the plain flow form does not explain says what is strange about rig, oil or logger."""
+"""A log that the plain flow form does not explain shows another effect of rig, oil or logger."""
 
 from dataclasses import replace
 from functools import partial
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 def lagging(lag: float) -> Record:
-    """Return a log whose pressure sensor lags before its noise comes on top."""
+    """Return a log whose pressure sensor lags, with its noise added after the lag."""
     record, true = log(), log(sensors=IDEAL)[PRESSURE]
     share = 1.0 - np.exp(-record.sample_time / lag)
     noise = BENCH.pressure_noise * np.random.default_rng(6).standard_normal(len(true))
@@ -59,7 +59,7 @@ def test_a_speed_that_lags_by_little_more_than_a_sample_is_no_lead_of_the_motor(
     found = explained(lagged)
     assert found.names == ("speed_late",)
     lag, std = found.values["speed_lag"]
-    assert 1.0 < lag / record.sample_time < 1.6  # half a sample of it is how lines between samples follow steps
+    assert 1.0 < lag / record.sample_time < 1.6  # half a sample is due to straight lines between samples at steps
     assert std < 0.02 * lag
     monkeypatch.setattr(asked_hypotheses, "FARTHEST_LEAD", np.inf)
     assert fit_flow(lagged, HEALTHY, HEALTHY.bulk_modulus).explanation is None
@@ -94,7 +94,7 @@ def test_a_lag_and_a_delay_are_known_by_their_sum() -> None:
 
 
 LATE = ("motor_speed_rad_s", "speed_late"), ("position_m", "position_late")
-"""Half a millisecond of a position is asked for in `test_lateness`."""
+"""`test_lateness` tests a position that is half a millisecond late."""
 
 
 @pytest.mark.parametrize(("channel", "name"), thinned(LATE, [LATE[0]]))
@@ -264,9 +264,9 @@ def test_the_lag_of_a_filtered_pressure_is_believed_whatever_it_gains() -> None:
 
 @pytest.mark.parametrize(("seed", "seconds"), thinned([(2, 8.0), (2, 20.0), (3, 20.0)], [(2, 8.0)]))
 def test_a_plant_that_holds_its_volumes_is_not_said_to_have_another_zero(seed: int, seconds: float) -> None:
-    """Both explain its log alike; an encoder homed at a stop would read one sign only, and not zero in mid-stroke.
+    """Both explain its log equally well; an encoder homed at a stop reads one sign only, and not zero in mid-stroke.
 
-    What a zero must gain where no stop was seen is claimed above; on the longer logs it is asked for.
+    A test above gives the gain that a zero needs if no stop was seen; on the longer logs the zero is tested.
     """
     rng = np.random.default_rng(seed)
     drive = make_drive("steps", seconds, 1e-3, HEALTHY, rng)
@@ -277,7 +277,7 @@ def test_a_plant_that_holds_its_volumes_is_not_said_to_have_another_zero(seed: i
 
 
 def test_a_log_cut_out_of_a_run_where_pressure_crosses_zero_is_fitted_from_sides_shut_in_high() -> None:
-    """Both chambers stand far above the accumulator then, which no make-up would explain as well at first sight."""
+    """Both chambers are then far above the accumulator, which a form without make-up at first explains as well."""
     p = replace(HEALTHY, leakage_coefficient=2.5e-11)
     run = simulate(CIRCUIT, np.repeat([120.0, -120.0, 60.0, -90.0] * 3, 250), 1e-3, p, sensors=BENCH,
                    rng=np.random.default_rng(4))  # fmt: skip

@@ -1,4 +1,4 @@
-"""Make-up valves that open late, each at a pressure of its own, as springs and seats of real ones do."""
+"""Make-up valves that open late, each at a pressure of its own, as those with real springs and seats do."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ PAPER = EhaParameters()
 
 
 def logged(crack_a: float, crack_b: float) -> Record:
-    """Return 2.5 s of an actuator whose make-up valves open so far below the accumulator's pressure [Pa]."""
+    """Return 2.5 s of an actuator whose make-up valves open at these pressures below the accumulator's [Pa]."""
     machine = Machine(crack_a=crack_a, crack_b=crack_b, quadratic=1.1e6, linear=0.0, coulomb=490.0)
     time = 1e-3 * np.arange(2500)
     course = np.ones((len(time), 5))

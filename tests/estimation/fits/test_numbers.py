@@ -1,4 +1,4 @@
-"""What the arithmetic of fits gives, and fits to steady logs, kept in `numbers.json`."""
+"""Results of the fits' arithmetic, and of fits to steady logs, kept in `numbers.json`."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace

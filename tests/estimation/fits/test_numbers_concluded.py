@@ -1,4 +1,4 @@
-"""What is concluded from fits that are made up, and how far searches may go, kept in `numbers_concluded.json`."""
+"""Conclusions from made-up fits, and bounds of searches, kept in `numbers_concluded.json`."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -52,7 +52,7 @@ def concluded(
     open_by: PredictedGain = NO_GAIN,
     **how: Any,
 ) -> Any:
-    """Return what is told of a log by its plain fits, and by one under hypotheses."""
+    """Return the result for a log, from its plain fits and one fit under hypotheses."""
     values = {name: (value, strange.std[name]) for name, value in strange.values.items() if name in strange.std}
     explanation = Explanation(names, values, {}, (strange,), (), 1e6, lambda: open_by)
     asked: list[Any] = []
@@ -159,7 +159,7 @@ def encoders_that_were_homed() -> dict[str, Any]:
 
 
 MOVED_BOUNDS = {"chamber_volume", "relief_conductance", "start_level", "position_zero"}
-"""Unknowns of which the log says how far they may go, or where they begin."""
+"""Unknowns whose bounds or starts depend on the log."""
 
 
 @NUMBERS.case()

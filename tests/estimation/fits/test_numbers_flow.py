@@ -1,4 +1,4 @@
-"""What fits of the flow form see and find in short logs, kept in `numbers_flow.json`."""
+"""Logs of the flow form and results of its fits to short logs, kept in `numbers_flow.json`."""
 
 from dataclasses import asdict, replace
 from typing import Any
@@ -39,7 +39,7 @@ NUMBERS = Numbers(__file__)
 
 
 def noise_of(noise: OutputNoise) -> dict[str, Any]:
-    """Return an output's noise, with what losses leave of it."""
+    """Return an output's noise, with the noise that remains after losses."""
     kept = None if noise.lost_from is None else [noise.lost_from.kept(lost) for lost in (0.1, 1.0)]
     return {**asdict(replace(noise, lost_from=None)), "lost_from": kept}
 

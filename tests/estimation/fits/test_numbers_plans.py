@@ -1,6 +1,6 @@
-"""How searches are led: in which order, with how many steps, on which part of a log, kept in `numbers_plans.json`.
+"""Plans of searches: their order, number of steps and part of the log, kept in `numbers_plans.json`.
 
-Descents are replaced by ones that stay where they begin, so that nothing is computed but the plan.
+Descents are replaced by ones that stay where they begin, so that only the plan is computed.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -39,15 +39,16 @@ Cost = Callable[[int], float]
 
 
 def still(theta: Array, cost: float) -> Point:
-    """Return a point of a misfit without slopes."""
+    """Return a point of a misfit whose slopes are zero."""
     return Point(theta, cost, np.zeros(len(theta)), np.eye(len(theta)))
 
 
 @contextmanager
 def planned(cost: Cost, *modules: Any) -> Iterator[list[list[float]]]:
-    """Write down evaluations, samples, steps, noise and radius of each descent, which stays where it begins.
+    """Record evaluations, samples, steps, noise and radius of each descent, which stays where it begins.
 
-    Its cost is that of its number in the order of descents. One that ends another with all short steps keeps that.
+    The cost of a descent depends on its number in the order of descents. A descent that finishes another one with all
+    short steps keeps the cost of that one.
     """
     plan: list[list[float]] = []
     led: list[tuple[Array, float, bool]] = []
@@ -94,7 +95,7 @@ def planned(cost: Cost, *modules: Any) -> Iterator[list[list[float]]]:
 
 
 def grouped(plan: list[list[float]]) -> list[list[Any]]:
-    """Return equal descents in a row as one, with their count."""
+    """Return consecutive equal descents as one, with their count."""
     told: list[list[Any]] = []
     for one in plan:
         if told and told[-1][1] == one:

@@ -1,4 +1,4 @@
-"""What searches from many starts find in short logs and how often they ask, kept in `numbers_searches.json`."""
+"""Results of searches from many starts in short logs, and their evaluations, kept in `numbers_searches.json`."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -37,7 +37,7 @@ NUMBERS = Numbers(__file__)
 
 @contextmanager
 def counted() -> Iterator[list[int]]:
-    """Count for how many points a misfit is asked, each beside its own count of samples."""
+    """Record each evaluation of a misfit by the number of its samples."""
     asked: list[int] = []
     at, at_each, costs = Problem.at, FreedProblem.at_each, FreedProblem.costs
 

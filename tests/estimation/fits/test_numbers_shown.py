@@ -1,4 +1,4 @@
-"""What residuals and sensors show of plays, teeth and late channels, kept in `numbers_shown.json`."""
+"""Plays, pump ripple and late channels as residuals and sensors show them, kept in `numbers_shown.json`."""
 
 from collections.abc import Iterator
 from dataclasses import astuple, replace
@@ -43,7 +43,7 @@ COURSE = (
     (750, 1e-3),
     (899, 1.005e-3),
 )
-"""An encoder that goes up, stands, goes on, stands for a moment, goes on, stands, comes back, stands, and creeps."""
+"""Rows and positions [m] of an encoder: up, rest, up, short rest, up, rest, back, rest, creep."""
 
 WHEN, WHERE = np.array(COURSE).T
 
@@ -84,14 +84,14 @@ def courses_of_a_play() -> dict[str, Any]:
 
 
 def shown_as(shown: play.ShownPlay) -> dict[str, float]:
-    """Return what is shown, each number for itself."""
+    """Return the numbers of a shown play by name."""
     return {name: value for name, value in shown._asdict().items() if name != "moved"}
 
 
 def standing(
     stood: int, rows: int = 400, step: float = TIME, seen: float = 0.0, noise: float = 0.0, yields: float = 1e-10
 ) -> Record:
-    """Return a log whose encoder stands for so many samples at a time, while the piston yields to pressure."""
+    """Return a log whose encoder rests for ``stood`` samples at a time, while the piston yields to pressure."""
     time = step * np.arange(rows)
     force = 1e6 * np.sin(40.0 * time)
     yielded = yields * force
@@ -152,7 +152,7 @@ def one_by_one(late: Iterator[tuple[str, tuple[float, float]]]) -> Iterator[tupl
 
 
 def left_of(free: Array) -> Array:
-    """Return what is left of a change that an unknown takes up in part."""
+    """Return the part of a change that remains after an unknown has absorbed some of it."""
     return free - 0.3 * np.mean(free)
 
 

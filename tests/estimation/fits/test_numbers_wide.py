@@ -1,4 +1,4 @@
-"""Objections, hypotheses and the form of motion on short logs, kept in `numbers_wide.json`."""
+"""Objections, hypotheses and the motion form on short logs, kept in `numbers_wide.json`."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -71,7 +71,7 @@ def objections_on_either_side() -> dict[str, Any]:
 
 @contextmanager
 def all_promise(one: PredictedGain) -> Iterator[None]:
-    """Let every hypothesis promise the same."""
+    """Let every hypothesis have the same predicted gain."""
     each = [one] * len(asked_hypotheses.ALWAYS_ASKED)
     with patch.multiple(asked_hypotheses, predicted_gain=lambda *_, **__: one, predicted_gains=lambda *_, **__: each):
         yield
@@ -79,7 +79,7 @@ def all_promise(one: PredictedGain) -> Iterator[None]:
 
 @NUMBERS.case()
 def what_is_asked_of_a_log() -> dict[str, Any]:
-    """Promises of the delivery on either side of where it is asked, and lengths of logs."""
+    """Return the hypotheses tested with gains of delivery on either side of each limit, and by length of the log."""
     told: dict[str, Any] = {}
     sound, base = made_fit(100.0, 2e8, 1e6), wide()
     for gain, size, deviation in (

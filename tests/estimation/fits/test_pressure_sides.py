@@ -1,4 +1,4 @@
-"""A gauge of each chamber, with gains of their own: pressure reads more of one direction."""
+"""Gauges of the two chambers with different gains: differential pressure reads more in one direction."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from estimation.notes import RigCode
 from tests.estimation.fits.strange_logs import HEALTHY, PRESSURE, explained, log
 
 RUBBING = replace(HEALTHY, friction_quadratic=4.462e6, friction_linear=1.863e4, friction_coulomb=551.0)
-"""With major friction: some 20 bar, of which a percent is far above the noise."""
+"""An actuator with major friction: some 20 bar, of which one percent is far above the noise."""
 
 
 @pytest.mark.parametrize("half", [0.015, -0.01])

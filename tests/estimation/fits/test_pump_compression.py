@@ -1,4 +1,4 @@
-"""A pump that is filled at its inlet delivers less at its outlet: bulk modulus is right, and it is named."""
+"""A pump that is filled at its inlet delivers less at its outlet: bulk modulus is right, and the effect is named."""
 
 from dataclasses import replace
 
@@ -17,14 +17,14 @@ from plant.log.record import Record
 
 RIG = EhaParameters()
 SHARE = 3.0
-"""Oil that the pump compresses over what it delivers: as much again stays in its teeth, and once more."""
+"""Oil that the pump compresses over the oil that it delivers: twice the delivered oil stays in its teeth."""
 
 
 def filled_at_its_inlet() -> tuple[Record, float]:
-    """Return six seconds of an actuator of other equations, and its bulk modulus [Pa].
+    """Return six seconds of an actuator with other equations, and its bulk modulus [Pa].
 
-    Its own pump delivers its displacement at the outlet. One that is filled at the inlet turns faster for that, by the
-    oil's compression.
+    The pump of those equations delivers its displacement at the outlet. A pump that is filled at the inlet turns faster
+    for the same flow, by the oil's compression.
     """
     drawing, driving, logging = np.random.default_rng(5).spawn(3)
     drawn = draw_plain("major_friction", "steps", drawing).with_machine(bulk_modulus=6e7)

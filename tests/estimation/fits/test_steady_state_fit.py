@@ -1,4 +1,4 @@
-"""What went into steady logs comes back from them, with intervals that say how surely."""
+"""Fits of steady logs return the true parameters, with intervals that match the errors."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A leak that goes with the root of pressure, as through a worn edge, leaves bulk modulus right and is named."""
+"""Leakage with the square root of pressure, as through a worn edge, leaves bulk modulus right and is named."""
 
 from dataclasses import replace
 
@@ -33,9 +33,9 @@ SHARE = 0.3
 
 
 def leaking(share: float) -> tuple[Record, float, float]:
-    """Return six seconds of an actuator of other equations, a share of whose leakage is turbulent at 5 bar.
+    """Return six seconds of an actuator with other equations, of whose leakage a share is turbulent at 5 bar.
 
-    Beside it stand its bulk modulus [Pa] and its leakage [m^3/(s Pa)].
+    Its bulk modulus [Pa] and its leakage [m^3/(s Pa)] are returned too.
     """
     drawing, driving, logging = np.random.default_rng(3).spawn(3)
     drawn = draw_plain("minor_leakage_minor_friction", "prbs", drawing).with_machine(turbulent=share)

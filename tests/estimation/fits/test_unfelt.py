@@ -1,4 +1,4 @@
-"""An unknown whose unit is not felt may still be free by many of them, and then leaves others open."""
+"""An unknown whose unit has no effect may still vary by many units, and then makes others uncertain."""
 
 from dataclasses import replace
 
@@ -15,9 +15,9 @@ BULK_MODULUS = "bulk_modulus"
 
 
 def fitted(lead_std: float, late: int = 0) -> GreyBoxFit:
-    """Return what a log says of which few samples of pressure are there, and of the motor's lead so much is known.
+    """Return the fit of a log with few samples of pressure, for a prior deviation of the motor's lead.
 
-    Pressure comes ``late`` by so many samples.
+    Pressure is late by ``late`` samples.
     """
     record = log(2.0)
     pressure = np.roll(record["differential_pressure_pa"], late)
@@ -46,7 +46,7 @@ def test_what_is_known_of_a_lead_goes_with_the_sample_time() -> None:
 
 
 def test_a_lead_that_is_not_felt_by_its_unit_takes_up_no_channel_that_is_late() -> None:
-    """As slopes have it, it would be less than none: a pressure 2 ms late passed, bulk modulus 2.3 % too low."""
+    """In the linear approximation it becomes negative: a pressure 2 ms late passed, with bulk modulus 2.3 % too low."""
     free, held = fitted(25.0, late=2), fitted(1e-6, late=2)
     place = free.model.unknowns.index("speed_lead")
     assert 0.0 < np.linalg.norm(free.slopes[:, place]) < LEAST_EFFECT
@@ -56,7 +56,7 @@ def test_a_lead_that_is_not_felt_by_its_unit_takes_up_no_channel_that_is_late() 
 
 
 def test_a_make_up_valve_that_is_barely_felt_leaves_no_leakage_open_that_no_valve_has() -> None:
-    """Its logarithm was known to e^30 or not at all, and leakage four times as well or as badly with it."""
+    """Its logarithm was known to within e^30 or not at all, and the deviation of leakage differed fourfold with it."""
     sparse = seen(log(2.0), PAPER)
     values = {"makeup_conductance": 1e-13, "makeup_opening": 1e3, "case_leakage": 1e-13, "speed_lead": 1e-5}
     values |= {name: getattr(WORN, name) for name in (BULK_MODULUS, "leakage_coefficient", "flow_bias")}

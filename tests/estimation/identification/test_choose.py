@@ -1,4 +1,4 @@
-"""Which order and structure a record is given where neither is told."""
+"""The order and structure that are chosen for a record if neither is given."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_structures_are_compared_on_the_second_of_two_experiments_too() -> None:
     form = {"n_numerator": 1, "n_denominator": 1, "delay": 1}
     right = compare_structures(u, y, 0.01, form, ("output-error",))["fit_percent"].iloc[0]
     assert right > 90.0
-    other = [y[0], filtered([0.0, -0.5], [1.0, -0.8], u[1])]  # a plant that answers the other way
+    other = [y[0], filtered([0.0, -0.5], [1.0, -0.8], u[1])]  # a plant that responds with the opposite sign
     assert compare_structures(u, other, 0.01, form, ("output-error",))["fit_percent"].iloc[0] < 50.0
 
 

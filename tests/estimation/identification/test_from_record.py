@@ -46,7 +46,7 @@ def test_a_record_is_resampled_to_the_model_s_sample_time(plant_30hz: LinearMode
     assert model.sample_time == 1e-3
     assert model.n_samples == 8_000
     assert model.fit_percent > 98.0
-    # a plant of 300 Hz, seen at 1 kHz
+    # a plant of 300 Hz, sampled at 1 kHz
     assert model.dc_gain == pytest.approx(fast.dc_gain, rel=0.01)
 
 

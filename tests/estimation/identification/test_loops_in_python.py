@@ -1,4 +1,4 @@
-"""Loops of identification are Python: run as they are written they give what their machine code gives."""
+"""Loops of identification, run as plain Python, give the same results as their machine code."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Structures that are chosen, logs that are identified, and loops in two stages, kept in `numbers.json`."""
+"""Chosen structures, identified logs, and closed loops in two stages, kept in `numbers.json`."""
 
 from functools import partial
 from typing import Any
@@ -140,7 +140,7 @@ def _fed_back() -> Record:
 
 
 def closed_loop(share: float) -> Record:
-    """Return a log of a loop whose reference drives the input by a share."""
+    """Return a log of a closed loop whose input contains a share of the reference."""
     rng = np.random.default_rng(43)
     r, white = np.repeat(rng.choice([-1.0, 1.0], N // 18), 18), 0.2 * rng.normal(size=N)
     u, y, x, noise = np.zeros(N), np.zeros(N), 0.0, 0.0

@@ -1,6 +1,6 @@
-"""What searches ask for: how many starts, steps and finalists, to which tolerance, kept in `numbers_asked.json`.
+"""Effort of searches: the number of starts, steps and finalists, and tolerances, kept in `numbers_asked.json`.
 
-Their economies change no result that a small record shows, but they are what a fit costs, and where it ends.
+These limits change no result of a small record, but they determine what a fit costs, and where it ends.
 """
 
 from collections.abc import Iterator
@@ -283,7 +283,7 @@ def state_spaces() -> dict[str, Any]:
 
 @NUMBERS.case()
 def threads() -> dict[str, Any]:
-    """On how many threads matrices are multiplied: more make small ones slower."""
+    """Return the number of threads for matrix products: more threads make small products slower."""
     told: dict[str, Any] = {}
     whole = channels_from([U[:, None]], [answer()], 0.1, ("a",), "y")
     for name, place, inner, call in (

@@ -1,4 +1,4 @@
-"""What a log's model and its signals are where the caller names nothing."""
+"""Defaults of a log's model and of its signals."""
 
 from collections.abc import Callable
 from typing import Any

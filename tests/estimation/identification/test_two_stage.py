@@ -1,4 +1,4 @@
-"""Closed loops: a reference takes the bias away."""
+"""Closed loops: a reference removes the bias."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_a_reference_takes_the_bias_of_a_closed_loop_away() -> None:
 
 def test_the_explained_share_of_an_input_is_said_and_fits_are_from_it() -> None:
     (found,), (data,) = identify_columns([closed_loop(1)], ["u"], ["y"], references=["r"], options=FORM)
-    # the measured input carries noise that the output holds already
+    # the measured input contains noise that is already in the output
     assert found.quality.fit_percent > found.model.quality(data.u, data.y).fit_percent + 10.0
     assert found.sound
     (note,) = [one for one in found.notes if one.code == IdentificationCode.TWO_STAGES]

@@ -1,4 +1,4 @@
-"""Logs made in a millisecond, of a piston's motion, the pressure that it takes, and its pump; and of the circuit."""
+"""Logs made in a millisecond from a piston's motion, its pressure and its pump; and logs of the circuit."""
 
 from typing import Any
 
@@ -33,7 +33,7 @@ def circuit_log(drive: str, sensors: Sensors = BENCH) -> Record:
 
 
 def made_log(count: int = N, *, leakage: float = 1.0, size: float = 1.0, noisy: float = 1.0) -> Record:
-    """Return a log of two sines of the piston, with the friction and leakage that its parameters say."""
+    """Return a log of a piston that moves in two sines, with the friction and leakage of its parameters."""
     p, t = HEALTHY, T * np.arange(count)
     waves = ((0.03 * size, 7.0, 0.0), (0.015 * size, 24.0, 1.0))
     velocity = sum((a * np.sin(w * t + s) for a, w, s in waves), np.zeros(count))
@@ -59,7 +59,7 @@ LOG = made_log()
 
 
 def stands(values: Array, begin: int, count: int) -> Array:
-    """Return a channel that holds a value for so many samples."""
+    """Return a channel that holds one value for ``count`` samples."""
     out = values.copy()
     out[begin : begin + count] = out[begin]
     return out
@@ -80,7 +80,7 @@ def names(**change: Any) -> list[str]:
 
 
 def first_with(told_of: Any, low: int, high: int) -> int:
-    """Return the least whole number with which a verdict is another one than with the lowest."""
+    """Return the least whole number at which a verdict differs from that at the lowest number, -1 if there is none."""
     return (
         int(np.ceil(float(edge(lambda one: told_of(int(one)), low, high + 0.5, 12)) - 0.5))
         if told_of(low) != told_of(high)

@@ -1,4 +1,4 @@
-"""What a straight line in place of missing samples leaves open enters a filter's belief, no more and no less."""
+"""The uncertainty of a straight line across missing samples enters a filter's belief, no more and no less."""
 
 import numpy as np
 import pytest
@@ -108,7 +108,7 @@ def test_what_is_opened_is_the_volume_over_what_takes_it_up(linear: ProcessModel
     angle = unknown_angle(record["motor_speed_rad_s"], 0.01)
     swept = HEALTHY.pump_displacement / HEALTHY.piston_area
     np.testing.assert_allclose(problem.opened[:, 0] * 1e-3**2, swept**2 * angle, rtol=1e-12)
-    assert not np.any(problem.opened[:, 2])  # no pump moves the disturbance force
+    assert not np.any(problem.opened[:, 2])  # the pump does not act on the disturbance force
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_pressures_within_a_gap_of_position_are_not_compared() -> None:
     record = without(prbs(0.5), "position_m", 200, 300)
     spoilt = record[PRESSURE].copy()
     spoilt[200:300] += 1e6
-    noise = measurement_variances(record, tuple(record.channels))  # of the whole log
+    noise = measurement_variances(record, tuple(record.channels))  # from the whole log
     logs = record, record.replace(**{PRESSURE: spoilt})
     kept, moved = (filter_flow(log, HEALTHY, variances=noise).online for log in logs)
     assert moved.settled("bulk_modulus_pa") == kept.settled("bulk_modulus_pa")

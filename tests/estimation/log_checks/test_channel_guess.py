@@ -34,7 +34,7 @@ def test_velocity_is_the_slope_of_position_whatever_it_is_called(record: Record)
 
 
 def test_a_column_that_is_called_pressure_is_no_velocity_though_it_moves_like_one(record: Record) -> None:
-    """A log in German without a velocity: its pressure was taken for one, in mm/s."""
+    """In a German log without velocity, pressure was taken for velocity in mm/s."""
     named = [("t", record.time), ("Weg", 1e3 * record["position_m"]), ("Druck", 1e3 * record["velocity_m_s"])]
     headings = [Heading(name) for name, _ in named]
     found = guess_channels(headings, {place: one for place, (_, one) in enumerate(named)}, HEALTHY)
@@ -59,7 +59,7 @@ def test_a_unit_that_is_not_given_is_guessed_and_makes_less_sure(record: Record)
 def test_a_velocity_without_unit_takes_that_in_which_it_is_the_slope_of_position(
     record: Record, unit: str, factor: float
 ) -> None:
-    """Its size alone says m/s of one in in/s, and of a slow one in mm/s; a reversed sensor has a unit too."""
+    """By size alone a velocity in in/s, or a slow one in mm/s, is in m/s; a reversed sensor has a unit too."""
     scale = {"position_m": 1.0 / 0.0254, "velocity_m_s": factor}
     found = guess(record, {"position_m": "Stroke (in)", "velocity_m_s": "Vel"}, scale)["velocity_m_s"]
     assert (found.guess.unit, found.why[-1].code) == (unit, "unit_of_slope")
@@ -202,4 +202,5 @@ def test_the_difference_of_two_columns_is_found_among_hundreds_without_units() -
     assert _differences(noise[[7, 40, 120]]) == [(1, 0, 2), (2, 0, 1)]
     columns = dict(enumerate([1e-3 * np.arange(600), *noise]))
     headings = [Heading("time_s"), *(Heading(f"p{place}") for place in range(len(noise)))]
-    assert guess_channels(headings, columns, HEALTHY)  # in a tenth of a second: every three of them took minutes
+    # this takes a tenth of a second; comparing every three columns took minutes
+    assert guess_channels(headings, columns, HEALTHY)

@@ -1,4 +1,4 @@
-"""A channel with a wrong sign, unit or name is named; a sound log is not accused, whatever its actuator has."""
+"""A channel with a wrong sign, unit or name is named; a sound log is not accused, whatever its actuator's condition."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -34,7 +34,7 @@ SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
 PRESSURE = "differential_pressure_pa"
 RPM = 60.0 / (2.0 * np.pi)
 VIEWS = ((), (PRESSURE,), (VELOCITY,), (POSITION,), (PRESSURE, VELOCITY))
-"""Channels that are not logged."""
+"""Sets of channels that are not logged."""
 
 
 @cache
@@ -178,7 +178,7 @@ def test_a_piston_too_far_for_its_pump_tells_the_unit_where_the_balance_takes_mo
 
 @pytest.mark.parametrize("power", [3, 4])
 def test_a_pump_at_one_speed_that_delivered_more_than_the_piston_swept_has_no_unknown_unit(power: int) -> None:
-    """Without its mean and trend a path of constant speed is noise, and any piston goes farther."""
+    """Without its mean and trend a path at constant speed is only noise, and any piston goes farther."""
     rng, time = np.random.default_rng(0), 1e-3 * np.arange(1001)
     position = -0.0095 * time**power
     channels = {
@@ -271,7 +271,7 @@ def test_a_balance_that_explains_little_of_the_flow_is_not_believed(monkeypatch:
 
 @pytest.mark.parametrize(("share", "told"), [(0.45, True), (0.006, False)])
 def test_a_piston_that_hardly_moves_is_no_proof_of_a_unit(share: float, *, told: bool) -> None:
-    """What a balance leaves unexplained of a leaky actuator looks like ten times the motion that there is."""
+    """In a leaky actuator the unexplained part of the balance looks like ten times the real motion."""
     rng = np.random.default_rng(2)
     held = np.repeat(rng.choice([-1.0, 1.0], 6000), 20) * np.repeat(rng.uniform(20.0, 120.0, 6000), 20)
     flow = HEALTHY.pump_displacement * held
@@ -302,7 +302,7 @@ def test_a_logger_that_repeats_one_row_is_named_at_once() -> None:
 
 
 def test_position_and_velocity_that_agree_are_not_accused_of_tens() -> None:
-    """A piston that sticks one way drifts, and went 11 times too far where motor speed was in rev/s."""
+    """A piston that sticks in one direction drifts, and went 11 times too far if motor speed was in rev/s."""
     (said,) = channel_mistakes(scaled(SPEED, 1.0 / 12.4)(run()).replace(**{PRESSURE: None}), HEALTHY)
     assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, SPEED)
 
@@ -328,7 +328,7 @@ def test_a_piston_that_pressure_cannot_move_tells_no_unit_of_speed() -> None:
 def test_a_spring_that_drives_a_piston_back_while_its_pump_goes_on_reverses_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The pump leaks all that it delivers; the balance of flows still says that pump and piston count alike."""
+    """The pump leaks all that it delivers; the flow balance still shows that pump and piston have the same sign."""
     time = 1e-3 * np.arange(6000)
     speed = -60.0 + 2.0 * np.cos(2.0 * time)
     channels = {SPEED: speed, POSITION: 1e-5 * time - 1e-6 * np.sin(2.0 * time), PRESSURE: np.full(6000, -5e6)}
@@ -343,7 +343,7 @@ def test_a_spring_that_drives_a_piston_back_while_its_pump_goes_on_reverses_noth
 
 @pytest.mark.parametrize(("begins", "sign", "named"), [(-80.0, 1.0, False), (0.0, 1.0, False), (0.0, -1.0, True)])
 def test_a_piston_that_lags_a_sine_is_not_opposed_to_it(begins: float, sign: float, *, named: bool) -> None:
-    """Half a period is a long block: its means tell the phase at which blocks begin, and a lag turns their sign."""
+    """A long block is half a period: its means depend on where blocks begin, and a lag reverses their sign."""
     angle = 20.0 * np.pi * 1e-3 * np.arange(3001) + np.deg2rad(begins)
     position = -sign * 1e-3 * np.cos(angle - np.deg2rad(60.0))
     found = channel_mistakes(Record(1e-3, {SPEED: 100.0 * np.sin(angle), POSITION: position}), HEALTHY)

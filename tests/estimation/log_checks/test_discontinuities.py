@@ -1,4 +1,4 @@
-"""A zero that is set anew is subtracted, rows that were lost end a log's part, and what only moves is neither."""
+"""A reset zero is subtracted, lost rows end a part of the log, and plain motion does neither."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_behind_a_zero_of_pressure_that_is_set_anew_the_longer_part_is_used(driv
 
 @pytest.mark.parametrize(("rows", "named"), [(1, True), (3, False)])
 def test_a_pressure_that_rises_over_several_rows_was_not_set_anew(rows: int, *, named: bool) -> None:
-    """A piston that bounces off a stop compresses a small chamber by 60 bar in four rows: the log was cut there."""
+    """A piston that bounces off a stop raises a small chamber by 60 bar in four rows: the log was cut there."""
     record = circuit_log("multisine")
     risen = 2e6 * np.clip(np.arange(len(record)) - ROW + 1, 0, rows)
     _, notes = without_discontinuities(record.replace(**{PRESSURE: record[PRESSURE] + risen}))
@@ -70,7 +70,7 @@ def test_lost_rows_are_named_and_the_longest_part_is_used(drive: str, rows: int)
 
 
 def test_a_motor_that_steps_within_a_row_sets_no_pressure_anew() -> None:
-    """Of a run without noise nothing else jumps as far; a step of the motor was called lost rows."""
+    """In a run without noise nothing else jumps as far, so a step of the motor was called lost rows."""
     record = circuit_log("steps", IDEAL)
     pressure = record[PRESSURE] + np.where(np.arange(len(record)) < ROW, 0.0, 3e6)
     speed = record[SPEED] + np.where(np.arange(len(record)) < ROW, 0.0, 400.0)
@@ -80,7 +80,7 @@ def test_a_motor_that_steps_within_a_row_sets_no_pressure_anew() -> None:
 
 @pytest.mark.parametrize(("first", "named"), [(0.0, False), (100.0, True)])
 def test_the_first_rise_of_pressure_from_rest_sets_none_anew(first: float, *, named: bool) -> None:
-    """Until one chamber draws make-up both give pressure: it rose twice as fast as it ever does again."""
+    """Until one chamber draws make-up oil, both raise pressure: it rose twice as fast as at any later time."""
     record, rows = circuit_log("multisine"), np.arange(4000)
     speed = np.where(rows < ROW, first, record[SPEED])
     speed[ROW : ROW + 20] = np.linspace(first, record[SPEED][ROW + 20], 20)
@@ -91,7 +91,7 @@ def test_the_first_rise_of_pressure_from_rest_sets_none_anew(first: float, *, na
 
 
 def test_a_pressure_that_is_zeroed_while_the_motor_turns_slowly_is_named() -> None:
-    """All that came before the motor was at half its highest speed was taken for its setting off."""
+    """Everything before the motor reached half its top speed was taken for its start."""
     record, rows = circuit_log("multisine"), np.arange(4000)
     slow = np.where(rows < 500, 0.0, np.where(rows < 3500, 0.2 * record[SPEED], 5.0 * record[SPEED]))
     pressure = record[PRESSURE] + np.where(rows < ROW, 0.0, 1e6)
@@ -100,7 +100,7 @@ def test_a_pressure_that_is_zeroed_while_the_motor_turns_slowly_is_named() -> No
 
 
 def test_a_piston_that_meets_a_stop_has_lost_no_rows_and_no_zero() -> None:
-    """A load pulls it there; pump and pressure then change within a row. The part behind gave oil 17 % too soft."""
+    """A load pulls it there; pump and pressure then change within a row. The part after it gave oil 17 % too soft."""
     time = 1e-3 * np.arange(3000)
     free = np.arange(3000) < ROW
     position = np.where(free, 0.05 * time, 0.05 * time[ROW])
@@ -120,7 +120,7 @@ def test_a_piston_that_meets_a_stop_has_lost_no_rows_and_no_zero() -> None:
 
 @pytest.mark.parametrize("stopped", [True, False])
 def test_a_stop_yields_over_milliseconds_however_fast_a_log_is(stopped: bool) -> None:
-    """At 5 kHz a stop of a healthy small cylinder was a pressure whose zero was reset, and its log unknown."""
+    """At 5 kHz a stop of a healthy small cylinder was taken for a reset pressure zero, and its log was unknown."""
     rng, time = np.random.default_rng(3), 2e-4 * np.arange(10000)
     hit = time[5000]
     beyond = 8e-5 * (1.0 - np.exp(-np.maximum(time - hit, 0.0) / 2e-3)) if stopped else 0.05 * (time - hit)

@@ -1,4 +1,4 @@
-"""Rows that a logger wrote again while it had none are left out; rest is not, nor is a channel that is held alone."""
+"""Rows that a logger repeated because it had none are left out; a rest is not, nor is a single held channel."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ SPEED, POSITION, PRESSURE = "motor_speed_rad_s", "position_m", "differential_pre
 
 
 def repeated(record: Record, first: int, behind: int, *names: str) -> Record:
-    """Return a log that repeats some channels, or all, from the row before the first one on."""
+    """Return a log in which some channels, or all, repeat the row before ``first`` up to ``behind``."""
     source = np.arange(len(record))
     source[first:behind] = first - 1
     return record.replace(**{name: record[name][source] for name in names or tuple(record)})
@@ -46,7 +46,7 @@ def test_few_rows_and_a_channel_that_is_held_alone_are_no_dropout() -> None:
 
 def test_a_machine_at_rest_that_goes_on_from_there_is_no_dropout() -> None:
     time = 1e-3 * np.arange(3000)
-    moved = np.clip(time, 0.0, 1.0) + np.clip(time - 2.0, 0.0, 1.0)  # stands from 1 to 2 s, without any noise
+    moved = np.clip(time, 0.0, 1.0) + np.clip(time - 2.0, 0.0, 1.0)  # rests from 1 to 2 s, without any noise
     record = Record(1e-3, {SPEED: 100.0 * moved, POSITION: 0.05 * moved, PRESSURE: 1e6 * moved})
     assert without_dropouts(record) == (record, ())
     beyond = np.where(time > 1.5, moved + 0.5, moved)
@@ -54,7 +54,7 @@ def test_a_machine_at_rest_that_goes_on_from_there_is_no_dropout() -> None:
 
 
 def test_a_motor_that_leaves_rest_from_one_row_to_the_next_is_no_dropout() -> None:
-    """So a simulated log without noise begins; its rest was called a dropout."""
+    """A simulated log without noise begins like this; its rest was called a dropout."""
     speed = np.where(np.arange(2000) < 1000, 0.0, 60.0)
     record = simulate(LUMPED, speed, 1e-3, EhaParameters(), sensors=IDEAL)
     assert without_dropouts(record) == (record, ())

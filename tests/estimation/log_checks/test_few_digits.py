@@ -1,4 +1,4 @@
-"""A channel with few significant digits is found, and has steps of one size afterwards; a converter's is left alone."""
+"""A channel with few significant digits is found, and then has steps of one size; a converter's is left alone."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pressure that was filtered before it was logged keeps samples of independent noise; no other log is touched."""
+"""Pressure that was filtered before logging keeps samples with independent noise; no other log is changed."""
 
 import numpy as np
 import pytest
@@ -32,12 +32,12 @@ def log(drive: str, sensors: Sensors = BENCH, sample_time: float = 1e-3, seed: i
 
 
 def averaged(values: Array, rows: int) -> Array:
-    """Return means over the last rows, as a logger's block average gives them."""
+    """Return means over the last rows, like those of a logger's block average."""
     return np.convolve(np.concatenate([np.full(rows - 1, values[0]), values]), np.ones(rows) / rows, "valid")
 
 
 def lagged(values: Array, corner: float) -> Array:
-    """Return what an analogue filter of first order with a corner [cycles/sample] passes on."""
+    """Return the output of a first-order analogue filter with a corner [cycles/sample]."""
     kept, out = np.exp(-2.0 * np.pi * corner), values.copy()
     for row in range(1, len(values)):
         out[row] = kept * out[row - 1] + (1.0 - kept) * values[row]
@@ -95,7 +95,7 @@ def test_a_correlation_that_the_check_would_object_to_shows_in_a_log_of_twenty_s
 
 
 def turning(teeth: float, amplitude: float, rng: np.random.Generator) -> Record:
-    """Return 20 s of a pump at 30 to 100 % of 157 rad/s, whose teeth are in the pressure [Pa] with white noise."""
+    """Return 20 s of a pump at 30 to 100 % of 157 rad/s, with its ripple and white noise in pressure [Pa]."""
     speed = 157.0 * np.repeat(rng.choice((-1.0, 1.0), 40) * rng.uniform(0.3, 1.0, 40), 500)
     tones = amplitude * np.sin(teeth * np.cumsum(speed) * 1e-3)
     return Record(1e-3, {"motor_speed_rad_s": speed, PRESSURE: 3.0 * speed + tones + rng.normal(0.0, 5e3, len(speed))})
@@ -134,15 +134,15 @@ def test_what_no_distance_makes_independent_is_left_as_it_is() -> None:
     walk = np.cumsum(np.random.default_rng(10).standard_normal(20_000))
     assert not is_white(walk)
     assert independent_rows(walk, 1e-3) == 1
-    struck = log("prbs")  # the actuator rings as fast as the samples that are left would come
+    struck = log("prbs")  # the actuator rings as fast as the remaining samples would come
     assert without_correlated_noise(struck.replace(**{PRESSURE: averaged(struck[PRESSURE], 4)}))[1] == ()
-    assert independent_rows(averaged(np.random.default_rng(11).standard_normal(4000), 4), 0.01) == 1  # too slow a log
+    assert independent_rows(averaged(np.random.default_rng(11).standard_normal(4000), 4), 0.01) == 1  # log too slow
 
 
 def test_little_or_broken_data_is_no_evidence() -> None:
     rng = np.random.default_rng(12)
     short, broken = averaged(rng.standard_normal(200), 5), averaged(rng.standard_normal(8000), 5)
-    broken[::50] = np.nan  # no window is whole
+    broken[::50] = np.nan  # no window is complete
     assert is_white(short)
     assert is_white(broken)
     assert is_white(short[: WINDOW - 1])

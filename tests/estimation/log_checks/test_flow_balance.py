@@ -1,4 +1,4 @@
-"""What the pumped flow goes into where the piston hardly moves, and where one motor speed hides the flow bias."""
+"""Balance of the pumped flow if the piston hardly moves, and if a single motor speed hides the flow bias."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from tests.estimation.log_checks.made_logs import HEALTHY, POSITION, PRESSURE, S
 
 
 def test_a_piston_that_yields_on_its_seals_under_a_quick_sine_takes_up_its_own_flow_within_the_deviation() -> None:
-    """The balance made 6 to 45 times of its motion, at 3 to 33 deviations from the one that is true."""
+    """The balance found 6 to 45 times its motion, 3 to 33 deviations from the true one."""
     p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(5)
     log = simulate(CIRCUIT, make_drive("sine", 1.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     found = flow_balance(log, HEALTHY, MIDDLE)
@@ -30,7 +30,7 @@ def test_a_piston_that_yields_on_its_seals_under_a_quick_sine_takes_up_its_own_f
 
 @pytest.mark.parametrize("times", [1.0, 9.55])
 def test_a_pump_of_one_speed_loses_no_more_than_any_flow_bias(times: float) -> None:
-    """Its sign says what it pumps, so that a bias explained all flow where noise hides what the piston does."""
+    """The sign of its speed gives its flow, so a bias explained all flow if noise hid the motion of the piston."""
     rng = np.random.default_rng(1)
     speed = np.repeat(rng.choice([-100.0, 100.0], 300), 30) + rng.normal(0.0, 0.05, 9000)
     lost = 0.2 * HEALTHY.pump_displacement * HEALTHY.rated_speed * np.sign(speed)
@@ -44,7 +44,7 @@ def test_a_pump_of_one_speed_loses_no_more_than_any_flow_bias(times: float) -> N
 
 
 def test_a_pump_that_knows_one_speed_leaves_its_flow_bias_open() -> None:
-    """A bias took up a quarter of all flow, and the piston's factor was 0.75 at 23 deviations from the true one."""
+    """A bias absorbed a quarter of all flow, and the piston's factor was 0.75, 23 deviations from the true one."""
     rng = np.random.default_rng(4)
     log = simulate(CIRCUIT, make_drive("prbs", 4.0, 1e-3, HEALTHY, rng), 1e-3, HEALTHY, sensors=BENCH, rng=rng)
     found = flow_balance(log, HEALTHY, MIDDLE)
@@ -54,7 +54,7 @@ def test_a_pump_that_knows_one_speed_leaves_its_flow_bias_open() -> None:
 
 
 def test_of_a_piston_that_stands_still_nothing_is_known_however_well_its_pressure_is_explained() -> None:
-    """Where every other flow bias was out of question, the deviation was no number, and NumPy warned of it."""
+    """If every other flow bias was ruled out, the deviation was not a number, and NumPy warned of it."""
     rng = np.random.default_rng(1)
     speed = np.repeat(100.0 * rng.choice([-1.0, 1.0], 3000) * rng.uniform(0.2, 1.0, 3000), 30)
     pressure = 1e7 * HEALTHY.pump_displacement * np.cumsum(speed)
@@ -67,7 +67,7 @@ def test_of_a_piston_that_stands_still_nothing_is_known_however_well_its_pressur
 
 @pytest.mark.parametrize("load", [0.0, 500.0])
 def test_a_single_rods_pump_moves_the_side_that_holds_the_pressure(load: float) -> None:
-    """By its mean area a rod with 35 % on either side seemed to move by 0.72 and 0.9 times what it was pumped."""
+    """With its mean area, a rod with 35 % on either side seemed to move by 0.72 and 0.9 times the pumped flow."""
     rod = replace(circuit_of(HEALTHY), area_difference=0.35, pilot_share=1.0, load_force=load)
     log = simulate(CIRCUIT, make_drive("steps", 6.0, 1e-3, rod, np.random.default_rng(2)), 1e-3, rod)
     found, by_mean = (flow_balance(log, one, MIDDLE) for one in (rod, replace(rod, pilot_share=0.0)))
@@ -78,7 +78,7 @@ def test_a_single_rods_pump_moves_the_side_that_holds_the_pressure(load: float) 
 
 
 def test_noise_of_pressure_does_not_change_the_side_that_a_single_rods_pump_moves() -> None:
-    """By the sign of each sample a sixth of them were the other side's, and the factor was 0.9."""
+    """By the sign of each sample, a sixth of them belonged to the other side, and the factor was 0.9."""
     rng = np.random.default_rng(6)
     rod = replace(HEALTHY, area_difference=0.35, pilot_share=1.0)
     speed = np.repeat(rng.uniform(20.0, 120.0, 120) * np.tile([1.0, -1.0], 60), 100)

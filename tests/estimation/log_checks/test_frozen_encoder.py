@@ -1,4 +1,4 @@
-"""A still encoder is accused only of a motion that leakage cannot explain, however leaky the actuator is."""
+"""A still encoder is accused only if leakage cannot explain the motion that it misses, however leaky the actuator."""
 
 from dataclasses import replace
 from functools import cache
@@ -32,7 +32,7 @@ def run(leakage: float, drive: str, condition: str = "normal") -> Record:
 
 
 def frozen(log: Record, length: int) -> tuple[Record, int]:
-    """Return the log with an encoder that freezes while the piston goes farthest, and when."""
+    """Return the log with an encoder that freezes where the piston goes farthest, and the row at which it freezes."""
     position = log[POSITION].copy()
     start = 500 + int(np.argmax(np.abs(position[1000:-1000] - position[500:-1500])))
     position[start : start + length] = position[start]
@@ -70,7 +70,7 @@ def test_an_encoder_that_freezes_for_good_is_named(absent: tuple[str, ...], leak
 
 
 def test_an_encoder_that_freezes_while_the_piston_yields_on_its_seals_is_named() -> None:
-    """Half of such a log passed as air that enters, or as a speed in another unit: no motion of 0.5 mm is missed."""
+    """A log with its second half frozen passed as air that enters or as a unit of speed: it misses less than 0.5 mm."""
     p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(18811)
     log = simulate(CIRCUIT, make_drive("sine", 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     unseen = log.replace(**{VELOCITY: None})
@@ -86,7 +86,7 @@ def test_a_flow_bias_is_known_though_the_motor_rests_most_of_the_log() -> None:
     bias = 6.0 * p.flow_bias
     speed = np.where(rows % 2500 < 500, np.where(rows // 2500 % 2, -90.0, 90.0), 0.0)
     hold = slice(6000, 7000)
-    speed[hold] = 0.9 * bias / p.pump_displacement  # all of it is lost
+    speed[hold] = 0.9 * bias / p.pump_displacement  # the flow bias takes all of it
     moved = np.sign(speed) * np.maximum(p.pump_displacement * np.abs(speed) - bias, 0.0) / p.piston_area
     log = Record(
         1e-3,

@@ -1,4 +1,4 @@
-"""Values that a logger only repeated are left out; a channel that rests or is coarse keeps all of its own."""
+"""Values that a logger only repeated are left out; a channel that rests or is coarse keeps all its values."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ PRESSURE, POSITION = "differential_pressure_pa", "position_m"
 
 
 def held(values: np.ndarray, rows: float) -> np.ndarray:
-    """Return values that come every so many rows, on a clock of their own where that is no whole number."""
+    """Return values that come every ``rows`` rows, on a clock of their own if ``rows`` is not a whole number."""
     at = np.arange(len(values))
     return values[(np.floor(at / rows) * rows).astype(int)]
 
@@ -43,7 +43,7 @@ def test_a_held_channel_is_named_and_its_own_samples_stay(channel: str, rows: fl
     assert note.code is SensorCode.HELD
     assert note.data["channel"] == channel
     assert note.data["rows"] == int(rows)
-    moved = np.append(True, np.diff(given) != 0.0)  # a sample that is what the last one was tells nothing
+    moved = np.append(True, np.diff(given) != 0.0)  # a sample equal to the last one has no information
     assert np.array_equal(there, moved)
     assert np.array_equal(found[channel][there], given[there])
 
@@ -64,7 +64,7 @@ def test_a_clean_log_says_what_was_held() -> None:
 
 
 def bridged(values: np.ndarray, rows: int, first: int) -> np.ndarray:
-    """Return values on straight lines between those of every so many rows, rounded as a file is."""
+    """Return values on straight lines between every ``rows``-th one, rounded as in a file."""
     at = np.arange(len(values))
     there = at[first::rows]
     return np.array([float(f"{one:.9g}") for one in np.interp(at, there, values[there])])

@@ -1,4 +1,4 @@
-"""A channel that stands still by itself for a while is missing there; what rests, clips or is coarse is not."""
+"""A channel that alone stands still for a while is missing there; one that rests, clips or is coarse is not."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Tones that a cable picks up are taken off a pressure channel; what moves stays."""
+"""Tones that a cable picks up are removed from a pressure channel; motion stays."""
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def test_a_line_at_a_harmonic_of_a_fast_drive_may_be_the_drive() -> None:
 
 @pytest.mark.parametrize("repeats", [2.5, 3.4, 6.2])
 def test_the_mains_are_no_harmonic_of_a_slow_drive_that_has_no_others_near_them(repeats: float) -> None:
-    """Every frequency lies within 1 Hz of a multiple of one below 2 Hz, and most do of one of 3 Hz."""
+    """Every frequency lies within 1 Hz of a multiple of one below 2 Hz, and for one of 3 Hz most do."""
     speed = 60.0 * np.sin(2.0 * np.pi * repeats * 1e-3 * np.arange(6000))
     record = simulate(CIRCUIT, speed, 1e-3, EhaParameters(), sensors=BENCH, rng=np.random.default_rng(4))
     assert without_hum(record)[1] == ()

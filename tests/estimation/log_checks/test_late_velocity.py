@@ -1,4 +1,4 @@
-"""A velocity that was filtered or derived with a delay is left out, for position says the same on time."""
+"""A velocity that was filtered or derived with a delay is left out; position has the same information on time."""
 
 import numpy as np
 import pytest
@@ -56,14 +56,14 @@ def test_a_late_velocity_is_told_and_not_used(how: str) -> None:
 
 
 def test_a_velocity_that_wanders_behind_its_filter_is_late_all_the_same() -> None:
-    """Seven tenths of what the two differ by is lateness, the rest noise that the filter made alike."""
+    """Seven tenths of their difference are lateness; the rest is noise that the filter correlated."""
     wanders = lagged(3.5e-3 * np.random.default_rng(3).standard_normal(len(RECORD)), 8e-3)
     _, (note,) = without_late_velocity(RECORD.replace(**{VELOCITY: LATE["lag"] + wanders}))
     assert note.data["late_ms"] == pytest.approx(8.0, rel=0.25)
 
 
 def test_a_lateness_that_means_over_a_block_show_is_told_under_fast_binary_noise() -> None:
-    """Over 50 ms velocity changes slowly, and lateness makes less of it than a sensor may be off by."""
+    """Over 50 ms velocity changes slowly, and the effect of lateness is less than a sensor's allowed error."""
     turns = np.repeat(np.random.default_rng(6).choice([-0.02, 0.02], 200), 30)
     velocity = lagged(turns, 4e-3)
     position = 1e-3 * np.cumsum(velocity)

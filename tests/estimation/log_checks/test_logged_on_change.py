@@ -1,4 +1,4 @@
-"""A channel of which only changes were logged is named; one that is coarse, rests or is held is not."""
+"""A channel of which only changes were logged is named; a channel that is coarse, rests or is held is not."""
 
 from functools import cache
 
@@ -29,7 +29,7 @@ def log(drive: str = "prbs", sensors: Sensors = BENCH) -> Record:
 
 
 def on_change(values: Array, threshold: float) -> Array:
-    """Return what a logger writes that repeats a value until it has changed by a threshold."""
+    """Return the output of a logger that repeats a value until it has changed by more than a threshold."""
     written = values.copy()
     for k in range(1, len(values)):
         written[k] = values[k] if abs(values[k] - written[k - 1]) > threshold else written[k - 1]
@@ -79,7 +79,7 @@ def test_the_threshold_is_read_off_the_steps_and_named_where_it_matters(channel:
 
 
 def test_such_a_log_is_refused_by_name_and_the_logger_is_to_be_set() -> None:
-    """Bulk modulus of such logs was up to 5 % off behind an open gate."""
+    """Such logs passed the gate with bulk modulus up to 5 % off."""
     values = log()[PRESSURE]
     record = log().replace(**{PRESSURE: on_change(values, 0.05 * float(values.std()))})
     (note,) = clean_log(record, PAPER).objections

@@ -1,4 +1,4 @@
-"""The noise of a channel is read off the log, whatever moves beneath it (errata E11)."""
+"""The noise of a channel is read from the log, whatever the motion beneath it (errata E11)."""
 
 import numpy as np
 import pytest
@@ -126,7 +126,7 @@ def test_blows_of_a_binary_drive_do_not_pass_for_noise() -> None:
     time = 1e-3 * np.arange(200)
     rung = np.exp(-40.0 * time) * np.sin(2.0 * np.pi * 60.0 * time)
     struck = 1e5 * np.convolve(blows, rung)[:15_000] + rng.normal(0.0, 5e3, 15_000)
-    assert 0.9 * 25e6 < struck_variance(struck) < 1.2 * 25e6  # a blow is in seven differences of twenty
+    assert 0.9 * 25e6 < struck_variance(struck) < 1.2 * 25e6  # seven of twenty differences include a blow
     channel = "differential_pressure_pa"
     assert measurement_variances(Record(1e-3, {channel: struck}), [channel])[channel] > 1.5 * 25e6
     assert struck_variance(np.where(np.arange(15_000) % 40 == 7, np.nan, struck)) == pytest.approx(25e6, rel=0.3)

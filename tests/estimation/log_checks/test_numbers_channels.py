@@ -1,4 +1,4 @@
-"""Where a channel is said to count the other way or in another unit, kept in `numbers_channels.json`."""
+"""Limits at which a channel is said to have the other sign or another unit, kept in `numbers_channels.json`."""
 
 from dataclasses import replace
 from typing import Any
@@ -50,12 +50,12 @@ def blocks(**given: Array | None) -> ChannelBlocks:
 
 
 def mixed(share: float, size: float = 1.0) -> Array:
-    """Return what correlates with the wave by about this share."""
+    """Return a signal whose correlation with the wave is about ``share``."""
     return size * (share * WAVE / np.std(WAVE) + (1.0 - share**2) ** 0.5 * OTHER / np.std(OTHER)) * np.std(WAVE)
 
 
 def together(share: float, size: float) -> Array:
-    """Return a piston whose way correlates with the pumped wave's by about this share."""
+    """Return a piston whose path correlates with that of the pumped wave by about ``share``."""
     ways = [np.cumsum(one) for one in (WAVE, OTHER)]
     way = share * ways[0] / np.std(ways[0]) + (1.0 - share**2) ** 0.5 * ways[1] / np.std(ways[1])
     return size * np.diff(way, prepend=0.0) * np.std(ways[0])

@@ -1,4 +1,4 @@
-"""Where a pressure is taken for dead or clipped, kept in `numbers_clipping.json`."""
+"""Limits at which a pressure is said to be dead or clipped, kept in `numbers_clipping.json`."""
 
 from dataclasses import replace
 from typing import Any

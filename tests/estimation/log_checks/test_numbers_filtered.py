@@ -1,4 +1,4 @@
-"""From where on noise counts as filtered, and how many rows are left out then, kept in `numbers_filtered.json`."""
+"""Limits at which noise counts as filtered, and how many rows are then left out, kept in `numbers_filtered.json`."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def averaged(rows: int, count: int = 20_000) -> Array:
 
 
 def alike(correlation: float, count: int) -> Array:
-    """Return noise of which neighbours share a part."""
+    """Return noise whose neighbouring samples share a part."""
     white = noise(1.0, count + 1)
     return white[1:] + correlation * white[:-1]
 

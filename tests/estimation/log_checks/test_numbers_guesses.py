@@ -1,4 +1,4 @@
-"""Where a column is taken for a channel or a unit for another, kept in `numbers_guesses.json`."""
+"""Limits at which a column is taken for a channel, or a unit for another one, kept in `numbers_guesses.json`."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What a log says of noise and of gaps, kept in `numbers_noise.json`."""
+"""Noise and gaps as a log shows them, kept in `numbers_noise.json`."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Where a sensor is believed no longer, kept in `numbers_sensors.json`."""
+"""Limits at which a sensor is no longer trusted, kept in `numbers_sensors.json`."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What is taken out of a log as hum or as repeated or as outliers, kept in `numbers_taken_out.json`."""
+"""What is removed from a log as hum, as repeated or as an outlier, kept in `numbers_taken_out.json`."""
 
 from typing import Any
 

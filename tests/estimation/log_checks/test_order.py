@@ -1,4 +1,4 @@
-"""Order statistics are those of NumPy, to the bit."""
+"""Order statistics equal those of NumPy to the bit."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Gross outliers are taken out, alone, in threes and at the ends; what moves is not."""
+"""Gross outliers are removed, alone, in threes and at the ends; motion is not."""
 
 import numpy as np
 import pytest
@@ -82,7 +82,7 @@ def test_an_outlier_at_an_end_is_found_there(place: int) -> None:
 
 @pytest.mark.parametrize("backward", [False, True])
 def test_a_motor_that_goes_from_rest_to_the_one_speed_of_its_log_begins_with_no_outlier(backward: bool) -> None:
-    """One that a load holds at its full speed had its first two samples left out, 0 and 22 rad/s."""
+    """A motor that a load holds at its full speed had its first two samples left out, 0 and 22 rad/s."""
     rng = np.random.default_rng(3)
     speed = np.full(2000, 125.6) + rng.normal(0.0, 0.05, 2000)
     speed[:9] = [0.0, 22.0, 43.8, 65.0, 81.4, 93.4, 102.0, 108.5, 113.1]
@@ -115,7 +115,7 @@ def test_a_burst_that_rings_on_in_a_pressure_goes_with_its_gross_outlier() -> No
     spoilt = record.replace(differential_pressure_pa=record["differential_pressure_pa"] + burst)
     cleaned, (said,) = without_gross_outliers(spoilt, CHANNELS)
     left = np.where(np.isnan(cleaned["differential_pressure_pa"]), 0.0, burst)
-    assert np.max(np.abs(left)) < 4e4  # of 180 kPa that ring on
+    assert np.max(np.abs(left)) < 4e4  # the ringing reaches 180 kPa
     taken = np.flatnonzero(np.isnan(cleaned["differential_pressure_pa"]))
     assert np.all(np.abs(burst[taken]) > 0.0)
     assert said.data["count"] == len(taken)

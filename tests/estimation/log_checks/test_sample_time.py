@@ -1,4 +1,4 @@
-"""Samples that are too far apart are refused in words; fits and filters took forever over them."""
+"""Samples that are too far apart are refused with a message; fits and filters took forever over them."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ SLOW = "samples are 1 s apart, but must be at most 0.1 s.*time_s=NAME:ms"
 
 
 def slow(sample_time: float) -> Record:
-    """A log of 40 samples that turns to and fro."""
+    """Return a log of 40 samples of a motor that turns to and fro."""
     k = np.arange(40.0)
     speed = 90.0 * np.sin(k / 9.0)
     channels = {"motor_speed_rad_s": speed, "position_m": 1e-5 * np.cumsum(speed), "velocity_m_s": 1e-3 * speed}

@@ -1,4 +1,4 @@
-"""A sensor that has stopped telling the truth is named; a sound log, however coarse or still, is not accused."""
+"""A sensor that no longer reads correctly is named; a sound log, however coarse or still, is not accused."""
 
 from dataclasses import replace
 from itertools import product
@@ -99,7 +99,7 @@ def test_a_pump_that_turns_too_slowly_to_move_the_piston_leaves_its_pressure_sen
 
 
 def test_a_pressure_sensor_is_alive_though_the_motor_rests() -> None:
-    """The noise of three sensors was told as a motor that turns and a sensor that is dead."""
+    """The noise of three sensors was taken for a motor that turns and a pressure sensor that is dead."""
     rng = np.random.default_rng(1)
     sizes = {"motor_speed_rad_s": 0.05, "position_m": 1e-6, PRESSURE: 3e3}
     rest = Record(1e-3, {name: size * rng.normal(size=2000) for name, size in sizes.items()})
@@ -110,7 +110,7 @@ def test_a_pressure_sensor_is_alive_though_the_motor_rests() -> None:
 
 @pytest.mark.parametrize("seed", [2, 4, 11])
 def test_twenty_samples_are_too_few_to_call_a_pressure_sensor_dead(seed: int) -> None:
-    """Of live sensors that keep four tenths of a sample in the next, one in six was called dead, these among them."""
+    """If four tenths of a sample stay in the next, one live sensor in six was called dead, these among them."""
     rng = np.random.default_rng(seed)
     load = np.convolve(rng.normal(size=21), [0.9, 0.4], mode="valid")
     short = Record(

@@ -1,4 +1,4 @@
-"""Rows that a logger wrote twice are left out; rest, drives that repeat and coarse channels are no copies."""
+"""Rows that a logger wrote twice are left out; rest, drives that repeat and coarse channels are not copies."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_a_copy_in_place_of_rows_that_were_lost_leaves_them_missing() -> None:
 
 
 def without_noise(*phases: np.ndarray) -> Record:
-    """Return three channels that follow a phase [periods], the same to the last bit where it is the same."""
+    """Return three channels that follow a phase [periods], equal to the last bit if the phase is equal."""
     phase = 2.0 * np.pi * np.concatenate(phases)
     return Record(
         1e-3, {SPEED: 100.0 * np.cos(phase), POSITION: 0.01 * np.sin(phase), PRESSURE: 1e6 * np.sin(2 * phase)}
@@ -119,7 +119,7 @@ def test_of_an_input_without_noise_and_one_output_a_copy_is_cut_out() -> None:
     assert note.data["rows"] == 20
     assert np.array_equal(found["y"], record["y"])
     sent = again(record)
-    assert without_rows_sent_twice(sent) == (sent, ())  # they are no channels of an actuator
+    assert without_rows_sent_twice(sent) == (sent, ())  # `u` and `y` are not channels of an actuator
 
 
 @pytest.mark.parametrize(("noise", "decimals"), [(0.02, 6), (0.0, 6), (0.02, 2), (0.02, 1), (0.3, 0)])

@@ -1,4 +1,4 @@
-"""Pressure under which a piston slides tells a unit of pressure from oil."""
+"""The pressure under which a piston slides distinguishes a wrong unit of pressure from other oil."""
 
 from dataclasses import replace
 
@@ -40,7 +40,7 @@ def test_a_rig_without_friction_tells_nothing() -> None:
 
 
 def test_viscous_friction_takes_pressure_too() -> None:
-    """Over Coulomb friction alone the pressure was 10 times too high, so that oil 4 times as stiff accused its unit."""
+    """Over Coulomb friction alone, pressure was 10 times too high, so oil 4 times as stiff made its unit seem wrong."""
     rig, rng = replace(RIG, friction_coulomb=20.0, friction_linear=3000.0), np.random.default_rng(4)
     log = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, rig, rng), 1e-3, rig, sensors=BENCH, rng=rng)
     assert beyond_sliding(sliding_pressure(log, rig)) == 0.0

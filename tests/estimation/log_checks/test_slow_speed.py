@@ -1,4 +1,4 @@
-"""A motor speed that its logger repeated slows a log down; one that the motor held does not."""
+"""A motor speed that the logger repeated makes the whole log a slow one; a speed that the motor held does not."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def log(drive: str = "multisine", seconds: float = 6.0, sensors: Sensors = BENCH
 
 
 def held(record: Record, rows: int, *more: str, first: int = 0) -> Record:
-    """Return a log whose motor speed comes every so many rows, and more channels every second one."""
+    """Return a log whose motor speed comes every ``rows`` rows, and more channels every second row."""
     at = np.arange(len(record))
     taken = np.maximum((at - first) // rows * rows + first, 0)
     return record.replace(**{SPEED: record[SPEED][taken], **{name: record[name][at // 2 * 2] for name in more}})
@@ -60,7 +60,7 @@ def test_a_motor_that_holds_its_speed_is_believed_row_by_row() -> None:
     record = simulate(LUMPED, stairs, 1e-3, P, sensors=BENCH, rng=np.random.default_rng(1))
     driven = record.replace(**{SPEED: stairs})
     assert without_held(driven) == (driven, ())
-    lacking = held(log(), 8).replace(**{PRESSURE: None})  # nothing tells which it was
+    lacking = held(log(), 8).replace(**{PRESSURE: None})  # nothing shows whether the logger or the motor held it
     assert without_held(lacking) == (lacking, ())
 
 

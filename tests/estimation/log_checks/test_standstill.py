@@ -1,4 +1,4 @@
-"""How far a piston and its pump went."""
+"""Travel of a piston and of its pump."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ RIG = EhaParameters()
 def test_a_piston_that_stands_still_is_stuck_only_where_its_pump_turns(
     speed: float, travel: float, still: bool, at_rest: bool, stuck: bool
 ) -> None:
-    """An offset of the speed is no turning pump."""
+    """An offset of speed is not a turning pump."""
     time, noise = np.arange(2000) * 1e-3, np.random.default_rng(1).standard_normal((2, 2000))
     channels = {SPEED: np.full(2000, speed) + 0.1 * noise[0], POSITION: travel * np.sin(6.0 * time) + 1e-5 * noise[1]}
     gone = travels(Record(1e-3, channels), RIG)
@@ -36,7 +36,7 @@ def test_a_piston_that_stands_still_is_stuck_only_where_its_pump_turns(
 
 @pytest.mark.parametrize(("velocity", "stuck"), [(1e-4, True), (1e-3, False)])
 def test_without_position_a_small_offset_of_velocity_is_no_motion(velocity: float, stuck: bool) -> None:
-    """It hid a blocked rod, which was told as major leakage and major friction without pressure."""
+    """It hid a blocked rod, which without pressure was diagnosed as major leakage and major friction."""
     noise = 1e-3 * np.random.default_rng(1).standard_normal(10_000)
     gone = travels(Record(1e-3, {SPEED: np.full(10_000, 100.0), VELOCITY: velocity + noise}), RIG)
     assert gone is not None

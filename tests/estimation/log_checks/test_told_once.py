@@ -1,4 +1,4 @@
-"""What an encoder repeats while the piston rests is told once; what only happens to be equal is not."""
+"""Values that an encoder repeats while the piston rests are used once; values that are equal by chance all count."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_a_channel_without_rows_has_none() -> None:
 
 
 def mean_error(position: Array) -> float:
-    """Return the sum of the errors that are told, on average over where the encoder's steps lie [steps]."""
+    """Return the sum of the errors of the rows that are kept, averaged over the position of the steps [steps]."""
     true = position + np.linspace(-0.495, 0.495, 100)[:, None]
     return float(np.mean([np.nansum(changes_and_rests(np.round(one))[1:] - one[1:]) for one in true]))
 

@@ -1,4 +1,4 @@
-"""A unit that changes within a log is named with its time and factor; a drive that grows is none."""
+"""A unit that changes within a log is named with its time and factor; a drive that grows is not one."""
 
 import numpy as np
 import pytest

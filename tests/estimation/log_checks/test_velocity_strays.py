@@ -1,4 +1,4 @@
-"""A velocity that was filtered runs on behind a piston that stops and wanders as it rests: no frozen encoder."""
+"""A filtered velocity runs on after a piston stops, and wanders while it rests: the encoder is not frozen."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ RESTS, INNER, SLIDES = slice(380, 500), slice(410, 470), slice(3050, 3300)
 
 
 def filtered(values: Array, lag: float, order: int) -> Array:
-    """Return values behind so many first-order lags [s] in a row."""
+    """Return values after ``order`` first-order lags [s] in series."""
     for _ in range(order):
         out, state = np.empty_like(values), values[0]
         for i, value in enumerate(values):

@@ -1,4 +1,4 @@
-"""Oil that holds air, against what its bubbles are compressed to."""
+"""Oil that contains air, compared with the compression of its bubbles."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""Parameters become states: the model stays the model, bounds hold, and changes are followed."""
+"""Parameters become states: the model is unchanged, bounds hold, and changes are followed."""
 
 from dataclasses import fields, replace
 from types import SimpleNamespace
@@ -72,7 +72,7 @@ def test_a_guess_of_nothing_begins_at_a_share_of_the_healthy_value() -> None:
 
 
 def followed(names: list[str], drift: dict[str, float]) -> tuple[Estimate, EhaParameters]:
-    """Filter a run in which leakage jumps fivefold after five seconds."""
+    """Filter a run whose leakage jumps fivefold after five seconds."""
     rng = np.random.default_rng(4)
     worn = replace(RIG, leakage_coefficient=5.0 * RIG.leakage_coefficient)
     path = abrupt(RIG, worn, at=5.0)

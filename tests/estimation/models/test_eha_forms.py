@@ -1,4 +1,4 @@
-"""The process models are the plant's equations, and their compiled Jacobians are the numerical ones (errata E4)."""
+"""The process models are the plant's equations, and their compiled Jacobians equal the numerical ones (errata E4)."""
 
 from dataclasses import asdict, replace
 
@@ -35,7 +35,7 @@ def state_of(model: ProcessModel, point: str, bulk_modulus: float = 1.5e8) -> np
 
 
 def numerical_jacobian(model: ProcessModel, state: np.ndarray, p: EhaParameters, step: float) -> np.ndarray:
-    """Central differences of the readable step, in the filter's scaled units."""
+    """Return central differences of the readable step, in the filter's scaled units."""
     scale = np.array([variable.scale for variable in model.states])
     columns: list[np.ndarray] = []
     for i in range(model.width):
@@ -118,11 +118,11 @@ def test_oil_of_which_nothing_is_known_moves_each_state_as_far_as_it_may() -> No
     displaced, _ = volume_left_open(p, {"position_m": np.array([9.0])}, T)
     assert displaced == pytest.approx(9.0 * p.piston_area**2)
     volume = 1e-7
-    # with the piston still, equation 5.8 compresses it all, half of it in each of two equal chambers
+    # with the piston at rest, equation 5.8 compresses all of it, half in each of two equal chambers
     assert volume * moves["differential_pressure_pa"] == pytest.approx(p.bulk_modulus * volume / p.chamber_volume)
     for chamber in ("pressure_a_pa", "pressure_b_pa"):
         assert moves[chamber] == pytest.approx(0.5 * moves["differential_pressure_pa"])
-    # and with rigid oil the piston makes room for it within a sample
+    # and with rigid oil, the piston makes room for it within a sample
     assert p.piston_area * volume * moves["position_m"] == pytest.approx(volume)
     assert T * moves["velocity_m_s"] == pytest.approx(moves["position_m"])
     pushed = p.piston_area * moves["differential_pressure_pa"]

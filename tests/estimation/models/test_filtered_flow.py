@@ -1,4 +1,4 @@
-"""The wide flow form behind a pressure filter of second order."""
+"""The wide flow form with a second-order pressure filter."""
 
 from types import SimpleNamespace
 
@@ -27,7 +27,7 @@ def test_a_filter_moves_what_is_read_and_not_the_circuit() -> None:
 
 
 def test_a_butterworth_filter_of_30_hz_is_found_and_bulk_modulus_behind_it() -> None:
-    """Whole milliseconds of delay, and a lag, had put bulk modulus up to five deviations off."""
+    """With a delay of whole milliseconds and a lag instead, bulk modulus was up to five deviations off."""
     plain = log(2.0, p=EhaParameters(), drive="prbs")
     over, under = butter(2, 30.0, fs=1e3)
     read = np.asarray(lfilter(over, under, plain[PRESSURE])) + 5e3 * np.random.default_rng(1).standard_normal(

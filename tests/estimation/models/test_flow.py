@@ -28,7 +28,7 @@ def values(**changes: float) -> SimpleNamespace:
 
 
 def settle(p: SimpleNamespace, speed: float, seconds: float, step: float = 1e-3) -> tuple[float, float]:
-    """Chamber pressures of a blocked piston, by explicit Euler: fine enough for what settles."""
+    """Return chamber pressures of a blocked piston by explicit Euler steps, fine enough for the steady state."""
     p1, p2 = P.accumulator_pressure, P.accumulator_pressure
     for _ in range(round(seconds / step)):
         rates = flow_rates((p1, p2), ((speed, speed), (0.0, 0.0), step), p, 0.0)
@@ -88,7 +88,7 @@ def test_a_make_up_valve_that_is_an_orifice_feeds_half_as_much_a_pascal_where_it
         for bend in (0.0, 3.0 / 6e4)
     )
     assert flat == completed(form).rates(state, drives, values(accumulator_stiffness=1e8), 0.0)
-    assert bent[2] == pytest.approx(0.5 * flat[2], rel=1e-12)  # all that the inner circuit loses is what they feed
+    assert bent[2] == pytest.approx(0.5 * flat[2], rel=1e-12)  # the inner circuit loses only what the valves feed
     assert bent[1] == flat[1]
     assert completed(form, bent=True).unknowns.count("makeup_bend") == 1
     assert balances_mass(completed(form, bent=True)) == balances_mass(form) == (form is MASS_FLOW_FORM)
@@ -113,7 +113,7 @@ def test_without_make_up_one_chamber_gains_what_the_other_loses(
 
 @given(pumped=st.floats(-1e-4, 1e-4), p1=st.floats(3e5, 2.5e7), p2=st.floats(3e5, 2.5e7))
 def test_balanced_by_mass_no_oil_is_lost(pumped: float, p1: float, p2: float) -> None:
-    """A single rod with plain make-up checks pumps both sides up to 250 bar: a tenth of bulk modulus."""
+    """With plain make-up checks, a single rod pumps both sides up to 250 bar: a tenth of bulk modulus."""
     p = values(relief_conductance=0.0)
     a, b = chamber_rates((p1, p2), Delivery(pumped, 0.0, 0.0), p, by_mass=True)
     densities = [1.0 / (1.0 - (chamber - ATMOSPHERE) / P.bulk_modulus) for chamber in (p1, p2)]

@@ -1,4 +1,4 @@
-"""A belief is finite, symmetric in shape, and cannot be changed."""
+"""A belief is finite, has a square covariance, and is immutable."""
 
 import numpy as np
 import pytest

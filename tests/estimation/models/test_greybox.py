@@ -91,7 +91,7 @@ def test_normal_equations_are_those_of_residuals_and_slopes_with_outliers_counte
 def test_a_block_holds_the_mean_over_the_samples_that_are_there() -> None:
     y = np.array([1.0, 2.0, 3.0, np.nan, 6.0, 8.0, np.nan, np.nan, np.nan, np.nan, 5.0])
     blocks = Problem(LAG, log_of(np.zeros((len(y), 1)), y, OutputNoise(4.0), sample_time=0.25 * BLOCK))
-    # means over the root of the mean's variance, 4 by the count of samples
+    # means over the root of the mean's variance, which is 4 over the number of samples
     assert blocks.residuals(TRUTH)[0] == pytest.approx([-2.0 * (3.0 / 4.0) ** 0.5, -7.0 * (2.0 / 4.0) ** 0.5, -2.5])
 
 
@@ -107,7 +107,7 @@ def test_a_walk_goes_on_where_samples_are_missing() -> None:
     u, y = np.zeros((5, 1)), np.array([0.0, 0.0, np.nan, np.nan, -3.0])
     out = Problem(LAG, log_of(u, y, OutputNoise(1.0, 0.5 / T))).residuals(TRUTH)[0]
     assert out[:4].tolist() == [0.0, 0.0, 0.0, 0.0]
-    # the level's variance: 0, then 1/3 after a sample at 1/2, and 1/2 more a step until the last sample
+    # the level's variance: 0, then 1/3 after a sample at 1/2, then 1/2 more at each step until the last sample
     assert out[4] == pytest.approx(3.0 / (1.0 + 1.0 / 3.0 + 1.5) ** 0.5)
 
 

@@ -8,7 +8,7 @@ from estimation.models.inner_circuit import accumulator_rate
 
 
 def test_gas_that_gives_a_third_of_its_oil_follows_its_law() -> None:
-    """A constant stiffness has its pressure at two thirds, where three quarters are true."""
+    """With a constant stiffness, the pressure would fall to two thirds instead of three quarters."""
     rod = {"area_difference": 0.3, "accumulator_pressure": 6e5, "accumulator_stiffness": 6e5 / 1e-3}
     p, gas, steps = SimpleNamespace(**rod), 1e-3, 10_000
     supply, taken = 6e5, gas / 3.0

@@ -1,4 +1,4 @@
-"""The flow form with one more loss: it takes oil from one chamber to the other, and none where its size is none."""
+"""The flow form with one more loss: it moves oil from one chamber to the other, and none if its size is zero."""
 
 from types import SimpleNamespace
 

@@ -36,7 +36,7 @@ def coefficients(law: tuple[float, float, float]) -> SimpleNamespace:
 def test_sliding_steadily_friction_is_equation_5_10(friction, law: tuple[float, float, float], velocity: float) -> None:
     p = coefficients(law)
     low, high = -50.0, 50.0
-    for _ in range(200):  # the bristle at which nothing yields any more, by bisection
+    for _ in range(200):  # bisection for the bristle deflection that no longer changes
         middle = 0.5 * (low + high)
         falling = float(friction(velocity, middle, p)[0]) * np.sign(velocity)
         low, high = (middle, high) if (falling > 0.0) == (velocity > 0.0) else (low, middle)

@@ -1,4 +1,4 @@
-"""Rates, steps and beliefs of every model on each side of its corners, kept in `numbers.json`."""
+"""Rates, steps and beliefs of every model on each side of its case distinctions, kept in `numbers.json`."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, replace
@@ -160,7 +160,7 @@ def motion_forms() -> dict[str, Any]:
     told: dict[str, Any] = {}
     bristle = {"bristle_stiffness": 2e7, "bristle_damping": 150.0}
     p = SimpleNamespace(**{**asdict(motion.MotionParameters()), **vars(ROD), **bristle})
-    del p.makeup_opening  # the form knows better
+    del p.makeup_opening  # the form sets its own
     falling = SimpleNamespace(**{**vars(p), "friction_linear": -5e3, "load_force": -4e3})
     for form in motion.MOTION_FORMS:
         for name, one in (("rising", p), ("falling", falling)):
@@ -184,7 +184,7 @@ def motion_forms() -> dict[str, Any]:
 
 
 def stepped(model: ProcessModel, state: Mapping[str, float], drives: Any, p: Any, h: float) -> list[float]:
-    """Return what a model's step makes of numbers, by its expressions."""
+    """Return the result of a model's step for given numbers, computed from its expressions."""
     names = [f"x{i}" for i in range(model.width)]
     moved = model.step(tuple(symbol(name) for name in names), drives, p, h)
     found = computed({f"y{i}": one for i, one in enumerate(moved)}, **dict(zip(names, state.values(), strict=True)))

@@ -1,4 +1,4 @@
-"""The flow balance with all that may be strange about rig and oil."""
+"""The flow balance with all unusual effects of rig and oil."""
 
 from types import SimpleNamespace
 
@@ -35,7 +35,7 @@ def test_oil_with_bubbles_that_is_pumped_across_is_lost_nowhere(quick: bool) -> 
         return share * (ATMOSPHERE / at) ** slope
 
     def room(at: float) -> float:
-        """Of liquid and bubbles, over that at the stated pressure (at atmospheric pressure for isothermal ones)."""
+        """Return the volume of oil with bubbles over that at the stated pressure (isothermal: atmospheric pressure)."""
         return 1.0 + bubbles(at) - bubbles(stated) - (at - (stated if quick else ATMOSPHERE)) / liquid
 
     p = WideFlowParameters(

@@ -1,4 +1,4 @@
-"""What a pressure sensor reads too much."""
+"""The offset of a pressure sensor, which drifts or settles."""
 
 import numpy as np
 import pytest

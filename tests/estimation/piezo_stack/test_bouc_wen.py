@@ -1,4 +1,4 @@
-"""Bouc-Wen parameters from loops: those of a stack, and those of the public benchmark."""
+"""Bouc-Wen parameters from hysteresis loops of a stack and of the public benchmark."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +30,7 @@ NOISE = 2e-8
 
 
 def slow_loop(swing: float, cycles: int, samples: int = SAMPLES) -> tuple[np.ndarray, np.ndarray]:
-    """Equation 1 in tiny Euler steps, which nothing in the packages takes."""
+    """Return a loop by equation 1 in tiny Euler steps, a method that no package uses."""
     fine = 20
     voltage = 0.5 * swing * (1.0 - np.cos(2.0 * np.pi * np.arange(cycles * samples * fine + 1) / (samples * fine)))
     shape = [getattr(STACK, name) for name in SHAPE]
@@ -58,7 +58,7 @@ def test_every_parameter_comes_back_from_three_noisy_cycles_from_rest(loop: tupl
 
 
 def closed_loop(loop: tuple[np.ndarray, np.ndarray], samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """The last cycle, logged so often."""
+    """Return the last cycle with the given number of samples."""
     moments = np.linspace(0.0, SAMPLES, samples + 1)
     voltage, displacement = (np.interp(moments, np.arange(SAMPLES + 1), values[-SAMPLES - 1 :]) for values in loop)
     return voltage, displacement

@@ -1,4 +1,4 @@
-"""Channels of another sign, unit or name, told by runs of likely actuators."""
+"""Channels with a wrong sign, unit or name are recognised by runs of likely actuators."""
 
 from itertools import combinations
 
@@ -49,7 +49,8 @@ def test_a_size_that_no_unit_explains_is_not_named() -> None:
 
 def test_two_channels_that_are_swapped_are_named_and_nothing_else() -> None:
     pairs = list(combinations(RUN, 2))
-    alike = [pair for pair in pairs if "position_m" not in pair]  # a rod that only creeps has no other course
+    # the position of a rod that only creeps is not like any other channel
+    alike = [pair for pair in pairs if "position_m" not in pair]
     for one, other in alike:
         said = channel_mistakes({**RUN, one: RUN[other], other: RUN[one]}, [RUN])
         assert said == (f"{one} and {other} are swapped",)

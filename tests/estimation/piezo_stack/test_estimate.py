@@ -1,4 +1,4 @@
-"""What a log of the piezo-stack actuator says, and how sure."""
+"""Estimates from a log of the piezo-stack actuator, and their uncertainty."""
 
 import warnings
 from dataclasses import asdict, replace

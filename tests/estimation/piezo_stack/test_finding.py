@@ -1,4 +1,4 @@
-"""When a number of the piezo-stack actuator is told, and what speaks against all of them."""
+"""When a number of the piezo-stack actuator is reported, and objections to all of them."""
 
 from dataclasses import replace
 from typing import Any
@@ -30,7 +30,7 @@ SIZES = {"coulomb_friction": SMALLEST_FAULT["coulomb_friction"], "air_fraction":
 
 
 def estimate(share: float, ratio: float = 1.0) -> StackEstimate:
-    """Deviations that are so much of the largest at which a number is told, residuals over noise."""
+    """Return deviations at a share of the largest one with which a number is reported, and residuals over noise."""
     deviations = {name: share * MOST_DEVIATION * size for name, size in SIZES.items()}
     misfit = {"stack_displacement_m": 1.0, "position_m": ratio}
     return StackEstimate(dict(SIZES), deviations, np.eye(2), misfit, 10, HEALTHY, SAMPLES)

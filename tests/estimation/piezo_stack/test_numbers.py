@@ -1,4 +1,4 @@
-"""What loops and runs of the piezo stack say, kept in `numbers.json`."""
+"""Results from loops and runs of the piezo stack, kept in `numbers.json`."""
 
 from dataclasses import replace
 from functools import cache

@@ -1,4 +1,4 @@
-"""The Cramér-Rao bound says beforehand what a drive and its sensors can tell."""
+"""The Cramér-Rao bound predicts what a drive and its sensors can determine."""
 
 from dataclasses import replace
 

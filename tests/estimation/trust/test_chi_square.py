@@ -1,4 +1,4 @@
-"""Tail and quantiles of the chi-square distribution are SciPy's."""
+"""Tail and quantiles of the chi-square distribution agree with SciPy's."""
 
 import math
 

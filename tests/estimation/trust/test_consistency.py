@@ -1,4 +1,4 @@
-"""A filter that is right is called so, and one that is fooled is told apart, with a reason."""
+"""The gate passes a filter that is right, and objects to one that is wrong, with a reason."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -202,11 +202,11 @@ def test_the_gate_sees_the_step_error_of_the_acceleration_form_where_nis_does_no
 
 
 OWN_NOISE = {"position_m": 1e-13, "velocity_m_s": 1e-7, "differential_pressure_pa": 3e4}
-"""As the noise of measured speed makes it: so little that a stuck piston is not shaken loose."""
+"""Process noise that noise of the measured speed causes: too little to shake a stuck piston loose."""
 
 
 def own_runs(runs: int, samples: int, rng: np.random.Generator) -> list[Record]:
-    """Draw logs from the pressure form itself, its process and sensor noise included."""
+    """Draw logs from the pressure form itself, including its process and sensor noise."""
     parameters, h, substeps = EhaParameters(), 2.5e-4, 4
     speed = make_drive("prbs", samples * h * substeps, h * substeps, parameters, np.random.default_rng(0))
     deviations = np.array([[(OWN_NOISE.get(state.name, 0.0) * h) ** 0.5] for state in PRESSURE_FORM.states])
@@ -260,7 +260,7 @@ def test_a_constant_that_moves_as_its_variance_shrinks_wanders_once(linear: Proc
 
 
 def constant(model: ProcessModel, mean: Array, nis: float = 1.0) -> Estimate:
-    """An estimate of position whose variance falls evenly to half of what it was."""
+    """Return an estimate of position whose variance falls evenly to half of its first value."""
     shown, variance = np.column_stack([mean, mean, mean]), np.linspace(4.0, 2.0, len(mean))
     return Estimate(
         model, ("position_m",), np.arange(float(len(mean))), shown, np.column_stack([variance] * 3), PRIOR,

@@ -1,4 +1,4 @@
-"""The card says before the experiment what the fit finds after it."""
+"""The card predicts before the experiment what the fit finds after it."""
 
 from dataclasses import replace
 

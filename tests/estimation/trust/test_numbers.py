@@ -95,7 +95,7 @@ def record(quantised: bool = False) -> Record:
 def estimate(
     mean: Array, std: Array, residuals: Array | None = None, nis: Mapping[str, float] | None = None, size: float = 1e-5
 ) -> Estimate:
-    """Return an estimate of the pressure form with a course of bulk modulus [Pa]."""
+    """Return an estimate of the pressure form with a given course of bulk modulus [Pa]."""
     means, variances = np.zeros((SAMPLES, 4)), np.ones((SAMPLES, 4))
     means[:, 3], variances[:, 3] = mean, std**2
     told = white() if residuals is None else residuals

@@ -1,4 +1,4 @@
-"""White innovations are called white; structure where the drive is, is found, named and sized; caution is no fault."""
+"""White innovations pass; structure in the drive's band is found, named and sized; too small ones are no objection."""
 
 import numpy as np
 import pytest
@@ -89,10 +89,10 @@ def test_a_disturbance_beside_the_drive_is_said_to_be_so(linear: ProcessModel) -
     assert not velocity.driven
 
 
-@pytest.mark.parametrize(("missed", "exceeded"), [(0.0, False), (0.8, True)])  # steps
+@pytest.mark.parametrize(("missed", "exceeded"), [(0.0, False), (0.8, True)])  # in quantisation steps
 def test_rounding_that_beats_with_the_clock_is_no_misfit(linear: ProcessModel, missed: float, exceeded: bool) -> None:
     step = 12.0**0.5  # its rounding has a variance of 1
-    true = np.cumsum(np.where(np.arange(SAMPLES) < 1000, 0.3, 40.043))  # steps
+    true = np.cumsum(np.where(np.arange(SAMPLES) < 1000, 0.3, 40.043))  # in quantisation steps
     residuals = white(9)
     residuals[:, 0] = step * (np.round(true) - true + missed * np.sin(2.0 * np.pi * 17.0 * TIME))
     found = judged(linear, residuals, position=step * np.round(true))[0]
@@ -196,7 +196,7 @@ def test_a_pattern_of_quantisation_that_follows_the_drive_is_no_excess(linear: P
     smooth, stepped = 6e-5 * push + 1e-9 * TIME, quantum * np.round(6e-5 * push / quantum)
     (fine, never), (coarse, often) = excess(smooth), excess(stepped)
     assert never < 0.01 < 0.3 < often
-    # all of the drive is in one line, which stands length / 2 times above white noise of its variance
+    # the drive is a single line, which is length / 2 times as high as white noise of the same variance
     driven = np.abs(np.fft.rfft(push[first:][: SEGMENTS * length].reshape(SEGMENTS, length), axis=1)) ** 2
     share = float(np.max(np.mean(driven, axis=0)) / np.sum(np.mean(driven, axis=0)))
     assert fine - coarse == pytest.approx(share * often / 12.0 * length / 2.0, rel=0.02)

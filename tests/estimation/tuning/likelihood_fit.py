@@ -1,9 +1,9 @@
 """Maximum-likelihood grey-box fit: physical parameters from the innovations of an extended Kalman filter.
 
-The likelihood of a log is that of its innovations (Schweppe 1965); its gradient is exact
-(`estimation.tuning.sensitivity`), and so is the Fisher information of the linearised model, which serves the optimiser
-as Hessian. Bulk modulus, leakage, flow bias and friction move in logarithmic coordinates, and the noise levels are
-fitted along with them, so that intervals follow what the log shows and not what was assumed of it.
+The likelihood of a log is that of its innovations (Schweppe 1965). Its gradient is exact
+(`estimation.tuning.sensitivity`), and so is the Fisher information of the linearised model, which the optimiser uses as
+Hessian. Bulk modulus, leakage, flow bias and friction are fitted in logarithmic coordinates, together with the noise
+levels, so that intervals follow from the log and not from assumptions about it.
 """
 
 import math
@@ -28,7 +28,7 @@ from plant.errors import HydrostateError, require_each_known
 from plant.log.record import Record
 
 LUMPED_FORM = replace(PRESSURE_FORM, name="lumped", states=PRESSURE_FORM.states[:3], step=lumped_step)
-"""The pressure form with bulk modulus as a parameter: what is constant need not be a state of a fit."""
+"""The pressure form with bulk modulus as a parameter: a constant need not be a state of a fit."""
 
 FITTED = (
     "bulk_modulus",
@@ -41,13 +41,13 @@ FITTED = (
 """Parameters that may be fitted."""
 
 BLOCKS = 64
-"""Stretches whose scores are summed for the sandwich covariance; each is taken as independent of the others."""
+"""Number of stretches whose scores are summed for the sandwich covariance; they are taken as independent."""
 
 STARTS = (1.0, 0.3, 3.0)
-"""Factors on the guess of bulk modulus from which the likeliest is taken first."""
+"""Factors on the guess of bulk modulus; the fit continues from the likeliest."""
 
 SCREENED = 20_000
-"""Samples at the beginning of a longer log on which the starts are compared."""
+"""Number of samples at the beginning of a longer log on which the starts are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class LikelihoodFit:
     converged: bool
 
     def interval(self, name: str) -> tuple[float, float]:
-        """Return the 95 % interval of a parameter; of a logarithm, so that it stays positive."""
+        """Return the 95 % interval of a parameter, on a logarithmic scale if it must stay positive."""
         value, std = self.parameters[name]
         if name == "friction_linear":
             return interval_95(value, std)
@@ -115,7 +115,7 @@ def _check(unknowns: Sequence[str], parameters: EhaParameters) -> None:
 
 
 def _first_noise(record: Record, p: EhaParameters) -> Mapping[str, float]:
-    """Return process noise as the speed sensor's own noise makes it: flow that the filter believes and is not there."""
+    """Return the process noise that the speed sensor causes: its noise is a flow that does not exist."""
     stiffness = (p.bulk_modulus / p.chamber_volume) ** 2
     silent = (1e-4 * p.rated_speed * p.pump_displacement) ** 2 * record.sample_time * stiffness
     pressure = max(speed_noise(record, p), silent)

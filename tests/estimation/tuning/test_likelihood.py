@@ -1,4 +1,4 @@
-"""Parameters of greatest likelihood are the true ones, and their intervals say how near."""
+"""Maximum-likelihood estimates are close to the true parameters, as close as their intervals say."""
 
 from dataclasses import replace
 from math import exp

@@ -1,4 +1,4 @@
-"""How innovations move with what is assumed, and where noise levels end, kept in `numbers.json`."""
+"""Sensitivity of innovations to assumptions, and tuned noise levels, kept in `numbers.json`."""
 
 from functools import cache
 from typing import Any

@@ -1,4 +1,4 @@
-"""The carried derivatives are those of the innovations: against high-order differences, for every form."""
+"""The propagated derivatives of the innovations agree with high-order differences, for every form."""
 
 from collections.abc import Callable
 from dataclasses import replace

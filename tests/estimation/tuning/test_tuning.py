@@ -1,4 +1,4 @@
-"""Noise levels come back from the log; the published ones stand beside and fare worse."""
+"""Noise levels are recovered from the log; the published ones are reported beside them and are less likely."""
 
 import numpy as np
 import pytest
@@ -84,7 +84,7 @@ def test_the_tuned_filter_is_what_the_result_says(tuning: Tuning, record: Record
 def test_long_and_fast_logs_are_tuned_alike(sample_time: float, duration: float) -> None:
     log = log_of(sample_time, duration)
     tuning = tuned(log)
-    chance = (2.0 / len(log)) ** 0.5  # relative deviation of a variance from so many samples
+    chance = (2.0 / len(log)) ** 0.5  # relative deviation of a variance from this number of samples
     assert tuning.tuned.variances["velocity_m_s"] == pytest.approx(BENCH.velocity_noise**2, rel=4.0 * chance)
     assert all(nis == pytest.approx(1.0, abs=0.1) for nis in tuning.tuned.nis.values())
 
@@ -92,7 +92,7 @@ def test_long_and_fast_logs_are_tuned_alike(sample_time: float, duration: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("first_guess", [1e8, 3e8])
 def test_without_pressure_a_far_first_guess_is_tuned_to_the_same_levels(record: Record, first_guess: float) -> None:
-    """Certainty grows by degrees: at once, such a filter would lock onto a wrong bulk modulus."""
+    """Certainty is increased step by step: a filter that was certain at once would lock onto a wrong bulk modulus."""
     prior = first_belief(PRESSURE_FORM, record, first_guess, 3e8)
     tuning = tune(record, PRESSURE_FORM, prior, RIG, channels=("position_m", "velocity_m_s"))
     found = tuning.prior.mean[PRESSURE_FORM.index(BULK_MODULUS)]
@@ -112,7 +112,8 @@ def test_noise_of_measured_speed_makes_pressure_wander_as_equation_5_8_pumps_it(
     p, T, deviation = EhaParameters(), 1e-3, 0.5
     noise = deviation * np.random.default_rng(0).standard_normal((1000, 400))  # runs of 400 samples
     record = Record(T, {"motor_speed_rad_s": noise[0], "position_m": np.zeros(400)})
-    pressure = np.cumsum(p.bulk_modulus / p.chamber_volume * p.pump_displacement * noise * T, axis=1)  # piston held
+    # the piston is blocked
+    pressure = np.cumsum(p.bulk_modulus / p.chamber_volume * p.pump_displacement * noise * T, axis=1)
     density = speed_noise(record, p, deviation**2)
     assert np.var(pressure[:, -1]) == pytest.approx(density * 400 * T, rel=0.15)
-    assert speed_noise(record, p) == pytest.approx(density, rel=0.5)  # read off the log
+    assert speed_noise(record, p) == pytest.approx(density, rel=0.5)  # estimated from the log

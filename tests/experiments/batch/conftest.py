@@ -1,4 +1,4 @@
-"""One small study, and how tests run it: 24 filters on 8 series of 500 samples, in lanes."""
+"""A small study and how tests run it: 24 filters on 8 series of 500 samples, in lanes."""
 
 from pathlib import Path
 from threading import Event
@@ -39,7 +39,7 @@ def run_into(
     again: bool = False,
     **options: Any,
 ) -> Tally:
-    """Run what the store lacks, as the command does."""
+    """Run the cases that the store lacks, as the command does."""
     with store.writing():
         done, _ = store.done(again=again)
         store.describe(manifest_of(plan, "small.toml"), plan.keys)
@@ -48,7 +48,7 @@ def run_into(
 
 
 def rows_in_parts(store: PartStore) -> int:
-    """Count the rows of all parts, without leaving out what is there twice."""
+    """Count the rows of all parts, duplicates included."""
     return sum(len(table) for table in store._whole(["key"]))  # pyright: ignore[reportPrivateUsage] -- what lies there
 
 
@@ -59,7 +59,7 @@ def _small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> pa.Table:
-    """Return the rows of the small study, run in one piece and undisturbed."""
+    """Return the rows of the small study, run in one piece without interruption."""
     store = open_store(tmp_path_factory.mktemp("stores") / "reference")
     run_into(store, small_plan())
     return store.rows()

@@ -7,7 +7,7 @@ from plant.errors import HydrostateError
 
 
 def study(seeds: int, error: float, method: str = "ekf", seed: int = 1, **changes: object) -> pd.DataFrame:
-    """Return rows whose errors share a large part, by seed, and have a small one of their own."""
+    """Return rows whose errors consist of a large part shared by seed, and a small part of their own."""
     rng, own = np.random.default_rng(7), np.random.default_rng(seed)
     shared = 5.0 + rng.standard_normal(seeds)
     rows = [

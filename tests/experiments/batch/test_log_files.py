@@ -1,4 +1,4 @@
-"""A pattern finds the files that `glob` finds, and links in a circle have an end."""
+"""A pattern finds the same files as `glob`, and circular links do not loop for ever."""
 
 import os
 from glob import glob

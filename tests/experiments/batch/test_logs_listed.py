@@ -1,4 +1,4 @@
-"""Each log of a study counts once, by whatever name, and no name of one costs the others their results."""
+"""Each log of a study counts once under any of its names, and one bad name does not spoil the other results."""
 
 import os
 from pathlib import Path
@@ -16,7 +16,7 @@ GLOB = "**/*.csv"
 
 
 def small_log() -> Record:
-    """Return a log that can be read and diagnosed as one that nothing is said of: its piston stands still."""
+    """Return a log that can be read and diagnosed without any remark: its piston stands still."""
     return Record(1e-3, {name: np.zeros(400) for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
 
 
@@ -62,7 +62,8 @@ def test_a_name_that_is_no_utf_8_is_spelt_out_and_its_log_read(tmp_path: Path, r
     name = os.fsdecode(b"l\xf6g.csv")
     write_record(small_log(), tmp_path / "plain.csv")
     lines = (tmp_path / "plain.csv").read_text().splitlines(keepends=True)
-    (tmp_path / name).write_text("".join(lines[: rows // 2] + lines[rows // 2 + 3 : rows]))  # with gaps, to warn of
+    # with gaps, so that there is a warning
+    (tmp_path / name).write_text("".join(lines[: rows // 2] + lines[rows // 2 + 3 : rows]))
     plan = planned(tmp_path)
     assert files(plan) == ["l\\xf6g.csv", "plain.csv"]
     said = [one for task in plan.tasks(set(), 1) for one in run_task(task).failures]

@@ -1,4 +1,4 @@
-"""A batch study of other actuators: which runs it makes, and what a row says of a finding."""
+"""A batch study of other actuators: its runs, and a finding as a row."""
 
 import json
 

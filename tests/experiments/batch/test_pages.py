@@ -1,4 +1,4 @@
-"""Cells of a batch's page: quantities of another actuator in words, and a dash where there is nothing."""
+"""Cells of a batch's page: quantities of another actuator in words, and a dash for a missing value."""
 
 import json
 import re
@@ -70,7 +70,7 @@ def test_a_log_that_was_asked_two_questions_has_one_row() -> None:
     assert made["verb"].tolist() == ["diagnose, estimate"] * 2 + ["estimate"] * 2 + ["diagnose", "estimate"]
     assert made["outcome"].tolist()[:2] == ["diagnose: ok; estimate: mismatch", "failed"]
     assert made["bulk_modulus_pa"].tolist()[0] == 2e8
-    assert made["bulk_modulus_pa"].tolist()[2:4] == [1e8, 3e8]  # two methods of one verb stay apart
+    assert made["bulk_modulus_pa"].tolist()[2:4] == [1e8, 3e8]  # two methods of one verb keep a row each
     assert made["reason"].tolist()[1] == "no columns"
 
 
@@ -101,7 +101,7 @@ def test_a_report_of_logs_opens_with_the_worst_and_lists_them_first() -> None:
     page = render_batch_report({**manifest, "cases": 4, "versions": {}}, tables, {}, 4, worst=worst)
     assert f"<h1>{said[0]}</h1>" in page
     assert f'<p class="answer">{said[1]}</p>' in page
-    assert "Classes found in the logs" not in page  # a line at the top says it
+    assert "Classes found in the logs" not in page  # the line at the top already says it
     assert re.findall(r'data-head="log">(.)\.csv', page) == ["b", "c", "a", "d"]
     assert page.index('<section id="logs">') < page.index('<section id="outcomes">')
     assert 'class="fleet-over" data-head="state">past a limit<' in page

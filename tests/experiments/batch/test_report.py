@@ -85,7 +85,7 @@ def test_a_report_that_cannot_be_written_is_a_sentence(tmp_path: Path) -> None:
 
 
 def reduced(study: Study, **changes: Any) -> Study:
-    """Return a study of the same parts with short runs, one seed and two first guesses."""
+    """Return a study with the same parts, but short runs, one seed and two first guesses."""
     runs = [one.model_copy(update={"seeds": 1, "starts_pa": one.starts_pa[::6], **changes}) for one in study.runs]
     return study.model_copy(update={"runs": tuple(runs)})
 
@@ -127,6 +127,6 @@ def test_the_study_of_a_fleet_runs_on_a_small_archive(tmp_path: Path) -> None:
     (link,) = re.findall(r'<a href="(pages/[^"]+)">major_leakage/run.csv</a>', page)
     assert "leaks badly inside" in (tmp_path / "store" / link).read_text(encoding="utf-8")
     logs = page.split('<section id="logs">')[1].split("</section>")[0]
-    assert 'class="cards whole"' in logs  # whose words leave no room on a phone for the rest of a row
+    assert 'class="cards whole"' in logs  # on a phone, its long texts leave no room for the rest of a row
     assert "broken.csv" in logs
-    assert '<section id="failures">' not in page  # which would say the same again
+    assert '<section id="failures">' not in page  # it would only repeat the table of logs

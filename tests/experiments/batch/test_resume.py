@@ -1,4 +1,4 @@
-"""What a crash leaves behind is resumed: no row lost, none double."""
+"""A batch resumes after a crash: no row is lost, and none is duplicated."""
 
 import signal
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from tests.thinned import thinned
 
 
 def begun(folder: Path, parts: int) -> PartStore:
-    """Return a store whose writer ended after so many parts."""
+    """Return a store whose writer stopped after a number of parts."""
     store, stop, count = open_store(folder / "store"), Event(), [0]
 
     def strike(*_: object) -> None:

@@ -1,4 +1,4 @@
-"""What a batch says on standard error while it runs."""
+"""The messages of a batch on standard error while it runs."""
 
 from pathlib import Path
 from types import SimpleNamespace

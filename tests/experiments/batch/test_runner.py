@@ -46,7 +46,8 @@ def test_an_interrupted_study_keeps_what_was_in_flight_and_goes_on(tmp_path: Pat
 
 def test_too_many_failures_end_a_study(tmp_path: Path) -> None:
     store = open_store(tmp_path / "store")
-    plan = small_plan(sensors=["rig"], sample_time_s=4e-3, duration_s=0.4)  # its velocity window is too short for it
+    # too slow for the velocity window of these sensors
+    plan = small_plan(sensors=["rig"], sample_time_s=4e-3, duration_s=0.4)
     tally = run_into(store, plan, max_failures=2)
     assert "--max-failures is 2" in tally.stopped
     assert tally.failed == tally.done < 24
@@ -63,7 +64,7 @@ def test_failed_cases_are_run_again_on_demand_and_count_once(tmp_path: Path) -> 
 
 
 class _Deadly(SerialExecutor):
-    """Ends its worker whenever it is given one certain case."""
+    """Ends its worker at each task with a certain case."""
 
     def __init__(self, key: str) -> None:
         self._key, self._broken = key, False
@@ -102,7 +103,7 @@ class KilledWorker(Exception):  # noqa: N818  Dask's name for it, by which it is
 
 
 class _Failing(SerialExecutor):
-    """Fails in its own way at the task that has one certain case."""
+    """Fails with a given error at each task with a certain case."""
 
     def __init__(self, key: str, error: BaseException) -> None:
         self._key, self._error = key, error

@@ -1,7 +1,8 @@
-"""A store on a server that speaks S3, on this machine.
+"""A store on a local server that speaks S3.
 
-Neither s3fs nor moto[server] is in the extra `dev`: they bring 70 packages and half a minute of installing, and s3fs
-wants an fsspec, botocore a python-dateutil, older than those pinned. Install both without the constraints to run this.
+Neither s3fs nor moto[server] is in the extra `dev`: they bring 70 packages and half a minute of installing. s3fs needs
+an older fsspec and botocore needs an older python-dateutil than the pinned ones. To run this test, install both without
+the constraints.
 """
 
 import pyarrow as pa

@@ -1,4 +1,4 @@
-"""A log that is estimated and diagnosed in one batch is estimated once, and each case has the row that it has alone."""
+"""A log that is estimated and diagnosed in one batch is estimated once, and each case has the same row as alone."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def plan(tmp_path: Path) -> Plan:
     rng, p = np.random.default_rng(8), severity(0.6, 0.0)
     record = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     pressure = record["differential_pressure_pa"].copy()
-    pressure[700] = 9e7  # left out, with a warning
+    pressure[700] = 9e7  # an outlier: it is left out, with a warning
     write_record(record.replace(differential_pressure_pa=pressure), tmp_path / "log.csv")
     return plan_of(tmp_path)
 

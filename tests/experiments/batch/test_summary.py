@@ -1,4 +1,4 @@
-"""Tables of a study's rows: counts, and errors by quantiles that are worked out here by hand."""
+"""Tables of a study's rows: counts, and quantiles of errors that are calculated by hand here."""
 
 import numpy as np
 import pandas as pd
@@ -35,7 +35,8 @@ def test_errors_are_given_by_quantiles_and_by_shares_of_the_estimates() -> None:
     assert row["median_percent"] == 0.0
     assert row["rms_percent"] == pytest.approx(np.sqrt(np.mean(np.square(errors))))
     assert row["near_percent"] == pytest.approx(100.0 * np.mean(np.abs(errors) <= NEAR_PERCENT))
-    assert row["covered_percent"] == pytest.approx(60.0)  # 1e6 Pa are 0.5 %, so 0.98 % is covered
+    # a deviation of 1e6 Pa is 0.5 %, so errors up to 0.98 % are covered
+    assert row["covered_percent"] == pytest.approx(60.0)
 
 
 def test_a_way_that_never_gave_an_estimate_has_counts_and_no_errors() -> None:

@@ -1,4 +1,4 @@
-"""Whatever kills a batch, the same command goes on, and the store ends as if nothing had happened."""
+"""Whatever kills a batch, the same command resumes it, and the store ends as if nothing had happened."""
 
 import json
 import os
@@ -24,7 +24,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="need
 STRIKES = 12
 
 LONGER: dict[str, Any] = {**RUNS, "seeds": 96, "duration_s": 0.1}
-"""144 tasks of 4 cases, about a hundredth of a second each: long enough to be struck 12 times on the way."""
+"""144 tasks of 4 cases, about a hundredth of a second each: long enough for 12 kills on the way."""
 
 DRIVER = """
 import os, sys
@@ -38,7 +38,7 @@ for line in sys.stdin:
     print(child, flush=True)
     print(os.waitpid(child, 0)[1], flush=True)
 """
-"""Loads the project once and forks a batch for each line, so that a kill strikes work and not the loading."""
+"""Loads the project once and forks a batch for each line, so that a kill hits work and not the loading."""
 
 
 def study_file(folder: Path, runs: dict[str, Any]) -> Path:
@@ -91,18 +91,19 @@ def test_a_batch_struck_at_moments_spread_over_its_parts_loses_and_doubles_no_ro
     kept, cut = dict[str, bytes](), set[str]()
     for number in range(STRIKES):
         child = begin(driver, *command)
-        if number % 2:  # at any moment, from the beginning on; else while parts are written
+        if number % 2:  # odd: at any moment; even: while parts are written
             time.sleep(moments.uniform(0.02, 0.2))
         else:
             _wait_for(lambda number=number: len(list(parts.glob("*.parquet"))) > 8 * number)
             time.sleep(moments.uniform(0.0, 0.02))
-        sent = signal.SIGTERM if number in (4, 7) else signal.SIGKILL  # of either kind of moment
+        # one odd and one even number, so that SIGTERM comes at both kinds of moment
+        sent = signal.SIGTERM if number in (4, 7) else signal.SIGKILL
         os.kill(child, sent)
         status = end(driver)
         assert sent is signal.SIGTERM or os.WTERMSIG(status) == signal.SIGKILL, "it had ended before"
         now = {path.name: path.read_bytes() for path in parts.glob("*.parquet")}
         assert {name: now.get(name) for name in kept} == kept, "a completed part was lost or changed"
-        if number % 3 == 0:  # as when the power fails: a part that was written just then is cut
+        if number % 3 == 0:  # as in a power failure: the part written last is truncated
             last = max(parts.glob("*.parquet"), key=lambda path: path.stat().st_mtime_ns)
             last.write_bytes(last.read_bytes()[: moments.randrange(last.stat().st_size)])
             cut.add(last.name)
@@ -162,7 +163,7 @@ def test_ctrl_c_finishes_what_is_in_flight_and_says_how_to_go_on(tmp_path: Path)
         start_new_session=True,
     ) as process:
         _wait_for(lambda: bool(list((Path(store.name) / "parts").glob("*.parquet"))))
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers too
+        os.killpg(process.pid, signal.SIGINT)  # to the workers too, as a terminal does
         out, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "finishing the running cases" in said

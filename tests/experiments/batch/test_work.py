@@ -78,7 +78,7 @@ def test_a_log_that_cannot_be_read_is_a_row_and_the_others_are_diagnosed(tmp_pat
     assert [row["outcome"] for row in rows] == ["mismatch", "failed", "failed", "failed"]
     assert "none of the nine conditions fits" in rows[0]["reason"]
     assert "the file is empty" in rows[2]["reason"]
-    assert not any(str(tmp_path) in row["reason"] for row in rows)  # the row names its log
+    assert not any(str(tmp_path) in row["reason"] for row in rows)  # the row already names its log
     assert "there is no such file" in rows[3]["reason"]
 
 
@@ -157,7 +157,7 @@ def test_an_estimate_of_a_simulated_run_has_its_error_and_its_filter_s_innovatio
 
 
 def log_of(seconds: float = 0.5, **changes: np.ndarray) -> str:
-    """Return a log that moves, as CSV."""
+    """Return a log with motion, as CSV."""
     time = np.arange(0.0, seconds, 1e-3)
     columns = {
         "motor_speed_rad_s": 100.0 * np.sin(20.0 * time),

@@ -1,4 +1,4 @@
-"""Figures 5 to 7, 10 and 11 come out of the circuit: linear around a mean, dead at small signals, second order."""
+"""The circuit shows figures 5 to 7, 10 and 11: linear around a mean, a dead zone at small signals, second order."""
 
 import numpy as np
 import pandas as pd
@@ -50,9 +50,9 @@ def estimates() -> pd.DataFrame:
 def test_around_a_mean_the_low_frequency_gain_is_the_slope_of_the_steady_state(
     means: pd.DataFrame, mean: float
 ) -> None:
-    """A lag lowers the gain by the cosine of its phase; the coherence says how sure an estimate is.
+    """A lag lowers the gain by the cosine of its phase; the coherence gives the uncertainty of an estimate.
 
-    At 7 V the response falls within the 2 Hz that the estimate averages over.
+    At 7 V the response falls within the 2 Hz over which the estimate averages.
     """
     lowest = means[means["mean_v"] == mean].iloc[0]
     above, below = (steady_state((mean + side) * RIG.motor_speed_per_volt, RIG)[0] for side in (1.0, -1.0))

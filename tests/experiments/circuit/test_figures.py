@@ -1,4 +1,4 @@
-"""The circuit's figures show what its tables hold, and its page needs nothing beside it."""
+"""The circuit's figures show the content of its tables, and its page is a single file."""
 
 import re
 from collections.abc import Mapping
@@ -112,7 +112,8 @@ def test_what_is_not_observable_is_said(drawn: Mapping[str, Figure]) -> None:
 def test_the_page_needs_nothing_beside_it_and_shows_every_figure(
     tables: Mapping[str, pd.DataFrame], drawn: Mapping[str, Figure]
 ) -> None:
-    one = "figure_11"  # the others are empty on this page: writing them takes as long as all that is asked here
+    # the other figures are empty on this page, since writing them takes as long as the rest of the test
+    one = "figure_11"
     drawings = {name: lambda _, name=name: drawn[name] if name == one else Figure((1.0, 1.0)) for name in drawn}
     figures = figure_files(drawings, tables)
     page = render_page(CIRCUIT.template, {**tables, "settings": Seeded(7)}, CIRCUIT.columns, figures)

@@ -1,4 +1,4 @@
-"""Section 4's first tests on the circuit say what Tables 2 to 4 and errata E8 imply."""
+"""The first tests of section 4, on the circuit, give what Tables 2 to 4 and errata E8 imply."""
 
 import numpy as np
 import pandas as pd

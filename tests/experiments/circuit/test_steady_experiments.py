@@ -1,4 +1,4 @@
-"""Figures 3, 4, 8 and 9 come out of the circuit as Tables 3 and 4 say, with errata E7's explanation."""
+"""The circuit shows figures 3, 4, 8 and 9 as Tables 3 and 4 describe them, with the explanation of errata E7."""
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ RIG = CircuitParameters()
 
 
 def assert_near_what_went_in(table: pd.DataFrame) -> None:
-    """One seed may miss an interval; none should miss it by as much again."""
+    """Allow one seed to miss an interval, but not by as much again as its half-width."""
     reach = 0.5 * (table["high"] - table["low"])
     assert (abs(table["refitted"] - table["went_in"]) < 2.0 * reach).all()
 

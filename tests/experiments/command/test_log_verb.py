@@ -1,4 +1,4 @@
-"""One log with its figure and its page; files of other loggers go with one log."""
+"""One log with its figure and its page; files of other loggers belong to one log."""
 
 import html
 import json
@@ -36,7 +36,7 @@ def test_an_estimate_is_drawn_and_written_as_a_page_where_asked(log: Path, tmp_p
 
 @pytest.mark.parametrize("call", [("estimate", "--form", "pressure"), ("diagnose",)], ids=lambda call: call[0])
 def test_a_page_says_first_what_reading_the_log_brought_up(call: tuple[str, ...], log: Path, tmp_path: Path) -> None:
-    rows = [line.split(",")[:5] for line in log.read_text().splitlines()[:300]]  # without the chambers' pressures
+    rows = [line.split(",")[:5] for line in log.read_text().splitlines()[:300]]  # without the chamber pressures
     assert rows[0][4] == '"differential_pressure_pa"'
     rows[0][4] = "dp"
     (tmp_path / "other.csv").write_text("\n".join(map(",".join, rows)) + "\n")

@@ -34,7 +34,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def hostile(folder: Path, good: Path) -> dict[str, Path]:
-    """Write one file of every kind that must be refused, by a part of the sentence."""
+    """Write one file of each kind that must be refused; return them by a part of the message."""
     lines = good.read_text().splitlines()
     others = ",0" * (lines[0].count(",") - 1)
     files = {

@@ -1,4 +1,4 @@
-"""Freed memory stays with the process of a single log."""
+"""The process of a single log keeps the memory that it frees."""
 
 import platform
 import subprocess

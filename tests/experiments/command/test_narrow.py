@@ -1,4 +1,4 @@
-"""Whatever the width of a terminal, no number and no verdict of a table is cut off."""
+"""At any width of the terminal, no number and no verdict of a table is cut off."""
 
 import re
 
@@ -22,7 +22,8 @@ def test_every_number_and_verdict_is_there_at_any_width(monkeypatch: pytest.Monk
     monkeypatch.setattr(terminal.sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("COLUMNS", str(width))
     text = re.sub("\x1b\\[[0-9;]*m", "", rendered(shown()))
-    assert max(map(len, text.splitlines())) <= max(width, 54)  # a name without a blank stays whole among lines
+    # a row given as lines keeps a name without blanks in one piece
+    assert max(map(len, text.splitlines())) <= max(width, 54)
     for whole in ("206.0", "1207.1", "0.3", "observable", "ok"):
         assert re.search(rf"(?<!\S){re.escape(whole)}(?!\S)", text), (whole, text)
     assert re.search(r"204\.8\s+to\s+207\.2", text)

@@ -1,4 +1,4 @@
-"""Every log and every output has a figure or page of its own, and a place for it is asked for first."""
+"""Each log and each output has its own figure or page, and its path is checked first."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Plain values reach a command as Typer's own validators hand them on, and those are imported for no others."""
+"""Plain values reach a command as from Typer's own validators, which are imported only for other types."""
 
 import sys
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ def taking(group: type[TyperGroup]) -> typer.Typer:
 
 
 def said_by(group: type[TyperGroup], words: Sequence[str]) -> tuple[list[Any], str]:
-    """Return what reaches the command, and the error if it refuses."""
+    """Return the values that reach the command, or the error if it refuses."""
     GIVEN.clear()
     command = typer.main.get_command(taking(group))
     try:

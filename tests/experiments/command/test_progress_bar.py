@@ -1,4 +1,4 @@
-"""A bar moves with pieces of work, and within one with what it tries."""
+"""A bar moves with each piece of work, and within a piece with each of its tries."""
 
 import io
 

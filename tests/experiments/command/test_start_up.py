@@ -1,4 +1,4 @@
-"""A verb imports what its answer takes and no more: importing is most of a short run."""
+"""A verb imports only what its answer needs: imports take most of the time of a short run."""
 
 import os
 import subprocess
@@ -37,7 +37,7 @@ DEAR = {
 """Modules that no verb needs for its JSON."""
 
 OTHERS = {"experiments.verbs.serve", "experiments.verbs.watch"}
-"""Modules of other verbs, which one of a single log does not import."""
+"""Modules of other verbs, which a verb for a single log does not import."""
 
 TELLING = """
 import sys

@@ -1,4 +1,4 @@
-"""What a terminal is told when a command ends in another way than it was meant to."""
+"""Messages on a terminal if a command ends in an unexpected way."""
 
 import logging
 

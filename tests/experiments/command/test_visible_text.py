@@ -1,4 +1,4 @@
-"""What would command a terminal, or turn the direction of text, is spelt out."""
+"""Characters that would control a terminal, or reverse the direction of text, are spelt out."""
 
 import pytest
 from jinja2 import DictLoader, Environment

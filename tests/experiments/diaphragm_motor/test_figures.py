@@ -1,4 +1,4 @@
-"""The motor's figures show what its tables contain, and its sweeps find what the motor does."""
+"""The motor's figures show the content of its tables, and its sweeps find the motor's behaviour."""
 
 from collections.abc import Mapping
 from dataclasses import replace

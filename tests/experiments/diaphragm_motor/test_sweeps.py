@@ -1,4 +1,4 @@
-"""A peak over frequency is found uphill, with few runs."""
+"""The peak over frequency is found by hill climbing, with few runs."""
 
 from types import SimpleNamespace
 

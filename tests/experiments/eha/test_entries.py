@@ -1,4 +1,4 @@
-"""Findings as entries: the keys that a log is promised, whatever came of it, and notes as codes with data."""
+"""Findings as entries: the keys that each log has whatever the outcome, and notes as codes with data."""
 
 import json
 from dataclasses import replace
@@ -36,7 +36,7 @@ from tests.thinned import thinned
 PRESSURE = "differential_pressure_pa"
 ALWAYS = {"outcome", "message", "warnings"}
 TOLD_BY_THE_VERB = {"condition"}
-"""What estimate was told, and is no part of what it found."""
+"""An input of estimate, which is no part of its finding."""
 
 
 @cache
@@ -97,7 +97,8 @@ def test_notes_are_codes_with_data_that_json_takes(channel: str, *, refused: boo
     assert froze["data"]["channel"] == channel
     assert froze["data"]["begin_s"] == pytest.approx(0.5)
     assert froze["text"] == str(SensorCode.SENSOR_FROZE.note(**froze["data"]))
-    for reasons in (written["reasons"], written["gate"]["reasons"]):  # a wrong velocity costs no class
+    # a wrong velocity is left out, and the class stands
+    for reasons in (written["reasons"], written["gate"]["reasons"]):
         assert (froze["text"] in reasons) == refused
     assert (froze["text"] in written["warnings"]) != refused
     assert len(written["notes"]) == len(found.all_notes)
@@ -235,7 +236,7 @@ def test_pressure_is_asked_for_where_it_was_not_used(pressure: bool) -> None:
 
 
 def test_another_drive_is_not_asked_for_where_the_fit_does_not_explain_the_log() -> None:
-    """The bound of a fit that leaves 6.6 times the noise says little; a pressure whose zero had moved was to blame."""
+    """The bound of a fit that leaves 6.6 times the noise says little; the cause was a shifted zero of pressure."""
     found = estimate_log(log(), Rig("rig", EhaParameters()))
     large = EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=6.6)
     wide = EstimateCode.BOUND_TOO_WIDE.note(percent=8.0)
@@ -252,7 +253,7 @@ def test_another_drive_is_not_asked_for_where_the_fit_does_not_explain_the_log()
 
 
 def test_a_sensor_alone_is_no_fault_of_the_model() -> None:
-    """Estimate said "the model does not describe the log" where all that spoke against it was a dead sensor."""
+    """Before, estimate said "the model does not describe the log" when the only objection was a dead sensor."""
     found = estimate_log(log(), Rig("rig", EhaParameters()))
     dead = SensorCode.SENSOR_NOISE_ONLY.note(channel=PRESSURE, noise=4e3)
     refused = replace(
@@ -279,7 +280,7 @@ def test_a_wrong_volume_in_the_rig_file_is_mended_before_another_drive_is_tried(
 
 
 def test_a_piston_that_stands_still_is_the_reason_why_there_is_no_number() -> None:
-    """A Cramér-Rao bound over 3 % was named, where it is 0.4 %; of a pump at rest none was worked out."""
+    """Before, the reason was a Cramér-Rao bound over 3 %; it is 0.4 %, and with a resting pump none was calculated."""
     rng, p = np.random.default_rng(8), replace(EhaParameters(), friction_coulomb=1e6)
     seized = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     resting = {name: np.zeros(len(seized)) for name in ("motor_speed_rad_s", "position_m")}

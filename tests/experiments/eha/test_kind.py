@@ -1,4 +1,4 @@
-"""What the gear-pump actuator's verbs are told: which transfer functions, which figure."""
+"""Settings of the gear-pump actuator's verbs: its transfer functions and its figure."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ OTHER = Rig("other", EhaParameters(moving_mass=9.0))
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[EhaParameters, float]]:
-    """Return what banks are identified for, and the first number of their noise."""
+    """Return the rigs for which banks are identified, with the first random number of each."""
     asked: list[tuple[EhaParameters, float]] = []
 
     def identified(parameters: EhaParameters, rng: np.random.Generator, **_: Any) -> dict[str, Any]:
@@ -57,7 +57,7 @@ def test_another_rig_s_transfer_functions_are_identified_only_if_asked_for_and_o
 ) -> None:
     assert linear_of(OTHER) is None
     linear = linear_of(OTHER, transfer_functions=True)
-    assert asked == []  # not before they are needed
+    assert asked == []  # nothing is identified before it is needed
     linear()
     linear()
     assert asked == [(OTHER.parameters, float(np.random.default_rng(7).random()))]
@@ -102,7 +102,7 @@ def test_the_rig_s_leakage_is_said_to_be_taken_as_known_unless_a_condition_is_na
 
 
 def test_a_verb_refuses_samples_that_are_far_apart_before_anything_is_computed_of_them(tmp_path: Path) -> None:
-    """The transfer functions would take each of its samples to ten million of theirs."""
+    """Otherwise the transfer functions would be run with ten million of their steps per sample."""
     path, speed = tmp_path / "run.csv", 90.0 * np.sin(np.arange(40.0) / 9.0)
     rows = np.column_stack([1e4 * np.arange(40.0), speed, 1e-5 * np.cumsum(speed)])
     np.savetxt(path, rows, delimiter=",", header="time_s,motor_speed_rad_s,position_m", comments="")

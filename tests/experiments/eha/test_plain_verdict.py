@@ -1,4 +1,4 @@
-"""What a mechanic reads first."""
+"""The sentences that a mechanic reads first."""
 
 from typing import Any
 
@@ -180,7 +180,7 @@ def test_friction_that_a_log_does_not_show_is_not_called_normal() -> None:
 
 @pytest.mark.parametrize(("share", "word"), [(0.54, "probably "), (0.89, "probably "), (0.91, "")])
 def test_a_level_below_nine_in_ten_is_called_probable(share: float, word: str) -> None:
-    """Friction was called normal at 54 %; it was minor."""
+    """Before, friction was called normal at 54 %, although it was minor."""
     leaks = {"major_leakage": share, "major_leakage_minor_friction": 1.0 - share}
     told = f"The actuator leaks badly inside (major leakage); friction is {word}normal."
     assert verdict(said_of("major_leakage", probabilities=leaks)) == told
@@ -196,7 +196,7 @@ def test_an_actuator_of_which_nothing_is_told_is_not_called_healthy() -> None:
     result = said_of("normal", probabilities=even)
     assert verdict(result) == "Leakage is normal; friction cannot be told from this log."
     assert "Nothing needs repair." not in what_to_do(result)
-    worn = said_of("normal", 0.3)  # what is left is that of a worn pump
+    worn = said_of("normal", 0.3)  # the remaining probability is that of a worn pump
     nothing = said_of("normal", probabilities=dict.fromkeys(CONDITIONS, 1 / 9))
     assert verdict(worn) == verdict(nothing)
     assert verdict(nothing) == "Leakage cannot be told from this log; friction cannot be told from this log."

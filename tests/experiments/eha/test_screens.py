@@ -1,4 +1,4 @@
-"""What a terminal shows of many logs of the gear-pump actuator, and of few."""
+"""What a terminal shows for many logs of the gear-pump actuator, and for few."""
 
 from typing import Any
 
@@ -100,7 +100,7 @@ def test_many_diagnoses_are_a_table_with_a_line_each() -> None:
     assert lines["run0.csv"][1:4] == ["normal", "90.0", "minor_leakage"]
     assert lines["run7.csv"][4:7] == ["6.0", "-", "-"]
     assert lines["run8.csv"][-1] == "UNKNOWN"
-    assert "run9.csv: said 9" in told  # what was not judged says why
+    assert "run9.csv: said 9" in told  # a log without a verdict gives its reason
     assert "said 0" not in told
     assert "<- best" not in diagnosed(many, scores=True)
 

@@ -1,4 +1,4 @@
-"""`simulate --fmu` makes logs of another tool's plant, in the conditions that it knows, and says what it cannot."""
+"""`simulate --fmu` makes logs of another tool's plant, in the conditions that it supports, and refuses the others."""
 
 import json
 import zipfile

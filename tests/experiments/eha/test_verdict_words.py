@@ -32,7 +32,7 @@ from plant.notes import Note
 def found_as(
     condition: str, change: Change | None = None, against: tuple[Note, ...] = (), *, judged: bool = True
 ) -> Finding:
-    """A diagnosis whose nominal models are a tenth of the condition's place off."""
+    """Return a diagnosis of a condition whose nominal model has an error of 0.1, and the others 0.2 and more."""
     errors = {name: 0.1 if name == condition else 0.2 + 0.01 * place for place, name in enumerate(CONDITIONS)}
     shares = {**dict.fromkeys(CONDITIONS, 0.0), "major_friction": 0.03, condition: 0.97}
     return Finding(
@@ -96,7 +96,7 @@ AGAINST = (AgainstCode.SPEED_BIAS.note(bias_rad_s=3.0), AgainstCode.OIL_SOFT.not
 def test_conditions_that_a_log_does_not_tell_apart_are_not_told_as_one_that_was_found(
     alike: tuple[str, ...], said: str
 ) -> None:
-    """Three equal percentages read as if the first had been found."""
+    """Before, three equal percentages read as if the first condition had been found."""
     shares = {**dict.fromkeys(CONDITIONS, 0.04 / (9 - len(alike))), **dict.fromkeys(alike, 0.96 / len(alike))}
     result = {**diagnosis_entries(found_as(alike[0])), "probabilities": shares}
     assert said in headline(result)
@@ -106,7 +106,7 @@ def test_conditions_that_a_log_does_not_tell_apart_are_not_told_as_one_that_was_
 
 
 def test_a_fault_outside_the_nine_that_is_likelier_than_a_condition_is_in_the_headline() -> None:
-    """It read "minor leakage, probability 90.0 %; second most likely major leakage, < 0.1 %", the rest unsaid."""
+    """Before, it read "minor leakage, probability 90.0 %; second most likely major leakage, < 0.1 %" and no more."""
     result = diagnosis_entries(found_as("minor_leakage"))
     said = headline({**result, "probabilities": {"minor_leakage": 0.9, "major_leakage": 1e-5}})
     assert said.startswith("minor leakage, probability 90.0 %")
@@ -153,7 +153,7 @@ def test_a_severity_that_is_not_told_is_not_determined() -> None:
 
 
 def with_library(found: Finding, best: str) -> Finding:
-    """The same finding, with a library in which one condition errs least."""
+    """Return the same finding, with a library in which one condition has the smallest error."""
     errors = {name: 1e-3 if name == best else 2e-3 for name in CONDITIONS}
     scores = Scores(errors, {"velocity_m_s": errors})
     unknown = dict.fromkeys(SHOWN, Quantity(None, "1"))
@@ -180,7 +180,7 @@ def test_an_unknown_verdict_gives_no_plain_probability_and_nothing_to_repair() -
 
 
 def test_the_nearest_condition_of_an_unknown_verdict_is_one_of_the_nine() -> None:
-    """A valve that never opened had its share of "if it had to be one of them": 90 % in place of 99.9 %."""
+    """Before, a valve that never opened kept its share of "if it had to be one of them": 90 instead of 99.9 %."""
     shares = {"normal": 0.9, "minor_friction": 0.0005}
     said = headline({"probabilities": shares, "unknown": True, "condition": "unknown", "since_s": None})
     assert "99.9 % if it had to be" in said
@@ -199,7 +199,7 @@ def test_the_numbers_of_an_unknown_log_are_preceded_by_a_warning() -> None:
 def test_a_bulk_modulus_that_its_check_refused_is_not_relied_on_beside_a_class_that_stands(
     shown: float, said: bool
 ) -> None:
-    """Diagnose printed a number that estimate calls doubtful, below "reliable: yes"; the circuit's own is another."""
+    """Before, a number that estimate calls doubtful stood below "reliable: yes"; the circuit's own number differs."""
     small = EstimateCode.PRESSURE_RESIDUALS_SMALL.note(ratio=1.6)
     found = found_as("normal")
     severities = {**found.severities, "bulk_modulus": Quantity.normal(shown, 1e6, "Pa")}

@@ -1,4 +1,4 @@
-"""Rows of a store, as a batch would have written them."""
+"""Rows of a store as a batch writes them."""
 
 import json
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from faults.notes import AgainstCode
 
 
 def store_row(file: str, leakage: float, spread: float = 0.2, **more: Any) -> Mapping[str, Any]:
-    """Return the row of a log that leaks so much: healthy is 1, the limit 3."""
+    """Return the row of a log with a given leakage: healthy is 1, the limit is 3."""
     ends = [leakage - spread, leakage + spread]
     amount = {"value": leakage, "unit": "L/min", "ci95": ends, "healthy": 1.0, "limit": 3.0}
     stiff = {"value": 2.0e8, "unit": "Pa", "ci95": [1.9e8, 2.1e8], "healthy": 2.07e8, "limit": 1.656e8}
@@ -17,13 +17,13 @@ def store_row(file: str, leakage: float, spread: float = 0.2, **more: Any) -> Ma
 
 
 def between(leakage: float, friction: float) -> str:
-    """Return what speaks against a log whose leakage and friction lie between those of two conditions, for a row."""
+    """Return the objection to a log whose leakage and friction lie between those of two conditions, as in a row."""
     return json.dumps(
         [{"code": str(AgainstCode.BETWEEN_CONDITIONS), "data": {"leakage": leakage, "friction": friction}}]
     )
 
 
 def beside(leakage: float, friction: float) -> str:
-    """Return what speaks against a log whose circuit does not even lie between two conditions, for a row."""
+    """Return the objection to a log whose circuit does not even lie between two conditions, as in a row."""
     data = {"leakage": leakage, "friction": friction, "part": "flow bias", "ratio": 0.2}
     return json.dumps([{"code": str(AgainstCode.OUTSIDE_CONDITIONS), "data": data}])

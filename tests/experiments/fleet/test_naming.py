@@ -1,4 +1,4 @@
-"""Which actuator, and when: from file names or from a table."""
+"""Actuator and date of a log, from file names or from a table."""
 
 from pathlib import Path
 
@@ -73,7 +73,7 @@ def test_names_that_hold_one_date_each_say_which_actuator(files: list[str], actu
 @pytest.mark.parametrize(
     "files",
     [
-        ["run1_20261122.csv", "run2_20261122.csv"],  # nothing says that these are of one actuator
+        ["run1_20261122.csv", "run2_20261122.csv"],  # nothing shows that both are of one actuator
         ["A_20261122.csv", "A_20261123.csv", "notes.csv"],
         ["A_20261322.csv", "A_20261323.csv"],
         ["serial 120261122.csv", "serial 120261123.csv"],

@@ -1,4 +1,4 @@
-"""How an actuator develops: its outlook, its alarm and its page."""
+"""The development of an actuator: its outlook, its alarm and its page."""
 
 import json
 import re
@@ -49,7 +49,7 @@ def test_an_actuator_that_grows_towards_its_limit_is_in_alarm_before_it_is_past(
     [
         ("P-1_202601{:02d}.csv", r"limit \d+ January 2026 \(\d+ to \d+ January 2026\)"),
         ("P-1_20260101_{:02d}00.csv", r"limit 2026-01-\d\d \d\d:00 \(2026-01-\d\d \d\d:00 to 2026-01-\d\d \d\d:00\)"),
-        ("P-1_{}.csv", r"limit in \d+ logs \(\d+ to \d+\)"),  # running hours
+        ("P-1_{}.csv", r"limit in \d+ logs \(\d+ to \d+\)"),  # names with running hours
     ],
 )
 def test_a_forecast_is_told_in_dates_where_logs_have_them_and_holds_the_crossing(name: str, words: str) -> None:
@@ -96,7 +96,8 @@ def test_few_logs_have_no_outlook_and_a_repair_makes_them_few() -> None:
 def test_the_line_follows_a_lasting_change_from_its_first_log_on() -> None:
     outlook = actuator([1.0] * 6 + [2.0] * 5).outlook
     assert outlook is not None
-    assert [trend.begin for trend in outlook.course][-5:] == [0, 0, 6, 6, 6]  # two logs after it, it might be chance
+    # up to two logs after the change, it might be chance
+    assert [trend.begin for trend in outlook.course][-5:] == [0, 0, 6, 6, 6]
     levels = np.array(followed(outlook))[:, 0]
     np.testing.assert_allclose(levels, [1.0] * 6 + [2.0] * 5, atol=0.15)
     assert levels[-1] == outlook.trend.level[0]
@@ -142,7 +143,7 @@ def test_the_level_of_a_trend_has_its_date_where_the_newest_log_has_no_place_in_
     assert ", as of 4" not in actuator_page(ActuatorRow("P-1", logs), {})
     page = actuator_page(ActuatorRow("P-1", (*logs[:-1], lost)), {})
     assert "level of the trend" in page
-    assert page.count(", as of 3") == 2  # of leakage and of oil
+    assert page.count(", as of 3") == 2  # one for leakage, one for bulk modulus
 
 
 def test_an_actuator_without_any_severity_has_a_page_that_says_why() -> None:
@@ -163,13 +164,13 @@ def test_the_page_of_an_actuator_shows_every_severity_with_its_forecast() -> Non
     assert "<h1>P-1: nearing a limit.</h1>" in page
     assert page.count('class="charts"') == 1
     assert 'href="../pages/last.html"' in page
-    assert re.findall(r'"file": ?"([^"]*)"', page) == ["P-1"]  # of all severities
+    assert re.findall(r'"file": ?"([^"]*)"', page) == ["P-1"]  # one chart for all severities
     assert "Leakage reaches its limit in about" in page
     assert "more than 300 logs" in page
 
 
 def weekly(leakages: Any, std: float = 0.05) -> ActuatorRow:
-    """Return an actuator with a log each week, dated without an hour."""
+    """Return an actuator with one log a week, dated without a time of day."""
     files = [f"P-1_{np.datetime64('2026-01-05') + 7 * place}.csv" for place in range(len(leakages))]
     rows = [store_row(file, float(one), std) for file, one in zip(files, leakages, strict=True)]
     (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
@@ -208,7 +209,7 @@ def test_logs_that_are_dated_without_an_hour_have_no_forecast_with_one() -> None
 
 
 def test_a_severity_that_recedes_from_its_limit_has_no_date_at_which_it_reaches_it() -> None:
-    """Futures in which it turns round gave a pressure that fell by 1 % a log a limit reached "2029 to 2038"."""
+    """Before, reversed futures gave a pressure that fell by 1 % per log a limit reached in "2029 to 2038"."""
     outlook = outlook_of(weekly(1.0 + 2.0 * np.exp(-np.arange(12) / 4.0), std=0.01).logs, "leakage_flow")
     assert outlook is not None
     assert outlook.trend.crossing is not None
@@ -286,13 +287,13 @@ def test_the_page_of_an_actuator_works_in_a_browser(browser: Any, tmp_path: Path
 
 
 def test_a_last_log_past_the_limit_beside_a_trend_within_it_says_so_and_what_to_do() -> None:
-    """The page told "past the limit" beside a level that was far within it."""
+    """Before, the page said "past the limit" beside a level far within it."""
     leaks = np.append(np.full(12, 1.2), 6.0)
     row = actuator(leaks)
     assert row.outlook is not None
     assert row.outlook.trend.level[0] < 3.0
     page = actuator_page(row, {})
-    assert page.count("its trend is still within it: log again") == 2  # the first sentence, and the table
+    assert page.count("its trend is still within it: log again") == 2  # in the first sentence and in the table
     assert "still within" not in actuator_page(actuator(np.full(12, 6.0)), {})
 
 

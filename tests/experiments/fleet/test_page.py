@@ -1,4 +1,4 @@
-"""The page of a fleet, and that it works in a browser."""
+"""The page of a fleet, also in a browser."""
 
 import re
 import subprocess
@@ -265,7 +265,7 @@ def test_the_last_row_is_reached_by_scrolling(page: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [390, 768, 1280])
 def test_a_table_says_how_many_rows_are_below_and_at_the_last_one_none(page: Any, width: int) -> None:
-    from playwright.sync_api import expect  # which not every developer has
+    from playwright.sync_api import expect  # not every developer has it
 
     page.set_viewport_size({"width": width, "height": 800})
     more = page.locator(".more-rows")
@@ -305,7 +305,7 @@ def test_a_long_condition_and_a_reason_are_read_whole(browser: Any, tmp_path: Pa
 
 
 def in_sight(page: Any, heading: str) -> bool:
-    """Return whether a cell of the first row lies within the window that scrolls."""
+    """Return whether a cell of the first row is visible in the scrolling window."""
     cell = page.locator(f'.window tbody tr >> nth=0 >> td[data-head="{heading}"]').bounding_box()
     window = page.locator(".window").bounding_box()
     return cell is not None and cell["x"] + cell["width"] <= window["x"] + window["width"]

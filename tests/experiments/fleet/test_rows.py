@@ -1,4 +1,4 @@
-"""A log's state follows from its severities and their limits."""
+"""The state of a log follows from its severities and their limits."""
 
 import json
 from typing import Any
@@ -75,7 +75,8 @@ def test_a_circuit_beside_the_nine_has_no_verdict_but_is_shown_and_named_if_few_
     )
     assert 'data-head="worst">leakage 4.00' in actuator_page(row, {})
     assert sickest_of(fleet([store_row(files[0], 1.0), *rows[-5:]])) == ["P-8"]
-    assert sickest_of(fleet([store_row(one, 4.0, **doubt) for one in files])) == []  # of another size, rather
+    # if many lie beside the nine, the rig file probably describes another size
+    assert sickest_of(fleet([store_row(one, 4.0, **doubt) for one in files])) == []
     assert "move their logs" in rig_hint(fleet([store_row(one, 4.0, **doubt) for one in files]))
 
 

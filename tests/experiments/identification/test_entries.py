@@ -1,4 +1,4 @@
-"""Entries of the JSON contract keep their types, whatever the model has."""
+"""Entries of the JSON contract keep their types, whatever the model contains."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from experiments.identification.entries import column_entries, gains_shown
 
 @pytest.fixture(scope="module")
 def found() -> Identified:
-    """Return a linear model of one input."""
+    """Return a linear model with one input."""
     rng = np.random.default_rng(0)
     u = rng.normal(size=300)
     y = filtered(np.array([0.0, 0.0, 0.2]), np.array([1.0, -0.9]), u) + 0.01 * rng.normal(size=300)
@@ -27,7 +27,7 @@ def found() -> Identified:
 
 
 def stopped(found: Identified, inputs: tuple[str, ...]) -> Identified:
-    """Return a model of a gain of 2 from each input whose output is held by stops."""
+    """Return a model with a gain of 2 from each input whose output is limited by stops."""
     form = Form(1, (1,) * len(inputs), (2,) * len(inputs))
     by = Scaling(np.zeros(len(inputs)), np.ones(len(inputs)), 0.0, 1.0)
     theta = np.array([*[0.2] * len(inputs), -0.9, 0.0])

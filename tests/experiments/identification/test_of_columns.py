@@ -1,4 +1,4 @@
-"""The command line between any columns: fitted, validated, saved, simulated again."""
+"""The command line for models between any columns: fitted, validated, saved and simulated again."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ from experiments.identification.entries import gains_shown
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Return three logs of a plant with two inputs and two outputs, in no unit that is known."""
+    """Return three logs of a plant with two inputs and two outputs, in units that are not known."""
     folder = tmp_path_factory.mktemp("any")
     paths: list[Path] = []
     for seed in (1, 2, 3):
@@ -184,7 +184,7 @@ def test_a_frequency_response_is_drawn_and_printed_with_its_levels(tmp_path: Pat
 
 @pytest.fixture(scope="module")
 def saved(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return models of both outputs."""
+    """Return the file with models of both outputs."""
     path = tmp_path_factory.mktemp("model") / "model.json"
     channels = ("--input", "Valve [%],load", "--output", "flow,heat", "--order", 1, "--delay", 1)
     ran = run(logs[0], *channels, "--out", path, "--json")
@@ -227,7 +227,7 @@ def test_a_saved_model_is_asked_for_one_of_its_outputs_or_for_columns_of_other_n
 
 
 def test_names_of_a_saved_model_are_its_own_in_whatever_order_they_are_asked_for(logs: list[Path], saved: Path) -> None:
-    """With outputs turned about, the model of each was compared with the column of the other."""
+    """Before, with the outputs in reverse order, each model was compared with the column of the other output."""
     (one,) = json.loads(run(logs[1], "--simulate", saved, "--json").stdout)
     turned = ("--input", "load,Valve [%]", "--output", "heat,flow")
     (other,) = json.loads(run(logs[1], "--simulate", saved, *turned, "--json").stdout)

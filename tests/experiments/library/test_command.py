@@ -1,4 +1,4 @@
-"""`hydrostate library` shows the models, and what it builds says why they are output error."""
+"""`hydrostate library` shows the models, and why they have the output-error structure."""
 
 import json
 import re
@@ -30,7 +30,7 @@ SHOWN = ("normal", "minor_friction")
 
 @pytest.fixture(scope="module")
 def tables() -> Mapping[str, pd.DataFrame]:
-    """Return what the command finds, by short tests of two conditions."""
+    """Return the results of the command, from short tests of two conditions."""
     rig, library = CircuitParameters(), read_library()
     around = read_library(which="around_mean")
     models = {name: around[name] for name in SHOWN}
@@ -75,7 +75,7 @@ def test_output_error_runs_free_best_and_predicts_one_step_worst(tables: Mapping
 def test_the_rivals_criteria_look_above_25_hz(tables: Mapping[str, pd.DataFrame]) -> None:
     weight = tables["structures"].pivot_table(index="condition", columns="structure", values="weight_above_percent")
     ours = weight.pop("output-error")
-    assert ours.between(3.0, 10.0).all()  # what a 50 ms clock puts there
+    assert ours.between(3.0, 10.0).all()  # the share above 25 Hz of the spectrum of a 50 ms clock
     assert (weight.min(axis=1) > 2.0 * ours).all()
 
 

@@ -45,11 +45,11 @@ def test_gains_fall_with_leakage_and_with_friction() -> None:
     gains = library_table(read_library()).set_index("condition")["dc_gain"]
     assert gains["normal"] > gains["minor_leakage"] > gains["major_leakage"]
     assert gains["minor_friction"] > gains["minor_leakage_minor_friction"] > gains["major_leakage_minor_friction"]
-    assert (gains < 1.1 * 5.57e-7 / 1.52e-3).all()  # no piston outruns its pump
+    assert (gains < 1.1 * 5.57e-7 / 1.52e-3).all()  # the pump's flow limits the piston's velocity
 
 
 def test_nothing_jumps_as_the_printed_models_do() -> None:
-    """Errata E15: eight of nine printed models do not roll off; ours jump where the piston sticks, by half as much."""
+    """Errata E15: eight of nine printed models do not roll off; ours jump if the piston sticks, by half as much."""
     table, moving = library_table(read_library()), library_table(read_library(which="around_mean"))
     assert (moving["jump_ratio"].abs() < 0.15).all()
     assert (table["jump_ratio"].abs() < 0.45).all()
@@ -92,7 +92,7 @@ def test_passes_have_no_mean_and_alternate_without_changing_sign() -> None:
     speeds, velocities = circuit_passes(CircuitParameters(), "normal", np.random.default_rng(1), duration=8.0)
     assert len(speeds) == len(velocities) == 2
     assert all(abs(one.mean()) < 1e-9 for one in velocities)
-    # a faster motor means a faster piston, whichever way the pass went
+    # a faster motor drives the piston faster, in either direction of the pass
     assert all(np.corrcoef(u, v)[0, 1] > 0.5 for u, v in zip(speeds, velocities, strict=True))
 
 
@@ -121,7 +121,7 @@ def test_a_higher_order_never_fits_several_short_experiments_worse() -> None:
 
 @pytest.mark.parametrize("drive", ["prbs", "steps"])
 def test_the_library_alone_tells_85_percent_of_circuit_logs_apart(drive: str) -> None:
-    """Section 6's rule, the smallest RMSE in velocity, on circuits spread about the nine; no seed is the library's."""
+    """Section 6's rule, least RMSE in velocity, on circuits spread about the nine, without seeds of the library."""
     library, right = read_library(), []
     for seed in range(3):
         for name, condition in CONDITIONS.items():

@@ -1,4 +1,4 @@
-"""Two logs side by side, and the fleet of what was dropped."""
+"""A comparison of two logs, and the fleet page of the uploaded logs."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ def test_a_quantity_changed_where_the_interval_of_the_difference_leaves_out_zero
 
 
 def test_a_lopsided_interval_gives_a_lopsided_difference() -> None:
-    """Leakage of 6 L/min (3 to 16), less one of 6.04, was said to lie between -7 and 6."""
+    """Before, leakage of 6 L/min (3 to 16) less one of 6.04 was said to be between -7 and 6."""
     wide = {"value": 6.0, "std": None, "ci95": [3.0, 16.0], "unit": "N"}
     (row,) = compared(result(6.0, 0.02), {"file": "b", "message": "so", "severity": {"added_friction": wide}})
     assert row["interval"] == pytest.approx([-3.0, 10.0], abs=0.01)
@@ -69,7 +69,7 @@ def test_logs_without_a_quantity_in_common_are_not_called_alike() -> None:
     page = compare_view(first, {"file": "b.csv", "message": "inspected"})
     assert "The two logs cannot be compared: no quantity has an interval in both." in page
     assert "No certain difference" not in page
-    assert "&lt; 0.1" not in page  # it was not diagnosed, so nothing is improbable
+    assert "&lt; 0.1" not in page  # the second log was not diagnosed, so no condition has a small probability
 
 
 def test_logs_of_one_name_are_told_apart_and_a_date_that_is_none_leaves_a_log_without_an_actuator() -> None:

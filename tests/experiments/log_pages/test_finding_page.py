@@ -1,4 +1,4 @@
-"""The heading of a log's page, and the sentence for what was found."""
+"""The heading of a log's page, and the sentence about the finding."""
 
 from dataclasses import replace
 

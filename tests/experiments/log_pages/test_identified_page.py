@@ -1,4 +1,4 @@
-"""The page of an identified model: its verdict, what it may be used for, and what a reader takes along."""
+"""The page of an identified model: its verdict, its permitted uses, and its downloads."""
 
 import base64
 import json
@@ -31,7 +31,7 @@ TRUTH = LinearModel(
 
 
 def seen(model: LinearModel = TRUTH, held: float | None = 95.0, **changes: Any) -> IdentifiedView:
-    """Return the view of a model on a log of the truth."""
+    """Return the view of a model on a log of the true plant."""
     rng = np.random.default_rng(1)
     u = 100.0 * np.repeat(rng.choice([-1.0, 1.0], 300), 10)
     y = TRUTH.simulate(u)
@@ -126,7 +126,7 @@ def test_lines_of_noise_that_are_large_by_chance_are_not_known() -> None:
 
 
 def taken(page: str) -> dict[str, str]:
-    """Return the files that a page offers, by name."""
+    """Return the files that a page offers for download, by name."""
     found = re.findall(r'download="([^"]+)" href="data:[^,]+,([^"]+)"', page)
     return {name: base64.b64decode(content).decode() for name, content in found}
 
@@ -164,7 +164,7 @@ def test_a_model_in_continuous_time_is_taken_along_as_such_and_its_step_has_a_ba
 
 @pytest.fixture(scope="module")
 def columns(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a log of two inputs and two outputs, one of them bent."""
+    """Return a log of two inputs and three outputs, one of them nonlinear."""
     rng = np.random.default_rng(5)
     a, b = (np.repeat(rng.uniform(-1.0, 1.0, 100), 6) for _ in range(2))
     y = LinearModel(np.array([0.0, 0.4]), np.array([1.0, -0.7]), 1.0, "a", "y", delay=1).simulate(a + 0.5 * b)

@@ -1,4 +1,4 @@
-"""The page of a filtered log: titled, labelled, and written whole."""
+"""The figure of a filtered log: it has a title and labels, and is written as a whole."""
 
 from functools import cache
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The page of `hydrostate inspect`: whether the log can be read, its clock, and columns drawn by time."""
+"""The page of `hydrostate inspect`: whether the log can be read, its clock, and its columns over time."""
 
 import re
 from base64 import b64decode
@@ -36,7 +36,7 @@ def drawing(page: str) -> str:
 
 def test_columns_are_drawn_by_time_or_by_row_where_time_does_not_rise(tmp_path: Path) -> None:
     by_time = drawing(page_of(tmp_path, "time_s,motor_speed_rad_s", TIME, SPEED))
-    assert by_time.count("<!-- time_s -->") == 1  # it is the axis, not a drawing of its own
+    assert by_time.count("<!-- time_s -->") == 1  # time is the axis, and has no drawing of its own
     assert "<!-- row -->" not in by_time
     assert "<!-- row -->" in drawing(page_of(tmp_path, "time_s,motor_speed_rad_s", np.round(TIME, 2), SPEED))
 
@@ -68,12 +68,13 @@ def test_no_line_ends_within_an_option_and_all_can_be_copied(tmp_path: Path) -> 
     (said,) = re.findall(r"add these options to one command: <code>(.*?)</code>", page, re.DOTALL)
     options = re.findall(r'<span class="option">(.*?)</span>', said)
     assert "--columns motor_speed_rad_s=MOTOR_RPM:rpm" in options
-    assert "--columns differential_pressure_pa=DP_PA:Pa" in options  # the unit as it is written, not as names have it
-    assert re.sub(r"<.*?>", "", said).split() == " ".join(options).split()  # as a browser copies them
+    # the unit as it is usually written (Pa), not as in the column's name (PA)
+    assert "--columns differential_pressure_pa=DP_PA:Pa" in options
+    assert re.sub(r"<.*?>", "", said).split() == " ".join(options).split()  # the text as a browser copies it
 
 
 def test_units_are_to_be_checked_where_the_file_gives_none_and_the_columns_are_named(tmp_path: Path) -> None:
-    """The page asked for units "that are marked as guessed", and marked none."""
+    """Before, the page asked the reader to check units "that are marked as guessed", and marked none."""
     asked = "The file gives no unit for Zeit, Drehzahl, Weg: check"
     assert asked in page_of(tmp_path, "Zeit,Drehzahl,Weg", TIME, SPEED, WAY)
     assert "gives no unit" not in page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
@@ -87,7 +88,7 @@ def test_a_unit_that_was_guessed_is_marked_in_the_heading_and_in_the_rig_file(tm
 
 
 def test_a_guessed_unit_is_marked_where_the_column_is_the_block_s_own() -> None:
-    """Two tables may hold the same channel, of which one has its unit."""
+    """Two tables may contain the same channel, and only one of them its unit."""
     why = [{"code": GuessCode.UNIT_GUESSED}]
     tables = [
         {"columns": [{"channel": "position_m", "name": "Weg", "why": why}]},

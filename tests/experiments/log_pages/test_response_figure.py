@@ -1,4 +1,4 @@
-"""A measured response shows no phase where its 95 % circle contains zero: there, any phase is possible."""
+"""A measured response has no phase if its 95 % circle contains zero, since any phase is then possible."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What a terminal shows of quantities: digits enough to tell the ends of an interval apart."""
+"""Quantities on a terminal, with enough digits to distinguish the ends of an interval."""
 
 from typing import Any
 

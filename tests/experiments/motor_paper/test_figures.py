@@ -1,4 +1,4 @@
-"""The figures show what the study's tables contain."""
+"""The figures show the content of the study's tables."""
 
 from collections.abc import Mapping
 
@@ -24,7 +24,7 @@ def drawn(tables: Tables) -> Mapping[str, Figure]:
 
 
 def curves(figure: Figure, panel: int) -> dict[str, np.ndarray]:
-    """Return the curves of a panel by the words of their legend."""
+    """Return the curves of a panel by their text in the legend."""
     return {str(line.get_label()): np.asarray(line.get_ydata()) for line in figure.axes[panel].lines}
 
 

@@ -1,4 +1,4 @@
-"""Figure 12 comes back to every printed digit in one reading, and Table 3's rules are applied to all three."""
+"""One reading reproduces figure 12 to every printed digit, and Table 3's rules are applied to all three readings."""
 
 import numpy as np
 import pytest

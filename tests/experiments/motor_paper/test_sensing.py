@@ -1,4 +1,4 @@
-"""Velocity from sensing voltages: what the paper wants does not do, and one electrode with the drive does."""
+"""Velocity from sensing voltages: the paper's regression fails, and one electrode with the drive voltage works."""
 
 import pandas as pd
 import pytest

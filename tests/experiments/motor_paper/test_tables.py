@@ -1,4 +1,4 @@
-"""What holds in the diaphragm-motor paper's tables, and what does not."""
+"""Which statements of the diaphragm-motor paper's tables hold, and which do not."""
 
 from typing import get_args
 

@@ -1,4 +1,4 @@
-"""The motor paper's linear models: who is stable, where they peak, and what a loop around them does."""
+"""The motor paper's linear models: their stability, their peaks, and the effect of a loop around them."""
 
 import numpy as np
 import pandas as pd

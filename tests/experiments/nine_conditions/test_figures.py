@@ -1,4 +1,4 @@
-"""The figures show what the tables hold, and say what they show."""
+"""The figures show the content of the tables, with titles and labels."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -26,14 +26,14 @@ PRESSURE = "convergence_pressure_form"
 SOME_FIGURES = pytest.mark.parametrize(
     "name", thinned(FIGURES, [name for name in FIGURES if not name.startswith("convergence") or name == PRESSURE])
 )
-"""Of three figures that one function draws, the fast tests ask one."""
+"""Of three figures from one function, the fast tests use one."""
 
 UNIT = re.compile(r"\[[^\[\]]+\]")
 LETTERS = re.compile(r"(?<!\\)\b[a-z]{3,}")
 
 
 def _labels_of_numbers(figure: Figure) -> Iterator[str]:
-    """Yield the label of every axis whose ticks are numbers, or of the figure where its panels share one."""
+    """Yield the label of each axis with numeric ticks, or that of the figure if its panels share one."""
     for axis in figure.axes:
         for ticks, shared in ((axis.xaxis, figure.get_supxlabel()), (axis.yaxis, figure.get_supylabel())):
             written = [label.get_text() for label in ticks.get_ticklabels() if label.get_visible() and label.get_text()]

@@ -1,4 +1,4 @@
-"""filterpy's filter and ours say the same in the study, and the table would tell if they did not."""
+"""filterpy's filter and ours agree in the study, and the table would show a difference."""
 
 from dataclasses import replace
 

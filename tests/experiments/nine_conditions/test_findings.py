@@ -1,4 +1,4 @@
-"""What the tables amount to is counted right."""
+"""The counts in the summary of the tables are right."""
 
 import numpy as np
 import pandas as pd

@@ -1,4 +1,4 @@
-"""The report is one file, complete, and says what the tables say."""
+"""The report is one complete file, and agrees with the tables."""
 
 import re
 from html.parser import HTMLParser
@@ -29,12 +29,12 @@ SECTIONS = (
 
 @pytest.fixture(scope="session")
 def page(written: Path) -> str:
-    """Return the report with its unbreakable spaces made plain."""
+    """Return the report with plain spaces instead of its non-breaking ones."""
     return (written / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
 
 
 class _Balance(HTMLParser):
-    """Collects open tags, ids and links, to see that the page closes and finds its own."""
+    """Collects open tags, ids and links, to check that all tags are closed and all internal links have a target."""
 
     VOID = frozenset({"meta", "img", "br", "link"})
 
@@ -108,7 +108,7 @@ def test_scalars_stand_beside_the_published_ones_with_their_notes(page: str, stu
     assert f'<td class="number">{number(1e-6 * float(first["ours"]))}</td><td>MPa</td>' in page
     assert (
         "1e8" not in page.split("<h2>Errata</h2>")[0].split("<main>")[1]
-    )  # one unit of bulk modulus, in text and tables
+    )  # bulk modulus has one unit, in text and tables
 
 
 def test_estimates_are_those_of_the_table(page: str, study: Found) -> None:

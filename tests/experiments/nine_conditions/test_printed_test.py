@@ -1,4 +1,4 @@
-"""Tables 5 and 6 on circuits: section 4's experiment to the letter, and errors where the plant is not the model."""
+"""Tables 5 and 6 on circuits: section 4's experiment exactly as printed, and errors if the plant is not the model."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from plant.eha.model import EhaParameters
 
 RIG = EhaParameters()
 
-# to the letter the output alone is filtered, which warns
+# the printed experiment filters only the output, and that raises a warning
 pytestmark = pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 
 

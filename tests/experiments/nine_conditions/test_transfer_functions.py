@@ -1,4 +1,4 @@
-"""What Table 6's models and ours do within the first sample of a step."""
+"""Behaviour of Table 6's models and of ours within the first sample of a step."""
 
 import numpy as np
 import pytest

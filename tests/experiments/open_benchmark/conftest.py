@@ -1,4 +1,4 @@
-"""Logs of two seconds in place of ten and twenty."""
+"""Logs of two seconds instead of ten and twenty."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Baselines learn what is there to learn, and the table counts their right verdicts."""
+"""Baselines learn separable classes, and the table counts their correct verdicts."""
 
 import sys
 from pathlib import Path
@@ -17,7 +17,7 @@ from plant.errors import HydrostateError
 
 
 def waves(seed: int, each: int = 12) -> tuple[Array, NDArray[np.str_]]:
-    """Return logs whose velocity follows the motor, or does so late and less."""
+    """Return logs whose velocity either follows the motor, or has a smaller gain and a lag."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0.0, 8.0, 400)
     logs, names = list[Array](), list[str]()

@@ -1,4 +1,4 @@
-"""What is asked of the motor leaves the piston within its travel and the speed within its rating, for every draw."""
+"""With every random drive, the piston stays within its travel and the speed within its rating."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_a_speed_is_within_its_rating_and_leads_the_piston_no_farther_than_from_
     assert speed.shape == (ROOM.ticks,)
     assert np.max(np.abs(speed)) <= ROOM.rated * (1.0 + 1e-9)
     where = np.cumsum(ROOM.glide * speed * TICK)
-    assert 0.2 * ROOM.travel < np.ptp(where) <= 2.1 * ROOM.travel  # from one side to the other
+    assert 0.2 * ROOM.travel < np.ptp(where) <= 2.1 * ROOM.travel  # twice the travel is from one side to the other
 
 
 @pytest.mark.parametrize("drive", [position_steps, tracking])

@@ -1,4 +1,4 @@
-"""What a verdict is worth: silent errors are those that nothing in the answer warns of."""
+"""The assessment of a verdict: an error is silent if nothing in the answer warns of it."""
 
 from typing import Any
 
@@ -73,7 +73,7 @@ def test_a_condition_that_began_within_a_log_is_dated_and_one_that_did_not_is_no
     said = diagnosis("normal", 0.99) | {"since_ci95_s": ends}
     row = judge_class(said, {"accept": "normal", "steady": steady, "since_s": began})
     assert (row["false_since"], row["since"]) == (false, dated)
-    assert judge_class(said, {"accept": "normal"})["since"] is None  # sets of others do not say
+    assert judge_class(said, {"accept": "normal"})["since"] is None  # data sets of other authors do not state it
 
 
 def test_a_cause_is_named_in_any_sentence() -> None:

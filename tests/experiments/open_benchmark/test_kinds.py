@@ -1,4 +1,4 @@
-"""Kinds of logs: the same bits for the same name, no seed in two splits, every one written and read back."""
+"""Kinds of logs: one name gives the same bits, no seed is in two splits, and each can be written and read back."""
 
 from itertools import product
 from math import gcd
@@ -34,7 +34,7 @@ COLUMNS = [
     ),
     *("bulk_modulus_pa", "beta_lo", "beta_hi", "accept", "rig", "columns", "sev", "vmax", "dpmax", "xmin", "xmax"),
 ]
-"""What the truth of strange rigs has, which `score.py` reads."""
+"""Columns of the truth of strange rigs that `score.py` reads."""
 
 
 @pytest.mark.usefixtures("_short")
@@ -102,7 +102,7 @@ def test_the_truth_says_whether_and_when_an_actuator_changes(tmp_path: Path) -> 
         (told[kind],) = read_truth(write_set(kind, "validation", 1, tmp_path).parent).to_dict("records")
     assert [kind for kind, row in told.items() if row["steady"]] == ["plain", "entrained_air"]
     assert [kind for kind, row in told.items() if row["since_s"] != ""] == ["leakage_sets_in"]
-    assert 0.6 < told["leakage_sets_in"]["since_s"] < 1.4  # of two seconds
+    assert 0.6 < told["leakage_sets_in"]["since_s"] < 1.4  # in the middle of a log of two seconds
 
 
 @pytest.mark.usefixtures("_short")

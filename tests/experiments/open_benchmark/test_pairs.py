@@ -1,4 +1,4 @@
-"""Two kinds in one log: both are drawn, what is right follows from both, and single logs keep their bits."""
+"""Two kinds in one log: both are drawn, the right answer follows from both, and single logs keep their bits."""
 
 import re
 from collections import Counter

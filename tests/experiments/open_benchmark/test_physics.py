@@ -1,4 +1,4 @@
-"""The open benchmark's actuator keeps oil and energy, settles where the equations say, and really sticks."""
+"""The open benchmark's actuator conserves oil and energy, settles as the equations say, and really sticks."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def course(speed: Array | float, seconds: float, air: float = 0.0) -> Array:
 
 
 def oil(states: Array, air: float, m: Machine) -> Array:
-    """Return the oil in both chambers and what the accumulator lost, as volume at atmospheric pressure."""
+    """Return the oil in both chambers less that lost by the accumulator, as volume at atmospheric pressure."""
     a, b = (np.array([specific_volume(p, air, m) for p in states[:, i]]) for i in (4, 5))
     x = states[:, 2]
     return (m.volume_a + m.area_a * x) / a + (m.volume_b - m.area_b * x) / b - states[:, 6]
@@ -151,7 +151,7 @@ def test_the_end_stops_push_out_of_their_way_and_never_pull() -> None:
     inward, outward = (stop_force(end + 1e-4, v, m) for v in (-0.01, 0.01))
     assert outward == pytest.approx(-m.stop_stiffness * 1e-4 - 0.01 * m.stop_damping)
     assert inward > outward
-    assert stop_force(end + 1e-6, -10.0, m) == 0.0  # it leaves faster than the stop follows
+    assert stop_force(end + 1e-6, -10.0, m) == 0.0  # the piston leaves faster than the stop can follow
 
 
 def test_a_run_that_ran_away_is_no_log() -> None:

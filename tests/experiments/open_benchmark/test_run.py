@@ -1,4 +1,4 @@
-"""The compiled run is what its functions say as Python."""
+"""The compiled run gives the same results as its functions in plain Python."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a log's truth is without pressure: that of a plain one where the pressure sensor alone is strange."""
+"""A log's truth without pressure: that of a plain log if only the pressure sensor is strange."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def test_of_such_kinds_the_pressure_sensor_alone_is_strange(name: str) -> None:
     strange = KINDS[name].draw(plain, np.random.default_rng(1))
     assert strange != plain
     sensors = {**strange.logger.sensors, **{one: plain.logger.sensors[one] for one in PRESSURES}}
-    channels = plain.logger.channels  # two gauges may be logged in place of their difference
+    channels = plain.logger.channels  # a kind may log the two chamber pressures instead of their difference
     assert replace(strange, logger=replace(strange.logger, sensors=sensors, channels=channels)) == plain
 
 

@@ -1,4 +1,4 @@
-"""The page of baselines: who is in it, and how often each is right."""
+"""The page of baselines: its methods, and the share of correct verdicts of each."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -44,7 +44,7 @@ def test_a_learner_whose_package_is_not_installed_is_left_out(monkeypatch: pytes
         raise HydrostateError("needs scikit-learn")
 
     def constant(series: np.ndarray, names: np.ndarray) -> Any:
-        assert np.isfinite(series).all()  # what is not logged is zero
+        assert np.isfinite(series).all()  # channels that are not logged are zero
         return lambda other: np.repeat(names[:1], len(other))
 
     silent = np.full((2, 4 * 5), np.nan)

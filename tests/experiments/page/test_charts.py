@@ -1,4 +1,4 @@
-"""Charts hold their numbers, a still picture, and a table."""
+"""A chart contains its numbers, a still picture and a table."""
 
 import base64
 import json

@@ -1,4 +1,4 @@
-"""The one-line errata follow the list in the documents."""
+"""The one-line errata agree with the list in the documents."""
 
 import re
 from pathlib import Path

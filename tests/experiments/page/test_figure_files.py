@@ -1,4 +1,4 @@
-"""A figure that cannot be written ends in a sentence, as a page does."""
+"""A figure that cannot be written gives an error in one sentence, like a page."""
 
 from pathlib import Path
 

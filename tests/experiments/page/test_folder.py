@@ -1,4 +1,4 @@
-"""A result folder is there whole or not at all, and nobody's files are lost."""
+"""A result folder is complete or absent, and no user's file is lost."""
 
 import json
 import os
@@ -31,19 +31,19 @@ from tests.experiments.conftest import SMALL, WRITTEN
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave figures and report out, which these tests do not need."""
+    """Leave out figures and report, which these tests do not need."""
     monkeypatch.setattr(runner, "figure_files", lambda *_: {})
     monkeypatch.setattr(runner, "render_page", lambda *_: "report")
 
 
 @pytest.fixture
 def short(study: Found) -> Found:
-    """Return one table of the small study and its files, which are written as all of it would be."""
+    """Return one table of the small study and its files; it is written like the whole study."""
     return Found({"bulk modulus": study.tables["bulk_modulus"]}, {}, study.files)
 
 
 def write_study(found: Found, folder: Path) -> Path:
-    """Write a part of the small study; return its report."""
+    """Write a part of the small study, and return its report."""
     write_result(replace(NINE_CONDITIONS, facts=lambda *_: {}), SMALL, found, folder)
     return folder / "report.html"
 
@@ -131,7 +131,7 @@ def test_a_swap_that_fails_brings_the_earlier_result_back(
             raise PermissionError(13, "Permission denied")
         return rename(path, new)
 
-    monkeypatch.setattr(folder, "_exchanged", lambda *_: False)  # as on a system that cannot
+    monkeypatch.setattr(folder, "_exchanged", lambda *_: False)  # as on a system that cannot exchange two folders
     monkeypatch.setattr(Path, "rename", second_fails)
     with pytest.raises(HydrostateError, match="can be written, got: Permission denied"):
         write_study(short, target)
@@ -208,7 +208,7 @@ def test_what_a_killed_run_left_is_tidied_and_an_earlier_result_gets_its_name_ba
     short: Found, tmp_path: Path
 ) -> None:
     write_study(short, tmp_path / "out")
-    (tmp_path / "out").rename(tmp_path / ".out.0123abcd.old")  # killed before the new result took the name
+    (tmp_path / "out").rename(tmp_path / ".out.0123abcd.old")  # the run was killed before the new result took the name
     for name in (".out.89abcdef.tmp", ".out.ffff0000.tmp", ".out.mine.tmp"):
         (tmp_path / name).mkdir()
     with held(tmp_path / ".out.ffff0000.tmp") as free:  # another study is at work
@@ -292,7 +292,7 @@ def test_a_study_that_is_asked_to_end_is_interrupted(
     try:
         with pytest.raises(KeyboardInterrupt):
             finish_study(NINE_CONDITIONS, SMALL, tmp_path / "out", as_json=False)
-        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # nohup starts a program like this
         stop_at_signals()
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:

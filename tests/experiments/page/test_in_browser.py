@@ -1,4 +1,4 @@
-"""Pages in a real browser: they draw, zoom, fit the screen and the paper, load nothing and can be read by all."""
+"""Pages in a real browser: drawing, zoom, fit to screen and paper, no loading from elsewhere, and accessibility."""
 
 import json
 import re
@@ -35,7 +35,7 @@ SHEET = 703
 """Width of an A4 sheet between its margins of 12 mm [pixel]."""
 
 DARKEST_LIGHT, LIGHTEST_DARK = 200, 60
-"""Mean brightness of a light figure at the least, and of a dark one at the most [0 to 255]."""
+"""Lowest mean brightness of a light figure, and highest of a dark one [0 to 255]."""
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def opened(browser: Any, pages: dict[str, Path]) -> Iterator[Any]:
 
 
 def brightness(page: Any, selector: str) -> float:
-    """Return the mean brightness of the corners of an element, where nothing is drawn."""
+    """Return the brightness of an element's background, from its median."""
     from io import BytesIO
 
     from matplotlib.image import imread
@@ -216,7 +216,7 @@ def test_without_scripts_the_verdict_and_a_still_picture_are_there(opened: Any) 
 @pytest.mark.parametrize("name", ["diagnosis", "identified"])
 def test_a_page_prints_on_two_sheets_and_names_no_folder(opened: Any, name: str) -> None:
     page = opened(name, scheme="dark")
-    if name == "diagnosis":  # a log of which there is more to say
+    if name == "diagnosis":  # a diagnosis with long notes
         noted = "'beforeend', '<p>What was noted of this log, in words that fill two lines of the sheet. '.repeat(2)"
         page.evaluate(f"for (let i = 0; i < 3; i++) document.getElementById('condition').insertAdjacentHTML({noted})")
     edges = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
@@ -236,7 +236,7 @@ def test_a_logarithmic_axis_zooms_by_shares_of_decades_and_its_model_is_download
     panel.focus()
     page.keyboard.press("ArrowRight")
     middle = float(figure.locator(".place").inner_text().split(":")[1])
-    assert 2.0 < middle < 12.0  # from 0.25 to 500 Hz the middle is at 11 Hz, and on a linear axis at 250 Hz
+    assert 2.0 < middle < 12.0  # of 0.25 to 500 Hz, the middle is 11 Hz; 250 Hz on a linear axis
     before = panel.screenshot()
     figure.get_by_role("button", name="Zoom in").click()
     figure.get_by_role("button", name="Higher").click()

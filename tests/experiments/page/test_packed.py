@@ -1,4 +1,4 @@
-"""A page carries numbers in 16 bits a value, and long series by their ends."""
+"""A page stores numbers in 16 bits each, and long series as extremes."""
 
 import zlib
 from base64 import b64decode
@@ -13,7 +13,7 @@ from plant.arrays import Array
 
 
 def unpacked(one: dict[str, object]) -> Array:
-    """Return what the script of a page makes of a series."""
+    """Return a series as the script of a page unpacks it."""
     data = zlib.decompress(b64decode(str(one["data"])), -zlib.MAX_WBITS)
     with np.errstate(over="ignore"):
         codes = np.cumsum(np.frombuffer(data, "<i2"), dtype=np.int16)

@@ -1,4 +1,4 @@
-"""Numbers of pages, at the ends of what a file may hold."""
+"""Numbers on pages, at the ends of the range that a file may contain."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A page runs its own scripts and nothing else."""
+"""A page runs its own scripts and no others."""
 
 import re
 from base64 import b64encode

@@ -1,4 +1,4 @@
-"""A severity as a row of a page: in a reader's unit, or left out where the log does not tell it."""
+"""A severity as a row of a page: in a reader's unit, or left out if the log does not determine it."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The still picture of a chart: well-formed, broken where values are missing, with round ticks."""
+"""The still picture of a chart: well-formed, with gaps at missing values and round ticks."""
 
 import re
 from xml.etree import ElementTree as ET
@@ -102,7 +102,7 @@ def test_a_logarithmic_axis_has_powers_of_ten_at_equal_distances() -> None:
 @pytest.mark.parametrize(("days", "step"), [(20.0, 7), (100.0, 28), (4000.0, 1825)])
 def test_an_axis_of_dates_has_whole_days_that_do_not_touch(days: float, step: int) -> None:
     x = 20700.0 + np.linspace(0.0, days, 50)
-    panels = [Panel("level", "N", [Curve("a", np.ones(50))])] * 5  # two columns
+    panels = [Panel("level", "N", [Curve("a", np.ones(50))])] * 5  # five panels are drawn in two columns
     picture = ET.fromstring(still_picture(x, "date", panels, dates=True))  # noqa: S314 -- our own picture
     texts = [one for one in picture.iter(f"{SVG}text") if re.fullmatch(r"\d{4}-\d\d-\d\d", one.text or "")]
     places = {np.datetime64(str(one.text)): float(one.attrib["x"]) for one in texts}

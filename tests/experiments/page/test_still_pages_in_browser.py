@@ -1,4 +1,4 @@
-"""Pages with still figures alone, of a log's columns and of a study, in a real browser."""
+"""Pages with still figures only, of a log's columns and of a study, in a real browser."""
 
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ def test_no_column_of_a_log_is_out_of_sight(browser: Any, pages: dict[str, Path]
 
 
 def test_the_name_of_a_log_above_a_value_breaks_on_a_phone(browser: Any) -> None:
-    """Of "minor_leakage_minor_friction.csv" the end was cut off on the page that compares two logs."""
+    """Before, the end of "minor_leakage_minor_friction.csv" was cut off on the page that compares two logs."""
     style = (Path(__file__).parents[3] / "experiments/page/templates/report.css").read_text(encoding="utf-8")
     cells = '<th>leakage</th><td data-head="run.csv">1</td><td data-head="minor_leakage_minor_friction_2026.csv">2</td>'
     page = browser.new_page(viewport={"width": 390, "height": 800})
@@ -86,7 +86,7 @@ def test_a_still_page_is_quiet_dark_and_as_wide_as_a_phone(browser: Any, pages: 
 
 
 def test_paper_has_the_colours_of_paper_whatever_the_screen_has(browser: Any, pages: dict[str, Path]) -> None:
-    """Marks of states were printed in the pale colours of dark pages."""
+    """Before, marks of states were printed in the pale colours of dark pages."""
     found: list[Any] = []
     for scheme in ("light", "dark"):
         page = browser.new_page(color_scheme=scheme)
@@ -103,7 +103,7 @@ def test_paper_has_the_colours_of_paper_whatever_the_screen_has(browser: Any, pa
 
 
 def test_paper_has_the_rows_that_are_open_and_a_box_opens_them_all(browser: Any, tmp_path: Path) -> None:
-    """The page of the papers printed on 60 sheets, since paper showed every row of every line."""
+    """Before, the page of the papers printed on 60 sheets, since paper showed all rows."""
     style = (Path(__file__).parents[3] / "experiments/page/templates/report.css").read_text(encoding="utf-8")
     frame = pd.DataFrame({"where": ["Table 1"] * 40 + ["Table 2"] * 40, "verdict": ["reproduced"] * 80})
     table = folded_tables(frame, ("where", "verdict"), "where", "verdict")

@@ -1,4 +1,4 @@
-"""What stands in the two tables of claims and figures, without a run."""
+"""The content of the two tables of claims and figures, without a run."""
 
 import re
 import tomllib

@@ -1,4 +1,4 @@
-"""The parts behind the page: kept, read again, made anew where anything changed; and the page made of real ones."""
+"""The parts behind the page: kept, read again, remade if anything changed; and the page made from real parts."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -28,7 +28,7 @@ class Stop(KeyboardInterrupt):
 
 
 def stand_in(monkeypatch: pytest.MonkeyPatch, stop_at: str = "") -> list[str]:
-    """Let three parts note that they are made; one of them may be interrupted."""
+    """Replace the parts by three that record that they are made; one of them may be interrupted."""
     made: list[str] = []
 
     def maker(name: str) -> Callable[[PapersSettings, Track], Tables]:

@@ -1,4 +1,4 @@
-"""The stack's figures show what its tables contain, and its tables say what the runs gave."""
+"""The stack's figures show the content of its tables, and its tables that of the runs."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""Figure 12 left out: a calibration never runs at 100 V, moves towards its targets, and then says what 100 V gives."""
+"""Figure 12 left out: a calibration without runs at 100 V approaches its targets, and then predicts 100 V."""
 
 from collections.abc import Iterator, Sequence
 
@@ -15,7 +15,7 @@ Case = tuple[PiezoStackParameters, OperatingPoint]
 
 
 def stand_in(cases: Sequence[Case]) -> Iterator[dict[str, float]]:
-    """Yield flows of a formula in the freed values: their top lies at 275 Hz times line area over that of the rig."""
+    """Yield flows from a formula in the freed values, with their peak at 275 Hz times line area over the rig's."""
     for p, at in cases:
         best = 275.0 * p.line_area / RIG.line_area
         size = 1.6 * (p.piston_area / RIG.piston_area) * (at.voltage_v / HIGH_VOLTAGE) * (1.0 - 0.019 * at.load_kg)
@@ -24,7 +24,7 @@ def stand_in(cases: Sequence[Case]) -> Iterator[dict[str, float]]:
 
 @pytest.fixture
 def seen(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """Return the voltages of every run, which the list grows with."""
+    """Return the voltages of all runs; the list grows with each run."""
     voltages: list[float] = []
 
     def noted(cases: Sequence[Case]) -> Iterator[dict[str, float]]:

@@ -1,4 +1,4 @@
-"""What a printed number may differ by from what was rounded to it."""
+"""The largest difference between a printed number and the number that was rounded to it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The published tables load as printed, agree with the parameters, and bear out the errata."""
+"""The published tables load as printed, agree with the parameters, and support the errata."""
 
 from dataclasses import FrozenInstanceError, replace
 from hashlib import sha256
@@ -78,7 +78,7 @@ def test_scalars_cannot_be_changed() -> None:
 
 
 def _dc_gain_intervals(table: pd.DataFrame) -> pd.DataFrame:
-    """Return all that the gains at z = 1 can be, given Table 6's four significant digits (errata E14)."""
+    """Return the range of the gains at z = 1, given Table 6's four significant digits (errata E14)."""
     printed = table.set_index("condition")
     half_digit = printed.map(lambda value: 0.5 * 10.0 ** (np.floor(np.log10(abs(value))) - 3.0))
     numerator, denominator = ["b0", "b1", "b2"], ["a1", "a2"]

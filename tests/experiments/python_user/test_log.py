@@ -1,4 +1,4 @@
-"""A log in the hands of a Python user: as a table, and drawn."""
+"""A log in Python: as a table, and drawn."""
 
 import pickle
 from dataclasses import replace
@@ -122,7 +122,7 @@ def test_a_diagnosis_writes_the_page_of_its_actuator(log: hs.Log, tmp_path: Path
 
 @pytest.fixture
 def fits(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
-    """Channels of each log that bulk modulus is estimated from."""
+    """Return the channels of each log from which bulk modulus is estimated."""
     from estimation.eha import estimate as module
 
     asked, estimated = list[tuple[str, ...]](), module.estimate_clean
@@ -216,7 +216,7 @@ def test_what_is_no_time_and_no_size_is_refused_in_a_sentence(log: hs.Log) -> No
 
 
 def test_a_channel_without_a_sample_is_left_out_of_a_record_made_by_hand_and_of_a_part(log: hs.Log) -> None:
-    """The fit asked for "a signal with at least one finite sample", of no file and no channel."""
+    """Before, the fit asked for "a signal with at least one finite sample", without naming file or channel."""
     late = log["differential_pressure_pa"].copy()
     late[: len(log) // 2] = np.nan
     whole = hs.Log(log.record.replace(differential_pressure_pa=late), log.rig)

@@ -1,4 +1,4 @@
-"""Own equations in the hands of a Python user: what is fitted prints, draws, simulates and passes itself on."""
+"""A user's own equations in Python: the fit prints, draws, simulates and can be passed on."""
 
 # ruff: noqa: ARG005 - every slip is given the same log
 

@@ -1,4 +1,4 @@
-"""Models between any channels as a Python user holds them: of one output and of several, fitted and loaded."""
+"""Models between any channels in Python, of one output and of several, fitted and loaded."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from plant.log.record import Record
 
 T = 0.02
 GAINS = {"flow": (2.0, -0.5), "heat": (0.0, 2.0)}
-"""Steady gain from valve and load, by output."""
+"""Steady-state gain from valve and load, by output."""
 
 
 def record(seed: int) -> Record:
@@ -78,8 +78,8 @@ def test_each_model_writes_the_page_that_the_command_does(both: Relation, tmp_pa
 def test_one_model_has_what_it_was_fitted_with_as_attributes_and_two_have_not(both: Relation) -> None:
     one = identified([record(1)], "load", "heat", {"order": 1, "delay": 1})
     assert one.output == "heat"
-    assert one.fit_percent > 95.0  # of the entries
-    assert one.sample_time == pytest.approx(T)  # of the model
+    assert one.fit_percent > 95.0  # an attribute from the entries
+    assert one.sample_time == pytest.approx(T)  # an attribute from the model
     with pytest.raises(NoSuchNameError, match="simulat"):
         _ = one.simulat
     with pytest.raises(NoSuchNameError):
@@ -93,7 +93,8 @@ def test_inputs_alone_are_simulated_too_and_a_log_begins_from_its_measured_outpu
     alone = both.simulate(np.column_stack([log["valve"], log["load"]]))
     begun = both.simulate(opened(log))
     assert alone.shape == begun.shape == (400, 2)
-    np.testing.assert_allclose(alone[100:], begun[100:], atol=1e-6)  # the slowest pole is 0.8
+    # the initial state has decayed: the slowest pole is 0.8
+    np.testing.assert_allclose(alone[100:], begun[100:], atol=1e-6)
     np.testing.assert_allclose(begun[:, 0], log["flow"], atol=0.3)
     assert abs(begun[0, 0] - log["flow"][0]) < abs(alone[0, 0] - log["flow"][0])
 
@@ -125,7 +126,7 @@ def test_saved_models_are_loaded_without_what_was_fitted(both: Relation, tmp_pat
     assert list(loaded.to_frame().columns) == ["structure", "n_values"]
     assert "From valve, load" in str(loaded)
     assert "output-error" in loaded._repr_html_()
-    assert loaded.plot() == []  # it has no log to draw
+    assert loaded.plot() == []  # a loaded model has no log to draw
 
 
 def test_every_output_has_two_drawings(both: Relation) -> None:
@@ -151,7 +152,7 @@ def test_a_table_is_taken_by_the_names_of_its_columns(both: Relation) -> None:
     np.testing.assert_allclose(both.validate(table)["rmse"], both.validate(opened(log))["rmse"])
     alone = both.simulate(np.column_stack([log["valve"], log["load"]]))
     np.testing.assert_allclose(both.simulate(table[["load", "valve"]]), alone)
-    with pytest.warns(LogWarning, match=r"sample time of 0\.02 s"):  # rows without a time are the model's
+    with pytest.warns(LogWarning, match=r"sample time of 0\.02 s"):  # rows without a time have the model's sample time
         np.testing.assert_allclose(both.simulate({"load": log["load"], "valve": log["valve"]}), alone)
     with pytest.raises(HydrostateError, match="channel 'valve' is needed"):
         both.simulate(table[["load"]])
@@ -194,7 +195,7 @@ def bent(seed: int, size: float) -> Record:
 
 def test_inputs_beyond_the_fit_of_a_polynomial_model_are_told() -> None:
     found = identified([bent(1, 1.0)], "valve", "heat", {"structure": "narx", "order": 1, "delay": 1})
-    found.simulate(bent(1, 1.0))  # a warning would be an error
+    found.simulate(bent(1, 1.0))  # pytest turns a warning into an error
     far = bent(2, 4.0)
     for ask in (found.simulate, found.validate, lambda log: found.simulate(log["valve"])):
         with pytest.warns(LogWarning, match="input 'valve' ranges from"):
@@ -220,7 +221,7 @@ def test_a_linear_model_that_stands_in_is_told(monkeypatch: pytest.MonkeyPatch) 
         assert {one.message.note.code for one in said} == {"linear_stands_in"}
     with pytest.warns(LogWarning, match="linear"):
         found.validate(bent(1, 1.0))
-    assert len(told) == 3  # the fits without a block are run once for the result and the warning
+    assert len(told) == 3  # the fits that leave out a block run once, for both the result and the warning
 
 
 def test_rows_that_a_logger_wrote_twice_are_told_and_left_out() -> None:

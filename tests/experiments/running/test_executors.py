@@ -1,4 +1,4 @@
-"""Where a study's tasks run: what a task raises is kept, and a cluster that is not there is said."""
+"""Where a study's tasks run: a task's error is kept, and a missing cluster is reported."""
 
 import sys
 from types import SimpleNamespace

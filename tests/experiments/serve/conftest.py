@@ -1,4 +1,4 @@
-"""A server whose work is done in threads of the test: what stands around the work is tried, not how it ends."""
+"""A server whose work runs in threads of the test: what surrounds the work is tested, not how a process ends."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -42,7 +42,7 @@ Served = Callable[..., TestClient]
 
 @pytest.fixture
 def served(tmp_path: Path, in_threads: None) -> Iterator[Served]:  # noqa: ARG001
-    """Return what makes a server, with its folder and other settings."""
+    """Return a function that makes a server, with its folder and other settings."""
     with ExitStack() as stack:
 
         def make(**settings: Any) -> TestClient:

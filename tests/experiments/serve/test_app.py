@@ -1,4 +1,4 @@
-"""What the server answers: logs that are dropped, and requests that are refused."""
+"""The server's answers to uploaded logs, and to requests that it refuses."""
 
 import re
 import time
@@ -73,7 +73,7 @@ def test_a_name_leads_nowhere(served: Served, tmp_path: Path, name: str, kept: s
     found = dropped(client, name, b"a,b\n1,2\n2,3\n")
     assert found["name"] == kept
     new = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")} - {str(one) for one in before}
-    own = {f"kept/logs/{found['id']}", f"kept/work/{found['id']}"}  # the second goes when the work is tidied away
+    own = {f"kept/logs/{found['id']}", f"kept/work/{found['id']}"}  # the second disappears when the work is tidied up
     known = {"kept", "kept/logs", "kept/pages", "kept/work", "kept/in-use"} | own
     assert {one for one in new if "sqlite" not in one and not one.endswith(".html")} <= known
 

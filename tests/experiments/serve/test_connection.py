@@ -1,4 +1,4 @@
-"""Connections end when a client says nothing, reads nothing, or says what is no HTTP; and only so many are held."""
+"""Connections end if a client is silent, does not read, or sends no HTTP; and their number is limited."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -12,7 +12,7 @@ from experiments.serve import connection
 from experiments.serve.connection import FULL, LATE, PatientProtocol
 
 SOON = 0.02
-"""Patience of these tests [s]."""
+"""Time limit in these tests [s]."""
 
 Heard = list[str]
 App = Callable[[Any, Any, Any], Awaitable[None]]
@@ -22,7 +22,7 @@ POSTED = b"POST / HTTP/1.1\r\nHost: bench\r\nTransfer-Encoding: chunked\r\n\r\n"
 
 
 class Wire(asyncio.Transport):
-    """A transport that keeps what is written to it."""
+    """A transport that records what is written to it."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -60,7 +60,7 @@ def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def connected(app: App = answers) -> tuple[PatientProtocol, Wire]:
-    """Return a connection and its wire, on the loop that runs."""
+    """Return a connection and its transport, on the running loop."""
     config = Config(app, lifespan="off", log_config=None)
     config.load()
     protocol = PatientProtocol(config, ServerState(), {}, asyncio.get_running_loop())
@@ -82,7 +82,7 @@ def test_a_client_that_sends_no_headers_is_told_that_it_is_late() -> None:
         protocol, wire = connected()
         protocol.data_received(ASKED[:20])
         await asyncio.sleep(3.0 * SOON)
-        protocol.data_received(ASKED[20:])  # too late: nothing listens
+        protocol.data_received(ASKED[20:])  # too late: the server no longer reads
         await asyncio.sleep(3.0 * SOON)
         protocol.connection_lost(None)
         return wire
@@ -164,7 +164,8 @@ def test_what_is_no_http_is_refused_and_who_works_on_an_answer_is_told() -> None
         await asyncio.sleep(0)
         protocol.data_received(b"no length\r\n")
         await asyncio.sleep(0.5 * SOON)
-        assert heard[-1:] == ["http.disconnect"]  # before the connection is lost, which would tell it too
+        # already before the connection is lost, which would also cause the message
+        assert heard[-1:] == ["http.disconnect"]
         protocol.connection_lost(None)
         return wire
 

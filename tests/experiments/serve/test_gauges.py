@@ -1,4 +1,4 @@
-"""The process of a stream: what its gauges say of what came, and how it ends."""
+"""The process of a stream: its gauges of the received rows, and its end."""
 
 import signal
 from pathlib import Path
@@ -16,7 +16,7 @@ HEADER = "time_s,motor_speed_rad_s,velocity_m_s\n"
 
 
 class Clock:
-    """A monotonic clock that stands where it is put [s]."""
+    """A monotonic clock that stands at a set time [s]."""
 
     now = 100.0
 
@@ -77,7 +77,7 @@ def test_before_the_watch_has_begun_there_are_no_gauges(sent: list[Any], clock: 
 
 
 class Pipe:
-    """The end of a pipe to a server, which may be gone."""
+    """The end of a pipe to a server that may have ended."""
 
     def __init__(self, gone: bool = False) -> None:
         self.sent: list[Any] = []
@@ -94,7 +94,7 @@ class Pipe:
 
 @pytest.fixture
 def bound(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Return the servers to which the process binds itself; signals stay as they are."""
+    """Return the servers to which the process binds itself; signal handlers are not changed."""
     servers: list[int] = []
     monkeypatch.setattr(gauges, "bind_to_server", servers.append)
     monkeypatch.setattr(gauges, "signal", SimpleNamespace(signal=lambda *_: None, SIGINT=signal.SIGINT, SIG_IGN=None))
@@ -106,7 +106,7 @@ def run(pipe: Pipe, state: Path, server: int = 41) -> None:
 
 
 def rows(*_: object) -> list[str]:
-    """Return three seconds of rows, then garbage alone."""
+    """Return three seconds of rows, then only garbage."""
     return [HEADER, *(f"{0.01 * k:.2f},20,0.01\n" for k in range(300)), *["x,x,0\n"] * 60]
 
 

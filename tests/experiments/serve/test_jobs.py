@@ -1,4 +1,4 @@
-"""The queue: what a server that ended left is taken up, and work that is lost is told so."""
+"""The queue: unfinished work of a server that ended is resumed, and lost work is reported."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -34,7 +34,7 @@ def store(settings: Settings) -> Iterator[Store]:
 
 
 class Ending:
-    """A pool whose work ends as it is told."""
+    """A pool in which each job ends as the test sets it."""
 
     ends: Callable[["Future[Any]"], None]
 
@@ -127,7 +127,7 @@ def test_a_result_that_cannot_be_kept_is_noted_and_its_log_is_worked_on_again_la
 
 @pytest.fixture
 def pending(monkeypatch: pytest.MonkeyPatch) -> list["Future[Any]"]:
-    """Return the futures of a pool whose work is still under way."""
+    """Return the futures of a pool whose jobs are still running."""
     futures: list[Future[Any]] = []
     monkeypatch.setattr(Ending, "ends", staticmethod(futures.append), raising=False)
     monkeypatch.setattr("experiments.serve.jobs.ProcessPool", Ending)
@@ -168,15 +168,15 @@ def test_a_log_that_is_taken_back_leaves_no_file_even_if_its_page_is_written_aft
     for identity in ("a", "b"):
         jobs.submit(added(store, settings, identity))
     pending[0].set_running_or_notify_cancel()
-    jobs.cancel("a")  # too late to leave the queue: its process is at it
+    jobs.cancel("a")  # too late to leave the queue: a process is already working on it
     page_file(settings, "a").write_text("half")
     pending[0].set_result(worked())
-    jobs.cancel("b")  # in time
+    jobs.cancel("b")  # still in the queue
     jobs.cancel("b")
     assert files_of(settings, "a") == files_of(settings, "b") == []
     assert jobs.waiting == 0
     unfinished = [one.id for one in store.unfinished()]
-    assert unfinished == ["a", "b"]  # whoever takes a log back deletes it in the store
+    assert unfinished == ["a", "b"]  # the caller of `cancel` deletes the log in the store
 
 
 def test_a_log_that_is_deleted_in_the_store_meanwhile_leaves_no_page(

@@ -1,4 +1,4 @@
-"""Bodies that are too large, too slow, empty or cut leave nothing behind; who may ask is asked first."""
+"""Bodies that are too large, slow, empty or cut leave nothing behind; permission is checked first."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -45,7 +45,7 @@ def test_a_body_that_stops_or_drips_is_given_up(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(limits, "IDLE", 0.05)
     with pytest.raises(RefusedError, match="stopped coming"):
         received(chunks(b"a", b"b", pause=0.2), tmp_path / "a")
-    monkeypatch.setattr(limits, "IDLE", 60.0)  # a busy machine takes its time between two bytes
+    monkeypatch.setattr(limits, "IDLE", 60.0)  # on a busy machine, much time may pass between two bytes
     monkeypatch.setattr(limits, "GRACE", 0.05)
     with pytest.raises(RefusedError, match="too slowly"):
         received(chunks(*[b"a"] * 20, pause=0.02), tmp_path / "a")
@@ -66,7 +66,7 @@ def test_a_host_that_others_reach_wants_a_token(tmp_path: Path, token: str | Non
 
 
 def guarded(app: Any, folder: Path, **settings: Any) -> tuple[Guard, list[dict[str, Any]], Any]:
-    """Return a guard, what it sends, and what asks it for a page."""
+    """Return a guard, the messages that it sends, and a function that requests a page from it."""
     guard, sent = Guard(app, Settings(folder=folder, **settings)), list[dict[str, Any]]()
 
     async def send(message: Any) -> None:

@@ -1,4 +1,4 @@
-"""Streams: gauges of what came, events that are kept, and what a view is told."""
+"""Streams: gauges of the received rows, stored events, and the messages to a view."""
 
 import asyncio
 import errno
@@ -32,12 +32,12 @@ def stream(tmp_path: Path) -> Iterator[Stream]:
 
 
 def fill(store: Store) -> None:
-    """Let a database take no more, as on a full disk."""
+    """Let a database accept no more data, as on a full disk."""
     store._connection.execute("PRAGMA max_page_count = 1")
 
 
 def heard(stream: Stream, *messages: tuple[str, dict[str, Any]]) -> None:
-    """Let a stream hear what its process would say, and then that this has ended."""
+    """Let a stream receive its process's messages, and then the end of the process."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
 
     def say() -> None:
@@ -76,7 +76,7 @@ def test_a_view_that_comes_back_gets_what_it_missed_and_no_more_than_is_kept(str
 def test_the_state_of_a_stream_is_that_of_its_last_event_and_events_are_kept(stream: Stream) -> None:
     assert stream.state["state"] == "connecting"
     heard(stream, ("event", {"event": "start", "time_s": 0.0, "message": "learning"}))
-    assert stream.state["state"] == "failed"  # its process ended without a word
+    assert stream.state["state"] == "failed"  # its process ended without a final event
     for _ in range(3):
         heard(stream, ("event", {"event": "end", "time_s": None, "outcome": "failed", "message": "nobody answers"}))
     assert (stream.state["state"], stream.state["message"]) == ("failed", "nobody answers")
@@ -87,7 +87,7 @@ def test_the_state_of_a_stream_is_that_of_its_last_event_and_events_are_kept(str
 def test_an_alarm_that_cannot_be_kept_is_told_all_the_same_and_the_watch_goes_on(
     stream: Stream, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The thread that listens ended with a full disk, and the stream stayed "watching" for ever."""
+    """Before, the listening thread ended when the disk was full, and the stream stayed "watching" for ever."""
     fill(stream._store)
     heard(stream, ("event", {"event": "alarm", "message": "x" * 100_000}), ("gauges", {"time_s": 2.0}))
     assert (stream.alarms, stream.revision[0]) == (1, 1)
@@ -165,7 +165,7 @@ def test_a_stream_that_ended_is_watched_anew_and_a_process_that_hangs_is_killed(
     happened: list[str] = []
 
     class Hangs:
-        """A process that says one thing and does not end."""
+        """A process that sends one message and does not end."""
 
         def __init__(self, target: Any, args: tuple[Any, ...], daemon: bool) -> None:
             assert daemon
@@ -226,14 +226,14 @@ def test_a_server_that_closes_ends_the_process_of_every_stream_and_begins_none_a
     begun = threading.Semaphore(0)
 
     class Watches:
-        """A process that runs until it is ended."""
+        """A process that runs until it is terminated."""
 
         def __init__(self, target: Any, args: tuple[Any, ...], daemon: bool) -> None:
             del target, daemon
             self._out, self._name, self._ended = args[0], args[2].address, threading.Event()
 
         def start(self) -> None:
-            self._kept = self._out  # which this process alone holds open
+            self._kept = self._out  # the process's end of the pipe, which only the process keeps open
             self._theirs = os.dup(self._out.fileno())
             begun.release()
 

@@ -1,4 +1,4 @@
-"""A process that a server begins ends with it."""
+"""A process that a server starts ends with the server."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,4 @@
-"""A person who is refused a page reads why, in light and in dark, on a page that may do nothing else."""
+"""A refused request shows its reason to a person, in light and in dark, on a page with its own style only."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ def test_a_browser_is_refused_by_a_page_with_its_own_style_alone(served: Served,
 
 
 def test_what_the_address_lacks_is_named_in_words(served: Served) -> None:
-    """A comparison without logs was refused with "Query first: Field required"."""
+    """Before, a comparison without logs was refused with "Query first: Field required"."""
     client = served()
     assert "The query has no &#x27;first&#x27;; it must give one." in client.get("/compare", headers=BROWSER).text
     assert client.post("/api/logs", content=b"x").json() == {"detail": "the query has no 'name'; it must give one"}

@@ -1,4 +1,4 @@
-"""Which rig file a log takes on a server, and that a log without one gets no wrong numbers."""
+"""Which rig file a log uses on a server; a log without one gets no wrong numbers."""
 
 import os
 from pathlib import Path
@@ -102,7 +102,7 @@ def task(log: Path, folder: Path, name: str) -> Task:
 
 def test_work_takes_the_rig_file_as_it_is_now_and_names_no_folder(rig_folder: Path, tmp_path: Path) -> None:
     log = tmp_path / "kept-under-a-number"
-    log.write_bytes(b"\x00")  # no log: what is told of the rig does not need one
+    log.write_bytes(b"\x00")  # not a log: the result names the rig even so
 
     def rig_of_work(name: str) -> str:
         return work_on(task(log, tmp_path, name)).result["rig"]

@@ -1,4 +1,4 @@
-"""A whole server in a process of its own: hostile clients, a kill in the middle of uploads, a fast stream, a browser.
+"""A whole server in its own process: hostile clients, a kill during uploads, a fast stream, and a browser.
 
 `python -m benchmarks server` measures the same at full length.
 """
@@ -22,12 +22,12 @@ pytestmark = pytest.mark.slow
 MB = 1 << 20
 
 PATIENCE = 120_000
-"""How long a browser waits for a server that has much else to do [ms]."""
+"""How long a browser waits for a busy server [ms]."""
 
 MARK = """([selector, name]) => new MutationObserver(() => { document.documentElement.dataset[name] = "" })
     .observe(document.querySelector(selector), { childList: true })"""
-"""Sets an attribute of the page when an element's content is next set, to the same or not. Attributes can be waited
-for; expressions cannot, since the page's policy forbids eval."""
+"""Sets an attribute of the page when an element's content is next set, whether or not it changes. Tests can wait for
+attributes, but not for expressions, since the page's policy forbids eval."""
 
 
 def test_hostile_clients_get_no_server_error_no_file_outside_the_folder_and_no_memory(tmp_path: Path) -> None:
@@ -67,7 +67,7 @@ def test_what_openapi_allows_and_what_it_does_not_is_answered_as_it_says(tmp_pat
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with (
-        feeding(1800.0, 500.0) as (address, _),  # for longer than all tests on these pages take
+        feeding(1800.0, 500.0) as (address, _),  # longer than all tests on these pages take
         Server(tmp_path_factory.mktemp("served") / "kept", "--watch", f"bench={address}") as server,
     ):
         yield server
@@ -181,7 +181,8 @@ def test_a_log_may_be_dropped_anywhere_and_a_refusal_stays_in_sight(opened: Any)
     page.evaluate(drop, ["empty.csv", ""])
     page.get_by_text("Not taken: empty.csv: the body must be the file itself, but it is empty.").wait_for()
     page.evaluate(MARK, ["[role=status]", "looked"])
-    page.wait_for_selector("html[data-looked]", state="attached")  # the list was asked for and told anew
+    # the list was requested again, and the status was written anew
+    page.wait_for_selector("html[data-looked]", state="attached")
     assert "Not taken: empty.csv" in page.get_by_role("status").inner_text()
     page.evaluate(drop, ["dropped beside.csv", "a,b\n1,2\n3,4\n"])
     page.locator("tr", has_text="dropped beside.csv").locator("td", has_text="failed").wait_for()
@@ -189,14 +190,14 @@ def test_a_log_may_be_dropped_anywhere_and_a_refusal_stays_in_sight(opened: Any)
 
 
 def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_path: Path) -> None:
-    """A log that had failed was shown as waiting again, until the server was next asked."""
+    """Before, a log that had failed was shown as waiting again, until the next request to the server."""
     page, asked, held = opened("home"), list[Any](), list[Any]()
 
     def answer(route: Any) -> None:
         asked.append(route)
         if len(asked) > 1:
             route.continue_()
-        else:  # the next question may come while this one is fetched, and must not be held too
+        else:  # further requests may come while this one is fetched; only the first is held
             held.append((route, route.fetch()))
 
     page.route("**/api/logs?most=*", answer)
@@ -204,13 +205,14 @@ def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_pa
     page.set_input_files("#file", str(tmp_path / "late answer.csv"))
     row = page.locator("tr", has_text="late answer.csv")
     row.locator("td", has_text="failed").wait_for()
-    while not held:  # the first answer may be fetched later than the second
+    while not held:  # the first answer may arrive after the second
         page.wait_for_timeout(20)
     (route, old) = held[0]
     with page.expect_response("**/api/logs?most=*") as late:
         route.fulfill(response=old)
     late.value.finished()
-    page.evaluate("fetch('api/health').then((answer) => answer.text())")  # what came before it was dealt with by then
+    # by then the page has handled all earlier answers
+    page.evaluate("fetch('api/health').then((answer) => answer.text())")
     assert "failed" in row.inner_text()
 
 
@@ -229,7 +231,7 @@ def test_an_alarm_stays_in_the_heading_of_the_live_view(opened: Any, raised: int
     body = f"event: history\ndata: {json.dumps({**told, 'events': [ready, *[alarm] * raised]})}\n\n"
     page = opened("live")
     page.route("**/events", lambda route: route.fulfill(content_type="text/event-stream", body=body))
-    page.add_init_script(  # the answer ends at once, which is no matter here
+    page.add_init_script(  # the stream of events ends at once, which does not matter here
         "addEventListener('DOMContentLoaded', () => new MutationObserver((all) => all.forEach((one) => {"
         "document.documentElement.dataset.said ??= one.target.textContent }))"
         ".observe(document.querySelector('.live-state'), { childList: true }))"
@@ -241,13 +243,13 @@ def test_an_alarm_stays_in_the_heading_of_the_live_view(opened: Any, raised: int
 
 
 def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> None:
-    from playwright.sync_api import expect  # which not every developer has
+    from playwright.sync_api import expect  # not every developer has it
 
     page = opened("live")
     assert page.locator(".gauges li").count() == 7
-    assert page.locator(".histories canvas").count() >= 3  # a channel each; a balance has one once it is learnt
+    assert page.locator(".histories canvas").count() >= 3  # one per channel; a balance has one after it is learnt
     assert page.locator(".alarms tbody tr").first.is_visible()
-    when = page.locator(".alarms tbody th").first  # a date and a time on one line
+    when = page.locator(".alarms tbody th").first  # date and time are on one line
     assert when.evaluate("one => one.offsetHeight < 3 * parseFloat(getComputedStyle(one).fontSize)")
     told = page.locator(".gauges strong").last
     rows = told.inner_text()

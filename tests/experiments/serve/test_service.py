@@ -1,4 +1,4 @@
-"""Pages over many logs are made once, and anew where that helps; files of logs that are kept stay."""
+"""A page over many logs is made once, and again only if that helps; the files of stored logs remain."""
 
 import asyncio
 import socket
@@ -36,7 +36,7 @@ def kept(service: Service, identity: str, state: str = DONE) -> None:
 
 
 class Views:
-    """What makes pages, as it is told; it counts what is asked."""
+    """A maker of pages with set results, which records the requests."""
 
     def __init__(self) -> None:
         self.rows: list[list[str]] = []

@@ -1,4 +1,4 @@
-"""What a server keeps: it is there after the file is opened again, and nothing else is taken for it."""
+"""The store of a server: its content survives a restart, and no other file is taken for a store."""
 
 import os
 import sqlite3
@@ -19,7 +19,7 @@ Opened = Callable[[str], Store]
 
 @pytest.fixture
 def opened(tmp_path: Path) -> Iterator[Opened]:
-    """Return what opens a file by its name, to be closed after the test."""
+    """Return a function that opens a store by its name; it is closed after the test."""
     with ExitStack() as stack:
         yield lambda name: stack.enter_context(closing(Store(tmp_path / name)))
 

@@ -1,4 +1,4 @@
-"""Rows to a filter: what a stream that breaks, or misses a sensor, makes of the estimate, and what is said."""
+"""Rows to a filter: the estimate and the messages if a stream breaks, or a sensor is missing."""
 
 from pathlib import Path
 from typing import Any

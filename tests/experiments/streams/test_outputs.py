@@ -1,4 +1,4 @@
-"""Outputs of a watch beside its lines: a real broker, metrics for Prometheus, a view on a terminal."""
+"""Outputs of a watch beside its lines: a real broker, metrics for Prometheus, and a view on a terminal."""
 
 import io
 import json
@@ -25,14 +25,14 @@ LINE = re.compile(r'[a-z_]+(\{([a-z]+="([^"\\\n]|\\[\\"n])*",?)+\})? [0-9.e+-]+|
 
 
 class OneBalance:
-    """What an output asks of a watch."""
+    """The part of a watch that an output uses."""
 
     balances, scores, thresholds = ("flow", "motion"), (3.0, 1.0), (12.0, float("inf"))
     sample_time, last, unlearnt = 1e-3, 5.0, 0.0
 
 
 def watching() -> Watched:
-    """A watch that has learnt, has seen two samples, and has raised an alarm."""
+    """Return a watch that has learnt, has received two samples, and has raised an alarm."""
     told = Watched("bench\x1b[2J.csv")
     told.start("bench", OneBalance(), "paper", 1.0)  # type: ignore[arg-type]
     told.saw({"position_m": np.array([0.1, 0.25]), "velocity_m_s": np.array([0.0, np.nan])}, 5.0, gap=True)
@@ -97,7 +97,7 @@ def test_an_address_that_cannot_be_published_on_is_refused_with_what_is_wanted(a
 def test_a_broker_that_does_not_answer_is_named() -> None:
     pytest.importorskip("paho.mqtt.client", reason="paho-mqtt is an extra")
     with socket.socket() as held:
-        held.bind(("127.0.0.1", 0))  # bound and not listening: nobody answers, and nobody else takes it
+        held.bind(("127.0.0.1", 0))  # bound but not listening: nobody answers, and no other program takes the port
         address = f"mqtt://127.0.0.1:{held.getsockname()[1]}/press"
         done = CliRunner().invoke(app, ["watch", "-", "--publish", address], input=rows(1.0))
     assert "no broker answers" in json.loads(done.stdout)["message"]
@@ -116,7 +116,7 @@ def test_metrics_tell_how_far_each_balance_is_from_an_alarm() -> None:
     assert values['hydrostate_stream_valuechannel="position_m"'] == "0.25"
     assert (values["hydrostate_stream_rows_total"], values["hydrostate_stream_gaps_total"]) == ("2", "1")
     assert (values["hydrostate_stream_up"], values["hydrostate_stream_alarms_total"]) == ("1", "1")
-    assert "motion" not in text  # its threshold is not learnt yet
+    assert "motion" not in text  # its threshold is not yet learnt
     assert "hydrostate_logs" not in text
 
 
@@ -161,4 +161,4 @@ def test_lines_stay_on_standard_output_beside_a_view_that_is_not_on_the_same_ter
     done = CliRunner().invoke(app, ["watch", str(log), "--view", "--metrics", "0"])
     assert done.exit_code == 0, done.stderr
     assert [json.loads(line)["event"] for line in done.stdout.splitlines()] == ["start", "end"]
-    assert "ended, 0 alarms" in " ".join(done.stderr.split())  # a long path breaks the line
+    assert "ended, 0 alarms" in " ".join(done.stderr.split())  # a long path wraps the line

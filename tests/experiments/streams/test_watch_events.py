@@ -1,4 +1,4 @@
-"""Events of a watch as entries: what an alarm says of its cause, and what is not known."""
+"""Events of a watch as entries: the cause of an alarm, and what is unknown."""
 
 import threading
 from types import SimpleNamespace

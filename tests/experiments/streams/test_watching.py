@@ -1,4 +1,4 @@
-"""Rows to a watch: what a broken, late, slow or restarted stream does to it is said, and changes nothing else."""
+"""Rows to a watch: the effect of a broken, late, slow or restarted stream is reported, and limited to that."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,15 +21,15 @@ from plant.log.stream.source import BatchCounts
 
 T = 0.01
 SPEED = 50.0
-"""Motor speed, forward and back [rad/s]."""
+"""Motor speed, in both directions [rad/s]."""
 
 HEADER = "time_s,motor_speed_rad_s,velocity_m_s"
 LEARNT = engine.LEAST_LEARNING
-"""Least time that a watch learns [s]."""
+"""Least time for which a watch learns [s]."""
 
 
 def rows(start: float, seconds: float, share: float = 1.0, seed: int = 0, T: float = T) -> list[str]:
-    """Return rows of an actuator whose piston moves by a share of what the pump delivers, reversed every 0.1 s."""
+    """Return rows of an actuator whose piston moves by a share of the pump's delivery and may reverse every 0.1 s."""
     p, rng = EhaParameters(), np.random.default_rng(seed)
     count = round(seconds / T)
     speed = SPEED * rng.choice((-1.0, 1.0), count // 10 + 1).repeat(10)[:count]
@@ -46,7 +46,7 @@ def asked(**changes: Any) -> WatchSettings:
 def watched(
     lines: list[str], state: Path | None = None, header: str = HEADER, **changes: Any
 ) -> tuple[list[dict[str, Any]], WatchEvents]:
-    """Watch lines; return what is told, and who told it."""
+    """Watch lines; return the events, and the object that reported them."""
     events: list[dict[str, Any]] = []
     told = WatchEvents(events.append)
     watch_rows(told, [header + "\n", *lines], asked(**changes), "bench", state)
@@ -58,7 +58,7 @@ def named(events: list[dict[str, Any]]) -> list[str]:
 
 
 def position(lines: list[str], offset: float = 0.0, T: float = T) -> list[str]:
-    """Return the same rows, position instead of velocity."""
+    """Return the same rows, with position instead of velocity."""
     cells = [line.split(",") for line in lines]
     place = offset + np.cumsum([float(velocity) for *_, velocity in cells]) * T
     return [f"{time},{speed},{x:.12f}\n" for (time, speed, _), x in zip(cells, place, strict=True)]
@@ -74,7 +74,7 @@ def test_what_changes_during_a_gap_is_no_alarm_for_it_is_learnt_again(capsys: py
     assert "bench: warning: rows are missing before 72" in capsys.readouterr().err
     assert named(events) == ["start", "ready"]
     assert told.rows == len(healthy) + len(leaking[0])
-    short, _ = watched(healthy + leaking[1])  # half a second is filled with missing samples
+    short, _ = watched(healthy + leaking[1])  # a gap of half a second is filled with missing samples
     assert named(short) == ["start", "ready", "alarm", "change"]
     assert capsys.readouterr().err == ""
 
@@ -104,7 +104,7 @@ def test_the_state_is_kept_while_the_stream_runs_and_not_only_at_its_end(
     lines = rows(0.0, 35.0)
     _, told = watched(lines, tmp_path / "state.npz")
     assert told.watch is not None
-    steps = np.diff(times[:-1])  # the last one is that of the end
+    steps = np.diff(times[:-1])  # the last save is that at the end of the stream
     assert len(times) == 4
     assert np.all((steps > SAVED_EVERY) & (steps < SAVED_EVERY + 1.0))
     _, _, travelled = load_state(tmp_path / "state.npz")
@@ -114,7 +114,7 @@ def test_the_state_is_kept_while_the_stream_runs_and_not_only_at_its_end(
 def test_a_disk_that_is_full_for_a_while_ends_no_watch_and_is_told_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A watch ended at its first save: with a full disk it never got to its alarms."""
+    """Before, a watch ended at its first save on a full disk, and never reached its alarms."""
     import faults.watch.saved as saved
 
     save, asked = saved.save_watch, list[float]()

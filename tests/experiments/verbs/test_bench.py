@@ -1,4 +1,4 @@
-"""Logs of a bench that is not our simulator: bulk modulus and class against what was true."""
+"""Logs of a bench that is not our simulator: bulk modulus and class compared with the truth."""
 
 import csv
 import json
@@ -48,7 +48,7 @@ def test_bulk_modulus_of_all_foreign_logs_comes_within_a_tenth(truth: dict[str, 
         for one in results("estimate", *logs, "--condition", name, "--start", 0.5e8, "--start-std", 1e8):
             errors[one["file"]] = one["bulk_modulus_pa"]["value"] / float(truth[one["file"]]["bulk_modulus_pa"]) - 1.0
     assert len(errors) == 18
-    assert max(abs(error) for error in errors.values()) < 0.1  # measured: all 18, the largest 6.7 %; 14 are asked for
+    assert max(abs(error) for error in errors.values()) < 0.1  # measured: all 18, largest error 6.7 %; required: 14
 
 
 def test_a_constant_would_miss_some_foreign_logs(truth: dict[str, dict[str, str]]) -> None:
@@ -57,7 +57,7 @@ def test_a_constant_would_miss_some_foreign_logs(truth: dict[str, dict[str, str]
 
 
 EACH_LEVEL = ("normal", "minor_leakage_major_friction", "major_leakage_minor_friction")
-"""Conditions that have every level of leakage and of friction between them."""
+"""Conditions that together contain every level of leakage and of friction."""
 
 
 def test_a_foreign_log_of_each_level_gets_its_class(truth: dict[str, dict[str, str]]) -> None:
@@ -70,7 +70,7 @@ def test_a_foreign_log_of_each_level_gets_its_class(truth: dict[str, dict[str, s
 @pytest.mark.slow
 def test_every_foreign_log_gets_its_class(truth: dict[str, dict[str, str]]) -> None:
     found = {one["file"]: one["condition"] for one in results("diagnose", *truth)}
-    assert found == {log: row["name"] for log, row in truth.items()}  # measured: all 18; 15 are asked for
+    assert found == {log: row["name"] for log, row in truth.items()}  # measured: all 18; required: 15
 
 
 @pytest.mark.slow
@@ -78,7 +78,7 @@ def test_without_pressure_every_foreign_log_gets_its_class_and_is_close_or_not_c
     truth: dict[str, dict[str, str]],
 ) -> None:
     found = results("diagnose", *truth, "--no-pressure")
-    # measured: all 18; 15 are asked for
+    # measured: all 18; required: 15
     assert {one["file"]: one["condition"] for one in found} == {log: row["name"] for log, row in truth.items()}
     close = 0
     for one in found:

@@ -1,4 +1,4 @@
-"""Two studies side by side at the terminal and for a program."""
+"""A comparison of two studies, on the terminal and for a program."""
 
 import json
 from pathlib import Path
@@ -43,7 +43,7 @@ def test_a_program_gets_the_rows_that_the_screen_shows(stores: tuple[Path, Path]
     assert "near [%]" in shown.stdout
     assert f"{error['difference']:+.3g}" in shown.stdout
     same = CliRunner().invoke(app, ["compare", str(stores[0]), str(stores[0])])
-    assert "A [%]" in same.stdout  # studies of one name
+    assert "A [%]" in same.stdout  # two studies with the same name are called A and B
 
 
 @pytest.mark.slow

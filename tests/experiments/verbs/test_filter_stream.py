@@ -38,7 +38,7 @@ def run(*arguments: object, given: str | None = None) -> tuple[int, list[dict[st
 
 def test_a_stream_tells_bulk_modulus_with_its_deviation_while_it_comes(log: Path) -> None:
     code, told, said = run("-", given=log.read_text())
-    assert (code, "warning" in said) == (0, False)  # the first run may say that it compiles
+    assert (code, "warning" in said) == (0, False)  # not `said == ""`: the first run may announce that it compiles
     assert [one["event"] for one in told] == ["start", *["estimate"] * 4, "end"]
     last = told[-2]
     assert last["values"]["bulk_modulus_pa"] == pytest.approx(P.bulk_modulus, rel=0.01)
@@ -50,7 +50,7 @@ def test_a_restart_between_two_rows_changes_no_digit(log: Path, tmp_path: Path) 
     state, (header, *rows) = tmp_path / "filter.npz", log.read_text().splitlines(keepends=True)
     run("-", "--state", state, given=header + "".join(rows[:2345]))
     told = run("-", "--state", state, given=header + "".join(rows[2346:]))[1]
-    # row 2345 never came: it is a missing sample, as it is to a filter that is not restarted
+    # row 2345 never came: it is a missing sample, for a restarted filter as for one that ran on
     lost = run("-", given=header + "".join(rows[:2345] + rows[2346:]))[1]
     assert told[0]["message"] == "continued"
     assert (told[-2]["values"], told[-2]["std"]) == (lost[-2]["values"], lost[-2]["std"])

@@ -79,7 +79,7 @@ ROW = {"verb": "diagnose", "outcome": "ok", "found_condition": "normal", "reason
 
 
 class Stored:
-    """A store of a batch study, as far as its rows go."""
+    """A store of a batch study that has rows only."""
 
     def __init__(self, rows: list[dict[str, Any]]) -> None:
         self._rows = rows

@@ -20,7 +20,7 @@ from plant.sensors.sensors import BENCH
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Return two logs of one linear plant of order 2 that answers after three samples."""
+    """Return two logs of a linear plant of order 2 with a delay of three samples."""
     folder = tmp_path_factory.mktemp("identify")
     truth = LinearModel([0.0, 0.0, 0.0, 2e-5, 1e-5], [1.0, -1.5, 0.6], 1e-3, "u", "y", delay=3)
     paths: list[Path] = []
@@ -55,7 +55,7 @@ def test_the_residual_is_tested_and_drawn(logs: list[Path], tmp_path: Path) -> N
     for entry in json.loads(ran.stdout):
         low, high = entry["dc_gain"]["ci95"]
         assert low < 3e-4 < high
-        assert min(entry["validation"].values()) > 1e-3  # the model is the truth's
+        assert min(entry["validation"].values()) > 1e-3  # the model has the structure of the true plant
     for log in logs:
         assert (tmp_path / f"fit-{log.stem}.png").read_bytes()[:4] == b"\x89PNG"
 

@@ -135,7 +135,7 @@ def test_each_channel_is_the_surest_column_of_all_files_of_a_test(tmp_path: Path
 
 def test_what_a_clock_lacks_is_said_in_the_unit_of_its_column(tmp_path: Path) -> None:
     steps = np.ones(40)
-    steps[7] = 5.0  # three are missing
+    steps[7] = 5.0  # a gap
     steps[20] = 0.0
     steps[30] = -1.0
     time = np.concatenate([[0.0], np.cumsum(steps)])

@@ -1,4 +1,4 @@
-"""What a terminal shows of the other actuators' logs."""
+"""What a terminal shows for logs of the other actuators."""
 
 from pathlib import Path
 
@@ -42,7 +42,7 @@ def test_logs_of_two_kinds_of_actuator_are_told_apart_by_their_columns(
         assert made.exit_code == 0, made.output
     done = invoke("estimate", *logs.values())
     assert done.exit_code == 0, done.output
-    assert opened == ["stack.csv", "motor.csv"]  # once each, though the first kind that is tried is not theirs
+    assert opened == ["stack.csv", "motor.csv"]  # each is opened once, although the first kind tried is not theirs
     for quantity in ("outlet reed stiffness", "gas fraction"):
         assert quantity in done.stdout
     for kind, log in logs.items():

@@ -16,8 +16,8 @@ from plant.sensors.sensors import BENCH
 COMMAND = Path(sys.executable).parent / "hydrostate"
 
 
-# A process that is started counts what the one that started it held until then. So a small process starts the command,
-# and reports the most memory of its only child.
+# A child process inherits the peak memory of its parent. So a small process starts the command,
+# and reports the peak memory of its only child.
 BETWEEN = """
 import resource, subprocess, sys
 subprocess.run(sys.argv[1:], check=True)
@@ -26,7 +26,7 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, file=sys.stderr)
 
 
 def finding_and_peak(verb: str, path: Path) -> tuple[dict[str, object], int]:
-    """What `hydrostate VERB` finds in a log, and the most memory that this one process held in bytes."""
+    """Return the finding of `hydrostate VERB` for a log, and the peak memory of its process in bytes."""
     command = [sys.executable, "-c", BETWEEN, COMMAND, verb, path, "--json"]
     run = subprocess.run(command, capture_output=True, check=True, text=True)  # noqa: S603 - our own command
     (finding,) = json.loads(run.stdout)

@@ -1,4 +1,4 @@
-"""`hydrostate serve`: what it refuses before it listens, and what it says when a package is missing."""
+"""`hydrostate serve`: what it refuses before it listens, and its message if a package is missing."""
 
 import sys
 from pathlib import Path
@@ -61,7 +61,7 @@ def test_the_folder_that_keeps_everything_is_told(tmp_path: Path, monkeypatch: p
 
 
 def test_a_missing_package_is_named_with_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "experiments.serve.server", None)  # as where what it imports is missing
+    monkeypatch.setitem(sys.modules, "experiments.serve.server", None)  # as if a package that it imports were missing
     assert "pip install 'hydrostate[serve]'" in refused()
 
 

@@ -1,4 +1,4 @@
-"""`hydrostate size-cylinder`: a small calculator at the command line."""
+"""`hydrostate size-cylinder`: a small calculator on the command line."""
 
 import json
 import math

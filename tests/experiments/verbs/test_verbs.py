@@ -40,7 +40,7 @@ def _no_constant(name: str) -> None:
     raise AssertionError(f"JSON has no {name}")
 
 
-asked = cache(results)  # of one log, however many claims rest on it
+asked = cache(results)  # each command runs once, however many tests use its result
 
 
 def codes(result: dict[str, Any]) -> list[str]:
@@ -54,7 +54,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def steps(folder: Path) -> dict[str, Path]:
-    """One run in minor friction, in the three formats."""
+    """Return one run in minor friction, in the three formats."""
     paths = {suffix: folder / f"steps{suffix}" for suffix in (".csv", ".parquet", ".mat")}
     for path in paths.values():
         made = invoke(
@@ -104,13 +104,13 @@ def test_the_seed_alone_decides_a_run(folder: Path) -> None:
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         assert invoke(*arguments, folder / f"{name}.mat", "--seed", seed).exit_code == 0
         record = read_record(folder / f"{name}.mat")
-        assert record.metadata["plant"] == "circuit"  # what diagnose explains in every condition
+        assert record.metadata["plant"] == "circuit"  # the plant that diagnose explains in every condition
         runs.append(record["position_m"])
     assert np.array_equal(runs[0], runs[1])
     assert not np.array_equal(runs[0], runs[2])
 
 
-# `tests/log_formats` reads one record from each format
+# `tests/log_formats` covers all formats, each with one record
 @pytest.mark.parametrize("formats", [".csv .mat", pytest.param(".csv .parquet .mat", marks=pytest.mark.slow)])
 def test_estimate_comes_back_from_every_format(steps: dict[str, Path], formats: str) -> None:
     paths = [steps[suffix] for suffix in formats.split()]
@@ -203,7 +203,7 @@ def test_identify_says_that_the_absence_of_pressure_costs_nothing() -> None:
 @pytest.mark.parametrize(
     "formats",
     [
-        pytest.param((".csv",), id="csv"),  # that `estimate` reads each format is asked above
+        pytest.param((".csv",), id="csv"),  # the test above covers all formats, with `estimate`
         pytest.param((".csv", ".parquet", ".mat"), marks=pytest.mark.slow, id="every format"),
     ],
 )
@@ -269,7 +269,7 @@ def test_transfer_functions_are_scored_on_request(
         return dict(zip(CONDITIONS, made, strict=True))
 
     monkeypatch.setattr(faults.eha.bank, "identify_bank", bank)
-    paths, rig = list(steps.values()), folder / "no paper.toml"  # whose library is not the one that ships
+    paths, rig = list(steps.values()), folder / "no paper.toml"  # its library is not the one that ships
     rig.write_text(rig_template().replace("piston_area = 0.00152", "piston_area = 0.00153"))
     first, second, _ = results("diagnose", *paths, "--transfer-functions", "--seed", 3, "--rig", rig)
     scores = first["transfer_function_scores"]
@@ -278,7 +278,7 @@ def test_transfer_functions_are_scored_on_request(
     assert second["transfer_function_scores"] == pytest.approx(scores)
     assert drawn == [float(np.random.default_rng(3).random())]
     assert "best transfer function" in invoke("diagnose", paths[0], "--transfer-functions").stdout
-    assert len(drawn) == 1  # the paper's rig has the library that ships
+    assert len(drawn) == 1  # nothing is identified for the paper's rig: its library ships
 
 
 @pytest.mark.slow

@@ -196,7 +196,7 @@ def test_a_heartbeat_comes_while_no_row_does_and_every_event_has_the_clock(
     assert events[-1]["event"] == "end"
     taken = [one["samples"] for one in events if one["event"] == "alive"]
     silent = [one["silent_s"] for one in events if one["event"] == "alive" and one["samples"] == 400]
-    assert taken == sorted(taken)  # a beat may fall between two pieces of what came
+    assert taken == sorted(taken)  # a heartbeat may fall between two received pieces
     assert len(silent) >= 2
     assert silent == sorted(silent)
     stamps = [datetime.fromisoformat(one["clock"]) for one in events]

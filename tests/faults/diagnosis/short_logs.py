@@ -1,4 +1,4 @@
-"""Short logs of one actuator, and fits that are made up, for the numbers of the diagnosis."""
+"""Short logs of one actuator, and made-up fits, for tests of the diagnosis's numbers."""
 
 from dataclasses import replace
 from functools import cache
@@ -45,7 +45,7 @@ def noted(notes: Any) -> list[dict[str, Any]]:
 def log(
     condition: str = "minor_leakage", drive: str = "prbs", after: str = "", seconds: float = 3.0, share: float = 0.55
 ) -> Record:
-    """Return a short log of a circuit, which another condition may befall midway."""
+    """Return a short log of a circuit, with or without a change to another condition midway."""
     rng = np.random.default_rng(11)
     speed = make_drive(drive, seconds, 2e-3, PAPER, rng)
     first = circuit_of(parameters_for(CONDITIONS[condition]))
@@ -73,7 +73,7 @@ def classes(condition: str = "minor_leakage", *, pressure: bool = True) -> Class
 
 
 def made_fit(off: Array, scales: Array, information: Array, one: Blocks) -> PointFit:
-    """Return a fit at some place off the second condition, whose residuals are what the blocks show."""
+    """Return a fit at a distance from the second condition, with residuals of 3 % of the blocks' outputs."""
     return PointFit(
         ACTUATOR.conditions[1] + off, 5.0, information, scales, 0.97 * one.outputs, np.ones((7, *one.outputs.shape))
     )

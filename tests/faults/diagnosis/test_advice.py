@@ -1,4 +1,4 @@
-"""Advice is computed from what a log holds: what it holds already is not asked for."""
+"""Advice depends on what a log contains: it does not ask for what is already there."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ ALIKE = (ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(),)
 
 
 def staircase(levels: list[float], dwell: float = 0.5, sample_time: float = 1e-3, noise: float = 0.0) -> Record:
-    """Levels held one after the other, behind a motor's lag of 10 ms."""
+    """Return levels held one after the other, behind a motor's lag of 10 ms."""
     wanted = np.repeat(levels, max(1, round(dwell / sample_time)))
     share, speed = 1.0 - np.exp(-sample_time / 0.01), np.empty(len(wanted))
     now = 0.0
@@ -226,7 +226,8 @@ def test_soft_oil_is_to_be_bled_where_its_interval_lies_below_the_limit(
     assert codes(said) == ([] if percent is None else [AdviceCode.BLEED])
     assert [note.data["percent"] for note in said] == ([] if percent is None else [pytest.approx(percent)])
     volumes = [] if modulus.value is None or percent is None else [pytest.approx(1e-3 * 2e8 / modulus.value)]
-    assert [note.data["volume"] for note in said] == volumes  # for which the log would give the bulk modulus of the rig
+    # the chamber volume at which the log would give the rig file's bulk modulus
+    assert [note.data["volume"] for note in said] == volumes
 
 
 def test_a_chamber_volume_that_contradicts_the_log_is_to_be_corrected_to_its_value() -> None:
@@ -237,5 +238,5 @@ def test_a_chamber_volume_that_contradicts_the_log_is_to_be_corrected_to_its_val
     )
     (stiff,) = rig_advice([RigCode.OIL_STIFFER.note(ratio=2.0)], written, written)
     assert "else correct chamber_volume from 0.00108 to 0.00054 m^3; then" in str(stiff)
-    assert rig_advice([RigCode.OIL_SOFTER.note(ratio=0.5)], written, written) == ()  # it may be air
+    assert rig_advice([RigCode.OIL_SOFTER.note(ratio=0.5)], written, written) == ()  # the cause may be air
     assert codes(rig_advice([Note(RigCode.SINGLE_ROD, {})], written, written)) == [AdviceCode.GIVE_TWO_SIDES]

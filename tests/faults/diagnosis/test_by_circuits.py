@@ -1,4 +1,4 @@
-"""Verdicts on logs whose truth is known."""
+"""Verdicts on logs whose true condition is known."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -46,7 +46,7 @@ def population() -> list[Drawn]:
 
 @pytest.fixture(scope="module")
 def verdicts(population: list[Drawn]) -> Mapping[bool, list[Diagnosis]]:
-    """Return the verdicts on the logs, with pressure and without."""
+    """Return the verdicts on the logs, by whether pressure is logged."""
     return {pressure: [diagnosed(log.record, pressure=pressure) for log in population] for pressure in (True, False)}
 
 
@@ -58,7 +58,7 @@ def test_every_log_of_a_seed_gets_its_class_and_none_is_flagged(
     found = verdicts[pressure]
     assert [one.condition for one in found] == [log.condition for log in population]
     assert [one.against for one in found] == [()] * len(found)
-    sums = [sum(one.probabilities.values()) for one in found]  # without pressure less what a worn pump may have
+    sums = [sum(one.probabilities.values()) for one in found]  # without pressure, less the probability of a worn pump
     assert all(one == pytest.approx(1.0) if pressure else 0.5 < one < 1.0 + 1e-9 for one in sums)
 
 
@@ -100,7 +100,7 @@ def test_severities_come_with_intervals_that_mostly_cover(
 
 
 SATURATED = "pressure saturates at 60 %"
-"""The one kind that is mended: samples at the end of the sensor's range are left out before anything is fitted."""
+"""The only kind that is corrected: samples at the end of the sensor's range are left out before anything is fitted."""
 
 
 @pytest.mark.slow
@@ -148,7 +148,7 @@ def test_the_shipped_numbers_say_where_they_come_from() -> None:
 
 
 def stretched(by: float, weight: float) -> Calibration:
-    """The shipped calibration with wider intervals and other weights."""
+    """Return the shipped calibration with wider intervals and other weights."""
     shipped = shipped_calibration()
     parts = (
         {
@@ -168,11 +168,11 @@ def test_intervals_and_probabilities_are_those_of_the_calibration(*, pressure: b
     once, twice = (diagnose_clean(log, ACTUATOR, calibration=stretched(by, 1.0)) for by in (1.0, 2.0))
     for name in shipped_calibration().widths(pressure):
         (low, high), (lower, higher) = once.severity[name].ci95 or (0.0, 0.0), twice.severity[name].ci95 or (0.0, 0.0)
-        on = np.log if name == "bulk_modulus" else np.asarray  # which stays positive
+        on = np.log if name == "bulk_modulus" else np.asarray  # bulk modulus stays positive
         assert on(higher) - on(lower) == pytest.approx(2.0 * (on(high) - on(low))), name
     assert once.probabilities == twice.probabilities
     undecided = diagnose_clean(log, ACTUATOR, calibration=stretched(1.0, 0.0)).probabilities
-    left = sum(undecided.values())  # by faults that a log without pressure does not exclude
+    left = sum(undecided.values())  # the rest is for faults that a log without pressure does not exclude
     assert left == pytest.approx(sum(once.probabilities.values()))
     assert list(undecided.values()) == pytest.approx([left / len(CONDITIONS)] * len(CONDITIONS))
     assert once.probabilities[once.condition] > 0.5

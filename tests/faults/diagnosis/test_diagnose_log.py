@@ -1,4 +1,4 @@
-"""When a log's class is unknown, and what stands in its place: every way that leads there, on short logs."""
+"""Why the class of a log may be unknown, and what is reported instead: each reason, on short logs."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -61,7 +61,7 @@ def test_a_pressure_that_its_logger_averaged_is_believed_and_its_lag_found(rows:
     found = diagnose_log(record.replace(**{PRESSURE: averaged}), RIG)
     assert (found.outcome, found.condition, found.unknown) == (Outcome.OK, "minor_leakage", False)
     assert found.quantities["bulk_modulus"].value == pytest.approx(HEALTHY.bulk_modulus, rel=0.005)
-    assert ClassCode.ONE_SCALE not in {note.code for note in found.all_notes}  # pressure plays its part
+    assert ClassCode.ONE_SCALE not in {note.code for note in found.all_notes}  # pressure contributes
     late = [note.data["late_ms"] for note in found.all_notes if note.code == RigCode.PRESSURE_LATE]
     assert late == pytest.approx([0.5 * (rows - 1)], abs=0.3)
 
@@ -191,7 +191,7 @@ def test_oil_that_is_no_kin_of_the_rigs_is_compared_with_the_rigs(share: float, 
 
 
 def test_without_pressure_a_refused_fit_of_motion_leaves_the_circuits_bulk_modulus() -> None:
-    """A refused number with a narrow interval stood there, and nothing where it was not observable."""
+    """Before, a rejected number with a narrow interval was reported, and no number if it was not observable."""
     record = log(duration=1.0).replace(**{PRESSURE: None})
     large = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=4.0, motion_percent=2.0)
     gate = Gate(False, (large,))
@@ -205,7 +205,7 @@ def test_without_pressure_a_refused_fit_of_motion_leaves_the_circuits_bulk_modul
 
 
 def test_without_position_a_refused_filter_leaves_the_circuits_bulk_modulus() -> None:
-    """A filter's number that its own check refused, a third of the truth, stood beside a reliable class."""
+    """Before, a filter's number that its own check rejected, a third of the truth, stood beside a reliable class."""
     record = log(duration=1.0).replace(position_m=None)
     gate = Gate(False, (EstimateCode.ESTIMATE_WANDERS.note(state="bulk_modulus_pa", ratio=47.0),))
     refused = BulkModulusEstimate(Outcome.OK, 7e7, 1e6, 0.004, gate, "pressure", ("velocity_m_s", PRESSURE), {}, {})
@@ -219,7 +219,7 @@ def test_where_nothing_moves_pump_wear_is_no_matter() -> None:
     rng, count = np.random.default_rng(17410), 1500
     noise = {"motor_speed_rad_s": 0.05, "position_m": 1e-6, PRESSURE: 2e3}
     still = {name: size * rng.standard_normal(count) for name, size in noise.items()}
-    still["motor_speed_rad_s"] += 2.0 * np.sin(2.0 * np.pi * 2e-3 * np.arange(count))  # 0.1 mm of the piston
+    still["motor_speed_rad_s"] += 2.0 * np.sin(2.0 * np.pi * 2e-3 * np.arange(count))  # 0.1 mm of piston travel
     record, wear = Record(1e-3, still), RigCode.WEAR_NOT_EXCLUDED.note(percent=30.0, half_width=30.0)
     unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(0.5),), "flow", ("position_m", PRESSURE), 0.5)
     found = diagnose_log(record, RIG, (clean_log(record, HEALTHY), replace(unseen, remarks=(wear,))))

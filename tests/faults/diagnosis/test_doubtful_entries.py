@@ -1,4 +1,4 @@
-"""Entries of a rig file that do not go together."""
+"""Entries of a rig file that contradict each other."""
 
 from dataclasses import replace
 

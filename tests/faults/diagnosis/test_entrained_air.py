@@ -1,4 +1,4 @@
-"""A log whose oil holds air is compared with conditions in that oil, and its air is told as it was found."""
+"""A log whose oil contains air is compared with conditions in that oil, and the air is reported as estimated."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def aerated_log() -> Record:
 
 
 def estimate() -> BulkModulusEstimate:
-    """Return what the balance of flows makes of that log, without its search."""
+    """Return the estimate of the flow balance for that log, without its search."""
     value = 1.0 / (1.0 / HEALTHY.bulk_modulus + SHARE * ATMOSPHERE / STATED**2)
     told = {"bulk_modulus": (value, 4e5), "air_softness": (SHARE * ATMOSPHERE, 15.0), "air_quickness": (0.0, 0.05)}
     return BulkModulusEstimate(
@@ -49,7 +49,7 @@ def estimate() -> BulkModulusEstimate:
 
 
 def test_the_class_of_a_log_with_air_is_told_in_its_oil_and_the_air_as_it_was_found() -> None:
-    """Around oil as soft throughout a circuit left 23 % of the velocity, and the class was unknown."""
+    """With oil equally soft at every pressure, a circuit left 23 % of the velocity, and the class was unknown."""
     record = aerated_log()
     found = diagnose_log(record, Rig("paper", HEALTHY), (clean_log(record, HEALTHY), estimate()))
     assert (found.condition, found.unknown, found.against) == (CONDITION, False, ())
@@ -57,7 +57,7 @@ def test_the_class_of_a_log_with_air_is_told_in_its_oil_and_the_air_as_it_was_fo
     assert found.probabilities[CONDITION] > 0.9
     told = {note.code for note in found.notes}
     assert RigCode.AIR_ENTRAINED in told
-    assert RigCode.OIL_SOFTER not in told  # the oil without its air is the rig's
+    assert RigCode.OIL_SOFTER not in told  # without its air, the oil is the rig file's
     air, oil = found.severities["entrained_air"], found.severities["bulk_modulus"]
     assert air.value == pytest.approx(100.0 * SHARE)
     assert oil.value == estimate().value

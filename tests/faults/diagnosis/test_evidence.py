@@ -1,4 +1,4 @@
-"""Evidences on one scoreboard: what each says, how they add up, and what a stuck piston leaves open."""
+"""Several evidences on one scoreboard: the score of each, their sum, and what a stuck piston leaves open."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ WEIGHTS = {"transfer_functions": 0.0, "models": 0.5, "innovations": 0.0, "parame
 
 
 def blocks(pressure: float | None) -> Blocks:
-    """Return a log of a stuck piston, pushed with a pressure."""
+    """Return a log of a stuck piston under a pressure."""
     still = np.zeros(50)
     pushed = None if pressure is None else np.linspace(-pressure, pressure, 50)
     return Blocks(np.zeros(501), 1e-3, 10, still, pushed, np.ones(1 if pushed is None else 2))
@@ -82,7 +82,7 @@ def test_no_evidence_is_surer_than_its_bound_and_the_order_stays() -> None:
 
 
 RESTING = np.exp(ACTUATOR.conditions[:, COORDINATES.index("friction_rest")]) / ACTUATOR.circuit.piston_area
-"""Pressures at which each condition's piston breaks loose [Pa]."""
+"""Pressures at which the piston breaks loose in each condition [Pa]."""
 
 
 def test_frictions_that_would_hold_the_piston_alike_score_alike_and_leakage_still_counts() -> None:
@@ -96,7 +96,8 @@ def test_frictions_that_would_hold_the_piston_alike_score_alike_and_leakage_stil
 @pytest.mark.parametrize(("share", "open_still"), [(1.1, True), (1.3, False)])
 def test_a_friction_is_left_open_up_to_a_fifth_beyond_its_breakaway_force(share: float, *, open_still: bool) -> None:
     scores = np.random.default_rng(1).normal(size=len(NAMES))
-    second = sorted(set(RESTING.round(-2).tolist()))[-2]  # the strongest friction of all has none to be mistaken for
+    # the strongest friction cannot be confused with a stronger one
+    second = sorted(set(RESTING.round(-2).tolist()))[-2]
     found = friction_left_open(scores, blocks(share * second), ACTUATOR)
     assert np.all(np.isfinite(found))
     assert (found.tolist() != scores.tolist()) == open_still
@@ -144,7 +145,7 @@ def test_nominal_circuits_say_no_more_than_the_log_tells_and_where_it_tells_all_
     apart = np.array([[0.0, 2.0, 60.0], [2.0, 0.0, 60.0], [60.0, 60.0, 0.0]])
     assert within_reach(scores, apart).tolist() == [-2.0, 0.0, -40.0]
     assert within_reach(scores, 1e9 * (1.0 - np.eye(3))).tolist() == scores.tolist()
-    # what cannot be told from the second best is no farther below it than the second best itself
+    # a condition is no farther below another than the log separates the two
     chain = np.array([[0.0, 50.0, 1.0], [50.0, 0.0, 50.0], [1.0, 50.0, 0.0]])
     assert within_reach(scores, chain).tolist() == [-5.0, 0.0, -6.0]
     assert within_reach(np.array([-np.inf, 0.0]), np.array([[0.0, 3.0], [3.0, 0.0]])).tolist() == [-3.0, 0.0]

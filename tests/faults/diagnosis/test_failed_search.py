@@ -1,4 +1,4 @@
-"""A fit of motion whose search failed speaks against no log that the motion form follows at the circuit's values."""
+"""A failed search for motion parameters is no objection if the motion form follows the log at the circuit's values."""
 
 from dataclasses import replace
 from typing import Any, cast
@@ -31,10 +31,10 @@ FROZE = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.
 def left(
     monkeypatch: pytest.MonkeyPatch, share: float, form: str = "motion", noises: float = 1.0, pump: float = 0.0
 ) -> tuple[Any, ...]:
-    """Return what is left of three doubts, where the circuit's values leave a share of the motion.
+    """Return the remaining ones of three objections, if the motion form leaves ``share`` of the motion.
 
-    The circuit leaves so many times the sensors' noise of a velocity that is a hundred times as large. The pump's whole
-    flow would move the piston ``pump`` times as fast as it moves.
+    The circuit leaves ``noises`` times the sensors' noise of a velocity, which is a hundred times that noise. The
+    pump's whole flow would move the piston ``pump`` times as fast as it moves.
     """
     one = log(pressure=False)
     per_speed = PAPER.pump_displacement / PAPER.piston_area

@@ -1,4 +1,4 @@
-"""Nine filters of one log."""
+"""Nine filters on one log."""
 
 from collections.abc import Iterable
 from types import SimpleNamespace

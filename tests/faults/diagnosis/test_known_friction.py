@@ -1,4 +1,4 @@
-"""Friction by the balance of forces, on records made of Newton's second law alone."""
+"""Friction from the force balance, on records that are made from Newton's second law alone."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def record(
     quantum: float = 1e-6,
     step: float = STEP,
 ) -> Record:
-    """A piston under two sines of velocity, rated velocity at the most, and what rings, with a bench's noise."""
+    """Return a piston under two sines of at most rated velocity and a ringing, with the noise of a bench."""
     rng, time = np.random.default_rng(seed), np.arange(0.0, 6.0, step)
     pace = np.array([0.7, 2.0, 55.0]) * 2.0 * np.pi
     sizes = np.array([0.5 * RATED, 0.5 * RATED, rings]) / pace
@@ -57,12 +57,12 @@ def test_friction_at_rated_velocity_is_told_as_well_as_is_said(load: float) -> N
 
 
 def test_a_piston_that_rings_and_a_coarse_encoder_leave_friction_where_it_is() -> None:
-    """At 55 Hz, a straight line over 2 ms lost 2 % of the velocity; a rounding's noise was taken for velocity."""
+    """At 55 Hz, a straight line over 2 ms lost 2 % of the velocity, and noise from rounding was taken for velocity."""
     found = [friction_by_forces(record(seed, rings=6e-3, quantum=3e-6, step=1e-4), RIG, RATED) for seed in range(6)]
     off = np.mean([one.forces - (REST, BENT, WHOLE) for one in found if one is not None], axis=0)
     left = np.mean([np.diag(one.covariance) for one in found if one is not None], axis=0) ** 0.5
     assert all(found)
-    assert np.all(np.abs(off) < 1.3 * left)  # three deviations of a mean of six
+    assert np.all(np.abs(off) < 1.3 * left)  # three standard deviations of a mean of six logs
 
 
 def test_a_mass_that_is_a_tenth_off_is_not_taken_for_friction() -> None:
@@ -119,5 +119,5 @@ def test_severities_take_the_friction_and_leave_leakage() -> None:
     assert (
         severities(fits(NARROW), ACTUATOR, {"added_friction": 2.0}, rubbing=known)["added_friction"]
         == told["added_friction"]
-    )  # factors were fitted to circuits
+    )  # calibration factors were fitted to circuits, and do not apply
     assert told["leakage_flow"] == circuit["leakage_flow"]

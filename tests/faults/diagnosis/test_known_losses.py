@@ -1,4 +1,4 @@
-"""Severities with the leakage that the balance of flows tells, which no seal hides."""
+"""Severities with the leakage from the flow balance, which does not depend on the seals."""
 
 from dataclasses import replace
 from functools import partial

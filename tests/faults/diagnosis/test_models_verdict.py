@@ -1,4 +1,4 @@
-"""What nine errors alone say: a class, none, or that no model fits."""
+"""The verdict from nine model errors alone: a class, no class, or no model that fits."""
 
 import math
 
@@ -67,7 +67,8 @@ def test_channels_that_are_0_throughout_are_named_and_tell_no_class() -> None:
 def test_a_best_model_that_leaves_more_than_half_of_the_signal_fits_none(
     share: float, said: bool, channels: int
 ) -> None:
-    least = share * (0.1 if channels == 1 else 1.0)  # one channel's error has its unit, two are shares already
+    # the error of one channel has its unit, those of two are already shares
+    least = share * (0.1 if channels == 1 else 1.0)
     found = models_verdict(scored(least, channels=channels, rest=2.0), RECORD)
     assert [note.code for note in found.against] == ([AgainstCode.NONE_FITS] if said else [])
     if said:
@@ -86,5 +87,5 @@ def test_a_best_model_that_leaves_more_than_half_of_the_signal_fits_none(
 def test_where_no_model_fits_only_errors_of_all_that_are_alike_tell_none_apart(
     least: tuple[float, float], rest: float, outcome: Outcome
 ) -> None:
-    """Under a load, two unlike models left 77.6 % each, and the others 80 to 96 %."""
+    """Under a load, two different models left 77.6 % each, and the others 80 to 96 %."""
     assert models_verdict(scored(*least, channels=2, rest=rest), RECORD).outcome is outcome

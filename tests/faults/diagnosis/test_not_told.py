@@ -1,4 +1,4 @@
-"""What a log does not tell of how bad it is."""
+"""Severities that a log does not determine."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ FRICTION = ("friction_rest", "friction_quadratic", "friction_rated")
 
 
 def blind(*names: str) -> np.ndarray:
-    """Return a covariance that is the prior's in some coordinates and narrow in the others."""
+    """Return a covariance that is the prior's in some coordinates and narrow in all others."""
     sizes = np.array([WEAK[i, i] * 50.0 if name in names else 1e-4 for i, name in enumerate(COORDINATES)])
     return np.diag(sizes)
 
@@ -77,7 +77,7 @@ def test_a_piston_that_stands_still_for_an_unknown_reason_has_no_condition(
 def test_without_position_velocity_tells_that_a_piston_stands_still(
     pressure: float | None, reason: AgainstCode
 ) -> None:
-    """Its noise hides what friction does; a circuit had 50 times the friction, or leakage and friction in one."""
+    """Velocity noise hides friction; a circuit had 50 times the friction, or leakage and friction were inseparable."""
     time = 1e-3 * np.arange(2000)
     sign, noise = np.sign(np.sin(3.0 * time)), 1e-3 * np.random.default_rng(2).standard_normal(2000)
     record = Record(1e-3, {"motor_speed_rad_s": 100.0 * sign, "velocity_m_s": noise})

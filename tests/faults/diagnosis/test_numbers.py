@@ -1,4 +1,4 @@
-"""What a diagnosis makes of short logs and of made-up fits, kept in `numbers.json`."""
+"""Results of the diagnosis on short logs and made-up fits, kept in `numbers.json`."""
 
 from dataclasses import replace
 from typing import Any

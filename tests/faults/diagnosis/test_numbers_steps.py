@@ -1,4 +1,4 @@
-"""Single steps of a diagnosis: of a fit, of a bias, of where a log splits, kept in `numbers_steps.json`."""
+"""Single steps of a diagnosis (fits, biases, splits of a log), kept in `numbers_steps.json`."""
 
 from dataclasses import replace
 from typing import Any
@@ -25,7 +25,7 @@ SIZES = {"pump": 1.0, "motor_speed_rad_s": 80.0, "differential_pressure_pa": 3e5
 
 
 def biased(*found: tuple[float, float]) -> dict[str, tuple[float, float]]:
-    """Return values and errors of the biases of pump, speed and pressure, zero where none is given."""
+    """Return values and errors of the biases of pump, speed and pressure; those that are not given are zero."""
     return dict(zip(SIZES, [*found, *[(0.0, 0.0)] * (3 - len(found))], strict=True))
 
 
@@ -57,7 +57,8 @@ def rounds_of_free_fits() -> dict[str, Any]:
     afar = ACTUATOR.conditions[8] + 0.4
     for name, start, gained in (("usual", None, 0.5), ("roughly", None, 50.0), ("from afar", afar, 0.5)):
         with patch.object(class_fit, "predicted", side_effect=runs) as asked:
-            fit = fit_freely(replace(blocks()), ACTUATOR, "normal", start, gained)  # whose runs are not known yet
+            # a copy of the blocks, whose runs are not yet cached
+            fit = fit_freely(replace(blocks()), ACTUATOR, "normal", start, gained)
         told[name] = {"rounds": Roughly(asked.call_count, 0.1), "cost": Roughly(fit.cost, 1e-3)}
     with patch.object(class_fit, "predicted", side_effect=runs) as asked:
         fit_classes(blocks("major_friction"), ACTUATOR)
@@ -107,7 +108,7 @@ def biases_on_either_side() -> dict[str, Any]:
         with patch.object(out_of_model, "_one_step", return_value=found):
             told[name] = noted(_biases(blocks(), classes(), ACTUATOR))
     for gain, pressure in ((19.0, True), (21.0, True), (2.9, False), (3.1, False)):
-        found = biased((-0.2 if pressure else 0.2, 0.0))  # a worn pump is sought elsewhere without pressure
+        found = biased((-0.2 if pressure else 0.2, 0.0))  # without pressure, another step looks for a worn pump
         if not pressure:
             del found["differential_pressure_pa"]
         one = blocks(pressure=pressure)
@@ -147,7 +148,7 @@ def splits_near_the_ends_of_a_log() -> dict[str, Any]:
 
 @NUMBERS.case()
 def parts_of_a_log_about_alarms() -> dict[str, Any]:
-    """A log of 100 s at 50 Hz, in which the watch is told to raise alarms."""
+    """Return the parts of a log of 100 s at 50 Hz, about alarms that the watch is made to raise."""
     from faults.watch.events import Alarm
 
     long = Record(0.02, {name: np.resize(log()[name], 5000) for name in log()}, start_time=7.0)

@@ -1,4 +1,4 @@
-"""What speaks for and against conditions on either side of the limits, kept in `numbers_verdict.json`."""
+"""Reasons for and against conditions on both sides of the limits, kept in `numbers_verdict.json`."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -198,11 +198,11 @@ def innovations_of_the_bank() -> dict[str, Any]:
 
 
 STANDING = (*((reach, 0.3) for reach in (0.3, 0.5, 0.7)), *((5.0, rest) for rest in (0.03, 0.05, 0.07, 0.09, 0.12)))
-"""Reaches [mm] and rests [s] on either side of where a piston counts as one that stands at an end."""
+"""Reaches [mm] and rests [s] on both sides of the limits from which a piston rests at an end."""
 
 
 def resting(reach: float, rest: float) -> Blocks:
-    """Return a piston that goes out, rests so long, and comes back."""
+    """Return a piston that moves out, rests for a time, and comes back."""
     time = 0.01 * np.arange(201)
     gone = np.interp(time, [0.0, 0.05, 0.05 + rest, 0.1 + rest], [0.0, reach, reach, 0.0])
     return replace(blocks(), velocity=np.diff(gone) / 0.01)
@@ -228,7 +228,7 @@ def pistons_at_their_ends() -> dict[str, Any]:
 
 
 def verdict_of(asked: EhaParameters, calls: list[float], blocks: Blocks) -> Any:
-    """Return a diagnosis that objects until the load is 300 N."""
+    """Return a diagnosis with an objection unless the load is within 40 N of 300 N."""
     calls.append(asked.load_force)
     off = 300.0 - asked.load_force
     notes: tuple[Note, ...] = (

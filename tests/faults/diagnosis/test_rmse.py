@@ -1,4 +1,4 @@
-"""The condition whose model errs least is the condition that the actuator is in."""
+"""The model with the smallest error is that of the actuator's condition."""
 
 from functools import cache
 from pathlib import Path
@@ -137,7 +137,7 @@ def test_rmse_ignores_what_is_missing() -> None:
 
 @pytest.fixture(scope="module")
 def linear_bank() -> dict[str, LinearModel]:
-    """Two discrete lags of different gain, in place of identified functions."""
+    """Return discrete lags of different gain, in place of identified transfer functions."""
     return {
         name: LinearModel(
             np.array([0.0, 0.1 * gain]), np.array([1.0, -0.9]), 1e-3, "motor_speed_rad_s", "velocity_m_s", delay=1

@@ -1,4 +1,4 @@
-"""Severities in the units of a shop."""
+"""Severities in the units of a workshop."""
 
 import math
 from dataclasses import replace
@@ -72,7 +72,7 @@ def test_severities_rise_with_their_fault() -> None:
 
 
 def fits(spread: np.ndarray, place: int = 0) -> ClassFits:
-    """A circuit at a condition's centre, with what is believed of it."""
+    """Return a circuit at the centre of a condition, with a given covariance."""
     empty = np.zeros((10, 2))
     best = PointFit(ACTUATOR.conditions[place], 0.0, np.eye(7), np.ones(2), empty, np.zeros((7, 10, 2)))
     nine = np.zeros(len(CONDITIONS))
@@ -124,7 +124,7 @@ def test_a_calibrated_width_stretches_its_own_interval_and_no_other() -> None:
                 assert size(wide[other]) == pytest.approx((2.5 if other == name else 1.0) * size(one)), (name, other)
     loose = severities(fits(np.diag(np.full(7, 0.3**2))), ACTUATOR, {"bulk_modulus": 4.0})["bulk_modulus"]
     assert loose.ci95 is not None
-    assert 0.0 < loose.ci95[0] < 1e8  # it was negative
+    assert 0.0 < loose.ci95[0] < 1e8  # the lower end was negative
 
 
 def test_intervals_are_95_percent_of_what_is_believed() -> None:

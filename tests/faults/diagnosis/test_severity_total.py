@@ -1,4 +1,4 @@
-"""What severities owe to the rig file: laws of scale, tried by diagnosing again with another rig."""
+"""The dependence of severities on the rig file: scaling laws, tested by another diagnosis with a different rig."""
 
 from dataclasses import asdict, replace
 from functools import cache
@@ -36,7 +36,7 @@ def log() -> Record:
 
 
 def severities_of(entry: str = "", factor: float = 1.0) -> dict[str, Quantity]:
-    """Return severities under a rig of which an entry is larger."""
+    """Return the severities for a rig with one entry larger by a factor."""
     record, rig = log(), HEALTHY
     if entry == PRESSURE_GAIN:
         record = record.replace(**{PRESSURE: record[PRESSURE] / factor})
@@ -46,7 +46,7 @@ def severities_of(entry: str = "", factor: float = 1.0) -> dict[str, Quantity]:
 
 
 def added_by(entry: str) -> dict[str, float]:
-    """Return by how much an entry that may be 2 % off moves each severity, by the laws."""
+    """Return the shift of each severity by the laws, for an entry with an error of 2 %."""
     found = {name: one.value for name, one in severities_of().items() if one.value is not None}
     bare = {name: Quantity(value, "1", (value, value)) for name, value in found.items()}
     spread = {entry: Spread.of(float(np.log1p(STEP)) / 1.96)}

@@ -1,4 +1,4 @@
-"""A velocity sensor that is wrong is named and left out, where motor speed and pressure agree with position."""
+"""A wrong velocity sensor is named and left out if motor speed and pressure agree with position."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -46,7 +46,7 @@ def diagnosed(velocity: Array) -> Finding:
 
 
 def stuck_when_slow(velocity: Array) -> Array:
-    """Return a velocity whose sensor reads 0 in slow motion."""
+    """Return a velocity from a sensor that reads 0 in slow motion."""
     return np.where(np.abs(velocity) < 0.5 * velocity.std(), 0.0, velocity)
 
 
@@ -82,7 +82,7 @@ def test_a_velocity_is_left_out_only_where_the_balance_of_flows_confirms_the_pos
 
 @pytest.mark.parametrize(("gain", "offset", "told"), [(0.9, 0.0, False), (1.0, 2e-3, True)])
 def test_at_one_motor_speed_a_wrong_gain_may_be_that_of_position(gain: float, offset: float, *, told: bool) -> None:
-    """The balance of flows does not tell that from a worn pump then; any other error of position breaks it."""
+    """At one speed, the flow balance cannot separate it from a worn pump; any other error of position breaks it."""
     clean, estimate = seen()
     wave = offset * np.sin(4.0 * clean.record.time)
     changed = replace(clean, record=clean.record.replace(**{VELOCITY: gain * clean.record[VELOCITY] + wave}))

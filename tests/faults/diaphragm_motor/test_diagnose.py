@@ -1,4 +1,4 @@
-"""Faults named from logs of the diaphragm motor."""
+"""Faults of the diaphragm motor, named from its logs."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What speaks against a diagnosis of the diaphragm motor."""
+"""Reasons against a diagnosis of the diaphragm motor."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,4 @@
-"""What faults of the diaphragm motor change, and how logs are laid beside them, kept in `numbers.json`."""
+"""Effects of faults of the diaphragm motor, and the comparison of logs with them, kept in `numbers.json`."""
 
 from dataclasses import replace
 from typing import Any

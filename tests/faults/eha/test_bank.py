@@ -1,4 +1,4 @@
-"""A bank holds the nine conditions, and its mathematical models predict what the plant does."""
+"""A bank holds the nine conditions, and its mathematical models predict the plant."""
 
 from dataclasses import replace
 

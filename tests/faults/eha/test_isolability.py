@@ -75,7 +75,7 @@ def test_a_distance_is_that_of_two_normal_laws_with_the_spread_of_a_class_and_th
     found = condition_distances(P, drive, T, channels)
     log = Record(T, {"motor_speed_rad_s": drive})
     healthy = predict_run(log, P)
-    # noise, and an error of 5 % that lasts 50 ms: it is as much as 25 samples' own
+    # sensor noise, and a model error of 5 % that lasts 50 ms and so counts like the errors of 25 samples
     noise = {"velocity_m_s": BENCH.velocity_noise**2}
     noise["differential_pressure_pa"] = BENCH.pressure_noise**2 + BENCH.pressure_quantum**2 / 12.0
     sizes = {name: np.sqrt(one + 0.05**2 * (0.05 / T) * np.var(healthy[name])) for name, one in noise.items()}

@@ -1,4 +1,4 @@
-"""What faults of the gear-pump actuator change, and how far apart they are, kept in `numbers.json`."""
+"""Effects of faults of the gear-pump actuator, and how far apart they are, kept in `numbers.json`."""
 
 from dataclasses import asdict
 from typing import Any

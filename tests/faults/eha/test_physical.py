@@ -1,4 +1,4 @@
-"""Throttle voltages are Table 1's conditions, and physical faults change what they should and nothing else."""
+"""Throttle voltages give the conditions of Table 1, and a physical fault changes only what it should."""
 
 from dataclasses import asdict
 

@@ -18,7 +18,7 @@ from faults.own_classes.classifier import Classifier
 
 
 def runs(seed: int, count: int, apart: float, width: int = 3) -> tuple[Array, np.ndarray[Any, Any]]:
-    """Return features and labels of two classes that take turns every five runs."""
+    """Return features and labels of two classes that alternate every five runs."""
     rng = np.random.default_rng(seed)
     labels = np.tile(np.repeat(["sound", "worn"], 5), count // 10)
     return rng.standard_normal((count, width)) + apart * (labels == "worn")[:, None], labels
@@ -27,7 +27,7 @@ def runs(seed: int, count: int, apart: float, width: int = 3) -> tuple[Array, np
 @parametrize_with_checks([Classifier()])
 @pytest.mark.filterwarnings("ignore")
 def test_it_keeps_the_conventions_of_scikit_learn(estimator: Any, check: Any) -> None:
-    # the checks divide by zero on purpose; our floating point raises otherwise
+    # the checks divide by zero on purpose, and our tests otherwise raise floating-point errors
     with np.errstate(all="ignore"):
         check(estimator)
 
@@ -55,7 +55,7 @@ def test_probabilities_are_those_of_the_two_normal_distributions_that_made_the_r
 
 
 def test_neighbours_that_are_copies_do_not_make_probabilities_sure() -> None:
-    # every run ten times over, and blocks of ten apart from one another: the labels are noise
+    # every run occurs ten times, each ten form a group, and the labels are noise
     x, labels = runs(5, 60, 0.0)
     order = np.random.default_rng(6).permutation(60)
     x, labels = np.repeat(x[order], 10, axis=0), np.repeat(labels[order], 10)
@@ -65,7 +65,7 @@ def test_neighbours_that_are_copies_do_not_make_probabilities_sure() -> None:
 
 
 def signs(seed: int) -> tuple[Array, np.ndarray[Any, Any], list[str]]:
-    """Return runs whose state shows with the opposite sign under the other load."""
+    """Return runs in which the sign of the state's effect depends on the load."""
     rng = np.random.default_rng(seed)
     worn, load = np.arange(300) // 10 % 2, np.arange(300) // 5 % 2
     x = np.column_stack([(2 * worn - 1.0) * (2 * load - 1.0), 5.0 * load]) + 0.3 * rng.standard_normal((300, 2))

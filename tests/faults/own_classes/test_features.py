@@ -97,7 +97,7 @@ def bands_of(samples: int, octaves: int, sample_time: float = 0.01) -> list[str]
 def test_bands_are_octaves_below_half_the_rate_as_far_as_a_run_has_lines_in_them() -> None:
     assert bands_of(200, 3) == ["6.25-12.5 Hz", "12.5-25 Hz", "25-50 Hz"]
     assert bands_of(200, 0) == []
-    # 16 samples of 10 ms: lines every 6.25 Hz, and no edge below half of that
+    # 16 samples of 10 ms: spectral lines are 6.25 Hz apart, and no band edge is below half of that
     assert bands_of(16, 10) == ["3.125-6.25 Hz", "6.25-12.5 Hz", "12.5-25 Hz", "25-50 Hz"]
 
 
@@ -106,7 +106,7 @@ def test_the_shape_of_a_run_is_that_of_its_moments_and_its_power_that_of_its_spe
     run = 5.0 + 2.0 * rng.exponential(size=400)
     row = channel_features(["p"], [run[None]], 0.01, Recipe(2, octaves=1)).loc[0]
     left = run - run.mean()
-    floor = 1e-4 * np.sqrt(np.mean(run**2))  # what is taken for rounding
+    floor = 1e-4 * np.sqrt(np.mean(run**2))  # what counts as rounding error
     deviation = run.std() + floor
     wanted = {
         "mean 1/2": run[:200].mean(),
@@ -120,5 +120,5 @@ def test_the_shape_of_a_run_is_that_of_its_moments_and_its_power_that_of_its_spe
     lines = [np.sum(windowed * np.exp(-2j * np.pi * k * np.arange(400) / 400)) for k in range(101, 201)]
     wanted["power 25-50 Hz"] = np.log(
         np.mean(np.abs(lines) ** 2) / 400 + floor**2
-    )  # lines 0.25 Hz apart, from above 25 Hz
+    )  # lines are 0.25 Hz apart, the first above 25 Hz
     assert {name: row[f"p {name}"] for name in wanted} == pytest.approx(wanted, rel=1e-6)

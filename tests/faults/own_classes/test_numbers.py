@@ -1,4 +1,4 @@
-"""What features, folds and classifiers make of a few runs, kept in `numbers.json`."""
+"""Results of features, folds and classifiers on a few runs, kept in `numbers.json`."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The page on own classes runs, block after block, and its claims are its own assertions."""
+"""The page on own classes runs, block by block; its assertions check its claims."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A quantity of the piezo stack says a fault where it is large and sure, and nothing where either is missing."""
+"""A fault of the piezo stack is reported if its quantity is both large and certain."""
 
 from dataclasses import replace
 from types import SimpleNamespace

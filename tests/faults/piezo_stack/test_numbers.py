@@ -1,4 +1,4 @@
-"""What faults of the piezo stack change, and from which size each is named, kept in `numbers.json`."""
+"""Effects of faults of the piezo stack, and the size from which each is named, kept in `numbers.json`."""
 
 from dataclasses import asdict, replace
 from typing import Any

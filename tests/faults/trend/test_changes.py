@@ -1,4 +1,4 @@
-"""Jumps are seen where they are, by what came before and the next few logs."""
+"""Jumps are detected at the right log, from the logs before and the next few after."""
 
 import numpy as np
 import pytest

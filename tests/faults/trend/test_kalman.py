@@ -1,4 +1,4 @@
-"""The trend's filter, against what is known in closed form and against its own claims."""
+"""The filter of a trend, against closed-form results and against its own claims."""
 
 from dataclasses import replace
 
@@ -67,12 +67,12 @@ def test_two_steps_are_one_step_of_twice_the_time() -> None:
 def test_a_slope_that_feeds_on_itself_moves_as_its_equation_says(step: float, pace: float) -> None:
     rates = np.array([[0.0, 1.0], [0.0, pace]])
 
-    def brought(after: float) -> Array:  # by noise on the slope a while ago
+    def brought(after: float) -> Array:  # covariance from noise on the slope some time ago
         found = expm(rates * after)[:, 1]
         return np.outer(found, found)
 
     move, covariance = exponential_growth(step, pace)
-    # below a relative growth of 1e-4 in a step it is left out
+    # below 1e-4 per step, relative growth is neglected
     assert move == pytest.approx(expm(rates * step)[:, 1], rel=1e-4 if pace * step < 1e-4 else 1e-12)
     assert covariance == pytest.approx(quad_vec(brought, 0.0, step)[0], rel=1e-4 if pace * step < 1e-4 else 1e-6)
 

@@ -1,4 +1,4 @@
-"""What a trend makes of short series on either side of its thresholds, kept in `numbers.json`."""
+"""Trends of short series on both sides of the thresholds, kept in `numbers.json`."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -30,7 +30,7 @@ SOME = [0, 5, 16, 40, 77, 120, 166, 203, 221]
 
 
 def series(kind: str) -> Array:
-    """Return 24 levels, over healthy as 0 and the limit as 1."""
+    """Return 24 levels, scaled so that healthy is 0 and the limit is 1."""
     noise = np.random.default_rng(21).standard_normal(24)
     k = np.arange(24)
     return {
@@ -161,7 +161,7 @@ def jumps_of_a_series() -> dict[str, Any]:
 
 
 def held(mean: tuple[float, float, float], **chosen: float) -> tuple[Belief, Settings]:
-    """Return a belief without doubt in one setting."""
+    """Return a belief with zero covariance in one setting."""
     grid = one_setting(**chosen)
     return Belief(np.array([mean]), np.zeros((1, 3, 3)), np.zeros(1)), grid
 

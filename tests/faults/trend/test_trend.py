@@ -1,4 +1,4 @@
-"""Levels, forecasts, alarms and stretches of simulated actuators."""
+"""Levels, forecasts, alarms and segments of simulated actuators."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from tests.faults.trend.small_beliefs import one_setting
 
 
 def last_trend(series: Series) -> Trend:
-    """What a series says after its last log."""
+    """Return the trend of a series after its last log."""
     return [*trends(series)][-1]
 
 
@@ -146,7 +146,7 @@ def test_a_constant_curvature_crosses_where_the_parabola_does() -> None:
 def test_exponential_growth_crosses_where_its_exponential_does() -> None:
     grid = one_setting(pace=0.05, slope=1e-9)
     belief = replace(first_belief(grid), mean=np.array([[0.1, 0.01, 0.0]]), covariance=np.zeros((1, 3, 3)))
-    expected = np.log1p(0.9 * 0.05 / 0.01) / 0.05  # 0.1 + 0.01 expm1(0.05 t) / 0.05 = 1
+    expected = np.log1p(0.9 * 0.05 / 0.01) / 0.05  # solves 0.1 + 0.01 expm1(0.05 t) / 0.05 = 1
     assert crossing(belief, grid, np.random.default_rng(0)).quantiles == pytest.approx([expected] * 5, abs=0.02)
 
 
@@ -154,7 +154,7 @@ def test_futures_of_exponential_growth_scatter_as_its_noise_says() -> None:
     grid = one_setting(pace=0.1, slope=1e-9, bend=0.004)
     belief = replace(first_belief(grid), mean=np.array([[0.0, 0.02, 0.0]]), covariance=np.zeros((1, 3, 3)))
     rise, spread = exponential_growth(20.0, 0.1)
-    limit = 0.02 * rise[0] + 0.004 * np.sqrt(spread[0, 0])  # one standard deviation above the mean after 20 logs
+    limit = 0.02 * rise[0] + 0.004 * np.sqrt(spread[0, 0])  # one deviation above the mean after 20 logs
     found = crossing(belief, grid, np.random.default_rng(0), float(limit))
     assert found.within(20.0) == pytest.approx(0.16, abs=0.05)
 

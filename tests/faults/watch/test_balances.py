@@ -1,4 +1,4 @@
-"""Each balance finds the law that made its series, from the regressors that the law names."""
+"""Each balance recovers the law that generated its series, from the regressors of that law."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def bent(x: float) -> float:
 
 
 def learnt(balance: str) -> Array:
-    """Return the coefficients found of a series that `LAW` makes, of what the balance predicts."""
+    """Return the coefficients that a balance finds in a series whose predicted channel follows `LAW`."""
     rng = np.random.default_rng(4)
     wide = 1 if balance == "motion" else 2
     which = 1 if balance == "force" else 0
@@ -59,7 +59,7 @@ def test_what_was_learnt_fades_and_the_miss_is_that_of_the_coefficients_so_far()
 def test_the_normal_equations_are_solved_with_the_ridge_that_is_named() -> None:
     rng = np.random.default_rng(6)
     rows = rng.standard_normal((50, FEATURES))
-    rows[:, 7] = rows[:, 6]  # what is never told apart
+    rows[:, 7] = rows[:, 6]  # two features that cannot be separated
     information, moment = rows.T @ rows, rng.standard_normal(FEATURES)
     found = np.zeros(FEATURES)
     solve(np.tril(information), moment, found, np.zeros((FEATURES, FEATURES)))
@@ -78,7 +78,7 @@ def test_gains_weigh_lost_flow_with_pressure_and_pressure_with_velocity() -> Non
     gains = np.zeros((3, GAINS))
     rng = np.random.default_rng(7)
     velocity, pressure = rng.standard_normal((2, 20))
-    speed = velocity + 0.3 * pressure  # of which the pump loses three tenths of the pressure
+    speed = velocity + 0.3 * pressure  # the pump loses 0.3 times the pressure
     for w, v, p in zip(speed, velocity, pressure, strict=True):
         count_gains(w, v, p, 1, gains)
     assert gains[1] == pytest.approx(

@@ -1,4 +1,4 @@
-"""The CUSUM against Page's own expression, and thresholds of censored peaks."""
+"""The CUSUM against Page's own expression, and thresholds from censored peaks."""
 
 import math
 
@@ -42,7 +42,7 @@ def counted(heights: np.ndarray) -> np.ndarray:
 def test_alarms_count_as_peaks_of_at_least_the_threshold() -> None:
     count, alarms = 20_000, 40
     heights = -SCALE * np.log((np.arange(count) + 0.5) / count)
-    seen = counted(heights[alarms:])  # the highest ended at the threshold, which is all that is known of them
+    seen = counted(heights[alarms:])  # the highest peaks ended in alarms, and only that is known of them
     level = threshold(seen, float(alarms), WIDTH, float(alarms))
     assert level == pytest.approx(SCALE * math.log(count / alarms), abs=0.02)
     blind = threshold(seen, 0.0, WIDTH, float(alarms))

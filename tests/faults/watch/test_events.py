@@ -16,7 +16,7 @@ def test_the_change_time_is_the_most_likely_one_and_its_interval_holds_what_is_n
     scores = np.random.default_rng(3).standard_normal(60)
     scores[:9] += 1.5
     gains = []
-    for n in range(1, 61):  # twice the log-likelihood that a mean of the last n takes off, where it rose
+    for n in range(1, 61):  # twice the gain in log-likelihood from a raised mean of the last n scores
         risen = scores[:n] - max(np.mean(scores[:n]), 0.0)
         gains.append(scores[:n] @ scores[:n] - risen @ risen)
     found, (least, most) = change_time(scores)

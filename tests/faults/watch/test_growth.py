@@ -34,7 +34,7 @@ def test_however_slowly_oil_drifts_the_interval_has_an_end() -> None:
     rise = 0.07 + 3e-4 * np.maximum(ENDS - 1000.0, 0.0)
     since, (low, high) = growth_time(rise + 0.01 * np.sin(ENDS / 200.0), ENDS)
     assert low < 1000.0 < high
-    assert since - low < 200.0  # a fifth of what came before it
+    assert since - low < 200.0  # a fifth of the time before it
     assert high - since < 200.0
 
 

@@ -1,4 +1,4 @@
-"""The watch's loops are Python: run as it stands it says what the compiled kernel says, to the last bit."""
+"""The loops of the watch are Python code; without compilation they give the same results, bit for bit."""
 
 from types import ModuleType
 
@@ -14,7 +14,7 @@ P = EhaParameters()
 
 
 def reversals(seconds: float, leak_from: float, T: float) -> np.ndarray:
-    """Return an actuator that follows random reversals at once, and loses a third of its speed at some time."""
+    """Return an actuator that follows random reversals without delay and loses a third of its speed at some time."""
     rng = np.random.default_rng(2)
     count = round(seconds / T)
     speed = P.rated_speed * np.repeat(rng.choice((-1.0, 1.0), count // 25 + 1), 25)[:count]

@@ -36,7 +36,7 @@ USUAL, SPANS_LEARNT = 0.08, 12
 
 
 def learnt(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Return what is known of a circuit that loses 8 %, with 0.2 % of noise a span."""
+    """Return the learnt state of a circuit that loses 8 %, with noise of 0.2 % in each span."""
     loss, levels = np.zeros(SEEN + 1), np.zeros((512, 2))
     loss[WANTED], loss[LIMIT] = SPANS_LEARNT, loss_threshold(1e-4)
     for now in range(SPANS_LEARNT):
@@ -143,7 +143,7 @@ def test_rest_tells_nothing() -> None:
 
 
 def lagging(speed: np.ndarray, lost: float) -> np.ndarray:
-    """Return what a span tells of a piston that loses a share of its speed and follows with a lag."""
+    """Return the measurements over a span of a piston that loses a share of its speed and follows with a lag."""
     speeds, lag, moment, told = (
         np.zeros((2, DELAYS + 2)),
         np.zeros((DELAYS + 2, DELAYS + 2)),
@@ -192,12 +192,12 @@ def test_a_span_is_scored_by_its_distance_from_what_warm_oil_explains_over_its_d
     for place, value in {**state, RISEN: 0.5, LIMIT: 7.0}.items():
         loss[place] = value
     assert not judge_loss(span(0.2), 33.0, loss, levels)
-    apart = 0.5 * (0.2 - 0.08) ** 2  # half the square of a difference has the variance of one
+    apart = 0.5 * (0.2 - 0.08) ** 2  # half the squared difference of two values estimates the variance of one
     if known >= LEAST_LEARNT:
         apart = min(apart, 9.0 * 4e-4)
     spread = 4e-4 + (apart - 4e-4) / (known + 1.0)
     assert loss[SPREAD] == pytest.approx(spread)
-    deviation = np.sqrt(spread) * (1.0 + 2.0 / np.sqrt(known + 2.0))  # the spread is an estimate itself
+    deviation = np.sqrt(spread) * (1.0 + 2.0 / np.sqrt(known + 2.0))  # the spread is itself an estimate
     score = min((0.2 - 0.08 - (OIL - 1.0) * 0.08) / deviation, LARGEST)
     assert loss[RISEN] == pytest.approx(0.5 + score - ALLOWED)
     assert levels[20 % 4].tolist() == [0.2, 33.0]

@@ -1,4 +1,4 @@
-"""What the watch over balances counts, scores and raises, kept in `numbers.json`."""
+"""Statistics, scores and alarms of the watch over balances, kept in `numbers.json`."""
 
 from functools import cache
 from typing import Any
@@ -40,7 +40,7 @@ LATER = ("SPREAD", "KNOWN", "LAST", "LAST_RESISTANCE", "RISEN", "LIMIT", "SEEN")
 
 
 def motion(count: int = 60) -> Array:
-    """Return scaled speed, velocity and pressure of an actuator that lags and leaks, with a little noise."""
+    """Return scaled speed, velocity and pressure of an actuator with lag and leakage, with a little noise."""
     rng = np.random.default_rng(3)
     w = np.sign(np.sin(0.5 * np.arange(count))) * (0.6 + 0.3 * np.cos(0.21 * np.arange(count)))
     v = np.zeros(count)
@@ -216,7 +216,7 @@ def memory_at_its_start() -> dict[str, Any]:
 
 @cache
 def watched_log(seconds: float = 150.0, sample_time: float = 2e-3) -> Array:
-    """Return a first-order actuator under random reversals, that loses more at 90 s, and ever more from 105 s on."""
+    """Return a first-order actuator under random reversals whose loss jumps at 90 s, and grows from 105 s on."""
     rng = np.random.default_rng(0)
     count = round(seconds / sample_time)
     time = sample_time * np.arange(count)

@@ -22,7 +22,8 @@ def samples(seconds: float, leak_from: float) -> np.ndarray:
     return np.column_stack([speed, np.cumsum(velocity) * T + 1e-6 * rng.standard_normal(count), pressure])
 
 
-@pytest.mark.parametrize("cut", [3_333, 18_100])  # within a block of learning, and between an alarm and its change
+# within a block of the learning phase, and between an alarm and its change
+@pytest.mark.parametrize("cut", [3_333, 18_100])
 def test_a_watch_continues_over_a_restart_to_the_last_bit(cut: int, tmp_path: Path) -> None:
     rows = samples(100.0, leak_from=90.0)
     whole, first = Watch(P, T, learning=60.0), Watch(P, T, learning=60.0)

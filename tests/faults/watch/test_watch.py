@@ -15,7 +15,7 @@ SECONDS = 100.0
 
 
 def _run(leak_from: float = np.inf, seconds: float = SECONDS, seed: int = 0) -> np.ndarray:
-    """Return a first-order actuator under random reversals, whose piston loses a quarter of its speed at some time."""
+    """Return a first-order actuator under random reversals whose piston loses a quarter of its speed at some time."""
     rng = np.random.default_rng(seed)
     count = round(seconds / T)
     signs = np.repeat(rng.choice((-1.0, 1.0), count // 25 + 1), 25)[:count]
@@ -50,13 +50,13 @@ def test_an_abrupt_leak_is_found_within_half_a_second_and_dated(leaking: np.ndar
 
 
 def test_a_sudden_leak_is_told_once() -> None:
-    """The loss that had been learnt before was passed by it some spans later, as `loss`."""
+    """Before, the leak exceeded the loss learnt earlier, and raised `loss` as well some spans later."""
     events = Watch(P, T, learning=60.0).take(_run(leak_from=90.0, seconds=240.0))
     assert [event.balance for event in events if isinstance(event, Alarm)] == ["flow"]
 
 
 def test_a_load_that_doubles_does_not_hide_a_leak_that_grows() -> None:
-    """Twice the pressure loses twice the flow; that was taken for a leak and learnt, and the loss never told."""
+    """Twice the pressure doubles the lost flow; before, that was taken for a leak and learnt, and `loss` never came."""
     count = round(800.0 / 5e-3)
     rng, time = np.random.default_rng(7), 5e-3 * np.arange(count)
     speed = P.rated_speed * np.repeat(rng.choice((-1.0, 1.0), count // 10 + 1), 10)[:count]
@@ -73,7 +73,8 @@ def test_a_load_that_doubles_does_not_hide_a_leak_that_grows() -> None:
 @pytest.mark.parametrize("most", thinned([1, 7, 25000], [7, 25000]))
 def test_events_do_not_depend_on_how_samples_are_cut(leaking: np.ndarray, most: int) -> None:
     watch = Watch(P, T, learning=60.0)
-    near = [k for k in range(most, len(leaking), most) if most > 1 or abs(T * k - 60.0) < 2.0 or T * k > 85.0]  # events
+    # single samples are cut off only near events
+    near = [k for k in range(most, len(leaking), most) if most > 1 or abs(T * k - 60.0) < 2.0 or T * k > 85.0]
     pieces = np.split(leaking, near)
     assert [event for piece in pieces for event in watch.take(piece)] == Watch(P, T, learning=60.0).take(leaking)
 
@@ -138,7 +139,7 @@ def test_the_threshold_is_higher_the_less_has_been_learnt() -> None:
 
 
 def _slowly(most: float, seed: int = 7) -> np.ndarray:
-    """Return ten minutes of an actuator that loses a tenth of its speed, and from the third to the tenth ever more."""
+    """Return ten minutes of an actuator that loses a tenth of its speed, and more and more from the third minute on."""
     rng, step = np.random.default_rng(seed), 5e-3
     count = round(600.0 / step)
     speed = P.rated_speed * np.repeat(rng.choice((-1.0, 1.0), count // 10 + 1), 10)[:count]
@@ -190,6 +191,6 @@ def test_what_is_still_to_be_learnt_is_known_and_standing_still_teaches_nothing(
     assert watch.unlearnt == pytest.approx(60.0)
     watch.take(moving[10:])
     left = watch.unlearnt
-    assert 39.0 < left < 45.0  # blocks in which the actuator hardly moved do not count
+    assert 39.0 < left < 45.0  # blocks without enough motion do not count
     watch.take(np.tile([0.0, moving[-1, 1], 0.0], (5000, 1)))
     assert watch.unlearnt > left - 1.0

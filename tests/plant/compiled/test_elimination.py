@@ -1,4 +1,4 @@
-"""Elimination finds the Jacobian that differentiation forward finds, with fewer operations."""
+"""Elimination gives the same Jacobian as forward differentiation, with fewer operations."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A graph differentiates as calculus does, with signs and choices held constant."""
+"""Derivatives of a graph agree with calculus, with signs and choices held constant."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -43,7 +43,7 @@ ARITHMETIC: Mapping[str, Callable[..., float]] = {
 
 
 def evaluate(output: Expression, x: float, y: float) -> tuple[float, tuple[float, ...]]:
-    """Return the value of a graph, and every decision (comparison, sign) that was taken on the way."""
+    """Return the value of a graph, and every decision (comparison, sign) made on the way."""
     values: dict[int, float] = {}
     decisions: list[float] = []
     for item in ordered([output]):

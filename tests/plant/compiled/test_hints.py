@@ -1,4 +1,4 @@
-"""Hints change no value: derivatives follow what a model knows, and what comes late is multiplied and added once."""
+"""Hints change no value: derivatives use what a model knows, and late inputs pass one product and one sum."""
 
 from collections.abc import Callable
 

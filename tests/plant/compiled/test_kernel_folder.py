@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept."""
+"""Tests of the folder in which compiled kernels are kept."""
 
 from pathlib import Path
 

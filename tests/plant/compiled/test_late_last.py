@@ -1,4 +1,4 @@
-"""Sums and products keep their value, and what comes last goes through one operation of each."""
+"""Reordered sums and products keep their value, and the last input to arrive passes only one operation of each."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_the_order_of_sums_and_products_changes_no_value(late: tuple[str, ...]) 
 def test_the_last_to_come_passes_one_product_and_one_sum() -> None:
     for mixed in (((X * Y) * Z + Y) + Z, X * Y + Z * W, (X + Y) * Z - W):
         _, times = late_last({"f": mixed}, {"x": 0.0})
-        fused = LATENCY["*"]  # a sum is rounded with its product
+        fused = LATENCY["*"]  # a sum is fused with its product
         assert times["f"] == (fused if mixed.operation == "+" else LATENCY["+"] + fused)
 
 

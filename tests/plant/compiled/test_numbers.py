@@ -1,6 +1,6 @@
-"""Texts and counts of operations that formulas and loops become, kept in `numbers.json`.
+"""Texts and operation counts of compiled formulas and loops, kept in `numbers.json`.
 
-That a kernel computes what its formula says is tested elsewhere; here stands with which operations it does.
+Other tests check that a kernel computes what its formula states; this one checks with which operations.
 """
 
 from collections import Counter
@@ -154,7 +154,7 @@ def loops_for_machines() -> dict[str, Any]:
 
 
 def written(module: Any, compiled: Callable[[], Any]) -> tuple[str, Mapping[str, Any]]:
-    """Return the text of a kernel of processors with four lanes, and what it takes."""
+    """Return the text of a kernel for processors with four lanes, and its signatures."""
     found: list[Any] = []
 
     def load(_: str, text: Callable[[], str], entries: Mapping[str, Any], *__: Any) -> Any:
@@ -173,7 +173,7 @@ def unkept(cached: Any, given: tuple[Any, ...]) -> Callable[[], Any]:
 
 @NUMBERS.case()
 def kernels_of_plants() -> dict[str, Any]:
-    """How often each instruction stands in what machine code is made of."""
+    """Return how often each instruction occurs in the code from which machine code is made."""
     told: dict[str, Any] = {}
     for lanes in (1, 8):
         plant: Any = "lumped", lumped_step, 3, EhaParameters, lanes

@@ -1,4 +1,4 @@
-"""NumPy's functions on symbols are the graph's own, and every one that is not is refused by name."""
+"""NumPy functions on symbols become operations of the graph, and any other one is refused by name."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Divisions and roots side by side give the bits of divisions and roots alone."""
+"""Divisions and roots computed side by side give the same bits as one at a time."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What is pasted into a kernel is the function as written, less what a kernel has no use for."""
+"""A function is pasted into a kernel as written, without the parts that a kernel does not need."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A simplified graph computes the same to rounding, with fewer operations."""
+"""A simplified graph gives the same values up to rounding, with fewer operations."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""What is emitted computes what the model function computes."""
+"""The generated source computes what the model function computes."""
 
 import math
 from dataclasses import asdict
@@ -30,7 +30,7 @@ def emitted(step: StepFunction, state: tuple[float, ...], name: str, parameters:
 
 
 def rosenbrock(state: tuple[float, ...], parameters: EhaParameters) -> NDArray[np.float64]:
-    """One ROS2 step by linear algebra, its Jacobian by central differences."""
+    """Return the result of one ROS2 step by linear algebra, with a Jacobian from central differences."""
     start, end = SPEEDS
     x = np.array(state)
     size = 1e-6 * np.array([1e-2, 1e-2, 1.0])

@@ -1,4 +1,4 @@
-"""The accumulator is gas that oil compresses."""
+"""The accumulator is a gas volume that oil compresses."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""A check valve passes nothing backward, and opens without a step in flow or slope."""
+"""A check valve passes no backward flow, and opens without a step in its flow or slope."""
 
 import pytest
 from hypothesis import given

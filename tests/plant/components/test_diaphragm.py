@@ -1,4 +1,4 @@
-"""A diaphragm's chamber: what it stores is the slope of the volume it takes in."""
+"""The compliance of a diaphragm's chamber is the slope of the volume that it takes in."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The 4/3 valve: what it joins at each place of its spool, and its implicit return."""
+"""The 4/3 valve: which ports each spool position connects, and its implicit return flow."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The ends of the stroke push back, and take energy."""
+"""The end stops of the stroke push back and dissipate energy."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""The check valve in its port: openings between leak and lift, exact limits of the implicit step."""
+"""The check valve in its port: openings between leak and lift, and exact limits of the implicit step."""
 
 import numpy as np
 import pytest

@@ -15,7 +15,7 @@ COULOMBS = st.floats(0.0, 1e3)
 
 
 def residual(v: float, push: float, resistance: float, quadratic: float, coulomb: float) -> float:
-    """Force left over, relative to the largest force in the balance."""
+    """Return the remaining force, relative to the largest force in the balance."""
     direction = np.sign(v)
     left = resistance * v + quadratic_friction(v, direction, quadratic, 0.0, coulomb) - push
     return left / max(abs(push), coulomb)

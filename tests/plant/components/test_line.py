@@ -1,4 +1,4 @@
-"""A line's oil settles where viscosity and minor losses take up the pressure, and starts with its inertance."""
+"""The oil in a line settles where viscous and minor losses balance the pressure, and starts with its inertance."""
 
 import numpy as np
 import pytest

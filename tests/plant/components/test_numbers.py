@@ -1,4 +1,4 @@
-"""What the parts' laws give on both sides of every corner, kept in `numbers.json`."""
+"""Values of the components' laws on both sides of every corner, kept in `numbers.json`."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -35,7 +35,7 @@ NUMBERS = Numbers(__file__)
 
 
 def each(law: Callable[..., Any], arguments: Mapping[str, tuple[Any, ...]]) -> dict[str, Any]:
-    """Call a law on several arguments, each under the name that says what is special about it."""
+    """Call a law with several sets of arguments, each named after its special feature."""
     return {name: law(*some) for name, some in arguments.items()}
 
 

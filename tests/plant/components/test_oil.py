@@ -1,4 +1,4 @@
-"""Oil, air and vapour: state equation, inverse and slope agree, and pressure stays above the vapour's."""
+"""Oil, air and vapour: state equation, inverse and slope agree, and pressure stays above the vapour pressure."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Throttles: small drops see a laminar path, large ones an orifice, and the load of an orifice is quadratic."""
+"""Throttles: small drops see a laminar path, large ones an orifice, and the resistance of an orifice is quadratic."""
 
 import numpy as np
 import pytest

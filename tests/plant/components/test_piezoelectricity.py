@@ -15,7 +15,7 @@ PZT = PoledCeramic()
 
 
 def turned(angle: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the turn about axis 3 of a vector, and of a stress in Voigt's order (Bond's matrix)."""
+    """Return the rotation about axis 3 of a vector, and of a stress in Voigt's order (Bond's matrix)."""
     c, s = np.cos(angle), np.sin(angle)
     vector = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     pairs = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]

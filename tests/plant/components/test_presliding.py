@@ -1,4 +1,4 @@
-"""The bristle ends in the steady-state law, 5.10, and never gives back more than was put in."""
+"""The bristle settles to the steady-state law, equation 5.10, and never returns more energy than was put in."""
 
 import numpy as np
 import pytest

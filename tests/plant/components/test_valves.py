@@ -1,4 +1,4 @@
-"""A pump's loss never pumps backward, and a relief valve flows only above its setting."""
+"""The pump's loss never reverses its flow, and a relief valve flows only above its setting."""
 
 import pytest
 from hypothesis import given

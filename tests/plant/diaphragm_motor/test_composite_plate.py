@@ -1,4 +1,4 @@
-"""The diaphragm as a composite plate: exact limits, independent finite-element figures, the plant's own numbers."""
+"""The diaphragm as a composite plate: exact limits, independent finite-element results, and the plant's own numbers."""
 
 from dataclasses import replace
 from math import pi
@@ -36,7 +36,7 @@ def test_bare_brass_is_the_textbooks_plate() -> None:
 
 
 def test_a_plate_of_one_stuff_throughout_does_not_see_its_joint() -> None:
-    """Ceramic to next to the rim, as stiff as the brass: a uniform plate of both thicknesses."""
+    """The ceramic reaches almost to the rim and is as stiff as the brass: a uniform plate of both thicknesses."""
     same = replace(PLATE, ceramic_compliance=1.0 / PLATE.brass_modulus, ceramic_radius=PLATE.clamp_radius * (1 - 1e-9))
     bend = same.brass_modulus * same.thickness**3 / (12.0 * (1.0 - same.poisson_ratio**2))
     assert plate_coefficients(same).compliance == pytest.approx(pi * same.clamp_radius**6 / (192.0 * bend), rel=1e-6)
@@ -54,7 +54,7 @@ def test_the_roots_are_those_of_a_clamped_plate() -> None:
 
 
 def test_the_first_dry_mode_is_far_above_the_drive() -> None:
-    """A finite-element model of the same plate, made apart from this one, has it at 3983 Hz."""
+    """An independent finite-element model of the same plate gives 3983 Hz."""
     assert plate_modes(PLATE)[0].frequency == pytest.approx(3983.0, rel=0.01)
 
 

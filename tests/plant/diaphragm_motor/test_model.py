@@ -1,4 +1,4 @@
-"""The diaphragm motor: balances, energy, numerics against a stiff solver, and the flows that the paper quotes."""
+"""The diaphragm motor: balances, energy, agreement with a stiff solver, and the flows that the paper quotes."""
 
 from dataclasses import replace
 from typing import Any
@@ -48,7 +48,7 @@ def flow(frequency: float, swing: float = SWING, p: DiaphragmMotorParameters = P
 
 
 def stored_energy(states: np.ndarray, p: DiaphragmMotorParameters) -> np.ndarray:
-    """Return what diaphragms, liquid, gas, ports, lines and piston hold above rest [J]."""
+    """Return the energy of diaphragms, liquid, gas, ports, lines and piston, relative to rest [J]."""
     n, p0 = p.gas_exponent, p.supply_pressure
     absolute = p0 + states[:, PRESSURES]
     gas = np.array(p.gas_fraction) * p.chamber_volume / n * p0 ** (1.0 / n)
@@ -239,7 +239,7 @@ def test_flow_and_deflections_follow_a_stiff_solver() -> None:
     drive = motor_drive(PEAK, SWING, time, step)
     rate = np.gradient(drive, step, edge_order=2)
     start = at_rest(HEALTHY)
-    start[SIDE_B] = 1.0  # the root in the return land has no slope at zero
+    start[SIDE_B] = 1.0  # the square root in the return land's flow has no slope at zero
     row = MotorRow(*motor_row(HEALTHY))
     scale = np.array([2e4] * 7 + [10.0] + [2e-6] * 8 + [1.0] * 8 + [1e4, 1e4, 5e-3, 1e-4])
 

@@ -1,4 +1,4 @@
-"""What the diaphragm motor's model, plate and runs give, kept in `numbers.json`."""
+"""Results of the diaphragm motor's model, plate and runs, kept in `numbers.json`."""
 
 from dataclasses import asdict, replace
 from typing import Any
@@ -47,7 +47,7 @@ MOTORS = {"paper's": PAPER, "varied": VARIED, "holding": HOLDING}
 
 
 def states() -> dict[str, tuple[float, ...]]:
-    """Return states that nothing is special about, one near rest, and two beyond an end."""
+    """Return ordinary states, one near rest, and two beyond an end of the stroke."""
     rng = np.random.default_rng(8)
 
     def one(size: float, position: float) -> tuple[float, ...]:
@@ -90,7 +90,7 @@ def states_after_a_step() -> dict[str, Any]:
 
 
 def gathered_flat(p: DiaphragmMotorParameters) -> Any:
-    """Return the parameters as the kernel reads them, one number a name."""
+    """Return the parameters as the kernel reads them, one number for each name."""
     from plant.diaphragm_motor.model import MotorRow
 
     return MotorRow(*motor_row(p))

@@ -1,4 +1,4 @@
-"""The break frequency of small motion, against a system of the same three equations solved for its response."""
+"""The break frequency of small motion agrees with the frequency response of a system of the same equations."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def test_at_the_break_frequency_the_gain_is_down_by_the_root_of_two(speed: float
     velocity, _ = steady_state(speed, p)
     rub = p.friction_linear + 2.0 * p.friction_quadratic * velocity
     oil = p.bulk_modulus / p.chamber_volume
-    # velocity and differential pressure, under flow: equations 5.8 and 5.9 without what is constant
+    # velocity and differential pressure as driven by flow: equations 5.8 and 5.9 without their constant terms
     system = np.array([[-rub, p.piston_area], [-oil * p.piston_area, -oil * p.leakage_coefficient]])
     system[0] /= p.moving_mass
 

@@ -1,4 +1,4 @@
-"""The circuit conserves oil, creates no energy, adds up to the lumped plant, and never leaves what it describes."""
+"""The circuit conserves oil, creates no energy, converges to the lumped plant, and stays within its range."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -45,13 +45,13 @@ def drive(name: str, seconds: float, seed: int = 0) -> Array:
 
 
 def disturbance(record: Record, other: Record) -> float:
-    """Largest RMS difference, each over what the drive could do: 1 cm, 1 cm/s, 100 kPa."""
+    """Return the largest RMS difference, each relative to a scale of the drive: 1 cm, 1 cm/s, 100 kPa."""
     scales = dict(zip(TRUTHS, (1e-2, 1e-2, 1e5), strict=True))
     return max(float(np.sqrt(np.mean((record[n] - other[n]) ** 2))) / scales[n] for n in TRUTHS)
 
 
 def floating(p: CircuitParameters, size: float) -> CircuitParameters:
-    """Return the circuit on its way to the lumped plant: larger and stiffer in step, make-up idle, seals stiff."""
+    """Return the circuit closer to the lumped plant: larger and equally stiffer, make-up idle, seals stiff."""
     return replace(
         p,
         chamber_volume=p.chamber_volume * size,
@@ -63,7 +63,7 @@ def floating(p: CircuitParameters, size: float) -> CircuitParameters:
     )
 
 
-# Where friction falls with speed (minor friction) the lumped piston jumps when it breaks loose: half an order less.
+# If friction falls with speed (minor friction), the lumped piston jumps as it breaks loose: half an order less.
 @pytest.mark.parametrize(
     ("condition", "share"), [("normal", 0.45), ("major_friction", 0.45), ("major_leakage_minor_friction", 0.7)]
 )
@@ -113,7 +113,7 @@ def test_a_drain_that_floats_passes_on_all_that_it_takes(a: float, b: float) -> 
 
 @pytest.mark.parametrize("a_is_higher", [True, False])
 def test_a_chamber_above_the_case_drains_oil_of_its_own_density(*, a_is_higher: bool) -> None:
-    # half of the drain is all the leakage: nothing crosses inside
+    # half of the drain makes up all of the leakage, so that no oil crosses inside
     only_drained = replace(DRAINED, leakage_coefficient=1e-12, pump_crossport_leakage=0.0)
     supply = only_drained.accumulator_pressure
     high, low = (supply + 4e5, 1.04), (supply + 2e5, 1.01)

@@ -1,4 +1,4 @@
-"""Error-controlled steps follow scipy's tight-tolerance stiff solver, at their order, in every condition and drive."""
+"""Error-controlled steps agree with scipy's stiff solver at a tight tolerance, in every condition and drive."""
 
 from dataclasses import replace
 from itertools import product
@@ -40,7 +40,7 @@ def reference(p: CircuitParameters, speed: Array, method: Method = "LSODA", tole
 
 
 def error(states: Array, truth: Array, p: CircuitParameters) -> float:
-    """Largest relative RMS error over the channels that a bench logs."""
+    """Return the largest relative RMS error over the channels that a bench logs."""
     rows = parameter_row(p)[None]
     found, wanted = CIRCUIT.channels(states, rows), CIRCUIT.channels(truth, rows)
     return max(float(np.sqrt(np.mean((found[n] - wanted[n]) ** 2) / np.mean(wanted[n] ** 2))) for n in CHANNELS)

@@ -1,4 +1,4 @@
-"""With the pump stopped the circuit only ever loses energy."""
+"""With the pump stopped, the circuit only loses energy."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ PAPER = CircuitParameters()
 
 
 def enthalpy(pressure: Array, p: CircuitParameters) -> Array:
-    """Integral of the specific volume over pressure, from the atmosphere's [J a unit amount]."""
+    """Return the integral of the specific volume over pressure from atmospheric pressure [J a unit amount]."""
     air = p.air_fraction + NUCLEI
     over = pressure - ATMOSPHERE
     gas = air * (ATMOSPHERE - p.vapour_pressure)
@@ -32,7 +32,7 @@ def chamber_energy(oil: Array, pressure: Array, p: CircuitParameters) -> Array:
 
 
 def accumulator_energy(oil: Array, p: CircuitParameters) -> Array:
-    """Integral of the oil's enthalpy over the oil taken in, by Gauss's rule from the charge to each amount."""
+    """Return the integral of the oil's enthalpy over the oil taken in since the charge, by Gauss's rule."""
     nodes, weights = np.polynomial.legendre.leggauss(20)
     taken = oil - p.accumulator_oil
     at = p.accumulator_oil + 0.5 * taken[:, None] * (nodes + 1.0)

@@ -1,4 +1,4 @@
-"""The circuit's parameters add up to the actuator's, and those that make no circuit are refused with a reason."""
+"""The circuit's parameters add up to the actuator's, and impossible ones are refused with a reason."""
 
 from dataclasses import asdict, fields, replace
 

@@ -1,4 +1,4 @@
-"""The circuit through `simulate`: what it logs, what its sensors add, faults that come, and why it stops."""
+"""The circuit through `simulate`: its channels, its sensors, faults that begin during the run, and why it stops."""
 
 from collections.abc import Mapping
 from dataclasses import replace

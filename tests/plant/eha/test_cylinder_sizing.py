@@ -1,4 +1,4 @@
-"""A sized cylinder does its duty, with standard diameters and a rod that does not buckle."""
+"""A sized cylinder meets its duty, with standard diameters and a rod that does not buckle."""
 
 from dataclasses import replace
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""The lumped model sticks, breaks loose, loses energy and settles as the paper's equations say."""
+"""The lumped model sticks, breaks loose, loses energy and settles as the paper's equations require."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -35,7 +35,7 @@ def lumped(initial: tuple[float, float, float], speed: Array, p: EhaParameters, 
 
 
 def energy(states: Array, p: EhaParameters) -> Array:
-    """Kinetic energy of the piston and energy stored in the oil [J]."""
+    """Return the kinetic energy of the piston plus the energy stored in the oil [J]."""
     _, v, dp = states.T
     return 0.5 * p.moving_mass * v**2 + 0.5 * p.chamber_volume / p.bulk_modulus * dp**2
 
@@ -214,7 +214,7 @@ class EventDriven:
         ]
 
     def run(self, times: Array, knots: list[float]) -> Array:
-        """Return the states at the times, from rest; the drive is smooth between the knots."""
+        """Return the states at the given times, starting at rest; the drive is smooth between the knots."""
         p = self.p
 
         def slips(t: float, y: Array, sense: float) -> float:
@@ -295,7 +295,7 @@ def test_the_steps_derivatives_are_those_of_its_values(state: tuple[float, float
 def test_a_long_stage_opens_the_relief_valve_where_the_pressure_after_it_says_so(
     side: float, velocity: float, beyond: float
 ) -> None:
-    p, h = EhaParameters(), 2e-3  # the piston's motion moves pressure by more than it lies from the setting
+    p, h = EhaParameters(), 2e-3  # the piston's motion changes the pressure by more than its distance from the setting
     base = (0.0, side * velocity, side * (p.relief_pressure + beyond))
     _, moves, pressure = _implicit_stage(base, 0.0, p, h)
     relieved = p.relief_conductance * max(abs(pressure) - p.relief_pressure, 0.0) * np.sign(pressure)

@@ -1,4 +1,4 @@
-"""What the gear-pump actuator's models, drives and sizes give, kept in `numbers.json`."""
+"""Results of the gear-pump actuator's models, drives and sizing, kept in `numbers.json`."""
 
 from dataclasses import asdict, replace
 from typing import Any
@@ -131,7 +131,7 @@ def settled_motion() -> dict[str, Any]:
 def state_of(
     motor: float, bristle: float, x: float, v: float, oils: tuple[float, ...], p: CircuitParameters
 ) -> tuple[Scalar, ...]:
-    """Return a state with each chamber's oil as a share of what it holds at rest."""
+    """Return a state, with the oil in each chamber given as a share of its amount at rest."""
     rest = at_rest(p)
     return motor, bristle, x, v, *(share * held for share, held in zip(oils, rest[4:], strict=True))
 
@@ -196,7 +196,7 @@ def circuit_about_an_actuator() -> dict[str, Any]:
 
 
 def course(duration: float = 0.06) -> np.ndarray:
-    """Return a speed that starts, holds, reverses and rests."""
+    """Return a speed that starts, holds, reverses and returns to rest."""
     time = np.arange(0.0, duration, 1e-3)
     return np.interp(time, [0.0, 0.01, 0.025, 0.035, 0.05, 0.06], [0.0, 120.0, 120.0, -150.0, -150.0, 0.0])
 

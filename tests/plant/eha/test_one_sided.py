@@ -1,4 +1,4 @@
-"""A circuit with unlike make-up valves: the circuit where nothing is wrong, and each side answers its own fault."""
+"""A circuit with unequal make-up valves is the usual circuit if nothing is wrong, and each side shows its own fault."""
 
 from dataclasses import replace
 
@@ -38,7 +38,8 @@ def test_a_chamber_whose_valve_is_stuck_shut_draws_no_oil_and_its_pressure_falls
     sound, stuck = (lowest(run(sign, **fault))[low] for fault in ({}, {f"makeup_shut_{side}": 1.0}))
     assert sound > 0.7 * PAPER.accumulator_pressure
     assert stuck < 0.3 * PAPER.accumulator_pressure
-    assert lowest(run(-sign, **{f"makeup_shut_{side}": 1.0}))[low] > 0.9 * PAPER.accumulator_pressure  # filled before
+    # here the pump fills the chamber first
+    assert lowest(run(-sign, **{f"makeup_shut_{side}": 1.0}))[low] > 0.9 * PAPER.accumulator_pressure
 
 
 @pytest.mark.parametrize(("side", "sign"), [("a", 1.0), ("b", -1.0)])

@@ -28,9 +28,9 @@ def test_the_template_gives_the_papers_parameters_exactly(tmp_path: Path) -> Non
 
 
 def test_a_filled_in_template_that_kept_its_name_is_not_the_papers_actuator(tmp_path: Path) -> None:
-    """A page called a file with parameters of its own "no rig file of your own"."""
+    """A page used to call a file with parameters of its own "no rig file of your own"."""
     own = rig_template().replace("moving_mass = 7.376", "moving_mass = 9.0")
-    assert rig_of(tmp_path, own).name == "rig"  # as its file
+    assert rig_of(tmp_path, own).name == "rig"  # named after its file
     assert rig_of(tmp_path, own.replace('name = "paper"', 'name = "Press 4"')).name == "Press 4"
 
 

@@ -1,4 +1,4 @@
-"""A rig file takes what a nameplate says, with its unit."""
+"""A rig file accepts values from a nameplate, with their units."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""An entry of a rig file in another unit is refused with how to write it, whatever actuator it is of."""
+"""An entry of a rig file in another unit is refused with how to write it, for actuators of any size."""
 
 from pathlib import Path
 

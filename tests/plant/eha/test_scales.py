@@ -1,4 +1,4 @@
-"""What the same leakage and friction are on an actuator of another size."""
+"""The scaling of leakage and friction to an actuator of another size."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ def test_the_paper_rig_is_its_own_measure() -> None:
 
 
 def test_a_scaled_actuator_loses_the_same_share_of_velocity_and_adds_the_same_share_of_pressure() -> None:
-    """Three times the pump and twice the area; friction as the paper's share of the force."""
+    """The pump is three times as large and the area twice; friction is the same share of the force as in the paper."""
     area, flow = 2.0, 3.0
     p = replace(
         PAPER_RIG,
@@ -32,7 +32,7 @@ def test_a_scaled_actuator_loses_the_same_share_of_velocity_and_adds_the_same_sh
 
 
 def test_valves_of_which_nothing_is_said_let_the_pumps_own_flow_through() -> None:
-    """A pump of 15 times the flow lost 5 bar in the paper's valves."""
+    """A pump with 15 times the flow used to lose 5 bar in the paper's valves."""
     p = replace(PAPER_RIG, pump_displacement=15.0 * PAPER_RIG.pump_displacement)
     sized = with_valves_sized(p, ())
     assert sized.makeup_conductance == pytest.approx(15.0 * PAPER_RIG.makeup_conductance)

@@ -1,4 +1,4 @@
-"""`simulate` gives one record for one seed, shows faults when they come, and says what it cannot do."""
+"""`simulate` gives the same record for the same seed, shows faults from their time on, and states what it cannot do."""
 
 from dataclasses import asdict, replace
 

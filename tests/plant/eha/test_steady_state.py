@@ -1,4 +1,4 @@
-"""Where actuators settle, one at a time or many at once."""
+"""The states in which actuators settle, for one or for many at once."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ from plant.eha.steady_state import steady_state
 RIG = EhaParameters()
 LEAKAGES = np.array([0.0, 4.8e-12, 6e-11, 4.8e-12, 0.0])
 COULOMB = np.array([436.0, 436.0, 436.0, 6e3, 6e3])
-"""Tight and leaking actuators; the last two rub so much that the relief valve opens."""
+"""Actuators with and without leakage; the last two have so much friction that the relief valve opens."""
 
 
 def test_many_circuits_settle_as_each_does_alone() -> None:

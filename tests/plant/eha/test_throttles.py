@@ -1,4 +1,4 @@
-"""Throttle laws pass through their calibration and never turn back."""
+"""Throttle laws pass through their calibration points and are monotonic."""
 
 import pytest
 from hypothesis import given

@@ -37,7 +37,7 @@ def written(folder: Path, plant: Plant, fmi: str) -> str:
 
 
 def held(plant: Plant, parameters: EhaParameters = RIG) -> dict[str, np.ndarray]:
-    """The native trajectory where the drive is held from sample to sample."""
+    """Return the native trajectory, with the drive held from each sample to the next."""
     row = parameter_row(plant.complete(parameters))
     run = compile_trajectory(plant.name, plant.step, len(plant.states), plant.parameter_class)
     states = [np.asarray(plant.start(row), dtype=float)]

@@ -1,4 +1,4 @@
-"""Files that are read, or how they are refused."""
+"""Helpers that read a file and return the result, or the text of the refusal."""
 
 import tempfile
 import zlib

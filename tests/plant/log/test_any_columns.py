@@ -1,4 +1,4 @@
-"""Logs of anything: whatever their columns are called, they are read as they stand."""
+"""Any log can be read as it is, whatever its columns are called."""
 
 from pathlib import Path
 

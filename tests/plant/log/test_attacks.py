@@ -1,4 +1,4 @@
-"""Files made to hang, to fill the memory or to bring up an internal error are refused in one sentence."""
+"""Files made to hang, to fill the memory or to cause an internal error are refused in one sentence."""
 
 import gzip
 import os
@@ -78,7 +78,7 @@ try:
 except LogError as error:
     print(peak() - before, error)
 """
-"""Prints by how much the peak of memory has grown [kB], and how the log was refused."""
+"""Prints how much the peak of memory has grown [kB], and how the log was refused."""
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak of memory is read from /proc")
@@ -101,7 +101,7 @@ def test_a_bomb_unpacks_to_a_limit_and_no_further(tmp_path: Path, kind: str) -> 
     else:
         columns = dict.fromkeys(HEADER.split(","), pa.array(np.zeros(4 << 20)))
         pq.write_table(pa.table(columns), path, compression="zstd")
-    # in a process of its own, whose peak is its own (tracing allocations crashes beside threads that read ahead)
+    # in a separate process with its own memory peak (tracing allocations crashes alongside threads that read ahead)
     ended = subprocess.run(  # noqa: S603
         [sys.executable, "-c", PEAK, str(path)], capture_output=True, text=True, check=True, timeout=120
     )
@@ -176,7 +176,8 @@ def test_an_mdf_whose_records_are_not_what_they_say_is_refused_before_it_is_copi
     pytest.importorskip("asammdf")
     path = mdf4(pd.DataFrame(dict.fromkeys(SI, 1e-3 * np.arange(60))), tmp_path)
     content = bytearray(path.read_bytes())
-    places = [one.start() + at for one in re.finditer(block, content)]  # where a channel begins, how long a record is
+    # the fields that state where a channel begins or how long a record is
+    places = [one.start() + at for one in re.finditer(block, content)]
     (place,) = (one for one in places if struct.unpack_from("<I", content, one) == (was,))
     struct.pack_into("<I", content, place, written)
     path.write_bytes(content)
@@ -212,6 +213,6 @@ def test_the_empty_end_of_arrays_that_were_made_before_the_test_is_left_out() ->
     checked = trusted({"time_s": 1e-3 * np.arange(N + 300) * ended, **channels}, source="a.csv")
     assert checked.notes[0].code == LogCode.END_LEFT_OUT
     assert len(checked.channels["velocity_m_s"]) == N
-    channels["velocity_m_s"][-1] = 0.1  # something was measured there
+    channels["velocity_m_s"][-1] = 0.1  # now the end contains a measured value
     with pytest.raises(LogError, match="time_s is missing in 300 of 700 samples"):
         trusted({"time_s": 1e-3 * np.arange(N + 300) * ended, **channels}, source="a.csv")

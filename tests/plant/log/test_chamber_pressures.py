@@ -1,4 +1,4 @@
-"""The two chambers' pressures make a difference, and one alone does not."""
+"""The pressures of both chambers give the differential pressure; one alone does not."""
 
 import numpy as np
 

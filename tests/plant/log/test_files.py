@@ -77,7 +77,7 @@ def records(draw: st.DrawFn) -> Record:
     count = draw(st.integers(10, 40))
     chosen = draw(st.lists(names, min_size=1, max_size=4, unique=True))
     channels = {name: draw(arrays(np.float64, count, elements=finite)) for name in chosen}
-    # both port pressures without their difference would come back with it
+    # a record with both port pressures would come back with their difference added
     if {"pressure_a_pa", "pressure_b_pa"} <= set(channels):
         channels.setdefault("differential_pressure_pa", np.zeros(count))
     return Record(
@@ -284,7 +284,7 @@ def test_a_log_with_foreign_names_is_read_through_a_mapping(shared: Path) -> Non
 
 
 def test_stamps_of_whole_seconds_are_read_with_the_sample_time_that_the_refusal_asks_for(tmp_path: Path) -> None:
-    """The refusal named --sample-time, and the same refusal came again with it."""
+    """The refusal named --sample-time, but the same refusal used to come again with it."""
     rows = (f"2026-11-29 10:00:0{k // 20},{k}.5,0.{k:03d}" for k in range(60))
     (tmp_path / "log.csv").write_text("\n".join(["time,motor_speed_rad_s,position_m", *rows]))
     with pytest.raises(ClockError, match="--sample-time S takes the rows as evenly spaced by S seconds"):

@@ -1,4 +1,4 @@
-"""Tables in memory are read as the same log from a file is."""
+"""Tables in memory are read like the same log from a file."""
 
 import warnings
 from typing import Any, ClassVar

@@ -104,7 +104,7 @@ def test_the_option_that_is_offered_reads_pressure_too_and_asks_for_units_that_n
     said = str(caught.value)
     option = "time_s=Zeit:s,motor_speed_rad_s=Drehzahl:UNIT,position_m=Weg:UNIT,differential_pressure_pa=Druck:UNIT"
     assert f"perhaps --columns '{option}', with the unit of each for UNIT;" in said
-    assert "--sample-time" not in said  # there is a time
+    assert "--sample-time" not in said  # the log has a time column
 
 
 def test_a_log_of_one_logger_says_how_the_other_is_merged(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a log holds is told as it is: numbers, dates and text, and the clock of its rows."""
+"""An inspection reports what a log holds: numbers, dates and text, and the clock of its rows."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Numbers that stand for lost samples are missing samples, and no value of a channel is taken for one."""
+"""Numbers that mark lost samples become missing samples, and no real value of a channel is mistaken for one."""
 
 import numpy as np
 import pytest

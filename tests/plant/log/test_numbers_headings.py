@@ -1,4 +1,4 @@
-"""Which channel a heading is taken for and which sizes are usual, kept in `numbers_headings.json`."""
+"""The channel guessed for each heading, and the usual magnitudes, kept in `numbers_headings.json`."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What a record and a table hold and whether a log is trusted, kept in `numbers_records.json`."""
+"""The contents of records and tables, and whether a log is trusted, kept in `numbers_records.json`."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""A sensor's scale in the unit of a column."""
+"""Tests of a sensor's scale in the unit of a column."""
 
 from pathlib import Path
 

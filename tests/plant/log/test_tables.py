@@ -1,4 +1,4 @@
-"""The tables of one log: which gives a channel, and which clock its rows have."""
+"""The tables of one log: which one gives each channel, and which clock the rows have."""
 
 from collections.abc import Mapping
 from typing import Any

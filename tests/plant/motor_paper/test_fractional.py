@@ -1,4 +1,4 @@
-"""Fractional derivatives against what is known of them in closed form."""
+"""Fractional derivatives agree with known closed forms."""
 
 from math import gamma
 

@@ -1,4 +1,4 @@
-"""Bouc-Wen hysteresis of a diaphragm: one loop at every frequency, and the linear model about it."""
+"""Bouc-Wen hysteresis of a diaphragm: the same loop at every frequency, and the linear model about it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Noise, relay, delay and PID do what they are called, alone and in a loop."""
+"""Noise, relay, delay and PID do what their names say, alone and in a loop."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_the_integral_waits_while_a_limit_holds_the_command() -> None:
     reference = np.concatenate([np.full(2000, 5.0), np.full(2000, 0.5)])
     waiting = _pid_run(Pid(1.0, 20.0, high=1.0, low=-1.0), reference)
     assert waiting.command.max() == 1.0
-    assert waiting.output[2150] < 0.6  # an integral that had gone on would hold it at 1 for seconds
+    assert waiting.output[2150] < 0.6  # with integrator windup it would stay at 1 for seconds
 
 
 def test_a_delayed_command_acts_so_many_samples_later() -> None:

@@ -1,4 +1,4 @@
-"""What the diaphragm-motor paper's own models give, kept in `numbers.json`."""
+"""Results of the diaphragm-motor paper's own models, kept in `numbers.json`."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The linear vibration model: mended it is stable and swings at 480 Hz, printed it is not and does not."""
+"""The linear vibration model: with mended signs it is stable and swings at 480 Hz, as printed it is unstable."""
 
 from dataclasses import replace
 from math import pi

@@ -1,4 +1,4 @@
-"""Fractional damping in time: a compiled ring of past samples, against the viscous damper and the exact response."""
+"""Fractional damping in time: a compiled ring of past samples agrees with the viscous damper and the exact response."""
 
 from dataclasses import replace
 from math import pi

@@ -1,4 +1,4 @@
-"""The stack alone."""
+"""Tests of the stack alone."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The piezo-stack actuator: conservation, numerics against a stiff solver, and the flows that the paper quotes."""
+"""The piezo-stack actuator: conservation, agreement with a stiff solver, and the flows that the paper quotes."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""What the piezo-stack actuator's model and runs give, kept in `numbers.json`."""
+"""Results of the piezo-stack actuator's model and runs, kept in `numbers.json`."""
 
 from dataclasses import asdict, replace
 from typing import Any
@@ -30,7 +30,7 @@ STACKS = {"paper's": PAPER, "varied": VARIED, "accumulator shut": SHUT}
 
 
 def states(p: PiezoStackParameters) -> dict[str, tuple[float, ...]]:
-    """Return states that are far from rest: pumping, taking in, reeds at both ends, a rod at its stops."""
+    """Return states far from rest: pumping, drawing in, reeds at both ends of their travel, a rod at its stops."""
     rest = at_bias(p, 40.0)
     oil = np.ones(len(rest))
 

@@ -1,4 +1,4 @@
-"""A faulty sensor changes its own channel, from its time on, by what it says, and nothing else."""
+"""A faulty sensor changes only its own channel, from its start time on and by its stated amount."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What sensors, sound and faulty, make of a run, kept in `numbers.json`."""
+"""The readings of healthy and faulty sensors in a run, kept in `numbers.json`."""
 
 from dataclasses import asdict, replace
 from typing import Any, get_args

@@ -1,4 +1,4 @@
-"""A derivative and its Jacobian by the kernel of the benchmarks, as plain functions."""
+"""A derivative and its Jacobian from the kernel of the benchmarks, as plain functions."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Means over blocks are those of the channel as it is written, sample by sample."""
+"""Means over blocks equal those of the channel computed sample by sample."""
 
 from types import SimpleNamespace
 

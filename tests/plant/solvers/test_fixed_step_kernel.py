@@ -1,4 +1,4 @@
-"""Fixed steps as straight lines: the plant's own steps, one run or eight."""
+"""Fixed steps compiled to straight-line code equal the plant's own steps, for one run or eight."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The loops that kernels are pasted from give in plain Python what the kernels give."""
+"""The loops from which kernels are made give the same results in plain Python."""
 
 import ctypes
 import inspect
@@ -132,7 +132,7 @@ def test_a_run_in_its_shortest_steps_ends_where_these_fill_a_sample_but_for_roun
         nonlocal asked
         asked += 1
         assert asked < 10 * steps, "the same step is asked for again and again"
-        ctypes.c_double.from_address(address + 8 * 7).value = 2.0  # an error that no step makes small
+        ctypes.c_double.from_address(address + 8 * 7).value = 2.0  # an error that no step size reduces
 
     kernel: Any = SimpleNamespace(LANES=1, WIDTH=1, COLUMNS=1, NUMBERS=14, VECTOR=1, move=lambda *_: None)
     kernel.settle_at, kernel.between_at, kernel.stages_at = (lambda *_: None), (lambda *_: None), stages
@@ -144,14 +144,15 @@ def test_a_run_in_its_shortest_steps_ends_where_these_fill_a_sample_but_for_roun
 @pytest.mark.parametrize("lost", [(0,), (3,), (7,), (2, 5), tuple(range(8))])
 def test_a_run_without_numbers_ends_and_leaves_those_beside_it_as_they_are(lost: tuple[int, ...]) -> None:
     run = compile_adaptive("damper", rates, 2, Damper, 8)
-    control = T, np.array([1e3, 1e2]), 1e-3, STRAIGHT, 20.0, 1e-9  # so short that a run which stays there never ends
+    # the shortest step is so short that a run that stays at it never ends
+    control = T, np.array([1e3, 1e2]), 1e-3, STRAIGHT, 20.0, 1e-9
     wanted, found = np.empty((len(DRIVE), 2, 8)), np.empty((len(DRIVE), 2, 8))
     run(STARTS, DRIVE, ROWS[None], *control, wanted)
     parameters = ROWS[None].copy()
     parameters[:, list(lost), 1] = np.nan
     run(STARTS, DRIVE, parameters, *control, found)
     others = [lane for lane in range(8) if lane not in lost]
-    apart = np.abs(found - wanted)[..., others] * control[1][:, None]  # in errors that a step may have
+    apart = np.abs(found - wanted)[..., others] * control[1][:, None]  # in units of a step's permitted error
     assert not np.any(apart > 10.0)
     assert np.all(np.isnan(found[1:][..., list(lost)]))
 
@@ -167,7 +168,7 @@ def test_a_drive_is_smooth_as_far_as_one_parabola_follows_it() -> None:
 
 
 def volumes(drive: np.ndarray, bend: float, bulge: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return at which samples pieces of a drive end, and what it has summed up to there."""
+    """Return the samples at which the pieces of a drive end, and the integral of the drive up to each."""
     ends, sums, rows = [0], [0.0], np.zeros((1, 1, 1))
     while ends[-1] < len(drive) - 1:
         end, lift, ramp, curvature = smooth(drive, rows, ends[-1], bend, bulge)
@@ -180,13 +181,13 @@ def volumes(drive: np.ndarray, bend: float, bulge: float) -> tuple[np.ndarray, n
 @pytest.mark.parametrize("bend", [1e-3, 0.3])
 @pytest.mark.parametrize("bulge", [SAMPLES, MEANS])
 def test_pieces_of_a_curve_hold_as_much_as_it(bulge: float, bend: float) -> None:
-    """A speed that settles exponentially; with long pieces along straight lines 16 times as much was lost."""
+    """The speed settles exponentially; long pieces with straight lines used to lose 16 times as much volume."""
     time = np.arange(60.0)
     half = 0.5 if bulge == MEANS else 0.0
     grown = -40.0 * np.exp(-time / 8.0)  # the antiderivative of the speed
     speed = 5.0 * np.exp(-time / 8.0) if half == 0.0 else np.diff(-40.0 * np.exp(-(np.arange(61.0) - half) / 8.0))
     ends, sums = volumes(speed, bend, bulge)
-    inside = ends[(ends > 0) & (ends < 59)]  # at the ends of a log there is no slope to go by
+    inside = ends[(ends > 0) & (ends < 59)]  # the slope is unknown at the ends of a log
     held, wanted = np.interp(inside, ends, sums), grown[inside]
     curved = np.abs((held - held[0]) - (wanted - wanted[0])).max()
     straight = np.abs(np.diff(np.interp(inside, *volumes(speed, bend, STRAIGHT))) - np.diff(wanted)).max()

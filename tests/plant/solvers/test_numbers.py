@@ -1,4 +1,4 @@
-"""What every solver makes of a small damper, kept in `numbers.json`."""
+"""The results of every solver for a small damper, kept in `numbers.json`."""
 
 from dataclasses import dataclass
 from typing import Any

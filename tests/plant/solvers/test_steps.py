@@ -53,14 +53,14 @@ def relative_rms(found: Array, wanted: Array) -> Array:
 
 
 def halving_ratios(run: Callable[[int], Array], fine: int, first: int = 4) -> Array:
-    """By how much each halving of the step, four times over, lowers the error against a fine run."""
+    """Return the factor by which each of four halvings of the step lowers the error against a fine run."""
     wanted = run(fine)[:, 1:]
     errors = np.array([np.max(relative_rms(run(first * 2**k)[:, 1:], wanted)) for k in range(5)])
     return errors[:-1] / errors[1:]
 
 
 def swaying(p: EhaParameters) -> Array:
-    """A drive that never reverses: 4 V with a ripple, 0.3 s at 1 ms."""
+    """Return a drive that never reverses: 4 V with a ripple, 0.3 s at 1 ms."""
     time = MILLISECOND * np.arange(301)
     return p.rated_speed * (0.8 + 0.2 * np.cos(2.0 * np.pi * 5.0 * time))
 
@@ -122,7 +122,7 @@ def test_sdirk2_is_of_second_order() -> None:
 
 @dataclass(frozen=True)
 class _Fed:
-    """A chamber that a pump empties and fills, and a check valve feeds, in units of the pumped flow [s, Pa]."""
+    """A chamber that a pump empties and fills and a check valve feeds, in units of the pumped flow [s, Pa]."""
 
     filled_in: float = 1e-4
     rated_drop: float = 5e4
@@ -135,7 +135,7 @@ def _fed(state: Any, flow: Any, p: Any) -> Any:
 
 
 def test_an_implicit_step_follows_a_valve_that_fills_a_chamber_within_it() -> None:
-    """ROS2 takes the valve for shut in the step in which it opens, and makes up oil that the chamber keeps."""
+    """ROS2 treats the valve as shut in the step in which it opens, and so adds oil that stays in the chamber."""
     drive, row = np.sin(2.0 * np.pi * 5.0 * MILLISECOND * np.arange(401)), parameter_row(_Fed())[None]
 
     def run(scheme: Callable[..., Any], substeps: int) -> Array:

@@ -1,4 +1,4 @@
-"""Scipy's stiff solvers agree with each other, and the slopes that they are given are right."""
+"""Scipy's stiff solvers agree with each other, and the Jacobians that they are given are right."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What is presumed of the inner circuit's accumulator, and what a log of a compact actuator says of it."""
+"""Presumed stiffness of the inner circuit's accumulator, and what the log of a compact actuator shows of it."""
 
 import math
 from dataclasses import replace
@@ -27,7 +27,7 @@ from plant.sensors.sensors import BENCH
 from tests.estimation.fits.short_logs import PAPER, log, made_fit, seen
 
 SMALL = 1.2e-4
-"""Gas of a compact actuator's accumulator: 1.7 times the oil that its chambers take up, an eighth of the paper's."""
+"""Gas of a compact actuator's accumulator [m^3]: 1.7 times what its chambers take up, an eighth of the paper's."""
 
 
 @cache
@@ -41,7 +41,7 @@ def test_gas_that_is_stated_is_believed_as_far_as_its_uncertainty_goes() -> None
     known, doubted = (presumed_stiffness(rig, {"accumulator_gas": doubt})[STIFFNESS] for doubt in (0.0, 0.3))
     assert rig.accumulator_pressure / SMALL < known[0] < 1.4 * rig.accumulator_pressure / SMALL
     assert doubted[0] == known[0]
-    assert known[1] < 0.1  # of the exponent alone
+    assert known[1] < 0.1  # from the exponent alone
     assert doubted[1] == pytest.approx(math.hypot(known[1], 0.3))
 
 
@@ -57,13 +57,13 @@ def test_a_single_rod_gives_and_takes_what_its_rod_displaces() -> None:
 
 
 def test_an_accumulator_far_stiffer_than_presumed_has_taken_up_something_else() -> None:
-    """That of 45 plain logs is 0.6 deviations above at most, those of two encoders homed at a stop were 2.4."""
+    """In 45 plain logs it is at most 0.6 deviations stiffer; in two with an encoder homed at a stop it was 2.4."""
     plain = seen(log(0.2))
     usual, std = plain.presumed[STIFFNESS]
     for deviations, wanted in ((0.6, False), (FAR_STIFFER - 0.01, False), (FAR_STIFFER + 0.01, True), (-3.0, False)):
         assert is_far_stiffer(plain, {STIFFNESS: usual * math.exp(deviations * std)}) is wanted
     assert not is_far_stiffer(plain, {STIFFNESS: 0.0})
-    assert not is_far_stiffer(plain, {"bulk_modulus": 2e8})  # held volumes have none
+    assert not is_far_stiffer(plain, {"bulk_modulus": 2e8})  # a form with held volumes has no accumulator
 
 
 @pytest.mark.parametrize(
@@ -78,13 +78,13 @@ def test_gas_that_a_log_contradicts_is_named(less: float, left: float, limit: st
     fit = replace(made_fit(100.0, 2e8, 1e6), values={STIFFNESS: found}, std={STIFFNESS: left * found})
     said = gas_contradicted(told, fit, rig)
     assert [note.data["limit"] for note in said] == ([] if limit is None else [limit])
-    assert gas_contradicted(told, fit, PAPER) == ()  # it states none
-    assert gas_contradicted(told, replace(fit, std={STIFFNESS: np.inf}), rig) == ()  # the log tells nothing
+    assert gas_contradicted(told, fit, PAPER) == ()  # this rig file states no gas volume
+    assert gas_contradicted(told, replace(fit, std={STIFFNESS: np.inf}), rig) == ()  # the log does not show the gas
 
 
 @pytest.mark.parametrize("stated", [None, SMALL, 2.0 * SMALL])
 def test_a_compact_actuator_has_its_bulk_modulus_and_its_gas_whatever_its_file_says_of_it(stated: float | None) -> None:
-    """Its bulk modulus was 1.1 % low, at six deviations, while the gas was held to the paper's size."""
+    """With the gas held to the paper's size, bulk modulus was 1.1 % low, by six deviations."""
     rig = replace(EhaParameters(), accumulator_gas=stated)
     fit = fit_flow(compact(3), rig, rig.bulk_modulus, {"accumulator_gas": 0.3})
     value, std = fit.parameters["bulk_modulus"]

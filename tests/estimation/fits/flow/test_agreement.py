@@ -1,4 +1,4 @@
-"""What straight lines between samples and turns that were read say of a slow log together."""
+"""Conclusions from fits of a slow log with straight lines between samples and with turns read from the log."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +10,7 @@ from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.notes import RigCode
 
 TURNS = 9.0
-"""How often the motor of these logs turns [count]."""
+"""Number of turns of the motor in these logs [count]."""
 
 
 def said(name: str, gain: float = 0.0, *, explained: bool = False) -> Answered:
@@ -32,7 +32,7 @@ def test_what_both_ways_show_has_the_numbers_of_straight_lines() -> None:
 
 @pytest.mark.parametrize("explained", [True, False])
 def test_what_straight_lines_alone_show_is_not_strange(explained: bool) -> None:
-    """A pump that compresses its oil gained 76 of them: leakage was 66 % low."""
+    """Oil compressed by the pump gained 76 with straight lines, and leakage was 66 % low."""
     straight, read = said("pump_compresses", 76.0, explained=explained), said("", explained=True)
     told = agreed(straight, read)
     assert told.strange is None
@@ -42,7 +42,7 @@ def test_what_straight_lines_alone_show_is_not_strange(explained: bool) -> None:
 @pytest.mark.parametrize("name", ["delivery", ""])
 @pytest.mark.parametrize("left", [0.05, 0.0])
 def test_a_worn_pump_that_turns_exclude_is_not_left_open_by_straight_lines(name: str, left: float) -> None:
-    """A sound pump was 99 % likely to deliver 73 % in a plain log at 200 Hz: ten deviations, 0.6 with turns read."""
+    """In a plain log at 200 Hz a sound pump was 99 % likely to deliver 73 %: ten deviations, 0.6 with turns read."""
     told = RigCode.WEAR_NOT_EXCLUDED.note(percent=37.0, half_width=6.2)
     by_turns = (RigCode.WEAR_NOT_EXCLUDED.note(percent=100.0 * left, half_width=3.6),) if left else ()
     straight, read = (said(one, 80.0, explained=True) for one in (name, ""))

@@ -1,4 +1,4 @@
-"""What a log is asked beside the plain form."""
+"""Which hypotheses are tested on a log beside the plain form."""
 
 import math
 from dataclasses import replace
@@ -48,42 +48,43 @@ from tests.estimation.fits.test_numbers_wide import all_promise
 
 
 def test_a_fit_that_leaves_more_than_the_noise_of_sensors_is_asked_for_all_that_may_be_strange() -> None:
-    """The gate lets it pass: bulk modulus of a single rod was 39 % too low behind it."""
+    """The gate would pass such a fit: bulk modulus of a single rod was 39 % too low in one."""
     plain, sound = seen(log(6.0)), made_fit(400.0, 2e8, 1e5)
     doubted = replace(sound, chi_square=(0.5 * (DOUBTED + LARGEST_CHI_SQUARE),))
     with all_promise(PredictedGain(0.0, 0.0, 2.0 * OPEN_DELIVERY)):
         asked, remarks = hypotheses_asked(plain, PAPER, doubted, doubted, loaded=False, moving=False)
         assert asked == HYPOTHESES
-        assert [note.code for note in remarks] == [RigCode.WEAR_NOT_EXCLUDED]  # what is left open stays so
+        assert [note.code for note in remarks] == [RigCode.WEAR_NOT_EXCLUDED]  # wear is still not excluded
         assert hypotheses_asked(plain, PAPER, sound, sound, loaded=False, moving=False) == ((), remarks)
 
 
 def test_a_fit_that_leaves_far_less_than_the_noise_of_position_is_asked_for_nothing() -> None:
-    """What is freed leaves less still: a log of which everything was asked took 19 s, and was refused as before."""
+    """Hypotheses reduce the residuals further: to test them all took 19 s, and the log was refused all the same."""
     plain, sound = seen(log(6.0)), made_fit(400.0, 2e8, 1e5)
     noisy = replace(plain, noise=tuple(replace(one, passed_on=1.0) for one in plain.noise))
     for left, wanted in ((0.99 * QUIET, ()), (1.01 * QUIET, HYPOTHESES)):
-        fit = replace(sound, chi_square=(left,), autocorrelation=(0.9,))  # alike as well, which alone asks for all
+        # also correlated, which alone would have all hypotheses tested
+        fit = replace(sound, chi_square=(left,), autocorrelation=(0.9,))
         assert hypotheses_asked(noisy, PAPER, fit, fit, loaded=False, moving=False)[0] == wanted
 
 
 def test_valves_as_wide_as_a_model_resolves_are_asked_what_they_took_up() -> None:
-    """A pressure that lags by 2 ms was told as plain, bulk modulus six deviations too low."""
+    """A log whose pressure lags by 2 ms was called plain, with bulk modulus six deviations too low."""
     plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
     widest = widest_makeup(PAPER.chamber_volume, PAPER.bulk_modulus, plain)
-    for share, wanted in ((0.42, ()), (1.0, HYPOTHESES)):  # of sound logs 0.42 at most
+    for share, wanted in ((0.42, ()), (1.0, HYPOTHESES)):  # at most 0.42 in sound logs
         wide = replace(sound, values={**sound.values, "makeup_conductance": share * widest})
         with all_promise(PredictedGain(0.0, 0.0, 2.0 * OPEN_DELIVERY)):
             asked, remarks = hypotheses_asked(plain, PAPER, wide, wide, loaded=False, moving=False)
         assert asked == wanted
-        assert [note.code for note in remarks] == [RigCode.WEAR_NOT_EXCLUDED]  # what is left open stays so
+        assert [note.code for note in remarks] == [RigCode.WEAR_NOT_EXCLUDED]  # wear is still not excluded
 
 
 @pytest.mark.parametrize(("lead", "wanted"), [(-0.5, ()), (-1.0, (PRESSURE_LATE,)), (1.0, (SPEED_LATE,))])
 def test_a_lead_of_the_motor_at_its_bounds_is_asked_which_channel_is_late(
     lead: float, wanted: tuple[Hypothesis, ...]
 ) -> None:
-    """A pressure 2.5 ms late went into it at 500 Hz, with bulk modulus 5.6 % too high and a worn pump called sound."""
+    """At 500 Hz it absorbed a pressure 2.5 ms late: bulk modulus was 5.6 % too high, a worn pump was called sound."""
     plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
     early = replace(sound, values={**sound.values, "speed_lead": lead * plain.sample_time})
     with all_promise(NO_GAIN):
@@ -91,7 +92,7 @@ def test_a_lead_of_the_motor_at_its_bounds_is_asked_which_channel_is_late(
 
 
 def test_a_minute_at_1_khz_is_asked_and_two_are_not() -> None:
-    """A sound log of a minute was refused: the pump's oil was compressed, and nothing was asked."""
+    """A sound log of a minute was refused: its pump compressed the oil, and no hypothesis was tested."""
     short, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
     for samples, wanted in ((60_000, True), (120_000, False)):
         long = replace(short, drives=np.zeros((samples, short.drives.shape[1])))
@@ -100,7 +101,7 @@ def test_a_minute_at_1_khz_is_asked_and_two_are_not() -> None:
 
 
 def test_a_worn_pump_that_is_asked_for_stays_open_until_it_is_found() -> None:
-    """The plain form is told where the search ends short of it."""
+    """If the search ends before it finds the worn pump, the plain form is reported."""
     sound = made_fit(400.0, 2e8, 1e5)
     with all_promise(PredictedGain(12.0, -0.14, 0.03)):
         asked, remarks = hypotheses_asked(seen(log(0.2)), PAPER, sound, sound, loaded=False, moving=False)
@@ -120,7 +121,7 @@ def test_an_encoder_s_zero_is_asked_for_where_no_held_volumes_fit_better_or_the_
 
 @pytest.mark.parametrize(("deviations", "wanted"), [(0.5, False), (2.5, True)])
 def test_an_encoder_s_zero_is_asked_for_where_the_accumulator_took_it_up(deviations: float, *, wanted: bool) -> None:
-    """Slopes beside an accumulator that follows the piston promised nothing: bulk modulus was 1.8 and 2.1 % low."""
+    """Slopes beside an accumulator that follows the piston predicted no gain: bulk modulus was 1.8 and 2.1 % low."""
     plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
     usual, std = plain.presumed[STIFFNESS]
     values = {**sound.values, "makeup_conductance": 1e-9, STIFFNESS: usual * math.exp(deviations * std)}
@@ -132,7 +133,8 @@ def test_an_encoder_s_zero_is_asked_for_where_the_accumulator_took_it_up(deviati
 
     with all_promise(NO_GAIN), patch.object(asked_hypotheses, "predicted_gain", beside_none):
         asked, _ = hypotheses_asked(plain, PAPER, fit, fit, loaded=False, moving=False)
-    assert (ZERO_HIDDEN in asked) is wanted  # with what has taken it up: 25311 was 1.5 % low, the zero not believed
+    # freed together with what absorbed it: otherwise log 25311 was 1.5 % low, and its zero was not accepted
+    assert (ZERO_HIDDEN in asked) is wanted
     assert ENCODER_ZERO not in asked
     (near,) = near_starts(fit, (), lambda _: True, in_motion=False)
     assert STIFFNESS in near
@@ -142,7 +144,7 @@ def test_an_encoder_s_zero_is_asked_for_where_the_accumulator_took_it_up(deviati
 
 
 def test_a_short_log_is_not_asked_for_all_where_noise_alone_leaves_as_much_by_chance() -> None:
-    """One plain log of 2 s in eleven was: it took four times as long, and nothing was ever found."""
+    """One in eleven plain logs of 2 s was tested for all, which took four times as long and never found anything."""
     short, sound = seen(log(2.0)), made_fit(400.0, 2e8, 1e5)
     with all_promise(PredictedGain(0.0, 0.0, 2.0 * OPEN_DELIVERY)):
         for chi_square, wanted in ((1.16, ()), (1.18, HYPOTHESES)):
@@ -163,9 +165,9 @@ def test_a_log_is_asked_nothing_where_slopes_promise_more_than_it_leaves() -> No
 
 
 def test_valves_that_open_late_or_never_are_asked_for_where_a_plain_fit_has_late_ones() -> None:
-    """The slopes promised nothing, where a valve is all but shut already.
+    """If a valve is almost shut already, the slopes predicted no gain.
 
-    Bulk modulus of `checks_crack_late` 17006 passed 3.0 % low: the drops were held back by what is presumed of them.
+    `checks_crack_late` 17006 passed with bulk modulus 3.0 % low: priors held the opening drops back.
     """
     plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
     usual, late = 0.9 * LARGE_CRACK, 1.1 * LARGE_CRACK

@@ -1,4 +1,4 @@
-"""Which of two explanations of a log is believed, and what is hinted at where none is."""
+"""Which of two explanations of a log is accepted, and the hint that is given if there is none."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +15,7 @@ def explanation(name: str, cost: float) -> Explanation:
 
 
 def test_gauges_of_unlike_gains_are_told_where_nothing_else_is_as_likely() -> None:
-    """Asked beside all others they took up 1.8 of 2 rad/s that a speed was off by."""
+    """Tested together with all others, they absorbed 1.8 rad/s of a speed offset of 2 rad/s."""
     offset, gauges = explanation("pressure_offset", 2585.0), explanation("pressure_sides", 2731.0)
     assert likelier(offset, gauges) is offset
     assert likelier(explanation("delivery", 2731.0), gauges) is not gauges
@@ -27,7 +27,7 @@ def test_gauges_of_unlike_gains_are_told_where_nothing_else_is_as_likely() -> No
 
 @pytest.mark.parametrize(("chi", "left"), [(1.1, 0.1), (9.0, 8.0), (12.0, None)])
 def test_what_takes_nearly_all_away_that_is_unexplained_is_hinted_at(chi: float, left: float | None) -> None:
-    """`makeup_check_stuck_shut`, validation 25300: a blocked valve left 1.14 of 1100, which is no explanation."""
+    """`makeup_check_stuck_shut`, validation 25300: a blocked valve left 1.14 of 1100, too much for an explanation."""
     plain: Any = SimpleNamespace(best=made_fit(5e4, 2e8, 1e5, chi=101.0), explains=lambda fit: fit.chi_square[0] < 1.05)
     blocked = Explanation(("makeup_blocked",), {}, {}, (made_fit(1e3, 2e8, 1e5, chi=chi),), (), 1e6)
     said = nearly_explained(plain, blocked)

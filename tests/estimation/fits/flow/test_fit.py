@@ -45,8 +45,10 @@ def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condit
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(p.bulk_modulus, rel=0.005)
     leakage, std = fit.parameters["leakage_coefficient"]
     assert abs(leakage - p.leakage_coefficient) < 2.0 * std
-    through = leakage + 0.5 * fit.parameters["case_leakage"][0]  # what dp drives, whichever way it takes
-    assert through == pytest.approx(p.leakage_coefficient, rel=0.05, abs=2.0 * std)  # of a healthy one 6 s tell 5 %
+    # leakage driven by differential pressure, by either path
+    through = leakage + 0.5 * fit.parameters["case_leakage"][0]
+    # 6 s of a healthy actuator show it to 5 %
+    assert through == pytest.approx(p.leakage_coefficient, rel=0.05, abs=2.0 * std)
     assert fit.parameters["flow_bias"][0] == pytest.approx(p.flow_bias, rel=0.10)
     assert fit.reasons == ()
 
@@ -72,10 +74,10 @@ def test_what_a_log_begins_with_must_leave_noise_alone_and_an_offset_no_more_tha
 
 @pytest.mark.slow
 def test_a_wandering_pressure_sensor_is_objected_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And a fit that does not explain its log contradicts no gas of the rig file."""
+    """A fit that does not explain its log does not contradict the gas volume of the rig file either."""
     gas, record = RigCode.GAS_CONTRADICTED.note(limit="least", ratio=4.0), log("normal", 12, duration=2.0)
     monkeypatch.setattr(flow_fit, "gas_contradicted", lambda *_: (gas,))
-    drift = 2e5 * np.sin(np.linspace(0.0, 6.0, len(record)))  # an even drift would be found and taken off
+    drift = 2e5 * np.sin(np.linspace(0.0, 6.0, len(record)))  # a steady drift would be found and subtracted
     fit = fit_flow(record.replace(differential_pressure_pa=record["differential_pressure_pa"] + drift), HEALTHY, 2e8)
     (ratio,) = (note.data["ratio"] for note in fit.reasons if note.code == EstimateCode.PRESSURE_RESIDUALS_LARGE)
     assert ratio > 3.0
@@ -97,7 +99,7 @@ def test_a_log_whose_search_was_ended_is_refused_and_handed_to_no_filter(
 
 
 def test_slips_that_are_asked_last_may_do_no_more_than_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pairs of slips were searched however much that took."""
+    """Pairs of slips were searched without a limit on the work."""
 
     def searched(_: object, plain: PlainFits, *__: object, paired: bool = True) -> None:
         if paired:
@@ -142,7 +144,7 @@ def test_an_offset_of_pressure_does_not_pass_for_one_of_speed(monkeypatch: pytes
     assert fit.turning.offset == 0.0
     assert fit.explanation is not None
     assert fit.explanation.values["pressure_offset"][0] == pytest.approx(2e4, rel=0.05)
-    assert unseen in fit.remarks  # what an explained log does not show is told as well
+    assert unseen in fit.remarks  # also reported if a hypothesis explains the log
 
 
 def test_a_log_without_pressure_is_refused_with_what_it_lacks() -> None:
@@ -264,7 +266,7 @@ def test_a_relief_valve_with_a_sharp_corner_does_not_feign_certainty(seed: int) 
     rng, rig = np.random.default_rng(seed), EhaParameters(relief_pressure=1.7e6)
     p = replace(parameters_for(CONDITIONS["major_friction"], rig), relief_conductance=1e-7)
     record = simulate(CIRCUIT, make_drive("prbs", 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
-    bit = 12207.0  # of a 12-bit converter
+    bit = 12207.0  # resolution of a 12-bit converter [Pa]
     coarse = record.replace(differential_pressure_pa=bit * np.round(record["differential_pressure_pa"] / bit))
     fit = fit_flow(coarse, rig, 2.07e8)
     assert 1e-3 < fit.bound < 5e-3

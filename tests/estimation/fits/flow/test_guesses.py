@@ -1,4 +1,4 @@
-"""Guesses of which the likeliest is followed."""
+"""Guesses about a start, of which the likeliest is followed."""
 
 import pytest
 

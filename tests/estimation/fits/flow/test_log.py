@@ -1,4 +1,4 @@
-"""What noise of the encoder does to a fit of the flow form."""
+"""Effect of encoder noise on a fit of the flow form."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ from tests.thinned import thinned
 
 HEALTHY = EhaParameters()
 NOISY = replace(BENCH, position_noise=3e-5, position_quantum=1e-5)
-"""A sensor of position as many rigs have it, where the reference bench has an encoder of 1 um."""
+"""A position sensor such as many rigs have; the reference bench has an encoder of 1 um."""
 
 
 def log(condition: str, seed: int, duration: float = 6.0) -> tuple[Record, float]:
@@ -47,7 +47,7 @@ def deviations(record: Record, true: float) -> float:
 def test_noise_of_position_does_not_pass_for_soft_oil(condition: str, monkeypatch: pytest.MonkeyPatch) -> None:
     record, true = log(condition, 5, duration=4.0)
     assert abs(deviations(record, true)) < 3.0
-    monkeypatch.setattr("estimation.fits.flow.log.FELT_NOISE", np.inf)  # as if all of it were the pressure sensor's
+    monkeypatch.setattr("estimation.fits.flow.log.FELT_NOISE", np.inf)  # as if all noise came from the pressure sensor
     value, std = fit_flow(record, HEALTHY, 2e8).parameters["bulk_modulus"]
     assert value < true - 5.0 * std
 
@@ -77,7 +77,7 @@ def test_noise_of_position_counts_where_it_is_felt_beside_the_pressure_sensor() 
 
 
 def lagging(values: np.ndarray, lag: float) -> np.ndarray:
-    """Return what a sensor with a first-order lag [s] gives of samples 1 ms apart."""
+    """Return the output of a sensor with a first-order lag [s] for samples 1 ms apart."""
     kept = np.exp(-1e-3 / lag)
     return lfilter([1.0 - kept], [1.0, -kept], values, zi=[kept * values[0]])[0]
 
@@ -92,7 +92,7 @@ def test_a_position_sensor_that_lags_is_named_and_its_number_is_right(condition:
     assert fit.reasons == ()
     assert fit.explanation is not None
     assert fit.explanation.names == ("position_late",)
-    kept = np.exp(-1.0 / 3.0)  # in steps of 1 ms this is late by so many of them where signals are slow
+    kept = np.exp(-1.0 / 3.0)  # share kept in each step of 1 ms: a slow signal is late by kept / (1 - kept) steps
     assert lateness(fit.explanation, "position_m") == pytest.approx(1e-3 * kept / (1.0 - kept), abs=1e-4)
     value, std = fit.parameters["bulk_modulus"]
     assert value == pytest.approx(HEALTHY.bulk_modulus, abs=3.0 * std)
@@ -120,11 +120,11 @@ def test_the_slope_of_the_cost_holds_what_the_variance_changes_by(kind: type[Pro
         gradient = problem.at(theta).gradient[place]
         assert gradient == pytest.approx(slope, rel=0.01)
         held = gradient + problem.untilted(theta, problem.residuals(theta))[place]
-        assert abs(held - gradient) > least * abs(gradient)  # the test can tell
+        assert abs(held - gradient) > least * abs(gradient)  # the difference is large enough for this test
 
 
 def test_noise_of_position_leaks_off_and_goes_with_stiffness_over_volume() -> None:
-    """Else oil as stiff as steel, or twice the volume with twice the modulus, would explain any leaky actuator."""
+    """Otherwise oil as stiff as steel, or twice the volume with twice the modulus, would explain any leaky actuator."""
     noise = flow_log(*_sound(log("normal", 7, duration=4.0)[0])).noise[0]
 
     def passed(modulus: float, volume: float = 1.0, leakage: float = 1e-10, case: float = 0.0) -> float:
@@ -197,7 +197,7 @@ def test_speeds_missing_at_an_end_of_a_log_are_open_by_the_half_slope_of_the_end
     speed = 10.0 * np.arange(n, dtype=float)
     speed[:3] = speed[-3:] = np.nan
     gaps = speed_gaps(Record(at, {"motor_speed_rad_s": speed}), HEALTHY, 0.0)
-    # the missing end is held, so half the slope of 10 rad/s a sample is what four intervals leave open
+    # a missing end is held, so half the slope of 10 rad/s per sample is uncertain over four intervals
     volume = 0.5 * (0.5 * 10.0 * 4) * 3 * at * HEALTHY.pump_displacement
     variance = (HEALTHY.bulk_modulus / HEALTHY.chamber_volume * volume) ** 2 / 4
     assert gaps.tolist() == [[0.0, 3.0, pytest.approx(variance)], [n - 3.0, n - 1.0, pytest.approx(variance)]]

@@ -1,4 +1,4 @@
-"""Lumped leakage: what a log tells of two leaks together, where it tells neither."""
+"""Lumped leakage: the sum of two leaks, for a log that shows neither of them alone."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ ACROSS, DRAINED, BIASED = 5e-12, 4e-13, 2e-6
 
 
 def fit(across: float = ACROSS, apart: float = -0.99) -> GreyBoxFit:
-    """Return a fit with leaks of which the log tells the sum alone: a drain to 50 %, the rest to 2 %."""
+    """Return the fit of a log that shows only the sum of two leaks: the drain is known to 50 %, the leakage to 2 %."""
     unknowns = FLOW_FORM.unknowns
     values = {**dict.fromkeys(unknowns, 1.0), LEAKAGE: across, DRAIN: DRAINED, BIAS: BIASED}
     deviations = {LEAKAGE: 0.02, DRAIN: 0.5, BIAS: 0.01}
@@ -46,7 +46,7 @@ def test_two_leaks_are_known_together_where_neither_is_known() -> None:
 
 
 def test_no_leakage_is_known_better_than_the_forms_steps_balance_the_pumped_flow() -> None:
-    """Leakage of a circuit at 10 kHz was told to 0.005 %, and was 0.02 % off."""
+    """Leakage of a circuit at 10 kHz was reported to within 0.005 %, and was 0.02 % off."""
     sure = replace(fit(), covariance=1e-12 * fit().covariance)
     told, correlation = with_lumped(found(sure), [sure], weights(1.0), PAPER)
     steps = DISCRETISED * PAPER.pump_displacement * PAPER.rated_speed / PAPER.relief_pressure
@@ -55,7 +55,7 @@ def test_no_leakage_is_known_better_than_the_forms_steps_balance_the_pumped_flow
 
 
 def test_losses_of_a_single_rod_are_known_no_better_than_its_balance_and_its_drain() -> None:
-    """Four rods were told a leakage 7 to 110 deviations off: a drain of the other side looks like a leak."""
+    """Leakage of four single rods was 7 to 110 deviations off: a drain of the other side looks like a leak."""
     sure, single = replace(fit(), covariance=1e-12 * fit().covariance), replace(PAPER, area_difference=0.2)
     told, _ = with_lumped(found(sure), [sure], weights(1.0), single, 1e6)
     left_out = UNEVEN_SIDES * PAPER.rated_flow

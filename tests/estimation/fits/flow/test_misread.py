@@ -1,4 +1,4 @@
-"""Signs and units that fits name where correlations of channels do not."""
+"""Wrong signs and units that fits identify if correlations between channels do not."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -33,7 +33,7 @@ SAID = {SPEED: "rpm read as rad/s", PRESSURE: "a wrong sign of differential_pres
 
 
 def log(softer: float = 1.0) -> Record:
-    """Return a second of steps: too little for correlations."""
+    """Return a log with one second of steps, which is too short for correlations."""
     rng, p = np.random.default_rng(8), replace(RIG, bulk_modulus=RIG.bulk_modulus / softer)
     return simulate(CIRCUIT, make_drive("steps", 1.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
@@ -60,7 +60,7 @@ def test_a_short_log_names_a_unit_or_sign_that_correlations_do_not(
 def test_slips_are_tried_once_and_first_where_the_pump_has_turned_for_two_seconds(
     rests: int, missing: int, lengths: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A speed that was missing throughout the first 2 s ended in an error."""
+    """A speed that was missing throughout the first 2 s caused an error."""
     seen: list[int] = []
     fit = made_fit(50.0, 0.01 * RIG.bulk_modulus, 1e5)
 
@@ -83,7 +83,7 @@ def test_slips_are_tried_once_and_first_where_the_pump_has_turned_for_two_second
 
 
 def test_a_log_that_is_fitted_anew_is_asked_for_slips_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A lower valley may be none of the rig's where the first one was."""
+    """The first minimum may fit the rig, and a lower one may not."""
     plains = [SimpleNamespace(best=best, explains=lambda _: True) for best in ("kin", "foreign")]
     nothing: Any = None
     monkeypatch.setattr(flow_fit, "plain_fits", lambda *_: plains.pop(0))
@@ -109,7 +109,7 @@ def test_a_log_that_is_fitted_anew_is_asked_for_slips_anew(monkeypatch: pytest.M
 def test_slips_are_tried_of_what_nothing_explains_unless_an_offset_of_pressure_does(
     monkeypatch: pytest.MonkeyPatch, named: str
 ) -> None:
-    """A pump that delivers a tenth looks like a speed in rpm; no slip looks like an offset."""
+    """A pump that delivers a tenth of its flow looks like a speed in rpm; no slip looks like an offset."""
     plain: Any = SimpleNamespace(best="foreign", explains=lambda _: False)
     strange: Any = SimpleNamespace(names=(named,), fit="kin")
     nothing: Any = None
@@ -132,7 +132,7 @@ def test_slips_are_tried_of_what_nothing_explains_unless_an_offset_of_pressure_d
 
 @pytest.mark.parametrize("noise", [0.0, 2e3])
 def test_a_dead_sensor_of_pressure_accuses_no_speed(noise: float) -> None:
-    """Nothing moved, so that a pump a tenth as fast explained it best."""
+    """Nothing moved, so a pump a tenth as fast explained the log best."""
     sound = log()
     still = {name: np.zeros(len(sound)) for name in ("position_m", "velocity_m_s")}
     dead = noise * np.random.default_rng(1).standard_normal(len(sound))
@@ -173,7 +173,7 @@ def test_a_fit_is_none_of_the_rigs_where_its_oil_or_what_its_pump_loses_is_surel
 
 
 def test_oil_seven_times_as_stiff_as_the_rigs_is_no_pressure_in_another_unit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pressure read ten times too large has the stiffness of such oil; friction tells the two apart."""
+    """Pressure that reads ten times too high looks like such stiff oil; friction distinguishes the two."""
     monkeypatch.setattr(misread_module, "SLIPS", [one for one in SLIPS if one.channel == PRESSURE])
     stiff = log(1 / (1.05 * FOREIGN))
     found = estimate_bulk_modulus(stiff, RIG)
@@ -186,7 +186,7 @@ def test_oil_seven_times_as_stiff_as_the_rigs_is_no_pressure_in_another_unit(mon
 
 @pytest.fixture(params=[False, pytest.param(True, marks=pytest.mark.slow)], ids=["slips alone", "whole search"])
 def _strange_rigs_are_searched_for(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing strange about a rig explains a log in another unit, and finding that none does is most of the work."""
+    """No hypothesis about the rig explains a log in another unit, and most of the work is to find that out."""
     if not request.param:
         monkeypatch.setattr(flow_fit, "_strange", lambda *_: None)
 
@@ -203,7 +203,7 @@ def _strange_rigs_are_searched_for(request: pytest.FixtureRequest, monkeypatch: 
 def test_a_unit_of_a_factor_that_oils_differ_by_and_two_slips_together_are_named(
     wrong: dict[str, float], channel: str, said: str
 ) -> None:
-    """Psi read as kPa passed with a bulk modulus 85 % too low."""
+    """A pressure in psi, read as kPa, passed with bulk modulus 85 % too low."""
     sound = log()
     read = sound.replace(**{name: times * sound[name] for name, times in wrong.items()})
     (note,) = estimate_bulk_modulus(read, RIG).gate.reasons
@@ -226,7 +226,7 @@ def test_slips_that_a_rough_search_refutes_are_not_fitted(monkeypatch: pytest.Mo
 @pytest.mark.usefixtures("_strange_rigs_are_searched_for")
 @pytest.mark.parametrize(("times", "passed"), [(1.0, True), (-1.0, False)])
 def test_a_rig_file_without_friction_at_rest_is_fitted_and_names_slips(times: float, passed: bool) -> None:
-    """Both ended in a division by zero, on every log."""
+    """Both failed on every log, with a division by zero."""
     sound = log()
     read = sound.replace(**{PRESSURE: times * sound[PRESSURE]})
     found = estimate_bulk_modulus(read, replace(RIG, friction_coulomb=0.0))
@@ -237,7 +237,7 @@ def test_a_rig_file_without_friction_at_rest_is_fitted_and_names_slips(times: fl
 def test_of_units_that_explain_a_log_alike_those_are_fitted_first_whose_pressure_the_rigs_friction_takes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A pressure in psi, read as bar, was called kPa or MPa: of five that explained it, four were fitted."""
+    """A pressure in psi, read as bar, was called kPa or MPa: five units explained it, and only four were fitted."""
     pressures = [one for one in SLIPS if one.channel == PRESSURE]
     monkeypatch.setattr(misread_module, "_rough_misfit", lambda *_: 0.9)
     right = log()

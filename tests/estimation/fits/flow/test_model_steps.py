@@ -1,4 +1,4 @@
-"""Model steps that err by less than noise does."""
+"""Model steps whose error is smaller than the noise."""
 
 from dataclasses import replace
 
@@ -44,14 +44,14 @@ PILOTED = CircuitParameters(
     motor_speed_per_volt=49.2,
     motor_speed_limit=394.0,
 )
-"""A leaky single rod of 84 mm, of which each side holds the other's make-up valve open by turns at no load."""
+"""A leaky single rod of 84 mm; at no load each side in turn holds the other's make-up valve open."""
 
 SPEED = 175.0
-"""Speed that its motor turns to [rad/s]."""
+"""Amplitude of its motor's speed [rad/s]."""
 
 
 def test_steps_that_chatter_are_taken_implicitly_and_the_log_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With usual steps such logs were refused: what the model left was its own error."""
+    """With the usual steps such logs were refused: the residuals were the model's own error."""
     speed = chirp(1.5, 5e-4, SPEED, 0.5, 4.0)
     sensors, rng = replace(BENCH, pressure_noise=1500.0), np.random.default_rng(1)
     rod = EhaParameters(**{name: getattr(PILOTED, name) for name in PARAMETER_NAMES})

@@ -1,4 +1,4 @@
-"""Whether a motor's command is held between samples is read off the log, where it is felt."""
+"""Whether the motor's command is held between samples is read from the log if it has an effect."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from tests.estimation.fits.short_logs import PAPER, POSITION, PRESSURE, SPEED, l
 STIFF = replace(PAPER, bulk_modulus=1.4e9)
 
 FINE = 10
-"""Steps of a run between two samples."""
+"""Simulation steps between two samples [count]."""
 
 
 def logged(*, held: bool) -> Logged:
@@ -46,7 +46,7 @@ def test_a_log_says_whether_its_motors_command_was_held(held: bool) -> None:
 def test_a_held_command_is_fitted_from_the_end_of_the_smooth_ones_fit_where_bends_may_gain_little(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Both fits of a log were searched from the start: a third of an estimate."""
+    """Both fits of a log were searched from the start, which took a third of the time of an estimate."""
     log = logged(held=True)
     plain = plain_fits(log, FitStart(STIFF, STIFF.bulk_modulus))
     whole = by_course(log, plain)
@@ -54,7 +54,7 @@ def test_a_held_command_is_fitted_from_the_end_of_the_smooth_ones_fit_where_bend
     with pytest.raises(pytest.fail.Exception, match="searched anew"):
         by_course(log, plain)
     monkeypatch.setattr(motor_course, "ELSEWHERE", 1e3)
-    known = {fit.model.name: fit for fit in by_course(log, plain).fits}  # those that are far behind, too
+    known = {fit.model.name: fit for fit in by_course(log, plain).fits}  # also the fits that are far behind
     for fit in whole.fits:
         assert known[fit.model.name].cost < fit.cost + 0.05
         for name in ("bulk_modulus", "leakage_coefficient"):
@@ -67,14 +67,14 @@ def test_a_held_command_is_fitted_from_the_end_of_the_smooth_ones_fit_where_bend
         (2.0, True, 1.0, True),
         (2.0, True, 1.9, False),  # turns do not explain it either
         (2.0, False, 1.0, False),
-        (1.1, True, 1.0, False),  # it is explained
+        (1.1, True, 1.0, False),  # the log is already explained
         (NEARLY + 0.1, True, 1.0, False),
     ],
 )
 def test_turns_are_left_open_in_a_log_that_nothing_else_explains(
     monkeypatch: pytest.MonkeyPatch, left: float, felt: bool, then: float, opened: bool
 ) -> None:
-    """Asked before gains of two gauges, they took these up."""
+    """Tried before the gains of two gauges, free turns absorbed the effect of these gains."""
 
     def fits(chi: float, start: FitStart) -> PlainFits:
         fit, bare = made_fit(500.0 * chi, 2e8, 1e5, chi=chi), seen(log(0.2))
@@ -90,7 +90,7 @@ def test_turns_are_left_open_in_a_log_that_nothing_else_explains(
 
 
 def test_a_log_in_which_bends_move_pressure_by_less_than_noise_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To ask took two runs of the model of every log, and chance had some of them fitted twice."""
+    """The test took two runs of the model for each log, and chance had some logs fitted twice."""
 
     def asked(*_: object) -> float:
         raise AssertionError
@@ -105,7 +105,7 @@ def test_a_log_in_which_bends_move_pressure_by_less_than_noise_is_not_asked(monk
 
 
 def test_a_fast_log_that_is_averaged_otherwise_under_a_held_command_has_no_course() -> None:
-    """Corners of a speed decide over how many samples it is averaged: such a log ended in an internal error."""
+    """Corners of motor speed decide how many samples are averaged: such a log caused an internal error."""
     plain = plain_fits(Logged(*without_strays(log(0.3))), FitStart(PAPER, PAPER.bulk_modulus))
     halved = Logged(*without_strays(log(0.3).slice(0, 150)))
     assert by_course(halved, plain) is plain

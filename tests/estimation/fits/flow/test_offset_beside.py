@@ -1,4 +1,4 @@
-"""An offset of speed that stands beside what is strange, by fits that are made up."""
+"""An offset of speed together with another effect, by made-up fits."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ STD = 1e-3
 
 
 def told(offset: float) -> PlainFits:
-    """Plain fits that took up an offset of speed [rad/s]."""
+    """Return plain fits with an offset of speed [rad/s] subtracted."""
     bare, fit = seen(log(0.2)), made_fit(900.0, 2e8, 1e5)
     turned = with_ripple(bare, (), offset)
     notes = told_offset(offset, STD)
@@ -36,7 +36,7 @@ def explanation(cost: float, shown: float = 0.0, gain: float = 0.0) -> Explanati
 @pytest.mark.parametrize(
     ("taken", "shown", "gain", "left"),
     [
-        (0.2, -0.2 + 0.5 * STD, 80.0, 0.0),  # it was the encoder's zero alone
+        (0.2, -0.2 + 0.5 * STD, 80.0, 0.0),  # it was only the encoder's zero
         (0.2, 0.1, 80.0, 0.3),
         (0.2, 0.1, 0.9 * OFFSET_SETTLED, 0.2),
         (0.0, 0.1, 1.1 * OFFSET_WORTH, 0.1),
@@ -48,7 +48,7 @@ def explanation(cost: float, shown: float = 0.0, gain: float = 0.0) -> Explanati
 def test_a_log_is_explained_at_the_offset_that_the_explanation_leaves(
     taken: float, shown: float, gain: float, left: float
 ) -> None:
-    """Bulk modulus was 4.2 % low, at seven deviations, beside an offset that a worn pump had taken for its own."""
+    """Beside a false offset in the log of a worn pump, bulk modulus was 4.2 % low, by seven deviations."""
     plain, first, again = told(taken), explanation(500.0, shown, gain), explanation(500.0 - gain)
     raw = plain.unturned.drives[:, 0]
 
@@ -71,7 +71,7 @@ def test_an_offset_that_does_not_keep_its_promise_stays_as_it_was() -> None:
 
 
 def test_a_pair_is_the_same_in_either_order_and_is_asked_as_it_was() -> None:
-    """What a log that begins in motion is asked has the name of what another one is asked."""
+    """The hypothesis for a log that begins in motion has the same name as the one for other logs."""
     plain = told(0.2)
     first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, BEGUN.name))
     heard: list[Sequence[Hypothesis]] = []
@@ -86,7 +86,7 @@ def test_a_pair_is_the_same_in_either_order_and_is_asked_as_it_was() -> None:
 
 
 def test_beside_another_offset_fewer_hypotheses_may_be_enough_or_a_worn_pump_but_no_others() -> None:
-    """A worn pump passed for a relief valve set low, an offset of pressure and a pump that delivers 150 %."""
+    """A worn pump passed for a low relief valve, a pressure offset and a pump that delivers 150 %."""
     plain = told(0.2)
     first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, ENCODER_ZERO.name))
     fewer, others = explanation(400.0), replace(explanation(400.0), names=("volume",))

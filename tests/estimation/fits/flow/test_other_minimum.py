@@ -1,4 +1,4 @@
-"""A hypothesis that leads out of a wrong valley of the plain form, and of which nothing is left."""
+"""A hypothesis that leads out of a wrong minimum of the plain form, and whose effect then vanishes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -75,7 +75,7 @@ def test_what_a_hypothesis_held_is_as_the_plain_form_has_it() -> None:
 def test_a_form_whose_search_came_nowhere_near_is_led_on_if_it_is_nearer_there(
     behind: float, bend: float | None, *, led: bool
 ) -> None:
-    """Make-up valves that are orifices would be taken up unnamed."""
+    """Otherwise make-up valves that act as orifices would be absorbed without being named."""
     form = replace(best().model, unknowns=tuple(name for name in best().model.unknowns if name not in CRACKS))
     bare = {name: value for name, value in best().values.items() if name not in CRACKS}
     far = replace(best(), model=form, values=bare, cost=best().cost + behind)
@@ -89,16 +89,16 @@ def test_a_log_with_gaps_is_led_nowhere() -> None:
 
 
 def test_a_search_that_is_told_of_a_lower_valley_ends_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = best()  # before its search is broken: others ask for it too
+    sound = best()  # fitted before the search is patched, as other tests use it too
     monkeypatch.setattr("estimation.fits.flow.search._finished", unmoved)
     lost = balanced(seen(), PAPER, STARTS)
     led = balanced(seen(), PAPER, STARTS, {**sound.values, "bulk_modulus": 1.001 * sound.values["bulk_modulus"]})
     assert min(fit.cost for fit in lost) > sound.cost + 1.0
-    assert min(fit.cost for fit in led) == pytest.approx(sound.cost, abs=0.5)  # without valves that crack
+    assert min(fit.cost for fit in led) == pytest.approx(sound.cost, abs=0.5)  # fitted without cracking pressures
 
 
 def unmoved(one: Any, log: GreyBoxLog, wanted: float = np.inf, **_: Any) -> Any:  # noqa: ARG001 -- as it is called
-    """Return a form as it stands a percent off its bulk modulus, as if there were a valley."""
+    """Return a form with bulk modulus some percent off its optimum, as if it had a minimum there."""
     problem, theta = one.problem.on(log), one.point.theta.copy()
     theta[0] += 0.05
     return problem, problem.at(theta), one.bounds
@@ -106,7 +106,7 @@ def unmoved(one: Any, log: GreyBoxLog, wanted: float = np.inf, **_: Any) -> Any:
 
 @pytest.mark.parametrize("lost", [True, False])
 def test_a_form_that_fails_is_led_by_one_that_has_lost_its_leakage(*, lost: bool) -> None:
-    """A search by mass ended at 24 times the noise, without leakage, from where none comes back."""
+    """A search with the mass balance ended at 24 times the noise and no leakage, from where no search returns."""
     problem = FreedProblem.of(MASS_FLOW_FORM, seen())
     known = {STIFFNESS: first_stiffness(seen()), **best().values}
     ended = problem.at(MASS_FLOW_FORM.theta({**known, "leakage_coefficient": 1e-26}))
@@ -137,7 +137,7 @@ def test_a_rig_with_a_small_accumulator_or_a_search_without_leakage_has_its_bulk
 def test_a_hypothesis_is_believed_where_it_gains_over_its_own_valley_alone(
     cost: float, believed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A plain log was unknown for a drain of port A that had ended as that of port B."""
+    """A plain log was called unknown because of a drain of port A that had turned into that of port B."""
     told: list[Mapping[str, float] | None] = []
 
     def lost(
@@ -147,7 +147,7 @@ def test_a_hypothesis_is_believed_where_it_gains_over_its_own_valley_alone(
         valley: Mapping[str, float] | None = None,
         stiffest: float = np.inf,
     ) -> Sequence[GreyBoxFit]:
-        assert stiffest == np.inf  # the noise is that of the oil found
+        assert stiffest == np.inf  # no limit: position noise is that for the oil that was found
         assert parameters is PAPER
         assert starts
         told.append(valley)
@@ -177,7 +177,7 @@ def test_a_plain_log_whose_plain_form_has_two_valleys_is_explained_by_the_lower_
 
 
 def test_the_drain_of_a_side_that_a_load_shuts_in_is_sought_from_below_too() -> None:
-    """The minimum with fourteen times the drain put leakage twelve deviations off."""
+    """In the minimum with fourteen times the drain, leakage was twelve deviations off."""
     made = make("constant_load", "validation", 17804)
     answer = flow_fit.fit_flow(Record.from_frame(made.log), PAPER, PAPER.bulk_modulus)
     value, std = answer.parameters["leakage_coefficient"]
@@ -187,7 +187,7 @@ def test_the_drain_of_a_side_that_a_load_shuts_in_is_sought_from_below_too() -> 
 
 @pytest.mark.slow
 def test_a_plain_log_whose_search_ended_far_off_is_told_no_air() -> None:
-    """Air that enters after the end of the log, `0 ± inf %`, was found, and its bleeding advised."""
+    """Air was found that enters after the end of the log, `0 ± inf %`, and bleeding was advised."""
     made = hydrostate.simulate("minor_leakage", drive="steps", duration=5.0, sample_time=1e-4, seed=2)
     answer = flow_fit.fit_flow(made.record, PAPER, PAPER.bulk_modulus)
     assert answer.explanation is None

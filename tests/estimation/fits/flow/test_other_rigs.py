@@ -1,4 +1,4 @@
-"""The flow form on actuators that are not like the paper's: small chambers, stiff oil, pumps that fill them at once."""
+"""The flow form on actuators unlike the paper's: small chambers, stiff oil, pumps that fill the chambers at once."""
 
 from dataclasses import replace
 
@@ -76,7 +76,7 @@ SUBSTEPS, LAG = 5, 2e-3
 
 
 def log(healthy: EhaParameters, leakage: float, sample_time: float, duration: float = 4.0, seed: int = 1) -> Record:
-    """A motor that lags twice behind a binary drive, whose course between samples is no straight line."""
+    """Return a log of a motor with a double lag behind a binary drive: its speed is not linear between samples."""
     rng = np.random.default_rng(seed)
     fine = sample_time / SUBSTEPS
     speed = prbs(duration, fine, healthy.rated_speed, 0.05, rng)
@@ -88,7 +88,7 @@ def log(healthy: EhaParameters, leakage: float, sample_time: float, duration: fl
 
 
 def seen(record: Record, p: EhaParameters) -> int:
-    """Return over how many samples a log is averaged."""
+    """Return how many samples of a log are averaged into one."""
     cleaned, variances = without_strays(record)
     return round(flow_log(cleaned, p, {}, variances).sample_time / record.sample_time)
 
@@ -128,7 +128,7 @@ def test_noise_that_was_taken_for_too_large_speaks_against_no_fit() -> None:
 def test_oil_in_which_the_encoders_noise_would_be_felt_more_than_it_is_explains_no_log(
     left: float, *, small: bool
 ) -> None:
-    """Oil five times as stiff as it is was believed, with a pressure that seemed late, at a fifth of the noise."""
+    """Oil five times too stiff was accepted at a fifth of the noise, together with a pressure that seemed late."""
     record, variances = without_strays(log(PAPER, 1.0, 1e-3))
     fit = replace(plain_fits(Logged(record, variances), FitStart(PAPER, 2e8)).best, chi_square=(left,))
     fit = replace(fit, autocorrelation=(-0.1,))
@@ -143,6 +143,6 @@ def test_a_single_rod_that_pumps_up_its_mean_pressure_is_balanced_by_mass() -> N
     healthy = EhaParameters(**{name: getattr(PUMPED_UP, name) for name in PARAMETER_NAMES})
     plain = plain_fits(Logged(*without_strays(record)), FitStart(healthy, healthy.bulk_modulus))
     assert balances_mass(plain.best.model)
-    assert plain.best.chi_square[0] < 1.1  # a search that was cut off on its way left 1.35
+    assert plain.best.chi_square[0] < 1.1  # a search that was stopped too early left 1.35
     assert plain.explains(plain.best)
     assert plain.best.values["bulk_modulus"] == pytest.approx(PUMPED_UP.bulk_modulus, rel=0.005)

@@ -1,4 +1,4 @@
-"""What a log is fitted anew from, once it is known what explains it."""
+"""Starts of a new fit of a log, once it is known what explains it."""
 
 from dataclasses import replace
 from types import SimpleNamespace

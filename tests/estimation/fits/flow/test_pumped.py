@@ -1,4 +1,4 @@
-"""Straight lines between means of a fast log pump what its samples do."""
+"""Straight lines between means of a fast log pump the same volume as its samples."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def turning(time: Array) -> Array:
 
 
 def seen(sample_time: float, parameters: EhaParameters = P) -> GreyBoxLog:
-    """A piston at rest whose pressure sensor is noisy, as the flow form sees it."""
+    """Return the flow form's log of a piston at rest with a noisy pressure sensor."""
     still = dict.fromkeys(("position_m", "differential_pressure_pa"), np.zeros(3000))
     record = Record(
         sample_time, {"motor_speed_rad_s": turning(sample_time * np.arange(3000, dtype=np.float64)), **still}
@@ -32,7 +32,7 @@ def seen(sample_time: float, parameters: EhaParameters = P) -> GreyBoxLog:
 
 
 def drives(sample_time: float) -> Array:
-    """Motor speed and position."""
+    """Return motor speed and position."""
     return seen(sample_time).drives
 
 
@@ -43,7 +43,7 @@ def pumped(speed: Array, sample_time: float, bias: float) -> Array:
 
 @pytest.mark.parametrize(("bias", "left"), [(1.0, 0.15), (6.0, 0.3)])
 def test_straight_lines_between_means_pump_and_sweep_what_the_motor_does(bias: float, left: float) -> None:
-    """The rig file knows the flow bias of a sound pump alone."""
+    """The rig file only states the flow bias of a sound pump."""
     means = drives(SAMPLE)
     course = pumped(turning(SAMPLE / FINE * np.arange(3000 * FINE, dtype=np.float64)), SAMPLE / FINE, bias)[::FINE]
     wanted = block_means(course[BLOCK // 2 + 1 :], BLOCK)
@@ -61,7 +61,7 @@ def test_a_flow_bias_that_a_fit_has_found_takes_the_place_of_the_rig_files() -> 
 
 
 def test_teeth_that_means_hold_are_not_taken_back_by_positions() -> None:
-    """`logged_at_5_kHz`, validation 25301: teeth of 2.7 % gained 3 of 36 promised, and were "left" in a refused log."""
+    """`logged_at_5_kHz`, validation 25301: ripple of 2.7 % gained 3 of a predicted 36, and the log was refused."""
     found, means = {"flow_bias": 6.0 * P.flow_bias}, seen(SAMPLE)
     rippled = with_ripple(means, [Ripple(12, 0.1, 0.0)])
     moved = (pumped_evenly_at(one, P, found).drives[:, 1] - one.drives[:, 1] for one in (rippled, means))

@@ -1,11 +1,11 @@
-"""Balances that end in a wrong valley are searched from where another one has left it."""
+"""A balance that ends in a wrong minimum is searched again from the end of another balance."""
 
 from benchmarks.diagnosis.coverage import Case, logged
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 
 
 def test_a_balance_that_another_leads_out_of_a_wrong_valley_counts() -> None:
-    """That by mass came down alone: bulk modulus was 0.31 % low, 7 deviations, and leakage 1.1 % high."""
+    """Only the mass balance came down: bulk modulus was 0.31 % low, by 7 deviations, and leakage 1.1 % high."""
     record, true, rig = logged(Case("lumped", "flow", 10000, "prbs", "minor_leakage_major_friction", 24011))
     found = estimate_bulk_modulus(record, rig)
     assert found.value is not None

@@ -51,7 +51,7 @@ def seen(record: Record) -> GreyBoxLog:
 
 @pytest.fixture
 def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """How many starts each search had."""
+    """Record the number of starts of each search."""
     counts: list[int] = []
 
     def counted(problem: object, guesses: Sequence[object], *others: object, **more: object) -> object:
@@ -101,7 +101,7 @@ def test_valves_of_the_balance_by_mass_spare_that_by_volume_runs(monkeypatch: py
 
 
 def test_valves_that_crack_are_fitted_beside_missing_speeds() -> None:
-    """Else what they leave is laid to a cause that is not there: a drift of leakage, a blocked valve."""
+    """Otherwise their effect is attributed to a false cause: a drift of leakage, a blocked valve."""
     record = recorded("normal")
     speed = record["motor_speed_rad_s"].copy()
     speed[int(np.argmax(np.abs(np.diff(speed))))] = np.nan
@@ -136,7 +136,7 @@ def test_a_guess_that_leads_into_a_wrong_valley_is_not_followed_over_the_whole_l
 
 
 def test_a_log_that_rests_for_long_before_it_moves_is_explained_by_the_plain_form() -> None:
-    """On a beginning at rest any guess leaves noise alone, so one was followed to oil without stiffness."""
+    """Any guess leaves only noise on a beginning at rest, so one was followed to oil without stiffness."""
     rng, p = np.random.default_rng(0), parameters_for(CONDITIONS["minor_leakage"])
     strokes = [np.repeat([share, 0.0], 1000) for share in (0.5, -0.5, 0.9, -0.9)]
     drive = p.rated_speed * np.concatenate([np.zeros(6000), *strokes])
@@ -187,7 +187,7 @@ def test_what_is_told_has_short_steps_throughout_though_less_drain_was_found_wit
 def test_less_drain_is_looked_for_where_the_log_tells_the_drain_alone(
     monkeypatch: pytest.MonkeyPatch, deviation: float, asked: bool
 ) -> None:
-    """A lumped plant has no make-up valve that a drain could open: half of its log's search was such a way and back."""
+    """A lumped plant has no make-up valve that a drain could open, yet half of its search was spent on less drain."""
     fit = by_mass(balanced(seen(recorded("normal")), HEALTHY, STARTS))
     problem, ways = FreedProblem.of(fit.model, seen(recorded("normal"))), list[Array]()
     point, along = problem.at(fit.theta), np.eye(len(fit.theta))[fit.model.unknowns.index("case_leakage")]

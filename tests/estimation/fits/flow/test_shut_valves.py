@@ -31,10 +31,10 @@ def fits(makeup: float = 1e-29, std: float = np.inf, held: float = np.inf) -> An
     ("plain", "traits", "sound", "said"),
     [
         (fits(), AT_REST, 1.1 * WORTH, [RigCode.MAKEUP_BLOCKED]),
-        (fits(), AT_REST, 0.9 * WORTH, [RigCode.MAKEUP_UNSEEN]),  # the log does not tell
+        (fits(), AT_REST, 0.9 * WORTH, [RigCode.MAKEUP_UNSEEN]),  # the log does not decide
         (fits(std=900.0), AT_REST, 1.1 * WORTH, []),
         (fits(makeup=1e-8), AT_REST, 1.1 * WORTH, [RigCode.MAKEUP_UNSEEN]),
-        (fits(held=100.0 + 0.9 * BEHIND), AT_REST, 1.1 * WORTH, []),  # a lumped plant has none
+        (fits(held=100.0 + 0.9 * BEHIND), AT_REST, 1.1 * WORTH, []),  # a lumped plant has no make-up valves
         (fits(), LogTraits(moving=True), 1.1 * WORTH, []),
     ],
 )

@@ -1,4 +1,4 @@
-"""Slips of channels, set right one or two at a time."""
+"""Slips in channels, corrected one or two at a time."""
 
 import numpy as np
 import pytest

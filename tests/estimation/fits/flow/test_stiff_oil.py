@@ -1,4 +1,4 @@
-"""A pump of 11 cm3 a turn in stiff oil under a binary drive: what is small beside soft oil, and is not beside this."""
+"""A pump of 11 cm3 per turn in stiff oil under a binary drive: effects that are small in soft oil matter here."""
 
 from dataclasses import replace
 

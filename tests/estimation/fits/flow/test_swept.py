@@ -1,4 +1,4 @@
-"""Positions are led by what leaks between samples of a slow log, and not where nobody feels it."""
+"""Positions are corrected for the leakage between samples of a slow log, unless it has no effect."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def seen(values: dict[str, float]) -> Array:
 
 
 def emptied(position: Array) -> Array:
-    """Pressure of a chamber that leaks empty, over its stiffness, swept at one velocity from sample to sample."""
+    """Return pressure over stiffness of a chamber that leaks empty, swept at constant velocity between samples."""
     kept, out = np.exp(-SAMPLE / EMPTIES), np.zeros(len(position))
     for k, velocity in enumerate(np.diff(position) / SAMPLE):
         out[k + 1] = kept * out[k] + velocity * EMPTIES * (1.0 - kept)
@@ -36,7 +36,7 @@ def emptied(position: Array) -> Array:
 
 def test_straight_lines_between_samples_leak_what_the_pistons_own_course_does() -> None:
     rate = 2.0 * np.pi * 25.0
-    answer = 1e-3 * 1j * rate / (1j * rate + 1.0 / EMPTIES)  # to exp(j w t)
+    answer = 1e-3 * 1j * rate / (1j * rate + 1.0 / EMPTIES)  # response to exp(j w t)
     wanted = (answer * np.exp(1j * TURNED)).imag
     straight, led = (emptied(one)[100:-2] - wanted[100:-2] for one in (1e-3 * np.sin(TURNED), seen(VALUES)))
     assert np.std(led) < 0.1 * np.std(straight)

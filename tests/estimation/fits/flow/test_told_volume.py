@@ -1,4 +1,4 @@
-"""Bulk modulus where the log tells the volume of the chambers."""
+"""Bulk modulus if the log shows the volume of the chambers."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a slow log's turns pump is read off the samples after them, and a hypothesis must gain with that too."""
+"""The volume pumped at turns of a slow log is read from the next samples, and a hypothesis must gain with it too."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,11 +21,11 @@ from plant.log.record import Record
 from tests.estimation.fits.short_logs import PAPER, POSITION, PRESSURE, SPEED, made_fit, seen
 
 COMMANDS = 0.5 + 0.3 * np.arange(12) + 1e-3 * np.array([3, 8, 1, 6, 9, 4, 2, 7, 5, 8, 3, 6])
-"""When a motor is told to turn [s]."""
+"""Times at which the motor's command changes [s]."""
 
 
 def turned(time: Array, lag: float, commands: Array = COMMANDS) -> tuple[Array, Array]:
-    """Return speed [rad/s] and angle [rad] of a motor of first order that turns to and fro."""
+    """Return speed [rad/s] and angle [rad] of a first-order motor that turns to and fro."""
     speed, angle = np.zeros_like(time), np.zeros_like(time)
     for k, at in enumerate(commands):
         whole, since = (100.0 if k == 0 else 200.0) * (-1.0) ** k, np.maximum(time - at, 0.0)
@@ -35,7 +35,7 @@ def turned(time: Array, lag: float, commands: Array = COMMANDS) -> tuple[Array, 
 
 
 def off(sample_time: float, lag: float) -> tuple[float, float]:
-    """Return what straight lines leave of the angle in a time between samples, and what is left once turns are read."""
+    """Return the error of the angle between samples with straight lines, and with turns read [rad], as norms."""
     time = np.arange(0.0, 4.5, sample_time)
     speed, angle = turned(time, lag)
     logged = speed + np.random.default_rng(1).normal(0.0, 0.05, len(time))
@@ -51,7 +51,7 @@ def test_the_samples_after_a_turn_tell_what_it_pumped(sample_time: float, lag: f
 
 
 def test_a_turn_that_is_over_by_the_next_sample_is_left_as_it_is() -> None:
-    """At 50 Hz a motor of 3 ms is at its new speed to a thousandth: noise would tell when the command came."""
+    """At 50 Hz a motor of 3 ms reaches its new speed to a thousandth: noise would decide when the command came."""
     straight, read = off(0.02, 2e-3)
     assert read == straight
 
@@ -85,7 +85,7 @@ def test_what_a_turn_pumps_is_swept_less_and_a_fast_log_stays_what_it_was() -> N
 
 
 def test_a_hypothesis_must_gain_at_each_turn_of_a_slow_log_by_the_noise_that_it_leaves() -> None:
-    """76 at nine turns was a pump that compresses its oil, which was not there, and leakage was 66 % low."""
+    """A gain of 76 at nine turns wrongly showed a pump that compresses its oil, with leakage 66 % low."""
     log = seen(slow())
     turning = replace(log, course=IntersampleDoubt(np.where(np.arange(len(log.drives)) % 30 < 2, 1e6, 0.0)))
     assert worth_in(log) == 10.0
@@ -121,7 +121,7 @@ def test_what_looks_strange_is_believed_where_it_gains_with_turns_read_too(
     assert not read[0]
     assert read[-1]
     assert (answer.explanation is not None) == gains
-    if not gains:  # the log that nothing is strange about keeps its number
+    if not gains:  # without a strange effect the log keeps its value
         assert answer.parameters["bulk_modulus"][0] == pytest.approx(2e8)
 
 

@@ -1,4 +1,4 @@
-"""A fast log is averaged to one that says the same."""
+"""A fast log is averaged to one with the same information."""
 
 from dataclasses import replace
 
@@ -43,7 +43,7 @@ def test_straight_lines_stay_where_they_are_and_noise_shrinks() -> None:
 
 
 def test_a_log_at_5_khz_is_averaged_by_threes() -> None:
-    """An even count has no sample in its middle. Such a log stayed as it was: 20 s of it were asked nothing."""
+    """An even count has no middle sample, so such a log was not averaged, and 20 s of it were tested for nothing."""
     log = averaged(replace(fast(), sample_time=2e-4), 1.0)
     assert log.sample_time == pytest.approx(6e-4)
 

@@ -1,4 +1,4 @@
-"""What noise alone leaves of a short log is no reason to refuse it."""
+"""A short log is not refused for residuals that noise alone explains."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ ROWS = 400
 
 
 def test_of_many_short_logs_of_noise_few_leave_more_than_the_gate_lets_by() -> None:
-    """Before, one in fifteen left more than 1.2 and one in twenty had residuals that were alike."""
+    """Before, one in fifteen left more than 1.2, and one in twenty had correlated residuals."""
     rng = np.random.default_rng(0)
     left, alike = [], []
     for noise in rng.normal(size=(3000, ROWS)):

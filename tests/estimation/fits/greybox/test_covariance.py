@@ -13,11 +13,11 @@ from estimation.notes import EstimateCode
 from plant.errors import LogWarning
 
 NOTHING = np.zeros(2)
-"""Nothing is known of two parameters before the fit."""
+"""Prior information on two parameters: none."""
 
 
 def spread_of_estimates(colour: float, runs: int = 300) -> tuple[float, float, float]:
-    """Return the slope's true deviation over many fits, and what white and coloured formulas said on average."""
+    """Return the slope's true deviation over many fits, and the mean ones of the white and the coloured formula."""
     n = 600
     columns = np.column_stack([np.ones(n), np.sin(np.arange(n) * 0.01)])
     found, white, coloured = [], [], []

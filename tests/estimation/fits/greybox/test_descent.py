@@ -6,7 +6,7 @@ FAR = np.full(3, 10.0)
 
 
 def bowl(x: np.ndarray) -> Point:
-    """Return a least-squares problem of two coordinates that act together, and a third that is not felt."""
+    """Return a point of a least-squares problem with two coupled coordinates, and a third one without effect."""
     slopes = np.array([[1.0, 1.0, 0.0], [0.0, 1e-2, 0.0], [0.0, 0.0, 0.0]])
     errors = slopes @ (x - np.array([2.0, 3.0, 0.0]))
     return Point(x, 0.5 * float(errors @ errors), slopes.T @ errors, slopes.T @ slopes)
@@ -45,7 +45,7 @@ def test_searches_together_end_where_each_ends_alone() -> None:
     together = descend_together(at_each, starts, 60, (-FAR, FAR), 1e-12)
     for start, found in zip(starts, together, strict=True):
         np.testing.assert_array_equal(found.theta, descend(bowl, start, 60, (-FAR, FAR), 1e-12).theta)
-    assert evaluated[0] == len(starts)  # the search that begins at the optimum leaves the others alone
+    assert evaluated[0] == len(starts)  # the search that begins at the optimum then drops out
     assert evaluated[-1] < len(starts)
 
 
@@ -69,7 +69,7 @@ def test_a_search_whose_end_is_of_no_use_is_given_up_and_any_other_is_not() -> N
     tried: list[np.ndarray] = []
 
     def bent(x: np.ndarray) -> Point:
-        """A valley (Rosenbrock's) down which many steps lead, with a floor of 5."""
+        """Return a point of Rosenbrock's valley, which takes many steps to descend, with a floor of 5."""
         tried.append(x)
         slopes = np.array([[1.0, 0.0], [-20.0 * x[0], 10.0]])
         errors = np.array([x[0] - 1.0, 10.0 * (x[1] - x[0] ** 2)])
@@ -85,7 +85,7 @@ def test_a_search_whose_end_is_of_no_use_is_given_up_and_any_other_is_not() -> N
     descend(bent, start, 40, (-far, far), 1e-9, 0.5, wanted=-20.0)
     assert len(tried) < needed
     tried.clear()
-    assert descend(bent, start, 40, (-far, far), 1e-9, 0.5, good=6.0).cost < 6.0  # how far it would come is not asked
+    assert descend(bent, start, 40, (-far, far), 1e-9, 0.5, good=6.0).cost < 6.0  # it ends once it is good enough
     assert len(tried) < needed
     tried.clear()
     descend(bent, start, 40, (-far, far), 1e-9, 0.5, good=99.0)
@@ -94,7 +94,7 @@ def test_a_search_whose_end_is_of_no_use_is_given_up_and_any_other_is_not() -> N
 
 def test_a_step_that_promises_less_than_its_share_is_not_taken() -> None:
     def slow(x: np.ndarray) -> Point:
-        """A quartic: each step takes off the same share, over a floor of 1 that no step takes off."""
+        """Return a point of a quartic: each step removes the same share of the cost above a floor of 1."""
         error, slope = x[0] ** 2, 2.0 * x[0]
         return Point(x, 1.0 + 0.5 * error**2, np.array([slope * error]), np.array([[slope**2]]))
 

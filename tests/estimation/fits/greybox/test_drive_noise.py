@@ -1,4 +1,4 @@
-"""Noise of the drives adds to the covariance what its draws do, whether they are kept or made one after another."""
+"""Drive noise adds as much to the covariance as its draws do, whether they are stored or made one after another."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the motor's course between the samples of a slow log leaves open."""
+"""Uncertainty due to the motor's course between the samples of a slow log."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -34,7 +34,7 @@ def logged(rate: int, seed: int) -> Record:
 
 
 def still(samples: int, noise: float) -> GreyBoxLog:
-    """A log at rest, 5 ms a sample."""
+    """Return a log at rest with a sample every 5 ms."""
     drives, measured = np.zeros((samples, 2)), np.zeros((samples, 1))
     row, steps = parameter_row(flow_parameters(HEALTHY)), np.ones(samples, dtype=int)
     return GreyBoxLog(drives, measured, row, 5e-3, steps, (OutputNoise(noise**2),), (0.05, 0.0))
@@ -43,7 +43,7 @@ def still(samples: int, noise: float) -> GreyBoxLog:
 def test_a_speed_turns_where_its_second_difference_exceeds_what_noise_makes_of_it() -> None:
     log = still(7, 1.0)
     log.drives[:, 0] = [0.0, 0.1, 0.0, 0.0, 10.0, 20.0, 30.0]
-    assert turns(log) == pytest.approx([0.0, 0.0, 0.0, 9.8, 9.8, 0.0, 9.8])  # the last rise is followed by none
+    assert turns(log) == pytest.approx([0.0, 0.0, 0.0, 9.8, 9.8, 0.0, 9.8])  # nothing follows the last rise
 
 
 @pytest.mark.parametrize(("turned", "passes"), [([0.0, 5.0, 5.0, 0.01, 0.01, 3.0, 3.0], 2.0), ([0.0, 0.1], 1.0)])
@@ -67,7 +67,7 @@ def test_a_log_of_1_khz_is_left_as_it_is() -> None:
 
 @cache
 def fitted(rate: int, seed: int) -> tuple[FormFit, float]:
-    """What a log says, and how sure a balance is of what it gains beside the others."""
+    """Return the fit of a log, and the divisor of log-likelihood differences between its balances."""
     tempers, original = list[float](), fit.weights_of
 
     def heard(fits: Sequence[GreyBoxFit], temper: float, priors: Sequence[float]) -> np.ndarray:

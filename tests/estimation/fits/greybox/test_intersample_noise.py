@@ -1,4 +1,4 @@
-"""How much of the motor's course between samples a slow log leaves open."""
+"""Uncertainty of the motor's course between the samples of a slow log."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ HEALTHY = EhaParameters()
 
 
 def still(samples: int, noise: float) -> GreyBoxLog:
-    """A log at rest, 5 ms a sample."""
+    """Return a log at rest with a sample every 5 ms."""
     drives, measured = np.zeros((samples, 2)), np.zeros((samples, 1))
     row, steps = parameter_row(flow_parameters(HEALTHY)), np.ones(samples, dtype=int)
     return GreyBoxLog(drives, measured, row, 5e-3, steps, (OutputNoise(noise**2),), (0.05, 0.0))

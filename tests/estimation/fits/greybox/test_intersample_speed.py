@@ -8,7 +8,7 @@ LAG, ACCELERATION, SAMPLE = 4e-3, 3e4, 1e-3
 
 
 def motor(asked: float, time: Array) -> tuple[Array, Array]:
-    """Return speed [rad/s] and angle [rad] of a motor that starts at 5 ms, as fast as it may, then lags."""
+    """Return speed [rad/s] and angle [rad] of a motor that starts at 5 ms at full acceleration, then lags."""
     fine = np.linspace(0.0, time[-1], 100 * (len(time) - 1) + 1)
     speed, step = np.zeros_like(fine), fine[1]
     for k in range(1, len(fine)):

@@ -1,4 +1,4 @@
-"""Channels that are late or early by little, and a speed that comes before position and pressure."""
+"""Channels that are slightly late or early, and a speed that leads position and pressure."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Noise of a driving channel that an output follows and loses again."""
+"""Noise of a driving channel in an output that follows it and leaks."""
 
 import math
 
@@ -14,7 +14,7 @@ RNG = np.random.default_rng(0)
 
 
 def spread(errors: Array, lost: float, samples: int, every: int = 1) -> float:
-    """Return the deviation of means of an output that follows errors and loses them, over that of white noise."""
+    """Return the deviation of means of a leaking output that follows errors, over that of white noise."""
     kept = math.exp(-lost)
     output = lfilter([(1.0 - kept) / lost], [1.0, -kept], np.diff(errors))[40 * samples :]
     there = output[: len(output) // samples * samples].reshape(-1, samples)[:, ::every]
@@ -31,14 +31,14 @@ def test_means_of_white_noise_that_is_lost_again_have_the_variance_that_is_told(
 @pytest.mark.parametrize("every", [2, 3, 6])
 @pytest.mark.parametrize("lost", [0.03, 0.13, 1.0])
 def test_losses_even_out_less_of_the_noise_where_an_output_has_one_row_in_several(lost: float, every: int) -> None:
-    """A thinned pressure of a small chamber was told 55 % of the encoder's noise where 90 % is left of it."""
+    """For a thinned pressure of a small chamber 55 % of the encoder's noise was predicted, and 90 % remain."""
     told, _ = white_noise(24, every).kept(lost)
     assert spread(RNG.standard_normal(400_000), lost, 24, every) == pytest.approx(told, rel=0.04)
     assert told > 1.05 * white_noise(24).kept(lost)[0]
 
 
 def read(per_sample: float, blur: float) -> tuple[Array, Array, LeakedNoise]:
-    """Return errors of an encoder, the piston's course, and what is told of it: to and fro at one speed."""
+    """Return an encoder's errors, the piston's course to and fro at one speed, and the noise that is found."""
     turns = np.convolve(np.repeat(np.resize([1.0, -1.0], 80), 250), np.full(20, 0.05), "same")
     course = np.cumsum(turns) * per_sample * STEP + 0.02 * STEP * np.cumsum(RNG.standard_normal(len(turns)))
     position = STEP * np.round((course + blur * STEP * RNG.standard_normal(len(course))) / STEP)
@@ -48,7 +48,7 @@ def read(per_sample: float, blur: float) -> tuple[Array, Array, LeakedNoise]:
 
 @pytest.mark.parametrize("lost", [0.1, 0.3, 1.0])
 def test_errors_of_an_encoder_are_alike_at_a_steady_speed(lost: float) -> None:
-    """At 8.99 steps a sample each error is nearly the one before; white noise would be half as large or less."""
+    """At 8.99 steps per sample each error is nearly the one before; white noise would be half as large or less."""
     errors, _, told = read(8.99, 0.0)
     found = spread(errors, lost, SAMPLES)
     assert told.kept(lost)[0] == pytest.approx(found, rel=0.3)
@@ -62,7 +62,7 @@ def test_errors_of_an_encoder_whose_reading_flickers_are_white() -> None:
 
 
 def test_means_of_samples_are_judged_as_their_samples_are() -> None:
-    """Where nothing is alike from one sample to the next, a mean of five is lost as one sample of white noise is."""
+    """If errors are not correlated between samples, a mean of five is lost like one sample of white noise."""
     _, course, _ = read(8.99, 0.6)
     position = course + STEP * RNG.standard_normal(len(course))
     of_means = encoder_noise(position, course, STEP**2, 5, SAMPLES // 5)
@@ -87,7 +87,7 @@ def test_a_short_log_or_one_that_stands_still_is_taken_for_white() -> None:
 
 
 def test_an_encoders_step_shows_beside_samples_that_are_missing() -> None:
-    """A line across a gap has steps that are none of the encoder's, and its noise was taken for white."""
+    """A straight line across a gap has steps that are not the encoder's, so its noise was taken for white."""
     errors, course, told = read(8.99, 0.0)
     position = course + errors
     position[5000:5050] = np.nan

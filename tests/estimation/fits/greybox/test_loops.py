@@ -1,4 +1,4 @@
-"""The misfit's kernel is Python: its text, run as it stands, gives what the machine code gives, to the last bit."""
+"""The misfit's kernel, run as plain Python, gives the same result as its machine code to the last bit."""
 
 import ctypes
 from dataclasses import replace
@@ -38,7 +38,7 @@ def test_the_same_bits_as_python(model: GreyBoxModel, asked: bool, monkeypatch: 
     rng, samples, block = np.random.default_rng(3), 60, 4
     drives = np.stack([120.0 * np.sign(np.sin(0.3 * np.arange(samples))), 0.01 * np.sin(0.1 * np.arange(samples))], 1)
     measured = 1e6 * rng.normal(size=(samples, 1))
-    measured[rng.random(samples) < 0.2] = measured[20:24] = np.nan  # a whole block among them
+    measured[rng.random(samples) < 0.2] = measured[20:24] = np.nan  # including a whole block
     theta = np.array([*np.log([2e8, 1e-12, 1e-6, 1e-9, 1e4, 1e-13]), 0.3, *[2.0] * (len(model.unknowns) - 7)])
     gaps = np.array([[10.0, 14.0, 1e9], [30.0, 31.0, 1e8]])
     given = (

@@ -1,4 +1,4 @@
-"""What noise of motor speed moves a fit by is taken back, and nothing where it is not felt."""
+"""The shift of a fit by motor speed noise is corrected, and nothing is if the noise has no effect."""
 
 from dataclasses import replace
 
@@ -12,11 +12,11 @@ from plant.arrays import Array
 from tests.estimation.fits.short_logs import problem, usual
 
 SPREAD = 0.3
-"""Of the noise of motor speed [rad/s]."""
+"""Standard deviation of motor speed noise [rad/s]."""
 
 
 def loud(walk: float = 1e9) -> FreedProblem:
-    """Return a problem whose motor speed is noisy, and that leaves nothing at the usual values."""
+    """Return a problem with noisy motor speed, and with zero residuals at the usual values."""
     one = problem()
     left = one.residuals(usual(one)).T * one.log.noise[0].variance ** 0.5
     noisy = (replace(one.log.noise[0], walk=walk),)
@@ -43,7 +43,7 @@ def test_it_is_what_draws_of_the_noise_move_the_solution_by(monkeypatch: pytest.
     pull = np.mean(pulls, axis=0) - one.at(theta).gradient
     modulus = one.model.unknowns.index("bulk_modulus")
     moved = -(told.fitted_bread @ pull[told.felt])[told.felt.tolist().index(modulus)]
-    assert moved < 0.0  # noise makes oil look soft
+    assert moved < 0.0  # noise makes the oil look softer
     assert shift["bulk_modulus"] == pytest.approx(-moved, rel=0.3)
     assert variance["bulk_modulus"] == pytest.approx((0.2 * shift["bulk_modulus"]) ** 2)
 

@@ -1,4 +1,4 @@
-"""Loops that fill what normal equations are sums of: as compiled and as Python."""
+"""Loops that compute the terms of normal equations: compiled and as Python."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SLOPES = RNG.normal(size=(2, 40, 3))
 def test_differences_are_taken_from_the_first_lane_and_lanes_that_are_left_count_for_nothing(fill: object) -> None:
     found = np.concatenate([ERRORS[..., None], ERRORS[..., None] + 1e-3 * SLOPES, np.full((2, 40, 4), 7.0)], axis=-1)
     here, slopes = np.empty((2, 40)), np.empty((2, 40, 3))
-    fill(found, 1e-3, here, slopes)  # type: ignore[operator]  # a loop, or the function that it is made of
+    fill(found, 1e-3, here, slopes)  # type: ignore[operator]  # a compiled loop, or its Python function
     np.testing.assert_array_equal(here, ERRORS)
     np.testing.assert_allclose(slopes, SLOPES, rtol=1e-11, atol=1e-11)
 
@@ -25,7 +25,7 @@ def test_a_residual_beyond_the_limit_counts_linearly(fill: object) -> None:
     errors = np.array([1.0, -2.0 * OUTLIER])
     squares, pulling, bent = np.empty(2), np.empty(2), np.empty((2, 1))
     fill(errors, np.full((2, 1), 5.0), OUTLIER, STRAIGHT, squares, pulling, bent)  # type: ignore[operator]  # as above
-    assert squares.tolist() == [0.5, 1.5 * OUTLIER**2]  # as Huber's: limit times size, less half the limit squared
+    assert squares.tolist() == [0.5, 1.5 * OUTLIER**2]  # Huber: limit times size, minus half the limit squared
     assert pulling.tolist() == [1.0, -OUTLIER]
     assert bent[:, 0].tolist() == [5.0, 5.0 * STRAIGHT]
 

@@ -1,4 +1,4 @@
-"""Slopes of a single rod are found over a longer step than those of a through rod."""
+"""Slopes of a single rod use a longer step than those of a through rod."""
 
 from dataclasses import replace
 

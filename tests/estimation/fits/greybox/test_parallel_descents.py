@@ -10,7 +10,7 @@ FAR = np.full(3, 10.0)
 
 
 def bent(x: np.ndarray) -> Point:
-    """A valley (Rosenbrock's) down which many steps lead, with a floor that the third coordinate sets."""
+    """Return a point of Rosenbrock's valley, which takes many steps to descend; the third coordinate sets its floor."""
     slopes = np.array([[1.0, 0.0, 0.0], [-20.0 * x[0], 10.0, 0.0]])
     errors = np.array([x[0] - 1.0, 10.0 * (x[1] - x[0] ** 2)])
     return Point(x, x[2] ** 2 + 0.5 * float(errors @ errors), slopes.T @ errors, slopes.T @ slopes)
@@ -53,4 +53,4 @@ def test_searches_abreast_end_where_each_ends_that_waits_for_those_before_it(sha
     assert asked == [*range(len(starts))]
     assert max(together) == ABREAST
     assert len(together) < 0.5 * waited
-    assert sum(together) == waited if share == np.inf else sum(together) > waited  # some have gone on in vain
+    assert sum(together) == waited if share == np.inf else sum(together) > waited  # some searches went on in vain

@@ -1,4 +1,4 @@
-"""Where the piston may be in its encoder's play, and whether a log's residuals show one."""
+"""Where the piston may be in its encoder's play, and whether a log's residuals show a play."""
 
 from collections.abc import Sequence
 from copy import deepcopy
@@ -48,7 +48,7 @@ QUANTUM = 1e-6
 
 
 def side_of_play(position: Array) -> Array:
-    """Return the course that every log is asked for first: the piston crosses late."""
+    """Return the first course that is tested on every log: the piston crosses late."""
     return crossings(position, np.zeros(len(position)), 1e-3)[:, 0]
 
 
@@ -76,14 +76,14 @@ def test_a_dead_encoder_is_at_no_side() -> None:
 
 
 def turned() -> Array:
-    """Return a reading that goes up for 500 ms, stands for 50 ms and comes back."""
+    """Return a reading that rises for 500 ms, rests for 50 ms and returns."""
     up = np.linspace(0.0, 1e-2, 500)
     return read(np.concatenate([up, np.full(50, 1e-2), up[::-1]]))
 
 
 def test_a_piston_that_pressure_moves_crosses_while_pressure_turns() -> None:
     position = turned()
-    pressure = np.where(np.arange(len(position)) < 510, 1e6, -1e6)  # turns when the encoder has stood for 10 ms
+    pressure = np.where(np.arange(len(position)) < 510, 1e6, -1e6)  # reverses when the encoder has rested for 10 ms
     late, by_pressure, at_once, sprung = crossings(position, pressure, 1e-3).T
     assert late == pytest.approx(side_of_play(position))
     assert (late + by_pressure)[[499, 530, 560]] == pytest.approx([1.0, -1.0, -1.0], abs=0.02)
@@ -176,7 +176,7 @@ def test_an_encoder_that_sees_half_of_what_the_piston_yields_within_chance_has_n
 
 
 def standing_still(noise: float, seed: int, samples: int = 4000) -> Record:
-    """Return a sound encoder whose piston hardly moves, and a velocity sensor that is all noise."""
+    """Return a log of a sound encoder whose piston hardly moves, and of a velocity sensor with only noise."""
     rng = np.random.default_rng(seed)
     pressure = np.cumsum(rng.normal(0.0, 2e4, samples))
     channels = {
@@ -188,10 +188,10 @@ def standing_still(noise: float, seed: int, samples: int = 4000) -> Record:
 
 
 def test_noise_of_velocity_shows_a_play_as_seldom_as_the_limit_says() -> None:
-    """It is averaged over two sample times, so it counts for more than it scatters."""
+    """It is averaged over two sample times and so correlated: it counts for more than its scatter."""
     gains = [sensed_play(standing_still(1e-3, seed)).gain for seed in range(300)]
-    assert sum(gain > PLAY_SENSED for gain in gains) <= 6  # 3 by chance
-    assert sum(gain > 1.0 for gain in gains) >= 8  # a test that sees nothing would pass too
+    assert sum(gain > PLAY_SENSED for gain in gains) <= 6  # 3 are expected by chance
+    assert sum(gain > 1.0 for gain in gains) >= 8  # otherwise a test that detects nothing would pass
 
 
 def test_few_samples_that_stand_are_few_looks_at_the_noise() -> None:
@@ -210,7 +210,7 @@ def test_few_samples_that_stand_are_few_looks_at_the_noise() -> None:
 
 
 def test_what_the_piston_creeps_between_an_encoders_steps_is_no_play() -> None:
-    """All standings together leave 40 um unseen, each of them 5 um at most."""
+    """All rests together hide 40 um, each of them 5 um at most."""
     time = 1e-3 * np.arange(4000)
     position = 2e-5 * time / time[-1]
     pressure = 1e6 * time / time[-1]
@@ -239,7 +239,7 @@ def test_an_encoder_that_never_stands_shows_none_to_a_velocity_sensor() -> None:
 def concluded(
     monkeypatch: pytest.MonkeyPatch, plain: float, strange: float, chi: float = 1.0, record: Record | None = None
 ) -> FormFit:
-    """Return what is told of a log whose plain fit shows a play by one gain, and that with a play by another."""
+    """Return the result for a log, from the gains by which its plain fit and its fit with a play show one."""
     fit = replace(made_fit(500.0, 2e8, 1e5), play=ShownPlay(3e-5, plain, moved={"bulk_modulus": -0.02}))
     played = replace(made_fit(100.0, 2.1e8, 1e5, chi=chi), play=ShownPlay(1e-5, strange))
     values = {name: (value, played.std[name]) for name, value in played.values.items()}
@@ -268,7 +268,7 @@ def test_a_play_that_is_shown_is_asked_for_and_believed_where_no_more_than_noise
     assert not unseen.reasons
     assert asked.explanation is not None
     assert not asked.reasons
-    moved = 0.05  # of it a share is left open
+    moved = 0.05  # a share of this remains uncertain
     assert asked.parameters["bulk_modulus"][1] == pytest.approx(
         np.hypot(PLAY_STRUCTURE, PLAY_OPEN * moved) * 2.1e8, rel=0.01
     )
@@ -288,7 +288,7 @@ def test_a_play_that_residuals_may_show_by_chance_is_in_the_interval(monkeypatch
     assert not doubtful.reasons
     assert doubtful.explanation is None
     assert doubtful.parameters["bulk_modulus"][0] == sound.parameters["bulk_modulus"][0]
-    moved = 0.02  # as `concluded` has it
+    moved = 0.02  # the shift that `concluded` sets
     assert doubtful.parameters["bulk_modulus"][1] == pytest.approx(np.hypot(PLAY_STRUCTURE, moved) * 2e8, rel=0.01)
     assert sound.parameters["bulk_modulus"][1] < 0.2 * doubtful.parameters["bulk_modulus"][1]
     assert RigCode.PLAY_NOT_EXCLUDED in [note.code for note in doubtful.remarks]
@@ -328,13 +328,13 @@ def test_the_gate_is_shut_by_a_play_that_chance_seldom_shows_and_that_is_not_too
 
 
 def test_a_piston_that_begins_to_move_within_what_a_sound_encoder_resolves_shows_no_play() -> None:
-    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(21)  # gained 7.4 at 500 Hz
+    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(21)  # a play gained 7.4 at 500 Hz
     record = simulate(LUMPED, make_drive("prbs", 10.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
     assert sensed_play(record).gain <= PLAY_SHOWN
 
 
 def test_a_play_is_shown_by_chance_as_seldom_as_its_limit_says() -> None:
-    """The score statistic of a course that asks for more is the square of a normal deviate above zero."""
+    """If a course asks for more play, its score statistic is the square of a positive normal deviate."""
     assert 1.0 / (3.0 * float(ndtr(-((2.0 * PLAY_BELIEVED) ** 0.5)))) == pytest.approx(3600.0, rel=0.02)
     by_chance = float(ndtr(-((2.0 * PLAY_SHOWN) ** 0.5)))
     assert 1.0 / by_chance == pytest.approx(430.0, rel=0.02)
@@ -343,4 +343,4 @@ def test_a_play_is_shown_by_chance_as_seldom_as_its_limit_says() -> None:
 
 
 def test_what_a_fit_says_of_a_play_comes_back_from_another_process() -> None:
-    assert deepcopy(NO_PLAY) == NO_PLAY  # as pickle takes it apart
+    assert deepcopy(NO_PLAY) == NO_PLAY  # copied in the same way as by pickle

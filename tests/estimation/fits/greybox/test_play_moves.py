@@ -1,4 +1,4 @@
-"""What a play that residuals show would move the unknowns by."""
+"""Shift of the unknowns by a play that residuals show."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""How far a fit's residuals show the teeth of a pump, and a log whose speed holds them."""
+"""How clearly a fit's residuals show pump ripple, and a log whose speed includes it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -32,13 +32,13 @@ def bare(speed: Array, sample_time: float = SAMPLE) -> GreyBoxLog:
 
 
 def turned(speed: Array) -> Array:
-    """Return the angle at each sample, the speed being straight in between [rad]."""
+    """Return the angle at each sample [rad], with speed linear between samples."""
     return np.concatenate([[0.0], np.cumsum(0.5 * SAMPLE * (speed[1:] + speed[:-1]))])
 
 
 @pytest.mark.parametrize(("cosine", "sine"), [(0.1, 0.0), (0.0, 0.1), (-0.05, 0.08)])
 def test_a_log_with_teeth_delivers_what_they_do_between_any_two_samples(cosine: float, sine: float) -> None:
-    speed = 60.0 * np.sin(np.pi * SAMPLE * np.arange(2000))  # both ways, to 0.7 rad of a tooth a sample
+    speed = 60.0 * np.sin(np.pi * SAMPLE * np.arange(2000))  # both ways, up to 0.7 rad of tooth phase per sample
     log = with_ripple(bare(speed), [Ripple(12, cosine, sine)])
     added = turned(log.drives[:, 0]) - turned(speed)
     phase = 12 * turned(speed)
@@ -73,7 +73,7 @@ def test_two_counts_of_teeth_add_up() -> None:
 
 @cache
 def logged(ripple: float, overtone: float = 0.0) -> Record:
-    """Return a leaky actuator that is driven slowly, whose pump has 11 teeth."""
+    """Return a log of a leaky actuator that is driven slowly, and whose pump has 11 teeth."""
     machine = Machine(leakage=12.0 * Machine().leakage, crack_a=0.0, crack_b=0.0, teeth=11.0, ripple=ripple)
     time = SAMPLE * np.arange(4000)
     course = np.ones((len(time), 5))
@@ -85,7 +85,7 @@ def logged(ripple: float, overtone: float = 0.0) -> Record:
 
 
 def with_overtone(record: Record, amplitude: float) -> Record:
-    """Return a log whose speed lacks what 22 teeth more would have to deliver."""
+    """Return a log whose speed lacks the ripple of 22 more teeth."""
     less = with_ripple(bare(record["motor_speed_rad_s"]), [Ripple(22, -amplitude, 0.0)])
     return record.replace(motor_speed_rad_s=less.drives[:, 0])
 
@@ -178,7 +178,7 @@ def shifted(ripple: float) -> Record:
 
 
 def test_teeth_whose_phase_an_offset_of_speed_turns_are_found_with_it_and_without_it_are_not() -> None:
-    held = with_ripple(replace(seen(shifted(0.1)), counts=COUNTS), (), 0.7 * OFFSET)  # a little is left
+    held = with_ripple(replace(seen(shifted(0.1)), counts=COUNTS), (), 0.7 * OFFSET)  # a part of the offset is left
     best = most(min(fits_of(held), key=lambda fit: fit.cost))
     assert best.teeth.count == 11
     assert best.offset == pytest.approx(0.3 * OFFSET, abs=0.3 * 2.0 * np.pi / (11 * 4.0))

@@ -1,4 +1,4 @@
-"""A slope along a ridge, turned back, is the slope by one parameter."""
+"""A slope along a ridge, converted back, is the slope by one parameter."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_a_neighbour_on_the_ridge_gains_of_the_second_what_it_gains_of_the_first
 
 
 def test_a_slope_turned_back_is_that_of_the_first_parameter_alone() -> None:
-    """Of a residual that is the difference of two flows the slope along the ridge is nothing."""
+    """If a residual is the difference of two flows, its slope along the ridge is zero."""
     placed, theta, nudge = PlacedRidge(0, 1, 100.0), np.log([2e-6, 4e-5]), 1e-6
 
     def residual(at: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""Residuals under parameter sets side by side are those of one run after the other."""
+"""Residuals of parameter sets that run side by side equal those of single runs."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -42,7 +42,7 @@ def problem() -> FreedProblem:
     pressure[[20, 21, 22, 23, 300]] = np.nan
     record = record.replace(differential_pressure_pa=pressure)
     log = greybox_log(FLOW_FORM, record, flow_parameters(HEALTHY), longest_step=2.5e-4, variances=VARIANCES)
-    both_sides = [one for one in HYPOTHESES if one.name != "single_rod"]  # whose slopes are over a longer step
+    both_sides = [one for one in HYPOTHESES if one.name != "single_rod"]  # its slopes use a longer step
     return freed(widened(replace(log, presumed=presumed_stiffness(HEALTHY, {})), HEALTHY), both_sides)
 
 
@@ -52,7 +52,7 @@ def points(problem: FreedProblem, count: int) -> np.ndarray:
 
 
 def alone(problem: FreedProblem, theta: np.ndarray) -> np.ndarray:
-    """One run by the kernel that also carries sensitivities."""
+    """Return the residuals of one run by the kernel that also computes sensitivities."""
     row = problem.log.parameters.copy()
     for name, value in problem.model.values(theta).items():
         row[parameter_names(WideFlowParameters).index(name)] = value
@@ -124,7 +124,7 @@ def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_al
 def test_finite_differences_give_the_normal_equations_of_exact_derivatives(
     problem: FreedProblem, form: GreyBoxModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(nudges, "NUDGE", 3e-7)  # exact derivatives do not see what lies behind the next corner
+    monkeypatch.setattr(nudges, "NUDGE", 3e-7)  # exact derivatives do not see beyond the next corner
     p = flow_parameters(HEALTHY)
     log = replace(problem.log, drives=problem.log.drives[:, :2], parameters=parameter_row(p))
     start = {"case_leakage": 1e-13, "speed_lead": 1e-5, "accumulator_stiffness": 1e8, "makeup_opening": 1e3}
@@ -173,7 +173,7 @@ def test_a_point_near_a_known_one_lies_along_its_slopes_where_that_is_asked_for(
     own.near, slopes = 0.2, own.slopes(theta)
     near, far = (theta + size * np.eye(len(theta))[0] / np.linalg.norm(slopes[:, 0]) for size in (0.19, 0.21))
     _, sizes, along = np.linalg.svd(slopes, full_matrices=False)
-    bent = theta + (along * (0.19 / sizes)[:, None])[sizes > 0.05][-1]  # effects cancel, and logarithms bend
+    bent = theta + (along * (0.19 / sizes)[:, None])[sizes > 0.05][-1]  # effects cancel; logarithms are nonlinear
     exact = problem.on(problem.log).at(near)
     monkeypatch.setattr(own, "_side_by_side", lambda *_: pytest.fail("this point was run"))
     assert own.at(near).cost == pytest.approx(exact.cost, abs=1e-2)
@@ -230,7 +230,7 @@ def test_other_drives_of_a_long_log_are_run_one_by_one(problem: FreedProblem, mo
 
 @pytest.fixture(scope="module")
 def gapped(problem: FreedProblem) -> FreedProblem:
-    """A problem with two gaps in the motor's speed; pressure is missing in the first."""
+    """Return a problem with two gaps in motor speed; pressure is missing in the first."""
     log = replace(problem.log, drives=problem.log.drives[:, :2], parameters=parameter_row(flow_parameters(HEALTHY)))
     return FreedProblem.of(FLOW_FORM, replace(log, gaps=np.array([[18.0, 24.0, 1e9], [300.0, 340.0, 1e12]])))
 
@@ -273,7 +273,7 @@ def test_the_loop_across_gaps_run_as_python_gives_what_its_kernel_gives(
 
 
 def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Lanes of the kernels that a problem asks for, one after the other."""
+    """Record the lanes of each kernel that a problem requests."""
     asked: list[int] = []
 
     def noted(model: GreyBoxModel, lanes: int) -> object:

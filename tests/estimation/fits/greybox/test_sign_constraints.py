@@ -1,4 +1,4 @@
-"""What cannot be less than nothing makes no interval as wide as if it could."""
+"""An unknown that cannot be negative does not widen an interval as if it could."""
 
 from math import inf
 
@@ -32,7 +32,7 @@ def test_covariance_at_a_bound_is_that_of_what_is_drawn_above_it() -> None:
     wanted = np.array([0.3, -0.7])
     drawn = np.random.default_rng(2).multivariate_normal(wanted, SPREAD, 400_000)
     kept = drawn[drawn[:, 1] > 0.0]
-    # along the regression on the bounded one, from where that stands at its bound
+    # the estimate with the second unknown at its bound, by the regression on it
     held = np.array([wanted[0] - SPREAD[0, 1] / SPREAD[1, 1] * wanted[1], 0.0])
     told = not_negative(SPREAD, {1: (0.0, -0.7)})
     assert told == pytest.approx((kept - held).T @ (kept - held) / len(kept), rel=0.02)

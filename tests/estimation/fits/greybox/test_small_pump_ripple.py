@@ -1,4 +1,4 @@
-"""Small teeth of a pump are integrated out: what they move, what they add, and that a log with some has its number."""
+"""Small pump ripple is integrated out: its shift, its share of the interval, and a value for a log that has some."""
 
 from functools import cache
 
@@ -66,7 +66,7 @@ def test_a_move_beyond_what_is_linear_makes_a_number_uncertain_and_no_other_one(
 
 @cache
 def logged(ripple: float) -> Record:
-    """Return a leaky actuator that is driven slowly and logged at 2 kHz, whose pump has 11 teeth."""
+    """Return a log at 2 kHz of a leaky actuator that is driven slowly, and whose pump has 11 teeth."""
     machine = Machine(leakage=6.0 * Machine().leakage, teeth=11.0, ripple=ripple)
     time = 1e-3 * np.arange(4000)
     course = np.ones((len(time), 5))

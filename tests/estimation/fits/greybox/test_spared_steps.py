@@ -1,4 +1,4 @@
-"""Short model steps where they matter alone leave a search where all of them do."""
+"""Short model steps only where they matter lead a search to the same end as short steps throughout."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def log() -> GreyBoxLog:
 
 @pytest.fixture
 def steps_taken(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Model steps of each run side by side that has short ones."""
+    """Record the model steps of each side-by-side run that has short ones."""
     taken: list[int] = []
     run = FreedProblem._side_by_side  # pyright: ignore[reportPrivateUsage]
 

@@ -30,6 +30,6 @@ def test_one_that_counts_again_goes_on_from_what_was_done() -> None:
     work = Work(most=100)
     with work.counted():
         spend(LOG, 2)
-    spend(LOG, 1000)  # nobody counts
+    spend(LOG, 1000)  # not counted
     with pytest.raises(WorkSpentError), work.counted():
         spend(LOG)

@@ -1,4 +1,4 @@
-"""Air that gets into the oil within a log: when, how much, and bulk modulus before it."""
+"""Air that enters the oil during a log: when, how much, and bulk modulus before it."""
 
 from dataclasses import replace
 from functools import cache
@@ -28,7 +28,7 @@ PAPER, MACHINE = EhaParameters(), Machine(quadratic=1.1e6, linear=0.0, coulomb=4
 
 @cache
 def logged(air: float, *, at: float = 2.0, lasting: float = 0.5) -> Record:
-    """Return five seconds of an actuator into whose oil so much air gets, a unit of oil."""
+    """Return five seconds of an actuator whose oil takes in ``air`` per unit of oil."""
     time = 1e-3 * np.arange(5000)
     course = np.ones((len(time), 5))
     course[:, 0] = 110.0 * np.sin(2.0 * np.pi * time) + 60.0 * np.sin(5.2 * np.pi * time)
@@ -45,7 +45,7 @@ def seen(record: Record) -> GreyBoxLog:
 def test_lost_flow_tells_when_air_gets_in() -> None:
     entry = likeliest_entry(seen(logged(0.03)))
     assert entry.share > AIRED
-    assert entry.at == pytest.approx(0.45, abs=0.06)  # the middle of what takes half a second
+    assert entry.at == pytest.approx(0.45, abs=0.06)  # the middle of an entry that lasts half a second
 
 
 @pytest.mark.parametrize("course", ["none", "throughout"])
@@ -79,4 +79,4 @@ def test_air_that_gets_in_is_named_with_its_time_and_bulk_modulus_is_right(at: f
     assert fit.explanation.values["air_width"][0] == pytest.approx(lasting / 5.0, rel=0.1)
     value, std = fit.parameters["bulk_modulus"]
     assert abs(value - MACHINE.bulk_modulus) < std
-    assert 2e-3 < std / value < 3e-3  # how quickly bubbles yield is not known
+    assert 2e-3 < std / value < 3e-3  # the rate at which bubbles yield is not known

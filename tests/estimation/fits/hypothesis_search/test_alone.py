@@ -1,4 +1,4 @@
-"""What is tried by itself, and in pairs, where little is left of a long log, or much."""
+"""Which hypotheses are tried alone and in pairs if little of a long log is unexplained, or much."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -67,7 +67,7 @@ def test_a_start_that_leads_nowhere_is_not_used_again_where_little_is_left(
 def test_where_a_cause_explains_a_log_but_leaves_more_than_noise_what_slopes_do_not_see_is_tried_too(
     plain: float, left: float, asked: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All is tried where it gains too little to be believed: a worn pump that gained 3 hid a speed that gains 34."""
+    """All are tried if it gains too little to be accepted: a worn pump that gained 3 hid a speed that gains 34."""
     told: list[str] = []
 
     def nearing(_: Any, given: Any, *__: Any) -> Any:
@@ -90,7 +90,7 @@ Pairing = Callable[..., list[Trial]]
 
 @pytest.fixture
 def pairing(monkeypatch: pytest.MonkeyPatch) -> Pairing:
-    """Pairs beside a hypothesis that costs 5,000, of sets and searches that are given; the noise costs 1,000."""
+    """Return a search for pairs beside a hypothesis of cost 5,000, with given trials and fits; noise costs 1,000."""
 
     def paired(every: int, screened: Any, led_on: Any, rivalled: float = np.inf) -> list[Trial]:
         monkeypatch.setattr(explain, "delayed", lambda log, _: log)

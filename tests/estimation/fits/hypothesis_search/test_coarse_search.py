@@ -1,4 +1,4 @@
-"""Where hypotheses are brought to their optimum with long model steps."""
+"""Searches of hypotheses for their optimum, with long model steps."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from tests.estimation.fits.short_logs import wide
 def test_what_leaves_far_less_than_noise_of_position_is_no_explanation(
     passed_on: float, left: float, *, void: bool
 ) -> None:
-    """Speed that comes late and air left 2 % of the noise of a drone's log, of which its encoder's zero left all."""
+    """In a drone's log, a late speed and air left 2 % of the noise; the encoder's zero left all of it."""
     log = wide()
     log = replace(log, noise=tuple(replace(one, passed_on=passed_on) for one in log.noise))
     cost = left * QUIET / cost_over_noise(log, 1.0)

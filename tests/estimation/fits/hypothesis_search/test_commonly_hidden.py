@@ -1,4 +1,4 @@
-"""A pump's delivery that slopes put behind leaks, and a zero beside what took part of it up, are sought on."""
+"""A pump's delivery that slopes attribute to leaks, and a zero partly absorbed by another effect, are still tried."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -43,8 +43,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     ("first", "sought"),
     [
         (tried(90.0, OFFSET), True),
-        (tried(40.0, OFFSET), False),  # it explains the log
-        (tried(90.0, DELIVERY), False),  # it was sought
+        (tried(40.0, OFFSET), False),  # it already explains the log
+        (tried(90.0, DELIVERY), False),  # delivery was already sought
     ],
 )
 def test_another_delivery_is_followed_where_nothing_explains_a_log(
@@ -77,8 +77,8 @@ def test_a_load_a_pump_and_chambers_are_sought_together_only_where_nothing_expla
     [
         (tried(45.0, OFFSET), 27.0, -0.08, True),
         (tried(45.0, OFFSET), 12.0, -0.08, False),
-        (tried(45.0, OFFSET), 27.0, -0.005, False),  # no rig file is as sure
-        (tried(90.0, OFFSET), 27.0, -0.08, False),  # it explains nothing
+        (tried(45.0, OFFSET), 27.0, -0.005, False),  # no rig file is so accurate
+        (tried(90.0, OFFSET), 27.0, -0.08, False),  # it does not explain the log
         (tried(45.0, OFFSET, DELIVERY), 27.0, -0.08, False),
     ],
 )

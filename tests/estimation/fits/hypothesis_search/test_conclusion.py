@@ -1,4 +1,4 @@
-"""What hypotheses that explain a log alike say of it."""
+"""Conclusion from hypotheses that explain a log about equally well."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -26,7 +26,7 @@ def tried(one: Hypothesis, cost: float, modulus: float, volume: float = 1.0) -> 
 
 
 def told(monkeypatch: pytest.MonkeyPatch, volume: float, behind: float) -> Explanation:
-    """Return what is told where a zero is less likely than another volume by so much in log-likelihood."""
+    """Return the conclusion if a zero is behind another chamber volume by ``behind`` in log-likelihood."""
     monkeypatch.setattr(conclusion, "usual_pressure", lambda *_: 0.0)
     monkeypatch.setattr(conclusion, "delivery_beside", lambda *_: NO_GAIN)
     monkeypatch.setattr(conclusion, "with_details", lambda _, one: one)
@@ -50,7 +50,7 @@ def test_a_volume_that_the_rig_file_hardly_allows_yields_to_what_explains_the_lo
 
 
 def test_a_set_is_no_rival_of_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stuck valve, `makeup_check_stuck_shut` 25331, was found beside a late one and alone."""
+    """The stuck valve of `makeup_check_stuck_shut` 25331 was found both beside a late one and alone."""
     monkeypatch.setattr(conclusion, "usual_pressure", lambda *_: 0.0)
     alike = [tried(ENCODER_ZERO, cost, 2e8) for cost in (100.0, 101.0)]
     assert conclude(LOG, EhaParameters(), alike, lambda _: True).rivals == ()

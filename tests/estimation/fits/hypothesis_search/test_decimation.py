@@ -1,4 +1,4 @@
-"""Logs of which every few samples count, while hypotheses are compared."""
+"""Decimated logs, on which hypotheses are compared."""
 
 from dataclasses import replace
 from typing import Any
@@ -20,7 +20,7 @@ from tests.estimation.fits.short_logs import PAPER, log
 
 
 def seen() -> GreyBoxLog:
-    """Return a log of 3 s as the wide form sees it."""
+    """Return a log of 3 s for the wide form."""
     record, variances = without_strays(log(3.0))
     return widened(flow_log(record, PAPER, {}, variances), PAPER)
 
@@ -43,7 +43,7 @@ def test_what_is_pumped_and_swept_stays(every: int) -> None:
 
 @pytest.mark.parametrize(("apart", "first", "every"), [(5, 3, 5), (6, 1, 6), (10, 0, 5), (3, 2, 3)])
 def test_a_pressure_that_came_slower_counts_as_often_as_it_was_read(apart: int, first: int, every: int) -> None:
-    """Of a pressure in every sixth sample none was left, or each counted four times over."""
+    """Of a pressure that was read in every sixth sample, no sample was left, or each counted four times."""
     whole = seen()
     held = np.full_like(whole.measured, np.nan)
     held[first::apart] = whole.measured[first::apart]

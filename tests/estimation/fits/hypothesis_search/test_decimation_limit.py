@@ -1,4 +1,4 @@
-"""Few samples stand for a log only while they cost what all of them do."""
+"""A decimated log is only used if it costs the same as the whole log."""
 
 from dataclasses import replace
 from typing import Any
@@ -17,7 +17,7 @@ from tests.estimation.fits.flow.test_other_rigs import PAPER, STIFF, log
 
 
 def kept(record: Record, p: EhaParameters, every: int) -> int:
-    """Return how many samples may be one where a search for a healthy actuator begins."""
+    """Return how many samples may be merged into one at the start of the search for a healthy actuator."""
     cleaned, variances = without_strays(record)
     return decimation_limit(widened(flow_log(cleaned, p, {}, variances), p), flow_starts(p, p.bulk_modulus)[0], every)
 
@@ -28,7 +28,7 @@ def test_steps_of_4_ms_stay_on_the_papers_rig_and_not_where_small_chambers_hold_
 
 
 class AskedError(Exception):
-    """A search that is not wanted."""
+    """Raised by a search that should not run."""
 
 
 def test_hypotheses_are_compared_by_steps_that_the_rig_allows(monkeypatch: pytest.MonkeyPatch) -> None:

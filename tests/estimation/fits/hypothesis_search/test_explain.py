@@ -24,7 +24,7 @@ FED = {"makeup_conductance": 1e-9}
 
 
 class _Made(Trial):
-    """What was tried, as the hypotheses say."""
+    """A trial whose result means what its hypotheses say."""
 
     @property
     def meant(self) -> bool:
@@ -32,7 +32,7 @@ class _Made(Trial):
 
 
 def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[float, int]:
-    """Return the cost at which searches end that reach these, one after another, and how many there were."""
+    """Return the cost at the end of searches that reach these costs in turn, and the number of searches."""
     made: list[float] = []
 
     def descended(*_: Any, **__: Any) -> Any:
@@ -76,7 +76,7 @@ def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_say
 
 
 def relieved(setting: float, **more: Any) -> Any:
-    """Return a relief valve that opens at this, where the rig file has 3 MPa."""
+    """Return a trial of a relief valve that opens at a setting; the rig file states 3 MPa."""
     (relief,) = (one for one in HYPOTHESES if one.name == "relief_low")
     values, point = {"relief_pressure": setting}, Point(np.zeros(1), 50.0, np.zeros(1), np.eye(1))
     return Trial((relief,), point, values, {}, {"relief_pressure": 3e6}, **more)
@@ -162,7 +162,7 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
     )
     found = explain._paired(nothing, first, {"leakage_coefficient": 2e-12}, lambda _: explains)  # pyright: ignore[reportPrivateUsage]
     assert [name for name, _ in begun] == asked.split()
-    # from where its search with long steps ended, leakage revived, and from where it began
+    # starts: the end of its search with long steps, with leakage restored, and the start of that search
     revived = {"leakage_coefficient": 5e-12, "flow_bias": 3e-6, "offset": 4e4, **FED}
     assert all(starts == [revived, {"leakage_coefficient": 2e-12, "offset": 1e5}] for _, starts in begun)
     assert found[0].together[-1].name == asked.split()[-1 if not explains else 0]
@@ -173,10 +173,10 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
     ("second", "least", "chi", "hopeless", "beside", "names", "rivals"),
     [
         (105.0, 60.0, 5.0, 101.0, "worn relief", ("worn", "late"), 2),
-        (120.0, 60.0, 2.0, 101.0, "relief", ("relief", "late"), 1),  # it is not about as good
+        (120.0, 60.0, 2.0, 101.0, "relief", ("relief", "late"), 1),  # the second is clearly worse
         (105.0, 40.0, 5.0, 101.0, "relief", ("relief", "late"), 1),  # nothing explains the log
-        (105.0, 40.0, 2.0, 101.0, "worn relief", ("worn", "late"), 2),  # nor here, but little is left
-        (105.0, 60.0, 2.0, 100.0, "", ("relief",), 0),  # the best alone takes up next to nothing
+        (105.0, 40.0, 2.0, 101.0, "worn relief", ("worn", "late"), 2),  # nothing explains it either, but little is left
+        (105.0, 60.0, 2.0, 100.0, "", ("relief",), 0),  # the best alone explains next to nothing
     ],
 )
 def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
@@ -221,7 +221,7 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     assert found is not None
     assert " ".join(sorted(asked, reverse=True)) == beside
     assert found.names == names
-    # the pair of both firsts is found twice and counts once
+    # the pair of the two single hypotheses is found twice and counts once
     assert len(found.rivals) == rivals
 
 
@@ -239,7 +239,7 @@ def test_a_flow_that_no_worn_pump_and_no_rounded_rig_file_gives_is_objected_to(s
 
 
 def test_a_set_of_fewer_hypotheses_stands_in_place_of_all_that_hold_it_and_more() -> None:
-    """Another pair that held it came lower, by less than a hypothesis is worth, and was told in its place."""
+    """Another pair that contained it cost less, by less than a hypothesis must gain, and was reported instead."""
 
     def ended(cost: float, *together: Hypothesis) -> Trial:
         return Trial(

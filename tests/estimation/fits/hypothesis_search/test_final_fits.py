@@ -1,4 +1,4 @@
-"""How sets of hypotheses are fitted to the end."""
+"""Final fits of sets of hypotheses."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -100,15 +100,15 @@ def test_valves_that_a_set_frees_itself_are_not_freed_again(monkeypatch: pytest.
     ("share", "cost", "alone"),
     [
         (1.02, 95.0, True),
-        (1.07, 95.0, True),  # its 3.5 deviations gain less than is asked of a hypothesis
-        (1.02, 101.0, False),  # it is needed
+        (1.07, 95.0, True),  # its 3.5 deviations gain less than a hypothesis must
+        (1.02, 101.0, False),  # the hypothesis is needed
         (80.0, 95.0, False),  # the valve is stuck
     ],
 )
 def test_a_hypothesis_that_ended_at_its_absence_is_not_told_beside_another(
     share: float, cost: float, alone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A sound make-up valve was said to be stuck shut, in oil that holds air."""
+    """In oil with air, a sound make-up valve was said to be stuck shut."""
     fit = made_fit(90.0, 2e8, 1e5)
     fit = replace(fit, std={**fit.std, "air_softness": 3.0, "makeup_share_b": 0.02})
     absent = {"air_softness": 0.0, "makeup_share_b": 1.0}

@@ -1,4 +1,4 @@
-"""What the residuals of a fit of the flow form object to."""
+"""Objections to a fit of the flow form, from its residuals."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -17,7 +17,7 @@ from estimation.notes import EstimateCode
 def test_an_encoders_noise_that_leaks_off_alternates_and_objects_to_nothing(
     correlation: float, chi_square: float, noisy: bool, objected: bool
 ) -> None:
-    """A leaky single rod was refused for -0.47, with which the true values leave its log too."""
+    """A leaky single rod was refused for -0.47, which remains in its log with the true values too."""
     fit: Any = SimpleNamespace(
         chi_square=(chi_square,), autocorrelation=(correlation,), seen=1238.0, cost=709.0, late={}
     )
@@ -29,7 +29,7 @@ def test_an_encoders_noise_that_leaks_off_alternates_and_objects_to_nothing(
 def test_a_play_is_named_beside_a_misfit_only_where_it_is_much_of_it(
     chi_square: float, gain: float, named: bool
 ) -> None:
-    """A pressure drop in a hose left 28 times the noise, of which a play of 30 um that is not there took a little."""
+    """A pressure drop in a hose left 28 times the noise; a play of 30 um that is not there explained little of it."""
     fit: Any = SimpleNamespace(
         chi_square=(chi_square,), autocorrelation=(0.0,), seen=8000.0, cost=4000.0 * chi_square, late={}
     )

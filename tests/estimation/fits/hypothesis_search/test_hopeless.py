@@ -1,4 +1,4 @@
-"""What no hypothesis takes any of is not asked for two at once."""
+"""If no single hypothesis reduces a misfit, no pairs are tried."""
 
 import numpy as np
 import pytest
@@ -25,4 +25,4 @@ def test_noise_that_varies_is_asked_for_no_pair(monkeypatch: pytest.MonkeyPatch)
 def test_pairs_are_tried_where_the_best_of_all_takes_a_hundredth_of_what_is_left(chi: float, cost: float) -> None:
     plain = made_fit(1e4, 2e8, 1e5, chi=chi)
     assert hopeless_cost(plain, HYPOTHESES) == pytest.approx(cost)
-    assert hopeless_cost(plain, HYPOTHESES[:3]) == np.inf  # the others are tried in pairs alone
+    assert hopeless_cost(plain, HYPOTHESES[:3]) == np.inf  # the other hypotheses are only tried in pairs

@@ -1,4 +1,4 @@
-"""A seal that gives way within a log: bulk modulus, both leakages and when."""
+"""A seal that fails during a log: bulk modulus, both leakages and the time."""
 
 from dataclasses import replace
 from functools import cache
@@ -34,7 +34,7 @@ HEALTHY = EhaParameters()
 
 @cache
 def stepping(factor: float, at: float = 2.0, before: float = 1.0) -> Record:
-    """Return five seconds in which leakage steps to so many times a healthy one."""
+    """Return five seconds in which leakage steps to ``factor`` times a healthy one."""
     rng = np.random.default_rng(7)
     first, last = (replace(HEALTHY, leakage_coefficient=n * HEALTHY.leakage_coefficient) for n in (before, factor))
     path = ParameterPath((0.0, at), (circuit_of(first), circuit_of(last)))
@@ -55,7 +55,7 @@ def test_lost_flow_tells_when_leakage_steps_and_by_how_much() -> None:
 
 
 def test_a_seal_that_was_tight_is_found_where_lost_flow_says_that_it_leaked_less_than_nothing() -> None:
-    """Small rigs lose so little that noise makes it negative, and only times at which it is not were tried."""
+    """Small rigs leak so little that noise makes leakage negative, and only times with positive leakage were tried."""
     log = seen(stepping(6.0, before=1e-3))
     parameters = log.parameters.copy()
     parameters[parameter_names(WideFlowParameters).index("pump_displacement")] *= 0.7
@@ -66,7 +66,7 @@ def test_a_seal_that_was_tight_is_found_where_lost_flow_says_that_it_leaked_less
 
 
 def test_a_step_behind_a_hole_is_told_at_its_time_in_the_log() -> None:
-    """With three pieces of ten missing it was told at 0.2 for 0.4."""
+    """With three of ten pieces missing, it was reported at 0.2 instead of 0.4."""
     log = seen(stepping(6.0))
     measured = log.measured.copy()
     measured[round(0.1 * len(measured)) : round(0.3 * len(measured))] = np.nan
@@ -92,7 +92,7 @@ def test_a_seal_that_gives_way_is_named_and_bulk_modulus_is_right() -> None:
 
 
 def test_drops_at_which_make_up_valves_open_leave_bulk_modulus_open_beside_a_step() -> None:
-    """Held where the plain form had them, they made intervals too narrow."""
+    """Held at their values in the plain form, they made intervals too narrow."""
     log = seen(stepping(6.0))
     values = {"leakage_before": 1.0 / 6.0 - 1.0, "step_at": 0.4, "step_width": 1e-3, **dict.fromkeys(CRACKS, 0.0)}
     values |= {"makeup_conductance": 1e-9, "makeup_opening": 1e3, "case_leakage": 1e-13, "speed_lead": 1e-5}

@@ -1,4 +1,4 @@
-"""What a loss goes with: each course is one at its worst, and none where it has no business."""
+"""Regressors of a loss: each is one where the loss is largest, and none is tried on a log that cannot show it."""
 
 import numpy as np
 import pytest

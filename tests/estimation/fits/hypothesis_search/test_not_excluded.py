@@ -1,4 +1,4 @@
-"""A make-up valve that never opened in a log is told of, and wear of the pump that a log does not exclude."""
+"""A make-up valve that never opened in a log is reported, and so is pump wear that a log does not exclude."""
 
 import math
 from dataclasses import replace
@@ -38,7 +38,7 @@ def test_one_valve_that_is_not_felt_beside_one_that_is(stds: dict[str, float], s
         (0.0, 0.5 * OPEN_DELIVERY, None),
         (0.0, 0.15, 30.0),
         (-0.08, 0.02, 12.0),  # known well, but well below a sound pump
-        (0.08, 0.08, None),  # as much above one
+        (0.08, 0.08, None),  # as far above a sound pump
         (-0.05, 0.02, 9.0),
         (-0.05, 0.024, 9.8),  # two deviations below
         (-0.04, 0.025, None),
@@ -54,7 +54,7 @@ def test_wear_is_open_where_two_deviations_below_what_is_likeliest_come_to_the_l
 
 
 def test_a_pump_delivers_no_less_than_what_leaks_would_take() -> None:
-    """Slopes called the pump of three sound logs worn, with 53 to 97 %: it would have had to leak backwards."""
+    """By slopes the pump of three sound logs was worn with 53 to 97 %: it would have had to leak backwards."""
     plain = seen(log(0.2))
     plain = replace(plain, drives=np.full_like(plain.drives, 100.0), measured=np.full_like(plain.measured, -5e5))
     values = {"flow_bias": 2.36e-6, "leakage_coefficient": 4.78e-12}

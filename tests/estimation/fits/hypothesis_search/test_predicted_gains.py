@@ -1,4 +1,4 @@
-"""What is tried first, by what the slopes promise."""
+"""Order of trials, by the gain that slopes predict."""
 
 from types import SimpleNamespace
 
@@ -18,7 +18,7 @@ from estimation.models.wide_flow import QUICK_FLOW_FORM, QUICKNESS
 from tests.estimation.fits.short_logs import PAPER, at_one_speed, log, lost_in_bias, seen, wide
 
 FOUND = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 3e7, "case_leakage": 4e-13}
-"""What a plain fit may have found [SI]."""
+"""Possible result of a plain fit [SI]."""
 
 
 def test_what_slopes_say_nothing_of_is_not_tried_first() -> None:
@@ -28,7 +28,7 @@ def test_what_slopes_say_nothing_of_is_not_tried_first() -> None:
 
 
 def test_a_hypothesis_that_slopes_say_nothing_of_is_tried_where_nothing_else_is_asked() -> None:
-    """A stuck make-up valve beside an offset of speed: with none to try first, the search ended in an error."""
+    """A stuck make-up valve beside an offset of speed: with no other to try first, the search ended in an error."""
     likely, others, _ = by_predicted_gain(wide(), (), FOUND, [MAKEUP_BLOCKED])
     assert (likely, others) == ([MAKEUP_BLOCKED], [])
 
@@ -52,7 +52,7 @@ def test_what_is_taken_already_leaves_less_to_tell() -> None:
 def test_what_is_promised_beside_air_is_promised_with_bubbles_as_they_were_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With isothermal ones beside a fit of others, a sound pump was worn at 99 %, for a gain that was not there."""
+    """With isothermal bubbles beside a fit with others, a sound pump was worn at 99 %, by a gain that did not exist."""
     asked = list[object]()
 
     def noted(*given: object) -> object:
@@ -69,7 +69,7 @@ def test_what_is_promised_beside_air_is_promised_with_bubbles_as_they_were_found
 def test_what_another_delivery_promises_is_asked_where_the_fit_ended(
     by_mass: bool, freed_last: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Asked in the other balance, or without drops of valves that were freed, a sound pump promised 30,000 and 208."""
+    """In the other balance a sound pump was predicted to gain 30,000, and without valve drops that were freed, 208."""
     asked = list[tuple[bool, tuple[object, ...]]]()
 
     def noted(row: GreyBoxLog, *given: object) -> object:
@@ -87,7 +87,7 @@ def test_what_another_delivery_promises_is_asked_where_the_fit_ended(
 def test_what_a_worn_pump_at_one_speed_promises_does_not_hang_on_the_step_of_its_slopes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Forward slopes by delivery and flow bias hold curvature that does not cancel, which looked like knowledge."""
+    """Curvature in forward slopes by delivery and flow bias does not cancel, and it looked like information."""
     worn = seen(at_one_speed())
     fine = predicted_gain(worn, PAPER, lost_in_bias(), DELIVERY)
     monkeypatch.setattr(nudges, "NUDGE", 10.0 * nudges.NUDGE)

@@ -1,4 +1,4 @@
-"""When a pump's teeth are taken up, corrected, and left, by fits that are made up."""
+"""When pump ripple is included, corrected and left, by made-up fits."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -56,7 +56,7 @@ Asked = tuple[tuple[int, ...], tuple[int, ...]]
 
 
 def told(*fits: GreyBoxFit) -> tuple[Callable[[GreyBoxLog], Sequence[GreyBoxFit]], list[Asked]]:
-    """Return what fits logs in turn, and the counts that each log asks for and holds."""
+    """Return a function that returns the fits in turn, and the tooth counts that each log tests and includes."""
     asked: list[Asked] = []
 
     def fitted(one: GreyBoxLog) -> Sequence[GreyBoxFit]:
@@ -74,7 +74,7 @@ def well(_: GreyBoxFit) -> bool:
 
 
 def test_teeth_are_not_taken_up_where_the_log_stays_unexplained() -> None:
-    for explained, size in ((True, 0.1), (False, 0.1), (True, 0.01)):  # small ones too, where they are needed
+    for explained, size in ((True, 0.1), (False, 0.1), (True, 0.01)):  # small ripple too, if it is needed
         fitted, _ = told(fit(500.0, shown(12, 200.0, size)), fit(300.0, shown(12, 0.0)))
         found = with_pump_ripple(PLAIN, fitted, lambda one, said=explained: said and one.cost == 300.0)
         assert bool(found.remarks) is explained
@@ -104,7 +104,7 @@ def test_teeth_are_taken_up_and_corrected_until_nothing_is_left() -> None:
 def test_a_log_that_neither_teeth_nor_an_offset_can_explain_is_fitted_once(
     chi: float, hopeless: bool, by_offset: bool
 ) -> None:
-    # it has to lose 500 of 1000 at a residual of 2, and 667 at 3, where 60 promised may gain ten times as much
+    # its cost of 1000 must fall by 500 at a residual of 2, and by 667 at 3; a predicted 60 may gain ten times that
     off = (0.5, 60.0) if by_offset else (0.0, 0.0)
     teeth = () if by_offset else (shown(12, 60.0),)
     first = replace(fit(1000.0, *teeth, off=off), chi_square=(chi,))
@@ -131,7 +131,7 @@ def test_corrections_end_after_so_many_rounds() -> None:
         ([shown(12, 50.0), shown(13, BY_CHANCE + 39.9 / STANDS_OUT)], True),
         ([shown(12, 50.0), shown(13, 40.0, beside=BY_CHANCE + 39.9 / STANDS_OUT)], True),
         ([shown(12, 50.0), shown(13, BY_CHANCE + 40.1 / STANDS_OUT)], False),
-        ([shown(13, 1.0), shown(12, 50.0), shown(6, 49.0)], True),  # each an overtone of the other
+        ([shown(13, 1.0), shown(12, 50.0), shown(6, 49.0)], True),  # 12 is an overtone of 6
         ([shown(6, 50.0), shown(12, 49.0)], True),
         ([shown(12, 50.0), shown(18, 49.0)], False),
         ([], False),
@@ -179,7 +179,7 @@ def test_teeth_that_may_be_as_small_as_any_pumps_are_left_only_where_they_move_b
         fitted, _ = told(replace(rivals, small_teeth=({"bulk_modulus": felt}, {"bulk_modulus": 0.0})))
         return bool(with_pump_ripple(PLAIN, fitted, well).left)
 
-    most = LEAST_TEETH + 0.01 * ONE_SIDED_95  # their deviation is 0.01
+    most = LEAST_TEETH + 0.01 * ONE_SIDED_95  # the deviation of the ripple is 0.01
     assert [doubted(most - 1e-4, MOST_LINEAR + by) for by in (0.01, -0.01)] == [True, False]
     assert doubted(most + 1e-4, MOST_LINEAR - 0.01)
     assert doubted(most - 1e-4, 0.0, offset=0.1)
@@ -248,7 +248,7 @@ def test_an_offset_of_speed_is_subtracted_corrected_and_told_where_the_log_is_ex
     assert asked == 3 * [(COUNTS, ())]
     assert subtracted(found) == pytest.approx(0.24)
     assert found.log.speed_offset == pytest.approx(0.24)
-    assert not found.log.counts  # hypotheses on this log do not look for teeth again
+    assert not found.log.counts  # hypotheses on this log do not test for ripple again
     assert found.best.cost == 410.0
     assert noted(found.remarks) == [
         {
@@ -278,7 +278,7 @@ def test_an_offset_that_gains_little_or_breaks_its_promise_or_leaves_the_log_une
 
 
 def test_an_offset_that_leaves_more_than_the_noise_of_sensors_is_none() -> None:
-    """A piston with a rod on one side looks like one, and passed with bulk modulus 39 % too low."""
+    """A single rod looks like an offset, and its log passed with bulk modulus 39 % too low."""
     most = SURE * 0.2 + CHANCE * np.sqrt(2.0 / len(PLAIN.drives))
     for left, taken in ((0.95 * most, True), (1.05 * most, False)):
         after = replace(fit(400.0), chi_square=(1.0 + left,))

@@ -1,4 +1,4 @@
-"""What of several sets of hypotheses is brought to its optimum."""
+"""Which of several sets of hypotheses are searched to their optimum."""
 
 from typing import Any
 
@@ -29,5 +29,5 @@ def test_two_starts_that_came_to_one_place_are_led_on_once(monkeypatch: pytest.M
         ranking.ranked_optima(nothing, [[tried(1000.0, 0.0), second]], known=2e3)
         first = (0.0, 2e3 * ranking.NEARLY_AS_GOOD + CLOSE)
         apart = second.cost > 1001.0 or second.delays or second.point.theta[0] > 1.5
-        # the second has to come lower than the first
+        # the second must end lower than the first
         assert led == ([first, (float(second.point.theta[0]), 1000.0)] if apart else [first])

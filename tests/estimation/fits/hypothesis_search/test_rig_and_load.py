@@ -1,4 +1,4 @@
-"""A load on a rig whose file has pump and chambers wrong: three things at once."""
+"""A load on a rig whose file has the wrong pump and the wrong chambers: three effects at once."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Teeth that show by chance: with an offset of speed which the flow does not have, or at the edge of what counts."""
+"""Ripple that shows by chance: with an offset of speed that the flow contradicts, or at the edge of a limit."""
 
 from dataclasses import replace
 
@@ -24,11 +24,11 @@ LARGEST_SMALL = LEAST_TEETH + ONE_SIDED_95 * STD
 @pytest.mark.parametrize(
     ("size", "flow", "std", "left"),
     [
-        (LARGEST_SMALL - 1e-4, 1.0 - KEPT - 1e-3, 1e-3, False),  # another offset: chance
-        (LARGEST_SMALL - 1e-4, KEPT + 1e-3, 1e-3, True),  # nearly the same
-        (LARGEST_SMALL - 1e-4, 0.0, 1.01 / CONTRADICTS, True),  # the flow does not tell
+        (LARGEST_SMALL - 1e-4, 1.0 - KEPT - 1e-3, 1e-3, False),  # the flow has another offset: chance
+        (LARGEST_SMALL - 1e-4, KEPT + 1e-3, 1e-3, True),  # nearly the same offset
+        (LARGEST_SMALL - 1e-4, 0.0, 1.01 / CONTRADICTS, True),  # the flow does not decide
         (LARGEST_SMALL - 1e-4, 0.0, np.inf, True),
-        (LARGEST_SMALL + 1e-4, 0.0, 1e-3, True),  # no chance, and no small ones
+        (LARGEST_SMALL + 1e-4, 0.0, 1e-3, True),  # not small, so not chance
     ],
 )
 def test_small_teeth_that_need_an_offset_of_speed_which_the_flow_contradicts_shut_no_gate(
@@ -45,10 +45,10 @@ def test_small_teeth_that_need_an_offset_of_speed_which_the_flow_contradicts_shu
 @pytest.mark.parametrize(
     ("promised", "gained", "left"),
     [
-        (TEETH_WORTH + 0.5, TEETH_WORTH - 1.0, False),  # a simulated chirp was unknown for it
+        (TEETH_WORTH + 0.5, TEETH_WORTH - 1.0, False),  # this made a simulated chirp unknown
         (SURELY_WORTH - 0.5, KEPT * TEETH_WORTH, False),
         (SURELY_WORTH + 0.5, TEETH_WORTH - 1.0, False),
-        (SURELY_WORTH + 0.5, KEPT * SURELY_WORTH, True),  # the search with teeth ended short
+        (SURELY_WORTH + 0.5, KEPT * SURELY_WORTH, True),  # the search with ripple ended too early
         (10.0 * TEETH_WORTH, TEETH_WORTH - 1.0, True),
     ],
 )

@@ -1,4 +1,4 @@
-"""Teeth that make a fit worse are not corrected further."""
+"""Ripple that makes a fit worse is not corrected further."""
 
 from dataclasses import replace
 

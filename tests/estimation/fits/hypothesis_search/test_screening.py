@@ -1,4 +1,4 @@
-"""Where hypotheses lead in a few steps."""
+"""Where searches of hypotheses arrive after a few steps."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -17,7 +17,7 @@ from tests.estimation.fits.short_logs import PAPER, at_one_speed, lost_in_bias, 
 def test_a_worn_pump_at_one_speed_is_found_sooner_from_where_the_flow_bias_is_healthy(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    log, plain = widened(seen(at_one_speed()), PAPER, {STIFFNESS: 1.0}), lost_in_bias()  # as good as no accumulator
+    log, plain = widened(seen(at_one_speed()), PAPER, {STIFFNESS: 1.0}), lost_in_bias()  # practically no accumulator
     (from_worn,) = screen(log, (DELIVERY,), [plain])
     monkeypatch.setattr(screening, "worn_start", lambda *_: ())
     (from_sound,) = screen(log, (DELIVERY,), [plain])

@@ -1,4 +1,4 @@
-"""An offset of the motor's speed that passed for one of the pressure, by fits that are made up; and by lost flow."""
+"""An offset of motor speed that passed for one of pressure, by made-up fits; and such an offset from the lost flow."""
 
 from collections.abc import Sequence
 

@@ -36,7 +36,7 @@ def trial(together: Sequence[Hypothesis], cost: float, later: float = 0.0) -> Tr
 def stuck(
     monkeypatch: pytest.MonkeyPatch, cost: float, later: float, *beside: Hypothesis, crack: Hypothesis = CHECKS_CRACK
 ) -> list[tuple[Hypothesis, ...]]:
-    """Return what is told in place of a late valve of cost 1000, if a stuck one costs so much."""
+    """Return the sets that replace a late valve of cost 1000, if a stuck one has the given cost."""
     monkeypatch.setattr(stuck_valve, "delayed", lambda log, _: log)
     monkeypatch.setattr(stuck_valve, "screen", lambda _, together, *__, **___: iter([trial(together, cost)]))
     monkeypatch.setattr(stuck_valve, "likeliest", lambda _, tried, *__: [way for one in tried for way in one])
@@ -45,7 +45,7 @@ def stuck(
 
 
 def test_a_stuck_valve_is_told_where_a_late_one_is_hardly_likelier(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`makeup_check_stuck_shut`, training 17011: 47 kPa late, likelier by 2, and "major leakage, major friction"."""
+    """`makeup_check_stuck_shut`, training 17011: 47 kPa late was likelier by 2, "major leakage, major friction"."""
     late = -2.0 * UNLIKE_CRACKS
     assert stuck(monkeypatch, 1002.0, late) == [(MAKEUP_BLOCKED,)]
     assert stuck(monkeypatch, 1002.0, late, DELIVERY) == [(DELIVERY, MAKEUP_BLOCKED)]
@@ -65,7 +65,7 @@ def test_valves_that_open_alike_are_both_sound(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [16301, 17011])
 def test_a_valve_that_stays_shut_as_far_as_a_log_reaches_is_stuck(index: int) -> None:
-    """Both logs were in a class: one plain with a drop of 11 kPa (67 %), one with valves that open late (99.9 %)."""
+    """Both logs got a class: one as plain, with a drop of 11 kPa (67 %), one with valves that open late (99.9 %)."""
     log = make("makeup_check_stuck_shut", "training", index).log
     fit = fit_flow(Record.from_frame(log), EhaParameters(), EhaParameters().bulk_modulus)
     assert fit.explanation is not None

@@ -1,4 +1,4 @@
-"""A loss that goes with position, the shaft's angle, speed or the direction of pressure is found where it is."""
+"""A loss that depends on position, shaft angle, speed or the direction of pressure is found with its cause."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -45,7 +45,7 @@ def losing(course: LossRegressor) -> Record:
     rng = np.random.default_rng(4)
     record = simulate(CIRCUIT, make_drive("multisine", 2.0, 1e-3, HEALTHY, rng), 1e-3, HEALTHY, sensors=BENCH, rng=rng)
     speed, fill = record[SPEED], HEALTHY.pump_displacement
-    for _ in range(30):  # the loss goes with the faster speed
+    for _ in range(30):  # the loss depends on the faster speed
         angle = np.concatenate([[0.0], np.cumsum(5e-4 * (speed[1:] + speed[:-1]))])
         pressure = record[PRESSURE]
         seen = LossSignals(speed, angle, record[POSITION], pressure, pressure, HEALTHY.leakage_coefficient, fill)

@@ -1,4 +1,4 @@
-"""Where the searches for what is strange about a log begin."""
+"""Where searches for other effects in a log begin."""
 
 from dataclasses import replace
 
@@ -63,7 +63,7 @@ def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_a_number(on
 def test_leakage_that_grows_with_time_squared_is_within_bounds(factor: float) -> None:
     """It begins flat. Growth was held to twice its value halfway, and logs with such a leak were refused."""
     halfway, elapsed = 1.0 + 0.25 * (factor - 1.0), np.linspace(0.0, 1.0, 5)
-    of_halfway = (factor - 1.0) / halfway  # both in time and in its square, each from halfway
+    of_halfway = (factor - 1.0) / halfway  # growth with time and with its square, both relative to halfway
     for name in ("leakage_growth", "leakage_bend"):
         least, most = LIMITS[name]
         assert least <= of_halfway <= most
@@ -99,7 +99,7 @@ def test_an_offset_at_rest_is_first_taken_to_be_what_the_sensor_reads_there() ->
 
 def test_what_the_flow_bias_holds_beyond_a_healthy_one_is_first_taken_for_wear() -> None:
     log = widened(seen(at_one_speed()), PAPER)
-    assert flow_speed(log) == pytest.approx(100.0, rel=3e-2)  # of means about each sample
+    assert flow_speed(log) == pytest.approx(100.0, rel=3e-2)  # computed from means about each sample
     (start,) = worn_start(log, lost_in_bias())
     assert start["pump_displacement"] == pytest.approx(0.85 * PAPER.pump_displacement, rel=1e-2)
     assert start["flow_bias"] == pytest.approx(PAPER.flow_bias)
@@ -150,7 +150,7 @@ def test_the_level_at_which_chambers_begin_is_presumed_anywhere_up_to_half_of_wh
 
 
 def test_a_log_that_begins_with_both_chambers_shut_in_is_searched_from_there() -> None:
-    """Their pressures had met in a pause behind a hard move. Too low a start cost 0.05 % and five times the search."""
+    """Their pressures had met in a pause after a hard move. Too low a start cost 0.05 % and five times the search."""
     rng, p = np.random.default_rng(0), parameters_for(CONDITIONS["major_friction"])
     speed = np.repeat([120.0, 0.0, 0.0, 0.0, -110.0, 90.0, 0.0, -90.0, 80.0, -120.0, 0.0], 800)
     whole = simulate(CIRCUIT, speed, 1e-3, p, sensors=BENCH, rng=rng)
@@ -161,7 +161,7 @@ def test_a_log_that_begins_with_both_chambers_shut_in_is_searched_from_there() -
 
 @pytest.mark.slow
 def test_a_level_that_a_loaded_log_hardly_tells_is_in_the_deviation_of_bulk_modulus() -> None:
-    bench = draw_bench(1004)  # the level took on half of the load's pressure: 0.45 % high, at 4.9 deviations
+    bench = draw_bench(1004)  # the level absorbed half of the load's pressure: 0.45 % high, by 4.9 deviations
     found = estimate_bulk_modulus(bench.record, bench.healthy)
     assert found.gate.passed
     assert found.value is not None
@@ -177,7 +177,7 @@ def test_a_search_for_an_encoders_zero_begins_within_the_chambers(length: float,
 
 
 def test_a_drift_of_pressure_begins_where_it_explains_most_beside_what_is_guessed() -> None:
-    """Step by step a search came to a twentieth of 1.8 bar, and the log was refused at 17 times the noise."""
+    """A stepwise search reached a twentieth of 1.8 bar, and the log was refused at 17 times the noise."""
     record = log()
     drifts = record.replace(**{PRESSURE: record[PRESSURE] + np.linspace(0.0, 1.8e5, len(record))})
     wide_log = widened(seen(drifts), PAPER)

@@ -1,4 +1,4 @@
-"""Bristles that are too stiff for the model's steps: no search begins there, and no fit ends there in such steps."""
+"""Bristles that are too stiff for the model's steps: no search begins and no fit ends there with such steps."""
 
 from dataclasses import replace
 

@@ -28,7 +28,7 @@ HEALTHY = EhaParameters()
 
 
 def short_log(seconds: float, seed: int = 1, sample_time: float = 1e-3) -> Record:
-    """The healthy actuator, on steps, without pressure."""
+    """Return a log of the healthy actuator under steps, without pressure."""
     speed = make_drive("steps", seconds, sample_time, HEALTHY, np.random.default_rng(seed))
     rng = np.random.default_rng(seed + 100)
     run = simulate(PLANTS["lumped"], speed, sample_time, HEALTHY, sensors=BENCH, rng=rng)
@@ -40,7 +40,7 @@ def seen(record: Record, speed_variance: float = 1e-4) -> GreyBoxLog:
 
 
 def heard(record: Record) -> GreyBoxLog:
-    """Return a log with the noise of motor speed that it has."""
+    """Return a log with the noise of its motor speed."""
     return seen(record, measurement_variances(record, ("motor_speed_rad_s",))["motor_speed_rad_s"])
 
 
@@ -50,7 +50,7 @@ def searches_of(log: GreyBoxLog) -> list[MotionSearch]:
 
 
 def fine_searches(monkeypatch: pytest.MonkeyPatch, seconds: float = 2.0) -> list[MotionSearch]:
-    """Return the searches of a log with steps that follow a stiff bristle, and no shorter ones at their end."""
+    """Return the searches of a log with steps short enough for a stiff bristle, and no shorter ones at their end."""
     monkeypatch.setattr(motion_fit, "without_chatter", lambda problem, _: problem)
     log = heard(short_log(seconds))
     return searches_of(replace(log, steps=np.where(log.steps == np.max(log.steps), 4 * log.steps, log.steps)))
@@ -58,7 +58,7 @@ def fine_searches(monkeypatch: pytest.MonkeyPatch, seconds: float = 2.0) -> list
 
 @pytest.fixture(scope="module")
 def healthy() -> FormFit:
-    """What two seconds of a healthy actuator say, from a first guess of twice the value."""
+    """Return the fit of two seconds of a healthy actuator, from a first guess of twice the value."""
     return fit_motion(short_log(2.0), HEALTHY, 2.0 * HEALTHY.bulk_modulus, {"piston_area": 0.01})
 
 
@@ -96,7 +96,8 @@ def test_residuals_are_compared_with_how_far_the_piston_goes_while_noise_of_spee
     moving = replace(still, measured=4e-5 * np.arange(1000.0)[:, None], noise=(OutputNoise(2.56e-12, 1e-11),))
     moving.measured[500] = np.nan
     assert motion_fit.share_of_motion(100.0, moving) == pytest.approx(1.6e-5 / (16.0 * 4e-5))
-    surer = replace(moving, noise=(OutputNoise(2.56e-12, 0.0),))  # then all that was moved counts, half the log here
+    # without drift all motion counts, here that of half the log
+    surer = replace(moving, noise=(OutputNoise(2.56e-12, 0.0),))
     assert motion_fit.share_of_motion(100.0, surer) == pytest.approx(1.6e-5 / (500.0 * 4e-5))
     assert motion_fit.share_of_motion(100.0, still) == np.inf
     gone = replace(moving, measured=np.where(np.arange(1000)[:, None] % 16 == 0, moving.measured, np.nan))
@@ -118,7 +119,7 @@ def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(
     assert len(first.search.part.log.measured) == 1000
     fits, _, _ = motion_fit._fitted(ended)
     assert fits[0].cost == first.search.whole.at(fits[0].theta).cost
-    assert fits[0].cost < first.search.whole.at(first.point.theta).cost - 20.0  # likelier by far
+    assert fits[0].cost < first.search.whole.at(first.point.theta).cost - 20.0  # far likelier
 
 
 @pytest.mark.parametrize(("wanted", "alike", "brought"), [(np.inf, 0.0, 3), (np.inf, np.inf, 2), (0.0, 0.0, 1)])
@@ -172,7 +173,7 @@ def test_without_a_variance_the_noise_of_motor_speed_is_read_off_the_log(monkeyp
     for variances in (None, read, {"motor_speed_rad_s": 4.0 * read["motor_speed_rad_s"]}):
         fit_motion(record, HEALTHY, 0.0, variances=variances)
     assert np.array(walks) / walks[0] == pytest.approx([1.0, 1.0, 4.0])
-    assert guesses == pytest.approx([1e-2 * HEALTHY.bulk_modulus] * 3)  # a first guess of nothing starts no search
+    assert guesses == pytest.approx([1e-2 * HEALTHY.bulk_modulus] * 3)  # no search starts from a first guess of zero
 
 
 def test_fast_logs_are_averaged_to_a_millisecond() -> None:
@@ -193,11 +194,11 @@ def test_the_end_of_a_very_long_log_is_left_out(monkeypatch: pytest.MonkeyPatch)
 
 def test_steps_are_short_where_the_piston_turns_and_where_the_pump_is_set_off() -> None:
     t = 1e-3 * np.arange(400)
-    speed = np.where(t > 0.2, 50.0, 0.0)  # set off at sample 201
-    position = 1e-2 * np.abs(t - 0.1)  # turns at sample 100
+    speed = np.where(t > 0.2, 50.0, 0.0)  # starts at sample 201
+    position = 1e-2 * np.abs(t - 0.1)  # reverses at sample 100
     steps = motion_fit._steps(np.column_stack([speed, position]), 1e-3)
     assert set(steps) == {4, 16}
-    fine = np.flatnonzero(steps[5:-5] == 16) + 5  # smoothing bends the ends
+    fine = np.flatnonzero(steps[5:-5] == 16) + 5  # smoothing distorts the ends
     assert list(fine) == [99, 100, 101, 201]
 
 

@@ -1,4 +1,4 @@
-"""Fits without pressure of logs that nobody here made."""
+"""Fits without pressure of logs from other sources."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A search that ended in one of several valleys along the scale of forces looks into the others."""
+"""A search that ended in one of several minima along the scale of forces also tries the others."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,7 +20,7 @@ FAR = np.full(len(UNKNOWNS), 40.0)
 
 
 def problem_of(at_each: Callable[[list[np.ndarray]], list[Point]], duration: float = 20.0) -> FreedProblem:
-    """Return a misfit as the problem of a log at 1 kHz of a duration [s]."""
+    """Return the problem of a log at 1 kHz with a given misfit and duration [s]."""
     log = SimpleNamespace(measured=np.zeros(round(1e3 * duration)), sample_time=1e-3)
     return cast("FreedProblem", SimpleNamespace(model=MODEL, at_each=at_each, log=log))
 
@@ -28,7 +28,7 @@ def problem_of(at_each: Callable[[list[np.ndarray]], list[Point]], duration: flo
 def searched(
     at: Callable[[np.ndarray], Point], explained: float = np.inf, duration: float = 20.0
 ) -> tuple[Point, list[float], list[Point]]:
-    """Return the best of a misfit's optima from the point `HERE`, the others' bulk moduli, and what was evaluated."""
+    """Return a misfit's best optimum from the point `HERE`, the bulk moduli of the others, and the points evaluated."""
     seen: list[Point] = []
 
     def at_each(thetas: list[np.ndarray]) -> list[Point]:
@@ -40,7 +40,7 @@ def searched(
 
 
 def valleys(scale: float, lower: float) -> Callable[[np.ndarray], Point]:
-    """Return a misfit with valleys at bulk modulus here and on another scale, which is lower by so much."""
+    """Return a misfit with a minimum at bulk modulus here and one on another scale, which is lower by ``lower``."""
     second = np.log(scale)
 
     def at(theta: np.ndarray) -> Point:
@@ -132,12 +132,12 @@ def test_moduli_disagree_from_a_twentieth_on() -> None:
 
 
 def test_an_optimum_that_is_hardly_better_ends_the_search_where_it_is() -> None:
-    best, _, _ = searched(flat(lambda theta: 10.0 * theta[0]), explained=-np.inf)  # 2.2 lower a round, 5 are wanted
+    best, _, _ = searched(flat(lambda theta: 10.0 * theta[0]), explained=-np.inf)  # 2.2 lower a round; 5 are required
     assert best.theta[0] - HERE[0] == pytest.approx(np.log(0.8))
 
 
 def test_a_search_that_ends_close_by_goes_on_before_it_is_said_to_disagree() -> None:
-    """Steps are a quarter of what they should be, so that the first descent ends seven to nine percent away."""
+    """Steps are a quarter of what they should be, so the first descent ends seven to nine percent away."""
 
     def slow(theta: np.ndarray) -> Point:
         off, slopes = theta[0] - HERE[0], np.zeros((1, len(theta)))

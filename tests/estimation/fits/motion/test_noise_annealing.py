@@ -1,4 +1,4 @@
-"""An end that nearly explains a log is left under larger noise, under which the pits of its misfit are not there."""
+"""A search that nearly explains a log is led on under larger noise, which removes the local minima of its misfit."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -16,13 +16,13 @@ PIT = Point(np.array([3.0]), 50.0, np.zeros(1), np.eye(1))
 
 
 def valley(theta: Array, *, rough: bool) -> Point:
-    """The misfit of a valley about 0; a rough one has a pit wherever a search stands, but near its bottom."""
+    """Return a point of a misfit with its minimum at 0; a rough one stops a search anywhere but near the minimum."""
     away = theta if not rough or abs(theta[0]) < 0.5 else np.zeros(1)
     return Point(theta, 5.0 + 5.0 * float(theta @ theta), 10.0 * away, 10.0 * np.eye(1))
 
 
 def problem(asked: list[str]) -> Any:
-    """Return a problem that is smooth under a larger walk of the noise alone."""
+    """Return a problem that is smooth only under a larger random walk of the noise."""
 
     def softened(variance: float, walk: float) -> str:
         assert (variance, walk) == (1.0, LARGER_WALK)

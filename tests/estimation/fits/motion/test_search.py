@@ -1,4 +1,4 @@
-"""Searches of two structures of friction take turns, and end where one explains the log or none can."""
+"""Searches with two structures of friction take turns, and end if one explains the log or if none can."""
 
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
@@ -29,7 +29,7 @@ Misfit = Callable[[float], float]
 
 
 class Search:
-    """A search whose starts stand at 0, 1, 2, ..., a rank of `WAYS` each, and whose descents end where they begin."""
+    """A search with starts at 0, 1, 2, ..., `WAYS` for each rank, and with descents that end where they begin."""
 
     def __init__(self, misfit: Misfit, name: str, asked: list[str], steps: int = 1) -> None:
         self._steps = steps
@@ -110,7 +110,7 @@ def test_a_structure_that_explains_no_beginning_leaves_work_to_the_other(share: 
 
         return misfit
 
-    ended(noted("a"), noted("b"), steps=int(share * MOST_WORK) // 2)  # two evaluations a start
+    ended(noted("a"), noted("b"), steps=int(share * MOST_WORK) // 2)  # two evaluations for each start
     assert len({one for one in tried if one[0] == "a"}) == first
     assert len({one for one in tried if one[0] == "b"}) == later
 
@@ -120,7 +120,7 @@ def test_a_structure_that_explains_the_beginning_goes_on_while_any_work_is_left(
 
     def first(at: float) -> float:
         tried.append(at)
-        return 1.0 if len(tried) < 4 else 9.0  # the beginning, and no more
+        return 1.0 if len(tried) < 4 else 9.0  # it explains only the beginning
 
     ended(first, lambda _: 9.0, steps=MOST_WORK // 4)  # three quarters are spent on the first start
     assert set(tried) == {0.0, 1.0}

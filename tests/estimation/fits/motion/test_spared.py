@@ -1,4 +1,4 @@
-"""How far a log without pressure that nothing explains is searched on."""
+"""How far the search of a log without pressure goes on if nothing explains the log."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -17,7 +17,7 @@ BEGUN = Point(np.ones(1), 1.0, np.zeros(1), np.zeros((1, 1)))
 
 
 def problem_of(chi_square: float, samples: int) -> Any:
-    """Return a problem of which every point leaves so much."""
+    """Return a problem with the same residuals at every point."""
     point = Point(np.ones(1), 0.5 * chi_square * samples, np.zeros(1), np.zeros((1, 1)))
     return SimpleNamespace(log=SimpleNamespace(measured=np.zeros((samples, 1)), sample_time=1e-3), at=lambda _: point)
 
@@ -26,10 +26,10 @@ def problem_of(chi_square: float, samples: int) -> Any:
 @pytest.mark.parametrize(
     ("large", "far", "samples", "ends"),
     [
-        (0.99, 9.0, LONG, True),  # no class is refused for so little noise
-        (1.01, 0.99, LONG, True),  # nor for so small a share of the motion
+        (0.99, 9.0, LONG, True),  # so small a residual rules out no class
+        (1.01, 0.99, LONG, True),  # neither does so small a share of the motion
         (1.01, 1.01, LONG, False),
-        (0.99, 0.99, LONG - 1, False),  # short logs take little
+        (0.99, 0.99, LONG - 1, False),  # short logs take little time
     ],
 )
 def test_a_search_need_not_go_on_that_cannot_come_to_explain_a_log_whose_class_stands(
@@ -53,7 +53,7 @@ def test_a_log_that_is_no_longer_than_its_beginning_is_searched_on_once(monkeypa
 
 
 def searched(part: Any, whole: Any, monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """Return which searches of a log that nothing explains may end early, in their order."""
+    """Return whether the searches of a log that nothing explains may end early, in their order."""
     asked: list[bool] = []
 
     def noted(*_: Any, wanted: float = np.inf, **__: Any) -> Point:

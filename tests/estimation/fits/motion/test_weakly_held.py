@@ -1,4 +1,4 @@
-"""A log that holds bulk modulus far too weakly is spared the search on other scales; one that is believed never is."""
+"""A log that determines bulk modulus far too weakly skips the search on other scales; an accepted one never does."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Inputs that are designed, dead times, and pistons that rest, kept in `numbers.json`."""
+"""Designed inputs, dead times, and pistons at rest, kept in `numbers.json`."""
 
 from collections.abc import Callable
 from functools import partial

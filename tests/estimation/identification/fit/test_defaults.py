@@ -1,4 +1,4 @@
-"""What a fit takes where its caller names nothing is what its signature and its docstring say."""
+"""The defaults of a fit are those of its signature and its docstring."""
 
 from collections.abc import Callable
 from typing import Any
@@ -32,7 +32,7 @@ FORCE = -50.0 * (8.1 * np.sin(9.0 * TIME) + 22.05 * np.sin(21.0 * TIME)) + RNG.s
 
 
 def plain(found: Any) -> Any:
-    """Return what can be compared."""
+    """Return a result as values that can be compared."""
     if isinstance(found, LinearModel):
         return found.to_dict()
     if isinstance(found, pd.DataFrame):

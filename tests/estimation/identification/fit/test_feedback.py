@@ -51,7 +51,7 @@ def test_a_log_from_a_closed_loop_warns() -> None:
     (note,) = [one.message.note for one in caught if one.message.note.code == IdentificationCode.FEEDBACK]
     assert (note.data["input"], note.data["output"]) == ("motor_speed_rad_s", "velocity_m_s")
     assert note.data["p_value"] < 1e-3
-    assert {one.filename for one in caught} == {__file__}  # a warning points at who asked
+    assert {one.filename for one in caught} == {__file__}  # a warning points at the caller
 
 
 def test_a_closed_loop_is_noticed_between_any_columns_and_an_open_one_is_not() -> None:

@@ -1,4 +1,4 @@
-"""What is said of a fit's residual is right on average."""
+"""The residual deviation that a fit reports has no bias."""
 
 from types import SimpleNamespace
 from typing import Any

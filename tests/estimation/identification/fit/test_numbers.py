@@ -127,7 +127,7 @@ def subspaces() -> dict[str, Any]:
 
 
 def second_order(late: float = 0.0) -> Array:
-    """Return samples of 5 / (s^2 + 4 s + 25), whose input is held, behind a dead time."""
+    """Return noisy samples of 5 / (s^2 + 4 s + 25) with a held input and a dead time."""
     model = LinearModel([5.0], [1.0, 4.0, 25.0], 0.05, "u", "y", continuous=True, dead_time=late)
     return model.simulate(U) + 0.01 * NOISE
 

@@ -1,4 +1,4 @@
-"""Tests of residuals, covariances, orders and masses of small records, kept in `numbers_tests.json`."""
+"""Tests of residuals, covariances, orders and masses from small records, kept in `numbers_tests.json`."""
 
 from collections.abc import Callable
 from functools import partial
@@ -172,7 +172,7 @@ def orders() -> dict[str, Any]:
 
 
 def moved(n: int = 600) -> tuple[Array, Array]:
-    """Return position of a body that is pushed to and fro, and the force that it takes."""
+    """Return the position of a body that is pushed to and fro, and the force that this takes."""
     t = 0.001 * np.arange(n)
     position = 0.01 * np.sin(40.0 * t) + 0.002 * np.sin(91.0 * t + 0.4)
     velocity = 0.4 * np.cos(40.0 * t) + 0.182 * np.cos(91.0 * t + 0.4)

@@ -51,7 +51,7 @@ def test_table_6_coefficients_come_back_within_their_intervals(
     truth, rng = table6[condition], np.random.default_rng(6)
     u = binary(rng, 20_000)
     fitted = fit_output_error(u, noisy(truth, u, 0.1, rng), 1e-3, **TABLE_6)
-    # 95 % each is 77 % for all five: the band that all keep in 95 % of records is 2.57 deviations
+    # 95 % for each is 77 % for all five: in 95 % of records, all five are within 2.57 deviations
     assert np.abs(error_in_deviations(fitted, truth)).max() < 2.57
     assert np.all(fitted.coefficient_std > 0.0)
     assert abs(fitted.dc_gain - truth.dc_gain) < 2.57 * fitted.dc_gain_std
@@ -230,7 +230,7 @@ def hair_dryer() -> np.ndarray:
     return pd.read_csv(path).to_numpy()[:300]
 
 
-@pytest.mark.filterwarnings("ignore:the pole .* nearly cancel")  # of the third order, and rightly
+@pytest.mark.filterwarnings("ignore:the pole .* nearly cancel")  # correct for the third order
 @pytest.mark.parametrize(("form", "wanted"), [((2, 2, 3), 88.77), ((3, 3, 3), 89.35)])
 def test_the_hair_dryer_is_fitted_as_well_as_by_the_peers(
     form: tuple[int, int, int], wanted: float, hair_dryer: np.ndarray

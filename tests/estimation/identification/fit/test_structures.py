@@ -1,4 +1,4 @@
-"""ARX, ARMAX, Box-Jenkins, instrumental variables, subspace and continuous time on systems whose truth is known."""
+"""ARX, ARMAX, Box-Jenkins, instrumental variables, subspace and continuous time on systems with known parameters."""
 
 from collections.abc import Callable
 from typing import Any
@@ -98,7 +98,7 @@ def test_box_jenkins_is_more_accurate_than_it_is_without_a_noise_model(plant_30h
     coloured = fit_box_jenkins(u, y, 1e-3, **FORM, n_c=0, n_d=1)
     plain = fit_box_jenkins(u, y, 1e-3, **FORM, n_c=0, n_d=0, covariance="coloured")
     assert coloured.one_step_rmse < 0.5 * plain.rmse
-    assert coloured.rmse == pytest.approx(plain.rmse, rel=0.02)  # both run free
+    assert coloured.rmse == pytest.approx(plain.rmse, rel=0.02)  # both are errors of free runs
     assert coloured.pole_std[0].real < plain.pole_std[0].real
 
 
@@ -159,7 +159,7 @@ def test_a_long_dead_time_has_no_initial_values_to_search_for(monkeypatch: pytes
     assert (deviations(found, truth) < 3.0).all()
     assert found.dead_time == 0.07
     both = experiments_from([u, u[:72]], [late, late[:72]], ("u", "y"), n_excited=2, n_wanted=1)
-    short = continuous._Problem(both, 1e-3, 0, 2, 0.07)  # nothing is left of an experiment of 72 samples
+    short = continuous._Problem(both, 1e-3, 0, 2, 0.07)  # no sample of an experiment of 72 samples would be left
     assert short.without_whole_samples() is short
 
 
@@ -181,7 +181,7 @@ def test_order_and_structure_are_chosen(plant_30hz: LinearModel) -> None:
     choice = choose_model(u, y, 1e-3, orders=(1, 2, 3), delay=1)
     assert choice.model.denominator.size == 3
     assert list(choice.structures.index) == ["ARX", "ARMAX", "output-error", "Box-Jenkins"]
-    # noise at the output is what ARX cannot describe
+    # ARX cannot describe noise at the output
     assert choice.structures["fit_percent"].idxmin() == "ARX"
     assert {"aic", "aicc", "bic", "fpe", "cancellations"} <= set(choice.orders.columns)
 
@@ -193,7 +193,7 @@ def test_an_unstable_model_warns() -> None:
     with pytest.warns(LogWarning) as caught:
         assert not fit_arx(u, y, 1.0, n_numerator=1, n_denominator=1, delay=1).is_stable
     (note,) = [one.message.note for one in caught]
-    assert caught[0].filename == __file__  # it points at who asked for the fit
+    assert caught[0].filename == __file__  # it points at the caller of the fit
     assert (note.code, note.data["structure"]) == (IdentificationCode.UNSTABLE, "ARX")
     assert note.data["modulus"] == pytest.approx(1.01, abs=0.002)
 

@@ -1,4 +1,4 @@
-"""Logs of a plant of the second order, with one or two inputs."""
+"""Logs of a second-order plant with one or two inputs."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""An output that is measured without its sign gets the linear model before the absolute value."""
+"""If the sign of an output is not measured, the linear model before the absolute value is found."""
 
 import json
 
@@ -18,7 +18,7 @@ from plant.arrays import Array
 from plant.errors import LogWarning
 
 F = np.array([1.0, -1.6, 0.8])
-"""A belt that rings."""
+"""Denominator of a belt that rings."""
 
 
 def logged(seed: int, n: int = 300, lag: float = 0.0) -> tuple[Array, Array]:
@@ -66,7 +66,7 @@ def test_a_model_is_the_same_after_it_was_saved(found: Identified) -> None:
     again = FreeRunModel.from_dict(json.loads(json.dumps(found.model.to_dict())))
     u, y = logged(2)
     np.testing.assert_array_equal(again.simulate(u, y), found.model.simulate(u, y))
-    # without outputs a run begins at rest
+    # without outputs, a run begins at rest
     assert (again.simulate(u) - y)[50:].std() < 0.1 * y.std()
 
 

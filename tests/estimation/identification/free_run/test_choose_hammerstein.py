@@ -1,4 +1,4 @@
-"""Which candidate with a bent input is chosen, from which linear ones they begin, and how each is told."""
+"""Which candidate with an input nonlinearity is chosen, from which linear ones they start, and how each is reported."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Which polynomial models are grown, compared and let go on, with the fits themselves made up."""
+"""Which polynomial models are grown, compared and continued, with stubs in place of the fits."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -23,7 +23,7 @@ def linear(order: int, held_back: float) -> Any:
 def rubs(
     monkeypatch: pytest.MonkeyPatch, share: dict[tuple[int, str], float], models: list[Any]
 ) -> tuple[list[Any], list[Any]]:
-    """Return which models friction was tried on, and what grows where it leaves a share of their error."""
+    """Return the models on which friction was tried, and those that grow if it leaves a given share of their error."""
     asked: list[tuple[int, float, str]] = []
 
     def rubbing(fit: Any, friction: str, _: Any) -> Any:
@@ -61,7 +61,7 @@ def test_a_model_that_rubs_goes_on_where_friction_explains_a_tenth_of_the_error_
 
 
 class Growing:
-    """Stands in for a growth, and remembers how far it was taken."""
+    """Stub of a growth that records how far it was taken."""
 
     def __init__(self, error: float, runs: bool = True) -> None:
         self.errors, self.runs, self.most = [9.0, error, 5.0], runs, list[int]()
@@ -81,7 +81,7 @@ def test_growths_are_compared_after_three_products_and_the_best_are_taken_to_twe
 
 
 def made_up(monkeypatch: pytest.MonkeyPatch, error: Callable[[int], float]) -> list[int]:
-    """Judge sixty models of every product by an error of their rank; return which of them are fitted to all data."""
+    """Judge sixty models with every product by an error given by rank; return the ranks that are fitted to all data."""
     small, large = "small", "large"
     fitted: list[int] = []
 
@@ -117,7 +117,7 @@ def test_of_the_models_of_every_product_sixteen_and_six_larger_ones_are_fitted_b
 def test_a_model_that_cannot_be_the_best_one_any_more_is_not_fitted_to_all_data(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # the first one costs 1.031, a spread of 0.25 included: the fifth leaves more than that of what was held back
+    # the price of the first model is 1.031 with its spread of 0.25: the fifth has a larger held-back error
     fitted = made_up(monkeypatch, lambda rank: 0.99 + 0.01 * rank)
     assert [one.held_back for one in _dense(DATA, [], (1,), Asked(), np.inf)] == pytest.approx([1.0, 1.01, 1.03])
     assert fitted == [1, 2, 3, 4]

@@ -1,4 +1,4 @@
-"""Dead times: long ones are found by the default, and cost a fit none of its certainty."""
+"""Dead times: long ones are found by default, and do not make a fit less certain."""
 
 import warnings
 from dataclasses import replace
@@ -22,7 +22,7 @@ NOISE = 0.02
 
 
 def late_plant(delay: int, count: int = 700, seed: int = 0, held: int = 9) -> Channels:
-    """A second-order plant behind a dead time, driven by random levels from long before the log."""
+    """Return a log of a second-order plant behind a dead time, driven by random levels since long before the log."""
     rng = np.random.default_rng(seed)
     before = 200
     u = np.repeat(rng.choice([-1.0, 1.0], (count + before) // held + 1), held)[: count + before]
@@ -116,7 +116,7 @@ def test_the_default_finds_a_dead_time_of_eighty_samples_and_judges_what_is_answ
 
 
 def test_a_run_stays_where_it_begins_before_its_first_answer() -> None:
-    # an integrator that has long been under its first input is nowhere
+    # an integrator has no steady state under its first input
     form = Form(2, (1,), (13,))
     dynamics = LinearDynamics(form, np.array([0.3, -1.69999999, 0.699999993, 0.0]))
     u = np.random.default_rng(0).normal(1.0, 1.0, 220)
@@ -142,7 +142,7 @@ def test_a_dead_time_beyond_those_looked_for_is_named() -> None:
     assert note.code == "answers_late"
     assert 195 <= note.data["samples"] <= 201
     assert note.data["left"] < 0.05
-    assert late_answers(data, rmse=0.4) == []  # a model that explains most of the output has found the answer
+    assert late_answers(data, rmse=0.4) == []  # a model that explains most of the output has found the response
 
 
 def test_a_dead_time_that_is_looked_for_is_not_named_and_neither_is_chance() -> None:

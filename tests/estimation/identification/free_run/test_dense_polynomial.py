@@ -1,4 +1,4 @@
-"""Models of every product: their least squares, their penalty, and how they are judged."""
+"""Models with every product: their least squares, their penalty, and how they are judged."""
 
 from dataclasses import replace
 
@@ -88,7 +88,7 @@ def test_sizes_that_are_asked_for_are_kept() -> None:
 
 
 def late_product(n: int = 500) -> Channels:
-    """Return a log of a plant whose output answers an input three samples ago, and its product with the last."""
+    """Return a log of a plant that responds to the input three samples ago, and to its product with the last input."""
     rng = np.random.default_rng(3)
     u = rng.uniform(-1.5, 1.5, n)
     y = np.zeros(n)
@@ -133,7 +133,7 @@ def test_a_run_forgets_what_inputs_before_its_log_did() -> None:
     u, y = data.u[0][begin : begin + 40], data.y[0][begin : begin + 40]
     error = body.run(u, y) - y
     assert np.abs(error[2:]).max() < 0.04
-    assert np.abs(error[:2]).max() > 0.1  # inputs before the log are told by nothing, and outputs are not copied
+    assert np.abs(error[:2]).max() > 0.1  # inputs before the log are unknown, and outputs are not copied
     assert np.isfinite(body.run(u, np.full(40, np.nan))).all()
 
 

@@ -1,4 +1,4 @@
-"""Channels that are doubtful in themselves are told: inputs that are alike, outputs that stand out."""
+"""Doubtful channels are reported: inputs that are alike, and outputs with outliers."""
 
 import warnings
 from dataclasses import replace
@@ -42,7 +42,7 @@ def test_an_input_that_follows_others_exactly_is_told_and_one_with_noise_is_not(
     assert told(u[:, 0] - 2.0 * u[:, 1] + 5.0) == [("sum", "'a' and 'b'")]
     assert told(3.0 * u[:, 1]) == [("sum", "'b'")]
     assert told(u[:, 0] + 1e-3 * u[:, 2]) == []
-    assert told(np.full(300, 2.0)) == []  # what is constant is no function of another
+    assert told(np.full(300, 2.0)) == []  # a constant input is not a function of another
 
 
 @pytest.mark.parametrize("size", [30.0, 1e6])
@@ -51,7 +51,7 @@ def test_outputs_that_stand_out_and_decide_the_fit_are_told(size: float) -> None
     y = data.y[0].copy()
     y[[50, 200, 310]] += size
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # how much else is wrong with such a fit is told too
+        warnings.simplefilter("ignore")  # other notes on such a fit do not matter here
         found = identify_channels(replace(data, y=(y,)), order=1, delay=DELAY)
     assert [note.data["count"] for note in found.notes if note.code == "outliers"] == [3]
 
@@ -95,7 +95,7 @@ def test_a_linear_model_says_where_it_leaves_more_than_noise(dead: float, told: 
 
 
 def with_noise(kind: str, seed: int, n: int = 800) -> set[object]:
-    """Return the codes told of a linear plant behind coloured sensor noise of 15 %."""
+    """Return the note codes of a linear plant with coloured sensor noise of 15 %."""
     rng = np.random.default_rng(seed)
     u = filtered(np.array([0.1]), np.array([1.0, -0.9]), rng.normal(size=n))
     y = filtered(np.array([0.0, 0.2]), np.array([1.0, -0.8]), u)
@@ -129,7 +129,7 @@ def test_an_output_without_sign_that_is_cut_off_is_no_match() -> None:
     u = np.repeat(rng.uniform(-1.0, 1.0, 100), 12)[:1000]
     y = np.minimum(np.abs(filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u)), 1.0)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # which model is taken is not asked
+        warnings.simplefilter("ignore")  # the choice of the model does not matter here
         data = channels_from([u[:, None]], [y + 0.005 * rng.normal(size=1000)], 0.01, ["u"], "y")
         found = identify_channels(data, order=1, delay=1)
     assert IdentificationCode.SIGN_NOT_MEASURED in {note.code for note in found.notes}
@@ -141,7 +141,7 @@ def test_an_output_without_sign_that_is_cut_off_is_no_match() -> None:
     [
         (2, 0.01, 0.9, "INPUT_LOGGED_LATE"),
         (None, 0.01, 0.9, "SWAPPED"),
-        # behind noise the model of the other direction leaves much, too
+        # with noise, the model of the other direction leaves a large error, too
         (2, 0.03, 0.97, "INPUT_LOGGED_LATE"),
         (4, 0.06, 0.9, "INPUT_LOGGED_LATE"),
     ],
@@ -155,9 +155,9 @@ def test_an_input_that_is_logged_late_is_not_told_as_swapped(
     y = y + noise * y.std() * rng.normal(size=800)
     one, other = (y, u) if late is None else (u[:-late], y[late:])
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # notes are asked
+        warnings.simplefilter("ignore")  # only the notes matter here
         found = identify_channels(channels_from([one[:, None]], [other], 0.01, ["one"], "other"), order=1, delay=0)
     codes = {note.code for note in found.notes}
     both = {IdentificationCode.SWAPPED, IdentificationCode.INPUT_LOGGED_LATE}
     assert codes & both == {IdentificationCode[told]}
-    assert not found.sound  # gains are off by many of their deviations
+    assert not found.sound  # gains are off by many deviations

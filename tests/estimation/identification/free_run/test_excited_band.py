@@ -1,4 +1,4 @@
-"""A model that rings above the band of its inputs is taken only where it pays within the band."""
+"""A model that rings above the band of its inputs is taken only if it is better within the band."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ N = 600
 
 
 def rings(one: Candidate, pole: float, errors: tuple[float, ...]) -> Candidate:
-    """Return a model with a pole more and a zero beside it, which hardly change it within the band."""
+    """Return a model with one more pole and a zero beside it, which hardly change the model within the band."""
     b, f = np.convolve(one.fit.numerators[0], [1.0, -0.9 * pole]), np.convolve(one.fit.f, [1.0, -pole])
     b *= b.sum() ** -1 * f.sum() * one.fit.numerators[0].sum() / one.fit.f.sum()
     theta = np.concatenate([b, f[1:], [one.fit.theta[one.form.n_values - 1]], np.zeros(2)])
@@ -28,7 +28,7 @@ def rings(one: Candidate, pole: float, errors: tuple[float, ...]) -> Candidate:
 
 @pytest.fixture(scope="module")
 def slow() -> tuple[Channels, Scaling, Candidate]:
-    """Return an input of sines up to 0.3 rad a sample, scaled channels, and a first-order model of them."""
+    """Return scaled channels with an input of sines up to 0.3 rad a sample, their scaling, and a first-order model."""
     rng, lines = np.random.default_rng(1), 2.0 * np.pi * np.arange(1, 30) / N
     u = np.cos(np.outer(np.arange(N), lines) + rng.uniform(0.0, 6.0, lines.size)).sum(axis=1)
     y = filtered([0.0, 0.3], [1.0, -0.7], u)
@@ -42,7 +42,7 @@ def test_a_band_ends_where_an_input_hardly_moves(slow: tuple[Channels, Scaling, 
     data, _, _ = slow
     assert band_end(data) == pytest.approx(0.3, abs=0.05)
     steps = np.repeat(np.random.default_rng(2).normal(size=N // 8), 8)
-    # a pole that one input does not excite is shown by another
+    # a second input excites a pole that the first one does not
     two = replace(data, inputs=("u", "v"), u=(np.column_stack([data.u[0][:, 0], steps]),))
     assert band_end(two) > 2.0
 
@@ -53,10 +53,10 @@ def test_a_slow_pole_above_the_band_rings_beyond(slow: tuple[Channels, Scaling, 
     assert not rings_beyond(plain, data, end)
     assert rings_beyond(wild, data, end)
     assert not rings_beyond(wild, data, np.pi)
-    # what decays within a block is a plain pole of a sampled model, and a slow one within the band is another matter
+    # a pole that decays within a block does not count, and neither does a slow one within the band
     assert not rings_beyond(rings(plain, -0.98, (0.1,) * 4), data, end)
     assert not rings_beyond(rings(plain, 0.999, (0.1,) * 4), data, end)
-    # the two run alike on the input that was measured, and not on one that goes beyond
+    # the two models agree on the measured input, but not on one that goes beyond its band
     u, quick = data.u[0], np.random.default_rng(3).normal(size=(N, 1))
     for inputs, alike in ((u, True), (quick, False)):
         one, other = (LinearDynamics.of(x.fit).run(inputs, np.full(N, np.nan)) for x in (plain, wild))
@@ -66,8 +66,8 @@ def test_a_slow_pole_above_the_band_rings_beyond(slow: tuple[Channels, Scaling, 
 @pytest.mark.parametrize(
     ("errors", "taken"),
     [
-        ((0.0995, 0.0995, 0.0995, 0.0995), "plain"),  # in every block, and by too little
-        ((0.02, 0.09, 0.10, 0.115), "plain"),  # by more, in one block
+        ((0.0995, 0.0995, 0.0995, 0.0995), "plain"),  # better in every block, but by too little
+        ((0.02, 0.09, 0.10, 0.115), "plain"),  # better by more, but in one block
         ((0.08, 0.08, 0.08, 0.08), "wild"),
     ],
 )

@@ -1,4 +1,4 @@
-"""A linear model stands in for a nonlinear one where inputs do not determine the latter, and that is said."""
+"""A linear model replaces a nonlinear one on inputs that do not determine the latter, and a note says so."""
 
 import json
 from dataclasses import replace
@@ -28,19 +28,19 @@ def gain(value: float) -> LinearDynamics:
 
 
 def bend(value: float) -> HammersteinDynamics:
-    """Return ``y = value u`` up to the end of a saturation."""
+    """Return ``y = value u`` up to the limits of a saturation."""
     return HammersteinDynamics("saturation", np.array([-5.0, 5.0]), np.full(2, np.nan), gain(value))
 
 
 class Fails:
-    """Stands in for a polynomial fit that runs away."""
+    """Stub of a polynomial fit that diverges."""
 
     def run(self, u: Array, _: Array) -> Array:
         return np.full(u.shape[0], np.nan)
 
 
 def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
-    x = np.random.default_rng(0).normal(size=(5, 4000))  # five groups of one each, in as many samples
+    x = np.random.default_rng(0).normal(size=(5, 4000))  # five groups of one value each, 4000 times
     whole = x.mean(axis=0)
     parts = [(x.sum(axis=0) - one) / 4.0 for one in x[1:]]
     assert jackknife(whole, parts) == pytest.approx(1.0 / np.sqrt(5.0), rel=0.02)
@@ -53,7 +53,7 @@ def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
     [(0.04, 0.0, "own"), (0.06, 0.0, "linear"), (0.06, 0.05, "own"), (0.5, 0.05, "linear")],
 )
 def test_the_linear_run_is_taken_where_it_errs_less(apart: float, linear_apart: float, taken: str) -> None:
-    # runs of a unit input that lie apart by so much on both sides have four times its square as variance
+    # runs of a unit input that are off by `apart` on both sides have a variance of four times its square
     parts = tuple(gain(2.0 + sign * apart) for sign in (1, -1, 1, -1))
     straight = tuple(gain(1.0 + sign * linear_apart) for sign in (1, -1, 1, -1))
     one = Fallback(gain(1.0), straight, parts, 0.1)
@@ -67,7 +67,7 @@ def test_what_is_fitted_to_more_samples_is_better_determined() -> None:
     few = Fallback(gain(1.0), (gain(1.0),) * 4, parts, 0.1)
     u, y, own = np.ones((9, 1)), np.full(9, np.nan), np.full(9, 2.0)
     assert few.errors(u, y, own) == pytest.approx((0.12, 0.1))
-    many = replace(few, share=0.25)  # four times as many
+    many = replace(few, share=0.25)  # the model has four times as many samples
     assert many.errors(u, y, own) == pytest.approx((0.06, 0.1))
     assert np.array_equal(few.judged(u, y, own)[0], np.ones(9))
     assert np.array_equal(many.judged(u, y, own)[0], own)
@@ -90,7 +90,7 @@ def test_what_a_bend_leaves_of_held_back_blocks_is_counted_beside(own_error: flo
     notes = linear_instead(again, channels_from([near[:, None]], [near], 1.0, ["u"], "y"))
     assert [note.code for note in notes] == ([] if taken == "own" else ["linear_stands_in"])
     assert all("--structure hammerstein" in str(note) for note in notes)
-    # one that was asked for is run as it is
+    # a model that was requested is run as it is
     assert replace(whole, fallback=None).run(u, y) == pytest.approx(np.full(9, 2.0))
 
 
@@ -104,7 +104,7 @@ def test_a_run_that_has_no_end_is_replaced() -> None:
 
 
 class Held:
-    """Stands in for a polynomial whose output follows a linear one up to its ends."""
+    """Stub of a polynomial whose output follows a linear model up to its limits."""
 
     def __init__(self, linear: LinearDynamics) -> None:
         self.linear = linear
@@ -120,7 +120,7 @@ ENDS = np.array([-1.2, 1.2])
 def test_what_integrates_beyond_the_ends_of_a_nonlinear_run_is_an_error_of_that(
     decay: float, level: float, taken: int
 ) -> None:
-    """All fits stop at the same end and agree there, and what integrates has no range; what settles may be held."""
+    """All fits are clipped at the same limit and agree there; only an output that settles may be clipped."""
     linear = LinearDynamics(Form(1, (1,), (1,)), np.array([1.0, decay - 1.0, 0.0]))
     held: Any = Held(linear)
     one = Fallback(linear, (linear,) * 4, (held,) * 4, 0.1)
@@ -132,12 +132,12 @@ def test_what_integrates_beyond_the_ends_of_a_nonlinear_run_is_an_error_of_that(
     beyond = float(np.sqrt(np.mean((straight - own) ** 2))) if integrates else 0.0
     assert (undetermined, left) == pytest.approx((beyond, 0.1))
     assert np.array_equal(run, (own, straight)[taken])
-    # a nonlinearity at the input has no such ends
+    # a nonlinearity at the input has no such limits
     assert np.array_equal(one.judged(u, y, own)[0], own)
 
 
 def squared(coefficient: float, end: float) -> PolynomialDynamics:
-    """Return ``y = coefficient u[t - 1]^2``, its input held in the square at so much on both sides."""
+    """Return ``y = coefficient u[t - 1]^2``, with the input clipped in the square at the same value on both sides."""
     limits = np.array([[-9.0, 9.0], [-end, end]])
     variables = Variables(np.array([0, 1]), np.array([1, 1]), limits)
     return PolynomialDynamics(variables, np.array([[1, 1, -1]]), np.array([coefficient]))
@@ -146,13 +146,13 @@ def squared(coefficient: float, end: float) -> PolynomialDynamics:
 @pytest.mark.parametrize(
     ("parts", "u", "wanted"),
     [
-        # fits agree on the square, and not on its end: a block that is left out holds the largest input
+        # fits agree on the square, but not on its limit: a block that is left out contains the largest input
         ([(0.5, 1.0), (0.5, 0.8), (0.5, 1.0), (0.5, 0.8)], 1.5, 0.5 * 1.5**2),
-        # farther out they agree on it no longer
+        # farther out, they no longer agree
         ([(0.5, 1.0), (0.5, 0.8), (0.5, 1.0), (0.5, 0.8)], 3.0, 0.5),
-        # nor where they disagree on the square itself
+        # they disagree on the square itself
         ([(0.4, 1.0), (0.6, 1.0), (0.4, 1.0), (0.6, 1.0)], 1.5, 0.5),
-        # within the range nothing is held
+        # within the range, nothing is clipped
         ([(0.5, 1.0), (0.5, 0.8), (0.5, 1.0), (0.5, 0.8)], 0.7, 0.5 * 0.7**2),
     ],
 )
@@ -167,7 +167,7 @@ def test_products_go_on_beyond_what_was_seen_where_fits_agree_on_that(
     assert errors is not None
     assert errors[0] < errors[1]
     assert whole.variables.released().limits[1] == pytest.approx([-2.0, 2.0])
-    # a model that was asked for has nothing to tell it by
+    # a model that was requested has no other fits to decide this by
     asked = replace(whole, fallback=None).run(np.full((9, 1), u), np.full(9, wanted))
     assert asked[1:] == pytest.approx(np.full(8, 0.5 * min(u, 1.0) ** 2))
 
@@ -187,7 +187,7 @@ def log(u: Array) -> Channels:
 
 @pytest.fixture(scope="module")
 def switched() -> tuple[Channels, Identified]:
-    """Return what two levels of the input tell, which is nothing of the levels between."""
+    """Return a log with two levels of the input, and its model, which is not determined between the levels."""
     u = np.repeat(np.where(np.random.default_rng(4).random(N // 5) < 0.5, -1.0, 1.0), 5)
     data = log(u)
     return data, identify_channels(data, structure="auto", order=2, delay=1)
@@ -222,7 +222,7 @@ def test_a_model_of_two_levels_is_not_run_between_them_where_its_fits_disagree(
 
 
 def _bent(one: Any, much: float) -> Any:
-    """Return a fit whose constant is another."""
+    """Return a fit with a changed constant."""
     coefficients = one.coefficients.copy()
     coefficients[np.flatnonzero((one.terms == -1).all(axis=1))] += much
     return replace(one, coefficients=coefficients)

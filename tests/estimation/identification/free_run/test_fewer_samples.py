@@ -1,4 +1,4 @@
-"""Nonlinear models of a long log are compared with linear ones on fewer samples, and fitted to all."""
+"""Nonlinear models of a long log are compared with linear ones on fewer samples, and then fitted to all."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from estimation.identification.free_run.polynomial_dynamics import PolynomialDyn
 
 
 def log(n: int = 600) -> Channels:
-    """Return a log of a plant with a product, livelier in its second half."""
+    """Return a log of a plant with a product; its input moves more in the second half."""
     rng = np.random.default_rng(1)
     u = np.repeat(rng.uniform(-1.0, 1.0, n // 4), 4) * np.linspace(0.5, 1.0, n)
     y = np.zeros(n)
@@ -27,7 +27,7 @@ def test_linear_models_are_judged_anew_and_keep_what_is_doubtful_of_them() -> No
     whole = scaled(log())[0]
     linear = linear_candidates(whole, [1, 2], (1,))
     linear[1] = replace(linear[1], doubt="time_constant")
-    best = replace(linear[1], doubt="")  # one that is believed to integrate
+    best = replace(linear[1], doubt="")  # a model that is believed to integrate
     fewer = section(whole, 200)
     data, judged, own = on_fewer(linear, best, whole, fewer)
     assert data is fewer

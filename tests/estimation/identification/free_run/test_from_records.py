@@ -1,4 +1,4 @@
-"""A log is split where an input is not known, so that no model answers for what was never put in."""
+"""A log is split where an input is missing, so that no model is fitted to the effect of an unknown input."""
 
 import numpy as np
 import pytest
@@ -66,7 +66,7 @@ def test_a_log_falls_into_a_bounded_number_of_parts() -> None:
 def test_outputs_next_to_a_gap_are_left_out_for_they_may_answer_what_is_not_known() -> None:
     with pytest.warns(LogWarning) as said:
         data = channels_of([log(binary(), slice(1000, 1010))], ["u"], "y", split=True)
-    assert {one.filename for one in said} == {__file__}  # it points at who asked
+    assert {one.filename for one in said} == {__file__}  # it points at the caller
     assert [int(np.isnan(y).sum()) for y in data.y] == [0, 20]
     assert np.isnan(data.y[1][:20]).all()
 
@@ -107,7 +107,7 @@ def test_parts_that_are_less_than_a_two_hundredth_of_a_log_are_left_out() -> Non
 
 
 def test_bridged_samples_of_all_parts_are_told_once() -> None:
-    record = log(binary(), *(slice(start, start + 2) for start in range(52, N - 40, 60)))  # 49, of which 30 split it
+    record = log(binary(), *(slice(start, start + 2) for start in range(52, N - 40, 60)))  # 49 gaps: 30 split the log
     with pytest.warns(LogWarning) as said:
         channels_of([record], ["u"], "y", split=True)
     told = [str(one.message) for one in said if "interpolated linearly" in str(one.message)]

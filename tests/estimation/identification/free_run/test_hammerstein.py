@@ -132,7 +132,7 @@ def test_a_play_follows_at_half_its_width_and_stands_still_in_between() -> None:
 @pytest.mark.parametrize(
     "bent",
     [pytest.param(one, id=one.kind, marks=() if one.kind == "saturation" else pytest.mark.slow) for one in PLANTED],
-)  # that each kind is found is asked above
+)  # a test above covers that each kind is found
 def test_auto_takes_a_bend_where_it_is_better_than_every_other_on_blocks_held_back(bent: Planted) -> None:
     found = identify_channels(logged(bent, 5), structure="auto", order=2, delay=1)
     assert found.model.structure == "hammerstein"
@@ -140,7 +140,7 @@ def test_auto_takes_a_bend_where_it_is_better_than_every_other_on_blocks_held_ba
     assert found.model.dynamics.at_input == bent.kind
     rest = [row["held_back_percent"] for row in found.candidates if row["structure"] != "hammerstein"]
     assert found.held_back_percent > max(rest)
-    # the linear model that was judged beside it stands in on inputs that do not determine it
+    # the linear model that was judged with it replaces it on inputs that do not determine it
     fallback = found.model.dynamics.fallback
     assert fallback is not None
     assert len(fallback.parts) == len(fallback.linear_parts) == BLOCKS
@@ -178,7 +178,7 @@ def test_a_denominator_with_an_unbelievable_time_constant_is_no_start(monkeypatc
     assert given == [[-0.5], [-0.9]] * len(NONLINEARITIES)
     given.clear()
     hammerstein_candidates([slow], data)
-    assert given == [[-1.0]] * len(NONLINEARITIES)  # it alone is better than none
+    assert given == [[-1.0]] * len(NONLINEARITIES)  # this denominator alone is better than none
 
 
 def test_the_best_of_each_kind_and_order_is_judged_so_that_a_smaller_one_may_do_better(
@@ -187,7 +187,7 @@ def test_the_best_of_each_kind_and_order_is_judged_so_that_a_smaller_one_may_do_
     data = scaled(logged(PLANTED[0], 3))[0]
     linear = linear_candidates(data, [1, 2, 3], (1,))
     hopeful = hammerstein_candidates(linear, data)
-    # a saturation explains less of its own data than a linear model of what it has not seen
+    # a saturation leaves more of the fitted data than a linear model leaves of held-back data
     assert "dead-zone" in {one.fit.kind for one in hopeful}
     assert "saturation" not in {one.fit.kind for one in hopeful}
     monkeypatch.setattr("estimation.identification.free_run.choose_hammerstein.BENT_MARGIN", -100.0)
@@ -195,7 +195,7 @@ def test_the_best_of_each_kind_and_order_is_judged_so_that_a_smaller_one_may_do_
     orders = {kind: [one.fit.linear.form.order for one in found if one.fit.kind == kind] for kind in NONLINEARITIES}
     assert orders == {kind: [1, 2, 3] for kind in NONLINEARITIES}
     assert chosen_hammerstein(found).fit.kind == "dead-zone"
-    assert chosen_hammerstein(found).fit.linear.form.order == 2  # that of the plant, though 3 fits no worse
+    assert chosen_hammerstein(found).fit.linear.form.order == 2  # the order of the plant, although 3 fits no worse
     assert found[2].fit.cost <= found[1].fit.cost
 
 
@@ -240,9 +240,9 @@ def test_a_bend_that_nobody_asked_for_gains_more_than_blocks_scatter() -> None:
         as_good = straight((0.285,) * 4)
         assert worthwhile([even], [best, as_good], best, surely=not asked) is None
         assert worthwhile([], [best], best, surely=not asked) is None
-    assert worthwhile([chance], [best], best, surely=True) is None  # it is better in one block of four
+    assert worthwhile([chance], [best], best, surely=True) is None  # it is better in only one block of four
     assert worthwhile([chance], [best], best, surely=False) is chance
-    halfway = bent((0.2, 0.2, 0.29, 0.31))  # on two blocks of four, and on all together by 1.7 standard errors
+    halfway = bent((0.2, 0.2, 0.29, 0.31))  # better on two blocks of four, and on all together by 1.7 standard errors
     assert worthwhile([halfway], [best], best, surely=True) is None
 
 
@@ -258,7 +258,7 @@ def test_the_bend_that_was_judged_is_the_one_that_is_given(monkeypatch: pytest.M
     assert again == []
     monkeypatch.setattr("estimation.identification.free_run.identify.MOST_COMPARED", data.n_samples - 1)
     identified(data)
-    assert again == [data.n_samples]  # it was judged on less
+    assert again == [data.n_samples]  # it was judged on fewer samples
 
 
 def test_auto_takes_a_bend_only_where_it_is_surely_better(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""A polynomial model says where it is asked about inputs that it never saw."""
+"""A polynomial model reports inputs outside the range of its training data."""
 
 from dataclasses import replace
 

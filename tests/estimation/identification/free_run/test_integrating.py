@@ -1,4 +1,4 @@
-"""A plant that integrates is fitted with a pole at 1, and runs on without drifting off."""
+"""A plant that integrates is fitted with a pole at 1, and its free run does not drift off."""
 
 from dataclasses import replace
 
@@ -19,12 +19,12 @@ NOISE = 0.05 * np.random.default_rng(7).normal(size=(2, N))
 
 
 def levels(seed: int, n: int = N) -> Array:
-    """Return steps about a mean, so that the output has a ramp of its own."""
+    """Return steps about a mean that is not zero, so that the output contains a ramp."""
     return 0.3 + np.repeat(np.random.default_rng(seed).normal(size=n // 10 + 1), 10)[:n]
 
 
 def driven(u: Array, start: float) -> Array:
-    """Return a velocity's sum: the steady input is 0.1."""
+    """Return the sum of a velocity that is zero at an input of 0.1."""
     return start + filtered([0.0, 0.05, 0.02], F, u - 0.1)
 
 
@@ -44,7 +44,7 @@ def test_a_pole_at_one_runs_on_where_an_estimated_one_decays(data: Channels) -> 
     poles = np.sort(np.roots(fit.f))
     assert poles[0] == pytest.approx(0.8, abs=0.03)
     assert poles[1] == pytest.approx(1.0 - 1.0 / (RECORDS * N), abs=1e-9)
-    # twenty records on, begun at the true start; a time constant of three records would have lost all of it
+    # a run over twenty records from the true start: with a time constant of three records, the start would be lost
     u = levels(9, 20 * N)
     y = (driven(u, 0.0) - by.y_mean) / by.y_std
     known = np.where(np.arange(y.size) < N, y, np.nan)

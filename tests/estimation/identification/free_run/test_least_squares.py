@@ -1,4 +1,4 @@
-"""Least squares of the samples that count."""
+"""Least squares over the samples that are used."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""An output that is cut off, or held by stops, gets the linear model between its limits."""
+"""If an output saturates or is held by stops, the linear model between its limits is found."""
 
 import json
 from dataclasses import replace
@@ -20,14 +20,14 @@ from plant.errors import LogWarning
 
 
 def driven(seed: int, n: int = 600) -> tuple[Array, Array]:
-    """Return an input in steps, and the output of a plant of first order with a gain of 2."""
+    """Return an input in steps, and the output of a first-order plant with a gain of 2."""
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.uniform(-1.0, 1.0, n), rng.integers(5, 40, n))[:n]
     return u, filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u)
 
 
 def cut_off(seed: int, high: float, *, after: float = 0.01) -> Channels:
-    """Return a log whose output is cut off, with noise before or behind that."""
+    """Return a log whose output saturates, with noise before or after the saturation."""
     u, clean = driven(seed)
     rng = np.random.default_rng([seed, 1])
     y = np.clip(clean + (0.01 - after) * rng.normal(size=u.size), -np.inf, high) + after * rng.normal(size=u.size)
@@ -35,7 +35,7 @@ def cut_off(seed: int, high: float, *, after: float = 0.01) -> Channels:
 
 
 def between_stops(seed: int, n: int = 600) -> tuple[Array, Array]:
-    """Return an input in steps, and the output of an integrator that leans on stops, with noise."""
+    """Return an input in steps, and the output of an integrator that runs into stops, with noise."""
     u = driven(seed, n)[0]
     y = np.zeros(n)
     for t in range(1, n):
@@ -52,7 +52,7 @@ def test_the_gain_of_an_output_that_is_cut_off_is_that_of_the_plant(after: float
     assert abs(found.model.linear.dc_gain - 2.0) < 3.0 * found.model.linear.dc_gain_std < 0.05
     assert found.held_back_percent > 95.0
     u, y = driven(5)
-    # without outputs a run begins where its first input would have brought it
+    # without outputs, a run begins at the steady state of its first input
     assert np.abs(found.model.simulate(u) - np.minimum(y, 0.4))[80:].max() < 0.05
 
 
@@ -88,7 +88,7 @@ def test_an_end_that_one_block_alone_reaches_is_told() -> None:
 
 @pytest.mark.parametrize("seed", [0, 2])
 def test_an_output_that_settles_at_the_level_of_its_input_has_no_limits(seed: int) -> None:
-    """A plant that rises faster than it falls was told as cut off, with a gain of 1.37 for 1, or as held by stops."""
+    """A plant that rises faster than it falls was reported as cut off (with a gain of 1.37 for 1) or held by stops."""
     rng = np.random.default_rng(seed)
     u, y = np.repeat(rng.integers(0, 2, 1500).astype(float), rng.integers(20, 120, 1500))[:1500], np.zeros(1500)
     for t in range(1, 1500):
@@ -102,7 +102,7 @@ def test_an_output_that_settles_at_the_level_of_its_input_has_no_limits(seed: in
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_a_piston_driven_to_and_fro_between_its_stops_has_them() -> None:
-    """Its input has one value at each end, as that of an output that has settled has."""
+    """Its input has one value at each end, like the input of an output that has settled."""
     rng = np.random.default_rng(0)
     u, x, v = np.repeat(rng.choice([-1.0, 1.0], 1500), rng.integers(15, 90, 1500))[:1500], np.zeros(1500), 0.0
     for t in range(1, 1500):
@@ -116,7 +116,7 @@ def test_a_piston_driven_to_and_fro_between_its_stops_has_them() -> None:
 
 
 def rubbing(seed: int, n: int = 300) -> Channels:
-    """Return a motor's angle that dry friction holds at its turns, and no stop."""
+    """Return a motor's angle that dry friction, not a stop, holds at its turning points."""
     rng, v, x = np.random.default_rng(seed), 0.0, np.zeros(n)
     u = 2.0 * np.convolve(rng.normal(size=n + 40), np.ones(8) / 8.0, "same")[20 : 20 + n]
     for t in range(1, n):
@@ -138,7 +138,7 @@ def test_a_given_order_that_is_wrong_tells_no_stops(seed: int, order: int) -> No
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_stops_that_win_on_blocks_alone_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They leave 0.20 of the deviation there and the linear model 0.41, and more of the whole log."""
+    """On blocks, stops leave 0.20 of the deviation and the linear model 0.41, but stops leave more of the whole log."""
     monkeypatch.setattr(Task, "free", None)
     found = identify_channels(rubbing(0), order=4, delay=1)
     assert IdentificationCode.OUTPUT_STOPPED not in {note.code for note in found.notes}
@@ -147,7 +147,7 @@ def test_stops_that_win_on_blocks_alone_are_none(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.slow
 @pytest.mark.filterwarnings("error::plant.errors.LogWarning")
 def test_the_ends_of_a_staircase_ask_no_one_to_check_them() -> None:
-    """Levels between them tell the gain; each log of steps had the warning."""
+    """The levels between determine the gain; every log of steps had the warning."""
     rng = np.random.default_rng(3)
     u = np.repeat(rng.integers(-2, 3, 1500).astype(float), 60)[:1500]
     y = filtered(np.array([0.0, 0.1]), np.array([1.0, -0.9]), np.sign(u) * np.maximum(np.abs(u) - 0.2, 0.0))

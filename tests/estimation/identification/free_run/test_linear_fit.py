@@ -1,4 +1,4 @@
-"""Output error of several inputs with offset and initial states, and how its order is chosen."""
+"""Output-error models with several inputs, offset and initial states, and the choice of their order."""
 
 from dataclasses import replace
 from typing import Any
@@ -31,7 +31,7 @@ def steps(n: int, seed: int, hold: int = 8) -> Array:
 
 
 def plant(u: Array, seed: int, noise: float = 0.02, offset: float = 5.0) -> Array:
-    """Return the output of a second-order plant that answers after three samples, with offset and noise."""
+    """Return the output of a second-order plant that responds after three samples, with offset and noise."""
     y = filtered([0.0, 0.0, 0.0, 0.2, 0.1], F, u - u[0])
     return offset + y + noise * np.random.default_rng(seed).normal(size=u.size)
 
@@ -65,7 +65,7 @@ def test_rows_side_by_side_are_filtered_as_each_alone_from_its_level(order: int,
     series, levels = rng.normal(size=(rows, n)), rng.normal(size=rows)
     ran = series.copy()
     decay_rows(f, ran, levels)
-    rest = np.repeat(levels[:, None], 600, axis=1)  # long enough that the level has brought about what it does
+    rest = np.repeat(levels[:, None], 600, axis=1)  # long enough to reach the steady state of the level
     alone = [filtered([1.0], f, np.concatenate([a, b]))[600:] for a, b in zip(rest, series, strict=True)]
     assert ran == pytest.approx(np.array(alone).reshape(ran.shape), rel=1e-9, abs=1e-9)
 
@@ -95,7 +95,7 @@ def test_sensitivities_are_the_derivatives_of_the_output() -> None:
 
 
 def test_delay_and_offset_come_back_beside_a_mean_that_is_not_zero() -> None:
-    """Of second order, which is told: two more poles do nearly what a dead time of three samples does."""
+    """The order is given as 2, since two more poles act nearly like a dead time of three samples."""
     found = identify_channels(one_log(300), order=2)
     linear = found.model.linear
     assert linear is not None
@@ -167,7 +167,7 @@ def test_a_time_constant_beyond_the_record_is_tried_again_within_it() -> None:
     slowest = -1.0 / np.log(np.abs(np.roots(within[0].fit.f)).max())
     assert 100.0 < slowest <= 400.0
     assert not within[0].doubt
-    # what the bound costs, beside what other poles would
+    # the bound costs little compared with other poles
     assert within[0].fit.cost < 1.05 * beyond[0].fit.cost
 
 
@@ -224,7 +224,7 @@ def test_what_cannot_be_fitted_is_refused_with_a_sentence(u: Array, y: Array, sa
 @pytest.mark.parametrize("samples", [20, 25, 26])
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_a_log_of_hardly_more_samples_than_are_needed_has_a_model(samples: int) -> None:
-    """The residual is asked whether it is white at as many lags as the log has room for."""
+    """The whiteness of the residual is tested at as many lags as the log allows."""
     u = steps(samples, 8, hold=3)
     y = filtered([0.0, 0.5], [1.0, -0.5], u) + 0.01 * np.random.default_rng(8).normal(size=samples)
     found = identify_channels(channels_from([u[:, None]], [y], 1.0, ["u"], "y"), order=1, delay=1)
@@ -314,7 +314,7 @@ def test_a_structure_that_cannot_have_a_log_says_so(structure: str, log: Channel
 
 def test_an_order_is_tried_behind_the_estimated_dead_times_and_behind_none_or_one_sample() -> None:
     assert _forms(2, (3, 0), 2, None) == [
-        Form(2, (2, 3), (3, 0)),  # one value more where the output answers at once
+        Form(2, (2, 3), (3, 0)),  # one value more if the output responds at once
         Form(2, (3, 3), (3, 0)),
         Form(2, (3, 3), (0, 0)),
         Form(2, (2, 2), (1, 1)),

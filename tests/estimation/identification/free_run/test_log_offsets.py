@@ -1,4 +1,4 @@
-"""Logs whose sensors were set to zero anew in between have an offset each, and one gain."""
+"""Logs whose sensors were zeroed in between have one offset each, and a common gain."""
 
 import warnings
 from dataclasses import replace
@@ -18,7 +18,7 @@ N, POLE, GAIN = 160, 0.9, 2.0
 
 
 def logs(offsets: tuple[float, ...], seed: int = 0, noise: float = 0.1) -> Channels:
-    """Return logs of a plant of the first order."""
+    """Return logs of a first-order plant, each with its own offset."""
     rng, u, y = np.random.default_rng([seed, 1700]), list[Array](), list[Array]()
     for offset in offsets:
         driven = np.repeat(rng.standard_normal(N // 10), 10)

@@ -1,4 +1,4 @@
-"""Runs of factored terms are those of the terms themselves, and their sums those of its derivatives."""
+"""Runs of factored terms equal those of the terms themselves, and their sums equal those of the derivatives."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -22,7 +22,7 @@ TERMS = every_term(5, 3)
 
 
 def logs() -> Channels:
-    """Return two logs in which one output of ten is missing, and a block of the first."""
+    """Return two logs in which one output in ten is missing, and also a block of the first log."""
     rng = np.random.default_rng(2)
     outputs = [np.where(rng.random(n) < 0.1, np.nan, rng.normal(size=n)) for n in (150, 90)]
     outputs[0][40:80] = np.nan
@@ -30,7 +30,7 @@ def logs() -> Channels:
 
 
 def made(friction: str, rub: tuple[float, ...]) -> tuple[Runs, Array]:
-    """Return runs whose products and outputs are held at their ends now and then, and values of all terms."""
+    """Return runs whose products and outputs are clipped at their limits now and then, and values of all terms."""
     limits = np.array([[-0.4, 0.5]] * 2 + [[-2.0, 1.5]] * 3)
     variables = Variables(np.array([0, 0, 1, 1, 1]), np.array([1, 2, 0, 3, 4]), limits, friction)
     runs = Runs(variables, TERMS, logs())
@@ -47,7 +47,7 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def followed(runs: Runs, theta: Array, index: int, t: int, out: Array) -> tuple[float, float, Array]:
-    """Return the output that follows others, which way friction lets it move, and the product of each term."""
+    """Return the next output, the direction in which friction lets it move, and the product of each term."""
     one, u = runs.variables, runs.data.u[index]
     lagged = zip(one.source, one.lag, strict=True)
     z = np.array([out[t - lag] if source == 0 else u[max(t - lag, 0), source - 1] for source, lag in lagged])
@@ -64,7 +64,7 @@ def followed(runs: Runs, theta: Array, index: int, t: int, out: Array) -> tuple[
 
 
 def followed_freely(runs: Runs, theta: Array) -> tuple[Array, Array]:
-    """Return outputs and their derivatives by all values; at the ends the terms' own effect stays."""
+    """Return outputs and their derivatives by all values; at the limits, the direct effect of the terms remains."""
     k, n, n_rub, outs, rows = len(runs.terms), runs.variables.n_start, runs.variables.n_friction, [], []
     for index, begin in enumerate(runs.begins):
         out = runs.begun(theta, index)
@@ -76,7 +76,7 @@ def followed_freely(runs: Runs, theta: Array) -> tuple[Array, Array]:
             if n_rub:
                 moved[t, -n_rub:] = [moves < 0.0, -float(moves > 0.0), moves == 0.0][:n_rub]
             for lag in range(1, n + 1):
-                # a position that is held goes with the one before, if that is within the ends
+                # a position that friction holds follows the previous one, if that is within the limits
                 slope = float(lag == 1 and n_rub == 2 and runs.ends[0] <= out[t - 1] <= runs.ends[1])
                 if moves:
                     step = 1e-6 * (np.arange(out.size) == t - lag)
@@ -136,7 +136,7 @@ def test_a_run_that_grows_beyond_bounds_has_no_outputs() -> None:
 
 def test_terms_share_what_they_have_of_past_outputs_and_of_inputs() -> None:
     found = factored([0, 0, 1, 1], every_term(4, 3))
-    # 1, two outputs as they are, two that are held, three products of two and four of three
+    # 1, two outputs as they are, two clipped ones, three products of two and four of three
     assert found.parent.size == 1 + 2 + 2 + 3 + 4
     assert len(found.inputs) == 1 + 2 + 2 + 3 + 4
     assert (found.parent[1:] < np.arange(1, found.parent.size)).all()

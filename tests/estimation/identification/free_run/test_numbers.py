@@ -1,4 +1,4 @@
-"""Linear models as they run free on small logs, and how they are chosen, kept in `numbers.json`."""
+"""Free runs of linear models on small logs, and how the models are chosen, kept in `numbers.json`."""
 
 from dataclasses import replace
 from functools import partial
@@ -111,7 +111,7 @@ def fits() -> dict[str, Any]:
 
 
 def made(error: float, bic: float, doubt: str = "", late: int = 1, **changes: Any) -> Candidate:
-    """Return a candidate that could have been."""
+    """Return an invented candidate."""
     form = changes.pop("form", Form(1, (1,), (late,)))
     fit = changes.pop("fit", LinearFit(form, np.array([0.5, -0.5, 0.0, 0.0]), 1.0))
     return Candidate(fit, bic, doubt, block_errors=(error,) * 4, bic=bic)
@@ -176,7 +176,7 @@ def choices() -> dict[str, Any]:
 
 @NUMBERS.case()
 def believed() -> dict[str, Any]:
-    """Which candidate is believed, on either side of every bar."""
+    """Return which candidate is believed, on either side of each threshold."""
     base, by = scaled(channels())
     integrator = LinearFit(Form(1, (1,), (1,)), np.array([0.5, -0.9999, 0.0, 0.0, 0.0]), 1.0, integrates=True)
     beyond = LinearFit(Form(1, (1,), (1,)), np.array([0.5, -1.0, 0.0, 0.0, 0.0]), 1.0)
@@ -207,7 +207,7 @@ def believed() -> dict[str, Any]:
 
 @NUMBERS.case()
 def fed_back() -> dict[str, Any]:
-    """Of which models the input is asked whether it follows the output's noise."""
+    """Return the models for which the input is tested for feedback of the output's noise."""
     told: dict[str, Any] = {}
     fed = U + np.column_stack([np.concatenate([[0.0], 3.0 * NOISE[:-1]])] * 2)
     for name, inputs in (("a line", 1), ("two inputs", 2)):

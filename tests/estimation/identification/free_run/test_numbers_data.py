@@ -1,4 +1,4 @@
-"""Logs as free-run fits take them: scaled, cut, split at gaps, kept in `numbers_data.json`."""
+"""Logs as free-run fits use them: scaled, cut, split at gaps, kept in `numbers_data.json`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Other orders of the inputs keep what was put in, and tell a model that leaves its range from one that keeps it."""
+"""Reordered inputs keep their values, and distinguish a model that leaves its range from one that stays within it."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def channels(u: Array) -> Channels:
 
 
 def moves(gain: float, square: float = 0.0, level: float = 0.0) -> PolynomialFit:
-    """Return ``y = gain u[-1] + square u[-1]^2 + level``, of outputs that were seen from -1 to 1."""
+    """Return ``y = gain u[-1] + square u[-1]^2 + level``, for an output that was seen from -1 to 1."""
     limits = np.array([[-2.0, 2.0], [-9.0, 9.0]])
     variables = Variables(np.array([0, 1]), np.array([1, 1]), limits)
     terms = np.array([[1, -1, -1], [1, 1, -1], [-1, -1, -1]])
@@ -45,7 +45,7 @@ def test_a_model_is_wild_where_it_is_held_in_more_than_three_samples_of_a_thousa
             u[np.flatnonzero(u)[count:]] = 0.0
             assert is_wild(moves(1.0, 1e-9), channels(u)) is wild
             assert not is_wild(moves(0.98, 1e-9), channels(u))
-    assert not is_wild(moves(1.0), channels(np.zeros(20)))  # a short record as well
+    assert not is_wild(moves(1.0), channels(np.zeros(20)))  # nor for a short record
 
 
 def test_fits_disagree_by_the_root_mean_square_of_what_is_between_them() -> None:
@@ -54,5 +54,5 @@ def test_fits_disagree_by_the_root_mean_square_of_what_is_between_them() -> None
     same = disagreement([whole, whole], whole, channels(u))
     assert same == 0.0
     apart = disagreement([moves(0.5, level=0.3), moves(0.5, level=-0.1)], whole, channels(u))
-    # the first sample is where both begin
+    # both begin at the same first sample
     assert apart == pytest.approx(np.sqrt(0.99 * (0.3**2 + 0.1**2) / 2.0))

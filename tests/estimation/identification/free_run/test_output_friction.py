@@ -1,4 +1,4 @@
-"""Models whose output rubs: what dry friction holds stays, and friction that was planted is found again."""
+"""Models with friction at the output: dry friction holds the output, and simulated friction is recovered."""
 
 import math
 from collections.abc import Callable
@@ -30,7 +30,7 @@ NOISE = 0.005
 
 
 def body(n: int, seed: int, friction: float = FRICTION) -> tuple[Array, Array]:
-    """Return force over mass and velocity of a body that really sticks, in a hundred steps a sample."""
+    """Return force over mass, and velocity of a body with true stiction, in a hundred steps for each sample."""
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.uniform(-1.5, 1.5, n // 20 + 1), 20)[:n]
     y, v, fine = np.zeros(n), 0.0, STEP / 100.0
@@ -57,7 +57,7 @@ def found(order: int | None = 1, delay: int | None = 1) -> Identified:
 @pytest.mark.parametrize("rub", [[0.1, 0.2], [0.1, 0.2, 0.05]], ids=["position", "velocity"])
 def test_friction_takes_a_level_off_and_holds_what_moves_less(way: Callable[[Any], Any], rub: list[float]) -> None:
     u = np.random.default_rng(3).uniform(-1.0, 1.0, 80)
-    # of 1 and the output before: what the input gives, and 0.6
+    # factors of 1 and of the previous output: the input's contribution, and 0.6
     share, none = np.column_stack([0.5 * np.roll(u, 1), np.full(80, 0.6)]), np.zeros(2, dtype=np.int64)
     given = share, none, none, np.array([1]), np.array([[-9.0, 9.0]]), np.array([-9.0, 9.0]), 1, np.array(rub)
     out, slope = np.zeros(80), np.zeros((80, 2))

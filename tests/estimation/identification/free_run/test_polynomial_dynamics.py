@@ -1,4 +1,4 @@
-"""Polynomial bodies that are written down: what they run and predict, their friction in units, how they start."""
+"""Polynomial models with given coefficients: their runs and predictions, friction in units, and how they start."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ U = np.random.default_rng(4).uniform(-1.0, 1.0, (60, 1))
 
 
 def body(*friction: float, kind: str = "", lags: int = 1, square: float = 0.0) -> PolynomialDynamics:
-    """Return ``y = 0.6 y[-1] + 0.5 u[-1] + square y[-1]^2`` that may rub."""
+    """Return ``y = 0.6 y[-1] + 0.5 u[-1] + square y[-1]^2``, with friction if it is given."""
     source, lag = np.array([0] * lags + [1]), np.array([*range(1, lags + 1), 1])
     variables = Variables(source, lag, np.array([[-9.0, 9.0]] * (lags + 1)), kind)
     terms = np.array([[0, -1, -1], [lags, -1, -1], [0, 0, -1]])
@@ -33,7 +33,7 @@ def run_by_hand(first: float, square: float = 0.0) -> Array:
 @pytest.mark.parametrize("square", [0.0, 0.2])
 def test_a_run_begins_with_the_output_that_suits_what_was_measured_best(square: float) -> None:
     truth = run_by_hand(0.7, square)
-    seen = truth + np.where(np.arange(len(U)) == 0, 0.5, 0.0)  # the first sample is wrong, the others tell it
+    seen = truth + np.where(np.arange(len(U)) == 0, 0.5, 0.0)  # the first sample is wrong, but the others determine it
     seen[10:20] = np.nan
     off = body(square=square).run(U, seen) - truth
 
@@ -56,7 +56,7 @@ def test_the_search_of_a_start_ends_where_it_gains_nothing(monkeypatch: pytest.M
     monkeypatch.setattr(NormalEquations, "outputs", counted)
     one = body()
     found = one.run(U, run_by_hand(0.7) + 0.1 * np.sin(np.arange(60.0)))
-    # a linear start is found at once, and the next step gains nothing; smoothed ones are run once each
+    # a linear start is found in one step, and the next step gains nothing; smoothed ones are run once each
     assert 2 + 2 * len(SMOOTHED) <= len(asked) <= 4 + 2 * len(SMOOTHED) < START_STEPS
     assert found[1:] == pytest.approx(0.6 * found[:-1] + 0.5 * U[:-1, 0])
 
@@ -110,7 +110,7 @@ def test_a_body_comes_back_from_its_dictionary_and_counts_its_values() -> None:
 def test_noise_of_the_first_outputs_does_not_throw_a_run_where_nothing_leads_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # two steps of 1 ms are a speed: a body in a pit at zero, with a cubic pull that gives way beyond 1.2
+    # two samples of 1 ms give a speed: a body in a pit at zero, with a cubic force that drives it away beyond 1.2
     variables = Variables(np.array([0, 0, 1]), np.array([1, 2, 1]), np.array([[-9.0, 9.0]] * 3), "")
     terms = np.array([[0, -1, -1], [1, -1, -1], [2, -1, -1], [0, 0, 0]])
     pit = PolynomialDynamics(variables, terms, np.array([1.98, -0.99, 0.001, 0.007]), np.zeros(0))
@@ -122,4 +122,4 @@ def test_noise_of_the_first_outputs_does_not_throw_a_run_where_nothing_leads_bac
     seen[:2] += [-0.15, 0.15]
     assert np.abs(pit.run(u, seen) - truth).max() < 0.03
     monkeypatch.setattr(f"{PolynomialDynamics.__module__}.SMOOTHED", ())
-    assert not np.abs(pit.run(u, seen) - truth).max() < 1.0  # the measured first outputs alone
+    assert not np.abs(pit.run(u, seen) - truth).max() < 1.0  # with the measured first outputs only

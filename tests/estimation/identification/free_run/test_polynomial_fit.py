@@ -1,4 +1,4 @@
-"""Polynomial models: their free run, its sensitivities, and which products they are given."""
+"""Polynomial models: their free run, its sensitivities, and the choice of their products."""
 
 import json
 from collections.abc import Callable
@@ -49,7 +49,7 @@ def log(n: int = 400, seed: int = 1) -> Channels:
 
 
 def grown(of: Channels) -> tuple[Channels, PolynomialFit]:
-    """Return scaled data, and the polynomial model that a linear one of them begins."""
+    """Return scaled data, and the polynomial model that starts from a linear model of them."""
     data, _ = scaled(of)
     start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
     assert start is not None
@@ -85,7 +85,7 @@ def test_the_product_that_the_plant_has_is_the_first_one_added() -> None:
     fit = one_more(start, candidate_terms(start.variables), data)
     assert fit is not None
     lags = [(int(fit.variables.source[v]), int(fit.variables.lag[v])) for v in fit.terms[-1]]
-    assert {source for source, _ in lags} == {0}  # the cube of the output, at the lags that noise leaves apart
+    assert {source for source, _ in lags} == {0}  # the cube of the output; its lags depend on the noise
     assert fit.cost < 0.2 * start.cost
 
 

@@ -1,4 +1,4 @@
-"""Where runs of polynomial models begin, which samples count, and what a linear model hands over to them."""
+"""Where runs of polynomial models begin, which samples are used, and what they take over from a linear model."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SIZES = (60, 90)
 
 
 def logs(noise: float = 0.0) -> Channels:
-    """Return two logs of ``y = 1.2 y[-1] - 0.5 y[-2] + 0.3 u[-3] + 0.1 u[-4] + 0.2`` whose inputs stood before."""
+    """Return two logs of ``y = 1.2 y[-1] - 0.5 y[-2] + 0.3 u[-3] + 0.1 u[-4] + 0.2``; inputs were constant before."""
     rng = np.random.default_rng(7)
     inputs, outputs = list[Array](), list[Array]()
     for n in SIZES:

@@ -1,4 +1,4 @@
-"""What a product explains is what least squares beside the others takes off the residual; which products there are."""
+"""The gain of a product is the decrease of the least-squares residual; and which products are candidates."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def left(columns: Array, target: Array) -> float:
 
 
 def gains(own: Array, every: Array, residual: Array) -> Array:
-    """Return what candidates explain, from the products of sensitivities that a fit sums."""
+    """Return how much each candidate explains, from the products of sensitivities that a fit sums."""
     with np.errstate(invalid="ignore"):
         square = np.einsum("ij,ij->j", every, every)
         return _gains(own.T @ own, own.T @ every, square, own.T @ residual, every.T @ residual)
@@ -49,6 +49,6 @@ def test_products_are_those_of_two_and_three_signals_until_there_are_too_many(la
     assert sum(one[2] == -1 for one in found) == pairs
     if pairs + cubes <= MOST_CANDIDATES:
         assert len(found) == pairs + cubes
-    else:  # of many, the cubes of one channel's signals
+    else:  # if there are many, only the cubes of one channel's signals
         assert all(len({int(source[v]) for v in one}) == 1 for one in found if one[2] >= 0)
         assert len(found) == pairs + sum(k * (k + 1) * (k + 2) // 6 for k in (lags, inputs))

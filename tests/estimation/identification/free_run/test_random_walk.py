@@ -1,4 +1,4 @@
-"""What wanders by itself is told from what a plant does, and its gain is read off changes from sample to sample."""
+"""A random walk is distinguished from the plant's response, whose gain is fitted to changes from sample to sample."""
 
 import warnings
 from dataclasses import replace
@@ -34,7 +34,7 @@ LEVELS: Array = np.repeat(np.random.default_rng(16800).standard_normal(N // 10),
 
 
 def log(seed: int, step: float = 0.1, noise: float = 0.0, gain: float = GAIN) -> Channels:
-    """Return a plant of the first order whose output has a walk and white noise on it."""
+    """Return a log of a first-order plant, with a random walk and white noise on its output."""
     rng, y = np.random.default_rng(seed), np.zeros(N)
     for t in range(1, N):
         y[t] = POLE * y[t - 1] + (1.0 - POLE) * gain * LEVELS[t - 1]
@@ -113,7 +113,7 @@ def test_an_automatic_choice_takes_no_bends_where_the_output_wanders() -> None:
 def test_auto_leaves_changes_where_a_nonlinear_model_of_levels_leaves_clearly_less(
     structure: str, left: float | None, taken: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What a bend leaves may look like a walk: a heat exchanger's polynomial leaves a tenth of it."""
+    """The residual of a nonlinearity may look like a walk: a heat exchanger's polynomial leaves a tenth of it."""
     walk = identified(16801)
     share = (left or 0.1) * (100.0 - walk.held_back_percent)
     other = replace(walk, model=replace(walk.model, structure=structure), held_back_percent=100.0 - share)
@@ -126,7 +126,7 @@ def test_auto_leaves_changes_where_a_nonlinear_model_of_levels_leaves_clearly_le
 def test_a_walk_at_sizes_that_are_given_is_one_at_others_too(
     order: int | None, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What poles that are missing leave may look like a walk."""
+    """The residual of missing poles may look like a walk."""
     data = log(16801)
     whole, by = scaled(data)
     walk = wandering(whole, whole, [1], (1,), None)
@@ -196,7 +196,7 @@ def test_an_output_whose_changes_say_nothing_does_not_wander(gaps: bool) -> None
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_a_controller_that_answers_the_noise_is_told_and_no_walk() -> None:
-    """Fitted to changes, the gain was 1.7 in place of 1 and no word was said."""
+    """A fit to changes gave a gain of 1.7 instead of 1, without a note."""
     loop = closed_loop(0)
     data = channels_from([loop["u"][:, None]], [loop["y"]], 0.01, ["u"], "y")
     whole, _ = scaled(data)
@@ -208,7 +208,7 @@ def test_a_controller_that_answers_the_noise_is_told_and_no_walk() -> None:
 
 @pytest.mark.parametrize(("seed", "step"), [(16808, 0.03), (16810, 0.0)])
 def test_auto_says_of_a_nonlinear_model_that_the_output_wanders_beside_it(seed: int, step: float) -> None:
-    """A bend hides the walk from the linear models that are asked for it."""
+    """A nonlinearity hides the walk from the linear models that are tested for it."""
     rng, y, n = np.random.default_rng(seed), np.zeros(N), 600
     for t in range(1, N):
         y[t] = POLE * y[t - 1] + (1.0 - POLE) * (LEVELS[t - 1] + LEVELS[t - 1] ** 2)

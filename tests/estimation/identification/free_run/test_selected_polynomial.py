@@ -1,4 +1,4 @@
-"""Models of few products: which are selected, that no block is seen by its judge, and where nothing else finds them."""
+"""Models of few products: their selection, which never uses a held-back block, and a log that only they describe."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ FORM = Form(2, (2,), (0,))
 
 
 def sparse(n: int = 400, noise: float = 0.0) -> Channels:
-    """Return a log of a plant of four terms, of 35 that two lags have."""
+    """Return a log of a plant with four terms, of the 35 that two lags have."""
     rng = np.random.default_rng(1)
     u = rng.uniform(-1.0, 1.0, n)
     y = np.zeros(n)
@@ -34,7 +34,7 @@ def sparse(n: int = 400, noise: float = 0.0) -> Channels:
 
 
 def driven(n: int, seed: int, noise: float) -> tuple[Array, Array]:
-    """Return two inputs and an output with a product of both and a lag of four: 120 terms do not hold all of these."""
+    """Return two inputs and an output with their product and a lag of four: 120 terms cannot hold all such products."""
     rng = np.random.default_rng(seed)
     u = np.column_stack([np.repeat(rng.uniform(-1.0, 1.0, n // 3 + 1), 3)[:n], rng.uniform(0.0, 1.0, n)])
     y = np.zeros(n)
@@ -57,7 +57,7 @@ def test_each_regressor_is_measured_beside_those_before_it() -> None:
     columns = np.column_stack([columns, columns[:, 0] + columns[:, 1]])
     wanted = columns[:, 0] + 2.0 * columns[:, 1] + 0.1 * columns[:, 2]
     found = best_first(columns.T @ columns, columns.T @ wanted, 5)
-    # the sum explains most; of its parts one is left, and the other is then no news
+    # the sum explains most; one of its parts is then added, after which the other part adds nothing
     assert found[0] == 4
     assert found[1] in (0, 1)
     assert len(found) == 4

@@ -1,4 +1,4 @@
-"""A pole slower than a block that is held back is taken only where it wins by more than such blocks scatter."""
+"""A pole slower than a held-back block is taken only if its advantage exceeds the scatter between such blocks."""
 
 from dataclasses import replace
 
@@ -61,9 +61,9 @@ def test_a_block_ends_before_a_slow_pole_has_decayed(plain: tuple[Channels, Cand
 @pytest.mark.parametrize(
     ("slow", "taken"),
     [
-        ((0.08, 0.08, 0.08, 0.08), "slow"),  # better in every block alike
+        ((0.08, 0.08, 0.08, 0.08), "slow"),  # equally better in every block
         ((0.05, 0.05, 0.05, 0.11), "slow"),  # better by more than one standard error
-        ((0.03, 0.09, 0.10, 0.115), "quick"),  # as much better, in one block
+        ((0.03, 0.09, 0.10, 0.115), "quick"),  # as much better, but in one block
         ((0.1005, 0.1005, 0.1005, 0.1005), "quick"),
     ],
 )
@@ -76,7 +76,7 @@ def test_a_slow_pole_wins_by_more_than_blocks_scatter(
     models["slow"] = replace(models["slow"], bic=one.bic - 100.0)
     _, by = scaled(data)
     assert believable(list(models.values()), data, by)[0] is models[taken]
-    # where nothing quicker may be taken, the slow one is
+    # the slow model is taken if no quicker one may be
     doubted = replace(models["quick"], doubt="no_fit")
     assert believable([doubted, models["slow"]], data, by)[0] is models["slow"]
 
@@ -85,9 +85,9 @@ def test_a_slow_pole_wins_by_more_than_blocks_scatter(
     ("errors", "taken"),
     [
         ((0.3, 0.3), "slow"),
-        ((0.3, 0.295), "slow"),  # blocks and halves together are still less
+        ((0.3, 0.295), "slow"),  # the error of blocks and halves together is still smaller
         ((0.3, 0.25), "quick"),
-        ((float("nan"), 0.25), "slow"),  # a half that cannot be fitted says nothing
+        ((float("nan"), 0.25), "slow"),  # a half that cannot be fitted decides nothing
     ],
 )
 def test_a_slow_pole_carries_on_where_nothing_pins_it(
@@ -146,7 +146,7 @@ def test_an_output_that_rounding_left_no_spread_has_no_fit() -> None:
     ("late", "taken"),
     [
         ((0.08, 0.08, 0.08, 0.08), "late"),
-        ((0.03, 0.09, 0.10, 0.115), "prompt"),  # as much better, in one block
+        ((0.03, 0.09, 0.10, 0.115), "prompt"),  # as much better, but in one block
     ],
 )
 def test_a_dead_time_wins_by_more_than_blocks_scatter(
@@ -158,7 +158,7 @@ def test_a_dead_time_wins_by_more_than_blocks_scatter(
     models["late"] = replace(models["late"], fit=later)
     by = scaled(data)[1]
     assert believable(list(models.values()), data, by)[0] is models[taken]
-    # a slow model is no reason to leave a dead time, nor is one that may not be taken
+    # neither a slow model nor one that may not be taken replaces a dead time
     slow = with_pole(one, 0.9995, (0.1,) * 4)
     for other in (slow, replace(models["prompt"], doubt="no_fit")):
         assert believable([other, models["late"]], data, by)[0] is models["late"]
@@ -183,7 +183,7 @@ def test_a_pole_at_one_is_needless_where_a_settled_model_explains_the_record_bet
     plain: tuple[Channels, Candidate], gained: float, taken: str
 ) -> None:
     data, one = plain
-    # one block holds the only step of the inputs, and the fit without it knows nothing of the pole
+    # one block contains the only step of the inputs, so the fit without it cannot determine the pole
     settled = replace(one, block_errors=(0.02, 0.02, 0.02, 0.2))
     other = with_pole(one, 1.0, (0.02, 0.02, 0.02, 0.02), "time_constant")
     integrating = replace(other, fit=replace(other.fit, integrates=True), bic=one.bic + gained)

@@ -1,4 +1,4 @@
-"""A trend beside a plant: no pole at 1 follows it, and a plant that integrates or is slow keeps its pole."""
+"""A trend in the output of a plant: no pole at 1 follows it, and an integrating or slow plant keeps its pole."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 
 
 def channels(seed: int, pole: float, slope: float, logs: int = 1) -> Channels:
-    """Return logs of a plant of first order, beside a trend [output unit/s], and white noise."""
+    """Return logs of a first-order plant with a trend [output unit/s] and white noise on the output."""
     rng = np.random.default_rng(seed)
     u, y = list[Array](), list[Array]()
     for _ in range(logs):

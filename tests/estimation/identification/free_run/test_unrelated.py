@@ -1,4 +1,4 @@
-"""An output that its input has no part in is said to be that, however well a slow model follows it."""
+"""An output that its input does not influence is reported as such, however well a slow model follows it."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ COURSES = {
     "ramp": np.arange(N) / 100.0 + 0.3 * _noise(3),
     "sine": np.sin(2.0 * np.pi * np.arange(N) / 220.0) + 0.2 * _noise(4),
 }
-"""Outputs of their own, which slow models follow."""
+"""Outputs that are unrelated to the input, but that slow models follow."""
 
 
 @pytest.mark.parametrize("course", COURSES)

@@ -86,10 +86,10 @@ def test_a_notch_as_wide_as_a_five_hundredth_of_half_the_sample_rate_ends_the_ba
     turn, inner = np.pi * place, 0.997
     notch = np.poly(np.exp([1j * turn, -1j * turn])).real
     poles = np.poly(inner * np.exp([1j * turn, -1j * turn])).real
-    falling = np.array([1.0, 0.5])  # 3 dB down at 0.54 of half the sample rate, by itself
+    falling = np.array([1.0, 0.5])  # by itself, 3 dB down at 0.54 of half the sample rate
     found = LinearModel(np.convolve(notch, falling), poles, 1e-3, "u", "y").bandwidth_hz
     assert found is not None
-    width = (1.0 - inner) * 500.0 / np.pi  # half of it, where the gain of a narrow notch has fallen by 3 dB
+    width = (1.0 - inner) * 500.0 / np.pi  # half the width at which the gain of a narrow notch is 3 dB down
     assert 0.7 < (500.0 * place - found) / width < 1.6
 
 

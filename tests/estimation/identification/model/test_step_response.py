@@ -1,4 +1,4 @@
-"""The step response is the model's own, and its deviation is what the covariance makes of it."""
+"""The step response is that of the model, and its deviation follows from the covariance."""
 
 from dataclasses import replace
 

@@ -188,7 +188,7 @@ def test_an_integrator_has_no_bandwidth() -> None:
 def test_a_band_is_the_spread_along_the_response_and_across_it() -> None:
     gradient = np.array([[1.0 + 2.0j, -1.0j], [3.0 + 0.0j, 4.0j]])
     covariance = np.array([[0.04, 0.01], [0.01, 0.09]])
-    response = np.array([2.0j, 0.0])  # along the imaginary axis, and nowhere
+    response = np.array([2.0j, 0.0])  # along the imaginary axis, and zero
     band = response_band(np.array([1.0, 2.0]), response, gradient, covariance, 0.95)
     along, across = (part @ covariance @ part for part in (gradient[0].imag, gradient[0].real))
     assert band.gain_std == pytest.approx([np.sqrt(along), np.sqrt(gradient[1].real @ covariance @ gradient[1].real)])

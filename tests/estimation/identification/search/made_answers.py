@@ -1,4 +1,4 @@
-"""Answers of a plant of the second order."""
+"""Outputs of a second-order plant."""
 
 import numpy as np
 

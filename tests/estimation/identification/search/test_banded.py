@@ -1,4 +1,4 @@
-"""The criterion in bands, run as Python and as machine code, against complex least squares."""
+"""The criterion in bands, run as Python and as machine code, compared with complex least squares."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def cost_of(b: Array, f: Array) -> float:
 
 @pytest.fixture(params=["compiled", "Python"], autouse=True)
 def _way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run each test on machine code and on the loops as they are written."""
+    """Run each test with machine code and with the loops as plain Python."""
     if request.param == "Python":
         monkeypatch.setattr(Loop, "__call__", lambda loop, *args: loop.__wrapped__(*args))
 

@@ -61,7 +61,7 @@ def test_machine_code_computes_what_python_does(monkeypatch: pytest.MonkeyPatch)
     y, weight = rng.normal(size=80), (rng.random(80) > 0.1).astype(float)
     sums = [(np.empty((8, 8)), np.empty(8)) for _ in range(2)]
     normal_equations(theta, sizes, u, y, weight, bounds, *sums[0])
-    plain = normal_equations.__wrapped__  # type: ignore[attr-defined]  # as it is written
+    plain = normal_equations.__wrapped__  # type: ignore[attr-defined]  # the loop as plain Python
     for name in ("impulse_response", "respond", "_add_products"):
         monkeypatch.setattr(descent, name, getattr(descent, name).__wrapped__)
     found, wanted = (
@@ -74,7 +74,7 @@ def test_machine_code_computes_what_python_does(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.fixture(params=["compiled", "Python"])
 def _either_way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run a test on machine code and on the loops as they are written."""
+    """Run a test with machine code and with the loops as plain Python."""
     if request.param == "Python":
         monkeypatch.setattr(Loop, "__call__", lambda loop, *args: loop.__wrapped__(*args))
 
@@ -157,7 +157,7 @@ def test_a_step_beyond_the_circle_is_not_taken() -> None:
     u = first_order(0.0)[0]
     y = np.zeros(u.size)
     for t in range(1, u.size):
-        y[t] = 1.03 * y[t - 1] + 0.3 * u[t - 1]  # what no stable model follows
+        y[t] = 1.03 * y[t - 1] + 0.3 * u[t - 1]  # no stable model follows this
     start = np.array([0.3, -0.5, 0.0])
     cost, theta, _, _ = descend(start, SIZES, u, y, np.ones(u.size), np.array([0, u.size]), 60, 1e-10)
     assert abs(theta[1]) < 1.0

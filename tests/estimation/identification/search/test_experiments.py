@@ -14,7 +14,7 @@ def test_several_experiments_share_coefficients_and_begin_each_in_its_own_state(
     y = plant_30hz.simulate(u)
     y = y + 0.02 * y.std() * rng.standard_normal(u.size)
     form = {"n_numerator": 2, "n_denominator": 2, "delay": 1}
-    parts = [slice(0, 700), slice(900, 2_000)]  # what lies between is not logged
+    parts = [slice(0, 700), slice(900, 2_000)]  # the part between is not logged
     both = fit_output_error([u[p] for p in parts], [y[p] for p in parts], 1e-3, **form)
     one = fit_output_error(u[parts[0]], y[parts[0]], 1e-3, **form)
     assert both.n_samples == 1_800

@@ -1,4 +1,4 @@
-"""The descent ends at an optimum, does not step where it may not, and asks no more once nothing is to be gained."""
+"""The descent ends at an optimum, takes no forbidden step, and stops evaluating once nothing can be gained."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from estimation.identification.search.levenberg import levenberg
 
 
 class Valley:
-    """Rosenbrock's bent valley as a sum of squares, with a floor; it counts how often it is asked."""
+    """Rosenbrock's valley as a sum of squares with a floor; it counts its evaluations."""
 
     def __init__(self, floor: float = 0.0) -> None:
         self.floor, self.asked = floor, 0
@@ -48,7 +48,7 @@ def test_between_walls_it_stays_where_it_began_and_gives_up() -> None:
     assert cost == pytest.approx(24.2)
     assert valley.asked == 1
     sizes = [float(np.linalg.norm(x - found)) for x in tried]
-    assert sizes == sorted(sizes, reverse=True)  # each is a shorter step
+    assert sizes == sorted(sizes, reverse=True)  # each step is shorter than the last
     assert len(sizes) < 20
 
 

@@ -1,4 +1,4 @@
-"""Criteria and first guesses of small records, kept in `numbers.json`; loops run as they are written."""
+"""Criteria and first guesses of small records, kept in `numbers.json`; loops run as plain Python."""
 
 from collections.abc import Callable
 from functools import partial

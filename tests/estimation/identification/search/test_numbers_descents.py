@@ -1,4 +1,4 @@
-"""Loops, solvers and descents on small records, kept in `numbers_descents.json`; loops run as they are written."""
+"""Loops, solvers and descents on small records, kept in `numbers_descents.json`; loops run as plain Python."""
 
 from collections.abc import Callable
 from typing import Any
@@ -148,7 +148,7 @@ def steps_of_a_descent() -> dict[str, Any]:
 
 
 def line(x: Array) -> tuple[float, Array, Array]:
-    """Return a curved valley's cost."""
+    """Return the cost of a curved valley, and its normal equations."""
     left = np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0], 0.3])
     slopes = np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0], [0.0, 0.0]])
     return float(left @ left), slopes.T @ slopes, slopes.T @ left
@@ -210,7 +210,7 @@ def one_step_ahead() -> dict[str, Any]:
 
 @NUMBERS.case()
 def minima() -> dict[str, Any]:
-    """Ends of descents, with deviations."""
+    """Return ends of descents, with deviations."""
     y, sizes = answer(), np.array([2, 2, 1, 2])
     start = np.array([0.25, -0.05, -1.45, 0.66, 0.0, 0.0, 0.0, 0.0])
     cost, theta, gram, ended = descend(start, sizes, U, y, WEIGHT, BOUNDS, 60, 1e-12)

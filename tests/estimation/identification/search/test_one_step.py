@@ -1,4 +1,4 @@
-"""One-step errors are the noise model's inverse of what the plant leaves, and their sensitivities its derivatives."""
+"""One-step errors are the plant's residual through the inverse noise model; their sensitivities are its derivatives."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ BOUNDS = [0, 70, N]
 def errors(
     theta: Array, d: int, states: int, used: Array, bounds: list[int] | None = None
 ) -> tuple[float, Array, Array]:
-    """Return cost, errors and minus their derivative; where d has no values the noise shares the plant's poles."""
+    """Return cost, errors and minus their derivative; if d has no values, the noise shares the plant's poles."""
     error, jacobian = np.empty(N), np.empty((N, theta.size))
     sizes = np.array([2, 2, 1, d, DELAY, states])
     cost = prediction_errors(theta, sizes, d == 0, U, Y, used, np.array(bounds or BOUNDS), error, jacobian)
@@ -40,7 +40,7 @@ def test_errors_are_what_is_left_by_plant_and_noise_model(tied: bool) -> None:
 @pytest.mark.parametrize("tied", [False, True])
 def test_sensitivities_are_the_derivatives_of_the_errors(tied: bool, used: Array) -> None:
     d = [] if tied else D
-    theta = np.array([*B, *F, *C, *d, 0.1, 0.0, -0.1, 0.2])  # two initial states an experiment
+    theta = np.array([*B, *F, *C, *d, 0.1, 0.0, -0.1, 0.2])  # two initial states for each experiment
     _, _, jacobian = errors(theta, len(d), 2, used)
     for k in range(theta.size):
         step = np.zeros(theta.size)
@@ -55,7 +55,7 @@ def test_a_missing_output_is_no_error_and_is_replaced_by_its_prediction() -> Non
     assert np.all(error[~GAPPED] == 0.0)
     before = Y.copy()
     try:
-        Y[~GAPPED] = 1e6  # what stands there is not read
+        Y[~GAPPED] = 1e6  # missing outputs are not read
         _, again, _ = errors(theta, 1, 2, GAPPED)
     finally:
         Y[:] = before

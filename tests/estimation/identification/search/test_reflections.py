@@ -1,4 +1,4 @@
-"""Steps in the reflection coefficients stay within the bound of stability, and lead where plain steps are refused."""
+"""Steps in the reflection coefficients stay within the bound of stability, and proceed if plain steps are refused."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_a_step_towards_poles_outside_stays_inside_and_promises_less_cost() -> N
 
 
 def test_a_descent_follows_the_bound_where_plain_steps_end_at_it() -> None:
-    """The first value wants 1.2 and may not pass 1; the second must still come to its place, which bends with it."""
+    """The first value's optimum, of size 1.2, is beyond the bound 1; the second must still follow the curved valley."""
 
     def at(x: Array) -> tuple[float, Array, Array]:
         errors = np.array([x[0] + 1.2, 10.0 * (x[1] - 5.0 * (x[0] + 0.9) ** 2)])

@@ -1,4 +1,4 @@
-"""What a polynomial over neighbouring lines leaves of the output of a periodic test: distortion and nothing else."""
+"""The residual of a polynomial over neighbouring lines of a periodic test is the distortion and nothing else."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_each_line_is_what_least_squares_over_its_neighbours_misses_it_by_in_uni
     columns = powers * inside[window, None]
     others = np.arange(span) != place - begin
     without = np.linalg.lstsq(columns[others], output[window][others], rcond=None)[0]
-    # the error of a prediction from the others alone, over its deviation: both are larger by 1 / (1 - leverage)
+    # prediction error from the other lines over its deviation: error and variance are larger by 1 / (1 - leverage)
     hat = columns @ np.linalg.pinv(columns)
     missed = (output[place] - columns[place - begin] @ without) * np.sqrt(1.0 - hat[place - begin, place - begin].real)
     assert _left(output, inside)[place] == pytest.approx(missed)

@@ -1,4 +1,4 @@
-"""Responses come with circles that cover, and a multisine tells noise, odd and even distortion apart."""
+"""Responses have confidence circles that cover, and a multisine separates noise, odd and even distortion."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_noise_odd_and_even_distortion_are_told_apart(log: tuple[np.ndarray, np.
     u, y = log
     told = best_linear_approximation(u, y, 1.0)
     assert (told.period, told.periods) == (PERIOD, PERIODS - 1)
-    # a period's lines share the noise's variance; their mean over the periods has a part of it
+    # the lines of a period share the noise variance, which the mean over the periods reduces
     assert np.mean(told.noise) == pytest.approx(0.02**2 / PERIOD / (PERIODS - 1), rel=0.05)
     assert abs(told.level(odd=False)) < 0.1 * np.mean(told.noise)
     assert told.level(odd=True) > 20.0 * np.mean(told.noise)
@@ -127,7 +127,7 @@ def test_a_level_comes_with_how_far_it_scatters_from_multisine_to_multisine(
     mean = level.mean()
     assert np.all((low < level) & (level < high))
     assert 0.8 <= np.mean((low <= mean) & (mean <= high)) <= 1.0
-    # neither so wide that it says nothing, nor as narrow as lines that were independent would have it
+    # neither so wide that it is useless, nor as narrow as for independent lines
     scatter = np.std(np.log(level))
     assert 1.2 * scatter < np.median(np.log(high / low)) / 2.0 < 4.0 * scatter
     told = best_linear_approximation(*log, 1.0)
@@ -145,7 +145,7 @@ def test_what_a_level_scatters_by_is_not_guessed_where_the_lines_do_not_tell_it(
     assert told.period_wanted(odd=True) is None
     found = measured_response(u, bent(u, DAMPED), 1.0).to_dict()
     assert found["odd_power_interval"] is None
-    # far apart lines on a sharp resonance: what a smooth response leaves there is no distortion
+    # lines far apart on a sharp resonance: the residual of a smooth response is not distortion there
     lines = 64 * np.arange(1, 50, 2) - 1
     u = np.tile(multisine(lines, rng), 3)
     coarse = best_linear_approximation(u, filtered([0.0, 0.1], [1.0, -1.9, 0.99], u), 1.0)

@@ -1,4 +1,4 @@
-"""Frequency responses, distortion and what is done to signals before a fit, kept in `numbers.json`."""
+"""Frequency responses, distortion and the preprocessing of signals before a fit, kept in `numbers.json`."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -29,7 +29,7 @@ LOW: Array = np.hanning(9)
 
 
 def resonance(u: Array, cube: float = 0.0, square: float = 0.0) -> Array:
-    """Return what two poles make of an input, and powers of it on top."""
+    """Return the response of two poles to an input, plus powers of it."""
     y = np.zeros(u.size)
     for t in range(2, u.size):
         y[t] = 1.6 * y[t - 1] - 0.8 * y[t - 2] + 0.2 * u[t - 1]
@@ -142,7 +142,7 @@ def local_polynomials() -> dict[str, Any]:
 
 @cache
 def multisine(length: int, step: int, missing: bool, seed: int = 5) -> Array:
-    """Return a period of a multisine up to a third of half the rate, one odd line in four left out."""
+    """Return one period of a multisine up to a third of half the rate, with one odd line in four left out."""
     rng = np.random.default_rng(seed)
     spectrum = np.zeros(length // 2 + 1, dtype=complex)
     lines = np.arange(1, length // 6, step)
@@ -203,7 +203,7 @@ def distortion_of_multisines() -> dict[str, Any]:
 
 
 def made(power: float, noise: float, driven: float, length: int = 512) -> Distortion:
-    """Return what a multisine of odd lines could have told."""
+    """Return a possible result of a multisine of odd lines."""
     base = best_linear_approximation(np.tile(multisine(512, 2, True), 3), NOISE[:1536], SAMPLE_TIME, period=512)
     rng = np.random.default_rng(9)
     size = np.where(base.excited, np.sqrt(driven), np.sqrt(power))
@@ -263,7 +263,7 @@ def what_logs_tell() -> dict[str, Any]:
         arrays = ("frequency_hz", "real", "imag", "radius95")
         if found["method"] == "multisine":
             told[name] = {**found, **{key: some(found[key], 3) for key in arrays}}
-        else:  # leakage alone drives most lines
+        else:  # only leakage drives most lines
             told[name] = found["method"]
     noise = measured_response(WHITE[:300], resonance(WHITE[:300]), SAMPLE_TIME)
     return {**told, "noise": noise.method}

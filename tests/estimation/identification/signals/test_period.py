@@ -1,4 +1,4 @@
-"""Inputs that repeat themselves, noise aside, and those that only look alike for a while."""
+"""Inputs that are periodic apart from noise, and inputs that only look alike for a while."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ def test_a_period_is_found_beside_noise_and_where_the_last_one_is_cut() -> None:
         assert common_period((u + 0.05 * RNG.normal(size=u.size))[:, None]) == ONCE.size
     wave = np.sin(2.0 * np.pi * np.arange(900) / 150.0)
     assert common_period(wave[:, None]) == 150
-    # of two inputs, both have to
+    # if there are two inputs, both must be periodic
     both = np.column_stack([np.tile(ONCE, 3), np.tile(ONCE[:100], 6)])
     assert common_period(both) == ONCE.size
     assert common_period(np.column_stack([both[:, 0], RNG.normal(size=len(both))])) is None
@@ -39,14 +39,14 @@ def test_a_block_is_the_same_part_of_every_period() -> None:
         assert np.flatnonzero(mask).tolist() == [
             200 * period + 40 * (1 + index) + k for period in range(3) for k in range(40)
         ]
-    # inputs tell no more than one period does, and halves of a log would hold back nothing
+    # inputs contain no more information than one period, and halves of a log would hold back nothing
     data = channels_from([u[:, None], u[:250, None]], [u, u[:250]], 1.0, ["u"], "y")
     assert (data.longest, data.told) == (600, 200)
     assert [[half[:, 0].tolist() for half in one.u] for one in halves(data)] == [
         [u[400:500].tolist(), u[50:150].tolist()],
         [u[500:].tolist(), u[150:250].tolist()],
     ]
-    # of a short period a block would be too short
+    # a block of a short period would be too short
     short = np.tile(ONCE[:50], 8)
     (mask,) = blocks(channels_from([short[:, None]], [short], 1.0, ["u"], "y"), 4)[0]
     assert np.flatnonzero(mask).tolist() == list(range(80, 160))

@@ -1,4 +1,4 @@
-"""What a descent of a state space allows: no step leaves the unit circle, and one that would is judged by its poles."""
+"""Bounds of a state-space descent: no step leaves the unit circle, and a step that would is judged by its poles."""
 
 from collections.abc import Callable
 from typing import Any

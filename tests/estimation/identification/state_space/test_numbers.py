@@ -1,4 +1,4 @@
-"""State spaces of small logs: outputs, derivatives, starts, ends and what is told of them, kept in `numbers.json`."""
+"""State spaces of small logs: outputs, derivatives, starts, ends and reports, kept in `numbers.json`."""
 
 from dataclasses import replace
 from functools import cache, partial

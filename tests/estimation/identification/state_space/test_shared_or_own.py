@@ -1,4 +1,4 @@
-"""Outputs get one model of all or one each: by what is left on blocks held back, and by how many values it takes."""
+"""Outputs share one model or get one each, depending on held-back error and number of parameters."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +11,7 @@ from estimation.identification.state_space import identify
 from estimation.identification.state_space.identify import identify_outputs
 
 LEFT = 0.1
-"""What a model an output leaves of each output's deviation [fraction]."""
+"""Held-back error of the separate models, over each output's deviation [fraction]."""
 
 
 def found(name: str, left: float, n_values: int, *, sound: bool = True) -> Identified:
@@ -23,9 +23,9 @@ def found(name: str, left: float, n_values: int, *, sound: bool = True) -> Ident
 @pytest.mark.parametrize(
     ("left", "n_values", "shared"),
     [
-        (0.999 * LEFT, 19, True),  # fewer values than both models of their own have together
+        (0.999 * LEFT, 19, True),  # fewer values than both separate models have together
         (1.001 * LEFT, 19, False),
-        ((1.0 - 0.9 * CLEARLY) * LEFT, 20, False),  # as many: by a hundredth, or not at all
+        ((1.0 - 0.9 * CLEARLY) * LEFT, 20, False),  # as many values: it must be better by a hundredth
         ((1.0 - 1.1 * CLEARLY) * LEFT, 20, True),
     ],
 )

@@ -1,4 +1,4 @@
-"""State space of several inputs and outputs: derivatives, start, covariance, order, and what is shared by outputs."""
+"""State space with several inputs and outputs: derivatives, start, covariance, order, and what the outputs share."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -75,7 +75,7 @@ def test_errors_are_at_the_bound_and_deviations_say_so() -> None:
         free = limit > 1e-9
         errors.append(((values - truth)[free] / limit[free]) ** 2)
         own.append(((values - truth)[free] / deviations[free]) ** 2)
-    # eight logs of 23 values that hang together: the mean of squares scatters by 0.2
+    # eight logs of 23 correlated values: the mean of squares scatters by 0.2
     assert np.sqrt(np.mean(errors)) == pytest.approx(1.0, abs=0.3)
     assert np.sqrt(np.mean(own)) == pytest.approx(1.0, abs=0.3)
 
@@ -112,7 +112,7 @@ def test_outputs_share_one_model_that_is_saved_with_its_covariance(tmp_path_fact
         assert one.quality.fit_percent > 90.0
         ours = one.model.simulate(channels.u[0], channels.y[0])
         assert other.simulate(channels.u[0], channels.y[0]) == pytest.approx(ours)
-        # without the output the run begins at rest, and forgets it
+        # without the output, the run begins at rest, and forgets its start
         assert one.model.simulate(channels.u[0])[200:] == pytest.approx(ours[200:], abs=1e-3)
     gains = [[float(b.sum() / f.sum()) for b, f in one.model.transfer_functions()] for one in found]
     assert gains == pytest.approx(plant().dc_gain, abs=0.1)
@@ -127,7 +127,7 @@ def test_dead_time_is_a_state_of_its_own_or_a_late_input() -> None:
     assert response == pytest.approx(late.response(z)[0])
 
 
-@pytest.mark.slow  # kept numbers ask it of smaller logs
+@pytest.mark.slow  # kept numbers test this with smaller logs
 def test_missing_samples_and_several_logs_are_one_fit() -> None:
     first, second = logged(5, 300), logged(6, 300)
     both = [
@@ -138,7 +138,7 @@ def test_missing_samples_and_several_logs_are_one_fit() -> None:
     assert min(one.quality.fit_percent for one in found) > 90.0
 
 
-@pytest.mark.slow  # kept numbers ask it of a smaller log
+@pytest.mark.slow  # kept numbers test this with a smaller log
 def test_auto_takes_the_state_space_where_outputs_share_their_dynamics() -> None:
     shared = identify_outputs(logged(7, 300), structure="auto", order=3, delay=1)
     assert {one.model.structure for one in shared} == {"state-space"}

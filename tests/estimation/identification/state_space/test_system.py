@@ -1,4 +1,4 @@
-"""Responses of a state space are those of its matrices, their deviations those of first order."""
+"""Responses of a state space are those of its matrices, and their deviations are those of first order."""
 
 from dataclasses import replace
 
@@ -82,7 +82,7 @@ def test_an_output_at_rest_is_as_well_known_in_units_as_in_scale() -> None:
 
 
 def _at_rest(one: StateSpace, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Outputs at rest, and their deviations."""
+    """Return the outputs at rest, and their deviations."""
     found, slopes = (part.real for part in one.response(1.0))
     by = np.tensordot(slopes, inputs, axes=(1, 0))
     by[:, -P:] += np.eye(P)

@@ -1,4 +1,4 @@
-"""A single rod breathes from the inner circuit's accumulator, whose gas no rig file tells."""
+"""A single rod exchanges oil with the inner circuit's accumulator, whose gas volume no rig file states."""
 
 from dataclasses import replace
 from functools import cache
@@ -26,7 +26,7 @@ LITTLE = replace(circuit_of(PILOTED), accumulator_gas=1.5e-4, accumulator_oil=1.
 
 @cache
 def of_rod() -> tuple[Blocks, Actuator, ClassFits]:
-    """Return a log of the rod with little gas, and circuits that have a litre of it."""
+    """Return a log of a single rod with a small gas volume, and circuits fitted with a gas volume of one litre."""
     actuator = actuator_of(replace(LITTLE, accumulator_gas=1e-3, accumulator_oil=1e-3))
     speed = chirp(2.5, 5e-4, SPEED, 0.3, 1.0)
     record = simulate(CIRCUIT, speed, 5e-4, LITTLE, sensors=BENCH, rng=np.random.default_rng(1))

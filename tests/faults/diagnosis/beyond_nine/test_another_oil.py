@@ -1,4 +1,4 @@
-"""Without pressure, stiff oil alone is no reason for an unknown class."""
+"""Without pressure, stiffer oil alone does not make the class unknown."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -32,9 +32,9 @@ BIASED = AgainstCode.SPEED_BIAS.note(bias_rad_s=3.0)
 def asked_of(
     against: tuple[Note, ...], fitted: float = 1.0, again: tuple[Note, ...] = ()
 ) -> tuple[Loaded, list[float]]:
-    """Return what is said of a log, and around which moduli it was diagnosed, over the rig file's.
+    """Return the diagnosis of a log, and the bulk moduli around which it was made, relative to the rig file's.
 
-    The first circuit has ``fitted`` times the rig file's bulk modulus; ``again`` speaks against the second one.
+    The first circuit has ``fitted`` times the rig file's bulk modulus; ``again`` are the objections to the second one.
     """
     asked: list[float] = []
     coordinates = coordinates_of(replace(HEALTHY, bulk_modulus=fitted * HEALTHY.bulk_modulus), ACTUATOR.rated)

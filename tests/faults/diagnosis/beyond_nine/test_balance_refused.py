@@ -1,4 +1,4 @@
-"""A class stands without the balance of flows only where circuits follow the log closely and no fault explains it."""
+"""Without the flow balance, a class stands only if a circuit follows the log closely and no fault explains it."""
 
 from dataclasses import replace
 from typing import Any, cast
@@ -34,7 +34,7 @@ def stands(
     noises: float = 1.0,
     gains: dict[str, float] = NONE_BETTER,
 ) -> Note | None:
-    """Return what is said of a log of which a circuit leaves so many times the sensors' noise of velocity."""
+    """Return the note on a log if a circuit leaves ``noises`` times the sensors' noise of velocity."""
     one = log()
     one = replace(one, speed=np.full_like(one.speed, 50.0), velocity=one.velocity * 10.0)
     fits = cast("Any", type("Fits", (), {"best": leaving(noises, 1.0, one)}))

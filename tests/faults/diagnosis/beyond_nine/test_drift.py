@@ -1,4 +1,4 @@
-"""A log that warms: its classes are weighed over where in the drift of leakage the rig file's oil stands."""
+"""In a log that warms, classes are averaged over where in the drift of leakage the rig file's oil applies."""
 
 from dataclasses import replace
 from functools import cache
@@ -38,7 +38,7 @@ DRIFTS = (RigCode.LEAKAGE_DRIFTS.note(factor=TWICE, first=1e-11, last=2e-11),)
 
 @cache
 def warming(condition: str, first: float) -> CleanLog:
-    """Return a log whose viscosity halves, and whose leakage begins at a multiple of the condition's."""
+    """Return a log whose viscosity halves, and whose leakage starts at a multiple of the condition's."""
     p, rng = circuit_of(parameters_for(CONDITIONS[condition])), np.random.default_rng(5)
     times = np.linspace(0.0, SECONDS, 9)
     warm = [
@@ -154,5 +154,6 @@ def test_a_circuit_fitted_on_from_another_place_begins_at_its_leakage_and_has_th
     assert drift._followed([here, here], [1.0, 2.0], ACTUATOR, calibration).severity == {"widths": pressure}
     moved = starts[0] - one.scoreboard.fits.best.coordinates
     wanted = np.zeros(len(drift.COORDINATES))
-    wanted[drift.COORDINATES.index("leakage")] = -np.log(2.0)  # what leaks at the end, by what leaked there
+    # leakage at the end of the log over that at the other place
+    wanted[drift.COORDINATES.index("leakage")] = -np.log(2.0)
     assert moved == pytest.approx(wanted)

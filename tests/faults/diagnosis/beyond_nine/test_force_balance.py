@@ -1,4 +1,4 @@
-"""The force balance of a sliding piston tells force, spring and inertia on its rod, and how well."""
+"""The force balance of a sliding piston determines the force, spring and inertia on its rod, with their errors."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ NOISE = np.array([1e-5, 500.0])
 
 
 def to_and_fro(one_way: bool = False) -> Array:
-    """Return velocities over blocks [m/s], of two frequencies that no place belongs to one speed."""
+    """Return velocities over blocks [m/s]: two frequencies, so that position does not determine velocity."""
     swing = 0.02 * np.sin(2.0 * np.pi * 0.7 * TIME) + 0.01 * np.sin(2.0 * np.pi * 1.9 * TIME)
     return 0.001 + np.abs(swing) if one_way else swing
 
@@ -34,7 +34,7 @@ def to_and_fro(one_way: bool = False) -> Array:
 def blocks_under(
     p: EhaParameters, velocity: Array, force: float = 0.0, stiffness: float = 0.0, mass: float = 0.0
 ) -> Blocks:
-    """Return a log of a piston that slides under a load, by equation 5.9 with 3 N of noise."""
+    """Return a log of a piston that slides under a load, from equation 5.9 with 3 N of noise."""
     position = PLACE + STEP * (np.cumsum(velocity) - 0.5 * velocity)
     rubbing = (
         p.friction_quadratic * velocity * np.abs(velocity)
@@ -82,7 +82,7 @@ def test_the_rigs_own_load_and_two_areas_are_no_finding() -> None:
     rod = replace(PAPER, area_difference=0.2)
     one = blocks_under(PAPER, to_and_fro())
     assert one.pressure is not None
-    # what pushes a piston of two areas holds the pressure of both chambers, of which one is the inner circuit's
+    # with two areas, the force depends on both chamber pressures, and one chamber has the inner circuit's pressure
     difference = one.pressure - 0.2 * 2.0 * (PAPER.accumulator_pressure - ATMOSPHERE)
     difference = np.where(difference > 0.0, difference / 1.2, difference / 0.8)
     found = seen(replace(one, pressure=difference), rod)

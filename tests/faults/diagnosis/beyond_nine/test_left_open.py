@@ -1,4 +1,4 @@
-"""How likely a fault is that a log does not exclude."""
+"""The probability of a fault that a log does not exclude."""
 
 import numpy as np
 import pytest
@@ -40,13 +40,13 @@ def test_a_valve_that_never_opened_may_be_stuck_as_likely_as_each_of_the_nine() 
     assert [note.code for note in said] == [ClassCode.STUCK_NOT_TOLD]
     assert said[0].data["percent"] == pytest.approx(100.0 * (1.0 - left["major_friction"]))
     assert beside_unseen_valve(sure, ()) == (sure, ())
-    worn, (beside,) = beside_unseen_valve({"normal": 0.0, "major_friction": 0.7}, unseen)  # a worn pump has 0.3
+    worn, (beside,) = beside_unseen_valve({"normal": 0.0, "major_friction": 0.7}, unseen)  # 0.3 for a worn pump
     assert sum(worn.values()) + 0.01 * beside.data["percent"] == pytest.approx(0.7)
     assert beside_unseen_valve({}, unseen) == ({}, ())
 
 
 def test_a_fault_that_is_likelier_than_each_condition_speaks_against_all_nine() -> None:
-    """The headline said 94 % for none of the nine, and the rest of the page that a condition holds the log."""
+    """Before, the headline gave 94 % for none of the nine, while the rest of the page named a condition."""
     wear = ClassCode.WEAR_NOT_TOLD.note(percent=94.0, limit=90.0)
     unseen = ClassCode.STUCK_NOT_TOLD.note(percent=10.0)
     assert likelier_fault({"normal": 0.04, "minor_leakage": 0.02}, (unseen, wear)) == (wear,)

@@ -1,4 +1,4 @@
-"""A load on the rod is found from the force balance, and the condition under it."""
+"""The force balance finds a load on the rod, and circuits find the condition under it."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -123,7 +123,7 @@ def test_loads_that_the_balance_likes_and_that_hold_the_first_and_the_mean_press
 
 
 class Circuits:
-    """Diagnoses that ask for a share of the load that is missing, and are content within 1 N."""
+    """Diagnoses that report a share of the missing load, and have no objection within 1 N."""
 
     def __init__(self, true: float, *, gain: float = 1.0, told: bool = True, asks: bool = True) -> None:
         self.true, self.gain, self.told, self.asks = true, gain, told, asks
@@ -190,7 +190,7 @@ def test_no_load_is_tried_that_the_balance_rules_out(monkeypatch: pytest.MonkeyP
     circuits = Circuits(800.0)
     assert under(circuits, shown(0.0, 1.0), monkeypatch).parameters is HEALTHY
     assert loads_tried(circuits) == [0.0]
-    # and one that a bias leads to is not believed where the balance has another
+    # a load found from a bias is not believed if the balance shows another
     far = under(Circuits(800.0), shown(100.0, 20.0), monkeypatch)
     assert far.parameters is HEALTHY
 
@@ -216,7 +216,7 @@ def test_the_doubt_of_a_force_widens_what_is_said_of_friction_where_a_piston_sli
 
 @pytest.mark.slow
 def test_a_single_rod_of_which_the_rig_file_gives_the_mean_area_is_named_with_its_condition() -> None:
-    # with the seed of the others residuals show a play by chance (gain 5.3), and the check is shut
+    # with the seed of the other tests, residuals show encoder play by chance (gain 5.3), and the check fails
     found = diagnose_log(log("minor_leakage", seed=1000, **ROD), Rig())
     assert (found.condition, found.unknown) == ("minor_leakage", False)
     (note,) = [note for note in found.notes if note.code is RigCode.SINGLE_ROD]

@@ -1,4 +1,4 @@
-"""A circuit beside the nine conditions, without pressure: a model error that lasts counts in how far off it is."""
+"""Without pressure, a lasting model error counts when a circuit's distance from the nine conditions is judged."""
 
 from dataclasses import replace
 

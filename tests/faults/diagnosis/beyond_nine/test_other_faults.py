@@ -1,4 +1,4 @@
-"""Without pressure, a fault outside the nine that explains a log better is named, and a sound log has none."""
+"""Without pressure, a fault outside the nine is named if it explains a log better; in a sound log none is named."""
 
 from dataclasses import replace
 from functools import cache
@@ -33,7 +33,7 @@ MAJOR = float(np.exp(ACTUATOR.conditions[list(CONDITIONS).index("major_leakage")
 
 @cache
 def log_of(circuit: CircuitParameters = SOUND, condition: str = "minor_friction", *, pressure: bool = False) -> Blocks:
-    """Return the log that a circuit leaves of eight speeds, held for 0.4 s each, with noise."""
+    """Return a log of a circuit at eight speeds, each held for 0.4 s, with noise."""
     speed = np.repeat(LEVELS, 200)
     empty, noise = np.zeros(len(speed) // 5), np.append(NOISE, 2e3) if pressure else NOISE
     blank = Blocks(np.append(speed, speed[-1]), 2e-3, 5, empty, empty if pressure else None, noise)
@@ -44,7 +44,7 @@ def log_of(circuit: CircuitParameters = SOUND, condition: str = "minor_friction"
 
 
 def said(blocks: Blocks) -> tuple[list[tuple[Code, dict[str, object]]], str]:
-    """Return what speaks against all nine, and the faults that are not excluded."""
+    """Return the reasons against all nine, and the names of the faults that are not excluded."""
     against, open_, worn, _ = faults_outside(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
     assert [note.code for note in open_] in ([], [ClassCode.NOT_EXCLUDED])
     assert (worn is not None) == any("worn pump" in note.data["faults"] for note in open_)
@@ -73,7 +73,7 @@ def test_a_fault_that_no_condition_has_is_named(name: str) -> None:
 
 @pytest.mark.parametrize("share", [0.75, 0.85])
 def test_a_pump_that_delivers_something_between_tenths_is_named(share: float) -> None:
-    """10 s of steps of one that delivers 85 % were minor leakage at 98 %: neither 80 nor 90 % explained them better."""
+    """With pumps of 80 and 90 % only, 10 s of steps of a pump of 85 % were diagnosed as minor leakage at 98 %."""
     circuit = replace(SOUND, pump_displacement=share * SOUND.pump_displacement)
     ((found, data),), _ = said(log_of(circuit, "normal"))
     assert found == AgainstCode.PUMP_DELIVERS_LESS
@@ -101,7 +101,7 @@ def test_what_no_rig_file_knows_is_no_fault(circuit: CircuitParameters) -> None:
 def test_a_valve_that_never_had_to_open_is_not_excluded_and_a_worn_pump_is_where_speeds_tell_it() -> None:
     against, open_ = said(log_of(condition="normal"))
     assert not against
-    assert "stuck shut (10 %)" in open_  # as likely as with pressure, where it never opened either
+    assert "stuck shut (10 %)" in open_  # as with pressure, if the valve never opened
     assert "worn pump" not in open_
 
 

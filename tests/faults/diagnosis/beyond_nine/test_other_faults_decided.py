@@ -1,4 +1,4 @@
-"""Which fault outside the nine conditions is named or not excluded, by what circuits gain, with their fits made up."""
+"""Which fault outside the nine is named or not excluded, given the gain of each circuit; the fits are made up."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -38,7 +38,7 @@ def made_fit_at(place: Any) -> PointFit:
 
 
 def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, list[tuple[Any, bool]]]:
-    """Return what is said where each circuit explains the log so well, and which were fitted from which starts."""
+    """Return the reasons and the open faults for given scores, and which circuits were fitted, with a start or not."""
     found, asked = looked(monkeypatch, score)
     return found.against, found.open, asked
 
@@ -140,7 +140,7 @@ def test_a_well_worn_pump_that_is_not_excluded_takes_its_probability_from_the_co
 def test_a_valve_that_is_not_excluded_is_as_likely_as_not_where_it_would_be_believed(
     gain: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One that a log does not tell from a sound one keeps what is presumed of it."""
+    """A stuck valve that a log cannot distinguish from a sound one keeps its prior probability."""
 
     def score(one: CircuitParameters) -> float:
         stuck = getattr(one, "makeup_shut_b", 0.0) == 1.0
@@ -169,7 +169,7 @@ def test_a_low_relief_valve_gains_over_all_settings_that_it_may_have(
 def test_a_relief_valve_is_set_low_where_all_pressures_would_have_to_be_too_large_for_it_to_open_as_set(
     pressure: float, off: float, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a log in which it opened at 22 in place of 34 bar each circuit made pressures half as large again."""
+    """In a log whose valve opened at 22 instead of 34 bar, each circuit made all pressures half as large again."""
     places = ACTUATOR.conditions[1] + np.outer([0.0, off], PRESSURE_SCALE)
 
     def fitted(_: Any, actuator: Any, **__: Any) -> Any:
@@ -197,7 +197,7 @@ def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circ
     for module in (other_faults, sound_circuit):
         monkeypatch.setattr(module, "fit_classes", fitted)
     faults_outside(LOG, fits(0.0), ACTUATOR)
-    # five pumps twice, two settings, and of each valve four shares that stick and two seats
+    # five pumps twice, two relief settings, and for each make-up valve four blocked shares and two seat leakages
     assert len(wanted) == 10 + 2 + 2 * (len(other_faults.SHUT) + 2)
     assert set(wanted) == {30.0 * (20.0 - 3.0)}
 
@@ -303,7 +303,7 @@ def test_a_diagnosis_asks_every_circuit_whether_a_log_is_outside(near: float, mo
 def test_a_low_relief_valve_that_opens_nowhere_in_a_log_keeps_what_was_presumed_of_it(
     pressure: float, percent: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It had a tenth of that: the settings just below the largest pressure alone were counted."""
+    """Before, it kept a tenth of its prior: only the settings just below the largest pressure were counted."""
     found, _ = looked(monkeypatch, lambda one: 0.0 if one == SOUND else -20.0, pressure)
     hidden = np.exp(-4.0) * np.clip(np.log10(SOUND.relief_pressure / pressure), 0.0, 1.0)
     assert found.faulty == pytest.approx(hidden / (1.0 + hidden))
@@ -321,7 +321,8 @@ def test_what_the_condition_would_be_beside_a_fault_that_is_not_excluded_is_said
         return SimpleNamespace(scores=scores, best=fits(0.0).best)
 
     def fitted(_: Any, actuator: Any, **__: Any) -> Any:
-        if actuator.circuit.relief_pressure < SOUND.relief_pressure:  # excluded, but not above the log's pressures
+        # a low setting is excluded, unless it is above all pressures of the log
+        if actuator.circuit.relief_pressure < SOUND.relief_pressure:
             return SimpleNamespace(scores=np.array([-20.0, -29.0]), best=ahead(first=True).best)
         leaks = getattr(actuator.circuit, "seat_leakage_a", 0.0) > 0.0
         return ahead(first=moves) if leaks else ahead(first=False) if actuator.circuit == SOUND else fits(-9.0)

@@ -1,4 +1,4 @@
-"""Without pressure, what no rig file knows of a sound circuit leaves no log unexplained."""
+"""Without pressure, properties of a sound circuit that no rig file states do not leave a log unexplained."""
 
 from dataclasses import replace
 
@@ -47,9 +47,10 @@ def test_with_pressure_none_is_sought() -> None:
 
 @pytest.mark.slow
 def test_a_plain_log_that_wider_valves_explain_gets_its_class(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of the open benchmark, under multisines: the rig file's circuit leaves 16 % of the velocity, this one 10 %.
+    """In this multisine log of the open benchmark, the rig file's circuit leaves 16 % of the velocity, this one 10 %.
 
-    The piston moves so little that its seals might yield that much. They may not here, else nothing is unexplained.
+    The piston moves so little that yielding seals could explain that much. Here they may not, since otherwise nothing
+    would be unexplained.
     """
     monkeypatch.setattr(yielding, "YIELDING", 0.0)
     log = make("plain", "training", 9753).log
@@ -67,7 +68,7 @@ def test_a_plain_log_that_wider_valves_explain_gets_its_class(monkeypatch: pytes
 def test_a_circuit_is_followed_from_the_scale_at_which_it_ran_where_its_relief_valve_opened_there(
     pressure: float, opened: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """From the likeliest scale, where the valve stays shut, no search found back: a stuck make-up valve lost 2.6."""
+    """From the likeliest scale, where the valve stays shut, no search recovered: a stuck make-up valve lost 2.6."""
     setting = ACTUATOR.circuit.relief_pressure
     monkeypatch.setattr(subject, "largest_pressure", lambda *_: pressure * setting)
     fit = FITS.best

@@ -1,4 +1,4 @@
-"""A load that changes over a log is told from friction that comes and goes, by the force balance."""
+"""The force balance distinguishes a load that changes within a log from intermittent friction."""
 
 from dataclasses import replace
 

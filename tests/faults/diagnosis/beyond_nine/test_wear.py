@@ -1,4 +1,4 @@
-"""A log that does not tell a worn pump from leakage: its classes are weighed over what the pump may deliver."""
+"""If a log cannot distinguish a worn pump from leakage, classes are averaged over the pump's deliveries."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -44,7 +44,7 @@ HEALTHY = EhaParameters()
 ACTUATOR = actuator_of(HEALTHY)
 OPEN = (RigCode.WEAR_NOT_EXCLUDED.note(percent=30.0, half_width=30.0),)
 BETWEEN = 0.4
-"""How far the leakage is from minor to major, in its logarithm [fraction]."""
+"""Position of the leakage between minor and major, on a logarithmic scale [fraction]."""
 
 
 @pytest.fixture(scope="module")
@@ -81,10 +81,11 @@ def test_conditions_are_summed_over_pumps_by_what_is_presumed_of_them(monkeypatc
     best = board.fits.best
 
     def held(there: Any, information: Any, _: Any) -> Any:
-        assert information is board.fits.information  # no circuit is fitted with another pump
+        assert information is board.fits.information  # no circuit is fitted again for another pump
         led = dict(zip(COORDINATES, np.exp(there.coordinates - best.coordinates), strict=True))
         share = round(led["leakage"], 6)
-        scaled = {"leakage": share, "bias": share, "bulk_modulus": 1.0 / share}  # all flows, as what is pumped
+        # all flows scale with the pump's delivery
+        scaled = {"leakage": share, "bias": share, "bulk_modulus": 1.0 / share}
         assert led == pytest.approx({name: scaled.get(name, 1.0) for name in COORDINATES})
         return scores[share]
 
@@ -175,7 +176,7 @@ def test_the_nine_lose_the_probability_that_the_pump_is_worn(board: Scoreboard) 
 
 
 def test_a_worn_pump_is_the_likelier_the_less_any_condition_holds_the_log_with_a_sound_one(board: Scoreboard) -> None:
-    """A stuck piston's log with a pump that delivers 80 % was major leakage at 93 %, beyond any major leakage."""
+    """A stuck piston with a pump of 80 % was diagnosed as major leakage at 93 %, with more leakage than that has."""
     left = delivery_left_open(OPEN)
     assert left is not None
     best, major = board.fits.best, ACTUATOR.conditions[list(CONDITIONS).index("major_leakage")]
@@ -200,7 +201,7 @@ def test_a_log_that_says_nothing_of_the_conditions_leaves_wear_as_the_balance_ha
 
 
 def test_no_pump_is_worn_where_oil_would_leak_backwards(board: Scoreboard) -> None:
-    """Slopes promised a pump of a third, and no flow was lost: a sound actuator was worn at 99 %."""
+    """The slopes promised a pump of one third, although no flow was lost: a sound actuator was called worn at 99 %."""
     for likeliest, width in ((-104.0, 5.8), (-104.0, 0.0), (0.0, 5.8)):
         note = RigCode.WEAR_NOT_EXCLUDED.note(percent=3.7, half_width=width, likeliest=likeliest, most=3.7)
         left = delivery_left_open((note,))
@@ -209,7 +210,7 @@ def test_no_pump_is_worn_where_oil_would_leak_backwards(board: Scoreboard) -> No
 
 
 def test_the_nine_keep_their_order_where_slopes_call_a_pump_worn_for_sure(board: Scoreboard) -> None:
-    """A probability of 100 % left nothing to the nine, and the first of them was told: a healthy actuator."""
+    """A probability of 100 % left nothing for the nine, and the first of them was reported: a healthy actuator."""
     found = board.probabilities(shipped_calibration())
     sure = (RigCode.WEAR_NOT_EXCLUDED.note(percent=42.0, half_width=6.0),)
     judged = whatever_the_pump_delivers(Diagnosis(found, (), {}, {}, {}, (), board), ACTUATOR, said(remarks=sure))

@@ -1,4 +1,4 @@
-"""A change of condition is believed where two circuits are so much likelier than one, with all that was chosen."""
+"""A change of condition is believed if two circuits are much likelier than one, given everything that was chosen."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ def whole() -> ClassFits:
 
 
 def fits(*scores: tuple[int, float], deviation: float = 0.02) -> list[ClassFits]:
-    """Return circuits in the middle of a condition, known to a deviation, in the condition of that place by a lead."""
+    """Return circuits at the centres of conditions, known to a deviation, each ahead of other conditions by a lead."""
     found: list[ClassFits] = []
     for place, lead in scores:
         one = np.full(9, -lead)
@@ -52,11 +52,11 @@ def test_all_that_was_chosen_is_priced() -> None:
 
 
 def test_what_a_part_tells_of_a_circuit_counts_as_its_integral_over_the_region() -> None:
-    """In one coordinate, with the others known to nothing: the integral by quadrature."""
+    """The reference is an integral by quadrature over one coordinate; the log says nothing about the others."""
     parts = fits((0, 300.0), (3, 300.0))
     width, told, off = float(WITHIN[0, 0]), 400.0, 0.2
     first = np.zeros((7, 7))
-    first[0, 0] = 2 * LASTING * told  # of two outputs that count as one
+    first[0, 0] = 2 * LASTING * told  # twice, since the two outputs count as one
     at = parts[0].best.coordinates + np.array([off, *np.zeros(6)])
     parts[0] = replace(parts[0], information=first, best=replace(parts[0].best, coordinates=at))
     normal = math.sqrt(2.0 * math.pi * width)
@@ -99,7 +99,7 @@ def test_one_circuit_for_all_is_asked_again_where_its_search_ended_short_of_the_
 
 
 def test_a_part_that_is_followed_to_its_noise_is_priced_as_the_others_are() -> None:
-    """Where more than noise is left of the other part, or of both in one, information that is believed counts alike."""
+    """If the other part or the whole log leaves more than noise, all circuits have the same credible information."""
     rough, parts = 3.0 * blocks().noise, fits((0, 300.0), (3, 300.0))
     (whole,) = fits((0, 99.0))
     left = [replace(one, best=replace(one.best, scales=rough)) for one in (*parts, whole)]

@@ -1,4 +1,4 @@
-"""A stop that no rig file names is found where the piston stands against it, and nowhere else."""
+"""A stop that no rig file states is found if the piston rests against it, and not otherwise."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -28,7 +28,7 @@ OUT_AND_BACK = np.repeat([100.0, 60.0, 0.0, -100.0, -60.0, 0.0], 600)
 
 
 def log_of(stop: float | None, place: int = 0, circuit: CircuitParameters = ACTUATOR.circuit) -> Blocks:
-    """Return what a circuit leaves of a drive out and back that would take it some 35 mm, with and without a stop."""
+    """Return a log of a circuit, with or without a stop, under a drive out and back over some 35 mm."""
     empty = np.zeros(len(OUT_AND_BACK) // 10)
     noise = np.array([4e-5, 2e3])
     blank = Blocks(np.append(OUT_AND_BACK, 0.0), 1e-3, 10, empty, empty, noise, stop=stop)
@@ -57,7 +57,7 @@ def test_how_a_stop_yields_is_not_taken_for_friction_or_leakage() -> None:
     assert np.all(np.isfinite(seen.outputs[~stands]))
     off = fits.best.coordinates - ACTUATOR.conditions[0]
     told = [COORDINATES.index(name) for name in ("leakage", "bias", "friction_rest", "friction_rated", "bulk_modulus")]
-    assert np.all(np.abs(off[told]) < 0.06)  # flow bias would be 25 % off
+    assert np.all(np.abs(off[told]) < 0.06)  # otherwise flow bias would be 25 % off
 
 
 def test_a_piston_that_the_drive_left_standing_met_no_stop() -> None:
@@ -81,7 +81,7 @@ def test_a_stop_is_sought_where_a_circuit_leaves_6_percent_of_an_output(
         return left
 
     monkeypatch.setattr(end_stop, "fit_classes", fitted)
-    assert stopped(log, left, ACTUATOR) == (log, left)  # the stop gains nothing
+    assert stopped(log, left, ACTUATOR) == (log, left)  # the fit with a stop gains nothing
     assert asked == ([log.reach] if sought else [])
 
 

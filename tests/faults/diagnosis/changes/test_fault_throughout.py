@@ -1,4 +1,4 @@
-"""Without pressure, a worn pump's log is not taken for a change of condition, and a change is not taken for a fault."""
+"""Without pressure, a worn pump is not taken for a change of condition, nor a change for a fault."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -29,7 +29,7 @@ def two() -> Any:
 def test_a_worn_pump_that_two_sound_circuits_explain_better_than_one_is_no_change() -> None:
     log = make("worn_pump", "training", 1240).log
     record = Record(1e-3, {name: log[name].to_numpy() for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
-    assert last_part(record, ACTUATOR).onset is None  # two gain 77 on one sound circuit, a pump of 80 % gains 52
+    assert last_part(record, ACTUATOR).onset is None  # over one sound circuit, two gain 77, and a pump of 80 % gains 52
 
 
 def test_a_seal_that_gives_way_is_no_fault_from_end_to_end(two: Any) -> None:
@@ -40,7 +40,7 @@ def test_a_seal_that_gives_way_is_no_fault_from_end_to_end(two: Any) -> None:
 def test_a_change_has_to_be_likelier_than_a_fault_by_as_much_as_than_none(
     two: Any, monkeypatch: pytest.MonkeyPatch, beyond: float, throughout: bool
 ) -> None:
-    """A circuit that explains no more than the sound one, of a fault that is presumed to be there by so much."""
+    """The circuit with a fault explains no more than the sound one; the prior of the fault varies."""
     gain = gain_of(two.whole, two.parts, two.fits)
     odds = odds_of_change(gain, two.fits, two.whole, CHANGED, ACTUATOR)
     asked: list[float] = []

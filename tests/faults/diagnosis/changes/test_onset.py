@@ -1,4 +1,4 @@
-"""A change of condition within a log: when it came, and that the verdict is on what followed."""
+"""A change of condition within a log: its time is found, and the verdict is on the part after it."""
 
 import itertools
 from dataclasses import replace
@@ -62,7 +62,7 @@ def changed(condition: str, drive: str, *, pressure: bool, start: float = 0.0) -
 
 
 def short_log(condition: str | None, start: float = 0.0) -> Record:
-    """Return four seconds at 2 ms, in which a fault comes after 2.2 s or none does."""
+    """Return four seconds at 2 ms, with or without a fault that begins after 2.2 s."""
     rng = np.random.default_rng(11)
     speed = make_drive("prbs", 4.0, 2e-3, HEALTHY, rng)
     after = ACTUATOR.circuit if condition is None else circuit_of(parameters_for(CONDITIONS[condition]))
@@ -133,7 +133,7 @@ def test_a_log_in_one_condition_is_judged_whole() -> None:
 
 
 def foreign(kind: str, index: int) -> Record:
-    """Return a log of the open benchmark, whose physics no circuit here shares."""
+    """Return a log of the open benchmark, which is simulated with other physics than the circuits here."""
     return clean_log(Record.from_frame(make(kind, "training", index).log), HEALTHY).record
 
 
@@ -143,7 +143,7 @@ def test_a_piston_that_creeps_at_first_was_in_no_other_condition_then(index: int
 
 
 def test_two_circuits_that_explain_a_log_better_by_chance_are_no_change() -> None:
-    assert last_part(foreign("plain", 2489), ACTUATOR).onset is None  # they gain 12.1
+    assert last_part(foreign("plain", 2489), ACTUATOR).onset is None  # two circuits gain 12.1
 
 
 @pytest.mark.slow
@@ -155,7 +155,7 @@ def test_a_seal_that_gives_way_is_dated_on_another_actuator() -> None:
 
 
 def with_bursts(*begins: float) -> Record:
-    """Return six seconds at 2 ms of a healthy actuator whose Coulomb friction is fivefold for bursts of 0.3 s."""
+    """Return six seconds at 2 ms of a healthy actuator with bursts of 0.3 s in which Coulomb friction is fivefold."""
     rng = np.random.default_rng(11)
     speed = make_drive("multisine", 6.0, 2e-3, HEALTHY, rng)
     rough = replace(ACTUATOR.circuit, friction_coulomb=5.0 * ACTUATOR.circuit.friction_coulomb)
@@ -209,7 +209,7 @@ def test_of_a_long_log_the_stretches_about_the_last_alarms_are_looked_at_until_o
 
     monkeypatch.setattr(onset, "watch_record", lambda *_, **__: alarms)
     monkeypatch.setattr(onset, "_last_of", last_of)
-    long = Record(0.02, {"motor_speed_rad_s": np.zeros(5001)}, start_time=500.0)  # of 100 s
+    long = Record(0.02, {"motor_speed_rad_s": np.zeros(5001)}, start_time=500.0)  # 100 s long
     changed = 525.0
     assert last_part(long, ACTUATOR).window.start_time == 525.0
     assert looked == [(579.0, pytest.approx(21.0)), (555.0, 30.0), (525.0, 30.0)]
@@ -218,12 +218,13 @@ def test_of_a_long_log_the_stretches_about_the_last_alarms_are_looked_at_until_o
     assert last_part(long, ACTUATOR).record is long
     assert len(looked) == MOST_ALARMS + 1
     looked.clear()
-    for short in (long.slice(0, 4500), replace(long, sample_time=0.06)):  # of 90 s, and too slow to be watched
+    # one of 90 s, and one sampled too slowly for the watch
+    for short in (long.slice(0, 4500), replace(long, sample_time=0.06)):
         assert last_part(short, ACTUATOR).window is short
     assert len(looked) == 2
     alarms[1:] = [alarm(503.0)]
     last_part(long, ACTUATOR)
-    assert looked[2] == (500.0, 30.0)  # no stretch begins before the log
+    assert looked[2] == (500.0, 30.0)  # no part begins before the log
 
 
 @pytest.mark.slow
@@ -287,7 +288,7 @@ def test_the_interval_of_the_time_is_wider_by_what_the_circuits_leave_unexplaine
     def run(changing: Blocks, rows: np.ndarray) -> list[np.ndarray]:
         assert changing.earlier is not None
         assert len(rows) == len(np.atleast_1d(changing.earlier[0]))
-        costs = 0.1 * (np.atleast_1d(changing.earlier[0]) / 10 - best) ** 2  # 1.92 is passed beyond 4.4 blocks
+        costs = 0.1 * (np.atleast_1d(changing.earlier[0]) / 10 - best) ** 2  # exceeds 1.92 beyond 4.4 blocks
         return [np.full((200, 1), np.sqrt(2.0 * cost / (200 - blocks.first))) for cost in costs]
 
     monkeypatch.setattr(onset, "predicted", run)

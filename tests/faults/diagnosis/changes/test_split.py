@@ -1,4 +1,4 @@
-"""Where a log most likely splits into two circuits, and whether they can be in unlike conditions."""
+"""The most likely split of a log into two circuits, and whether the two can be in different conditions."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ ACTUATOR = actuator_of(EhaParameters())
 
 
 def flat(velocity: np.ndarray) -> tuple[Blocks, PointFit]:
-    """A log of one output, and a model of it that can only shift it."""
+    """Return a log of one output, and a model that can only shift it."""
     blocks = Blocks(np.zeros(10 * len(velocity) + 1), 1e-3, 10, velocity, None, np.array([1.0]))
     slopes = np.zeros((7, len(velocity), 1))
     slopes[0] = 1.0

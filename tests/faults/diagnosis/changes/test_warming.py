@@ -1,4 +1,4 @@
-"""Without pressure, a log whose oil warms: its drift of leakage is found, and no other log has one."""
+"""Without pressure, the drift of leakage is found in a log whose oil warms, and in no other log."""
 
 from dataclasses import replace
 from functools import cache
@@ -37,7 +37,7 @@ SECONDS = 4.0
 
 @cache
 def log(condition: str, factor: float) -> CleanLog:
-    """Return a log without pressure over which leakage grows by a factor, and viscous friction falls by it."""
+    """Return a log without pressure in which leakage grows by a factor and viscous friction falls by it."""
     p, rng = circuit_of(parameters_for(CONDITIONS[condition])), np.random.default_rng(5)
     times = np.linspace(0.0, SECONDS, 9)
     warm = [
@@ -104,7 +104,7 @@ def test_a_drift_is_not_followed_that_will_gain_less_than_is_wanted(monkeypatch:
         return fitted_on(*given)
 
     monkeypatch.setattr(warming, "fit_freely", counted)
-    monkeypatch.setattr(warming, "NEAR", 0.0)  # else one fit may be all
+    monkeypatch.setattr(warming, "NEAR", 0.0)  # otherwise the search may end after one fit
     monkeypatch.setattr(warming, "FARTHEST", 0.2)
     found = drift_of(blocks, fits, ACTUATOR, 0.5 * whole.gain)
     assert found is not None

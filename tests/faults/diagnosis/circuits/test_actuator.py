@@ -1,4 +1,4 @@
-"""A healthy actuator among circuits that are fitted to logs."""
+"""The healthy actuator with which circuits are fitted to logs."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ LONGEST = float(longest_stroke(PAPER))
 
 @pytest.mark.parametrize(("stroke", "larger"), [(None, 1.0), (0.9 * LONGEST, 1.0), (1.3 * LONGEST, 1.3)])
 def test_chambers_have_room_for_the_stroke(stroke: float | None, larger: float) -> None:
-    """With a volume 27 % too small in the rig file of a single rod no circuit fitted, and the class was unknown."""
+    """With a chamber volume 27 % too small in a single rod's rig file, no circuit fitted, and the class was unknown."""
     rig = replace(PAPER, stroke=stroke)
     assert with_room(rig).chamber_volume == pytest.approx(larger * PAPER.chamber_volume)
     (*said,) = doubtful_entries(rig)

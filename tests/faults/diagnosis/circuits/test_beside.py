@@ -1,4 +1,4 @@
-"""A circuit beside the nine conditions is told by its levels of leakage and friction, and by what is odd there."""
+"""A circuit outside the nine is described by its levels of leakage and friction, and by what deviates there."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A motor that turns at samples of a slow log is ahead of straight lines between them; circuits know by how much."""
+"""If commands come at samples of a slow log, the motor leads straight lines between them; circuits find the lead."""
 
 from dataclasses import replace
 
@@ -21,12 +21,12 @@ from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
 SLOW, FINE, LAG = 0.01, 5e-4, 5e-3
-"""Sample times of the log and of the run, and the motor's lag [s]."""
+"""Sample times of the log and of the simulation, and the motor's lag [s]."""
 
 RISEN = 1.0 - float(np.exp(-(SLOW - 0.5 * FINE) / LAG))
 AHEAD = (SLOW - 0.5 * FINE - LAG * RISEN) / RISEN - 0.5 * SLOW
-"""Lead of that motor where commands come at samples [s]: what it turns in one, over its rise, less half of the time. A
-command of the run takes a step of it."""
+"""Lead of that motor if commands come at samples [s]: its angle within one sample over its rise in speed, less half of
+the sample time. A command takes one step of the simulation."""
 
 CHANNELS = ("motor_speed_rad_s", "position_m", "differential_pressure_pa")
 CONDITION = "minor_leakage_minor_friction"
@@ -37,7 +37,7 @@ ACTUATOR = actuator_of(EhaParameters())
 
 
 def binary(shift: float = 0.0) -> Record:
-    """Return a log at 100 Hz under a binary signal of 50 ms, whose commands come some time before samples [s]."""
+    """Return a log at 100 Hz under a binary signal of 50 ms whose commands come ``shift`` before samples [s]."""
     every, late = round(SLOW / FINE), round((SLOW - FINE + shift) / FINE)
     speed = np.repeat(np.random.default_rng(1).choice((-90.0, 90.0), 160), round(0.05 / FINE))
     run = simulate(CIRCUIT, speed, FINE, TRUE, sensors=BENCH, rng=np.random.default_rng(2))
@@ -45,7 +45,7 @@ def binary(shift: float = 0.0) -> Record:
 
 
 def error(blocks: Blocks, name: str) -> float:
-    """Return how far off a coordinate of the circuit is that fits best."""
+    """Return the error of a coordinate of the circuit that fits best."""
     place = COORDINATES.index(name)
     fit = fit_freely(blocks, ACTUATOR, CONDITION)
     return abs(float(fit.coordinates[place] - coordinates_of(TRUE, ACTUATOR.rated)[place]))

@@ -33,7 +33,7 @@ def test_an_offset_counts_by_what_it_gains(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_piston_that_creeps_shows_no_offset_that_is_not_there() -> None:
-    """Of the open benchmark: one linear step promises 3.7 rad/s in 29, and a circuit with it gains 2.7."""
+    """In this log of the open benchmark, one linear step promises 3.7 rad/s in 29, and a circuit with it gains 2.7."""
     log = make("plain", "training", 9749).log
     record = Record(1e-3, {name: log[name].to_numpy() for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
     parameters = EhaParameters()

@@ -1,4 +1,4 @@
-"""Without pressure, what a piston began with is waited for until it is forgotten."""
+"""Logs in blocks: without pressure, the blocks in which the piston's initial state still matters are skipped."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ HEALTHY, PRESSURE = EhaParameters(), "differential_pressure_pa"
 
 
 def running(seconds: float, first: float) -> Record:
-    """Return a log cut out of a test of major friction, which begins with a motor speed [rad/s]."""
+    """Return a part of a test under major friction that begins at a motor speed [rad/s]."""
     rng = np.random.default_rng(3)
     speed = np.concatenate([[0.0], make_drive("steps", 12.0, 2e-3, HEALTHY, rng)])
     log = simulate(CIRCUIT, speed, 2e-3, parameters_for(CONDITIONS["major_friction"]), sensors=RIG, rng=rng)
@@ -72,11 +72,11 @@ def test_blocks_in_a_long_gap_of_speed_and_shortly_behind_it_do_not_count() -> N
 @pytest.mark.parametrize(
     ("drive", "sample_time", "most"),
     [
-        ("prbs", 1e-4, (2.5e-4, 3e-4)),  # 1.7e-4 and 2.0e-4; along straight lines 4.7e-4 and 6.6e-4
-        ("multisine", 1e-4, (6e-4, 4e-4)),  # 4.0e-4 and 2.5e-4; 1.9e-3 and 8.8e-4
-        ("prbs", 1e-3, (5e-4, 3e-4)),  # 3.8e-4 and 1.7e-4; 7.7e-4 and 6.9e-4
-        ("multisine", 1e-3, (4e-4, 3e-4)),  # 2.1e-4 and 1.5e-4; 1.6e-3 and 6.9e-4
-        ("steps", 1e-3, (8e-4, 5e-4)),  # 6.3e-4 and 2.5e-4; 6.5e-4 and 1.5e-3
+        ("prbs", 1e-4, (2.5e-4, 3e-4)),  # measured 1.7e-4 and 2.0e-4; with straight lines 4.7e-4 and 6.6e-4
+        ("multisine", 1e-4, (6e-4, 4e-4)),  # 4.0e-4 and 2.5e-4; with lines 1.9e-3 and 8.8e-4
+        ("prbs", 1e-3, (5e-4, 3e-4)),  # 3.8e-4 and 1.7e-4; with lines 7.7e-4 and 6.9e-4
+        ("multisine", 1e-3, (4e-4, 3e-4)),  # 2.1e-4 and 1.5e-4; with lines 1.6e-3 and 6.9e-4
+        ("steps", 1e-3, (8e-4, 5e-4)),  # 6.3e-4 and 2.5e-4; with lines 6.5e-4 and 1.5e-3
     ],
 )
 def test_a_circuit_follows_a_log_of_itself_whose_speed_is_curved_between_samples(

@@ -1,4 +1,4 @@
-"""Circuits by coordinates, and a log in blocks."""
+"""Circuits from coordinates, run under a log in blocks."""
 
 from dataclasses import replace
 from typing import Any
@@ -37,7 +37,8 @@ def test_every_condition_comes_back_from_its_coordinates(name: str) -> None:
     (row,) = parameter_rows(coordinates_of(true, ACTUATOR.rated)[None], ACTUATOR.circuit, ACTUATOR.rated)
     found = dict(zip(CircuitParameters.__dataclass_fields__, row.tolist(), strict=True))
     for field in CircuitParameters.__dataclass_fields__:
-        if field not in ("motor_lag", "stroke"):  # the logged speed is the motor's own, and no stop is known
+        # the logged speed already includes the motor's lag, and no stop is known
+        if field not in ("motor_lag", "stroke"):
             assert found[field] == pytest.approx(getattr(true, field), rel=1e-9), field
 
 
@@ -52,7 +53,7 @@ def test_friction_opposes_motion_at_every_coordinate() -> None:
 @pytest.mark.parametrize(("beyond", "shown"), [(-0.025, False), (-0.015, True), (0.015, True), (0.025, False)])
 def test_a_piston_that_turned_within_two_percent_of_a_stop_met_it(beyond: float, shown: bool) -> None:
     still = np.zeros(20)
-    still[5] = 0.03 * (1.0 + beyond) / 0.01  # out to beside a stop 30 mm away
+    still[5] = 0.03 * (1.0 + beyond) / 0.01  # out to a place near the stop 30 mm away
     log = Blocks(np.zeros(201), 1e-3, 10, still, None, np.ones(1))
     (row,) = _between_stops(log, parameter_rows(CENTRE[None], replace(ACTUATOR.circuit, stroke=0.06), ACTUATOR.rated))
     assert bool(row[COLUMN["stroke"]] == pytest.approx(0.06)) is shown
@@ -61,7 +62,7 @@ def test_a_piston_that_turned_within_two_percent_of_a_stop_met_it(beyond: float,
 
 @pytest.mark.parametrize(("stiffness", "read"), [(2e7, 2e7), (1e9, 1e8), (1e5, SOFTEST_END * 1e8)])
 def test_an_end_of_the_stroke_is_as_stiff_as_the_log_shows_it_pressed(stiffness: float, read: float) -> None:
-    """Ends that yielded 0.6 mm in place of 0.1 left 10 % of a small strut's pressure, and its log unexplained."""
+    """Ends that yielded 0.6 instead of 0.1 mm left 10 % of a small strut's pressure, and its log was unexplained."""
     healthy, moved, pressure = replace(ACTUATOR.circuit, stroke=0.06), np.zeros(20), np.zeros(20)
     moved[5], pressure[5:] = 0.0302 / 0.01, 0.0002 * stiffness / healthy.piston_area  # 0.2 mm past the stop
     log = Blocks(np.zeros(201), 1e-3, 10, moved, pressure, np.ones(2))
@@ -99,7 +100,7 @@ def test_a_pressure_that_comes_in_some_rows_alone_has_the_means_of_lines_between
     rng = np.random.default_rng(3)
     smooth, sampled = 1e6 * np.sin(8.0 * time), np.full(len(time), np.nan)
     sampled[::rows] = smooth[::rows] + 1e4 * rng.standard_normal(len(time[::rows]))
-    sampled[len(time) // 2 : len(time) // 2 + round(0.1 / sample_time)] = np.nan  # a real gap stays one
+    sampled[len(time) // 2 : len(time) // 2 + round(0.1 / sample_time)] = np.nan  # a real gap must remain a gap
     log = {"motor_speed_rad_s": np.cos(time), "position_m": 1e-2 * np.sin(time), "differential_pressure_pa": sampled}
     blocks = blocks_of(Record(sample_time, log))
     assert blocks.pressure is not None
@@ -108,7 +109,7 @@ def test_a_pressure_that_comes_in_some_rows_alone_has_the_means_of_lines_between
     centres = BLOCK * (np.arange(len(there)) + 0.5) - 0.5 * sample_time
     off = (blocks.pressure - 1e6 * np.sin(8.0 * centres))[there]
     assert blocks.noise[1] == pytest.approx(1e4 * (rows * sample_time / BLOCK) ** 0.5, rel=0.15)
-    # lines between samples that are a block apart have less noise in it than the samples
+    # averaged over a block, a line between samples one block apart has less noise than a sample
     assert 0.6 * blocks.noise[1] < np.sqrt(np.mean(off**2)) < 1.25 * blocks.noise[1]
 
 
@@ -155,9 +156,9 @@ def test_a_circuit_under_a_load_begins_where_its_log_does_and_strains_its_spring
         return float(found[0, 0]), float(found[0, 1])
 
     held = 300.0 / area
-    assert first(blocks, loaded)[1] == pytest.approx(held, rel=0.02)  # at rest
+    assert first(blocks, loaded)[1] == pytest.approx(held, rel=0.02)  # at rest, pressure holds the load
     velocity, pressure = first(replace(blocks, opening=(0.0, -0.02)), replace(loaded, load_force=900.0))
-    assert velocity < -0.01  # it gives way until its oil is squeezed
+    assert velocity < -0.01  # the piston gives way until its oil is compressed
     assert pressure < 0.5 * 900.0 / area
     assert first(replace(blocks, opening=(0.0, -0.02)), ACTUATOR.circuit) == first(blocks, ACTUATOR.circuit)
     assert first(replace(blocks, place=0.015), sprung)[1] == pytest.approx(held, rel=0.02)
@@ -210,10 +211,11 @@ def test_an_earlier_circuit_is_run_once_for_all_that_are_tried_after_it(monkeypa
     (first,), (again,) = predicted(changed, rows), predicted(changed, rows)
     assert asked == [501, 301, 301]
     np.testing.assert_array_equal(first, again)
-    (whole,) = predicted(replace(plain, earlier=(np.array([500]), leaking)), rows)  # at each sample its own circuit
+    # the sample of the change is given for each circuit
+    (whole,) = predicted(replace(plain, earlier=(np.array([500]), leaking)), rows)
     size = np.abs(whole).max(axis=0)
     assert np.all(np.abs(first - whole) < (2e-4, 2e-4) * size)
-    (between,) = predicted(replace(plain, earlier=(503, leaking)), rows)  # the change is no end of a block
+    (between,) = predicted(replace(plain, earlier=(503, leaking)), rows)  # the change is not at the end of a block
     assert asked[-1] == 801
     assert np.all(np.abs(between - first)[:49] < (2e-4, 1e-3) * size)
 
@@ -290,7 +292,7 @@ def test_the_noise_of_blocks_is_that_of_the_sensors_over_them(position: bool) ->
 
 def test_a_sensor_that_was_out_for_the_whole_stretch_is_none() -> None:
     velocity = 0.01 * np.sin(np.arange(3000) * 1e-3)
-    out = np.where(np.arange(3000) < 80, 1e5, np.nan)  # and was on while nothing counted yet
+    out = np.where(np.arange(3000) < 80, 1e5, np.nan)  # it worked only during the first samples, which do not count
     log = Record(1e-3, {"motor_speed_rad_s": SPEED, "velocity_m_s": velocity})
     for lost in (out, np.full(3000, np.nan)):
         blocks = blocks_of(log.replace(differential_pressure_pa=lost))

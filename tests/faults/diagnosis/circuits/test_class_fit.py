@@ -1,4 +1,4 @@
-"""A circuit is fitted to a log by steps down the slope of its log-posterior."""
+"""A circuit is fitted to a log by steps along the gradient of its log-posterior."""
 
 import warnings
 from dataclasses import replace
@@ -24,7 +24,7 @@ APART = np.array([0.05, -0.05, 0.08, 0.04, 0.03, 0.05, 0.02])
 
 @cache
 def log() -> Blocks:
-    """Return the log of a circuit beside the healthy one, without noise."""
+    """Return a log, without noise, of a circuit that differs from the healthy one."""
     speed = np.repeat([60.0, 120.0, -120.0, -70.0], 500)
     empty = np.zeros(len(speed) // 10)
     blank = Blocks(np.append(speed, speed[-1]), 1e-3, 10, empty, empty, np.array([1e-4, 2e3]))
@@ -62,7 +62,7 @@ def test_what_a_shorter_step_gains_is_read_off_the_parabola_through_the_one_that
     promised = 1.5
 
     def gained(share: float) -> float:
-        return 2.0 * promised * share - bend * share**2  # its slope where the step begins is twice what it promises
+        return 2.0 * promised * share - bend * share**2  # its slope at the start of the step is twice the promised gain
 
     best = max(gained(share) for share in np.linspace(0.0, 4.0, 40_001))
     assert _most_gained(promised, reach, gained(reach)) == pytest.approx(best, rel=1e-6)
@@ -76,7 +76,7 @@ def test_a_whole_step_promises_half_of_what_its_slope_would_give(pulled: float) 
     step = np.linalg.solve(information, class_fit._uphill(log(), here, CENTRE, pull))
     promised = class_fit._promised(log(), here, CENTRE, pull, step)
     assert promised == pytest.approx(0.5 * step @ information @ step)
-    for share in (0.5, 1.5):  # less is gained before it and beyond it
+    for share in (0.5, 1.5):  # a shorter or longer step gains less
         other = class_fit._promised(log(), here, CENTRE, pull, share * step)
         assert other == pytest.approx((2.0 * share - share**2) * promised)
 
@@ -84,7 +84,8 @@ def test_a_whole_step_promises_half_of_what_its_slope_would_give(pulled: float) 
 def test_the_circuit_that_left_a_log_is_found() -> None:
     found = fit_freely(log(), ACTUATOR, next(iter(CONDITIONS)), gained=1e-3)
     off = found.coordinates - CENTRE - APART
-    assert found.cost <= cost(CENTRE + APART) < cost(CENTRE)  # the weak prior pulls leakage and bias along each other
+    # the weak prior shifts leakage and bias against each other
+    assert found.cost <= cost(CENTRE + APART) < cost(CENTRE)
     assert float(off @ found.information @ off) < class_fit.LASTING  # within one deviation
     assert off[2:5] == pytest.approx(0.0, abs=0.02)
 

@@ -1,4 +1,4 @@
-"""Fitted circuits beside the conditions' regions."""
+"""Fitted circuits compared with the regions of the conditions."""
 
 from dataclasses import replace
 
@@ -90,7 +90,7 @@ def test_a_stuck_piston_says_nothing_of_friction() -> None:
 
 
 def residual(left: np.ndarray, *, pressure: bool = True) -> tuple[PointFit, Blocks]:
-    """A fit that leaves what is given of both channels."""
+    """Return a fit with given residuals in each channel, and its log."""
     log = blocks(pressure=pressure)
     outputs = log.outputs
     found = fit(0, outputs=outputs.shape[1])

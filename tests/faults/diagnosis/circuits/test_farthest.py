@@ -1,4 +1,4 @@
-"""How far off a circuit may lie: by as little chance in all that is fitted as in two severities."""
+"""The limits for a circuit's distance are equally improbable for all fitted coordinates and for two severities."""
 
 import pytest
 from scipy.special import chdtrc

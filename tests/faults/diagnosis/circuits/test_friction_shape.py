@@ -1,4 +1,4 @@
-"""What the shape of the friction law leaves open of friction at rated velocity."""
+"""The uncertainty of friction at rated velocity from the unknown shape of the friction law."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ FRICTION = [REST, QUADRATIC, RATED]
 
 
 def moved(fastest: float) -> np.ndarray:
-    """Return what bends move a healthy circuit by that slides at up to a share of rated velocity."""
+    """Return the effect of bends on a healthy circuit that slides at up to a share of rated velocity."""
     velocity = fastest * ACTUATOR.rated * np.sin(np.linspace(0.0, 40.0, 400))
     one = Blocks(np.zeros(4001), 1e-3, 10, velocity, velocity, np.array([1e-4, 1e3]))
     outputs = np.stack([velocity, velocity], axis=1)

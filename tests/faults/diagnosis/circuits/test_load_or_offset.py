@@ -1,4 +1,4 @@
-"""Without pressure, a load on the rod that the rig file does not have is not taken for an offset of motor speed."""
+"""Without pressure, a load on the rod that the rig file does not state is not taken for an offset of motor speed."""
 
 from dataclasses import replace
 from functools import cache
@@ -25,7 +25,7 @@ CODES = {AgainstCode.SPEED_BIAS, AgainstCode.LOAD_UNTOLD, AgainstCode.LOAD_OR_OF
 
 @cache
 def log(force: float = 0.0, stiffness: float = 0.0, offset: float = 0.0) -> Blocks:
-    """Return a log without pressure of an actuator under loads that its rig file does not have [N, N/m, rad/s]."""
+    """Return a log without pressure, with a force, a spring and an offset that the rig file lacks [N, N/m, rad/s]."""
     p, rng = replace(circuit_of(PAPER), load_force=force, load_stiffness=stiffness), np.random.default_rng(4)
     made = simulate(CIRCUIT, make_drive("steps", 6.0, 2e-3, PAPER, rng), 2e-3, p, sensors=RIG, rng=rng)
     speed = made["motor_speed_rad_s"] + offset

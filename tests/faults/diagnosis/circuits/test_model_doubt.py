@@ -1,4 +1,4 @@
-"""The doubt of a fitted circuit: sensors' noise, a wrong model's error counted once, and what is seldom known."""
+"""Covariance of a fitted circuit: sensor noise, a wrong model's error counted once, and rarely known parameters."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def log(blocks: int) -> Blocks:
 
 
 def told(blocks: int, share: float = 0.0) -> tuple[PointFit, Blocks]:
-    """Return a fit that leaves of each output a share that no sensor makes; each coordinate moves its own blocks."""
+    """Return a fit whose residuals exceed sensor noise by a share, and its log; each coordinate has its own blocks."""
     one = log(blocks)
     slopes = np.zeros((7, blocks, 2))
     for i in range(7):
@@ -48,7 +48,7 @@ def told(blocks: int, share: float = 0.0) -> tuple[PointFit, Blocks]:
 
 
 def leaving(fit: PointFit, one: Blocks, size: np.ndarray) -> PointFit:
-    """Return a fit at its best that leaves residuals of a size, which do not last: each is up as often as down."""
+    """Return a fit at its optimum with residuals of a given size that do not last: half of them have each sign."""
     block, which = np.divmod(np.arange(len(fit.fitted)) - one.first, 7)
     up = np.where(np.isin(block % 4, [0, 3]), 1.0, -1.0) * (-1.0) ** which
     return replace(fit, scales=size, fitted=one.outputs - up[:, None] * size)
@@ -88,10 +88,10 @@ def test_what_the_noise_is_not_known_to_is_no_wrong_model() -> None:
 
 @pytest.mark.parametrize("slope", [1.0, -1.0], ids=["the same in all blocks", "to and fro"])
 def test_what_a_position_adds_to_one_block_it_takes_from_the_next(slope: float) -> None:
-    """As many draws of an encoder's noise say how far off a fit is."""
+    """Many draws of an encoder's noise give the reference for the error of the fit."""
     fit, one = told(430)
     slopes = np.zeros_like(fit.slopes)
-    slopes[0, :, 0] = 100.0 * NOISE[0] * slope ** np.arange(430)  # next to which the prior counts for little
+    slopes[0, :, 0] = 100.0 * NOISE[0] * slope ** np.arange(430)  # so large that the prior hardly counts
     lone, noise = replace(fit, slopes=slopes), np.random.default_rng(0).standard_normal((4000, 431)) / np.sqrt(2.0)
     weight = slopes[0, one.first :, 0] / NOISE[0]
     drawn = np.var(np.diff(noise, axis=1)[:, one.first :] @ weight / np.sum(weight**2))
@@ -105,7 +105,7 @@ def test_what_a_position_adds_to_one_block_it_takes_from_the_next(slope: float) 
 
 
 def test_what_an_encoder_takes_back_is_no_wrong_model() -> None:
-    """Its steps do not average where a piston is slow, so that more is left than the noise."""
+    """The steps of an encoder do not average out if the piston is slow, so the residuals exceed the noise."""
     fit, one = told(2_010)
     rng, encoder = np.random.default_rng(0), replace(one, differenced=True)
     steps = 2.0 * np.diff(rng.standard_normal((2_011, 1)), axis=0) / np.sqrt(2.0)
@@ -119,7 +119,7 @@ def test_what_an_encoder_takes_back_is_no_wrong_model() -> None:
 
 
 def test_a_fast_log_that_is_followed_to_its_noise_shows_no_wrong_model() -> None:
-    """A search counts no residual as less than a thousandth of the signal; noise averages to less."""
+    """A search counts no residual as less than a thousandth of the signal, but the noise averages to less than that."""
     fit, one = told(14_010)
     quiet = replace(one, noise=0.3 * NOISE)
     followed = replace(leaving(fit, quiet, 0.3 * NOISE), scales=least_scales(quiet))
@@ -134,7 +134,8 @@ def test_a_fast_log_that_is_followed_to_its_noise_shows_no_wrong_model() -> None
 
 def test_beside_a_wrong_model_the_noise_of_a_position_is_white() -> None:
     fit, one = told(410, 0.5)
-    up = np.where(np.arange(410) // 2 % 2, 1.0, -1.0)[:, None]  # neighbours agree as often as not
+    # neighbouring residuals agree in sign as often as they differ
+    up = np.where(np.arange(410) // 2 % 2, 1.0, -1.0)[:, None]
     steady = replace(fit, slopes=fit.slopes + NOISE, fitted=one.outputs - up * fit.scales)
     white, differenced = (
         doubt_of(steady, nothing_seldom(410), blocks, CENTRE, SURE, ALL, SPREADS)
@@ -184,7 +185,7 @@ def test_each_output_answers_for_its_own_error() -> None:
         doubt_of(one_fit, nothing_seldom(1_410), one, CENTRE, SURE, ALL, SPREADS)[0, 0]
         for one_fit in (fit, velocity_off, both_off)
     )
-    assert less == pytest.approx(2.0 * sure, rel=0.1)  # pressure still tells all that it told
+    assert less == pytest.approx(2.0 * sure, rel=0.1)  # pressure still contributes all its information
     assert least > 10.0 * less
 
 
@@ -199,7 +200,7 @@ def test_what_is_seldom_known_widens_what_answers_like_it_as_far_as_the_log_leav
         for seldom in (nothing_seldom(blocks), alike, apart)
     )
     weak, valve = WEAK[0, 0], SELDOM_KNOWN["makeup_opening"] ** 2
-    odds = RIGHT / (1.0 - RIGHT) * np.sqrt((weak + valve) / weak)  # the log is as the rig's valve has it
+    odds = RIGHT / (1.0 - RIGHT) * np.sqrt((weak + valve) / weak)  # the log agrees with the rig file's valve
     assert open_**2 == pytest.approx(weak * valve / (weak + valve) / (1.0 + odds), rel=0.03)
     assert sure < seen < 2.0 * sure
 
@@ -209,7 +210,7 @@ def test_what_the_log_says_of_what_is_seldom_known_counts_as_far_as_the_fit_went
     fit, one = told(blocks)
     seldom = nothing_seldom(blocks)
     seldom[1] = fit.slopes[0] + fit.slopes[1] * 0.5
-    rest = seldom[1] - fit.slopes[0]  # what is left once the first coordinate has given way, and the second may not
+    rest = seldom[1] - fit.slopes[0]  # the remainder if the first coordinate is free and the second is fixed
     given_way = replace(fit, slopes=fit.slopes * np.array([1, 0, 1, 1, 1, 1, 1])[:, None, None])
     without = doubt_of(given_way, seldom, one, CENTRE, SURE, ALL, SPREADS)[0, 0]
     strayed = doubt_of(replace(given_way, fitted=one.outputs - by * rest), seldom, one, CENTRE, SURE, ALL, SPREADS)[
@@ -245,7 +246,7 @@ def test_friction_of_a_piston_that_sticks_is_open_to_each_condition_that_is_as_l
 
 
 def fitted(at: int) -> tuple[PointFit, Blocks, np.ndarray]:
-    """Return a fit at a condition, its log without what was measured, and its row of parameters."""
+    """Return a fit at a condition, its log without the measured outputs, and its row of parameters."""
     speed = make_drive("prbs", 4.0, 1e-3, EhaParameters(), np.random.default_rng(0))[:4_001]
     count = (len(speed) - 1) // 10
     one = Blocks(speed, 1e-3, 10, np.zeros(count), np.zeros(count), NOISE)
@@ -256,7 +257,7 @@ def fitted(at: int) -> tuple[PointFit, Blocks, np.ndarray]:
 
 
 def nudged(fit: PointFit, one: Blocks, row: np.ndarray, name: str, by: float) -> np.ndarray:
-    """Return by what the outputs change if a parameter does."""
+    """Return the change of the outputs for a change of one parameter."""
     other = row.copy()
     other[COLUMN[name]] += by
     return predicted(one, other[None])[0] - fit.fitted

@@ -1,4 +1,4 @@
-"""What a log says nothing of, and what then hangs on it."""
+"""The coordinates that a log does not narrow, and the severities that depend on them."""
 
 import numpy as np
 

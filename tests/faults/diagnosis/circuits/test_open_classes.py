@@ -1,4 +1,4 @@
-"""Severities of a log that leaves two classes open hold the circuits of both."""
+"""If a log leaves two classes open, its severities include the circuits of both."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def test_a_class_that_is_left_open_has_the_circuit_that_follows_best_about_it() 
     assert (first.probability, second.probability) == (0.4, 0.6)
     assert first.coordinates is classes().best.coordinates
     assert not np.array_equal(second.coordinates, ACTUATOR.conditions[NAMES.index(OTHER)])
-    # about another class much the same circuit follows this log best, but for how friction bends, which it hardly tells
+    # about another class nearly the same circuit is best: only the bend of friction differs, which the log hardly shows
     told = [COORDINATES.index(name) for name in ("leakage", "friction_rest", "friction_rated", "bulk_modulus")]
     assert second.coordinates[told] == pytest.approx(first.coordinates[told], abs=0.2)
 
@@ -78,6 +78,6 @@ def test_friction_at_rated_velocity_is_open_where_the_piston_moves_at_a_fifth_of
 
 @pytest.mark.slow
 def test_a_search_whose_slopes_nearly_cancel_comes_to_the_class_that_is_there() -> None:
-    found = read(make("plain", "training", 3194).log).diagnose()  # was minor leakage alone at 89 %
+    found = read(make("plain", "training", 3194).log).diagnose()  # the verdict was minor leakage alone, at 89 %
     assert found.condition == "minor_leakage_minor_friction"
-    assert found.probabilities[found.condition] > 0.6  # of which the law of friction above these speeds leaves some
+    assert found.probabilities[found.condition] > 0.6  # not all, since the friction law above these speeds is unknown

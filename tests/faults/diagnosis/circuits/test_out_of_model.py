@@ -1,4 +1,4 @@
-"""A log that no condition explains is "unknown", and each reason has its own limit: above it, not below."""
+"""A log that no condition explains is "unknown"; each reason has its own limit, and applies above it only."""
 
 import warnings
 from collections.abc import Mapping
@@ -37,9 +37,9 @@ NOISE = np.array([1e-4, 2e3])
 
 @cache
 def run_of(place: tuple[float, ...], dwell: int = 1000, pump: float = 1.0) -> Blocks:
-    """Return the log that a circuit leaves of eight speeds, each held for so many milliseconds, without noise.
+    """Return the log of a circuit at eight speeds, each held for ``dwell`` milliseconds, without noise.
 
-    Its pump moves ``pump`` times what the rig's does.
+    Its pump delivers ``pump`` times as much as the rig's.
     """
     speed = np.repeat(LEVELS, dwell)
     empty = np.zeros(len(speed) // 10)
@@ -51,7 +51,7 @@ def run_of(place: tuple[float, ...], dwell: int = 1000, pump: float = 1.0) -> Bl
 
 @cache
 def slopes_of(place: tuple[float, ...]) -> np.ndarray:
-    """Return derivatives of what a circuit does with respect to its coordinates."""
+    """Return the derivatives of a circuit's outputs with respect to its coordinates."""
     point = np.array(place)
     rows = parameter_rows(np.vstack([point, point + 0.02 * np.eye(len(point))]), ACTUATOR.circuit, ACTUATOR.rated)
     runs = predicted(run_of(place), rows)
@@ -59,7 +59,7 @@ def slopes_of(place: tuple[float, ...]) -> np.ndarray:
 
 
 def fitted(blocks: Blocks, place: np.ndarray) -> ClassFits:
-    """Return fits whose best circuit is at a place."""
+    """Return fits whose best circuit has given coordinates."""
     key = tuple(place.tolist())
     scales, slopes = scales_of(blocks, run_of(key).outputs), slopes_of(key)
     weighted = (slopes[:, blocks.first :] / scales).reshape(len(place), -1)
@@ -71,14 +71,14 @@ def fitted(blocks: Blocks, place: np.ndarray) -> ClassFits:
 
 
 def reasons(blocks: Blocks, place: np.ndarray | None = None) -> Mapping[AgainstCode, Note]:
-    """Return what speaks against a log, by code, where its best circuit is at a place, or is looked for."""
+    """Return the reasons against a log, by code, for a best circuit with given coordinates; by default it is fitted."""
     fits = fit_classes(blocks, ACTUATOR) if place is None else fitted(blocks, place)
     region = float(np.max(region_scores(fits.best, fits.information, ACTUATOR)))
     return {AgainstCode(note.code): note for note in reasons_against(blocks, fits, region, ACTUATOR)}
 
 
 def shifted(**by: float) -> np.ndarray:
-    """Return the healthy circuit's coordinates, some of them moved by a logarithm."""
+    """Return the healthy circuit's coordinates, some of them shifted, in logarithms."""
     return ACTUATOR.conditions[0] + np.array([by.get(name, 0.0) for name in COORDINATES])
 
 
@@ -150,7 +150,7 @@ def test_an_oil_is_another_only_where_the_log_knows_how_stiff_it_is(known: float
 
 
 def slipping(late: int, far: float = 1.0, *, pressure: bool = True) -> bool:
-    """Return whether velocity accuses a circuit whose piston slips blocks earlier than the log's, and another way."""
+    """Return whether velocity is unexplained if the circuit slips ``late`` blocks earlier, ``far`` times as far."""
     log, place = healthy(), ACTUATOR.conditions[0]
     slips = 0.02 * (np.arange(len(log.velocity)) % 40 < 3)
     seen = replace(log, velocity=np.roll(slips, late), pressure=log.pressure if pressure else None)
@@ -173,7 +173,7 @@ def test_a_piston_may_break_loose_some_blocks_sooner_if_it_goes_as_far_and_press
 
 
 def jumping(jump: float, *, pressure_left: float = 0.0, drift: float = 0.0, pressure: bool = True) -> bool:
-    """Return whether velocity accuses a circuit whose piston creeps where the log's jumps so far [m] every 40 ms."""
+    """Return whether velocity is unexplained if the circuit creeps while the log jumps ``jump`` [m] every 40 ms."""
     log, whole = healthy(), fitted(healthy(), ACTUATOR.conditions[0])
     velocity = jump / 0.01 * (np.arange(len(log.velocity)) % 4 == 1)
     seen = replace(log, velocity=velocity, pressure=log.pressure if pressure else None)
@@ -260,7 +260,7 @@ def test_a_speed_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bias(s
 
 
 def test_a_pump_that_moves_more_than_the_rig_file_says_is_named() -> None:
-    """One that moves less looks like leakage to a circuit: the balance of flows judges it (decisions 220 and 238)."""
+    """In a circuit, a pump that moves less looks like leakage: the flow balance judges it (decisions 220 and 238)."""
     place = tuple(ACTUATOR.conditions[0].tolist())
     found = reasons(run_of(place, pump=1.2))
     assert found[AgainstCode.PUMP_OFF].data["percent"] == pytest.approx(20.0, rel=0.35)

@@ -1,4 +1,4 @@
-"""How well the conditions' regions hold a circuit where friction counts as forces."""
+"""The score of each condition's region for a circuit, with friction as forces."""
 
 import numpy as np
 import pytest

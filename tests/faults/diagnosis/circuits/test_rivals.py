@@ -1,4 +1,4 @@
-"""Of circuits that follow a creeping piston roughly none is far behind; of those that follow it closely one may be."""
+"""Among circuits that follow a creeping piston roughly, none is far behind; if they follow it closely, one may be."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def log(blocks: int = 2_010, *, pressure: bool = True) -> Blocks:
 
 
 def leaving(velocity: float, pressure: float, one: Blocks, off: float = 0.0) -> PointFit:
-    """Return a fit that leaves so many times the sensors' noise of each output."""
+    """Return a fit with residuals of given multiples of the sensors' noise."""
     left = (np.array([velocity, pressure]) * NOISE)[: one.outputs.shape[1]]
     fitted = one.outputs - left
     point = ACTUATOR.conditions[0] + off

@@ -1,4 +1,4 @@
-"""Velocity and the slope of position tell one motion, to their noise and a twentieth; else one sensor is wrong."""
+"""Velocity and the slope of position agree within their noise and a twentieth; otherwise one sensor is wrong."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from plant.log.record import Record
 
 
 def with_two_sensors(gain: float, noise: float) -> Record:
-    """Return a log whose velocity sensor reads more than the encoder's slope says."""
+    """Return a log whose velocity sensor reads ``gain`` times the slope of the encoder, with noise."""
     time = 1e-3 * np.arange(3001)
     rng = np.random.default_rng(3)
     velocity = 0.05 * np.sin(2.0 * np.pi * time)
@@ -38,7 +38,7 @@ def test_noise_of_a_velocity_sensor_excuses_what_it_can_make_and_no_more(
 
 @pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (0.7, True)])
 def test_noise_that_a_filter_made_alike_accuses_no_sensor(gain: float, differs: bool) -> None:
-    """Its steps from sample to sample are small, and show a tenth of what is left of it in a block."""
+    """The steps of such noise between samples are small: they show a tenth of its size in the mean over a block."""
     noise = 0.02 * np.random.default_rng(8).standard_normal(3020)
     for _ in range(4):
         noise = np.convolve(noise, np.full(6, 1.0 / 6.0), "same")
@@ -67,10 +67,10 @@ def test_a_velocity_that_is_slower_than_the_rows_is_excused_by_its_noise_too() -
 
 @pytest.mark.parametrize("rows", [1, 20])
 def test_a_coarse_log_of_fast_motion_accuses_no_sensor(rows: int) -> None:
-    """Velocity that changes between two samples is not seen there, but moves the piston."""
+    """A coarse log does not show how velocity changes between two samples, although that moves the piston."""
     rng, time = np.random.default_rng(2), 1e-3 * np.arange(12_001)
     steps = 0.04 * np.repeat(rng.choice([-1.0, 1.0], 1 + len(time) // 150), 150)[: len(time)]
-    velocity = np.convolve(steps, 0.1 * np.exp(-0.1 * np.arange(100)))[: len(time)]  # 10 ms late
+    velocity = np.convolve(steps, 0.1 * np.exp(-0.1 * np.arange(100)))[: len(time)]  # a lag of 10 ms
     position = np.concatenate(([0.0], np.cumsum(velocity[:-1]) * 1e-3))
     channels = {"motor_speed_rad_s": 2e3 * velocity, "position_m": position, "velocity_m_s": velocity}
     record = Record(rows * 1e-3, {name: values[::rows] for name, values in channels.items()})
@@ -80,7 +80,7 @@ def test_a_coarse_log_of_fast_motion_accuses_no_sensor(rows: int) -> None:
 
 
 def test_a_velocity_that_doubles_within_a_block_accuses_no_sensor() -> None:
-    """Means of samples are half a sample early: a sound sensor was 6 % off the encoder at 20 Hz."""
+    """Means of samples are half a sample early: at 20 Hz, a sound sensor differed from the encoder by 6 %."""
     time = 1e-3 * np.arange(3001)
     turned = 2.0 * np.pi * 20.0 * time
     channels = {

@@ -1,4 +1,4 @@
-"""A piston that hardly moves yields on its seals, and need not be followed to the last digit."""
+"""A piston that hardly moves yields on its seals, and a circuit need not follow it exactly."""
 
 from dataclasses import replace
 
@@ -13,9 +13,9 @@ from tests.faults.diagnosis.circuits.test_out_of_model import ACTUATOR, NOISE, f
 
 
 def creeping_is_unexplained(share: float, followed: float, *, pressure: bool) -> bool:
-    """Return whether a creeping piston's circuit is accused, which leaves so much of the pump's flow.
+    """Return whether a circuit is rejected that leaves ``share`` of the pump's flow in the motion of a creeping piston.
 
-    It follows a motion that is ``followed`` times what it leaves.
+    The motion that it follows is ``followed`` times what it leaves.
     """
     place = ACTUATOR.conditions[0]
     log, pump = healthy(), ACTUATOR.circuit.pump_displacement / ACTUATOR.circuit.piston_area

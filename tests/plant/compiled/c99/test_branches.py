@@ -1,4 +1,4 @@
-"""A side of a choice that is much work is gone through only where it is chosen, and gives the same bits."""
+"""If one side of a choice takes much work, it is computed only if it is chosen, and gives the same bits."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ X, Y = symbol("x"), symbol("y")
 
 
 def much(x: Expression) -> Expression:
-    """Eleven operations."""
+    """Return an expression of eleven operations."""
     return sqrt(((x * 3.0 + 1.0) * x + 2.0) * x * x + 7.0) / (x * x + 5.0)
 
 

@@ -15,7 +15,7 @@ from tests.c_compiler import compiled, ran
 
 
 def spread(values: Array) -> tuple[float, float]:
-    """Return the mean and the largest distance from it."""
+    """Return the mean of the values and the largest distance from it."""
     total = farthest = 0.0
     for value in values:
         total += value
@@ -28,7 +28,7 @@ def spread(values: Array) -> tuple[float, float]:
 
 
 def work(table: Array, room: tuple[Array, Array], *, SHIFT: int) -> float:
-    """Fill both rooms from a table."""
+    """Fill both arrays of ``room`` from a table."""
     first, second = room
     second[:] = 0.0
     rows = table.shape[0]
@@ -43,7 +43,7 @@ def work(table: Array, room: tuple[Array, Array], *, SHIFT: int) -> float:
 
 
 def doubled(row: Array, first: Array) -> None:
-    """Double a row unless it is negative."""
+    """Mark a negative row, and overwrite any other row with ``first``."""
     if row[0] < 0.0 or not row[1] > 0.0:
         first[2] = -1.0
     else:
@@ -110,7 +110,7 @@ def test_a_function_that_stands_in_c_already_is_called_by_its_name() -> None:
 
 
 def endless(values: Array) -> float:
-    """Loop for as long as it takes."""
+    """Loop a number of times that is not known in advance."""
     while values[0] > 0.0:
         values[0] -= 1.0
     return values[0]
@@ -231,7 +231,7 @@ def test_what_c_would_take_for_something_else_is_refused_by_its_line(function: C
 
 
 def scaled(values: Array, scale: float) -> float:
-    """Scale a turn, and tell whether it is a number."""
+    """Write a number times pi, unless it is NaN."""
     if scale == scale:
         values[0] = math.pi * scale
     return float(values.shape[0])

@@ -1,4 +1,4 @@
-"""What is compiled computes what Python computes, to the last bit; what is not compiled is refused by line."""
+"""Compiled code gives the same bits as Python; code that cannot be compiled is refused with its line."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""A kernel has one signature, and says what is wrong with what it is given."""
+"""A kernel has one signature, and an error states what is wrong with an argument."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""One expression at a time: it is compiled to what Python computes, or refused in words."""
+"""Each expression on its own is compiled to what Python computes, or refused with a message."""
 
 import math
 from types import SimpleNamespace

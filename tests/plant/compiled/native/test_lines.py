@@ -1,4 +1,4 @@
-"""What lines compute as instructions is what they compute in Python, to the bit, for one number and for several."""
+"""Lines compiled to instructions give the same bits as in Python, for one number and for several at a time."""
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
@@ -32,7 +32,7 @@ def fused(x: Any, y: Any) -> Mapping[str, Any]:
 
 
 def of(lines: Callable[..., Mapping[str, Any]], width: int) -> dict[str, list[float]]:
-    """What lines give of `X` and `Y`, so many at a time."""
+    """Return what the lines compute from `X` and `Y`, with ``width`` numbers at a time."""
     found = stepped(pasted(lines), lines.__name__, {"x": X, "y": Y}, "abcde", width)
     return {name: values.tolist() for name, values in found.items()}
 
@@ -56,7 +56,7 @@ def test_a_fused_product_is_rounded_once_and_what_is_no_number_is_seen(width: in
 def test_the_sign_of_no_number_and_of_either_zero_is_zero(width: int) -> None:
     numbers = np.array([np.nan, -0.0, 0.0, np.inf, -np.inf, 5e-324, -5e-324, -2.0])
     found = stepped("def lines(x):\n    return {'a': 1.0 / sign(x)}", "lines", {"x": numbers}, "a", width)
-    assert found["a"].tolist() == [np.inf, np.inf, np.inf, 1.0, -1.0, 1.0, -1.0, -1.0]  # a zero of its own is positive
+    assert found["a"].tolist() == [np.inf, np.inf, np.inf, 1.0, -1.0, 1.0, -1.0, -1.0]  # sign gives a positive zero
 
 
 def both(x: float, y: float, *, of_both: Callable[[tuple[float, float]], tuple[float, ...]]) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""A loop of a module is compiled at its first call, with all that it calls and the constants that it reads."""
+"""A loop of a module is compiled at its first call, with all functions that it calls and constants that it reads."""
 
 from types import FunctionType
 from typing import Any
@@ -39,7 +39,7 @@ def summed(values: Any) -> float:
 
 
 def elsewhere(loop: Loop[..., Any], **names: Any) -> Loop[..., Any]:
-    """A loop as a module has it that gives its names another meaning."""
+    """Return a loop as it would be in a module in which some names have another meaning."""
     function: Any = loop.__wrapped__
     return Loop(FunctionType(function.__code__, {**function.__globals__, **names}, function.__name__), ())
 

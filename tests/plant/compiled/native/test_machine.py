@@ -1,4 +1,4 @@
-"""Machine code is made as a kernel wants it: small, for its loops hold all that there is to do side by side."""
+"""Machine code stays small: loops are not unrolled, because their bodies already work on several numbers at a time."""
 
 import pytest
 

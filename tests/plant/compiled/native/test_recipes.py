@@ -1,4 +1,4 @@
-"""A text is not written again where all that it follows from is as it was."""
+"""A kernel's text is not written again if everything that determines it is unchanged."""
 
 import os
 import time
@@ -18,13 +18,13 @@ TEXT = "def scale(x):\n    return 3.0 * x\n"
 
 @pytest.fixture
 def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Texts that were written."""
+    """The texts that were written."""
     monkeypatch.setenv("HYDROSTATE_CACHE", str(tmp_path))
     return []
 
 
 def scale(written: list[str], made_of: object) -> float:
-    """As a new process would run it."""
+    """Load and call the kernel as a new process would."""
     load._LOADED.clear()
 
     def text() -> str:
@@ -57,7 +57,7 @@ def test_a_source_written_anew_is_seen_though_its_size_and_time_are_what_they_we
     os.utime(source, (1.0, 1.0))
     before = [*recipes._stamps(str(tmp_path))]
     assert before == [*recipes._stamps(str(tmp_path))]
-    time.sleep(0.02)  # a file system's clock may tick so slowly
+    time.sleep(0.02)  # a file system's clock may be as coarse as this
     source.write_text("A = 2")
     os.utime(source, (1.0, 1.0))
     assert before != [*recipes._stamps(str(tmp_path))]

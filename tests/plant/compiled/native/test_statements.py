@@ -1,4 +1,4 @@
-"""Statements are compiled to what Python does; one that means nothing in a kernel is refused by its line."""
+"""Statements are compiled to what Python does; one that has no meaning in a kernel is refused with its line."""
 
 import math
 from collections.abc import Callable
@@ -52,7 +52,7 @@ def test_a_choice_whose_every_branch_returns_ends_the_function(x: float, n: int,
 def stepped(n: int, by: int, values: Array) -> float:
     total: float
     total = 0.0
-    "a text that stands alone says nothing"
+    "a text on its own has no effect"
     for k in range(0, n, by):
         total += values[k]
     return total + values[-2:][0]

@@ -1,4 +1,4 @@
-"""The cache of machine code heals, and what others could have written is never run."""
+"""The cache of machine code repairs itself, and files that others could have written are never run."""
 
 import errno
 import logging
@@ -25,14 +25,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def scale(factor: float = 2.0) -> Callable[[float], float]:
-    """As a new process would load it."""
+    """Load the kernel as a new process would."""
     load._LOADED.clear()
     return load_native("scale", TEXT.format(factor=factor), {"scale": signature("x : float")}).scale
 
 
 @pytest.fixture
 def compiling(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Kernels that were compiled."""
+    """The names of the kernels that were compiled."""
     names: list[str] = []
     compile_it = load._compiled
 

@@ -1,4 +1,4 @@
-"""Stamps of a clock that jitters."""
+"""Stamps of a clock with jitter."""
 
 import numpy as np
 

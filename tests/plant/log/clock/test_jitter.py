@@ -1,4 +1,4 @@
-"""Samples of jittering stamps are put on a uniform clock: moved along their slope, and kept on a sensor's quanta."""
+"""Samples with jittering stamps go on a uniform clock: shifted along their slope, and kept on a sensor's quanta."""
 
 import numpy as np
 import pytest

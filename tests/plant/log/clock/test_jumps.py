@@ -1,4 +1,4 @@
-"""A clock that is set while it logs."""
+"""Tests of a clock that is set during a log."""
 
 import warnings
 

@@ -73,7 +73,7 @@ def test_clocks_are_the_same_by_their_step_however_late_they_begin(begin: float)
 
 
 def test_a_refusal_has_the_times_of_both_and_says_where_day_and_month_may_be_exchanged(tmp_path: Path) -> None:
-    """01/03/2026 was read as the third of January, beside a logger of 1 March, and nothing said so."""
+    """01/03/2026 used to be read as 3 January beside a logger of 1 March, without a message."""
     steps = 0.01 * np.arange(300)
     american, iso = (np.array([f"{day} 12:00:{one:06.3f}" for one in steps]) for day in ("01/03/2026", "2026-03-01"))
     motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", steps, american)

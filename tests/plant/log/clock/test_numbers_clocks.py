@@ -1,4 +1,4 @@
-"""What becomes of a log's rows on either side of each limit of a clock, kept in `numbers_clocks.json`."""
+"""How rows of a log are treated on either side of each limit of the clock, kept in `numbers_clocks.json`."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""What becomes of stamps that jitter or were rounded, kept in `numbers_jitter.json`."""
+"""How stamps with jitter or rounding are treated, kept in `numbers_jitter.json`."""
 
 from typing import Any
 

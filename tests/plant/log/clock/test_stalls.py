@@ -17,7 +17,7 @@ RNG = np.random.default_rng(5)
 
 
 def stalled(at: tuple[float, ...] = (0.7, 1.9, 3.1), length: float = 0.02, apart: float = 0.0) -> Array:
-    """Return stamps that wait for `length` [s] each time, then follow each other by `apart` [s]."""
+    """Return stamps that are delayed by `length` [s] at each stall, then follow each other by `apart` [s]."""
     time = EVEN.copy()
     for begin in at:
         waits = (time > begin) & (time < begin + length)
@@ -48,7 +48,7 @@ def test_rows_that_waited_are_put_back_where_they_were_sampled(apart: float, jit
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 def test_rows_of_a_loop_that_sampled_late_and_caught_up_are_taken_when_they_say(noise: float) -> None:
-    """Its stamps are those of a queue: put on an even clock, a sine of 2 Hz was off by its amplitude."""
+    """Its stamps look like a queue's; on an even clock, a sine of 2 Hz was wrong by its whole amplitude."""
     time = stalled(length=0.0098, apart=1e-5)
     _, position, notes = read(time, time + noise / 9.0 * RNG.standard_normal(len(time)))
     assert notes[0].code == "time_jitters"
@@ -71,13 +71,13 @@ def test_rows_that_were_lost_or_a_clock_that_jitters_are_no_stall() -> None:
 
 
 def test_a_clock_that_goes_slower_for_a_while_is_no_stall() -> None:
-    """Rows that are late do not come at once then: they were sampled when they say."""
+    """Late rows then do not arrive all at once: they were sampled at their stamps."""
     time = EVEN + 5e-3 * np.clip(1.0 - np.abs(EVEN - 2.0) / 0.05, 0.0, 1.0)
     assert stalled_clock(time) is None
 
 
 def test_rows_that_come_at_once_beside_lost_ones_are_read() -> None:
-    """No clock is told then, and no cubic goes through stamps a nanosecond apart."""
+    """Then no clock can be found, and no cubic fits stamps a nanosecond apart."""
     time = np.delete(stalled(apart=1e-9), np.arange(2500, 2503))
     sample_time, position, notes = read(
         np.sort(time + 1e-4 * RNG.uniform(0.0, 1.0, len(time)) * (np.diff(time, append=9.0) > 1e-6))

@@ -1,4 +1,4 @@
-"""Units that stand behind each number of a text log."""
+"""Tests of units that follow each number in a text log."""
 
 from pathlib import Path
 

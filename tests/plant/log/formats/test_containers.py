@@ -1,4 +1,4 @@
-"""Workbooks and HDF5 files hold more than numbers: what is no log is passed over, what is one keeps its meaning."""
+"""Workbooks and HDF5 files may hold more than logs: other content is skipped, and a log keeps its meaning."""
 
 import re
 import zipfile
@@ -79,7 +79,7 @@ def test_units_that_another_sheet_lists_are_those_of_its_columns(tmp_path: Path)
             "m",
             "bar",
             None,
-        ]  # A is a sensor in bar and a channel in V: neither
+        ]  # A is a sensor in bar and a channel in V, so it gets no unit
     (alone,) = open_xlsx(workbook(tmp_path / "alone.xlsx", rows))
     assert [one.unit for one in alone.headings] == [None, "m", None, None]
 

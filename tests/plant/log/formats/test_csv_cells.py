@@ -1,4 +1,4 @@
-"""Lines of a text log that are no rows of data: skipped, left out at the end, or refused."""
+"""Lines of a text log that are not rows of data are skipped, left out at the end, or refused."""
 
 import warnings
 from pathlib import Path
@@ -185,7 +185,7 @@ def test_a_channel_of_text_that_nobody_asked_for_is_left_out(tmp_path: Path) -> 
 
 
 def test_a_number_in_a_column_of_dates_is_told_as_no_date(tmp_path: Path) -> None:
-    """The message asked for numbers, and named a number that it got."""
+    """The message used to ask for numbers, and to name a number as the fault."""
     stamps = [f"2026-11-29 10:00:00.{k:03d}" if k < 30 else f"{0.001 * k:.3f}" for k in range(60)]
     rows = [f"{stamp},{k}.5,0.{k:03d}" for k, stamp in enumerate(stamps)]
     (tmp_path / "log.csv").write_text("\n".join(["time,motor_speed_rad_s,position_m", *rows]))

@@ -102,7 +102,8 @@ def test_a_unit_of_micrometres_and_a_word_for_units_make_a_row_of_units() -> Non
     made = layout("path,,way", "unit,s,um", "rows,0.0,1.0", ",0.1,2.0", ",0.2,2.0")
     assert [one.unit for one in made.headings] == [None, "s", "um"]
     rows = [f"0.{k},1.0" for k in range(9)]
-    assert layout("t,x", rows[0], "s,um", *rows[1:]).skipped == 1  # a row of units among the rows makes none a header
+    # a row of units between rows of data does not turn the rows above it into a header
+    assert layout("t,x", rows[0], "s,um", *rows[1:]).skipped == 1
     made = layout("x-axis,1", "second,um", *rows)
     assert ([one.unit for one in made.headings], names(made), made.skipped) == (["second", "um"], ["x-axis", "1"], 2)
 
@@ -123,11 +124,11 @@ def test_labview_may_name_a_column_of_remarks_that_no_row_has(header: str, row: 
     assert [(one.name, one.unit) for one in made.headings] == [("X_Value", "s"), ("Way", "um")]
     assert made.skipped == 7
     again = layout(*above, header, *(row.format(k=k) for k in range(9)), *above[3:], header, row.format(k=1))
-    assert again == made  # another segment is none of the header
+    assert again == made  # another segment does not change the layout
 
 
 def scope(step: str, rows: list[str], *more: str, names_of: str = "Name\tWay\tName\tSpeed") -> Layout:
-    """Return the layout of an export of TwinCAT Scope."""
+    """Return the layout of a TwinCAT Scope export."""
     steps = "\t".join(f"SampleTime[ms]\t{step}" for _ in range(names_of.count("Name")))
     return layout("Name\tProject", "File\tx.svdx", "", names_of, steps, *more, "", *rows, "EOF")
 
@@ -138,7 +139,7 @@ def test_twincat_scope_has_one_clock_in_milliseconds_where_all_channels_share_it
     assert names(made) == ["Time", "Way", "Time of Speed", "Speed"]
     assert [one.unit for one in made.headings] == ["ms", "um", None, None]
     assert (made.decimal_point, made.skipped) == (",", 8)
-    assert names(scope("1", rows)) == ["Name", "Way", "Name", "Speed"]  # the clock is none in milliseconds
+    assert names(scope("1", rows)) == ["Name", "Way", "Name", "Speed"]  # the clock is not in milliseconds
     skewed = [row.replace("\t", "\t", 1).replace(f"\t{2 * k}\t", f"\t{2 * k + 1}\t") for k, row in enumerate(rows)]
     assert names(scope("2", skewed)) == ["Name", "Way", "Name", "Speed"]
     again = ["Name\tWay\tName\tSpeed", "SampleTime[ms]\t2\tSampleTime[ms]\t2", *rows]

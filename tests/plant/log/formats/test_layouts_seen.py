@@ -1,4 +1,4 @@
-"""A file that is written like an earlier one has its layout; what is written in any other way is looked at anew."""
+"""A file written like an earlier one gets its layout; a file written in any other way is examined anew."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ def nothing_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def looked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Files that were looked at line by line."""
+    """The files that were examined line by line."""
     found: list[str] = []
     usual = csv_layout.layout_of_lines
 

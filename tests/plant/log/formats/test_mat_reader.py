@@ -68,7 +68,7 @@ def test_files_that_matlab_wrote_are_read_as_scipy_reads_them() -> None:
         pytest.skip("this scipy was installed without its sample files")
     compared = 0
     for file in files:
-        if "hdf5" in file.name or "stringarray" in file.name:  # a block of text has no column to give
+        if "hdf5" in file.name or "stringarray" in file.name:  # a block of text contains no column
             continue
         variables = read_variables(file.read_bytes())
         theirs: dict[str, Any] = scipy.io.loadmat(file, simplify_cells=True)

@@ -1,4 +1,4 @@
-"""Structs of MATLAB, as its users put logs into them."""
+"""Tests of MATLAB structs, in the ways in which users put logs into them."""
 
 from typing import Any
 

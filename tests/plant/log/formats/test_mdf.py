@@ -1,4 +1,4 @@
-"""Groups of an MDF file become tables, each with its clock."""
+"""Groups of an MDF file become tables, each with its own clock."""
 
 from pathlib import Path
 from typing import Any
@@ -53,7 +53,7 @@ def test_a_group_of_more_rows_than_a_log_is_refused(two_groups: Path, monkeypatc
 def test_bytes_that_say_which_samples_are_invalid_count_too(tmp_path: Path) -> None:
     path = written(tmp_path / "log.mf4", [("speed", "rpm", TIME), ("way", "", TIME)])
     with asammdf.MDF(path) as file:
-        file.groups[0].channel_group.invalidation_bytes_nr = 0xFF000000  # which the library would allocate
+        file.groups[0].channel_group.invalidation_bytes_nr = 0xFF000000  # the library would allocate as much
         with pytest.raises(LogError, match="it unpacks to more than"):
             mdf._tables(_Opened(file), path)
 
@@ -74,7 +74,7 @@ def test_a_clock_alone_is_no_table(tmp_path: Path) -> None:
 
 
 class _Opened:
-    """The library, whose file is open already."""
+    """A stand-in for the library, with its file already open."""
 
     def __init__(self, file: Any) -> None:
         self._file = file

@@ -1,4 +1,4 @@
-"""What MAT files and HDF5 and rings hold byte by byte, kept in `numbers_binary.json`."""
+"""The contents read from MAT files, HDF5 files and rings, byte by byte, kept in `numbers_binary.json`."""
 
 import struct
 from collections.abc import Callable

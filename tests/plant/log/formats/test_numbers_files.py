@@ -1,4 +1,4 @@
-"""What packed files and sheets and tables hold, kept in `numbers_files.json`."""
+"""The contents read from packed files, sheets and tables, kept in `numbers_files.json`."""
 
 import zlib
 from io import BytesIO

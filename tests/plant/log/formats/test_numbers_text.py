@@ -1,4 +1,4 @@
-"""What text logs and stamps are read as, kept in `numbers_text.json`."""
+"""The values read from text logs and stamps, kept in `numbers_text.json`."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Columns of Arrow's tables are read by their kind: numbers, times, durations, and text that is a time."""
+"""Columns of Arrow tables are read by type: numbers, times, durations, and text that represents a time."""
 
 from pathlib import Path
 

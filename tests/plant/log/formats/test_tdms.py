@@ -1,4 +1,4 @@
-"""Groups of a LabVIEW file become tables with their units, steps and beginnings."""
+"""Groups of a LabVIEW file become tables with their units, time steps and start times."""
 
 from pathlib import Path
 from typing import Any
@@ -93,7 +93,7 @@ def test_a_file_without_a_channel_is_refused(tmp_path: Path) -> None:
 
 
 class _Longer:
-    """A channel that says it has a thousand million samples."""
+    """A channel that claims to have a thousand million samples."""
 
     name = "Speed"
 

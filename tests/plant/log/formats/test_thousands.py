@@ -50,7 +50,7 @@ def test_few_cells_are_not_judged() -> None:
 
 
 def late(folder: Path, cells: list[str]) -> Path:
-    """Return a log whose numbers reach a thousand below the lines that are looked at for its layout."""
+    """Return a log whose numbers reach a thousand only below the lines from which its layout is taken."""
     rows = (f"{1e-3 * k:.3f};{speed};{1e-6 * k:.7f}" for k, speed in enumerate(cells))
     path = folder / "log.csv"
     path.write_text("\n".join(["time_s;Motor speed [rpm];position_m", *rows]) + "\n")
@@ -96,7 +96,7 @@ def test_of_whole_numbers_one_beyond_a_million_says_what_its_signs_are(tmp_path:
 
 
 def test_decimal_commas_between_commas_are_refused_with_what_to_do(tmp_path: Path) -> None:
-    """Two cells below each name were read as columns without names."""
+    """The two cells below each name used to be read as columns without names."""
     rows = [f"{0.001 * k:.3f},{k / 3.0:.4f},-{k / 7.0:.2f}".replace(".", ",") for k in range(40)]
     (tmp_path / "log.csv").write_text("\n".join(["time_s,motor_speed_rad_s,position_m", *rows]))
     with pytest.raises(LogError, match=r"must have 3 cells .* got 6: a comma is the decimal sign here.* semicolons"):
@@ -107,7 +107,7 @@ def test_a_column_of_text_with_another_decimal_sign_than_the_log_is_read_by_its_
     cells = [f"{one / 7.0:.4f}".replace(".", ",") for one in SPEED]
     read = read_record(written(tmp_path, cells, "log.csv"))["motor_speed_rad_s"]
     np.testing.assert_allclose(read, SPEED / 7.0 * np.pi / 30.0, atol=1e-4)
-    # one glitch among whole numbers is none, and what may be thousands is not guessed
+    # one cell with a comma among whole numbers is a glitch; cells that may have separators of thousands are refused
     whole = [f"{one:.0f}" for one in SPEED]
     with pytest.warns(LogWarning, match=r"'12,7' in line 2|is missing in 1 of 300"):
         glitch = read_record(written(tmp_path, ["12,7", *whole[1:]], "log.csv"))

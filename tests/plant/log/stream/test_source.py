@@ -20,7 +20,7 @@ def free_port() -> int:
 
 
 def publish(port: int, topic: str, messages: list[str]) -> None:
-    """Publish each message once it is subscribed to: MQTT 5 tells a message that nobody took."""
+    """Publish each message until it has a subscriber: MQTT 5 reports a message that nobody received."""
     from paho.mqtt import client as mqtt
     from paho.mqtt.enums import CallbackAPIVersion
 
@@ -38,7 +38,7 @@ def publish(port: int, topic: str, messages: list[str]) -> None:
                 time.sleep(0.02)
                 client.publish(topic, message, qos=1)
     finally:
-        client.disconnect()  # first: the loop looks at nothing else for a second
+        client.disconnect()  # disconnect first, because the loop notices nothing else for a second
         client.loop_stop()
 
 
@@ -92,7 +92,7 @@ def test_a_sender_that_never_ends_its_line_is_refused_before_it_fills_the_memory
 
 
 def test_a_bench_that_lost_its_power_is_noticed_within_a_minute_or_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A watch waited for ever: nobody had closed the connection."""
+    """A watch used to wait for ever, because nobody had closed the connection."""
     made: list[socket.socket] = []
     connect = socket.create_connection
 
@@ -127,7 +127,7 @@ def test_a_bench_that_lost_its_power_is_noticed_within_a_minute_or_two(monkeypat
 def test_rows_of_a_tcp_connection_wait_at_the_sender_until_they_are_read() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-        sent = [f"{i},{i:01000}" for i in range(28_000)]  # more than both ends of a connection hold
+        sent = [f"{i},{i:01000}" for i in range(28_000)]  # more than the buffers at both ends hold
 
         def serve() -> None:
             connection, _ = server.accept()
@@ -148,7 +148,7 @@ def test_rows_of_a_tcp_connection_wait_at_the_sender_until_they_are_read() -> No
 def test_what_is_no_stream_is_refused_in_a_sentence() -> None:
     assert is_stream("tcp://here:1")
     assert not is_stream("bench.csv")
-    assert is_stream("http://here:1/x")  # an address, though none that is read
+    assert is_stream("http://here:1/x")  # an address, but not of a kind that can be read
     for address in ("http://here:1/x", "tcp://here", "tcp://:99", "mqtt://here", "tcp://here:99999999"):
         with pytest.raises(HydrostateError, match="a stream must be tcp://HOST:PORT, mqtt://"):
             stream_lines(address, BatchCounts())
