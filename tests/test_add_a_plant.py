@@ -81,7 +81,7 @@ def said(folder: Path, *words: str) -> dict[str, Any]:
     return entries
 
 
-def test_the_page_gives_a_folder_a_package_within_its_lines() -> None:
+def test_the_page_adds_one_folder_to_each_package_within_the_stated_lines() -> None:
     given = files()
     assert [path.split("/")[:2] for path in given] == [[package, "spring_cylinder"] for package in PACKAGES]
     assert sum(map(code_lines, given.values())) + code_lines(registry_line().strip()) <= MOST_LINES
@@ -113,7 +113,9 @@ def test_every_verb_of_the_page_works(copy: Path) -> None:
         ("weak_spring", {"leakage_coefficient": 2e-12, "spring_stiffness": 2.8e4}),
     ],
 )
-def test_numbers_come_back_and_the_fault_is_named(condition: str, truth: dict[str, float], copy: Path) -> None:
+def test_the_true_parameters_are_estimated_and_the_fault_is_diagnosed(
+    condition: str, truth: dict[str, float], copy: Path
+) -> None:
     log = f"{condition}.csv"
     words = ("--plant", "spring-cylinder")
     said(copy, "simulate", *words, "--condition", condition, "--seed", "5", "--out", log)
@@ -134,7 +136,7 @@ def test_numbers_come_back_and_the_fault_is_named(condition: str, truth: dict[st
 
 
 @pytest.mark.slow
-def test_the_contracts_hold_for_it(copy: Path) -> None:
+def test_the_new_actuator_passes_the_contract_tests(copy: Path) -> None:
     done = run(
         copy, "pytest", "-q", "-p", "no:cacheprovider", "tests/contracts/test_actuators.py", "-k", "spring-cylinder"
     )
@@ -143,7 +145,7 @@ def test_the_contracts_hold_for_it(copy: Path) -> None:
 
 
 @pytest.mark.slow
-def test_its_imports_are_in_order_and_its_types_are_strict(copy: Path) -> None:
+def test_the_new_actuator_passes_ruff_and_pyright(copy: Path) -> None:
     given = list(files())
     for tool in (["ruff", "check"], ["pyright"]):
         done = run(copy, *tool, *given)

@@ -319,12 +319,12 @@ def test_the_walk_finds_the_packages(packages: list[Source]) -> None:
 
 
 @pytest.mark.parametrize("guard", GUARDS, ids=lambda guard: guard.__name__)
-def test_the_packages_have_no(guard: Guard, packages: list[Source]) -> None:
+def test_the_packages_have_no_offences(guard: Guard, packages: list[Source]) -> None:
     offences = guard(packages)
     assert not offences, "\n".join(offences)
 
 
-def test_tests_and_benchmarks_are_no_longer_than_the_packages_may_be() -> None:
+def test_files_of_tests_and_benchmarks_keep_the_length_limit_of_the_packages() -> None:
     offences = overlong_files(_read("tests", "benchmarks"))
     assert not offences, "\n".join(offences)
 

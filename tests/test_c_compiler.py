@@ -9,7 +9,7 @@ from tests import c_compiler
 from tests.c_compiler import UNUSED, compiled, ran
 
 
-def test_a_program_is_compiled_once_and_deleted_when_no_test_has_asked_for_it_in_a_month(
+def test_a_program_is_compiled_once_and_deleted_after_a_month_without_use(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(c_compiler, "PROGRAMS", tmp_path / "programs")

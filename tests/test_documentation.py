@@ -311,7 +311,7 @@ def test_rule_fires_with_file_and_line(text: str, problem: str) -> None:
         ("*x: float, **y: float", "*x, **y : float", "Times [s].", None),
     ],
 )
-def test_numbers_say_their_unit_or_shape(signature: str, entry: str, description: str, problem: str | None) -> None:
+def test_numbers_must_have_a_unit_or_shape(signature: str, entry: str, description: str, problem: str | None) -> None:
     aliases = '"""A."""\nSpeed: TypeAlias = float | int\nTrack = NDArray[np.float64]\n'
     function = DESCRIBED.format(signature=signature, entry=entry, description=description)
     (page,) = pages({"plant/a.py": aliases + function})

@@ -32,7 +32,7 @@ def script(name: str) -> ModuleType:
     return module
 
 
-def test_no_name_is_missing_that_a_users_program_may_rest_on() -> None:
+def test_every_promised_public_name_exists() -> None:
     promised = json.loads((ROOT / "docs" / "interface.json").read_text("utf-8"))
     found = script("interface").interface()
     missing = [
@@ -47,7 +47,7 @@ def test_no_name_is_missing_that_a_users_program_may_rest_on() -> None:
     assert "bulk_modulus_pa" in promised["json"]["diagnose"]
 
 
-def test_every_decision_is_on_the_page_of_subjects() -> None:
+def test_the_page_of_decisions_is_current_and_lists_every_decision() -> None:
     index, docs = script("decisions_index"), ROOT / "docs"
     themes = tomllib.loads((docs / "decision_themes.toml").read_text("utf-8"))
     page = (docs / "decisions.md").read_text("utf-8")
@@ -61,7 +61,7 @@ def test_a_decision_has_its_number_in_its_heading() -> None:
         assert heading.startswith(f"{number}. "), heading
 
 
-def test_the_citation_has_what_its_schema_wants_and_the_projects_version() -> None:
+def test_the_citation_file_follows_its_schema_and_has_the_version_of_the_project() -> None:
     assert {"cff-version", "message", "title", "authors"} <= set(CITATION)
     assert CITATION["cff-version"] == "1.2.0"
     assert CITATION["type"] == "software"
@@ -80,7 +80,7 @@ def test_the_hooks_are_the_tools_of_make_lint() -> None:
 
 
 @pytest.mark.parametrize("path", [path for path in FORMS if path.name != "config.yml"], ids=lambda path: path.stem)
-def test_every_form_for_an_issue_asks_for_something_that_is_required(path: Path) -> None:
+def test_every_issue_form_is_valid_and_has_a_required_field(path: Path) -> None:
     form = yaml.safe_load(path.read_text("utf-8"))
     assert {"name", "description", "body"} <= set(form)
     ids = [field["id"] for field in form["body"]]
@@ -92,11 +92,11 @@ def test_every_form_for_an_issue_asks_for_something_that_is_required(path: Path)
 @pytest.mark.parametrize(
     "target", re.findall(r"(?:^|`)make ([\w-]+)", (ROOT / "CONTRIBUTING.md").read_text("utf-8"), re.M)
 )
-def test_every_target_that_contributors_are_told_of_is_in_the_makefile(target: str) -> None:
+def test_every_make_target_named_in_contributing_exists(target: str) -> None:
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
 
 
-def test_what_a_user_runs_is_locked_by_hashes_at_the_versions_of_the_constraints() -> None:
+def test_run_time_dependencies_are_locked_with_hashes_at_the_constrained_versions() -> None:
     locked = re.findall(r"^([\w.-]+)==(\S+)((?:.*\\\n)*.*)", (ROOT / "locked.txt").read_text("utf-8"), re.MULTILINE)
     held = re.findall(r"^([\w.-]+)==(\S+)$", (ROOT / "constraints.txt").read_text("utf-8"), re.MULTILINE)
     pinned = {normal(name): version for name, version in held}
@@ -112,7 +112,7 @@ def normal(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name.strip()).lower()
 
 
-def test_files_that_stand_on_the_same_go_to_one_worker() -> None:
+def test_files_that_share_fixtures_go_to_one_worker() -> None:
     folder = ROOT / "tests" / "experiments"
     made = _fixtures(folder / "conftest.py") - {"browser"}
     assert len(made) > 5
@@ -121,7 +121,7 @@ def test_files_that_stand_on_the_same_go_to_one_worker() -> None:
     assert all((ROOT / file).is_file() for file in DIAGNOSE_A_MOTOR)
 
 
-def test_every_second_worker_collects_from_the_other_end_and_all_tell_one_order() -> None:
+def test_every_second_worker_collects_in_reverse_and_all_report_the_same_order() -> None:
     workers = ("", "master", "gw0", "gw1", "gw2", "gw11")
     assert [from_its_end(worker) for worker in workers] == [False, False, False, True, False, True]
     folder: Any = SimpleNamespace(collect=lambda: iter("abc"))

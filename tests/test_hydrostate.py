@@ -46,7 +46,7 @@ def test_a_log_that_is_read_is_the_log_that_was_written(log: hs.Log, file: Path)
     assert len(again.between(1.0, 2.0)) == 1001
 
 
-def test_a_table_is_the_log_that_its_file_is(log: hs.Log, file: Path) -> None:
+def test_a_table_gives_the_same_log_as_its_file(log: hs.Log, file: Path) -> None:
     table = log.to_frame()
     again = hs.read(table.rename(columns={"position_m": "POS"}), columns={"position_m": "POS"})
     for channel in log.channels:
@@ -57,7 +57,7 @@ def test_a_table_is_the_log_that_its_file_is(log: hs.Log, file: Path) -> None:
     assert hs.read(table.reset_index(drop=True), sample_time=1e-3).diagnose().condition == "minor_leakage"
 
 
-def test_a_report_says_what_reading_the_log_brought_up(log: hs.Log, tmp_path: Path) -> None:
+def test_a_report_contains_the_notes_on_reading_the_log(log: hs.Log, tmp_path: Path) -> None:
     whole = log.between(0.0, 1.0).to_frame().drop(columns=["pressure_a_pa", "pressure_b_pa"])
     table = whole.rename(columns={"differential_pressure_pa": "dp"})
     with pytest.warns(LogWarning, match="column 'dp' was not used, but it may be differential_pressure_pa"):
@@ -67,7 +67,7 @@ def test_a_report_says_what_reading_the_log_brought_up(log: hs.Log, tmp_path: Pa
         assert "&#39;dp&#39; was not used" in (tmp_path / "page.html").read_text("utf-8")
 
 
-def test_estimate_and_diagnosis_are_one_answer(log: hs.Log, verdict: hs.Answer) -> None:
+def test_estimate_and_diagnosis_give_the_same_bulk_modulus(log: hs.Log, verdict: hs.Answer) -> None:
     found = log.estimate()
     assert found.believed
     assert found.bulk_modulus == verdict.bulk_modulus
@@ -77,7 +77,7 @@ def test_estimate_and_diagnosis_are_one_answer(log: hs.Log, verdict: hs.Answer) 
     assert [note.to_dict() for note in verdict.all_notes] == verdict.to_dict()["notes"] != []
 
 
-def test_an_answer_turns_into_what_a_program_needs(verdict: hs.Answer) -> None:
+def test_an_answer_converts_to_frame_dictionary_text_html_and_plot(verdict: hs.Answer) -> None:
     table = verdict.to_frame()
     assert isinstance(table, pd.DataFrame)
     assert table.loc["bulk_modulus", "unit"] == "Pa"
@@ -88,7 +88,7 @@ def test_an_answer_turns_into_what_a_program_needs(verdict: hs.Answer) -> None:
     assert all(isinstance(axis, Axes) and axis.get_xlabel() for axis in verdict.plot())
 
 
-def test_a_log_shows_its_channels_in_a_notebook_and_its_answers_bear_its_name(log: hs.Log, tmp_path: Path) -> None:
+def test_a_notebook_shows_the_channels_of_a_log_and_answers_contain_its_file_name(log: hs.Log, tmp_path: Path) -> None:
     assert "<th>position_m</th>" in log._repr_html_()
     log.to_frame().to_csv(tmp_path / "press 7.csv")
     read = hs.read(tmp_path / "press 7.csv")
@@ -96,7 +96,7 @@ def test_a_log_shows_its_channels_in_a_notebook_and_its_answers_bear_its_name(lo
     assert "press 7.csv" in str(read.between(0.0, 1.5).estimate())
 
 
-def test_a_model_turns_into_python_controls(log: hs.Log) -> None:
+def test_a_model_converts_to_a_transfer_function_of_python_control(log: hs.Log) -> None:
     model = log.identify()
     assert isinstance(model.to_control(), control.TransferFunction)
     assert model.to_frame().loc["dc_gain", "value"] == model.dc_gain
@@ -174,7 +174,7 @@ def run(code: str, *folders: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own interpreter
 
 
-def test_importing_it_imports_nothing_heavy() -> None:
+def test_importing_hydrostate_imports_no_heavy_dependency() -> None:
     done = run(f"import hydrostate; print([one for one in {HEAVY} if one in sys.modules])")
     assert done.stdout.strip() == "[]", done.stderr
 
@@ -186,7 +186,7 @@ def test_the_module_runs_as_the_command() -> None:
     assert "minor_leakage" in done.stdout
 
 
-def test_a_foreign_package_of_the_same_name_is_named(tmp_path: Path) -> None:
+def test_a_foreign_package_with_the_name_of_ours_is_refused_with_its_path(tmp_path: Path) -> None:
     (tmp_path / "faults").mkdir()
     (tmp_path / "faults" / "__init__.py").write_text("")
     done = run("import hydrostate", tmp_path)
@@ -195,7 +195,7 @@ def test_a_foreign_package_of_the_same_name_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("package", ["plant", "estimation", "faults", "experiments", "hydrostate"])
-def test_a_face_has_few_names_each_with_an_example(package: str) -> None:
+def test_every_package_exports_at_most_25_names_each_with_an_example(package: str) -> None:
     face = __import__(package)
     assert len(face.__all__) <= 25
     for name in face.__all__:
@@ -203,12 +203,12 @@ def test_a_face_has_few_names_each_with_an_example(package: str) -> None:
         assert package == "hydrostate" or f"\n{name} " in (face.__doc__ or ""), f"{package}.{name} has no example"
 
 
-def test_importing_a_face_imports_nothing_heavy() -> None:
+def test_importing_the_packages_imports_no_heavy_dependency() -> None:
     done = run(f"import plant, estimation, faults, experiments; print([one for one in {HEAVY} if one in sys.modules])")
     assert done.stdout.strip() == "[]", done.stderr
 
 
-def test_a_log_of_anything_is_read_related_and_simulated(tmp_path: Path) -> None:
+def test_a_log_with_unknown_channels_is_read_identified_and_simulated(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     u = np.repeat(rng.normal(size=60), 5)
     y = 3.0 + filtered([0.0, 0.5], [1.0, -0.5], u) + 0.01 * rng.normal(size=300)
@@ -228,7 +228,7 @@ def test_a_log_of_anything_is_read_related_and_simulated(tmp_path: Path) -> None
         log.identify(input="coil (V)")
 
 
-def test_a_log_under_other_names_says_how_to_name_its_columns_and_is_read_so(tmp_path: Path) -> None:
+def test_the_columns_suggested_for_a_log_with_other_names_make_it_readable(tmp_path: Path) -> None:
     """An earlier message named neither the missing channels nor the columns that may hold them."""
     table = hs.simulate(duration=1.0, sample_time=1e-3, seed=3).to_frame().reset_index()
     table = table[["time_s", "motor_speed_rad_s", "position_m", "differential_pressure_pa"]]
@@ -241,7 +241,7 @@ def test_a_log_under_other_names_says_how_to_name_its_columns_and_is_read_so(tmp
     assert "differential_pressure_pa" in hs.read(tmp_path / "a.csv", columns=columns).channels
 
 
-def test_a_model_is_not_judged_across_a_gap_of_its_input(tmp_path: Path) -> None:
+def test_a_model_is_validated_separately_on_both_sides_of_a_gap_of_its_input(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     u = np.repeat(rng.normal(size=80), 5)
     y = 3.0 + filtered([0.0, 0.1], [1.0, -0.9], u) + 0.01 * rng.normal(size=400)

@@ -54,7 +54,9 @@ def _told(now: Mapping[str, Any]) -> Any:
         {"not_a": Found(np.nan, 1.0)},
     ],
 )
-def test_rounding_of_other_processors_is_no_move(tmp_path: Path, change: Mapping[str, Any]) -> None:
+def test_rounding_differences_between_processors_are_not_reported_as_moved(
+    tmp_path: Path, change: Mapping[str, Any]
+) -> None:
     assert moved(tmp_path, **change) == []
 
 
@@ -78,13 +80,13 @@ def test_rounding_of_other_processors_is_no_move(tmp_path: Path, change: Mapping
         {"none": 0},
     ],
 )
-def test_what_moves_is_said_once_by_its_name(tmp_path: Path, change: Mapping[str, Any]) -> None:
+def test_a_number_that_moved_is_reported_once_by_its_name(tmp_path: Path, change: Mapping[str, Any]) -> None:
     (line,) = moved(tmp_path, **change)
     assert line.startswith(f"told: {next(iter(change)).replace('_', ' ')}")
     assert "->" in line
 
 
-def test_a_number_that_comes_or_goes_is_said(tmp_path: Path) -> None:
+def test_an_added_or_removed_number_is_reported(tmp_path: Path) -> None:
     kept = Numbers(str(tmp_path / "test_numbers.py"))
     now: dict[str, Any] = {"a": 1.0}
     kept.case()(_told(now))
@@ -95,7 +97,7 @@ def test_a_number_that_comes_or_goes_is_said(tmp_path: Path) -> None:
         kept.check("told")
 
 
-def test_the_file_has_a_line_a_number_and_a_name_of_its_own(tmp_path: Path) -> None:
+def test_the_file_of_kept_numbers_has_one_line_for_each_number(tmp_path: Path) -> None:
     kept = Numbers(str(tmp_path / "test_numbers_flow.py"))
     kept.case()(_told(TOLD))
     kept.write()
@@ -104,7 +106,9 @@ def test_the_file_has_a_line_a_number_and_a_name_of_its_own(tmp_path: Path) -> N
     assert len(lines) == len(TOLD) + 4
 
 
-def test_the_command_says_what_moved_and_keeps_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_reports_that_nothing_moved_and_refuses_a_path_without_kept_numbers(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert numbers.main(["tests/plant/components"]) == 0
     assert capsys.readouterr().out == "nothing moved\n"
     assert len(numbers.modules(["tests"])) >= 14
@@ -113,6 +117,6 @@ def test_the_command_says_what_moved_and_keeps_it(capsys: pytest.CaptureFixture[
     assert "no numbers are kept under estimation/trust" in capsys.readouterr().err
 
 
-def test_every_kept_number_is_made() -> None:
+def test_the_kept_cases_are_exactly_the_cases_of_the_code() -> None:
     for kept in numbers.modules(["tests"]):
         assert set(kept.kept()) == set(kept.cases), kept.file

@@ -43,7 +43,7 @@ def test_no_code_occurs_twice(enums: Mapping[str, type[Code]]) -> None:
     assert sorted(codes) == sorted(set(codes))
 
 
-def test_no_sentence_occurs_twice_and_all_are_clauses(enums: Mapping[str, type[Code]]) -> None:
+def test_sentences_of_notes_are_unique_clauses(enums: Mapping[str, type[Code]]) -> None:
     templates = [member.template for enum in enums.values() for member in enum]
     assert sorted(templates) == sorted(set(templates))
     assert [said for said in templates if said.endswith(".") or "\n" in said or said[0].isupper()] == []
@@ -54,7 +54,7 @@ def test_every_code_is_raised_somewhere(enums: Mapping[str, type[Code]]) -> None
     assert {f"{name}.{member.name}" for name, enum in enums.items() for member in enum} == raised
 
 
-def test_every_note_is_given_what_its_sentence_needs(enums: Mapping[str, type[Code]]) -> None:
+def test_every_note_is_raised_with_all_fields_of_its_sentence(enums: Mapping[str, type[Code]]) -> None:
     found = [
         f"{site.path}:{site.line}: {code} lacks {name}"
         for site in notes.sites(enums)
@@ -64,7 +64,7 @@ def test_every_note_is_given_what_its_sentence_needs(enums: Mapping[str, type[Co
     assert found == []
 
 
-def test_the_page_on_notes_is_that_of_the_codes() -> None:
+def test_the_page_on_notes_is_current() -> None:
     written = (ROOT / "docs" / "notes.md").read_text(encoding="utf-8")
     assert written == notes.page(), "run python docs/notes.py"
 
@@ -91,7 +91,7 @@ def asked(note):
 """
 
 
-def test_the_scan_sees_codes_by_name_and_choice_and_fields_by_dictionary() -> None:
+def test_the_scan_finds_codes_chosen_by_a_condition_and_fields_given_by_a_dictionary() -> None:
     known = {"Weather": Weather}
     by_codes = {site.codes: site.fields for site in notes.sites_in("a.py", EXAMPLE, known)}
     assert by_codes == {
@@ -102,12 +102,12 @@ def test_the_scan_sees_codes_by_name_and_choice_and_fields_by_dictionary() -> No
     assert notes.fields_of(Weather.RAIN.template) - by_codes["Weather.RAIN",] == {"depth_mm"}
 
 
-def test_a_dictionary_that_is_made_elsewhere_is_refused() -> None:
+def test_the_scan_refuses_fields_from_a_dictionary_made_elsewhere() -> None:
     with pytest.raises(ValueError, match=r"line 1: what \*\* gives"):
         list(notes.sites_in("a.py", "Weather.RAIN.note(**elsewhere.known())", {"Weather": Weather}))
 
 
-def test_a_number_that_is_converted_for_a_reader_has_its_unit_behind_it(enums: Mapping[str, type[Code]]) -> None:
+def test_a_converted_number_in_a_sentence_is_followed_by_its_unit(enums: Mapping[str, type[Code]]) -> None:
     """The unit follows the field, or the range of which the field is an end; no pressure is shown in pascal."""
     for member in (member for enum in enums.values() for member in enum):
         for said in re.split(r"[:,;] ", member.template.replace(":.", "=").replace(":+.", "=")):
@@ -128,7 +128,7 @@ def test_a_number_that_is_converted_for_a_reader_has_its_unit_behind_it(enums: M
         (".2g|mm/s", 0.012, "12"),
     ],
 )
-def test_a_sentence_gives_numbers_in_the_units_of_a_workshop(field: str, value: float, said: str) -> None:
+def test_a_sentence_gives_numbers_in_bar_rpm_and_other_workshop_units(field: str, value: float, said: str) -> None:
     class Told(Code):
         NUMBER = f"it is {{number:{field}}}"
 

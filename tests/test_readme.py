@@ -91,7 +91,7 @@ def test_the_readme_quotes_what_its_five_commands_print(done: Callable[[Path], l
 @pytest.mark.parametrize(
     "page", ["README.md", *(f"docs/{name}.md" for name in ("identification", "limits", "severities"))]
 )
-def test_a_command_within_a_sentence_names_a_verb_and_options_that_there_are(page: str) -> None:
+def test_inline_commands_use_existing_verbs_and_options(page: str) -> None:
     options = json.loads((ROOT / "docs" / "interface.json").read_text(encoding="utf-8"))["options"]
     told = re.findall(r"`hydrostate ([^`]+)`", (ROOT / page).read_text(encoding="utf-8"))
     assert told
@@ -121,7 +121,7 @@ def rows(page: Path, columns: int) -> list[list[str]]:
     return [row for row in cells if len(row) == columns and row[0] != "what"]
 
 
-def test_every_measured_row_of_the_readme_is_a_row_of_the_page_of_measurements() -> None:
+def test_every_measurement_of_the_readme_is_on_the_page_of_measurements() -> None:
     measured = [row[:3] for row in rows(MEASURED, 7)]
     shown = rows(README, 3)
     assert 0 < len(shown) <= 10
@@ -129,7 +129,7 @@ def test_every_measured_row_of_the_readme_is_a_row_of_the_page_of_measurements()
         assert row in measured, row[0]
 
 
-def test_every_measurement_names_a_command_that_is_there_a_machine_and_a_date() -> None:
+def test_every_measurement_names_an_existing_command_a_machine_and_a_date() -> None:
     machines = [machine[0] for machine in rows(MEASURED, 2)]
     for what, _, measured, command, machine, _, date in rows(MEASURED, 7):
         name, *options = command.strip("`").split()

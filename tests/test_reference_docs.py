@@ -195,7 +195,7 @@ class _Careless:
     no_source: Annotated[float, SI("Pa", "pressure", "")] = 1.0
 
 
-def test_careless_notes_are_found() -> None:
+def test_missing_or_incomplete_notes_on_parameters_are_reported() -> None:
     assert is_parameters(_Partly)
     assert not is_parameters(Cited)
     (missing,) = bad_notes(_Partly)

@@ -37,7 +37,7 @@ def anchors(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_every_link_leads_to_a_page_and_a_heading_that_are_there(page: Path) -> None:
+def test_every_link_leads_to_an_existing_page_and_heading(page: Path) -> None:
     for link in LINK.findall(prose(page)):
         parts = urlsplit(link)
         if parts.scheme:
@@ -52,7 +52,7 @@ def test_every_link_leads_to_a_page_and_a_heading_that_are_there(page: Path) -> 
         assert not parts.fragment or parts.fragment in anchors(target), link
 
 
-def test_every_test_that_a_page_names_is_there() -> None:
+def test_every_test_that_a_page_names_exists() -> None:
     tests = sorted((ROOT / "tests").rglob("test_*.py"))
     defined = {name for file in tests for name in re.findall(r"^def (test_\w+)", file.read_text("utf-8"), re.MULTILINE)}
     named = {(page, name) for page in PAGES for name in re.findall(r"`([^`\n]*)`", page.read_text("utf-8"))}
@@ -64,7 +64,7 @@ def test_every_test_that_a_page_names_is_there() -> None:
     assert not [one for one in paths if not (ROOT / one[1]).exists()]
 
 
-def test_every_python_file_that_a_page_names_is_there() -> None:
+def test_every_python_file_that_a_page_names_exists() -> None:
     records = {DOCS / "decisions.md"}  # may name files that no longer exist
     made = {DOCS / "add-a-plant.md"}  # its files are written by the reader
     folders = ("plant", "estimation", "faults", "experiments", "benchmarks", "tests", "docs")
@@ -83,7 +83,7 @@ def test_the_site_holds_every_page_once() -> None:
     assert sorted(line for line in held if line and not line.startswith(":")) == sorted(wanted)
 
 
-def test_every_name_of_every_face_has_an_entry() -> None:
+def test_every_public_name_of_the_packages_has_an_api_entry() -> None:
     pages = site_pages.api_pages()
     for face in site_pages.FACES:
         names = {name for name in importlib.import_module(face).__all__ if not name.startswith("_")}
@@ -91,7 +91,7 @@ def test_every_name_of_every_face_has_an_entry() -> None:
         assert headings == names
 
 
-def test_the_drawing_has_every_room_and_only_arrows_that_point_left() -> None:
+def test_the_drawing_shows_every_subpackage_and_imports_point_only_left() -> None:
     found = site_pages.house()
     drawing = site_pages.house_drawing()
     assert all(f">{room.partition('.')[2]}<" in drawing for room in found.rooms if "." in room)

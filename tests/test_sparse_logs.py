@@ -49,7 +49,7 @@ def by_command(path: Path, tmp_path: Path, *arguments: str) -> list[float]:
     return [*np.ravel(found["numerator"]), *found["denominator"]]
 
 
-def test_a_log_with_a_hole_gives_python_the_commands_model(holed: Path, tmp_path: Path) -> None:
+def test_python_and_the_command_identify_the_same_model_from_a_log_with_a_gap(holed: Path, tmp_path: Path) -> None:
     with pytest.warns(LogWarning):
         model = sparse(holed).identify(**MOTION, order=2, delay=1)
     assert [*np.ravel(model.numerator), *model.denominator] == pytest.approx(by_command(holed, tmp_path), rel=1e-9)
@@ -65,19 +65,23 @@ def test_a_log_with_a_hole_gives_python_the_commands_model(holed: Path, tmp_path
         lambda log: log.between(0.0, 0.5).estimate(),
     ],
 )
-def test_nothing_else_takes_a_log_with_a_hole(holed: Path, verb: Callable[[hs.Log], object]) -> None:
+def test_all_verbs_but_identification_refuse_a_log_with_a_long_gap(
+    holed: Path, verb: Callable[[hs.Log], object]
+) -> None:
     log = sparse(holed)
     with pytest.raises(hs.LogError, match=f"^{re.escape(str(holed))}: {LEFT_OUT}$"):
         verb(log)
 
 
-def test_a_log_of_which_over_half_is_missing_is_refused_when_it_is_read(run: pd.DataFrame, tmp_path: Path) -> None:
+def test_a_log_with_over_half_of_its_samples_missing_is_refused_by_read(run: pd.DataFrame, tmp_path: Path) -> None:
     run.drop(index=range(400, 1500)).to_csv(tmp_path / "most.csv", index=False)
     with pytest.raises(hs.LogError, match=LEFT_OUT):
         hs.read(tmp_path / "most.csv")
 
 
-def test_a_channel_that_an_estimate_leaves_out_is_related_and_told(run: pd.DataFrame, tmp_path: Path) -> None:
+def test_a_channel_too_sparse_for_estimates_is_used_in_identification_with_a_warning(
+    run: pd.DataFrame, tmp_path: Path
+) -> None:
     gone = run.copy()
     gone.loc[500:900, "differential_pressure_pa"] = np.nan
     gone.to_csv(tmp_path / "gone.csv", index=False)
@@ -91,7 +95,7 @@ def test_a_channel_that_an_estimate_leaves_out_is_related_and_told(run: pd.DataF
     assert "differential_pressure_pa" in log.between(0.0, 1.0).related
 
 
-def test_a_log_of_anything_relates_a_column_with_holes() -> None:
+def test_a_model_is_identified_from_a_column_with_missing_samples() -> None:
     rng = np.random.default_rng(1)
     u = np.repeat(rng.normal(size=80), 5)
     y = 3.0 + filtered([0.0, 0.5], [1.0, -0.5], u) + 0.01 * rng.normal(size=400)
@@ -105,7 +109,7 @@ def test_a_log_of_anything_relates_a_column_with_holes() -> None:
     assert model.simulate(log).shape == (400,)
 
 
-def test_a_pressure_that_begins_late_shortens_no_log_whose_other_channels_are_related(
+def test_a_pressure_that_begins_late_does_not_shorten_the_record_for_identification(
     run: pd.DataFrame, tmp_path: Path
 ) -> None:
     late = run.copy()

@@ -45,12 +45,12 @@ def worked_through(name: str, folder: Path) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in WORKED if name != "log-to-controller"])
-def test_every_block_runs_in_turn_and_what_it_claims_holds(name: str, tmp_path: Path) -> None:
+def test_every_block_of_a_tutorial_runs_in_order_and_its_claims_hold(name: str, tmp_path: Path) -> None:
     assert worked_through(name, tmp_path)
 
 
 @pytest.mark.slow
-def test_from_a_log_to_a_controller_with_the_same_numbers(tmp_path: Path) -> None:
+def test_the_controller_tutorial_gives_the_same_numbers_in_c_and_python(tmp_path: Path) -> None:
     compiler("gcc")
     if shutil.which("make") is None:
         pytest.skip("make is not installed")
@@ -63,7 +63,7 @@ def test_from_a_log_to_a_controller_with_the_same_numbers(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("name", WORKED)
-def test_a_tutorial_uses_verbs_and_options_that_there_are_and_python_that_parses(name: str) -> None:
+def test_tutorials_use_existing_verbs_and_options_and_valid_python(name: str) -> None:
     options = json.loads((ROOT / "docs" / "interface.json").read_text("utf-8"))["options"]
     for kind, text in blocks(name):
         if kind == "python":

@@ -7,7 +7,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ROWS = re.findall(r"^\| (.+?) \| `(.+?)` \| `(.+?)` \|$", (ROOT / "docs" / "where.md").read_text("utf-8"), re.MULTILINE)
 
 
-def test_what_is_looked_for_stands_where_the_table_says() -> None:
+def test_every_definition_in_the_look_up_table_is_in_the_file_named() -> None:
     assert len(ROWS) > 40
     texts = {path: (ROOT / path).read_text(encoding="utf-8") for _, path, _ in ROWS}
     wrong = [

@@ -19,7 +19,7 @@ def slower(*values: float) -> list[Check]:
     return [Check("a step [ns]", value, most=50.0) for value in values]
 
 
-def test_what_is_printed_is_kept_and_comes_back_from_the_file(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_printed_figures_are_recorded_and_read_back_unchanged(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     checks = [Check("covers [%]", 95.5, 90.0, 98.0), Check("times faster", 7.0, least=5.0), Check("open", 3.0)]
     assert printed(checks) == checks
     assert record("study --seeds 3", [*checks, Check("never found", inf, most=1.0)], path) == 3
@@ -31,7 +31,7 @@ def test_what_is_printed_is_kept_and_comes_back_from_the_file(path: Path, capsys
     assert "met    times faster: 7 (wanted: at least 5)" in said
 
 
-def test_a_figure_that_falls_short_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_figure_that_misses_its_target_is_marked_missed(capsys: pytest.CaptureFixture[str]) -> None:
     from benchmarks.targets import misses
 
     misses.clear()
@@ -53,23 +53,21 @@ def test_a_figure_that_falls_short_says_so(capsys: pytest.CaptureFixture[str]) -
         ((60.0, 61.0), False),  # missed it before
     ],
 )
-def test_only_a_change_for_the_worse_that_scatter_does_not_explain_counts(
-    values: tuple[float, ...], worse: bool
-) -> None:
+def test_only_a_worsening_beyond_the_earlier_scatter_is_a_regression(values: tuple[float, ...], worse: bool) -> None:
     assert (regression(slower(*values)) is not None) is worse
 
 
-def test_less_is_worse_where_at_least_is_wanted() -> None:
+def test_a_lower_figure_is_worse_if_its_target_is_a_minimum() -> None:
     checks = [Check("times faster", value, least=5.0) for value in (20.0, 21.0, 12.0)]
     assert regression(checks) == "worse by 41 %: 12, 20.5 before"
 
 
-def test_a_figure_in_a_range_is_worse_only_outside_it() -> None:
+def test_a_figure_with_a_target_range_is_worse_only_outside_it() -> None:
     assert regression([Check("z", 0.8, 0.7, 1.3), Check("z", 1.29, 0.7, 1.3)]) is None
     assert "misses its range now" in str(regression([Check("z", 0.8, 0.7, 1.3), Check("z", 1.4, 0.7, 1.3)]))
 
 
-def test_machines_and_arguments_are_not_compared_with_each_other(
+def test_runs_on_other_machines_or_with_other_arguments_are_not_compared(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     [one, other] = slower(20.0, 40.0)
@@ -89,7 +87,9 @@ def test_machines_and_arguments_are_not_compared_with_each_other(
     assert image.imread(drawn).std() > 0.01
 
 
-def test_recording_is_asked_for_before_the_name(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_figures_are_recorded_only_with_the_record_option_before_the_name(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     import benchmarks.many_logs.start_up as benchmark
 
     def measured(arguments: list[str]) -> int:
@@ -104,7 +104,7 @@ def test_recording_is_asked_for_before_the_name(path: Path, monkeypatch: pytest.
     assert entry_of(path.read_text()).benchmark == "start_up --seconds 5"
 
 
-def test_a_history_that_is_not_there_is_said(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_history_file_is_reported(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--file", str(path)]) == 1
     assert "no history there" in capsys.readouterr().err
     assert history.machine().split()[1] in ("processors,", "processor,")

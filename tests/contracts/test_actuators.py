@@ -78,7 +78,7 @@ def looked(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
 
 @EVERY_KIND
-def test_it_is_found_by_its_name_and_by_its_models(kind: ActuatorKind) -> None:
+def test_a_kind_of_actuator_is_found_by_its_name_and_by_its_models(kind: ActuatorKind) -> None:
     assert all(actuator(name) is kind for name in (kind.name, *kind.models))
     assert kind.description
     assert kind.simulate
@@ -87,7 +87,7 @@ def test_it_is_found_by_its_name_and_by_its_models(kind: ActuatorKind) -> None:
 
 
 @EVERY_KIND
-def test_its_parameters_have_notes_and_a_rig_file_gives_them_back(kind: ActuatorKind, tmp_path: Path) -> None:
+def test_parameters_have_notes_and_are_read_back_from_a_rig_file(kind: ActuatorKind, tmp_path: Path) -> None:
     assert list(notes(kind.parameters)) == [one.name for one in fields(kind.parameters)]
     path = tmp_path / "rig.toml"
     path.write_text(rig_template(kind.parameters, kind.name, {}), encoding="utf-8")
@@ -102,14 +102,14 @@ def test_its_parameters_have_notes_and_a_rig_file_gives_them_back(kind: Actuator
 
 
 @EVERY_KIND
-def test_its_channels_are_known_and_those_required_are_among_them(kind: ActuatorKind) -> None:
+def test_channels_of_a_kind_are_known_and_include_the_required_ones(kind: ActuatorKind) -> None:
     assert {name: UNITS[name] for name in kind.channels} == dict(kind.channels)
     assert {name for wanted in kind.required for name in wanted.split(" or ")} <= set(kind.channels)
     assert kind.required
 
 
 @EVERY_KIND
-def test_a_seed_decides_the_whole_run_and_all_that_is_required_is_logged(kind: ActuatorKind) -> None:
+def test_the_same_seed_gives_the_same_run_and_every_required_channel_is_logged(kind: ActuatorKind) -> None:
     first, again, other = (run_of(kind, seed).record for seed in (3, 3, 4))
     assert all(np.array_equal(first[name], again[name]) for name in first)
     assert not all(np.array_equal(first[name], other[name]) for name in first)
@@ -118,7 +118,7 @@ def test_a_seed_decides_the_whole_run_and_all_that_is_required_is_logged(kind: A
     assert json.loads(json.dumps(dict(first.metadata)))["plant"]
 
 
-def test_a_finding_is_whole(looked: Looked) -> None:
+def test_a_finding_has_an_outcome_a_gate_channels_and_ordered_intervals(looked: Looked) -> None:
     for found in looked.findings.values():
         assert found.actuator == looked.kind.name
         assert isinstance(found.outcome, Outcome)
@@ -133,7 +133,7 @@ def test_a_finding_is_whole(looked: Looked) -> None:
                 assert one.ci95[0] <= one.value <= one.ci95[1]
 
 
-def test_its_own_healthy_log_is_estimated_and_called_healthy(looked: Looked) -> None:
+def test_a_simulated_healthy_log_is_estimated_and_diagnosed_as_healthy(looked: Looked) -> None:
     estimate, diagnosis = looked.findings["estimate"], looked.findings["diagnose"]
     assert estimate.outcome is Outcome.OK
     assert estimate.gate.passed
@@ -144,7 +144,7 @@ def test_its_own_healthy_log_is_estimated_and_called_healthy(looked: Looked) -> 
     assert sum(diagnosis.probabilities.values()) + 0.01 * beside == pytest.approx(float(bool(diagnosis.probabilities)))
 
 
-def test_entries_are_those_of_a_log_that_failed_and_go_into_json(looked: Looked) -> None:
+def test_entries_of_a_finding_equal_those_of_a_failed_log_and_are_valid_json(looked: Looked) -> None:
     for name, found in looked.findings.items():
         verb = getattr(looked.kind, name)
         entries = verb.entries(found)
@@ -154,7 +154,7 @@ def test_entries_are_those_of_a_log_that_failed_and_go_into_json(looked: Looked)
         assert json.loads(json_text([entries]))[0]["outcome"] == found.outcome.value
 
 
-def test_the_page_says_what_was_found(looked: Looked) -> None:
+def test_the_page_shows_every_quantity_found(looked: Looked) -> None:
     for name, found in looked.findings.items():
         result = {"file": "run.csv", "rig": "mine", **getattr(looked.kind, name).entries(found)}
         page = finding_page(result, found, looked.record)
@@ -163,7 +163,7 @@ def test_the_page_says_what_was_found(looked: Looked) -> None:
         assert "rig mine" in page
 
 
-def test_the_command_says_the_same(looked: Looked) -> None:
+def test_the_diagnose_command_finds_the_healthy_condition(looked: Looked) -> None:
     load = [f"--{name}={value}" for name, value in LOADED.get(looked.kind.name, {}).items()]
     done = CliRunner().invoke(app, ["diagnose", "--plant", looked.kind.name, *load, "--json", str(looked.log)])
     assert done.exit_code == 0, done.output
@@ -173,7 +173,7 @@ def test_the_command_says_the_same(looked: Looked) -> None:
 
 
 @EVERY_KIND
-def test_what_it_does_not_take_is_refused_in_one_sentence(kind: ActuatorKind, tmp_path: Path) -> None:
+def test_foreign_options_and_missing_columns_are_refused_in_one_sentence(kind: ActuatorKind, tmp_path: Path) -> None:
     run = run_of(kind)
     lacking = next(name for wanted in kind.required for name in wanted.split(" or "))
     log = tmp_path / "log.csv"
@@ -186,7 +186,7 @@ def test_what_it_does_not_take_is_refused_in_one_sentence(kind: ActuatorKind, tm
         assert len(done.stderr.splitlines()) == 1
 
 
-def test_a_verb_that_a_kind_has_not_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_verb_that_is_not_available_for_a_kind_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     bare = replace(KINDS["piezo-stack"], estimate=None)
     monkeypatch.setattr(registry, "actuator", lambda _: bare)
     done = CliRunner().invoke(app, ["estimate", "--plant", "piezo-stack", str(tmp_path / "log.csv")])
@@ -199,7 +199,7 @@ def test_an_unknown_kind_is_refused_with_those_that_are_known() -> None:
         actuator("toy")
 
 
-def test_a_rig_file_names_its_kind(tmp_path: Path) -> None:
+def test_a_rig_file_selects_its_kind_of_actuator(tmp_path: Path) -> None:
     rig, out = tmp_path / "rig.toml", tmp_path / "run.csv"
     run = CliRunner()
     assert run.invoke(app, ["rig", "init", str(rig), "--plant", "diaphragm-motor"]).exit_code == 0

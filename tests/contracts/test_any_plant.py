@@ -121,21 +121,21 @@ def test_a_filter_finds_a_parameter_that_is_a_state(method: str, record: Record)
     assert all(0.8 < nis < 1.25 for nis in estimate.nis.values())
 
 
-def test_whatever_has_the_fields_may_be_handed_to_a_filter(record: Record) -> None:
+def test_a_filter_accepts_any_object_with_the_parameter_fields(record: Record) -> None:
     bench = make_dataclass("Bench", ["label", "damping", "mass", "stiffness"], frozen=True)
     same = bench(label=7.0, **asdict(TRUTH))
     one, other = (run_filter(METHODS["ekf"], MODEL, PRIOR, record, p) for p in (TRUTH, same))
     np.testing.assert_array_equal(one.mean, other.mean)
 
 
-def test_a_drive_with_gaps_is_bridged_where_no_opening_is_given(record: Record) -> None:
+def test_a_gap_of_the_drive_is_bridged_if_the_model_has_no_opening(record: Record) -> None:
     holed = FORCE.copy()
     holed[110:120] = np.nan
     estimate = run_filter(METHODS["ekf"], MODEL, PRIOR, record.replace(force_n=holed), TRUTH)
     assert estimate.settled("stiffness")[0] == pytest.approx(TRUTH.stiffness, rel=0.02)
 
 
-def test_a_drive_with_gaps_opens_the_states_that_it_moves(record: Record) -> None:
+def test_an_opening_for_gaps_of_the_drive_raises_the_likelihood(record: Record) -> None:
     def opening(p: Any, unknown: Mapping[str, Array], sample_time: float) -> tuple[Array, Mapping[str, float]]:
         del sample_time
         return unknown["force_n"], {"velocity_m_s": 1.0 / p.mass}
@@ -174,7 +174,7 @@ def test_a_grey_box_fit_finds_two_parameters_with_their_intervals(record: Record
     assert fit.chi_square == pytest.approx((1.0, 1.0), abs=0.1)
 
 
-def test_a_row_stands_in_the_fields_order_and_names_are_checked() -> None:
+def test_a_parameter_row_follows_the_order_of_the_fields_and_reserved_names_are_refused() -> None:
     assert parameter_names(Suspension) == ("mass", "stiffness", "damping")
     assert parameter_row(TRUTH).tolist() == [2.0, 800.0, 6.0]
     assert parameter_row(SimpleNamespace(damping=1.0, stiffness=2.0, mass=3.0), Suspension).tolist() == [3.0, 2.0, 1.0]

@@ -19,13 +19,13 @@ def test_conditions_are_registered_under_their_names() -> None:
     assert all(find_condition(name) is condition for name, condition in CONDITIONS.items())
 
 
-def test_every_pair_of_levels_is_one_condition() -> None:
+def test_every_combination_of_leakage_and_friction_levels_is_a_condition() -> None:
     pairs = {(condition.leakage, condition.friction) for condition in CONDITIONS.values()}
     assert pairs == {(leakage, friction) for leakage in LEVELS for friction in LEVELS}
 
 
 @EVERY_CONDITION
-def test_only_leakage_and_friction_change(condition: Condition) -> None:
+def test_a_condition_changes_only_leakage_and_friction_parameters(condition: Condition) -> None:
     changed = {name for name, value in vars(parameters_for(condition)).items() if value != getattr(RIG, name)}
     leaking = {"leakage_coefficient", "flow_bias"} if condition.leakage != "none" else set[str]()
     rubbing = {"friction_quadratic", "friction_linear", "friction_coulomb"} if condition.friction != "none" else set()
@@ -33,7 +33,7 @@ def test_only_leakage_and_friction_change(condition: Condition) -> None:
 
 
 @EVERY_CONDITION
-def test_it_still_moves_at_the_validation_steps_lowest_voltage(condition: Condition) -> None:
+def test_the_piston_still_moves_at_the_lowest_voltage_of_the_validation_steps(condition: Condition) -> None:
     p = parameters_for(condition)
     velocity, pressure = steady_state(2.5 * p.motor_speed_per_volt, p)
     assert velocity > 0.0
@@ -41,7 +41,7 @@ def test_it_still_moves_at_the_validation_steps_lowest_voltage(condition: Condit
 
 
 @EVERY_CONDITION
-def test_the_simulated_plant_settles_where_the_balances_say(condition: Condition) -> None:
+def test_the_simulated_plant_settles_at_the_steady_state_of_the_balances(condition: Condition) -> None:
     p = parameters_for(condition)
     speed = 3.0 * p.motor_speed_per_volt
     record = simulate(LUMPED, np.full(6_001, speed), 1e-3, p)
@@ -51,6 +51,6 @@ def test_the_simulated_plant_settles_where_the_balances_say(condition: Condition
 
 
 @pytest.mark.parametrize(("one", "other"), list(combinations(CONDITIONS, 2)))
-def test_any_two_settle_further_apart_than_the_sensors_err(one: str, other: str) -> None:
+def test_steady_states_of_any_two_conditions_differ_by_more_than_the_sensor_errors(one: str, other: str) -> None:
     a, b = (np.array(steady_state(100.0, parameters_for(CONDITIONS[name]))) for name in (one, other))
     assert np.any(np.abs(a - b) > [1e-3, 5e3])

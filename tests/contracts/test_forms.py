@@ -50,7 +50,7 @@ def test_forms_are_registered_under_their_names() -> None:
 
 
 @EVERY_FORM
-def test_its_states_are_named_with_their_units_and_scaled_to_order_one(model: ProcessModel) -> None:
+def test_every_state_has_a_unique_name_a_unit_a_scale_and_bounds(model: ProcessModel) -> None:
     assert len({state.name for state in model.states}) == model.width
     for state in model.states:
         assert state.scale > 0.0
@@ -60,7 +60,7 @@ def test_its_states_are_named_with_their_units_and_scaled_to_order_one(model: Pr
 
 
 @EVERY_FORM
-def test_it_holds_bulk_modulus_constant_and_physical(model: ProcessModel) -> None:
+def test_a_step_of_the_model_keeps_bulk_modulus_constant_and_its_bounds_are_physical(model: ProcessModel) -> None:
     state = model.states[model.index(BULK_MODULUS)]
     assert state.lower == 0.0
     assert state.upper > 2.07e9
@@ -70,7 +70,7 @@ def test_it_holds_bulk_modulus_constant_and_physical(model: ProcessModel) -> Non
 
 
 @EVERY_FORM
-def test_it_predicts_motion_linearly_in_its_state(model: ProcessModel) -> None:
+def test_predicted_channels_are_linear_in_the_state(model: ProcessModel) -> None:
     rng = np.random.default_rng(1)
     scale = np.array([state.scale for state in model.states])
     a, b = scale * rng.normal(size=(2, model.width))
@@ -105,7 +105,9 @@ def test_the_covariance_stays_symmetric_and_positive(method: Method, model: Proc
 
 @EVERY_FORM
 @WITHOUT_CHANCE
-def test_a_log_with_nothing_measured_leaves_bulk_modulus_as_believed(method: Method, model: ProcessModel) -> None:
+def test_a_log_without_measurements_leaves_the_prior_of_bulk_modulus_unchanged(
+    method: Method, model: ProcessModel
+) -> None:
     record = bench_log()
     missing = {name: np.full(len(record), np.nan) for name in record if name != "motor_speed_rad_s"}
     estimate = filtered(method, model, record.replace(**missing))
@@ -116,7 +118,7 @@ def test_a_log_with_nothing_measured_leaves_bulk_modulus_as_believed(method: Met
 
 
 @WITHOUT_CHANCE
-def test_a_filter_that_diverges_returns_that_and_raises_nothing(method: Method) -> None:
+def test_a_filter_that_diverges_returns_a_value_that_is_not_finite(method: Method) -> None:
     parameters = parameters_for(CONDITIONS["major_friction"])
     drive = sine(0.5, 1e-3, parameters.rated_speed, 2.0)
     record = simulate(LUMPED, drive, 1e-3, parameters, sensors=BENCH, rng=np.random.default_rng(0))
@@ -126,7 +128,7 @@ def test_a_filter_that_diverges_returns_that_and_raises_nothing(method: Method) 
 
 @EVERY_FORM
 @EVERY_METHOD
-def test_it_gives_the_same_answer_twice_and_leaves_its_prior_alone(method: Method, model: ProcessModel) -> None:
+def test_a_filter_run_is_reproducible_and_does_not_change_its_prior(method: Method, model: ProcessModel) -> None:
     record = bench_log(duration=0.02)
     prior = first_belief(model, record, 2e8, 3e8)
     first, again = (run_filter(method, model, prior, record, RIG) for _ in range(2))

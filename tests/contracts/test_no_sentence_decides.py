@@ -164,7 +164,7 @@ SLOW = {name for name in CALLS if "without pressure" in name or "long" in name} 
 @pytest.mark.parametrize(
     "call", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in CALLS]
 )
-def test_with_every_sentence_put_as_x_all_but_text_stays(
+def test_replacing_every_sentence_by_x_changes_only_text(
     call: str,
     folder: Path,
     as_written: dict[str, tuple[int, list[dict[str, Any]]]],
@@ -185,7 +185,7 @@ def test_with_every_sentence_put_as_x_all_but_text_stays(
 
 
 @pytest.mark.slow
-def test_the_logs_bring_up_notes_of_every_kind(
+def test_the_logs_used_raise_notes_and_outcomes_of_every_kind(
     folder: Path, as_written: dict[str, tuple[int, list[dict[str, Any]]]]
 ) -> None:
     every = (f"{verb}, most logs" for verb in ("estimate", "diagnose"))

@@ -102,6 +102,6 @@ def test_estimate_and_diagnose_give_one_answer_on_every_set(folder: str, shared:
     assert [said for said in found if said] == []
 
 
-def test_every_strange_set_is_asked(shared: Path) -> None:
+def test_every_strange_data_set_is_compared(shared: Path) -> None:
     folders = {f"strange/{path.name}" for path in (shared / "strange").iterdir() if path.is_dir()}
     assert folders <= set(SETS)

@@ -29,7 +29,7 @@ def test_plants_are_registered_under_their_names() -> None:
 
 @EVERY_PLANT
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
-def test_it_moves_within_reason_in_every_condition(plant: Plant, condition: Condition) -> None:
+def test_velocity_travel_and_pressure_are_plausible_in_every_condition(plant: Plant, condition: Condition) -> None:
     p = parameters_for(condition)
     record = run(plant, parameters=p)
     ideal = p.pump_displacement * p.rated_speed / p.piston_area
@@ -39,7 +39,7 @@ def test_it_moves_within_reason_in_every_condition(plant: Plant, condition: Cond
 
 
 @EVERY_PLANT
-def test_it_logs_what_a_bench_logs_on_the_clock_of_the_drive(plant: Plant) -> None:
+def test_a_simulation_logs_all_bench_channels_on_the_clock_of_the_drive(plant: Plant) -> None:
     record = run(plant)
     assert set(CHANNELS) <= set(record)
     assert (len(record), record.sample_time) == (len(DRIVE), 1e-3)
@@ -50,7 +50,7 @@ def test_it_logs_what_a_bench_logs_on_the_clock_of_the_drive(plant: Plant) -> No
 
 
 @EVERY_PLANT
-def test_undriven_it_stays_where_it_is(plant: Plant) -> None:
+def test_an_actuator_without_drive_stays_at_rest(plant: Plant) -> None:
     record = run(plant, np.zeros(300))
     assert np.max(np.abs(record["velocity_m_s"])) <= 1e-12
     assert np.max(np.abs(record["position_m"])) <= 1e-12
@@ -58,14 +58,14 @@ def test_undriven_it_stays_where_it_is(plant: Plant) -> None:
 
 
 @EVERY_PLANT
-def test_driven_the_other_way_it_moves_the_other_way(plant: Plant) -> None:
+def test_a_reversed_drive_reverses_the_sign_of_every_channel(plant: Plant) -> None:
     forth, back = run(plant), run(plant, -DRIVE)
     for name in CHANNELS:
         np.testing.assert_allclose(back[name], -forth[name], atol=1e-6 * np.max(np.abs(forth[name])))
 
 
 @EVERY_PLANT
-def test_it_begins_at_rest(plant: Plant) -> None:
+def test_a_simulation_begins_at_rest(plant: Plant) -> None:
     record = run(plant)
     assert record["position_m"][0] == record["velocity_m_s"][0] == 0.0
 
@@ -78,7 +78,7 @@ def test_velocity_is_the_rate_of_position(plant: Plant) -> None:
 
 
 @EVERY_PLANT
-def test_a_path_on_which_nothing_changes_is_a_constant_actuator(plant: Plant) -> None:
+def test_a_constant_parameter_path_gives_the_same_log_as_constant_parameters(plant: Plant) -> None:
     path = ParameterPath((0.0, 0.2), (RIG, RIG), "linear")
     constant, along = run(plant), run(plant, parameters=path)
     for name in constant:
@@ -86,13 +86,13 @@ def test_a_path_on_which_nothing_changes_is_a_constant_actuator(plant: Plant) ->
 
 
 @EVERY_PLANT
-def test_a_seed_decides_the_whole_log(plant: Plant) -> None:
+def test_the_same_seed_gives_the_same_log(plant: Plant) -> None:
     first, again = (simulate(plant, DRIVE, 1e-3, RIG, sensors=BENCH, rng=np.random.default_rng(3)) for _ in range(2))
     for name in first:
         np.testing.assert_array_equal(first[name], again[name])
 
 
 @EVERY_PLANT
-def test_it_steps_as_many_states_as_it_names(plant: Plant) -> None:
+def test_state_names_are_unique_and_there_is_at_least_one_substep(plant: Plant) -> None:
     assert len(set(plant.states)) == len(plant.states)
     assert plant.substeps >= 1

@@ -7,7 +7,7 @@ from estimation.identification.free_run.identify import identify_channels
 from estimation.progress import listening, tell
 
 
-def test_a_search_is_heard_within_the_block_and_by_the_innermost_listener() -> None:
+def test_progress_reaches_only_the_innermost_listener_and_only_inside_its_block() -> None:
     outer, inner = list[str](), list[str]()
     with listening(outer.append):
         tell("first")
@@ -18,7 +18,7 @@ def test_a_search_is_heard_within_the_block_and_by_the_innermost_listener() -> N
     assert (outer, inner) == (["first", "third"], ["second"])
 
 
-def test_an_identification_tells_each_kind_of_model_more_than_once() -> None:
+def test_an_identification_reports_progress_of_each_kind_of_model() -> None:
     rng = np.random.default_rng(3)
     u, y = rng.uniform(-1.0, 1.0, 300), np.zeros(300)
     for t in range(1, 300):

@@ -9,7 +9,7 @@ from estimation.stretches import in_long_stretches, stretches
 
 
 @given(st.lists(st.booleans(), max_size=40))
-def test_stretches_hold_what_they_are_of_and_do_not_touch(given_: list[bool]) -> None:
+def test_stretches_contain_exactly_the_true_samples_and_do_not_touch(given_: list[bool]) -> None:
     where = np.array(given_, dtype=np.bool_)
     first, behind = stretches(where)
     assert [i for a, b in zip(first, behind, strict=True) for i in range(a, b)] == np.flatnonzero(where).tolist()
@@ -17,6 +17,6 @@ def test_stretches_hold_what_they_are_of_and_do_not_touch(given_: list[bool]) ->
 
 
 @pytest.mark.parametrize(("least", "kept"), [(1, [0, 2, 3, 5, 6, 7]), (2, [2, 3, 5, 6, 7]), (2.5, [5, 6, 7]), (4, [])])
-def test_short_stretches_do_not_count(least: float, kept: list[int]) -> None:
+def test_stretches_shorter_than_the_limit_are_dropped(least: float, kept: list[int]) -> None:
     where = np.array([1, 0, 1, 1, 0, 1, 1, 1], dtype=np.bool_)
     assert np.flatnonzero(in_long_stretches(where, least)).tolist() == kept

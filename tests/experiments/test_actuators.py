@@ -16,7 +16,7 @@ def test_a_kind_is_found_by_its_name_and_by_each_of_its_plants() -> None:
         actuator("piezo")
 
 
-def test_a_log_is_of_the_kind_that_its_rig_file_names_and_of_the_usual_one_where_it_names_none() -> None:
+def test_the_kind_of_actuator_is_that_of_the_rig_file_or_else_the_default() -> None:
     assert kind_of_rig(Rig(plant="piezo-stack"), "eha").name == "piezo-stack"
     assert kind_of_rig(Rig(), "diaphragm-motor").name == "diaphragm-motor"
 
@@ -34,7 +34,7 @@ def test_a_verb_that_a_kind_does_not_offer_is_refused_by_both_names() -> None:
         offered(kind, "estimate")
 
 
-def test_the_columns_of_a_log_tell_its_kind_where_one_alone_has_them() -> None:
+def test_the_columns_of_a_log_determine_its_kind_of_actuator() -> None:
     stack = ("time_s", "drive_voltage_v", "position_m", "chamber_pressure_pa")
     assert kinds_by_columns(stack) == ("piezo-stack",)
     assert kinds_by_columns(("motor_speed_rad_s", "position_m", *stack)) == ("eha",)

@@ -32,7 +32,7 @@ def process(*arguments: object, **environment: str) -> "subprocess.CompletedProc
 
 
 @pytest.mark.parametrize("command", [(name,) for name in COMMANDS] + [("rig", "init")])
-def test_help_gives_an_example_that_parses_so_far(command: tuple[str, ...]) -> None:
+def test_help_of_every_command_gives_an_example(command: tuple[str, ...]) -> None:
     shown = invoke(*command, "--help")
     assert shown.exit_code == 0
     assert f"Example: hydrostate {' '.join(command)}" in " ".join(shown.stdout.split())
@@ -41,12 +41,12 @@ def test_help_gives_an_example_that_parses_so_far(command: tuple[str, ...]) -> N
 @pytest.mark.parametrize(
     "words", [[verb, *more] for verb in ALONE for more in (["--help"], [], ["--no-such", "x.csv"])]
 )
-def test_a_verb_that_is_loaded_alone_reads_as_among_the_others(words: list[str]) -> None:
+def test_a_verb_loaded_alone_gives_the_same_output_as_in_the_whole_app(words: list[str]) -> None:
     alone, among = CliRunner().invoke(app_for(words), words), CliRunner().invoke(app, words)
     assert (alone.exit_code, alone.output) == (among.exit_code, among.output)
 
 
-def test_help_of_a_verb_leaves_room_for_what_an_option_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_help_in_80_columns_cuts_neither_names_nor_descriptions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     shown = invoke("diagnose", "--help").stdout
     assert "stack_displacement_m" in shown, "a name is cut"
@@ -56,19 +56,19 @@ def test_help_of_a_verb_leaves_room_for_what_an_option_does(monkeypatch: pytest.
 
 
 @pytest.mark.parametrize("words", [["diagnose"], ["rig", "init"], ["rig"], []])
-def test_help_may_be_asked_for_by_its_name(words: list[str]) -> None:
+def test_the_verb_help_prints_the_same_as_the_option_help(words: list[str]) -> None:
     asked, meant = invoke("help", *words), invoke(*words, "--help")
     assert (asked.exit_code, asked.output) == (0, meant.output)
 
 
 @pytest.mark.parametrize("verb", ["diagnose", "estimate", "inspect"])
-def test_a_page_is_asked_for_by_either_name(verb: str) -> None:
+def test_the_options_report_and_html_are_equivalent(verb: str) -> None:
     refused = [invoke(verb, "x.csv", name, "page.txt").output for name in ("--report", "--html")]
     assert refused[0] == refused[1]
     assert "must end in .html" in refused[0]
 
 
-def test_a_log_on_standard_input_is_told_of_watch() -> None:
+def test_a_log_on_standard_input_is_referred_to_watch() -> None:
     assert "hydrostate watch -" in invoke("diagnose", "-").output
 
 
@@ -81,7 +81,7 @@ def test_a_log_on_standard_input_is_told_of_watch() -> None:
         ("diagnose", ["[m/s]", "[dimensionless]"]),
     ],
 )
-def test_help_says_units(command: str, units: list[str]) -> None:
+def test_help_contains_units(command: str, units: list[str]) -> None:
     shown = invoke(command, "--help").stdout
     assert [unit for unit in units if unit not in shown] == []
 
@@ -92,7 +92,7 @@ def test_every_command_has_the_common_options(command: str) -> None:
     assert all(option in shown for option in ("--json", "--out", "--seed"))
 
 
-def test_help_says_what_the_exit_codes_and_outcomes_mean() -> None:
+def test_help_explains_exit_codes_and_outcomes() -> None:
     shown = " ".join(invoke("--help").stdout.split())
     for meaning in (
         "0 all done",
@@ -104,7 +104,7 @@ def test_help_says_what_the_exit_codes_and_outcomes_mean() -> None:
         assert meaning in shown
 
 
-def test_help_and_version_wait_for_no_heavy_import() -> None:
+def test_help_and_version_import_no_heavy_package() -> None:
     code = (
         "import sys\nfrom experiments.cli import app\n"
         "for option in ('--help', '--version'):\n"
@@ -115,7 +115,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
     assert done.stdout.splitlines()[-2:] == ["hydrostate 0.1.0", "[]"]
 
 
-def test_a_log_that_is_fitted_waits_for_no_filter(tmp_path: Path) -> None:
+def test_fitting_a_log_imports_no_filters(tmp_path: Path) -> None:
     """Before, filters and tuning took a fifteenth of all imports, only for the names of their options."""
     (tmp_path / "log.csv").write_text("time_s,motor_speed_rad_s\n0,1\n")
     code = (
@@ -216,7 +216,7 @@ def test_a_log_that_is_fitted_waits_for_no_filter(tmp_path: Path) -> None:
         (["conditions", "--seed", "-1"], "Invalid value for '--seed'"),
     ],
 )
-def test_a_wrong_request_is_refused_in_one_sentence(
+def test_wrong_arguments_are_refused_in_one_line(
     arguments: list[str], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -228,7 +228,7 @@ def test_a_wrong_request_is_refused_in_one_sentence(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_internal_error_is_a_sentence_and_a_traceback_on_request_only(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_internal_error_prints_one_line_and_a_traceback_only_on_request(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise RuntimeError("the\nmill is broken")
 
@@ -282,7 +282,7 @@ def test_rig_init_writes_a_file_once(tmp_path: Path) -> None:
     assert "PATH must end in .toml, got" in invoke("rig", "init", tmp_path / "rig.csv").stderr
 
 
-def test_the_help_begins_with_what_a_log_says_and_ends_with_the_papers() -> None:
+def test_help_lists_the_groups_of_commands_in_order() -> None:
     said = invoke("--help").stdout
     headings = ["What a log says", "│ diagnose", "Many logs", "│ fleet", "Before a test", "│ rig ", "The papers"]
     places = [said.index(one) for one in headings]
@@ -290,7 +290,9 @@ def test_the_help_begins_with_what_a_log_says_and_ends_with_the_papers() -> None
 
 
 @pytest.mark.parametrize("as_json", [False, True])
-def test_study_ends_with_the_reports_path(as_json: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_study_prints_the_path_of_the_report_last(
+    as_json: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked: list[tuple[str, object, Path]] = []
 
     def run(study: Study[Any], settings: object, out: Path, console: object) -> Path:
@@ -321,12 +323,12 @@ def test_the_command_runs_as_a_process_with_its_exit_codes(tmp_path: Path) -> No
     assert "Traceback" not in refused.stderr
 
 
-def test_streams_that_were_closed_before_the_command_began_are_no_error() -> None:
+def test_closed_standard_streams_are_not_an_error() -> None:
     command = f"exec {sys.executable} -m experiments.cli conditions --json >&- 2>&- <&-"
     assert subprocess.run(["/bin/sh", "-c", command], check=False).returncode == 0  # noqa: S603
 
 
-def test_a_reader_that_goes_away_is_no_error() -> None:
+def test_a_closed_output_pipe_is_not_an_error() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-m", "experiments.cli", "conditions", "--json"]

@@ -35,7 +35,7 @@ def order(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     gc.set_threshold(*thresholds)
 
 
-def test_a_thread_is_waited_for_and_what_asked_to_be_called_at_the_exit_is(
+def test_the_immediate_exit_waits_for_threads_and_calls_the_exit_functions(
     order: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     go_on = threading.Event()
@@ -55,7 +55,9 @@ def test_a_thread_is_waited_for_and_what_asked_to_be_called_at_the_exit_is(
     assert order == ["sources trusted", "thread done", "exit functions", "end 1"]
 
 
-def test_an_end_without_a_code_is_left_to_python(order: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_exit_with_a_text_instead_of_a_code_is_left_to_python(
+    order: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     def command() -> None:
         raise SystemExit("words")
 
@@ -65,7 +67,7 @@ def test_an_end_without_a_code_is_left_to_python(order: list[str], monkeypatch: 
     assert order == ["sources trusted"]
 
 
-def test_an_interruption_while_a_command_is_loaded_is_a_sentence(
+def test_an_interruption_while_a_command_is_loaded_prints_one_line(
     order: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def loaded(_: object) -> None:
@@ -78,7 +80,7 @@ def test_an_interruption_while_a_command_is_loaded_is_a_sentence(
     assert capsys.readouterr().err == "hydrostate: interrupted\n"
 
 
-def test_the_users_own_count_of_threads_stands_and_one_is_the_default(
+def test_the_number_of_threads_is_the_user_s_or_one_by_default(
     order: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("OMP_NUM_THREADS")

@@ -87,12 +87,12 @@ def test_the_friction_table_is_the_published_table_4() -> None:
         assert list(asdict(row).values()) == table.loc[level].tolist()
 
 
-def test_the_papers_rig_without_change_is_the_level_none() -> None:
+def test_the_papers_rig_is_the_normal_condition() -> None:
     assert parameters_for(CONDITIONS["normal"]) == RIG
 
 
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=lambda c: c.name)
-def test_on_the_papers_rig_every_condition_is_exactly_the_tables(condition: Condition) -> None:
+def test_on_the_papers_rig_every_condition_has_exactly_the_values_of_the_tables(condition: Condition) -> None:
     wanted = replace(RIG, **asdict(LEAKAGE_TABLE[condition.leakage]), **asdict(FRICTION_TABLE[condition.friction]))
     assert parameters_for(condition) == wanted
 
@@ -105,7 +105,7 @@ def test_leakage_at_4_volts_leaves_71_and_53_percent_of_the_velocity() -> None:
     assert major == pytest.approx(0.53, abs=0.005)
 
 
-def test_minor_friction_at_4_volts_raises_the_pressure_to_320_percent_and_major_reaches_the_relief() -> None:
+def test_at_4_volts_minor_friction_needs_320_percent_pressure_and_major_the_relief_pressure() -> None:
     normal = steady_pressure(RIG)
     minor = steady_pressure(parameters_for(CONDITIONS["minor_friction"]))
     major = steady_pressure(parameters_for(CONDITIONS["major_friction"]))
@@ -114,7 +114,7 @@ def test_minor_friction_at_4_volts_raises_the_pressure_to_320_percent_and_major_
 
 
 @given(a=SEVERITIES, b=SEVERITIES)
-def test_leakage_rises_with_its_severity_and_friction_stays(a: float, b: float) -> None:
+def test_leakage_rises_with_its_severity_and_friction_does_not_change(a: float, b: float) -> None:
     less, more = severity(min(a, b), 0.0), severity(max(a, b), 0.0)
     assert less.leakage_coefficient <= more.leakage_coefficient
     assert less.flow_bias <= more.flow_bias
@@ -144,7 +144,7 @@ def test_at_the_highest_leakage_severity_the_rig_still_moves_and_a_little_beyond
     assert highest + 0.6 * (highest - one_less) > rated_flow(RIG)
 
 
-def test_severity_runs_linearly_between_the_levels_and_beyond() -> None:
+def test_parameters_are_linear_in_severity_between_and_beyond_the_levels() -> None:
     halfway = severity(1.5, 0.5)
     assert halfway.leakage_coefficient == pytest.approx(0.5 * (2.523e-11 + 6.006e-11), rel=1e-12)
     assert halfway.friction_linear == pytest.approx(0.5 * (2.144e3 - 7.44e3), rel=1e-12)
@@ -160,7 +160,7 @@ def test_a_rig_without_any_leakage_or_coulomb_friction_can_be_made_faulty(a: flo
     assert 0.0 <= faulty.friction_coulomb <= worse.friction_coulomb
 
 
-def test_a_frictionless_rig_that_needs_no_pressure_takes_the_papers_increments() -> None:
+def test_a_rig_without_friction_gets_the_papers_increments_of_leakage() -> None:
     ideal = EhaParameters(friction_coulomb=0.0, friction_quadratic=0.0, friction_linear=0.0)
     added = severity(1.0, 0.0, ideal).leakage_coefficient - ideal.leakage_coefficient
     assert added == pytest.approx(2.523e-11 - 4.784e-12, rel=1e-12)
@@ -205,7 +205,7 @@ def test_on_another_rig_a_friction_fault_adds_the_same_share_of_pressure_at_the_
     assert pressure_added(OTHER_RIG) == pytest.approx(pressure_added(RIG), rel=1e-9)
 
 
-def test_on_another_rig_the_leakage_levels_still_mean_about_three_quarters_and_half_the_velocity() -> None:
+def test_on_another_rig_leakage_levels_leave_about_three_quarters_and_half_of_the_velocity() -> None:
     normal = steady_velocity(OTHER_RIG)
     minor, major = (
         steady_velocity(parameters_for(CONDITIONS[name], OTHER_RIG)) / normal
@@ -223,7 +223,7 @@ def test_a_severity_out_of_range_is_refused_and_named(value: float) -> None:
         severity(0.0, value)
 
 
-def test_an_unknown_condition_or_level_is_refused_with_the_known_ones() -> None:
+def test_an_unknown_condition_or_level_is_refused_with_a_list_of_known_ones() -> None:
     with pytest.raises(HydrostateError, match=r"one of normal, minor_leakage, .*, got 'broken'"):
         find_condition("broken")
     with pytest.raises(HydrostateError, match="friction level must be one of none, minor, major, got 'huge'"):

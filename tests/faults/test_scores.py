@@ -22,18 +22,18 @@ def test_every_run_is_counted_once_in_the_row_of_its_truth(pairs: list[tuple[str
     assert accuracy(table) == pytest.approx(np.mean([a == b for a, b in pairs]))
 
 
-def test_rows_and_columns_stand_in_the_order_of_table_1() -> None:
+def test_rows_and_columns_of_the_confusion_matrix_are_in_the_order_of_table_1() -> None:
     table = confusion_matrix(["normal"], ["major_leakage"])
     assert list(table.index) == list(table.columns) == list(CONDITIONS)
     assert (table.index.name, table.columns.name) == ("true", "found")
     assert table.loc["normal", "major_leakage"] == 1
 
 
-def test_no_runs_have_no_accuracy() -> None:
+def test_the_accuracy_of_no_runs_is_not_a_number() -> None:
     assert np.isnan(accuracy(confusion_matrix([], [])))
 
 
 @pytest.mark.parametrize(("true", "found"), [(["normal"], []), (["normal"], ["broken"]), (["worn"], ["normal"])])
-def test_lists_that_do_not_match_or_name_no_condition_are_refused(true: list[str], found: list[str]) -> None:
+def test_lists_of_unequal_length_or_with_unknown_conditions_are_refused(true: list[str], found: list[str]) -> None:
     with pytest.raises(ValueError, match=r"zip\(\)|is not in list"):
         confusion_matrix(true, found)

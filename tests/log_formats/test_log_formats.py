@@ -67,12 +67,12 @@ def assert_same(record: Record, log: pd.DataFrame) -> None:
         np.testing.assert_allclose(record[name], log[name], rtol=0.0, atol=1e-6 * size, err_msg=name)
 
 
-def test_there_are_25_ways_of_which_23_are_read() -> None:
+def test_23_of_25_ways_to_write_a_log_are_read_and_2_are_refused() -> None:
     assert (len(READ), len(REFUSED)) == (23, 2)
 
 
 @pytest.mark.parametrize("name", READ)
-def test_a_log_is_one_record_however_it_is_written(
+def test_a_log_gives_the_same_record_in_every_format(
     name: str, log: pd.DataFrame, written: Callable[[str], Path]
 ) -> None:
     path = written(name)
@@ -82,7 +82,9 @@ def test_a_log_is_one_record_however_it_is_written(
 
 
 @pytest.mark.parametrize("name", ALSO_READ)
-def test_so_it_is_of_instruments_and_scripts(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
+def test_a_log_gives_the_same_record_in_the_formats_of_instruments_and_scripts(
+    name: str, log: pd.DataFrame, tmp_path: Path
+) -> None:
     path = ALSO_READ[name].write(log, tmp_path)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
@@ -90,7 +92,7 @@ def test_so_it_is_of_instruments_and_scripts(name: str, log: pd.DataFrame, tmp_p
 
 
 @pytest.mark.parametrize("name", READ)
-def test_inspect_finds_every_channel_however_the_log_is_written(name: str, written: Callable[[str], Path]) -> None:
+def test_inspect_finds_every_channel_in_every_format(name: str, written: Callable[[str], Path]) -> None:
     found = inspected(written(name))
     wanted = set(SI) - ({"differential_pressure_pa"} if name == "two loggers" else set())
     wanted -= {"time_s"} if name in ("no time", "TDMS with a step") else set()
@@ -105,7 +107,9 @@ def test_what_cannot_be_read_is_refused_with_the_remedy(way: Way, log: pd.DataFr
 
 
 @pytest.mark.parametrize("write", [rounded, with_a_copied_row])
-def test_rounded_and_copied_stamps_are_mended_with_a_note(write: Any, log: pd.DataFrame, tmp_path: Path) -> None:
+def test_rounded_stamps_and_duplicate_rows_are_corrected_with_a_note(
+    write: Any, log: pd.DataFrame, tmp_path: Path
+) -> None:
     with pytest.warns(LogWarning) as caught:
         record = read_record(write(log, tmp_path))
     assert [one.message.note.code for one in caught] in (["time_rounded"], ["time_repeats"])
@@ -114,7 +118,7 @@ def test_rounded_and_copied_stamps_are_mended_with_a_note(write: Any, log: pd.Da
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READ)
-def test_a_log_gives_one_estimate_however_it_is_written(
+def test_a_log_gives_the_same_estimate_in_every_format(
     name: str, log: pd.DataFrame, written: Callable[[str], Path]
 ) -> None:
     path = written(name)

@@ -11,6 +11,6 @@ def test_a_name_that_is_unknown_or_comes_twice_is_refused(names: list[str]) -> N
         require_each_known("filters", names, ("ekf", "ukf"))
 
 
-def test_known_names_pass_in_any_order_and_none_does_too() -> None:
+def test_known_names_pass_in_any_order_and_so_does_an_empty_list() -> None:
     require_each_known("filters", ["ukf", "ekf"], ("ekf", "ukf"))
     require_each_known("filters", [], ("ekf", "ukf"))

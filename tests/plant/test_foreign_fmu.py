@@ -35,7 +35,7 @@ def test_an_fmu_runs_as_the_plant_it_is_made_of(fmu: Path) -> None:
         assert 0.0 < np.max(np.abs(run[channel] - native[channel])) < 1e-3 * size
 
 
-def test_its_variables_are_named_with_units_as_columns_of_a_log_are(fmu: Path) -> None:
+def test_variables_of_an_fmu_are_named_with_units_like_columns_of_a_log(fmu: Path) -> None:
     plain = simulate_fmu(fmu, DRIVE, T)
     named = simulate_fmu(fmu, DRIVE, T, columns={"position_m": "position_m:mm"})
     assert np.allclose(named["position_m"], 1e-3 * plain["position_m"], rtol=1e-12)
@@ -76,14 +76,14 @@ def test_an_fmu_of_another_exporter_runs_under_its_own_names_and_units(tmp_path:
         simulate_fmu(Path(path), np.ones(11), 1e-2, columns=columns, sensors=BENCH, rng=np.random.default_rng(0))
 
 
-def test_its_parameters_and_the_benchs_sensors_count(fmu: Path) -> None:
+def test_an_fmu_runs_with_given_parameters_and_sensors(fmu: Path) -> None:
     soft = simulate_fmu(fmu, DRIVE, T, parameters={"bulk_modulus": 1e8})
     assert not np.allclose(soft["velocity_m_s"], simulate_fmu(fmu, DRIVE, T)["velocity_m_s"])
     noisy = simulate_fmu(fmu, DRIVE, T, sensors=BENCH, rng=np.random.default_rng(0))
     assert not np.array_equal(noisy["position_m"], simulate_fmu(fmu, DRIVE, T)["position_m"])
 
 
-def test_what_is_no_plant_is_refused(fmu: Path, tmp_path: Path) -> None:
+def test_an_invalid_fmu_or_argument_is_refused(fmu: Path, tmp_path: Path) -> None:
     (tmp_path / "no.fmu").write_text("none")
     with pytest.raises(HydrostateError, match="an FMU is needed"):
         simulate_fmu(tmp_path / "no.fmu", DRIVE, T)

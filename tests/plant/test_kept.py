@@ -9,7 +9,7 @@ from plant.errors import HydrostateError
 from plant.kept import read_kept, write_kept
 
 
-def test_a_state_comes_back_and_is_not_taken_for_another_kind(tmp_path: Path) -> None:
+def test_a_state_is_read_back_and_refused_as_another_kind(tmp_path: Path) -> None:
     path = tmp_path / "watch.state"
     write_kept(path, "watch 1", {"mean": np.arange(3.0)})
     found = read_kept(path, "watch 1")
@@ -19,7 +19,7 @@ def test_a_state_comes_back_and_is_not_taken_for_another_kind(tmp_path: Path) ->
         read_kept(path, "watch 2")
 
 
-def test_what_is_no_state_is_refused_in_one_sentence(tmp_path: Path) -> None:
+def test_a_missing_file_or_one_without_a_state_is_refused_in_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "watch.state"
     for content in (None, b"", b"PK\x03\x04 and no more", b"text"):
         if content is not None:

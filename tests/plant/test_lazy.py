@@ -7,7 +7,7 @@ import pytest
 from plant.lazy import lazily
 
 
-def test_names_are_those_of_the_imports_and_no_others(tmp_path: Path) -> None:
+def test_only_names_imported_with_as_are_exported(tmp_path: Path) -> None:
     file = tmp_path / "face.py"
     text = "from math import pi as number\nfrom math import tau as tau\nfrom math import e\n"
     file.write_text(f"from typing import TYPE_CHECKING\n{text}")

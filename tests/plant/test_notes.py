@@ -4,13 +4,13 @@ from plant.log.notes import LogCode
 from plant.notes import Code, distinct
 
 
-def test_a_note_is_kept_once_where_it_came_first() -> None:
+def test_distinct_keeps_each_note_once_at_its_first_place() -> None:
     one, other = LogCode.CLOCK_ASSUMED.note(sample_time_s=1.0), LogCode.CLOCK_ASSUMED.note(sample_time_s=2.0)
     assert distinct([one, other, LogCode.CLOCK_ASSUMED.note(sample_time_s=1.0)]) == (one, other)
     assert distinct([]) == ()
 
 
-def test_a_sentence_writes_no_powers_of_ten_where_a_reader_would_not() -> None:
+def test_a_sentence_uses_powers_of_ten_only_for_very_small_and_very_large_numbers() -> None:
     class Size(Code):
         SHARE = "missing in {percent:.2g} %, {factor:.3g} times too large, {tiny:.2g} m, {huge:.2g} Pa"
 
@@ -18,7 +18,7 @@ def test_a_sentence_writes_no_powers_of_ten_where_a_reader_would_not() -> None:
     assert said == "missing in 100 %, 123000 times too large, 2.5e-06 m, 2e+09 Pa"
 
 
-def test_a_half_width_that_nothing_bounds_is_no_number() -> None:
+def test_an_unbounded_half_width_is_written_in_words() -> None:
     class Offset(Code):
         READS = "pressure reads {offset_pa:.3g|bar} ± {half_width_pa:.2g|bar} bar too much"
 
@@ -26,7 +26,7 @@ def test_a_half_width_that_nothing_bounds_is_no_number() -> None:
     assert said == "pressure reads 1 bar too much; the log does not tell how far off this may be"
 
 
-def test_notes_at_a_prompt_are_sentences() -> None:
+def test_the_repr_of_a_note_contains_its_sentence() -> None:
     """A tuple of notes used to show templates with empty fields, separate from their numbers."""
     note = LogCode.CLOCK_ASSUMED.note(sample_time_s=0.5)
     assert repr((note,)) == f"(<clock_assumed: {note}>,)"

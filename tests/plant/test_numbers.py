@@ -180,5 +180,5 @@ def samples_and_drives() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)
-def test_numbers_stand(case: str) -> None:
+def test_kept_numbers_are_unchanged(case: str) -> None:
     NUMBERS.check(case)

@@ -15,19 +15,19 @@ def pipe(tmp_path: Path) -> Path:
     return tmp_path / "pipe.toml"
 
 
-def test_a_pipe_is_not_waited_for(pipe: Path) -> None:
+def test_a_pipe_is_refused_without_waiting(pipe: Path) -> None:
     with pytest.raises(RigError, match="a regular file is needed"):
         read_rig(pipe)
     with pytest.raises(StudyError, match="a regular file is needed"):
         read_study(pipe)
 
 
-def test_a_device_without_end_is_refused() -> None:
+def test_a_device_file_is_refused() -> None:
     with pytest.raises(RigError, match="a regular file is needed"):
         read_rig("/dev/zero")
 
 
-def test_a_file_that_no_person_wrote_is_refused_by_its_size(tmp_path: Path) -> None:
+def test_a_file_above_the_size_limit_is_refused(tmp_path: Path) -> None:
     (tmp_path / "large.toml").write_bytes(b"#" * 101)
     with pytest.raises(OSError, match="it has more than"):
         small_file(tmp_path / "large.toml", 100)
@@ -52,7 +52,7 @@ def test_a_decimal_comma_is_named_in_rig_and_study_files(tmp_path: Path) -> None
         ("bulk_modulus: 1.4e9", "has a colon, write an equals sign (=)"),
     ],
 )
-def test_a_slip_in_a_line_is_named(tmp_path: Path, line: str, said: str) -> None:
+def test_a_common_mistake_in_a_line_is_named(tmp_path: Path, line: str, said: str) -> None:
     (path := tmp_path / "rig.toml").write_text(f"[parameters]\n{line}\n", encoding="utf-8")
     with pytest.raises(RigError) as error:
         read_rig(path)
@@ -60,7 +60,7 @@ def test_a_slip_in_a_line_is_named(tmp_path: Path, line: str, said: str) -> None
 
 
 @pytest.mark.parametrize("name", ["../up", "a/b", ".", "..", "a\x1b[2J", "a\\b", "", "x" * 200])
-def test_a_study_is_called_what_a_folder_may_be(name: str) -> None:
+def test_a_study_name_that_is_no_valid_folder_name_is_refused(name: str) -> None:
     content = {"name": name, "runs": [{"seeds": 1, "methods": [{"verb": "diagnose"}]}]}
     with pytest.raises(StudyError, match="name"):
         parse_study(content, "a.toml")

@@ -35,7 +35,7 @@ def test_no_processor_is_spare_in_a_pools_process_or_in_a_thread() -> None:
 
 
 @pytest.mark.usefixtures("two")
-def test_what_was_begun_runs_meanwhile_and_its_thread_ends_though_nobody_asks() -> None:
+def test_a_begun_task_runs_in_a_thread_that_ends_before_its_result_is_requested() -> None:
     began, others = threading.Event(), set(threading.enumerate())
     waiting = begun(began.set)
     assert waiting is not None
@@ -48,7 +48,7 @@ def test_what_was_begun_runs_meanwhile_and_its_thread_ends_though_nobody_asks() 
 
 
 @pytest.mark.usefixtures("two")
-def test_what_goes_wrong_meanwhile_is_raised_where_the_result_is_asked_for() -> None:
+def test_an_error_of_a_begun_task_is_raised_when_its_result_is_requested() -> None:
     waiting = begun(lambda: _no_number(-1.0))
     assert waiting is not None
     with pytest.raises(ValueError, match="-1"):
@@ -58,7 +58,7 @@ def test_what_goes_wrong_meanwhile_is_raised_where_the_result_is_asked_for() -> 
 
 
 @pytest.mark.usefixtures("two")
-def test_cases_keep_their_order_and_how_numpy_takes_errors() -> None:
+def test_each_keeps_the_order_of_cases_and_the_error_settings_of_numpy() -> None:
     def slow_first(case: int) -> tuple[int, str]:
         time.sleep(0.02 / (1 + case))
         return case, np.geterr()["divide"]

@@ -31,7 +31,7 @@ def test_a_unit_that_is_no_product_of_names_is_refused_before_it_is_evaluated(un
 
 
 @pytest.mark.parametrize("unit", HOSTILE[:3])
-def test_such_a_unit_is_refused_in_a_header_and_on_the_command_line(unit: str) -> None:
+def test_an_invalid_unit_is_refused_in_a_header_and_on_the_command_line(unit: str) -> None:
     with pytest.raises(LogError, match="cannot become position_m"):
         resolve_columns([f"position_{unit}"], None, "a.csv")
     with pytest.raises(LogError, match="cannot become position_m"):
@@ -41,10 +41,10 @@ def test_such_a_unit_is_refused_in_a_header_and_on_the_command_line(unit: str) -
 
 
 @pytest.mark.parametrize("unit", ["rpm", "RPM", "U/min", "1/min", "min-1", "min^-1", "rev/min", "r/min"])
-def test_turns_a_minute_are_read_however_they_are_spelt(unit: str) -> None:
+def test_every_spelling_of_revolutions_per_minute_is_read(unit: str) -> None:
     assert conversion_to(unit, "rad/s") == (pytest.approx(math.pi / 30.0, rel=1e-14), 0.0)
 
 
 @pytest.mark.parametrize(("unit", "spelt"), [("m/s²", "m/s^2"), ("kgf/cm2", "kgf/cm^2"), ("BAR", "bar"), ("Mm", "Mm")])
-def test_units_of_benches_are_spelt_as_the_library_wants_them(unit: str, spelt: str) -> None:
+def test_units_of_benches_are_converted_to_the_spelling_of_the_library(unit: str, spelt: str) -> None:
     assert plain_unit(unit) == spelt

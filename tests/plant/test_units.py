@@ -36,23 +36,23 @@ def test_conversion_carries_the_offset_of_a_temperature() -> None:
 
 
 @pytest.mark.parametrize("unit", ["furlongz", "kg", "", "2 mm", "(", "5", "mm +"])
-def test_what_is_no_length_is_refused(unit: str) -> None:
+def test_a_unit_that_is_no_length_is_refused(unit: str) -> None:
     with pytest.raises(ValueError, match="unit"):
         conversion_to(unit, "m")
 
 
-def test_hertz_is_no_angular_speed() -> None:
+def test_hertz_does_not_convert_to_angular_speed() -> None:
     with pytest.raises(ValueError, match="leaves the angle out"):
         conversion_to("Hz", "rad/s")
 
 
-def test_a_speed_of_a_shaft_is_no_frequency() -> None:
+def test_angular_speed_does_not_convert_to_hertz() -> None:
     with pytest.raises(ValueError, match="angle"):
         conversion_to("rad/s", "Hz")
 
 
 @pytest.mark.parametrize("value", [1e-190, 1e209, 1e300])
-def test_a_parameter_of_no_actuators_size_is_refused(value: float) -> None:
+def test_a_parameter_of_impossible_magnitude_is_refused(value: float) -> None:
     with pytest.raises(RigError, match=r"piston_area must be from 1e-40 to 1e\+40 in size"):
         require_number("piston_area", value)
 
@@ -63,7 +63,7 @@ def test_a_parameter_without_a_unit_is_refused_by_name() -> None:
         notes(made)
 
 
-def test_units_of_most_logs_convert_as_pint_converts_them_without_its_import() -> None:
+def test_common_units_convert_without_pint_as_pint_converts_them() -> None:
     for name in USUAL:
         for wanted in {si for si, _ in USUAL.values()}:
             assert _converted(conversion_to, name, wanted) == _converted(by_pint, name, plain_unit(name), wanted)

@@ -7,7 +7,7 @@ from benchmarks.diagnosis.coverage import main as coverage
 from faults.conditions import CONDITIONS, parameters_for
 
 
-def test_a_line_tells_how_wide_intervals_are_and_how_often_they_cover() -> None:
+def test_a_summary_line_gives_the_rms_z_and_the_coverage_of_the_intervals() -> None:
     z = [0.5, -0.5, 3.0, float("nan")]
     rows = pd.DataFrame([{"plant": "p", "form": "f", "rate": 1, "quantity": "q", "z": one, "refused": ""} for one in z])
     (line,) = summarised(rows).to_dict("records")
@@ -18,7 +18,7 @@ def test_a_line_tells_how_wide_intervals_are_and_how_often_they_cover() -> None:
 
 
 @pytest.mark.parametrize("plant", ["lumped", "circuit"])
-def test_the_rig_file_says_the_rig_that_is_drawn_and_nothing_of_what_the_log_must_tell(plant: str) -> None:
+def test_the_rig_file_has_the_drawn_sizes_but_the_nominal_bulk_modulus_leakage_and_friction(plant: str) -> None:
     first, second = (logged(Case(plant, "severities", 1000, "steps", "minor_friction", seed)) for seed in (0, 1))
     assert first.rig.piston_area == first.true.piston_area != second.rig.piston_area
     for name in ("piston_area", "pump_displacement", "chamber_volume", "moving_mass"):
@@ -31,13 +31,13 @@ def test_the_rig_file_says_the_rig_that_is_drawn_and_nothing_of_what_the_log_mus
         assert ratio == pytest.approx(1.0, abs=SPREAD)
 
 
-def test_severities_of_a_log_stand_beside_their_truth() -> None:
+def test_estimated_severities_are_within_five_standard_deviations_of_the_truth() -> None:
     rows = asked(Case("circuit", "severities", 1000, "steps", "minor_leakage", 0))
     assert {row["quantity"] for row in rows} >= {"bulk_modulus", "leakage_flow", "added_friction"}
     assert all(abs(float(str(row["z"]))) < 5.0 for row in rows)
 
 
 @pytest.mark.slow
-def test_lines_outside_what_is_wanted_are_counted(capsys: pytest.CaptureFixture[str]) -> None:
+def test_lines_with_a_z_outside_the_wanted_range_are_counted(capsys: pytest.CaptureFixture[str]) -> None:
     missed = coverage(["--seeds", "1", "--rates", "1000", "--plants", "circuit"])
     assert f"0.8 to 1.3: {missed}" in capsys.readouterr().out

@@ -4,7 +4,7 @@ import pytest
 from benchmarks.diagnosis.fit_diagnosis import FAR, HELD, TWICE, fitted_width
 
 
-def test_a_width_holds_its_share_and_grows_where_tails_are_longer_than_twice_that() -> None:
+def test_a_fitted_width_covers_its_share_and_grows_if_the_tail_exceeds_twice_that_width() -> None:
     short = np.random.default_rng(0).uniform(0.0, 1.5, 2_000)
     assert fitted_width(short.tolist()) == pytest.approx(1.5 * HELD, abs=0.02)
     tailed = short.copy()
@@ -15,11 +15,11 @@ def test_a_width_holds_its_share_and_grows_where_tails_are_longer_than_twice_tha
     assert fitted_width(tailed.tolist()) == pytest.approx(1.5 * HELD, abs=0.02)
 
 
-def test_no_interval_is_made_narrower_than_its_theory() -> None:
+def test_a_fitted_width_never_narrows_an_interval() -> None:
     assert fitted_width(np.linspace(0.0, 0.5, 100).tolist()) == 1.0
 
 
-def test_the_first_population_is_held_too() -> None:
+def test_a_fitted_width_also_covers_the_first_population_alone() -> None:
     ratios = np.random.default_rng(0).uniform(0.0, 1.0, 2_000)
     ratios[:400] *= 1.5
     assert fitted_width(ratios.tolist()) > 1.3

@@ -16,7 +16,7 @@ def rig(shared: Path) -> Path:
     return folder
 
 
-def test_data_that_are_not_there_or_do_not_fit_are_refused(tmp_path: Path) -> None:
+def test_missing_or_mismatched_data_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"uci_hydraulic_1hz\.npz and profile\.csv are wanted"):
         read_rig_cycles(tmp_path)
     np.savez(tmp_path / "uci_hydraulic_1hz.npz", X=np.zeros((2, 3, 60)))
@@ -27,7 +27,9 @@ def test_data_that_are_not_there_or_do_not_fit_are_refused(tmp_path: Path) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("component", "least"), [("pump_leak", 0.98), ("valve_pct", 0.99)])
-def test_the_test_rigs_components_are_found_in_contiguous_blocks(rig: Path, component: str, least: float) -> None:
+def test_component_states_of_the_zema_rig_are_classified_in_contiguous_blocks(
+    rig: Path, component: str, least: float
+) -> None:
     pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra learn)")
     cycles, labels = read_rig_cycles(rig)
     features = hs.features(cycles)

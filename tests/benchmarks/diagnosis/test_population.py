@@ -23,7 +23,7 @@ def test_training_and_test_share_no_seed() -> None:
 
 
 @pytest.mark.parametrize("name", ["normal", "major_leakage_minor_friction"])
-def test_spreads_are_as_wide_as_they_say(name: str) -> None:
+def test_drawn_parameters_spread_up_to_the_stated_width(name: str) -> None:
     nominal = parameters_for(CONDITIONS[name])
     rng = np.random.default_rng(3)
     drawn = [draw_parameters(name, rng, 0.1) for _ in range(400)]
@@ -33,7 +33,7 @@ def test_spreads_are_as_wide_as_they_say(name: str) -> None:
     assert {p.piston_area for p in drawn} == {nominal.piston_area}
 
 
-def test_there_are_at_least_twelve_kinds_out_of_the_model_and_each_changes_the_log(logs: list[Drawn]) -> None:
+def test_each_of_at_least_twelve_out_of_model_kinds_changes_the_log(logs: list[Drawn]) -> None:
     assert len(OUT_OF_MODEL) >= 12
     for kind, changed in OUT_OF_MODEL.items():
         other = changed(logs[0])

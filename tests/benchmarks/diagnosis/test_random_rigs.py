@@ -31,7 +31,7 @@ def missed(rows: list[dict[str, Any]], *, wrong: bool = False) -> set[str]:
     return {check.what for check in summarised(rows, wrong=wrong) if not check.met}
 
 
-def test_a_line_says_verdict_error_coverage_and_time() -> None:
+def test_the_line_of_a_rig_shows_verdict_error_coverage_and_time() -> None:
     assert line_of(ROW) == "7 right | ok error 1.00 %, z 1.0 ++ | 2.0 s | normal; steps | end_stop"
     wrong = line_of({**ROW, "verdict": "wrong", "flagged": True, "error": None})
     assert wrong.startswith("7 wrong (normal 97 %) | ok, flagged no number  | 2.0 s")
@@ -47,29 +47,29 @@ def test_a_line_says_verdict_error_coverage_and_time() -> None:
         ({"covered": False}, "intervals given the rig that cover, %"),
     ],
 )
-def test_each_thing_that_is_wrong_misses_its_own_target(changed: dict[str, Any], what: str) -> None:
+def test_each_kind_of_error_misses_its_own_target(changed: dict[str, Any], what: str) -> None:
     rows = [*[ROW] * 15, *[{**ROW, **changed}] * 4]
     assert missed([*[ROW] * 19, {**ROW, "covered": False}]) == set()
     assert what in missed(rows)
 
 
-def test_intervals_given_a_wrong_file_are_not_judged() -> None:
+def test_intervals_based_on_a_wrong_rig_file_are_not_judged() -> None:
     rows = [{**ROW, "covered": False}] * 20
     assert missed(rows, wrong=True) == set()
 
 
-def test_a_number_that_the_check_refuses_counts_as_none(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bulk_modulus_flagged_by_the_check_counts_as_not_estimated(capsys: pytest.CaptureFixture[str]) -> None:
     summarised([ROW, {**ROW, "flagged": True, "error": 0.5, "covered_total": False}], wrong=False)
     assert "without a believed bulk modulus: 1 of 2" in capsys.readouterr().out
 
 
-def test_logs_that_tell_no_number_at_all_are_counted_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+def test_logs_that_do_not_determine_the_bulk_modulus_are_counted(capsys: pytest.CaptureFixture[str]) -> None:
     untold = {**ROW, "outcome": "not_observable", "flagged": True, "error": None, "z": None, "covered": None}
     assert missed([untold] * 3) == set()
     assert "of these not determined by the log: 3 of 3" in capsys.readouterr().out
 
 
-def test_the_seeds_are_drawn_from_the_first_to_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_seed_of_the_range_is_run_including_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[int, bool, bool]] = []
 
     def one(seed: int, *, wrong: bool, pressure: bool) -> dict[str, Any]:

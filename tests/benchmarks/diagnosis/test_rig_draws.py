@@ -28,14 +28,14 @@ def velocity_of(p: CircuitParameters) -> float:
     return p.pump_displacement * p.rated_speed / p.piston_area
 
 
-def test_a_seed_is_one_log_and_another_seed_another(bench: Bench) -> None:
+def test_a_seed_determines_the_rig_and_its_log(bench: Bench) -> None:
     again, other = draw_bench(1010), draw_bench(1016)
     assert again.true == bench.true
     assert np.array_equal(again.record["position_m"], bench.record["position_m"])
     assert other.true.piston_area != bench.true.piston_area
 
 
-def test_rigs_fill_the_ranges_that_actuators_are_built_in(rigs: list[CircuitParameters]) -> None:
+def test_drawn_rigs_fill_the_ranges_of_built_actuators(rigs: list[CircuitParameters]) -> None:
     ranges = {
         "piston area [cm2]": ([1e4 * p.piston_area for p in rigs], 3.0, 80.0),
         "velocity [m/s]": ([velocity_of(p) for p in rigs], 0.03, 0.4),
@@ -57,7 +57,7 @@ def test_a_healthy_rig_moves_at_nearly_its_rated_velocity_with_pressure_to_spare
         assert pressure < 0.35 * p.relief_pressure
 
 
-def test_the_right_file_says_nothing_of_the_circuit_and_nothing_of_the_fault(bench: Bench) -> None:
+def test_the_right_rig_file_has_the_true_sizes_but_not_the_circuit_or_the_true_bulk_modulus(bench: Bench) -> None:
     assert type(bench.healthy) is EhaParameters
     assert bench.condition in CONDITIONS
     for name in ("piston_area", "pump_displacement", "chamber_volume", "moving_mass"):
@@ -65,7 +65,7 @@ def test_the_right_file_says_nothing_of_the_circuit_and_nothing_of_the_fault(ben
     assert bench.healthy.bulk_modulus != bench.true.bulk_modulus
 
 
-def test_a_wrong_file_is_off_in_all_entries_at_once_by_the_usual_errors() -> None:
+def test_a_wrong_rig_file_has_an_error_of_the_usual_size_in_each_size_entry() -> None:
     right = EhaParameters()
     files = [wrong_file(right, seed) for seed in range(400)]
     off = np.array([[np.log(getattr(file, name) / getattr(right, name)) for name in WRONG] for file in files])

@@ -5,7 +5,7 @@ from benchmarks.diagnosis.scores import alarm_rate, median_delay
 from plant.errors import HydrostateError
 
 
-def test_the_interval_of_no_alarms_begins_at_zero_and_ends_at_three_over_the_time() -> None:
+def test_the_alarm_rates_interval_without_alarms_runs_from_zero_to_3_7_over_the_time() -> None:
     rate, (low, high) = alarm_rate(0, 10.0)
     assert (rate, low) == (0.0, 0.0)
     assert high == pytest.approx(-np.log(0.025) / 10.0)
@@ -33,6 +33,6 @@ def test_impossible_counts_are_refused(given: tuple[int, float]) -> None:
         alarm_rate(*given)
 
 
-def test_no_delays_are_refused() -> None:
+def test_an_empty_list_of_delays_is_refused() -> None:
     with pytest.raises(HydrostateError, match="got none"):
         median_delay([])

@@ -8,7 +8,7 @@ from benchmarks.diagnosis.strange_rigs import AS_THEY_ARE, DIFFERENCE, NAMES, RI
 from experiments.open_benchmark.kinds import KINDS
 
 
-def test_every_kind_is_one_of_the_open_benchmark_or_made_of_a_written_log_and_none_comes_twice() -> None:
+def test_every_kind_is_unique_and_from_the_open_benchmark_or_made_from_a_written_log() -> None:
     assert len(set(NAMES)) == len(NAMES)
     assert set(NAMES) - set(WRITTEN) <= set(KINDS)
     assert not set(AS_THEY_ARE) & set(sized(rig_of("laboratory")[0]))
@@ -32,7 +32,7 @@ def test_an_offset_is_a_share_of_the_rigs_own_relief_pressure(rig: str, monkeypa
     assert again.equals(table)
 
 
-def test_a_mistake_of_a_written_log_leaves_the_rest_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_frozen_speed_in_a_written_log_leaves_the_pressure_unfrozen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(strange_rigs, "DURATION", 0.5)
     table, truth, _ = made("laboratory", "speed_freezes", 1)
     assert np.count_nonzero(np.diff(table[SPEED]) == 0.0) >= 0.19 * len(table)

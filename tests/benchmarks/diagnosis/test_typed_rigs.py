@@ -16,14 +16,14 @@ def test_every_file_has_a_use_and_every_use_a_file() -> None:
 
 
 @pytest.mark.parametrize("name", USES)
-def test_a_file_is_right_about_the_gas_that_it_states_and_a_circuit_fits_around_it(name: str) -> None:
+def test_a_rig_file_states_the_true_accumulator_gas_or_none_and_its_circuit_keeps_the_stroke(name: str) -> None:
     p = read_rig(FILES / f"{name}.toml").parameters
     assert p.accumulator_gas in (None, pytest.approx(USES[name].gas))
     assert circuit_of(p).stroke == p.stroke
 
 
 @pytest.mark.parametrize("name", ["robot_leg", "mini_pack"])
-def test_a_log_of_a_rig_stays_within_its_stroke_and_is_the_same_again(
+def test_a_typed_rigs_log_stays_within_the_stroke_and_is_reproducible(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(typed_rigs, "DURATION", 1.0)

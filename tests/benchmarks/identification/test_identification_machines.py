@@ -13,7 +13,7 @@ def test_a_machine_whose_simulation_blows_up_is_left_out(monkeypatch: pytest.Mon
     assert [one.name for one in machine_sets(1)] == ["two tanks"]
 
 
-def test_a_seed_tells_a_machines_log_and_another_seed_another(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_seed_determines_the_log_of_a_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(identification_machines, "MACHINES", {"two tanks": MACHINES["two tanks"]})
     first, again, other = (machine_sets(seed)[0].train[1] for seed in (1, 1, 2))
     assert np.array_equal(first, again)

@@ -6,7 +6,7 @@ from benchmarks.identification import identification_sets
 from benchmarks.identification.identification_sets_data import PublicSet
 
 
-def test_a_name_that_matches_no_set_is_refused_with_those_there_are(
+def test_an_unknown_set_name_is_refused_with_the_list_of_sets(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     there = [PublicSet("cascaded tanks", True, 4.0, None, {}), PublicSet("dryer", False, 0.08, None, {})]  # type: ignore[arg-type]

@@ -7,13 +7,13 @@ from benchmarks.identification.identification_sets import LOOKS_AHEAD
 from benchmarks.identification.identification_sets_peer import growth, state_space_run
 
 
-def test_a_state_grows_by_its_largest_pole_over_the_longest_test() -> None:
+def test_growth_is_the_largest_pole_magnitude_to_the_power_of_the_longest_test() -> None:
     tests = [(np.zeros((n, 1)), np.zeros(n)) for n in (100, 500)]
     assert growth(np.diag([0.5, 1.02]), tests) == pytest.approx(1.02**500)
     assert growth(np.array([[0.0, 1.0], [-0.81, 0.0]]), tests) == pytest.approx(0.9**500)
 
 
-def test_what_grows_follows_an_output_that_its_input_never_made() -> None:
+def test_a_model_with_a_growing_state_follows_an_output_that_its_input_did_not_cause() -> None:
     rng = np.random.default_rng(1)
     y = 0.5 * rng.normal(size=400) + np.exp(0.02 * np.arange(400)) * 0.01
     u, b, c, d = np.zeros((400, 1)), np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1))

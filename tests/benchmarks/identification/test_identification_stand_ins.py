@@ -14,7 +14,7 @@ def sets() -> dict[str, PublicSet]:
     return {one.name: one for one in stand_in_sets(1)}
 
 
-def test_every_machine_is_measured_and_moves(sets: dict[str, PublicSet]) -> None:
+def test_every_machine_has_finite_records_with_a_varying_output(sets: dict[str, PublicSet]) -> None:
     assert {name.split(" ")[0] for name in sets} == {name.split(" ")[0] for name in (*MACHINES, "Duffing")}
     for one in sets.values():
         for u, y in (one.train, *one.tests.values()):
@@ -38,12 +38,12 @@ def test_machines_keep_their_physics(sets: dict[str, PublicSet]) -> None:
     assert warm.max() < 1.0, "between its two inlets"
 
 
-def test_the_arrow_leaves_the_range_of_the_training(sets: dict[str, PublicSet]) -> None:
+def test_the_arrow_test_of_the_duffing_set_exceeds_the_amplitude_of_the_training(sets: dict[str, PublicSet]) -> None:
     reached = [np.abs(one[1]).max() for one in (sets["Duffing"].train, *sets["Duffing"].tests.values())]
     assert reached[1] < 1.1 * reached[0] < reached[2]
 
 
-def test_a_seed_tells_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_seed_determines_the_log_of_a_stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MACHINES", {"damper": MACHINES["damper"]})
     first, again, other = (stand_in_sets(seed)[0].train[1] for seed in (1, 1, 2))
     assert np.array_equal(first, again)

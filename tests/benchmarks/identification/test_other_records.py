@@ -30,7 +30,7 @@ def of_records(
         (1.6, 1.0, "0 of 1 surely worse by over 2 %, 1 perhaps, 0 surely better"),
     ],
 )
-def test_what_records_disagree_on_is_not_sure(default: float, spread: float, said: str) -> None:
+def test_a_difference_is_sure_only_if_the_other_records_agree(default: float, spread: float, said: str) -> None:
     others = OtherRecords()
     (line,) = others.told(*of_records(16, {"default": default, "first": 1.0}, spread=spread))
     assert line.startswith("default over first ")
@@ -38,7 +38,7 @@ def test_what_records_disagree_on_is_not_sure(default: float, spread: float, sai
     assert said in summary
 
 
-def test_a_run_without_an_end_is_infinitely_wrong() -> None:
+def test_a_run_that_turns_nan_has_an_infinite_error() -> None:
     one, runs = of_records(4, {"default": 1.0, "auto": 1.0})
     runs["auto"]["record 0"][50:] = np.nan
     (line,) = OtherRecords().told(one, runs)

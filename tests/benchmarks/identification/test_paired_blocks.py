@@ -14,7 +14,7 @@ def errors(n: int, seed: int) -> Array:
     return slow[:2] + slow[2]
 
 
-def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
+def test_the_error_ratios_interval_has_its_nominal_coverage() -> None:
     held = 0
     for seed in range(200):
         one, other = errors(3000, seed)
@@ -23,7 +23,7 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
     assert 0.87 * 200 <= held <= 0.99 * 200
 
 
-def test_a_longer_test_tells_more() -> None:
+def test_a_longer_test_gives_a_narrower_interval() -> None:
     widths: list[float] = []
     for n in (1000, 16_000):
         ends = [error_ratio(*errors(n, seed))[1:] for seed in range(20)]
@@ -31,7 +31,7 @@ def test_a_longer_test_tells_more() -> None:
     assert widths[1] < 0.4 * widths[0]
 
 
-def test_what_one_stretch_alone_tells_is_not_sure() -> None:
+def test_a_larger_error_in_a_single_stretch_is_not_significant() -> None:
     one, other = errors(3000, 1)
     one[1200:1230] += 30.0
     ratio, low, _ = error_ratio(one, other)
@@ -39,12 +39,12 @@ def test_what_one_stretch_alone_tells_is_not_sure() -> None:
     assert low < 1.1
 
 
-def test_the_same_errors_are_equal_for_sure() -> None:
+def test_proportional_errors_have_an_interval_of_zero_width() -> None:
     one = errors(1000, 2)[0]
     assert error_ratio(2.0 * one, one) == (2.0, 2.0, 2.0)
 
 
-def test_records_of_unlike_levels_are_drawn_as_wholes() -> None:
+def test_resampled_records_with_different_error_levels_give_nominal_coverage() -> None:
     held = 0
     for seed in range(200):
         levels = np.exp(0.3 * np.random.default_rng(seed).normal(size=(2, 16)))

@@ -59,11 +59,11 @@ def test_a_fault_goes_first_to_the_tests_that_execute_its_line(project: Path) ->
     assert first(project, 6, 2) == {"test_high", "test_low"}
 
 
-def test_a_constant_goes_to_the_tests_of_the_functions_that_read_it(project: Path) -> None:
+def test_a_fault_in_a_constant_goes_first_to_the_tests_of_the_functions_that_read_it(project: Path) -> None:
     assert first(project, 2, 2) == {"test_high", "test_low"}
 
 
-def test_a_default_goes_to_the_tests_of_its_function(project: Path) -> None:
+def test_a_fault_in_a_default_value_goes_first_to_the_tests_of_its_function(project: Path) -> None:
     assert first(project, 11, 1) == {"test_doubled"}
 
 
@@ -72,12 +72,12 @@ def test_no_test_of_the_folder_is_left_out(project: Path) -> None:
         assert first(project, line, 9) == {"test_high", "test_low", "test_doubled"}
 
 
-def test_the_files_own_test_comes_first_and_quick_ones_before_others(project: Path) -> None:
+def test_tests_in_the_files_own_test_file_come_first(project: Path) -> None:
     named = Executed(project, project / "data").tests("plant/a.py", 6)
     assert named[0] == "tests/plant/test_a.py::test_high"
 
 
-def test_lines_of_a_file_that_was_edited_since_say_nothing(project: Path) -> None:
+def test_a_file_edited_after_the_recorded_run_has_no_tests_by_line(project: Path) -> None:
     later = (project / "data").stat().st_mtime + 10
     os.utime(project / "plant" / "a.py", (later, later))
     assert Executed(project, project / "data").of_file("plant/a.py") == {}

@@ -19,7 +19,7 @@ def test_other():
 """
 
 
-def test_a_fork_sees_the_fault_and_the_next_one_does_not(tmp_path: Path) -> None:
+def test_each_fork_runs_the_chosen_tests_on_the_current_files(tmp_path: Path) -> None:
     thing = tmp_path / "thing.py"
     (tmp_path / "test_thing.py").write_text(TESTS)
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow: none\n")

@@ -55,31 +55,31 @@ def test_each_fault_changes_one_thing(text: str, wanted: set[str]) -> None:
         '"""1 + 1"""',
     ],
 )
-def test_what_is_no_formula_is_left_alone(text: str) -> None:
+def test_code_without_a_formula_is_not_mutated(text: str) -> None:
     assert count_mutants(text) == 0
 
 
 @pytest.mark.parametrize("length", [-1, -2, -100])
-def test_any_negative_length_is_what_is_left(length: int) -> None:
-    """So a fault that changes only its size would have no effect."""
+def test_numpy_infers_the_remaining_length_from_any_negative_number(length: int) -> None:
+    """A fault that changes only the size of this number would have no effect."""
     values = np.arange(12.0)
     np.testing.assert_array_equal(values.reshape(length, 3), values.reshape(4, 3))
     assert values[:0].reshape(3, length).shape == (3, 0)
 
 
-def test_every_file_of_the_packages_can_be_mutated_and_still_be_read() -> None:
+def test_drawn_faults_change_the_code_and_leave_it_parsable() -> None:
     for mutant in draw(ROOT, ["plant/eha", "faults/diagnosis"], 30, 3):
         tree = ast.parse(mutant.source)
         assert ast.dump(tree) != ast.dump(ast.parse((ROOT / mutant.path).read_text(encoding="utf-8")))
         assert "  ->  " in mutant.change
 
 
-def test_a_seed_draws_the_same_faults_and_another_others() -> None:
+def test_a_seed_determines_the_drawn_faults() -> None:
     once, again, other = ([m.change for m in draw(ROOT, ["plant/eha"], 20, seed)] for seed in (1, 1, 2))
     assert once == again != other
 
 
-def test_a_file_is_tried_on_kept_numbers_on_its_own_test_and_on_its_folder() -> None:
+def test_a_file_is_tested_by_kept_numbers_then_its_own_tests_then_its_folder() -> None:
     assert mirrored(ROOT, "plant/eha/circuit.py") == [
         "tests/plant/eha/test_numbers.py",
         "tests/plant/eha/test_circuit.py",

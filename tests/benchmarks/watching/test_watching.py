@@ -7,7 +7,7 @@ from plant.eha.circuit_parameters import CircuitParameters
 from plant.errors import HydrostateError
 
 
-def test_warm_oil_leaks_more_and_rubs_less_and_is_softer() -> None:
+def test_warm_oil_has_more_leakage_less_friction_and_a_lower_bulk_modulus() -> None:
     cold = CircuitParameters()
     warm = at_oil_temperature(cold, 10.0)
     assert warm.leakage_coefficient / cold.leakage_coefficient == pytest.approx(np.exp(0.3))
@@ -17,7 +17,7 @@ def test_warm_oil_leaks_more_and_rubs_less_and_is_softer() -> None:
 
 
 @pytest.mark.parametrize("seconds", [0.0, 1.5 * PIECE])
-def test_a_piece_that_cannot_be_run_is_refused(seconds: float) -> None:
+def test_an_empty_or_too_long_piece_is_refused(seconds: float) -> None:
     with pytest.raises(HydrostateError, match="piece"):
         CircuitStream(0).run(seconds)
 

@@ -36,7 +36,7 @@ def estimated(seconds: float = 0.3, **values: float) -> MotorEstimate:
 
 
 @pytest.mark.parametrize("frequency", [480.0, pytest.param(437.3, marks=pytest.mark.slow)])
-def test_a_log_shows_the_signature_that_the_model_gives(frequency: float) -> None:
+def test_the_signature_of_a_log_agrees_with_that_of_the_model(frequency: float) -> None:
     seen = logged_signature(log_of(MOTOR, frequency=frequency))
     assert seen.drive.frequency == pytest.approx(frequency, rel=1e-9)
     assert seen.drive.peak_to_peak == pytest.approx(200.0, rel=1e-9)
@@ -45,13 +45,13 @@ def test_a_log_shows_the_signature_that_the_model_gives(frequency: float) -> Non
 
 
 @pytest.mark.slow
-def test_the_covariance_of_a_signature_is_its_scatter_over_noise() -> None:
+def test_the_covariance_of_a_signature_agrees_with_its_scatter() -> None:
     logs = [logged_signature(log_of(MOTOR, 0.2, seed)) for seed in range(40)]
     scatter = np.var([one.values for one in logs], axis=0, ddof=1) / np.diag(logs[0].covariance)
     assert 0.8 < float(np.mean(scatter)) < 1.25
 
 
-def test_the_velocitys_deviation_is_its_scatter_over_noise_of_the_position() -> None:
+def test_the_velocitys_deviation_agrees_with_its_scatter_under_position_noise() -> None:
     log, rng = log_of(MOTOR, 0.2), np.random.default_rng(2)
     noise = [1e-5 * rng.standard_normal(len(log)) for _ in range(30)]
     seen = [logged_signature(log.replace(position_m=log["position_m"] + one)) for one in noise]
@@ -59,7 +59,7 @@ def test_the_velocitys_deviation_is_its_scatter_over_noise_of_the_position() -> 
     assert 0.7 < np.std([one.values[-1] for one in seen], ddof=1) / said < 1.4
 
 
-def test_a_motor_that_is_off_by_a_tolerance_is_off_by_about_one_deviation() -> None:
+def test_one_parameter_off_by_its_tolerance_shifts_the_signature_by_under_one_deviation() -> None:
     covariance = tolerance(MOTOR, 480.0, 200.0)
     base = modelled_signature(MOTOR, 480.0, 200.0)
     for name, share in TOLERANCE.items():
@@ -75,7 +75,7 @@ def test_a_motor_that_is_off_by_a_tolerance_is_off_by_about_one_deviation() -> N
         *(pytest.param(*case, marks=pytest.mark.slow) for case in ((10.0, 5e-12), (20.0, 2e-12), (20.0, 5e-12))),
     ],
 )
-def test_leakage_and_load_are_told_without_pressure_or_flow(load: float, leakage: float) -> None:
+def test_leakage_and_load_are_found_without_pressure_or_flow(load: float, leakage: float) -> None:
     found = estimated(load_force=load, crossport_leakage=leakage)
     assert found.values["crossport_leakage"] == pytest.approx(leakage, rel=0.15)
     assert found.values["load_force"] == pytest.approx(load, abs=1.0)
@@ -84,7 +84,7 @@ def test_leakage_and_load_are_told_without_pressure_or_flow(load: float, leakage
 
 
 @pytest.mark.parametrize(("before", "after"), [(5.0, 15.0), pytest.param(20.0, 0.0, marks=pytest.mark.slow)])
-def test_a_step_of_load_is_followed_and_raises_no_alarm(before: float, after: float) -> None:
+def test_a_load_step_is_followed_and_raises_no_alarm(before: float, after: float) -> None:
     steps = ((0.0, replace(MOTOR, load_force=before)), (0.27, replace(MOTOR, load_force=after)))
     found = estimate_motor(log_of(steps, 0.6), MOTOR)
     assert found.track.alarm_time is None
@@ -94,7 +94,7 @@ def test_a_step_of_load_is_followed_and_raises_no_alarm(before: float, after: fl
 
 
 @pytest.mark.slow
-def test_a_leak_that_comes_raises_an_alarm_once_it_is_there() -> None:
+def test_a_sudden_leak_raises_an_alarm_within_a_quarter_second() -> None:
     tight = replace(MOTOR, load_force=15.0)
     found = estimate_motor(log_of(((0.0, tight), (0.3, replace(tight, crossport_leakage=4e-12))), 0.7), MOTOR)
     assert found.track.alarm_time is not None
@@ -110,7 +110,7 @@ def test_gas_in_every_chamber_is_estimated() -> None:
     assert found.values["load_force"] == pytest.approx(10.0, abs=1.0)
 
 
-def test_a_faulty_pump_is_seen_by_the_pattern_of_its_electrodes() -> None:
+def test_a_faulty_pump_breaks_the_pattern_of_its_electrodes() -> None:
     leaking = replace(MOTOR, load_force=10.0, valve_leak=changed(MOTOR.valve_leak, 4, 0.2))
     assert not estimate_motor(log_of(leaking), MOTOR).pattern_holds
 
@@ -135,7 +135,7 @@ def test_bulk_modulus_is_not_observable() -> None:
         assert 0.0 < abs(flow_change(pump_alone(MOTOR), 480.0, 200.0, factor)) < 1e-3
 
 
-def test_a_drive_that_is_no_steady_sine_is_refused() -> None:
+def test_a_drive_other_than_a_steady_sine_within_the_voltage_limit_is_refused() -> None:
     time = SAMPLE_TIME * np.arange(5000)
     with pytest.raises(LogError, match="must be a steady sine"):
         steady_drive(100.0 * np.sin(2.0 * np.pi * (400.0 + 500.0 * time) * time), SAMPLE_TIME)
@@ -145,7 +145,7 @@ def test_a_drive_that_is_no_steady_sine_is_refused() -> None:
         steady_drive(200.0 * np.sin(2.0 * np.pi * 400.0 * time), SAMPLE_TIME)
 
 
-def test_a_log_that_lacks_something_is_refused() -> None:
+def test_a_log_with_a_missing_channel_too_few_cycles_or_missing_samples_is_refused() -> None:
     log = log_of(MOTOR, 0.2)
     with pytest.raises(LogError, match="electrode_3_v is needed"):
         logged_signature(log.replace(electrode_3_v=None))

@@ -12,7 +12,7 @@ def estimate(value: float, deviation: float, name: str = "crossport_leakage", *,
     return SimpleNamespace(values={name: value}, deviations={name: deviation}, pattern_holds=holds, pattern=30.0)
 
 
-def test_a_broken_pattern_comes_before_a_leakage_below_nothing() -> None:
+def test_a_broken_pattern_takes_precedence_over_a_negative_leakage() -> None:
     (broken,) = _doubts(estimate(-1e-12, 1e-15, holds=False))
     assert broken == MotorCode.PATTERN_BROKEN.note(chi_square=30.0)
     (faster,) = _doubts(estimate(-1.01 * CLEARLY * 1e-14, 1e-14))
@@ -22,7 +22,7 @@ def test_a_broken_pattern_comes_before_a_leakage_below_nothing() -> None:
 
 
 @pytest.mark.parametrize("name", SIZES)
-def test_a_number_is_told_where_its_deviation_is_small_beside_it_or_its_usual_size(name: str) -> None:
+def test_a_value_is_reported_only_if_its_deviation_is_small(name: str) -> None:
     unit, size = SIZES[name]
     for value, most in ((0.0, size), (-5.0 * size, 5.0 * size)):
         known = _quantity(name, estimate(value, 0.99 * MOST_DEVIATION * most, name), told=True)

@@ -27,7 +27,7 @@ def step_up(time: float) -> float:
 
 
 @pytest.mark.parametrize(("swing", "load"), [(225.0, 0.0), (175.0, 12.0), (275.0, 20.0)])
-def test_an_electrode_and_the_voltage_say_flow_and_pressure_between_the_maps_points(
+def test_electrode_and_drive_voltage_give_flow_and_pressure_between_map_points(
     maps: MotorMaps, swing: float, load: float
 ) -> None:
     point = operate(replace(HEALTHY, load_force=load), PEAK, swing)
@@ -45,19 +45,21 @@ def test_the_averaged_motor_moves_as_the_fast_plant(maps: MotorMaps) -> None:
     np.testing.assert_allclose(position, fast[::10], atol=0.04 * position[-1])
 
 
-def test_between_two_frequencies_the_map_lies_between() -> None:
+def test_the_map_is_interpolated_linearly_between_frequencies() -> None:
     two = motor_maps(HEALTHY, (400.0, PEAK), (150.0, 200.0), (0.0, 2e4))
     low, middle, high = (two.row(two.flow, frequency, 200.0) for frequency in (400.0, 440.0, PEAK))
     np.testing.assert_allclose(middle, 0.5 * (low + high))
 
 
 @pytest.mark.parametrize(("frequency", "swing", "said"), [(300.0, 100.0, "frequency"), (PEAK, 301.0, "voltage")])
-def test_off_the_map_is_refused(maps: MotorMaps, frequency: float, swing: float, said: str) -> None:
+def test_a_frequency_or_voltage_outside_the_map_is_refused(
+    maps: MotorMaps, frequency: float, swing: float, said: str
+) -> None:
     with pytest.raises(HydrostateError, match=f"the map's {said} goes from"):
         maps.row(maps.flow, frequency, swing)
 
 
-def test_the_integral_stands_still_at_the_limit_and_leaves_it_at_once() -> None:
+def test_the_integral_part_does_not_wind_up_at_the_voltage_limit() -> None:
     control = VelocityController(proportional=0.0, integral=1e6)
     swing, held = 0.0, 0.0
     for _ in range(100):
@@ -82,7 +84,7 @@ def test_the_motor_reverses_under_control(maps: MotorMaps) -> None:
     assert run.velocity[-1] == pytest.approx(-3e-3, rel=0.05)
 
 
-def test_self_sensing_does_not_see_what_leaks_past_the_piston_and_an_encoder_does(maps: MotorMaps) -> None:
+def test_self_sensing_control_misses_leakage_past_the_piston_and_an_encoder_does_not(maps: MotorMaps) -> None:
     leaking = [(0.0, replace(HEALTHY, load_force=15.0, crossport_leakage=2e-12))]
     runs = {
         sensing: controlled_run(leaking, lambda _: 3e-3, 0.8, PEAK, maps, np.random.default_rng(2), sensing=sensing)
@@ -94,7 +96,7 @@ def test_self_sensing_does_not_see_what_leaks_past_the_piston_and_an_encoder_doe
     assert last["self"][0] < 0.95 * 3e-3
 
 
-def test_a_motor_that_is_stopped_does_not_turn_back(maps: MotorMaps) -> None:
+def test_a_stopped_motor_does_not_reverse(maps: MotorMaps) -> None:
     run = controlled_run(
         [(0.0, HEALTHY)], lambda time: 3e-3 if time < 0.3 else 0.0, 0.4, PEAK, maps, np.random.default_rng(1)
     )
@@ -103,7 +105,7 @@ def test_a_motor_that_is_stopped_does_not_turn_back(maps: MotorMaps) -> None:
     assert run.velocity[stopping].min() > -1e-4
 
 
-def test_the_derivative_gain_acts_on_what_the_measured_speed_gained(maps: MotorMaps) -> None:
+def test_the_derivative_gain_acts_on_the_change_of_measured_velocity(maps: MotorMaps) -> None:
     control, period = VelocityController(derivative=2.0), 4.0 / PEAK
     run = controlled_run(
         [(0.0, HEALTHY)], lambda _: 3e-3, 5 * period, PEAK, maps, np.random.default_rng(1), controller=control

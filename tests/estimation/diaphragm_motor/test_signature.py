@@ -11,7 +11,7 @@ from plant.errors import LogError
 
 @pytest.mark.parametrize("seconds", [0.2, 2.0, 10.0])
 @pytest.mark.parametrize("off", [0.0, 0.25, 0.45])
-def test_frequency_swing_and_phase_of_a_drive_between_two_spectral_lines(seconds: float, off: float) -> None:
+def test_frequency_and_swing_of_a_drive_between_spectral_lines_are_found(seconds: float, off: float) -> None:
     T = 1e-3
     size = round(seconds / T)
     frequency = (round(33.0 * seconds) + off) / seconds
@@ -24,7 +24,7 @@ def test_frequency_swing_and_phase_of_a_drive_between_two_spectral_lines(seconds
     assert found.peak_to_peak == pytest.approx(120.0, rel=1e-3)
 
 
-def test_a_position_that_stands_still_at_the_end_of_its_range_is_refused() -> None:
+def test_a_position_clipped_at_the_end_of_its_range_is_refused() -> None:
     drive = motor_drive(480.0, 200.0, 0.25, SAMPLE_TIME)
     log = simulate_motor(
         DiaphragmMotorParameters(), drive, SAMPLE_TIME, sensors=BENCH_SENSORS, rng=np.random.default_rng(1)

@@ -24,7 +24,7 @@ SMALL = replace(PAPER, piston_area=PAPER.piston_area / 3.0, chamber_volume=PAPER
 
 
 @pytest.mark.parametrize("times", [0.3, 0.5, 2.0, 3.0])
-def test_displacement_over_area_that_is_another_is_named_with_its_ratio(times: float) -> None:
+def test_another_ratio_of_displacement_to_piston_area_is_named_with_its_size(times: float) -> None:
     rig = replace(PAPER, pump_displacement=PAPER.pump_displacement / times)
     (note,) = rig_contradicted(log(4.0), rig)
     assert note.code == EstimateCode.RIG_CONTRADICTED
@@ -32,16 +32,16 @@ def test_displacement_over_area_that_is_another_is_named_with_its_ratio(times: f
 
 
 @pytest.mark.parametrize("rig", [PAPER, WORN, replace(PAPER, pump_displacement=1.07 * PAPER.pump_displacement)])
-def test_a_rig_file_within_its_doubts_is_not_contradicted(rig: EhaParameters) -> None:
+def test_a_rig_file_that_is_off_by_less_than_its_uncertainty_is_not_contradicted(rig: EhaParameters) -> None:
     assert rig_contradicted(log(4.0), rig) == ()
 
 
-def test_without_pressure_leakage_may_be_what_the_piston_lacks() -> None:
+def test_without_pressure_too_little_motion_may_be_leakage_and_contradicts_no_rig_file() -> None:
     rig = replace(PAPER, pump_displacement=2.0 * PAPER.pump_displacement)
     assert rig_contradicted(log(2.0).replace(**{PRESSURE: None}), rig) == ()
 
 
-def test_a_log_of_another_actuator_is_a_mismatch_with_its_rig_file_and_not_a_drive_that_is_too_weak() -> None:
+def test_a_log_of_another_actuator_is_a_mismatch_and_not_unobservable() -> None:
     unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(0.1),), "flow", FLOW_CHANNELS, 0.1)
     found = unless_another_rig(unseen, clean_log(log(2.0), SMALL), SMALL)
     assert found.outcome is Outcome.MISMATCH
@@ -50,7 +50,7 @@ def test_a_log_of_another_actuator_is_a_mismatch_with_its_rig_file_and_not_a_dri
 
 
 @pytest.mark.slow
-def test_its_estimate_says_so_in_place_of_asking_for_pressure_that_is_logged() -> None:
+def test_its_message_names_the_wrong_motion_and_does_not_ask_for_logged_pressure() -> None:
     found = estimate_log(log(2.0), Rig("small", SMALL))
     assert found.outcome is Outcome.MISMATCH
     said = estimate_entries(found)["message"]
@@ -59,7 +59,7 @@ def test_its_estimate_says_so_in_place_of_asking_for_pressure_that_is_logged() -
 
 
 @pytest.mark.parametrize(("longer", "told"), [(0.52, True), (0.87, False)])
-def test_a_ratio_that_longer_blocks_do_not_confirm_is_none(
+def test_a_ratio_that_longer_blocks_do_not_confirm_contradicts_no_rig_file(
     longer: float, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """For a leaky rig with a correct rig file, blocks of 20 ms gave a ratio of 0.62 and those of 50 ms 0.87."""

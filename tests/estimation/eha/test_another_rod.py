@@ -13,7 +13,7 @@ def explained(**values: tuple[float, float]) -> Explanation:
     return Explanation(("single_rod",), values, {}, (), (), 1e5)
 
 
-def test_a_ratio_of_areas_that_is_known_to_a_percent_is_believed_and_one_to_three_percent_is_not() -> None:
+def test_a_ratio_of_areas_with_a_deviation_of_three_percent_is_vague_and_half_a_percent_is_not() -> None:
     """Side B over side A is (1 - d) / (1 + d): near d = 0 its deviation is twice that of d."""
     assert vague_areas(explained(area_difference=(0.176, 0.002))) == ()
     (note,) = vague_areas(explained(area_difference=(-0.03, 0.015)))
@@ -21,12 +21,12 @@ def test_a_ratio_of_areas_that_is_known_to_a_percent_is_believed_and_one_to_thre
     assert note.data["percent"] == pytest.approx(1.96 * 3.0, rel=0.01)
 
 
-def test_an_explanation_without_areas_is_not_asked() -> None:
+def test_an_explanation_without_areas_has_no_vague_areas() -> None:
     assert vague_areas(None) == ()
     assert vague_areas(explained(pressure_offset=(1e5, 1e6))) == ()
 
 
-def test_what_the_log_does_not_determine_is_vague() -> None:
+def test_an_undetermined_value_is_vague() -> None:
     assert is_vague(1.0, None)
     assert is_vague(1.0, np.inf)
     assert is_vague(1.0, float("nan"))

@@ -137,13 +137,13 @@ def test_a_log_without_motion_is_refused() -> None:
         ({"start_std": 0.0}, "its deviation positive"),
     ],
 )
-def test_what_cannot_be_done_is_refused_in_a_sentence(options: dict[str, object], message: str) -> None:
+def test_invalid_options_are_refused_with_a_message(options: dict[str, object], message: str) -> None:
     log = bench_log("lumped", "steps", "normal").slice(0, 100)
     with pytest.raises(HydrostateError, match=message):
         estimate_bulk_modulus(log, EhaParameters(), **options)
 
 
-def test_the_first_belief_is_at_the_first_sample_that_is_there() -> None:
+def test_the_first_belief_begins_at_the_first_position_sample_that_is_not_missing() -> None:
     log = Record(1e-3, {"motor_speed_rad_s": np.zeros(3), "position_m": np.array([np.nan, 0.02, 0.03])})
     belief = first_belief(PRESSURE_FORM, log, 1e8, 3e8)
     assert belief.mean.tolist() == [0.02, 0.0, 0.0, 1e8]
@@ -177,7 +177,7 @@ def test_without_pressure_the_motion_form_is_chosen(shared: Path) -> None:
 
 
 @pytest.mark.parametrize("form", [pytest.param("flow", marks=pytest.mark.slow), "pressure"])
-def test_what_is_not_known_of_the_chamber_volume_is_not_known_of_bulk_modulus(form: str) -> None:
+def test_uncertainty_of_chamber_volume_widens_only_the_total_interval_of_bulk_modulus(form: str) -> None:
     log = bench_log("lumped", "steps", "normal")
     exact, vague = (
         estimate_bulk_modulus(log, EhaParameters(), form=form, uncertainties=given)
@@ -257,7 +257,7 @@ def test_a_clipped_pressure_of_the_foreign_bench_leaves_bulk_modulus_within_its_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.9, 0.7, 0.5])
-def test_clipped_logs_of_the_foreign_bench_cover_as_sound_ones_do(share: float, shared: Path) -> None:
+def test_intervals_of_clipped_foreign_bench_logs_cover_the_truth(share: float, shared: Path) -> None:
     covered: list[bool] = []
     for log, _, truth in foreign_logs(shared)[::2]:
         with pytest.warns(LogWarning) as caught:
@@ -293,7 +293,7 @@ def asynchronous(rate: str, duration: float = 5.0) -> Record:
 
 
 @pytest.mark.parametrize("rate", ASYNCHRONOUS)
-def test_the_pressure_form_takes_any_rate_and_channels_of_several(rate: str) -> None:
+def test_the_pressure_form_accepts_any_sample_rate_and_mixed_rates(rate: str) -> None:
     answer = estimate_bulk_modulus(asynchronous(rate), parameters_for(CONDITIONS["minor_leakage"]), form="pressure")
     assert covers(answer, TRUTH)
     assert answer.value == pytest.approx(TRUTH, rel=0.01)
@@ -302,7 +302,7 @@ def test_the_pressure_form_takes_any_rate_and_channels_of_several(rate: str) -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["least-squares", "ekf"])
 @pytest.mark.parametrize("rate", ASYNCHRONOUS)
-def test_the_flow_form_takes_any_rate_and_channels_of_several(rate: str, method: str) -> None:
+def test_the_flow_form_accepts_any_sample_rate_and_mixed_rates(rate: str, method: str) -> None:
     answer = estimate_bulk_modulus(asynchronous(rate, 10.0), EhaParameters(), form="flow", method=method, start=3e8)
     assert covers(answer, TRUTH)
     assert answer.value == pytest.approx(TRUTH, rel=0.01)
@@ -328,7 +328,7 @@ def test_a_log_that_begins_under_load_gives_its_bulk_modulus(first: int, samples
     assert answer.value == pytest.approx(truth, rel=0.005)
 
 
-def test_gross_outliers_and_drop_outs_of_speed_leave_a_filter_as_good_as_on_a_sound_log() -> None:
+def test_gross_outliers_and_drop_outs_of_speed_hardly_worsen_a_filter() -> None:
     log, rng = sampled(1e-3, "normal", 10.0), np.random.default_rng(4)
     speed = log["motor_speed_rad_s"].copy()
     speed[rng.choice(len(log), len(log) // 100, replace=False)] += 20.0 * np.std(speed)

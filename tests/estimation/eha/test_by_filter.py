@@ -40,13 +40,13 @@ def filtered(log: Record, tuned: bool) -> BulkModulusEstimate:
 
 
 @pytest.mark.slow
-def test_steps_of_the_model_do_not_show_in_a_tuned_filter_of_a_fast_log() -> None:
+def test_model_sub_steps_do_not_bias_a_tuned_filter_on_a_10_khz_log() -> None:
     found = filtered(run(1.0, 1e-4), tuned=True)
     assert found.std < 2e-5 * TRUTH
     assert found.value == pytest.approx(TRUTH, abs=4.0 * found.std)
 
 
-def test_tuning_narrows_the_interval_by_what_the_log_shows_of_the_noise() -> None:
+def test_tuning_to_a_quiet_log_narrows_the_interval_and_keeps_it_valid() -> None:
     log = run(3.0, 1e-3)
     tuned, given = filtered(log, tuned=True), filtered(log, tuned=False)
     assert 5.0 * tuned.std < given.std
@@ -62,7 +62,7 @@ def form_fit(*, bound: float = 0.01, chi_square: float = 1.0, reasons: tuple[Not
     return FormFit({"bulk_modulus": (2e8, 1e6), "flow_bias": (1e-6, 1e-8)}, bound, chi_square, reasons)
 
 
-def test_a_fit_that_is_not_like_its_log_or_tells_nothing_gives_no_number() -> None:
+def test_a_fit_with_large_residuals_or_a_wide_bound_gives_no_value() -> None:
     sound = outcome_of(form_fit())
     assert (sound.outcome, sound.value, sound.std, sound.gate.passed) == (Outcome.OK, 2e8, 1e6, True)
     doubted = outcome_of(form_fit(reasons=(EstimateCode.DIVERGED.note(),)))
@@ -93,7 +93,9 @@ REST = Record(1e-3, {name: np.zeros(300) for name in ("motor_speed_rad_s", "posi
         ({"form": "flow", "tuned": True}, "the flow form is filtered by a bank of ekf"),
     ],
 )
-def test_what_no_form_can_do_is_refused(options: dict[str, Any], said: str) -> None:
+def test_invalid_first_guesses_and_combinations_of_form_and_method_are_refused(
+    options: dict[str, Any], said: str
+) -> None:
     with pytest.raises(HydrostateError, match=said):
         estimate_bulk_modulus(REST.replace(differential_pressure_pa=np.zeros(300)), FAULTY, **options)
 
@@ -104,7 +106,7 @@ def test_the_flow_form_says_which_channel_it_lacks() -> None:
             estimate_bulk_modulus(REST, FAULTY, **options)
 
 
-def test_a_filter_that_diverged_or_cannot_know_gives_no_gate() -> None:
+def test_a_filter_that_diverged_or_has_a_wide_bound_passes_no_gate() -> None:
     nothing: Any = None
     assert _verdict(nothing, REST, False, 0.01)[0] is Outcome.DIVERGED
     outcome, gate = _verdict(nothing, REST, True, 1.01 * LARGEST_BOUND)
@@ -113,7 +115,7 @@ def test_a_filter_that_diverged_or_cannot_know_gives_no_gate() -> None:
 
 
 @pytest.mark.parametrize(("second", "taken"), [(5.0, "again"), (-5.0, "first"), (0.0, "first")])
-def test_of_two_passes_the_likelier_is_returned_with_the_first(second: float, taken: str) -> None:
+def test_the_likelier_of_two_filter_passes_is_returned_together_with_the_first(second: float, taken: str) -> None:
     begun: list[float] = []
 
     def filtered(guess: float) -> Any:

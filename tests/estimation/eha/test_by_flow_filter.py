@@ -62,7 +62,7 @@ def test_it_finds_bulk_modulus_and_leakage_without_being_told_the_condition(cond
 
 
 @pytest.mark.parametrize("condition", thinned(["minor_leakage", "major_friction"], ["minor_leakage"]))
-def test_on_the_circuit_it_comes_to_the_truth_where_the_pressure_form_stays_low(condition: str) -> None:
+def test_on_circuit_logs_it_finds_bulk_modulus_within_its_interval(condition: str) -> None:
     record = on_circuit(condition, 0)
     found = chamber_ekf(record)
     assert (found.form, found.method, found.gate.passed) == ("flow", "chamber-ekf", True)
@@ -80,7 +80,7 @@ def test_from_any_first_guess_it_comes_to_the_same_value(start: float) -> None:
     assert found.value == pytest.approx(near.value, rel=1e-3)
 
 
-def test_its_track_rests_on_what_came_before_alone() -> None:
+def test_its_online_track_does_not_depend_on_later_samples() -> None:
     record = on_circuit("normal", 1, duration=1.0)
     spoilt = record["differential_pressure_pa"].copy()
     spoilt[750:] += 1e6
@@ -93,7 +93,7 @@ def test_its_track_rests_on_what_came_before_alone() -> None:
     assert not np.array_equal(whole.mean[750:], later.mean[750:])
 
 
-def test_its_process_noise_is_what_the_motors_sensor_brings() -> None:
+def test_its_process_noise_is_the_motor_speed_noise_as_pressure_above_a_floor() -> None:
     record = on_circuit("normal", 1, duration=4.0)
     rate = TRUTH / (2.0 * HEALTHY.chamber_volume) * HEALTHY.pump_displacement
     told = drive_noise(record, HEALTHY, {"motor_speed_rad_s": 0.01})
@@ -117,19 +117,19 @@ def test_a_log_without_position_is_refused_by_name() -> None:
         filter_flow(record.replace(position_m=None), HEALTHY)
 
 
-def test_a_form_that_is_not_its_own_is_refused() -> None:
+def test_any_form_other_than_the_flow_form_is_refused() -> None:
     with pytest.raises(HydrostateError, match="chamber-ekf believes the flow form, got form 'pressure'"):
         chamber_ekf(run("normal")[0], form="pressure")
 
 
-def test_a_rig_without_leakage_is_no_obstacle() -> None:
+def test_it_also_converges_with_a_rig_file_without_leakage() -> None:
     record, truth = run("normal")
     tight = replace(HEALTHY, leakage_coefficient=0.0, flow_bias=0.0)
     assert last(record, tight)[0] == pytest.approx(truth.bulk_modulus, rel=0.01)
 
 
 @pytest.mark.slow
-def test_on_the_circuit_nine_of_nine_are_within_one_percent_and_intervals_are_right() -> None:
+def test_on_the_circuit_all_nine_conditions_are_within_one_percent_with_calibrated_intervals() -> None:
     scores: list[float] = []
     for seed in range(4):  # `benchmarks chamber_filter` runs 20
         for condition in CONDITIONS:
@@ -148,7 +148,7 @@ def test_on_the_foreign_bench_it_is_within_one_percent(shared: Path) -> None:
         assert value == pytest.approx(row.bulk_modulus_pa, rel=0.01), row.file
 
 
-def test_first_guesses_lie_side_by_side_from_a_healthy_actuator_to_beyond_the_worst_of_table_3() -> None:
+def test_first_guesses_at_most_double_from_healthy_to_beyond_the_worst_of_table_3() -> None:
     for guesses, worst in ((LEAKAGES, 12.6), (BIASES, 6.1)):
         steps = np.divide(guesses[1:], guesses[:-1])
         assert guesses[0] == 1.0
@@ -160,7 +160,7 @@ def test_first_guesses_lie_side_by_side_from_a_healthy_actuator_to_beyond_the_wo
     assert 1.0 in MODULI
 
 
-def test_a_fit_that_explains_a_load_but_not_bulk_modulus_is_not_overruled_by_a_filter(
+def test_a_filter_does_not_replace_a_vague_fit_that_explains_a_load(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     whole = run("minor_leakage")[0]
@@ -181,7 +181,7 @@ def test_a_fit_that_explains_a_load_but_not_bulk_modulus_is_not_overruled_by_a_f
 
 
 @pytest.mark.slow
-def test_no_number_is_told_of_chambers_that_leak_empty_within_a_sample_under_load() -> None:
+def test_no_value_is_reported_of_loaded_chambers_that_leak_empty_within_a_sample() -> None:
     bench = draw_bench(1020)  # the filter gave 210 +- 7 MPa, the truth is 302
     answer = estimate_bulk_modulus(bench.record, bench.healthy)
     assert answer.outcome is Outcome.NOT_OBSERVABLE

@@ -35,14 +35,14 @@ def test_a_mixture_has_the_moments_of_its_parts() -> None:
     assert (float(mean[0, 0]), float(variance[0, 0])) == pytest.approx((2.0, 2.0 + 4.0))
 
 
-def test_what_diverged_has_no_weight(task: FilterProblem) -> None:
+def test_a_diverged_filter_has_no_weight_in_the_mixture(task: FilterProblem) -> None:
     parts = [member(task, 0.0, score=-1e4), member(task, 1.0, score=-1e4 + np.log(3.0))]
     np.testing.assert_allclose(_weights(parts), [0.25, 0.75])
     mean, _ = _mixed(np.array([0.5, 0.5]), np.array([[[np.nan]], [[4.0]]]), np.ones((2, 1, 1)))
     assert float(mean[0, 0]) == 4.0
 
 
-def test_of_two_that_are_one_the_likelier_is_kept(task: FilterProblem) -> None:
+def test_of_two_filters_with_nearly_equal_means_the_first_is_kept(task: FilterProblem) -> None:
     parts = [member(task, 0.0), member(task, 0.5), member(task, 3.0)]
     assert _apart(parts, (0,)) == [parts[0], parts[2]]
     # a variance that rounding made negative causes no square-root warning
@@ -51,14 +51,14 @@ def test_of_two_that_are_one_the_likelier_is_kept(task: FilterProblem) -> None:
 
 
 @pytest.mark.parametrize(("samples", "every"), [(10_000, 1), (100_000, 5), (37, 1), (1, 1)])
-def test_blocks_end_at_samples_that_the_track_keeps_and_at_the_last(samples: int, every: int) -> None:
+def test_blocks_end_at_samples_of_the_track_and_at_the_last_sample(samples: int, every: int) -> None:
     ends = _ends(samples, every, 1e-3)
     assert ends == sorted(set(ends))
     assert ends[-1] == samples
     assert all((end - 1) % every == 0 for end in ends[:-1])
 
 
-def test_a_bank_of_one_on_a_linear_model_is_the_filter(task: FilterProblem) -> None:
+def test_a_bank_of_one_filter_on_a_linear_model_equals_that_filter(task: FilterProblem) -> None:
     alone = ekf(task)
     found = run_bank([Member(task, task.mean, task.covariance, 0.0)], (0, 1)).online
     np.testing.assert_allclose(found.track[:-1], alone.track[:-1], rtol=1e-9, atol=1e-12)

@@ -26,14 +26,14 @@ def explanation(share: float = SHARE, liquid: float = LIQUID, quickness: float =
 
 
 @pytest.mark.parametrize("quickness", [0.0, 0.2, QUICKEST])
-def test_oil_without_its_air_is_as_stiff_whatever_the_exponent_of_bubbles(quickness: float) -> None:
+def test_air_free_bulk_modulus_does_not_depend_on_the_bubbles_exponent(quickness: float) -> None:
     air = entrained_air(explanation(quickness=quickness))
     assert air is not None
     assert air.share == pytest.approx(SHARE)
     assert air.liquid == pytest.approx(LIQUID)
 
 
-def test_a_circuit_has_isothermal_bubbles_that_yield_as_much_at_the_inner_circuits_pressure() -> None:
+def test_a_circuits_isothermal_bubbles_are_as_compliant_at_the_accumulator_pressure() -> None:
     pressure, found = RIG.accumulator_pressure, explanation(quickness=0.2)
     air, p = entrained_air(found), with_air(RIG, found)
     assert air is not None
@@ -46,7 +46,7 @@ def test_a_circuit_has_isothermal_bubbles_that_yield_as_much_at_the_inner_circui
     assert circuit_of(p).piston_area == RIG.piston_area
 
 
-def test_an_actuator_stays_as_it_is_where_no_oil_holds_such_air() -> None:
+def test_an_actuator_is_unchanged_if_no_oil_can_hold_the_air_found() -> None:
     late = explanation(air_onset=0.4)
     stiffer_than_any = explanation(bulk_modulus=2.0 * LIQUID, share=0.2)
     foam = explanation(share=2.0 * MOST_AIR / (1.0 - MOST_AIR))
@@ -55,7 +55,7 @@ def test_an_actuator_stays_as_it_is_where_no_oil_holds_such_air() -> None:
         assert with_air(RIG, found) is RIG
 
 
-def test_air_is_less_by_as_much_as_bulk_modulus_is_larger_in_a_larger_chamber() -> None:
+def test_uncertain_chamber_volume_widens_the_interval_of_air_more_downwards() -> None:
     spreads = {"chamber_volume": Spread(0.1, 0.2)}
     air = amount_of_air(explanation(), {"chamber_volume": 1.0}, spreads)
     assert air is not None

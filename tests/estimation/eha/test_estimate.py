@@ -63,7 +63,7 @@ def test_a_finding_holds_what_the_estimate_found_with_units_and_intervals() -> N
     assert [note.code for note in found.all_notes] == [EstimateCode.KNOWN_AS_THE_RIG]
 
 
-def test_only_what_the_estimate_used_is_said_to_be_left_out() -> None:
+def test_outliers_are_noted_only_of_channels_that_the_estimate_used() -> None:
     unused, used = (
         estimate_log(with_outliers(log(), channel), Rig()) for channel in ("velocity_m_s", "motor_speed_rad_s")
     )
@@ -73,7 +73,7 @@ def test_only_what_the_estimate_used_is_said_to_be_left_out() -> None:
 
 
 @pytest.mark.parametrize("form", ["pressure", "acceleration"])
-def test_what_it_costs_not_to_use_the_pressure_is_noted(form: str) -> None:
+def test_an_estimate_that_does_not_use_pressure_notes_the_loss(form: str) -> None:
     record = log(duration=1.0)
     seen = record if form == "acceleration" else record.replace(**{PRESSURE: None})
     found = estimate_log(seen, Rig(), EstimateOptions(form=form))
@@ -84,7 +84,7 @@ def test_what_it_costs_not_to_use_the_pressure_is_noted(form: str) -> None:
     )
 
 
-def test_a_fit_is_refused_for_what_speaks_against_its_model_and_not_for_a_wide_bound() -> None:
+def test_evidence_against_the_model_refuses_a_fit_and_a_wide_bound_does_not() -> None:
     frozen = with_fault(log(duration=1.0), SensorFault(channel="position_m", kind="freeze", start=0.5))
     found = estimate_log(frozen, Rig())
     assert SensorCode.SENSOR_FROZE in [note.code for note in refused(found.evidence)]
@@ -95,7 +95,7 @@ def test_a_fit_is_refused_for_what_speaks_against_its_model_and_not_for_a_wide_b
     assert refused(unseen.evidence) == ()
 
 
-def test_a_form_that_is_told_leakage_and_friction_refuses_no_log() -> None:
+def test_the_pressure_form_with_given_leakage_and_friction_refuses_no_log() -> None:
     found = estimate_log(log("major_leakage_minor_friction"), Rig(), EstimateOptions(form="pressure"))
     assert EstimateCode.INNOVATIONS_LARGE in [note.code for note in found.gate.reasons]
     assert refused(found.evidence) == ()
@@ -107,7 +107,7 @@ def refused_with(form: str, outcome: Outcome, *reasons: Note) -> list[str]:
     return [note.code for note in refused(found)]
 
 
-def test_without_pressure_a_fit_that_is_near_speaks_against_bulk_modulus_alone() -> None:
+def test_slightly_large_position_residuals_without_pressure_do_not_refuse_the_fit() -> None:
     near, laws = (
         EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=1.9, motion_percent=9.0),
         EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=1e8, most_pa=2e8),
@@ -178,14 +178,16 @@ def test_the_noise_of_a_cleaned_log_is_measured_once(way: str, measured: list[tu
         ({"method": "ekf", "tuned": True}, True),
     ],
 )
-def test_a_filter_is_asked_for_by_its_name_or_by_what_only_a_filter_does(chosen: dict[str, Any], asked: bool) -> None:
+def test_a_filters_name_tuning_a_robust_update_or_further_states_select_filtering(
+    chosen: dict[str, Any], asked: bool
+) -> None:
     assert EstimateOptions(**chosen).filtering is asked
 
 
 @pytest.mark.parametrize(
     ("share", "code"), [(0.4, EstimateCode.STIFFER_THAN_RIG), (1.0, None), (2.5, EstimateCode.SOFTER_THAN_RIG)]
 )
-def test_oil_that_is_not_the_rigs_is_told_with_the_volume_that_would_explain_it(
+def test_oil_unlike_the_rigs_is_noted_with_the_chamber_volume_that_would_explain_it(
     share: float, code: EstimateCode | None
 ) -> None:
     rig = replace(HEALTHY, bulk_modulus=share * HEALTHY.bulk_modulus)

@@ -51,7 +51,7 @@ def data(note: Note) -> dict[str, Any]:
     }
 
 
-def test_delay_and_lag_add_up_and_an_offset_is_itself() -> None:
+def test_lateness_is_delay_plus_lag_and_an_offset_is_noted_unchanged() -> None:
     late = told("pressure_late", delay=2e-3, pressure_lag=(1e-3, 1e-4))
     assert late.code is RigCode.PRESSURE_LATE
     assert data(late) == {"late_ms": 3.0, "half_width_ms": 0.1 * NORMAL}
@@ -72,7 +72,7 @@ def test_an_encoders_zero_may_be_a_hose_on_one_side(zero: float, side: str) -> N
     }
 
 
-def test_no_pump_loses_less_than_nothing_to_compression() -> None:
+def test_a_negative_compression_loss_of_the_pump_is_a_pressure_tapping() -> None:
     assert told("pump_compresses", pump_compression=(1.2, 0.1)).code is RigCode.PUMP_COMPRESSES
     assert told("pump_compresses", pump_compression=(-2.1, 0.1)).code is RigCode.PRESSURE_TAPPED
 
@@ -85,7 +85,7 @@ def test_a_pump_that_delivers_far_less_is_worn(share: float, code: RigCode) -> N
     assert data(note) == {"percent": 100.0 * share, "half_width": NORMAL}
 
 
-def test_a_pump_that_delivers_what_none_can_has_its_speed_in_another_unit() -> None:
+def test_an_impossible_pump_delivery_is_a_speed_in_another_unit() -> None:
     """The factor on the logged speed is the inverse of the pump's apparent delivery over its displacement."""
     d = P.pump_displacement
 
@@ -103,7 +103,7 @@ def test_a_pump_that_delivers_what_none_can_has_its_speed_in_another_unit() -> N
     ("rig", "told_share", "other"),
     [(0.25, 0.25, False), (0.25, 0.23, False), (0.25, 0.2, True), (-0.25, -0.2, True), (0.0, 0.25, False)],
 )
-def test_areas_of_another_single_rod_than_the_rig_files_are_doubted(
+def test_areas_unlike_those_of_the_rig_files_single_rod_are_doubted(
     rig: float, told_share: float, *, other: bool
 ) -> None:
     """The areas of the rod absorbed a displacement that was 6 % off, and the class was wrong at 99 %."""
@@ -113,7 +113,7 @@ def test_areas_of_another_single_rod_than_the_rig_files_are_doubted(
     assert of_another_rod(note) == other
 
 
-def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:
+def test_notes_on_volume_play_load_relief_and_check_valves_hold_the_fitted_values() -> None:
     v = P.chamber_volume
     assert data(told("volume", chamber_volume=(0.8 * v, 0.02 * v))) == {"percent": 80.0, "half_width": 2.0 * NORMAL}
     assert data(told("position_play", position_play=(5e-5, 1e-6))) == {"play_um": 50.0}
@@ -154,7 +154,7 @@ def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:
     assert data(told("makeup_bends", makeup_bend=(5e-5, 1e-5))) == {"drop_pa": 6e4}
 
 
-def test_air_is_told_at_atmospheric_pressure_with_the_oil_without_it() -> None:
+def test_entrained_air_is_noted_at_atmospheric_pressure_with_the_air_free_bulk_modulus() -> None:
     share, liquid = 1e-3, 1.5e9
     softness = share * ATMOSPHERE
     modulus = 1.0 / (1.0 / liquid + softness / STATED**2)
@@ -197,7 +197,7 @@ def test_the_chamber_that_is_blocked_or_drains_is_named() -> None:
 @pytest.mark.parametrize(
     ("share", "case", "leaks"), [(0.1, 4e-12, "B"), (0.1, 1e-12, ""), (1.8, 1e-12, "A"), (1.6, 1e-12, "")]
 )
-def test_the_port_that_drains_more_leaks_if_no_sound_pump_drains_so(share: float, case: float, leaks: str) -> None:
+def test_a_port_that_drains_more_than_a_sound_pump_may_is_a_leak(share: float, case: float, leaks: str) -> None:
     """The prior is a twentieth of the healthy leakage; the drain of a sound pump may be seven times as large."""
     note = told("port_a_drains", drain_share_a=(share, 0.0), case_leakage=(case, 0.0))
     assert note.code is (RigCode.PORT_DRAINS if leaks else RigCode.PORTS_DRAIN_APART)
@@ -222,7 +222,7 @@ def clean() -> CleanLog:
     return CleanLog(Record(1e-3, channels), {}, (), ())
 
 
-def test_a_log_is_set_right_by_what_its_sensors_were_off() -> None:
+def test_a_log_is_corrected_by_its_sensors_offsets_and_lateness() -> None:
     found = explanation(delay=2e-3, pressure_lag=(1e-3, 0.0), pressure_offset=(5e4, 0.0), position_zero=(4e-3, 0.0))
     before, after = clean().record, set_right(clean(), found).record
     assert after["position_m"] == pytest.approx(before["position_m"] - 4e-3)
@@ -235,7 +235,7 @@ def test_a_log_is_set_right_by_what_its_sensors_were_off() -> None:
 
 
 @pytest.mark.parametrize("late", [0.0, 0.4e-3, 1.3e-3, 3e-3])
-def test_a_late_pressure_that_comes_in_some_rows_alone_is_set_right_in_its_nearest_rows(late: float) -> None:
+def test_a_late_pressure_at_a_lower_rate_is_corrected_in_its_nearest_rows(late: float) -> None:
     rows, time = np.arange(0, 200, 4), 1e-3 * np.arange(200)
     true = np.sin(30.0 * time)
     sampled = np.full(200, np.nan)
@@ -249,7 +249,7 @@ def test_a_late_pressure_that_comes_in_some_rows_alone_is_set_right_in_its_neare
     assert after[there[1:-1]] == pytest.approx(true[there[1:-1]], abs=3e-4)  # the slope at the ends is one-sided
 
 
-def test_a_course_of_leakage_is_one_at_the_end_and_never_nothing() -> None:
+def test_the_course_of_leakage_is_one_at_the_end_of_the_log_and_always_positive() -> None:
     found = explanation(leakage_growth=(1.0, 0.0), leakage_bend=(0.4, 0.0))
     course = set_right(clean(), found).record[LEAKAGE_COURSE]
     assert course[-1] == 1.0
@@ -258,14 +258,14 @@ def test_a_course_of_leakage_is_one_at_the_end_and_never_nothing() -> None:
     assert steep[0] * 2.98 == pytest.approx(1e-3, rel=1e-6)
 
 
-def test_the_rig_is_set_right_by_delivery_and_volume_alone() -> None:
+def test_the_rig_is_corrected_only_in_displacement_and_chamber_volume() -> None:
     found = explanation(pump_displacement=(5e-7, 0.0), chamber_volume=(6e-5, 0.0), bulk_modulus=(1e8, 0.0))
     right = rig_set_right(P, found)
     assert (right.pump_displacement, right.chamber_volume, right.bulk_modulus) == (5e-7, 6e-5, P.bulk_modulus)
     assert rig_set_right(P, explanation()) == P
 
 
-def test_a_log_gets_the_speed_at_which_a_pump_without_teeth_delivers_the_same() -> None:
+def test_a_log_gets_the_speed_at_which_a_pump_without_ripple_delivers_the_same() -> None:
     speed = np.linspace(20.0, 40.0, 200)
     speed[7] = np.nan
     log = CleanLog(Record(1e-3, {"motor_speed_rad_s": speed, "position_m": np.zeros(200)}), {}, (), ())

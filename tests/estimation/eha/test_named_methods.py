@@ -42,7 +42,7 @@ def test_a_step_of_a_tenth_of_a_millisecond_adds_the_printed_noise() -> None:
     assert [PRINTED_NOISE[state.name] * 1e-4 for state in ACCELERATION_FORM.states] == pytest.approx(list(PRINTED_Q))
 
 
-def test_mended_and_printed_steps_differ_by_the_volume_alone() -> None:
+def test_the_corrected_step_differs_from_the_printed_one_only_by_the_chamber_volume() -> None:
     p, T, state = EhaParameters(), 1e-4, (1e-3, 0.02, 1.5, 2.07e8)
     mended, printed = (np.array(step(state, (100.0, 100.0), p, T)) for step in (acceleration_step, printed_step))
     friction = 2.0 * p.friction_quadratic * 0.02 * 1.5 / p.moving_mass
@@ -50,7 +50,7 @@ def test_mended_and_printed_steps_differ_by_the_volume_alone() -> None:
     assert mended[2] - printed[2] == pytest.approx(T * friction * (1.0 / p.chamber_volume - 1.0), rel=1e-9)
 
 
-def test_as_printed_the_filter_stays_where_its_first_guess_puts_it() -> None:
+def test_the_filter_as_printed_does_not_converge_from_its_first_guess() -> None:
     record, p = sine("normal", 1.0)
     ends = [published(record, p, guess, PRINTED_FORM).settled(BULK_MODULUS)[0] for guess in GUESSES]
     mended = [published(record, p, guess).settled(BULK_MODULUS)[0] for guess in GUESSES]
@@ -59,7 +59,7 @@ def test_as_printed_the_filter_stays_where_its_first_guess_puts_it() -> None:
     assert np.ptp(ends) > PUBLISHED > 20.0 * np.ptp(mended)
 
 
-def test_by_name_it_is_the_filter_with_the_printed_noise() -> None:
+def test_method_published_ekf_is_the_acceleration_form_with_the_printed_noise() -> None:
     record, p = sine("normal")
     found = estimate_bulk_modulus(record, p, method="published-ekf", start=2e8)
     assert (found.form, found.method) == ("acceleration", "published-ekf")

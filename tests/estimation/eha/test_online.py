@@ -29,7 +29,7 @@ def chambers(record: Record) -> Record:
     return record.replace(**{PRESSURE: None}, pressure_a_pa=high, pressure_b_pa=high - record[PRESSURE])
 
 
-def test_noise_is_that_of_another_log_of_the_same_bench() -> None:
+def test_noise_levels_come_from_another_log_with_the_same_channels_and_rate() -> None:
     first, like = stream(), stream(1)
     own, told = begin_filter(ASKED, first), begin_filter(ASKED, first, like)
     np.testing.assert_array_equal(told.problem.variances, begin_filter(ASKED, like).problem.variances)
@@ -40,7 +40,7 @@ def test_noise_is_that_of_another_log_of_the_same_bench() -> None:
             begin_filter(ASKED, first, other)
 
 
-def test_samples_of_a_stream_are_drives_and_measurements_in_the_filters_order() -> None:
+def test_stream_samples_are_split_into_drives_and_measurements_in_the_filters_order() -> None:
     record = stream()
     filtered = begin_filter(ASKED, record)
     split = chambers(record)
@@ -53,7 +53,7 @@ def test_samples_of_a_stream_are_drives_and_measurements_in_the_filters_order() 
         samples_of(filtered, {name: record[name] for name in record if name != "velocity_m_s"})
 
 
-def test_a_saved_filter_goes_on_where_it_was_and_for_nothing_else(tmp_path: Path) -> None:
+def test_a_saved_filter_resumes_its_state_and_only_with_the_same_method_and_parameters(tmp_path: Path) -> None:
     record, path = stream(), tmp_path / "filter.npz"
     filtered = begin_filter(ASKED, record)
     save_filter(path, ASKED, filtered, 0.25)

@@ -61,7 +61,7 @@ FILTERS = {"pressure": "with pressure", "acceleration": "without it"}
 
 @pytest.mark.parametrize("form", FILTERS)
 @pytest.mark.parametrize("entry", ["chamber_volume", PRESSURE_GAIN])
-def test_a_filters_bulk_modulus_goes_with_the_volume_and_against_the_gain(form: str, entry: str) -> None:
+def test_a_filters_bulk_modulus_scales_with_volume_and_pressure_gain_as_predicted(form: str, entry: str) -> None:
     record, pressure = log(HEALTHY, duration=6.0), FILTERS[form] == "with pressure"
     moved = [
         estimate_bulk_modulus(seen, rig, form=form, method="ekf").value
@@ -74,7 +74,7 @@ def test_a_filters_bulk_modulus_goes_with_the_volume_and_against_the_gain(form: 
 
 
 @pytest.mark.slow
-def test_without_pressure_the_mass_holds_the_scale() -> None:
+def test_without_pressure_bulk_modulus_and_leakage_scale_with_the_moving_mass() -> None:
     # 4 s allow optima 4 % apart, and with 8 s the bound may exceed 3 %, so that no number is reported
     record = log(HEALTHY, duration=10.0).replace(**{PRESSURE: None})
     heavy = replace(HEALTHY, moving_mass=1.3 * HEALTHY.moving_mass)
@@ -86,7 +86,7 @@ def test_without_pressure_the_mass_holds_the_scale() -> None:
 
 
 @pytest.mark.parametrize(("pressure", "scale"), [(True, 1.0), (False, 2.0)])
-def test_displacement_and_area_that_grow_together_scale_all_flows(pressure: bool, scale: float) -> None:
+def test_displacement_and_area_that_grow_together_scale_bulk_modulus_and_leakage(pressure: bool, scale: float) -> None:
     laws = scaled_responses(HEALTHY, {}, pressure=pressure)
     oil, leakage = laws["bulk_modulus"], laws["leakage_coefficient"]
     assert oil["pump_displacement"] + oil.get("piston_area", 0.0) == -scale
@@ -99,23 +99,23 @@ def quantity(value: float, std: float) -> Quantity:
     return Quantity.normal(value, std, "Pa")
 
 
-def test_without_doubt_the_total_interval_is_the_one_given_the_rig() -> None:
+def test_an_exact_rig_makes_the_total_interval_equal_to_the_one_given_the_rig() -> None:
     one = with_total(quantity(2e8, 1e6), {"chamber_volume": 1.0}, {})
     assert one.ci95_total == one.ci95
 
 
-def test_a_law_of_scale_makes_the_interval_of_a_logarithm() -> None:
+def test_a_proportional_response_gives_a_total_interval_even_in_the_logarithm() -> None:
     one = with_total(quantity(2e8, 0.0), {"chamber_volume": 1.0}, {"chamber_volume": Spread.of(0.15)})
     assert one.ci95_total == pytest.approx((2e8 * math.exp(-1.96 * 0.15), 2e8 * math.exp(1.96 * 0.15)), rel=1e-4)
 
 
-def test_what_goes_against_an_entry_turns_its_sides_about() -> None:
+def test_a_negative_response_swaps_the_two_sides_of_an_entrys_uncertainty() -> None:
     one = with_total(quantity(1.0, 0.0), {"moving_mass": -1.0}, {"moving_mass": Spread(0.1, 0.4)})
     assert one.ci95_total == pytest.approx((math.exp(-1.96 * 0.4), math.exp(1.96 * 0.1)), rel=1e-4)
 
 
 @pytest.mark.parametrize(("std", "doubt"), [(0.04, 0.0), (0.3, 0.15), (1.5, 0.5), (200.0, 0.5)])
-def test_a_positive_quantity_has_positive_intervals_however_little_a_log_tells(std: float, doubt: float) -> None:
+def test_a_positive_quantity_has_positive_intervals_even_if_it_is_vague(std: float, doubt: float) -> None:
     """The interval of a bulk modulus that its check had refused was -300 to 700 MPa."""
     one = Quantity(2e8, "Pa", positive_interval_95(2e8, std * 2e8), std * 2e8)
     one = with_total(one, {"moving_mass": 1.0}, {"moving_mass": Spread.of(doubt)} if doubt else {})
@@ -126,14 +126,14 @@ def test_a_positive_quantity_has_positive_intervals_however_little_a_log_tells(s
     assert math.isfinite(one.ci95_total[1])
 
 
-def test_a_small_difference_of_flows_may_be_nothing_but_not_less() -> None:
+def test_the_interval_of_a_small_difference_of_flows_ends_at_zero() -> None:
     one = with_total(quantity(5e-12, 1e-13), {"pump_displacement": 60.0}, {"pump_displacement": Spread.of(0.03)})
     assert one.ci95_total is not None
     assert one.ci95_total[0] == 0.0
     assert one.ci95_total[1] == pytest.approx(5e-12 * (1.0 + 60.0 * math.expm1(1.96 * 0.03)), rel=1e-3)
 
 
-def test_a_quantity_of_which_no_law_is_known_has_no_total_interval() -> None:
+def test_a_quantity_without_known_responses_has_no_total_interval() -> None:
     assert with_total(quantity(1.0, 0.1), None, {"chamber_volume": Spread.of(0.15)}).ci95_total is None
 
 
@@ -141,7 +141,7 @@ EXACT = {name: 0.0 for name in DOUBTS if getattr(HEALTHY, name, 1.0) is not None
 """Uncertainties of a rig file whose entries are all exact."""
 
 
-def test_the_rig_widens_the_total_alone_and_decides_no_outcome_and_no_gate() -> None:
+def test_the_rigs_uncertainty_widens_only_the_total_interval_and_changes_no_outcome() -> None:
     exact, usual, vague = (
         estimate_log(log(HEALTHY), Rig(uncertainties=given)) for given in (EXACT, {}, {"chamber_volume": 2.0})
     )
@@ -160,7 +160,7 @@ def noted(given: Mapping[str, float], measured: tuple[str, ...] = ()) -> list[tu
     return [(n.data["entry"], n.data["percent"]) for n in found.notes if n.code == EstimateCode.KNOWN_AS_THE_RIG]
 
 
-def test_a_note_names_the_entry_that_bulk_modulus_is_known_as_well_as() -> None:
+def test_a_note_names_the_rig_entry_that_limits_the_accuracy_of_bulk_modulus() -> None:
     assert noted(EXACT) == []
     ((entry, percent),) = noted({})
     assert entry == "chamber_volume"
@@ -172,7 +172,7 @@ def test_a_note_names_the_entry_that_bulk_modulus_is_known_as_well_as() -> None:
 
 
 @pytest.mark.slow
-def test_total_intervals_cover_where_rigs_are_as_wrong_as_they_are_said_to_be() -> None:
+def test_total_intervals_cover_if_rig_files_err_by_their_stated_uncertainty() -> None:
     logs = 30
     rng, covered, given = np.random.default_rng(5), list[bool](), list[bool]()
     for trial in range(logs):
@@ -189,7 +189,7 @@ def test_total_intervals_cover_where_rigs_are_as_wrong_as_they_are_said_to_be() 
     assert np.mean(given) <= 0.3
 
 
-def test_wear_that_is_not_excluded_opens_displacement_downwards_alone() -> None:
+def test_wear_that_is_not_excluded_widens_displacement_downwards_only() -> None:
     known = {"pump_displacement": Spread(0.03, 0.02), "chamber_volume": Spread.of(0.15)}
     said = (RigCode.WEAR_NOT_EXCLUDED.note(percent=24.0, half_width=20.0),)
     assert with_wear(known, said) == {**known, "pump_displacement": Spread(pytest.approx(0.12), 0.02)}
@@ -198,7 +198,7 @@ def test_wear_that_is_not_excluded_opens_displacement_downwards_alone() -> None:
     assert with_wear(known, (RigCode.PUMP_WORN.note(percent=80.0, half_width=1.0),)) == known
 
 
-def test_what_is_left_open_of_a_delivery_is_where_it_likeliest_is_and_how_well_that_is_known() -> None:
+def test_an_undetermined_delivery_has_its_likeliest_value_and_deviation() -> None:
     (noted,) = open_wear_note(PredictedGain(1.0, -0.04, 0.05))
     assert delivery_left_open((noted,)) == (pytest.approx(-0.04), pytest.approx(0.05), -math.inf)
     assert delivery_left_open(()) is None

@@ -2,7 +2,7 @@ from estimation.engine.kalman import belief_symbols, moved
 from estimation.models.eha_forms import ACCELERATION_FORM
 
 
-def test_a_state_after_a_step_is_the_state_before_plus_what_the_step_adds_without_a_change_of_units() -> None:
+def test_a_step_adds_to_each_scaled_state_directly_and_leaves_a_constant_unchanged() -> None:
     mean, _ = belief_symbols(ACCELERATION_FORM)
     *moving, constant = zip(mean, moved(ACCELERATION_FORM, mean), strict=True)
     assert all(after.operation == "+" and any(one is before for one in after.arguments) for before, after in moving)

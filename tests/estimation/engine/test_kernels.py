@@ -22,7 +22,7 @@ from tests.kernels import computed
 CHANNELS = ("position_m", "velocity_m_s")
 
 
-def test_bulk_modulus_is_a_constant_row_that_costs_nothing() -> None:
+def test_the_constant_bulk_modulus_has_a_unit_row_in_the_jacobian() -> None:
     moved, slopes = scaled_step(PRESSURE_FORM)
     assert moved[3].operation == "symbol"
     assert all(slope is ZERO for slope in slopes[3][:3])
@@ -43,14 +43,14 @@ def test_no_update_divides_more_often_than_it_has_channels() -> None:
     assert sum(item.operation == "/" for item in items) == len(channels)
 
 
-def test_a_rule_is_the_same_straight_lines_for_one_filter_and_for_many() -> None:
+def test_one_filter_and_many_have_the_same_branch_free_kernel_source() -> None:
     one, many = (kernel_source(EKF, ACCELERATION_FORM, CHANNELS, lanes) for lanes in (1, LANES))
     lines = one.split("def prepare(")[1].split("SLOTS = ")[0]
     assert lines == many.split("def prepare(")[1].split("SLOTS = ")[0]
     assert not {"for", "if", "while"} & set(lines.split())
 
 
-def test_an_update_by_all_channels_asks_of_none_whether_it_is_there() -> None:
+def test_an_update_with_all_channels_present_checks_for_no_missing_sample() -> None:
     update = counting_missing(halves_of(EKF, ACCELERATION_FORM, CHANNELS).update)
     whole = all_present(update)
     assert update.keys() - whole.keys() == {"count0", "count1"}
@@ -60,7 +60,7 @@ def test_an_update_by_all_channels_asks_of_none_whether_it_is_there() -> None:
 
 @pytest.mark.parametrize("rule", [EKF, UKF], ids=lambda rule: rule.name)
 @pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
-def test_a_step_that_begins_at_a_sample_is_the_first_sub_step(model: ProcessModel, rule: Rule) -> None:
+def test_a_step_that_begins_at_a_sample_equals_the_first_sub_step(model: ProcessModel, rule: Rule) -> None:
     predict, rng = halves_of(rule, model, CHANNELS).predict, np.random.default_rng(3)
     begins = at_sample(predict)
     assert "j" in symbols_in(list(predict.values()))

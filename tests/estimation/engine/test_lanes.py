@@ -21,7 +21,7 @@ from tests.kernels import functions_of, on_memory, text_of
 
 
 @pytest.mark.parametrize("kept", [True, False])
-def test_one_filter_is_the_same_compiled_and_in_python(
+def test_one_filter_gives_the_same_result_compiled_and_in_python(
     linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, kept: bool
 ) -> None:
     rng = np.random.default_rng(4)
@@ -86,14 +86,14 @@ def test_every_sample_of_separate_logs_is_filtered_once(samples: int, monkeypatc
     assert max(laid) + lanes.ROWS == samples
 
 
-def test_no_sample_leaves_what_is_carried_as_it_is() -> None:
+def test_steps_over_no_samples_leave_the_working_memory_unchanged() -> None:
     kernel: Any = SimpleNamespace(LINE=8, WIDTH=1, DRIVES=1, LANES=1, CHANNELS=1, COUNT=2)
     work, nothing = np.arange(4.0), np.empty((0, 1))
     lanes.steps(kernel, work, 0, 0, 0, 0, 0, 1, 1, (nothing, nothing, nothing, nothing, nothing))
     assert work.tolist() == [0.0, 1.0, 2.0, 3.0]
 
 
-def test_a_product_of_variances_goes_into_its_own_lane_and_channel_once_it_is_large() -> None:
+def test_a_large_product_of_variances_goes_into_the_logarithm_of_its_own_lane_and_channel() -> None:
     kernel: Any = SimpleNamespace(LANES=3, CHANNELS=2, PRODUCT=4)
     work, logs = np.ones(4 + 3 * 2 + 1), np.zeros((2, 3))
     large = {(0, 1): 2.0 * lanes.LARGE, (1, 2): 3.0 * lanes.LARGE}
@@ -109,7 +109,7 @@ def test_a_product_of_variances_goes_into_its_own_lane_and_channel_once_it_is_la
 
 
 @pytest.mark.parametrize("large", [(True, False), (True, True)])
-def test_products_that_have_become_large_go_into_the_logarithms_if_all_are_large_too(large: tuple[bool, bool]) -> None:
+def test_large_products_go_into_the_logarithms_whether_one_or_all_are_large(large: tuple[bool, bool]) -> None:
     kernel: Any = SimpleNamespace(PRODUCT=1, LANES=2, CHANNELS=1)
     products = [2.0 * lanes.LARGE if one else 3.0 for one in large]
     work, logs = np.array([7.0, *products, 8.0]), np.full((1, 2), 0.5)
@@ -133,7 +133,7 @@ def test_the_score_is_the_log_density_of_the_innovations(linear: ProcessModel) -
     assert found.log_likelihood == pytest.approx(float(np.nansum(density)))
 
 
-def test_steps_between_samples_are_those_of_a_faster_log_that_measures_nothing_in_between(linear: ProcessModel) -> None:
+def test_sub_steps_between_samples_equal_the_steps_of_a_faster_log_with_missing_samples(linear: ProcessModel) -> None:
     rng = np.random.default_rng(7)
     model = replace(linear, longest_step=5e-4)
     speed, seen = rng.normal(size=12), rng.normal(size=12)

@@ -14,12 +14,12 @@ def factor(robust: str, deviations: float) -> float:
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_an_innovation_pulls_as_far_as_three_deviations_and_no_further(size: float) -> None:
+def test_huber_limits_an_innovation_to_its_threshold(size: float) -> None:
     assert size / factor("huber", size) == pytest.approx(min(size, HUBER))
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_student_t_believes_what_is_small_and_lets_go_of_what_is_gross(size: float) -> None:
+def test_student_t_keeps_small_innovations_and_discounts_gross_ones(size: float) -> None:
     pull = size / factor("student-t", size)
     assert pull == pytest.approx(size if size <= 1.0 else (DEGREES + 1.0) * size / (DEGREES + size**2))
     assert factor("student-t", 1.0 + 1e-9) == pytest.approx(1.0)

@@ -31,7 +31,7 @@ def given(state: tuple[float, ...]) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("state", STATES.values(), ids=STATES)
-def test_it_is_the_covariance_that_the_jacobian_gives(state: tuple[float, ...]) -> None:
+def test_the_covariance_through_waypoints_equals_the_one_by_the_jacobian(state: tuple[float, ...]) -> None:
     z, P = belief_symbols(PRESSURE_FORM)
     mean, F = scaled_step(PRESSURE_FORM)
     root = np.random.default_rng(3).normal(size=(4, 4))

@@ -61,20 +61,20 @@ def codes(notes: Any) -> set[str]:
     return {str(note.code) for note in notes}
 
 
-def test_an_input_at_its_limit_should_be_known_and_speaks_against_nothing(found: EquationsFit) -> None:
+def test_an_input_at_its_limit_is_noted_and_does_not_fail_the_gate(found: EquationsFit) -> None:
     assert found.finding.gate.passed
     ends = {note.data["end"]: note.data["value"] for note in found.finding.notes if note.code == "input_at_limit"}
     assert ends == {"least": -1.0, "largest": 1.0}
 
 
-def test_an_output_at_a_limit_that_the_equations_have_should_be_known() -> None:
+def test_an_output_at_a_limit_in_the_equations_is_noted_and_does_not_fail_the_gate() -> None:
     fit = fit_equations(equations(observe=limited), [log(np.clip(WAY, -0.5, 0.5))])
     assert fit.finding.gate.passed
     ends = {note.data["end"]: note.data["value"] for note in fit.finding.notes if note.code == "output_at_limit"}
     assert ends == {"least": pytest.approx(-0.5, abs=0.02), "largest": pytest.approx(0.5, abs=0.02)}
 
 
-def test_an_input_that_stands_still_is_no_reason_for_a_misfit() -> None:
+def test_a_misfit_is_not_attributed_to_a_constant_input() -> None:
     push = np.ones(300)
     slow = equations(lambda s, i, p: (p.gain * (i.push - s.way),), parameters={"gain": Parameter(0.5, (0.01, 10.0))})
     drifting = response(push) + 0.3 * np.sin(2.0 * TIME)
@@ -83,7 +83,7 @@ def test_an_input_that_stands_still_is_no_reason_for_a_misfit() -> None:
     assert "misfit_follows_input" not in reasons
 
 
-def test_two_starts_that_explain_the_log_alike_and_lie_apart_are_told() -> None:
+def test_different_solutions_that_fit_the_log_equally_well_are_noted() -> None:
     fit = fit_equations(equations(), [log()], starts=6, seed=1)
     assert abs(fit.values["gain"]) == pytest.approx(1.0, abs=0.01)
     (other,) = (note for note in fit.finding.notes if note.code == "starts_disagree")
@@ -92,7 +92,7 @@ def test_two_starts_that_explain_the_log_alike_and_lie_apart_are_told() -> None:
 
 
 @pytest.mark.parametrize(("worse", "told"), [(1.5, True), (2.5, False)])
-def test_another_start_explains_a_log_as_well_within_two_of_log_likelihood(
+def test_starts_disagree_only_if_their_log_likelihoods_differ_by_less_than_two(
     found: EquationsFit, worse: float, told: bool
 ) -> None:
     solution = found.solution
@@ -102,7 +102,7 @@ def test_another_start_explains_a_log_as_well_within_two_of_log_likelihood(
     assert ("starts_disagree" in codes(notes)) is told
 
 
-def test_steps_that_are_too_long_and_a_search_that_did_not_settle_speak_against_a_fit(found: EquationsFit) -> None:
+def test_too_long_steps_and_a_search_that_did_not_converge_fail_the_gate(found: EquationsFit) -> None:
     given = np.array([np.nan])
     doubted = replace(found.solution, moved=1.01 * SETTLED, evaluations=EVALUATIONS)
     reasons = {str(note.code): note.data for note in concluded(doubted, given)[0].gate.reasons}
@@ -118,7 +118,7 @@ def test_equations_need_a_log() -> None:
         fit_equations(equations(), [])
 
 
-def test_a_free_initial_state_begins_its_search_where_it_is_told_to() -> None:
+def test_the_search_of_a_free_initial_state_begins_at_the_given_value() -> None:
     free = equations(initial={"way": Parameter(0.3, (0.0, 1.0))})
     problem = Problem(free, (part_of(free, log()),), "rk4", 1, np.array([0.01]))
     assert [one.start for one in problem.unknowns] == [0.8, 0.3]
@@ -128,7 +128,7 @@ def test_a_free_initial_state_begins_its_search_where_it_is_told_to() -> None:
 
 
 @pytest.mark.parametrize("size", [1e4, 25.0], ids=["beyond all numbers", "squares beyond all numbers"])
-def test_a_point_from_which_the_equations_run_away_costs_infinitely_much(size: float) -> None:
+def test_a_point_at_which_the_equations_diverge_has_an_infinite_cost(size: float) -> None:
     growing = equations(
         lambda s, i, p: (p.rate * s.way + i.push,),
         parameters={"rate": Parameter(1.0, (0.0, 1e9))},
@@ -141,7 +141,7 @@ def test_a_point_from_which_the_equations_run_away_costs_infinitely_much(size: f
     assert not point.gradient.any()
 
 
-def test_equations_that_run_away_from_every_start_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_equations_that_diverge_from_every_start_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("estimation.equations.search.stepped", lambda problem, _: problem)
     growing = equations(
         lambda s, i, p: (p.rate * s.way + i.push,),
@@ -152,7 +152,7 @@ def test_equations_that_run_away_from_every_start_are_refused(monkeypatch: pytes
         fit_equations(growing, [log()], starts=3)
 
 
-def test_steps_are_halved_until_the_solution_no_longer_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_are_halved_until_the_solution_no_longer_changes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("estimation.equations.search.STEPPED_WELL", 1e3)  # the first check finds all steps short enough
     swinging = equations(
         lambda s, i, p: (s.pace, 40.0 * (i.push - s.way) - p.damping * s.pace),
@@ -167,13 +167,13 @@ def test_steps_are_halved_until_the_solution_no_longer_moves(monkeypatch: pytest
     assert fit.finding.quantities["damping"].covers(1.5)
 
 
-def test_noise_that_does_not_settle_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_noise_estimate_that_does_not_converge_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("estimation.equations.search.ROUNDS", 1)
     fit = fit_equations(equations(), [log()])
     assert fit.noise["way"] == pytest.approx(0.01, rel=0.2)
 
 
-def test_initial_states_are_sought_in_ten_steps_at_most() -> None:
+def test_the_search_of_initial_states_takes_at_most_ten_steps() -> None:
     flat = equations(
         lambda s, i, p: (0.0 * p.gain * i.push + 0.0 * s.way,), observe=lambda s, i, p: (s.way**3,), initial={}
     )
@@ -190,7 +190,7 @@ def linear(slopes: np.ndarray) -> Any:
     return SimpleNamespace(slopes=lambda _: slopes, residuals=lambda _: [errors], parts=[part])
 
 
-def test_deviations_are_those_of_linear_least_squares_however_weakly_an_unknown_is_felt() -> None:
+def test_deviations_equal_linear_least_squares_for_sensitivities_of_any_size() -> None:
     rng = np.random.default_rng(0)
     slopes = rng.normal(size=(400, 3)) * [1e-4, 1.0, 1e3]
     found = covariance_of(linear(slopes), np.zeros(3))
@@ -202,7 +202,7 @@ def test_deviations_are_those_of_linear_least_squares_however_weakly_an_unknown_
     assert found.condition == pytest.approx(np.linalg.cond(scaled))
 
 
-def test_what_is_not_felt_and_what_moves_together_is_told_and_the_rest_keeps_its_deviation() -> None:
+def test_undetermined_unknowns_are_grouped_and_the_others_keep_their_deviations() -> None:
     rng = np.random.default_rng(0)
     own, shared = rng.normal(size=(2, 400))
     found = covariance_of(linear(np.column_stack([shared, own, np.zeros(400), -2.0 * shared])), np.zeros(4))

@@ -50,7 +50,7 @@ def test_a_function_that_cannot_be_traced_is_refused(derivative: Callable[..., A
         traceable(Equations(derivative, **NAMES))
 
 
-def test_what_observe_returns_is_checked_too() -> None:
+def test_the_number_of_values_from_observe_is_checked() -> None:
     with pytest.raises(HydrostateError, match=r"observe .* must return 1 values, one for each of angle, got 2"):
         traceable(Equations(lambda s, i, p: (s.speed, 0.0), **NAMES, observe=lambda s, i, p: (s.angle, s.speed)))
 
@@ -96,7 +96,7 @@ def test_a_parameter_with_a_positive_bound_is_searched_by_its_logarithm() -> Non
     assert Parameter(0.0, (-1.0, 1.0)).size == pytest.approx(0.2)
 
 
-def test_an_attribute_that_is_none_is_told_as_python_tells_it() -> None:
+def test_an_unknown_attribute_is_reported_with_the_message_of_python() -> None:
     with pytest.raises(HydrostateError, match=r"derivative .* fails: module 'numpy' has no attribute 'sine'"):
         traceable(Equations(lambda s, i, p: (s.speed, np.sine(s.angle)), **NAMES))
 
@@ -106,7 +106,7 @@ def test_equations_need_a_function() -> None:
         Equations(3, **NAMES)  # type: ignore[arg-type]
 
 
-def test_what_python_asks_of_every_object_is_no_parameter() -> None:
+def test_special_attributes_of_python_are_not_taken_for_parameters() -> None:
     named = Named({"weight": 1.0})
     assert not hasattr(named, "__array__")
     with pytest.raises(HydrostateError, match="did you mean 'weight'"):

@@ -59,7 +59,7 @@ def found(swing: Any) -> EquationsFit:
     return fit_equations(model(), [logged(swing)])
 
 
-def test_parameters_come_back_within_their_intervals(found: EquationsFit) -> None:
+def test_intervals_contain_the_true_parameters(found: EquationsFit) -> None:
     assert found.finding.outcome is Outcome.OK
     assert found.finding.gate.passed
     assert all(found.finding.quantities[name].covers(truth) for name, truth in TRUTH.items())
@@ -68,7 +68,7 @@ def test_parameters_come_back_within_their_intervals(found: EquationsFit) -> Non
     assert found.finding.quantities["initial angle"].unit == "rad"
 
 
-def test_intervals_cover_in_19_of_20_fits(swing: Any) -> None:
+def test_intervals_contain_the_truth_in_19_of_20_fits(swing: Any) -> None:
     fits = [fit_equations(model(), [logged(swing, seed)]) for seed in range(100, 120)]
     hits = [one.finding.quantities[name].covers(truth) for one in fits for name, truth in TRUTH.items()]
     assert 0.85 <= np.mean(hits) <= 1.0
@@ -90,12 +90,12 @@ def test_sensitivities_are_exact_for_both_schemes(swing: Any) -> None:
             np.testing.assert_allclose(slopes[:, j], rise, atol=1e-5 * np.abs(rise).max())
 
 
-def test_the_steps_are_those_of_the_differential_equation(swing: Any) -> None:
+def test_a_simulation_follows_the_exact_solution_of_the_differential_equation(swing: Any) -> None:
     run = simulated(model(), logged(swing), TRUTH, {"angle": 0.3, "speed": 0.0})
     np.testing.assert_allclose(run["angle"], swing, atol=1e-4)
 
 
-def test_an_input_that_is_held_stands_still_between_samples() -> None:
+def test_a_held_input_is_constant_between_samples() -> None:
     def growing(state: Any, inputs: Any, p: Any) -> Any:
         return inputs.rate * p.one
 
@@ -112,7 +112,7 @@ def test_an_input_that_is_held_stands_still_between_samples() -> None:
     np.testing.assert_allclose(line["x"], [0.0, 0.5, 2.5, 4.0])
 
 
-def test_several_logs_share_parameters_and_have_starts_of_their_own(swing: Any) -> None:
+def test_several_logs_share_parameters_and_have_separate_initial_states(swing: Any) -> None:
     whole = logged(swing)
     fit = fit_equations(model(), [whole.slice(0, 300), whole.slice(300, 600)])
     assert {"initial angle of log 1", "initial angle of log 2"} <= fit.finding.quantities.keys()
@@ -120,7 +120,7 @@ def test_several_logs_share_parameters_and_have_starts_of_their_own(swing: Any) 
     assert fit.finding.quantities["initial angle of log 2"].covers(swing[300])
 
 
-def test_gaps_in_an_output_count_for_nothing_and_are_told(swing: Any) -> None:
+def test_gaps_in_an_output_are_left_out_and_noted(swing: Any) -> None:
     log = logged(swing)
     gappy = log["angle"].copy()
     gappy[100:200] = np.nan
@@ -129,7 +129,7 @@ def test_gaps_in_an_output_count_for_nothing_and_are_told(swing: Any) -> None:
     assert "samples_missing" in {str(note.code) for note in fit.finding.notes}
 
 
-def test_outliers_do_little_to_a_robust_fit(swing: Any) -> None:
+def test_a_robust_fit_is_hardly_affected_by_outliers(swing: Any) -> None:
     log = logged(swing)
     spoilt = log["angle"].copy()
     spoilt[60:90] += 2.0
@@ -139,7 +139,7 @@ def test_outliers_do_little_to_a_robust_fit(swing: Any) -> None:
     assert robust.noise["angle"] == pytest.approx(0.005, rel=0.2)
 
 
-def test_what_only_a_product_tells_has_no_value(swing: Any) -> None:
+def test_parameters_with_only_their_ratios_determined_have_no_value(swing: Any) -> None:
     def scaled(state: Any, inputs: Any, p: Any) -> Any:
         turned = p.gain * inputs.torque - p.damping * state.speed - p.weight * np.sin(state.angle)
         return state.speed, turned / p.inertia
@@ -154,7 +154,7 @@ def test_what_only_a_product_tells_has_no_value(swing: Any) -> None:
     assert not np.isfinite(fit.covariance.condition)
 
 
-def test_equations_that_are_not_the_logs_do_not_pass_the_gate(swing: Any) -> None:
+def test_equations_of_another_plant_fail_the_gate(swing: Any) -> None:
     def linear(state: Any, inputs: Any, p: Any) -> Any:
         return state.speed, (inputs.torque - p.damping * state.speed - p.weight * state.angle) / p.inertia
 
@@ -163,7 +163,7 @@ def test_equations_that_are_not_the_logs_do_not_pass_the_gate(swing: Any) -> Non
     assert "misfit_correlated" in {str(note.code) for note in fit.finding.gate.reasons}
 
 
-def test_noise_that_is_given_is_what_the_residuals_are_judged_by(swing: Any) -> None:
+def test_residuals_are_judged_by_the_given_noise(swing: Any) -> None:
     fit = fit_equations(model(), [logged(swing)], noise={"angle": 0.002})
     assert {str(note.code) for note in fit.finding.gate.reasons} == {"misfit_beyond_noise"}
 
@@ -173,13 +173,13 @@ def test_a_log_of_noise_is_a_mismatch() -> None:
     assert fit.finding.outcome is Outcome.MISMATCH
 
 
-def test_a_bound_that_is_reached_speaks_against_the_fit(swing: Any) -> None:
+def test_a_parameter_at_its_bound_fails_the_gate(swing: Any) -> None:
     narrow = {**model().parameters, "weight": Parameter(1.0, (0.1, 1.5))}
     fit = fit_equations(model(parameters=narrow), [logged(swing)])
     assert "parameter_at_bound" in {str(note.code) for note in fit.finding.gate.reasons}
 
 
-def test_an_end_stop_that_the_equations_leave_out_is_told(swing: Any) -> None:
+def test_an_end_stop_that_the_equations_lack_is_reported(swing: Any) -> None:
     stopped = logged(np.clip(swing, -0.25, 0.25), noise=0.002)
     fit = fit_equations(model(), [stopped])
     told = {
@@ -204,7 +204,7 @@ def test_a_stiff_model_is_stepped_implicitly() -> None:
     assert fit.finding.quantities["rate"].covers(5.0)
 
 
-def test_a_search_that_goes_astray_is_led_along_the_log(swing: Any) -> None:
+def test_parameters_are_found_from_a_distant_start(swing: Any) -> None:
     far = {
         "inertia": Parameter(2.0, (1e-4, 100.0)),
         "weight": Parameter(2.0, (0.01, 1e3)),
@@ -214,7 +214,7 @@ def test_a_search_that_goes_astray_is_led_along_the_log(swing: Any) -> None:
     assert all(fit.finding.quantities[name].covers(truth) for name, truth in TRUTH.items())
 
 
-def test_a_free_run_on_another_log_begins_where_that_begins(found: EquationsFit, swing: Any) -> None:
+def test_a_free_run_on_another_log_begins_at_the_initial_state_of_that_log(found: EquationsFit, swing: Any) -> None:
     later = logged(swing, seed=9).slice(200, 500)
     np.testing.assert_allclose(found.predicted(later)["angle"], swing[200:500], atol=0.01)
     bare = later.replace(angle=None)
@@ -241,7 +241,7 @@ def test_a_log_that_cannot_be_used_is_refused(swing: Any, spoil: Callable[[Recor
         fit_equations(model(), [spoil(logged(swing))])
 
 
-def test_equations_that_run_away_are_refused() -> None:
+def test_equations_that_diverge_are_refused() -> None:
     def exploding(state: Any, inputs: Any, p: Any) -> Any:
         return p.rate * np.sqrt(-1.0 - state.angle**2), state.angle
 
@@ -258,19 +258,19 @@ def test_equations_that_run_away_are_refused() -> None:
         ({"starts": 0}, "starts must be a whole number from 1 on, got 0"),
     ],
 )
-def test_options_that_mean_nothing_are_refused(swing: Any, options: Any, said: str) -> None:
+def test_invalid_options_are_refused(swing: Any, options: Any, said: str) -> None:
     with pytest.raises(HydrostateError, match=said):
         fit_equations(model(), [logged(swing)], **options)
 
 
-def test_names_that_are_none_are_refused_in_a_simulation(swing: Any) -> None:
+def test_a_simulation_refuses_unknown_names(swing: Any) -> None:
     with pytest.raises(HydrostateError, match="initial names 'velocity'"):
         simulated(model(), logged(swing), {}, {"velocity": 1.0})
     with pytest.raises(HydrostateError, match="values names 'mass'"):
         simulated(model(), logged(swing), {"mass": 1.0}, {})
 
 
-def test_a_log_that_is_too_short_for_tests_of_its_residual_is_fitted_all_the_same(swing: Any) -> None:
+def test_a_log_too_short_for_residual_tests_is_still_fitted(swing: Any) -> None:
     whole = logged(swing)
     short = Record(SAMPLE_TIME, {name: whole[name][:20] for name in ("torque", "angle")})
     values = fit_equations(model(), [whole, short]).values

@@ -27,7 +27,9 @@ EQUATIONS = Equations(
 
 @pytest.mark.parametrize("scheme", ["rk4", "ros2"])
 @pytest.mark.parametrize("sloped", [True, False])
-def test_the_same_numbers_as_python(scheme: str, sloped: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_compiled_simulation_gives_the_same_numbers_as_python(
+    scheme: str, sloped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     make = getattr(compile_equations, "__wrapped__", compile_equations)
     text = text_of(monkeypatch, kernel, lambda: make(EQUATIONS, scheme))
     values, known = np.array([0.4, 8.0, 0.1]), np.array([0.25])

@@ -18,7 +18,7 @@ def lag(state: Any, inputs: Any, p: Any) -> Any:
     return (p.gain * inputs.push - p.rate * state.way + p.load,)
 
 
-def test_other_starts_are_drawn_within_bounds_and_near_the_first_where_there_are_none() -> None:
+def test_further_starts_are_drawn_within_the_bounds_or_if_unbounded_near_the_first_start() -> None:
     equations = Equations(
         lag,
         states={"way": "m"},
@@ -48,7 +48,7 @@ def test_other_starts_are_drawn_within_bounds_and_near_the_first_where_there_are
 
 
 @pytest.mark.parametrize("substeps", [1, 2])
-def test_a_solution_whose_steps_run_away_has_moved_without_limit(
+def test_a_solution_that_diverges_with_other_steps_has_an_infinite_step_error(
     substeps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     equations = Equations(

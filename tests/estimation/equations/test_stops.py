@@ -24,13 +24,17 @@ NOISE = 0.003 * RNG.standard_normal(2000)
     ],
     ids=["clipped", "stopped", "sine", "noisy-sine", "square", "noise", "walk", "missing"],
 )
-def test_where_a_channel_stands(values: np.ndarray, noise: float, wanted: dict[str, float]) -> None:  # type: ignore[type-arg]
+def test_limits_are_found_at_the_ends_where_a_channel_stays(
+    values: np.ndarray,  # type: ignore[type-arg]
+    noise: float,
+    wanted: dict[str, float],
+) -> None:
     found = {one.end: one.value for one in standing([values], noise)}
     assert found == {end: pytest.approx(value, abs=0.005) for end, value in wanted.items()}
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e9])
-def test_whether_a_channel_stands_is_the_same_in_every_unit(unit: float) -> None:
+def test_the_limits_of_a_channel_do_not_depend_on_its_unit(unit: float) -> None:
     values = unit * np.clip(np.sin(TIME), -0.7, 0.5)
     ends = {(one.end, round(one.value / unit, 9)) for one in standing([values], 0.0)}
     assert ends == {("least", -0.7), ("largest", 0.5)}
@@ -39,7 +43,7 @@ def test_whether_a_channel_stands_is_the_same_in_every_unit(unit: float) -> None
     assert list(standing([values], 0.041 * unit)) == []
 
 
-def test_the_share_and_the_samples_are_those_that_stand() -> None:
+def test_the_samples_at_a_limit_and_their_share_are_returned() -> None:
     values = np.sin(TIME)
     values[values > 0.5] = 0.5
     (found,) = standing([values], 0.0)

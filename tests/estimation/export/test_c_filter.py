@@ -59,13 +59,13 @@ def apart(found: np.ndarray, wanted: np.ndarray) -> float:
         [("pressure", "gcc"), ("chambers_by_mass", "gcc")],
     ),
 )
-def test_every_form_gives_in_c_what_it_gives_in_python(form: str, using: str, tmp_path: Path) -> None:
+def test_every_form_gives_the_same_result_in_c_and_in_python(form: str, using: str, tmp_path: Path) -> None:
     problem = task(form, "minor_friction", SHORT)
     assert apart(in_c(tmp_path, problem, using=using)[0], in_python(problem)) < 1e-12
 
 
 @pytest.mark.parametrize("form", ["acceleration", "pressure"])
-def test_without_fused_products_it_differs_by_rounding_alone(form: str, tmp_path: Path) -> None:
+def test_without_fused_products_the_c_filter_differs_from_python_by_rounding_only(form: str, tmp_path: Path) -> None:
     problem = task(form, "minor_friction", SHORT)
     assert 0.0 < apart(in_c(tmp_path, problem, "ekf", "-O2")[0], in_python(problem)) < 1e-12
 
@@ -73,7 +73,7 @@ def test_without_fused_products_it_differs_by_rounding_alone(form: str, tmp_path
 @pytest.mark.parametrize(
     "form", thinned([form for form in EXPORTED_FORMS if form not in ("acceleration", "pressure")], ["flow"])
 )
-def test_a_form_that_rounding_spoils_is_fused_on_every_processor_unless_it_is_told_otherwise(
+def test_a_form_sensitive_to_rounding_uses_fused_products_unless_they_are_switched_off(
     form: str, tmp_path: Path
 ) -> None:
     problem = task(form, "normal", SHORT)
@@ -82,7 +82,7 @@ def test_a_form_that_rounding_spoils_is_fused_on_every_processor_unless_it_is_to
     assert apart(in_c(tmp_path, problem, "ekf", "-DEXPORTED_ROUNDED_TWICE")[0], exact) > 1e-14
 
 
-def test_a_compiler_that_may_fuse_by_itself_changes_no_bit(tmp_path: Path) -> None:
+def test_a_compiler_that_may_fuse_products_itself_gives_the_same_bits(tmp_path: Path) -> None:
     problem = task("pressure", "minor_friction", SHORT)
     found = in_c(tmp_path, problem, "ekf", "-std=gnu17", "-march=native", EXACT)[0]
     assert np.array_equal(found, in_c(tmp_path, problem)[0])
@@ -93,18 +93,18 @@ def test_a_compiler_that_may_fuse_by_itself_changes_no_bit(tmp_path: Path) -> No
     ("form", "condition"),
     [(form, name) for i, form in enumerate(EXPORTED_FORMS) for name in list(CONDITIONS)[i % 3 :: 3]],
 )
-def test_it_does_so_over_a_hundred_thousand_steps(form: str, condition: str, tmp_path: Path) -> None:
+def test_c_and_python_agree_over_a_hundred_thousand_steps(form: str, condition: str, tmp_path: Path) -> None:
     problem = task(form, condition, LONG)
     assert apart(in_c(tmp_path, problem)[0], in_python(problem)) < 1e-12
 
 
 @pytest.mark.parametrize("method", thinned([name for name in EXPORTED if name not in ("ekf", "imm")], ["ukf"]))
-def test_every_rule_gives_in_c_what_it_gives_in_python(method: str, tmp_path: Path) -> None:
+def test_every_update_rule_gives_the_same_result_in_c_and_in_python(method: str, tmp_path: Path) -> None:
     problem = task("pressure", "normal", 500)
     assert apart(in_c(tmp_path, problem, method)[0], in_python(problem, method)) < 1e-12
 
 
-def test_nine_interacting_filters_give_in_c_what_they_give_in_python(tmp_path: Path) -> None:
+def test_nine_interacting_filters_give_the_same_result_in_c_and_in_python(tmp_path: Path) -> None:
     problem = task("pressure", "minor_leakage", 1000)
     found, said = in_c(tmp_path, problem, "imm", EXACT, *SANITIZED)
     assert apart(found[0][None], in_python(problem, "imm")[0][None]) < 1e-12
@@ -115,11 +115,11 @@ def test_nine_interacting_filters_give_in_c_what_they_give_in_python(tmp_path: P
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", EXPORTED_FORMS)
-def test_it_runs_clean_under_sanitizers(form: str, tmp_path: Path) -> None:
+def test_the_c_filter_runs_without_errors_under_sanitizers(form: str, tmp_path: Path) -> None:
     assert np.all(np.isfinite(in_c(tmp_path, task(form, "normal", 500), "ekf", EXACT, *SANITIZED)[0]))
 
 
-def test_missing_samples_substeps_and_robust_updates_are_taken_as_in_python(tmp_path: Path) -> None:
+def test_missing_samples_substeps_and_robust_updates_are_treated_as_in_python(tmp_path: Path) -> None:
     problem = task("pressure", "normal", SHORT)
     measured = problem.measured.copy()
     measured[::3, 0] = np.nan
@@ -129,7 +129,7 @@ def test_missing_samples_substeps_and_robust_updates_are_taken_as_in_python(tmp_
     assert apart(in_c(tmp_path, problem)[0], in_python(problem)) < 1e-12
 
 
-def test_likelihood_and_counters_of_the_gate_are_those_of_python(tmp_path: Path) -> None:
+def test_log_likelihood_and_normalised_innovations_equal_those_of_python(tmp_path: Path) -> None:
     problem = task("pressure", "normal", SHORT)
     trace = METHODS["ekf"](problem)
     _, said = in_c(tmp_path, problem)
@@ -139,9 +139,7 @@ def test_likelihood_and_counters_of_the_gate_are_those_of_python(tmp_path: Path)
 
 
 @pytest.mark.parametrize(("shrunk", "wanted"), thinned([(1.0, 0), (1e-2, 1), (1e-6, 3)], [(1.0, 0), (1e-6, 3)]))
-def test_the_gate_says_how_far_innovations_are_from_what_is_predicted(
-    shrunk: float, wanted: int, tmp_path: Path
-) -> None:
+def test_the_gate_rates_innovations_by_their_predicted_variance(shrunk: float, wanted: int, tmp_path: Path) -> None:
     problem = task("pressure", "normal", SHORT)
     noise = np.random.default_rng(0).normal(size=problem.measured.shape) * np.sqrt(problem.variances)
     problem = replace(problem, measured=problem.measured + noise, variances=problem.variances * 2.0 * shrunk)
@@ -151,7 +149,7 @@ def test_the_gate_says_how_far_innovations_are_from_what_is_predicted(
     assert f"gate: {wanted}\n" in said
 
 
-def test_in_float_its_bulk_modulus_stays_within_two_percent_of_pythons(tmp_path: Path) -> None:
+def test_in_single_precision_bulk_modulus_agrees_with_python_within_two_percent(tmp_path: Path) -> None:
     problem = task("pressure", "normal", LONG // 4)
     found, wanted = in_c(tmp_path, problem, precision="float")[0][0], in_python(problem)[0]
     place = problem.model.index(BULK_MODULUS)
@@ -159,7 +157,7 @@ def test_in_float_its_bulk_modulus_stays_within_two_percent_of_pythons(tmp_path:
 
 
 @pytest.mark.parametrize("method", ["ekf", "imm"])
-def test_a_copy_of_a_filter_continues_to_the_bit(method: str, tmp_path: Path) -> None:
+def test_a_copy_of_a_filter_continues_with_the_same_bits(method: str, tmp_path: Path) -> None:
     compiler("gcc")
     problem, half = task("pressure", "normal", 400), 200
     library = built(problem, method, tmp_path, flags=()).library
@@ -182,7 +180,7 @@ def test_a_copy_of_a_filter_continues_to_the_bit(method: str, tmp_path: Path) ->
     assert copy.raw == first.raw
 
 
-def test_header_and_source_allocate_nothing_recurse_nowhere_and_jump_nowhere() -> None:
+def test_header_and_source_have_no_allocation_no_goto_and_only_bounded_loops() -> None:
     for method in ("ekf", "imm"):
         files = filter_in_c(task("pressure", "normal", 500), method, name="exported")
         text = files["exported.h"] + files["exported.c"]
@@ -191,7 +189,7 @@ def test_header_and_source_allocate_nothing_recurse_nowhere_and_jump_nowhere() -
         assert all(re.search(r"; \w+ < \d+;|; \w+ < \w+;", loop) for loop in re.findall(r"for \(.*\)", text))
 
 
-def test_names_and_units_stand_in_the_header() -> None:
+def test_the_header_contains_names_and_units() -> None:
     header = filter_in_c(task("pressure", "normal", 500), name="exported")["exported.h"]
     assert "EXPORTED_ROW_PISTON_AREA = 1, /* m^2, effective piston area A */" in header
     assert "EXPORTED_STATE_BULK_MODULUS_PA = 3 /* Pa; inside over 1e+08 */" in header
@@ -199,14 +197,14 @@ def test_names_and_units_stand_in_the_header() -> None:
     assert f"#define EXPORTED_OPERATIONS {sum(counts)} " in header
 
 
-def test_a_step_of_the_acceleration_form_takes_no_operation_that_its_jacobians_zeros_spare() -> None:
+def test_a_step_of_the_acceleration_form_skips_operations_with_zeros_of_the_jacobian() -> None:
     header = filter_in_c(task("acceleration", "normal", 500), name="exported")["exported.h"]
     found = re.search(r"EXPORTED_OPERATIONS (\d+)", header)
     assert found is not None
     assert int(found[1]) <= 156  # 163 if every entry of F P F' is summed over the column's terms
 
 
-def test_what_cannot_be_exported_is_refused() -> None:
+def test_an_unknown_method_or_form_and_a_log_without_a_needed_channel_are_refused() -> None:
     problem = task("pressure", "normal", 500)
     with pytest.raises(HydrostateError, match=r"a method that can be exported must be one of ekf, .*, got 'particle'"):
         filter_in_c(problem, "particle", name="exported")
@@ -220,7 +218,7 @@ def test_what_cannot_be_exported_is_refused() -> None:
         )
 
 
-def test_a_tuned_filter_carries_the_noise_of_its_log() -> None:
+def test_a_tuned_filter_has_the_noise_of_its_log() -> None:
     problem = task("pressure", "normal", 2000)
     record = Record(
         1e-4,
@@ -234,7 +232,7 @@ def test_a_tuned_filter_carries_the_noise_of_its_log() -> None:
     assert [state.name for state in wide.model.states][-1] == "leakage_coefficient"
 
 
-def test_the_example_refuses_rows_that_have_no_commas_between_their_fields(tmp_path: Path) -> None:
+def test_the_example_refuses_rows_without_commas(tmp_path: Path) -> None:
     program = compiled(tmp_path, filter_in_c(task("pressure", "normal", 500), name="exported"))
     done = subprocess.run([str(program)], input="90 0.01 0.02 1e5\n", capture_output=True, text=True, check=False)  # noqa: S603
     assert done.returncode == 1

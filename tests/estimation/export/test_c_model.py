@@ -43,7 +43,7 @@ def inputs(count: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("precision", "apart"), [("double", 1e-12), ("float", 1e-4)])
-def test_it_prints_the_free_run(precision: str, apart: float, tmp_path: Path) -> None:
+def test_the_c_program_prints_the_free_run_of_the_model(precision: str, apart: float, tmp_path: Path) -> None:
     model, u = linear(DECAYING), inputs(500)
     program = compiled(tmp_path, model_in_c(model, name="valve_to_speed", precision=precision))
     printed, _ = ran(program, [f"{a!r},{b!r}" for a, b in u.tolist()])
@@ -52,7 +52,7 @@ def test_it_prints_the_free_run(precision: str, apart: float, tmp_path: Path) ->
     np.testing.assert_allclose(found, wanted, rtol=0.0, atol=apart * np.max(np.abs(wanted)))
 
 
-def test_an_integrator_begins_at_its_level_and_sums_up_what_differs_from_the_means(tmp_path: Path) -> None:
+def test_an_integrator_begins_at_its_level_and_integrates_deviations_of_inputs_from_their_means(tmp_path: Path) -> None:
     model, u = linear(INTEGRATING), inputs(200)
     assert abs(sum((1.0, *INTEGRATING))) < 1e-12
     program = compiled(tmp_path, model_in_c(model, name="drift"))
@@ -82,7 +82,7 @@ def test_a_mat_file_holds_the_transfer_functions() -> None:
         (Limits(-1.0, 0.5, 0.01, stops=True), "held by stops at 6 and 12,"),
     ],
 )
-def test_a_model_with_limits_is_refused_by_their_names(limits: Limits, named: str) -> None:
+def test_the_export_of_a_model_with_output_limits_is_refused_with_their_name(limits: Limits, named: str) -> None:
     free = linear(DECAYING)
     assert isinstance(free.dynamics, LinearDynamics)
     model = replace(free, dynamics=LimitedDynamics(free.dynamics.form, free.dynamics.theta, limits))

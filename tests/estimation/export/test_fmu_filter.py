@@ -31,7 +31,7 @@ OTHERWISE = pytest.mark.slow
         pytest.param("flow", "ekf", "2.0", marks=OTHERWISE),
     ],
 )
-def test_it_passes_validation_and_believes_what_the_native_filter_believes(
+def test_a_filter_fmu_passes_validation_and_agrees_with_the_native_filter(
     fmpy: Any, fmi: str, form: str, method: str, tmp_path: Path
 ) -> None:
     from fmpy.validation import validate_fmu

@@ -84,7 +84,7 @@ def test_every_rule_gives_the_same_bits_alone_and_in_a_batch(
 @pytest.mark.slow
 @EVERY_RULE
 @pytest.mark.parametrize("form", FORMS)
-def test_every_rule_does_so_on_every_form(form: str, rule: Rule, robust: str) -> None:
+def test_every_rule_on_every_form_gives_the_same_bits_alone_and_in_a_batch(form: str, rule: Rule, robust: str) -> None:
     assert_batch_is_alone(rule, problems(FORMS[form], 33, robust=robust))
 
 
@@ -93,23 +93,23 @@ def test_steps_between_samples_give_the_same_bits_alone_and_in_a_batch(linear: P
     assert_batch_is_alone(EKF, [replace(one, substeps=substeps) for one in problems(linear, 40)])
 
 
-def test_a_kernel_of_fewer_lanes_gives_the_same_bits(linear: ProcessModel) -> None:
+def test_the_number_of_lanes_of_a_kernel_changes_no_bit(linear: ProcessModel) -> None:
     tasks = problems(linear, 9)
     assert_same_bits(list(filter_batch(tasks, lanes=16)), list(filter_batch(tasks)))
 
 
-def test_samples_are_counted_but_for_missing_ones(linear: ProcessModel) -> None:
+def test_only_samples_that_are_not_missing_are_counted(linear: ProcessModel) -> None:
     tasks = problems(linear, 40)
     tasks[3] = replace(tasks[3], measured=np.nan_to_num(tasks[3].measured, nan=1e-3))
     for task, trace in zip(tasks, filter_batch(tasks), strict=True):
         assert trace.count.tolist() == np.sum(np.isfinite(task.measured), axis=0).tolist()
 
 
-def test_threads_change_no_bit_and_no_order(linear: ProcessModel) -> None:
+def test_the_number_of_threads_changes_neither_bits_nor_order(linear: ProcessModel) -> None:
     assert_batch_is_alone(SVSF, problems(linear, 100), workers=2)
 
 
-def test_problems_are_drawn_a_block_at_a_time(linear: ProcessModel) -> None:
+def test_problems_are_taken_from_the_iterator_one_block_at_a_time(linear: ProcessModel) -> None:
     drawn: list[int] = []
     tasks = problems(linear, 96, samples=20)
     traces = filter_batch((drawn.append(i) or task for i, task in enumerate(tasks)), EKF)
@@ -118,11 +118,11 @@ def test_problems_are_drawn_a_block_at_a_time(linear: ProcessModel) -> None:
 
 
 @pytest.mark.parametrize("samples", [2, 7, 8, 9, 16])
-def test_short_logs_are_filtered_as_alone(linear: ProcessModel, samples: int) -> None:
+def test_short_logs_give_the_same_bits_alone_and_in_a_batch(linear: ProcessModel, samples: int) -> None:
     assert_batch_is_alone(EKF, problems(linear, 33, samples))
 
 
-def test_however_a_log_lies_in_memory_it_is_filtered_as_alone(linear: ProcessModel) -> None:
+def test_the_memory_layout_of_a_log_changes_no_bit(linear: ProcessModel) -> None:
     tasks = problems(linear, 40, samples=50)
     measured = np.concatenate([task.measured for task in tasks], axis=1)
     measured.flags.writeable = False
@@ -130,15 +130,15 @@ def test_however_a_log_lies_in_memory_it_is_filtered_as_alone(linear: ProcessMod
     assert_same_bits(list(filter_batch(lying)), [run_rule(EKF, task) for task in tasks])
 
 
-def test_the_track_of_every_sample_is_kept_as_alone(linear: ProcessModel) -> None:
+def test_full_tracks_are_the_same_alone_and_in_a_batch(linear: ProcessModel) -> None:
     assert_batch_is_alone(EKF, [replace(task, every=1) for task in problems(linear, 33, samples=50)])
 
 
-def test_no_problem_is_no_trace() -> None:
+def test_an_empty_batch_gives_no_trace() -> None:
     assert list(filter_batch([], EKF)) == []
 
 
-def test_filters_of_another_model_or_sampling_are_refused(linear: ProcessModel) -> None:
+def test_a_batch_of_different_models_or_settings_is_refused(linear: ProcessModel) -> None:
     first, second = problems(linear, 2, samples=20)
     with pytest.raises(HydrostateError, match="must share one model, got linear and pressure"):
         list(filter_batch([first, replace(second, model=FORMS["pressure"])]))
@@ -148,7 +148,7 @@ def test_filters_of_another_model_or_sampling_are_refused(linear: ProcessModel) 
         list(filter_batch([first, replace(second, robust="huber")]))
 
 
-def test_logs_of_another_length_are_refused(linear: ProcessModel) -> None:
+def test_a_batch_of_logs_of_different_lengths_is_refused(linear: ProcessModel) -> None:
     first, second = problems(linear, 2, samples=20)
     with pytest.raises(HydrostateError, match="one length, got 20 and 19, drives of 19"):
         list(filter_batch([first, replace(second, measured=second.measured[:-1], drives=second.drives[:-1])]))
@@ -156,7 +156,7 @@ def test_logs_of_another_length_are_refused(linear: ProcessModel) -> None:
         list(filter_batch([first, replace(second, drives=second.drives[:-1])]))
 
 
-def test_a_record_is_left_alone(linear: ProcessModel) -> None:
+def test_the_measured_samples_of_a_task_are_not_changed(linear: ProcessModel) -> None:
     rng = np.random.default_rng(0)
     names = ("motor_speed_rad_s", "position_m", "velocity_m_s")
     record = Record(1e-3, {name: rng.normal(size=50) for name in names})

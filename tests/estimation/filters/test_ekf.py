@@ -53,7 +53,9 @@ def kalman(record: Record, H: Array) -> tuple[Array, Array, float]:
     return mean, P, log_likelihood
 
 
-def test_on_a_linear_model_it_is_the_textbook_kalman_filter(linear: ProcessModel, observation: Array) -> None:
+def test_on_a_linear_model_the_extended_filter_equals_the_textbook_kalman_filter(
+    linear: ProcessModel, observation: Array
+) -> None:
     record = noisy_record()
     mean, covariance, log_likelihood = kalman(record, observation)
     estimate = filtered(linear, record)
@@ -70,7 +72,7 @@ def test_the_log_likelihood_and_nis_are_those_of_the_innovations(linear: Process
     assert list(estimate.nis.values()) == pytest.approx(np.mean(squares, axis=0).tolist(), rel=1e-12)
 
 
-def test_the_log_likelihood_survives_variances_whose_product_does_not(linear: ProcessModel) -> None:
+def test_the_log_likelihood_is_finite_if_the_product_of_variances_overflows(linear: ProcessModel) -> None:
     noise = dict.fromkeys((state.name for state in linear.states), 1e12)
     estimate = run_filter(
         ekf, linear, PRIOR, noisy_record(), EhaParameters(), variances=VARIANCES, noise=noise, keep_innovations=True
@@ -82,7 +84,7 @@ def test_the_log_likelihood_survives_variances_whose_product_does_not(linear: Pr
     assert estimate.log_likelihood == pytest.approx(float(np.sum(densities)), rel=1e-12)
 
 
-def test_missing_samples_change_nothing_but_the_prediction(linear: ProcessModel) -> None:
+def test_a_missing_sample_gives_a_prediction_without_update(linear: ProcessModel) -> None:
     record = noisy_record(2)
     gone = {name: np.array([record[name][0], np.nan]) for name in VARIANCES}
     first = filtered(linear, record.slice(0, 1)).belief
@@ -94,7 +96,7 @@ def test_missing_samples_change_nothing_but_the_prediction(linear: ProcessModel)
     assert np.all(np.isnan(estimate.residuals[1]))
 
 
-def test_a_channel_that_is_missing_throughout_is_a_channel_that_is_not_used(linear: ProcessModel) -> None:
+def test_a_channel_without_any_sample_has_the_effect_of_an_absent_channel(linear: ProcessModel) -> None:
     record = noisy_record()
     blind = filtered(linear, record.replace(velocity_m_s=np.full(len(record), np.nan)))
     without = filtered(linear, record.replace(velocity_m_s=None))
@@ -104,7 +106,7 @@ def test_a_channel_that_is_missing_throughout_is_a_channel_that_is_not_used(line
     assert np.isnan(blind.nis["velocity_m_s"])
 
 
-def test_with_every_channel_missing_only_the_model_speaks(linear: ProcessModel) -> None:
+def test_with_every_channel_missing_the_belief_is_the_prediction_of_the_model(linear: ProcessModel) -> None:
     record = noisy_record(3)
     nothing = {name: np.full(3, np.nan) for name in VARIANCES}
     mean, covariance = PRIOR.mean, PRIOR.covariance

@@ -67,7 +67,7 @@ def test_both_engines_agree_over_5000_steps(form: str, condition: str) -> None:
     assert_equal(ours, theirs)
 
 
-def test_both_engines_agree_on_every_innovation_one_channel_after_the_other() -> None:
+def test_both_engines_agree_on_every_innovation_of_sequential_updates() -> None:
     record = drop_samples(logged("pressure", EhaParameters(), samples=400), 0.2, np.random.default_rng(1))
     speed = logged("pressure", EhaParameters(), samples=400)["motor_speed_rad_s"]
     ours, theirs = both("pressure", record.replace(motor_speed_rad_s=speed), EhaParameters())

@@ -62,7 +62,7 @@ def most_probable() -> Array:
 
 @pytest.mark.parametrize("robust", ["none", "huber"])
 @pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
-def test_where_the_sensors_are_linear_its_update_is_the_extended_filters_node_by_node(
+def test_with_linear_sensors_the_update_has_the_same_expressions_as_the_extended_filter(
     model: ProcessModel, robust: str
 ) -> None:
     plain, iterated = (weighing(rule, robust).update(model, CHANNELS) for rule in (EKF, IEKF))
@@ -70,29 +70,29 @@ def test_where_the_sensors_are_linear_its_update_is_the_extended_filters_node_by
     assert all(plain[name] is iterated[name] for name in plain)
 
 
-def test_where_they_bend_it_finds_the_most_probable_state() -> None:
+def test_with_nonlinear_sensors_the_iterated_filter_finds_the_most_probable_state() -> None:
     found = updated(iekf, MEASURED).belief.mean
     np.testing.assert_allclose(found, most_probable(), rtol=2e-3)
     off = np.abs(updated(ekf, MEASURED).belief.mean - most_probable())
     assert np.max(off) > 20.0 * np.max(np.abs(found - most_probable()))
 
 
-def test_its_innovations_are_those_of_the_prediction() -> None:
+def test_innovations_are_computed_from_the_prediction() -> None:
     assert updated(iekf, MEASURED).log_likelihood == pytest.approx(updated(ekf, MEASURED).log_likelihood, rel=1e-12)
 
 
-def test_missing_samples_change_nothing() -> None:
+def test_missing_samples_leave_the_belief_unchanged() -> None:
     belief = updated(iekf, np.full(2, np.nan)).belief
     np.testing.assert_allclose(belief.mean, PRIOR.mean, rtol=1e-15)
     np.testing.assert_allclose(belief.covariance, PRIOR.covariance, rtol=1e-15)
 
 
-def test_a_gross_outlier_counts_for_less_in_every_pass() -> None:
+def test_a_robust_update_reduces_the_effect_of_a_gross_outlier() -> None:
     outlier = np.array([40.0, 0.4])
     plain, robust = (updated(iekf, outlier, robust).belief.mean for robust in ("none", "student-t"))
     assert np.linalg.norm(robust) < 0.9 * np.linalg.norm(plain)
 
 
-def test_the_plain_rule_is_the_rule_without_robust_updates() -> None:
+def test_weighting_without_robust_updates_returns_the_plain_rule() -> None:
     assert weighing(IEKF, "none") is IEKF
     assert IEKF.predict is EKF.predict

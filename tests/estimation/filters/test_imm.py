@@ -102,7 +102,7 @@ def textbook(record: Record, dampings: tuple[float, ...], dwell: float) -> tuple
     return mean, np.asarray(spread), mu, float(total)
 
 
-def test_it_is_the_textbook_filter_with_missing_samples(damped: ProcessModel) -> None:
+def test_the_bank_equals_the_textbook_imm_filter_with_missing_samples(damped: ProcessModel) -> None:
     dampings, record = (3.0, 5.0, 9.0), noisy_record()
     bank = run_imm(modes(damped, dampings), PRIOR, record, dwell_time=0.1, variances=VARIANCES)
     mean, covariance, probability, log_likelihood = textbook(record, dampings, 0.1)
@@ -124,7 +124,7 @@ def start(model: ProcessModel) -> Gaussian:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
-def test_a_bank_of_equal_models_is_one_filter(model: ProcessModel) -> None:
+def test_a_bank_of_equal_models_equals_a_single_filter(model: ProcessModel) -> None:
     record = bench_log(RIG)
     one = run_filter(ekf, model, start(model), record, RIG, keep_innovations=True)
     bank = run_imm(
@@ -140,7 +140,7 @@ def test_a_bank_of_equal_models_is_one_filter(model: ProcessModel) -> None:
     np.testing.assert_allclose(bank.probability, 1.0 / 3.0, rtol=1e-12)
 
 
-def test_different_filters_of_one_linear_model_are_one_filter_too(damped: ProcessModel) -> None:
+def test_a_bank_of_different_filters_of_one_linear_model_equals_a_single_filter(damped: ProcessModel) -> None:
     record = noisy_record()
     kinds = [
         Mode("kalman", damped, RIG),
@@ -155,7 +155,7 @@ def test_different_filters_of_one_linear_model_are_one_filter_too(damped: Proces
 
 @pytest.mark.slow
 @pytest.mark.parametrize("true", CONDITIONS)
-def test_a_bank_of_nine_conditions_that_last_the_whole_log_finds_the_one_that_is(true: str) -> None:
+def test_a_bank_of_nine_constant_conditions_finds_the_true_one(true: str) -> None:
     model = FORMS["pressure"]
     conditions = [Mode(name, model, parameters_for(condition)) for name, condition in CONDITIONS.items()]
     record = bench_log(parameters_for(CONDITIONS[true]), 1.0)
@@ -164,7 +164,7 @@ def test_a_bank_of_nine_conditions_that_last_the_whole_log_finds_the_one_that_is
     assert bank.estimate.settled("bulk_modulus_pa")[0] == pytest.approx(RIG.bulk_modulus, rel=0.01)
 
 
-def test_it_follows_a_change_of_mode(damped: ProcessModel) -> None:
+def test_the_bank_follows_a_change_of_mode(damped: ProcessModel) -> None:
     rng, state, samples = np.random.default_rng(3), np.zeros(3), 2000
     speed, measured = 500.0 * np.sign(np.sin(np.arange(samples) * STEP)), np.empty((samples, 2))
     for k in range(samples):
@@ -180,7 +180,7 @@ def test_it_follows_a_change_of_mode(damped: ProcessModel) -> None:
     assert np.mean(bank.probability[half + half // 4 :, 1]) > 0.9
 
 
-def test_with_nothing_measured_probabilities_relax_as_the_dwell_times_say(damped: ProcessModel) -> None:
+def test_without_measurements_mode_probabilities_relax_at_the_rate_of_the_dwell_times(damped: ProcessModel) -> None:
     record = noisy_record(60, missing=1.1)
     bank = run_imm(
         modes(damped, (3.0, 5.0)), PRIOR, record, dwell_time=0.1, probabilities=(1.0, 0.0), variances=VARIANCES
@@ -190,7 +190,7 @@ def test_with_nothing_measured_probabilities_relax_as_the_dwell_times_say(damped
     assert bank.estimate.log_likelihood == pytest.approx(0.0, abs=1e-12)
 
 
-def test_an_improbable_mode_keeps_its_probability_however_small(damped: ProcessModel) -> None:
+def test_the_log_probability_of_a_very_improbable_mode_stays_finite(damped: ProcessModel) -> None:
     rng = np.random.default_rng(0)
     channels = {name: 1e-2 * rng.normal(size=4000) for name in VARIANCES}
     record = Record(STEP, {"motor_speed_rad_s": np.full(4000, 400.0), **channels})
@@ -201,7 +201,7 @@ def test_an_improbable_mode_keeps_its_probability_however_small(damped: ProcessM
     np.testing.assert_allclose(np.sum(bank.probability, axis=1), 1.0, rtol=1e-12)
 
 
-def test_a_mode_that_diverges_does_not_take_the_bank_with_it(damped: ProcessModel) -> None:
+def test_a_diverging_mode_does_not_affect_the_bank(damped: ProcessModel) -> None:
     record = noisy_record(200, missing=0.0)
     bank = run_imm(modes(damped, (3.0, 1e200)), PRIOR, record, dwell_time=1.0, variances=VARIANCES)
     alone = run_filter(ekf, damped, PRIOR, record, replace(RIG, friction_linear=3.0), variances=VARIANCES)
@@ -209,17 +209,17 @@ def test_a_mode_that_diverges_does_not_take_the_bank_with_it(damped: ProcessMode
     assert bank.probability[-1, 0] == pytest.approx(1.0)
 
 
-def test_a_bank_of_diverged_modes_says_so(damped: ProcessModel) -> None:
+def test_a_bank_with_only_diverged_modes_has_no_belief(damped: ProcessModel) -> None:
     bank = run_imm(modes(damped, (1e200, 1e200)), PRIOR, noisy_record(50), dwell_time=1.0, variances=VARIANCES)
     assert bank.estimate.belief is None
 
 
-def test_a_mode_leaves_as_often_as_it_lasts() -> None:
+def test_transition_probabilities_sum_to_one_and_an_infinite_dwell_time_forbids_transitions() -> None:
     np.testing.assert_allclose(np.sum(np.exp(log_transitions([0.5, 2.0, 0.03], 0.01)), axis=1), 1.0, rtol=1e-14)
     assert log_transitions([np.inf, 1.0], 0.01)[0].tolist() == [0.0, -np.inf]
 
 
-def test_what_is_no_bank_is_refused(damped: ProcessModel) -> None:
+def test_an_invalid_bank_is_refused(damped: ProcessModel) -> None:
     record, bank = noisy_record(10), modes(damped, (3.0, 5.0))
     other = Mode("other", FORMS["pressure"], RIG)
     for wrong, options, message in (
@@ -233,14 +233,14 @@ def test_what_is_no_bank_is_refused(damped: ProcessModel) -> None:
             run_imm(wrong, PRIOR, record, variances=VARIANCES, **options)
 
 
-def test_as_a_method_on_a_model_that_its_levels_do_not_touch_it_is_one_filter(linear: ProcessModel) -> None:
+def test_the_imm_method_equals_one_filter_on_a_model_without_leakage_or_friction(linear: ProcessModel) -> None:
     record = noisy_record()
     one, bank = (run_filter(METHODS[m], linear, PRIOR, record, RIG, variances=VARIANCES) for m in ("ekf", "imm"))
     np.testing.assert_allclose(bank.mean, one.mean, rtol=1e-9, atol=1e-15)
     assert bank.log_likelihood == pytest.approx(one.log_likelihood, rel=1e-9)
 
 
-def test_as_a_method_its_bank_holds_leakage_by_friction_as_told_and_worse() -> None:
+def test_the_bank_of_the_imm_method_has_three_leakages_by_three_frictions_from_the_given_ones_up() -> None:
     problem = filter_problem(FORMS["pressure"], start(FORMS["pressure"]), bench_log(RIG, 0.01), RIG)
     rows = bank_parameters(problem)
     assert len(rows) == 9
@@ -250,7 +250,7 @@ def test_as_a_method_its_bank_holds_leakage_by_friction_as_told_and_worse() -> N
         assert any(np.allclose(row, told, rtol=0.01) for row in rows)
 
 
-def test_as_a_method_it_leaves_alone_what_the_model_estimates() -> None:
+def test_the_bank_of_the_imm_method_does_not_vary_parameters_that_the_model_estimates() -> None:
     wide = augmented(FORMS["pressure"], ("leakage_coefficient", "flow_bias"), {})
     prior = augmented_prior(wide, start(FORMS["pressure"]), RIG)
     rows = bank_parameters(filter_problem(wide, prior, bench_log(RIG, 0.01), RIG))
@@ -262,7 +262,7 @@ def test_as_a_method_it_leaves_alone_what_the_model_estimates() -> None:
 @pytest.mark.parametrize(
     ("true", "pressure"), [*((name, True) for name in CONDITIONS), *((name, False) for name in list(CONDITIONS)[::4])]
 )
-def test_as_a_method_it_finds_bulk_modulus_without_being_told_the_condition(true: str, pressure: bool) -> None:
+def test_the_imm_method_finds_bulk_modulus_without_the_condition_as_input(true: str, pressure: bool) -> None:
     p = parameters_for(CONDITIONS[true])
     drive = make_drive("steps", 3.0, 1e-4, p, np.random.default_rng(0))
     record = simulate(LUMPED, drive, 1e-4, p, sensors=BENCH, rng=np.random.default_rng(1))
@@ -273,7 +273,7 @@ def test_as_a_method_it_finds_bulk_modulus_without_being_told_the_condition(true
     assert found.gate.passed or not pressure
 
 
-def test_as_a_method_what_it_may_not_be_set_to_is_refused(linear: ProcessModel) -> None:
+def test_the_imm_method_refuses_invalid_settings(linear: ProcessModel) -> None:
     problem = filter_problem(linear, PRIOR, noisy_record(10), RIG, variances=VARIANCES)
     for settings, message in (
         ({"dwell_time": 0.0}, r"dwell_time must be positive, got 0\.0"),

@@ -29,7 +29,7 @@ def mixture(means: Array, covariances: Array, weights: Array) -> Array:
     return packed(mean, spread)
 
 
-def test_a_sum_of_exponentials_is_shared_out_and_one_of_nothing_is_nothing() -> None:
+def test_log_sum_returns_the_share_of_each_term_and_minus_infinity_for_no_probability() -> None:
     shares, terms = np.empty(3), np.array([-800.0, -801.0, -np.inf])
     assert log_sum(terms, shares) == pytest.approx(-800.0 + math.log1p(math.exp(-1.0)))
     assert shares == pytest.approx([1.0 / (1.0 + math.exp(-1.0)), 1.0 / (1.0 + math.e), 0.0])
@@ -38,7 +38,7 @@ def test_a_sum_of_exponentials_is_shared_out_and_one_of_nothing_is_nothing() -> 
 
 
 @pytest.mark.parametrize("weights", [[0.2, 0.5, 0.3], [0.6, 0.0, 0.4], [0.0, 0.0, 1.0]])
-def test_blended_beliefs_are_the_moments_of_their_mixture(weights: list[float]) -> None:
+def test_a_blended_belief_has_the_moments_of_the_mixture(weights: list[float]) -> None:
     means, covariances = beliefs(1)
     states = np.array([packed(*pair) for pair in zip(means, covariances, strict=True)])
     found = np.empty(BELIEF)
@@ -46,7 +46,7 @@ def test_blended_beliefs_are_the_moments_of_their_mixture(weights: list[float]) 
     assert found == pytest.approx(mixture(means, covariances, np.array(weights)))
 
 
-def test_modes_start_from_where_they_may_have_come_and_one_that_nothing_leads_to_stays() -> None:
+def test_a_mode_starts_from_the_mixture_of_its_predecessors_and_without_any_keeps_its_belief() -> None:
     means, covariances = beliefs(2)
     states = np.array([packed(*pair) for pair in zip(means, covariances, strict=True)])
     before, predicted = states.copy(), np.empty(3)
@@ -62,7 +62,7 @@ def test_modes_start_from_where_they_may_have_come_and_one_that_nothing_leads_to
     np.testing.assert_array_equal(states[2], before[2])
 
 
-def test_the_density_is_gaussian_over_what_is_there_and_none_for_a_mode_that_ran_away() -> None:
+def test_the_density_is_gaussian_over_present_channels_and_zero_for_a_diverged_mode() -> None:
     sample, seen = np.array([1.0, np.nan, 2.0]), np.array([[0.3, 5.0, -0.4], [0.5, 1.0, 2.0]])
     wanted = sum(-0.5 * (e * e / s + math.log(2.0 * math.pi * s)) for e, s in ((0.3, 0.5), (-0.4, 2.0)))
     assert log_density(sample, seen, np.zeros(BELIEF), BELIEF=BELIEF) == pytest.approx(wanted)
@@ -72,7 +72,7 @@ def test_the_density_is_gaussian_over_what_is_there_and_none_for_a_mode_that_ran
     assert log_density(sample, seen, np.zeros(BELIEF), BELIEF=BELIEF) == -np.inf
 
 
-def test_a_banks_innovation_has_the_moments_of_the_modes_that_are_believed() -> None:
+def test_the_innovation_of_a_bank_has_the_moments_of_its_modes_with_probability() -> None:
     seen = np.zeros((3, 2, 2))
     seen[:, 0, 1], seen[:, 1, 1] = [1.0, -2.0, np.nan], [0.5, 0.2, np.nan]
     shares = np.array([0.3, 0.1, 0.0])
@@ -84,7 +84,7 @@ def test_a_banks_innovation_has_the_moments_of_the_modes_that_are_believed() -> 
         assert np.isnan(innovate(1, y, seen, shares, believed)).all()
 
 
-def test_a_bank_of_which_no_mode_is_left_believes_nothing() -> None:
+def test_the_belief_of_a_bank_is_the_mixture_of_its_modes_or_nan_without_probability() -> None:
     means, covariances = beliefs(3)
     states = np.array([packed(*pair) for pair in zip(means, covariances, strict=True)])
     overall, weights = np.empty(BELIEF), np.array([0.2, 0.3, 0.5])

@@ -54,7 +54,7 @@ def smoothed(record: Record, guess: float, robust: str = "none") -> Estimate:
     return run_filter(iterated_smoother, form, prior, record, MINOR, channels=MOTION, noise=noise, robust=robust)
 
 
-def test_it_is_the_smoother_of_a_linear_model(linear: ProcessModel) -> None:
+def test_on_a_linear_model_the_iterated_smoother_equals_the_smoother(linear: ProcessModel) -> None:
     task = linear_task(linear)
     ours, theirs = iterated_smoother(task), smoother(task)
     np.testing.assert_allclose(ours.track, theirs.track, rtol=1e-9, atol=1e-12)
@@ -63,7 +63,7 @@ def test_it_is_the_smoother_of_a_linear_model(linear: ProcessModel) -> None:
     np.testing.assert_array_equal(ours.count, theirs.count)
 
 
-def test_the_first_guess_of_bulk_modulus_does_not_show_in_the_answer(sticking_log: Record) -> None:
+def test_the_result_does_not_depend_on_the_initial_guess_of_bulk_modulus(sticking_log: Record) -> None:
     low, middle, high = (smoothed(sticking_log, guess).track(BULK_MODULUS) for guess in (2e7, 3e8, 1e9))
     std = middle[1][-1]
     assert abs(middle[0][-1] - MINOR.bulk_modulus) < 4.0 * std
@@ -71,7 +71,7 @@ def test_the_first_guess_of_bulk_modulus_does_not_show_in_the_answer(sticking_lo
     assert abs(high[0][-1] - middle[0][-1]) < 0.2 * std
 
 
-def test_gross_outliers_count_for_nothing_where_that_is_asked_for(sticking_log: Record) -> None:
+def test_gross_outliers_do_not_affect_a_robust_smoother(sticking_log: Record) -> None:
     rng = np.random.default_rng(0)
     spoilt = sticking_log["position_m"] + np.where(rng.random(len(sticking_log)) < 0.01, 0.005, 0.0)
     log = sticking_log.replace(position_m=spoilt)
@@ -82,7 +82,7 @@ def test_gross_outliers_count_for_nothing_where_that_is_asked_for(sticking_log: 
 
 
 @pytest.mark.slow
-def test_it_is_chosen_where_noise_is_tuned_and_pressure_not_logged(sticking_log: Record) -> None:
+def test_the_iterated_smoother_is_the_default_with_tuned_noise_and_without_pressure(sticking_log: Record) -> None:
     blind = sticking_log.replace(differential_pressure_pa=None)
     found = estimate_bulk_modulus(blind, MINOR, form="pressure", tuned=True)
     assert found.method == "iterated-smoother"
@@ -92,14 +92,14 @@ def test_it_is_chosen_where_noise_is_tuned_and_pressure_not_logged(sticking_log:
     assert chosen_method(blind, form, False) == chosen_method(sticking_log, form, True) == "ekf"
 
 
-def test_a_log_too_long_to_be_held_is_refused(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_too_long_for_memory_is_refused(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "LONGEST", 149)
     with pytest.raises(HydrostateError, match="at most 149 samples, got 150"):
         iterated_smoother(linear_task(linear))
 
 
 @pytest.mark.slow
-def test_it_finds_what_the_filter_loses_while_the_piston_sticks() -> None:
+def test_the_iterated_smoother_finds_the_bulk_modulus_that_the_filter_loses_while_the_piston_sticks() -> None:
     filtered, found = (run_case(Case("steps", "major_leakage", 5, way, False)) for way in ("stated", "smoothed"))
     assert abs(float(filtered["z"])) > 100.0  # pyright: ignore[reportArgumentType]
     assert abs(float(found["z"])) < 3.5  # pyright: ignore[reportArgumentType]

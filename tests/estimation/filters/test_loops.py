@@ -68,7 +68,7 @@ def test_the_iterated_smoother_is_the_same_compiled_and_in_python(
 
 
 @pytest.mark.parametrize("mean", [0.13, np.nan])
-def test_a_trajectory_that_begins_out_of_bounds_is_lost(
+def test_a_trajectory_that_begins_out_of_bounds_gives_nan(
     linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, mean: float
 ) -> None:
     problem = task(linear, 1, kept=True)

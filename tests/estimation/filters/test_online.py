@@ -20,7 +20,7 @@ def pieces(filtered: OnlineFilter, begin: int = 0, end: int = SAMPLES, seed: int
 @pytest.mark.parametrize(
     ("form", "method"), [("pressure", "ekf"), ("acceleration", "ukf"), ("flow", "ekf"), ("chambers", "ekf")]
 )
-def test_however_a_stream_is_cut_it_believes_to_the_bit_what_the_filter_of_its_log_believes(
+def test_a_stream_in_pieces_of_any_length_gives_the_same_bits_as_the_filter_of_the_whole_log(
     form: str, method: str
 ) -> None:
     problem = task(form, "minor_leakage", SAMPLES)
@@ -33,7 +33,7 @@ def test_however_a_stream_is_cut_it_believes_to_the_bit_what_the_filter_of_its_l
 
 
 @pytest.mark.parametrize("method", ["ekf", "svsf"])
-def test_a_filter_that_resumes_goes_on_to_the_bit(method: str) -> None:
+def test_a_resumed_filter_gives_the_same_bits_as_an_uninterrupted_one(method: str) -> None:
     problem = task("pressure", "normal", SAMPLES)
     whole, before, after = (OnlineFilter(problem, method) for _ in range(3))
     pieces(whole)
@@ -46,7 +46,7 @@ def test_a_filter_that_resumes_goes_on_to_the_bit(method: str) -> None:
     assert np.array_equal(after.now().deviations, whole.now().deviations)
 
 
-def test_a_drive_that_is_missing_is_held_and_a_measurement_that_is_missing_changes_nothing() -> None:
+def test_a_missing_drive_keeps_its_last_value_and_missing_measurements_are_not_counted() -> None:
     problem = task("pressure", "normal", 100)
     drives, measured = problem.drives.copy(), problem.measured.copy()
     drives[41:45], measured[41:45] = np.nan, np.nan
@@ -60,7 +60,7 @@ def test_a_drive_that_is_missing_is_held_and_a_measurement_that_is_missing_chang
     assert ours.now().count.tolist() == [96.0] * 3
 
 
-def test_what_cannot_be_filtered_is_refused() -> None:
+def test_an_unsuitable_method_sample_shape_or_resumed_form_is_refused() -> None:
     problem = task("pressure", "normal", 100)
     filtered = OnlineFilter(problem)
     with pytest.raises(HydrostateError, match="a method that filters a stream must be one of ekf"):

@@ -43,7 +43,7 @@ def task(linear: ProcessModel, samples: int = 40) -> FilterProblem:
     return replace(problem, keep_innovations=True)
 
 
-def test_it_agrees_with_the_kalman_filter_within_monte_carlo_error(linear: ProcessModel) -> None:
+def test_the_particle_filter_agrees_with_the_kalman_filter_within_monte_carlo_error(linear: ProcessModel) -> None:
     problem = task(linear)
     exact = ekf(problem)
     runs = [particle_filter(problem, PARTICLES, np.random.default_rng(seed)) for seed in range(SEEDS)]
@@ -58,7 +58,7 @@ def test_it_agrees_with_the_kalman_filter_within_monte_carlo_error(linear: Proce
     assert np.std(likelihoods) < 2.0
 
 
-def test_its_error_falls_with_the_root_of_their_number(linear: ProcessModel) -> None:
+def test_the_error_falls_with_the_square_root_of_the_number_of_particles(linear: ProcessModel) -> None:
     problem = task(linear, 20)
     exact = ekf(problem).track
 
@@ -69,21 +69,21 @@ def test_its_error_falls_with_the_root_of_their_number(linear: ProcessModel) -> 
     assert 2.0 < error(100) / error(1600) < 8.0  # 4 is expected
 
 
-def test_one_stream_is_one_answer(linear: ProcessModel) -> None:
+def test_the_same_random_stream_gives_the_same_result(linear: ProcessModel) -> None:
     problem = task(linear)
     first, again, other = (particle_filter(problem, 50, np.random.default_rng(seed)) for seed in (7, 7, 8))
     np.testing.assert_array_equal(first.track, again.track)
     assert not np.array_equal(first.track, other.track)
 
 
-def test_what_is_missing_has_no_innovation(linear: ProcessModel) -> None:
+def test_missing_samples_have_no_innovation_and_are_not_counted(linear: ProcessModel) -> None:
     problem = task(linear)
     trace = particle_filter(problem, 50, np.random.default_rng(0))
     np.testing.assert_array_equal(np.isnan(trace.residuals), np.isnan(problem.measured))
     assert trace.count.tolist() == np.sum(np.isfinite(problem.measured), axis=0).tolist()
 
 
-def test_every_particle_keeps_to_the_physical_bounds(linear: ProcessModel) -> None:
+def test_particles_stay_within_the_physical_bounds(linear: ProcessModel) -> None:
     force = replace(linear.states[2], lower=0.0, upper=1.0)
     held = replace(linear, states=(*linear.states[:2], force))
     problem = task(held)
@@ -93,14 +93,14 @@ def test_every_particle_keeps_to_the_physical_bounds(linear: ProcessModel) -> No
     assert trace.mean[2] > low
 
 
-def test_what_it_cannot_do_is_refused(linear: ProcessModel) -> None:
+def test_a_single_particle_and_a_robust_update_are_refused(linear: ProcessModel) -> None:
     with pytest.raises(HydrostateError, match="at least 2 particles, got 1"):
         particle_filter(task(linear), 1, np.random.default_rng(0))
     with pytest.raises(HydrostateError, match="no robust update, got robust 'huber'"):
         particle_filter(replace(task(linear), robust="huber"), 10, np.random.default_rng(0))
 
 
-def test_as_a_method_it_draws_from_its_seed(linear: ProcessModel) -> None:
+def test_the_seed_setting_determines_the_result(linear: ProcessModel) -> None:
     problem = task(linear)
     first, again, other = (
         METHODS["particle"](replace(problem, settings={"particles": 50.0, "seed": seed})) for seed in (7.0, 7.0, 8.0)
@@ -111,14 +111,14 @@ def test_as_a_method_it_draws_from_its_seed(linear: ProcessModel) -> None:
     np.testing.assert_array_equal(first.track, drawn.track)  # every state of this model has process noise
 
 
-def test_as_a_method_it_lets_constants_walk_or_collapses(linear: ProcessModel) -> None:
+def test_the_cloud_of_a_constant_collapses_without_a_random_walk(linear: ProcessModel) -> None:
     still = replace(task(linear, 200), noise=np.array([1e4, 1e2, 0.0]))
     alive, collapsed = (particle(replace(still, settings={"walk": walk})).track_variance[-1, 2] for walk in (0.1, 0.0))
     assert alive > 1e-3 * still.covariance[2, 2]
     assert collapsed < 0.1 * alive
 
 
-def test_with_nothing_measured_its_cloud_stays_the_prior_within_bounds(linear: ProcessModel) -> None:
+def test_without_measurements_the_cloud_stays_the_prior_clipped_to_its_bounds(linear: ProcessModel) -> None:
     force = replace(linear.states[2], lower=0.0)
     problem = task(replace(linear, states=(*linear.states[:2], force)))
     blind = replace(problem, measured=np.full_like(problem.measured, np.nan), settings={"walk": 0.0})
@@ -129,7 +129,7 @@ def test_with_nothing_measured_its_cloud_stays_the_prior_within_bounds(linear: P
     assert trace.log_likelihood == 0.0
 
 
-def test_what_it_may_not_be_set_to_is_refused(linear: ProcessModel) -> None:
+def test_invalid_settings_are_refused(linear: ProcessModel) -> None:
     for settings, message in (
         ({"particles": 1.5}, r"particles must be a whole number, 2 or more, got 1\.5"),
         ({"seed": -1.0}, r"seed must be a whole number, 0 or more, got -1\.0"),
@@ -139,7 +139,7 @@ def test_what_it_may_not_be_set_to_is_refused(linear: ProcessModel) -> None:
             particle(replace(task(linear), settings=settings))
 
 
-def test_a_cloud_predicts_weighs_and_gathers_as_weighted_sums_do() -> None:
+def test_prediction_weights_and_moments_of_a_cloud_equal_weighted_sums() -> None:
     rng = np.random.default_rng(5)
     cloud, weights = rng.standard_normal((40, 3)), rng.dirichlet(np.ones(40))
     seen, y, r = cloud[:, 1] - 0.3, 0.4, 0.05
@@ -156,7 +156,7 @@ def test_a_cloud_predicts_weighs_and_gathers_as_weighted_sums_do() -> None:
 
 
 @pytest.mark.parametrize("place", [0.0, 0.3, 0.999])
-def test_particles_are_drawn_as_often_as_they_weigh(place: float) -> None:
+def test_resampling_draws_particles_in_proportion_to_their_weights(place: float) -> None:
     weights = np.random.default_rng(6).dirichlet(np.ones(25))
     cloud = np.arange(25.0)[:, None]
     resample(place, cloud, weights, np.empty_like(cloud))

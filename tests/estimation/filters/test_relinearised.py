@@ -30,7 +30,7 @@ def task() -> FilterProblem:
     return filter_problem(CHAMBERS_BY_MASS, prior, record, RIG)
 
 
-def test_reading_again_makes_the_log_likelier_and_ends_nearer(task: FilterProblem) -> None:
+def test_linearising_again_raises_the_likelihood_and_reduces_the_error_of_bulk_modulus(task: FilterProblem) -> None:
     first, place = ekf(task), CHAMBERS.index(BULK_MODULUS)
     again = relinearised(task, first.mean, first.covariance)
     truth = np.log(RIG.bulk_modulus / 1e8)

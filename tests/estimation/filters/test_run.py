@@ -37,13 +37,13 @@ def filtered(record: Record, model: ProcessModel = PRESSURE_FORM, **options: obj
     return run_filter(ekf, model, prior, record, RIG, **options)
 
 
-def test_a_model_predicts_the_channels_that_it_can_and_the_log_has(record: Record) -> None:
+def test_the_channels_used_are_those_that_the_model_predicts_and_the_log_has(record: Record) -> None:
     assert available_channels(PRESSURE_FORM, record) == ALL
     assert available_channels(ACCELERATION_FORM, record) == ALL[:2]
     assert available_channels(PRESSURE_FORM, record.replace(position_m=None)) == ("velocity_m_s", *ALL[2:])
 
 
-def test_a_log_without_anything_that_the_model_predicts_is_refused_by_name(record: Record) -> None:
+def test_a_log_without_any_channel_that_the_model_predicts_is_refused_with_their_names(record: Record) -> None:
     bare = record.replace(position_m=None, velocity_m_s=None, differential_pressure_pa=None)
     with pytest.raises(
         LogError,
@@ -52,7 +52,7 @@ def test_a_log_without_anything_that_the_model_predicts_is_refused_by_name(recor
         filtered(bare)
 
 
-def test_the_scale_of_the_states_does_not_show(record: Record, linear: ProcessModel) -> None:
+def test_the_result_does_not_depend_on_the_scale_of_the_states(record: Record, linear: ProcessModel) -> None:
     other = tuple(replace(state, scale=7.0 * state.scale) for state in linear.states)
     plain, scaled = (
         run_filter(ekf, model, Gaussian(np.zeros(3), np.eye(3)), record, RIG)
@@ -63,7 +63,7 @@ def test_the_scale_of_the_states_does_not_show(record: Record, linear: ProcessMo
     assert scaled.log_likelihood == pytest.approx(plain.log_likelihood, rel=1e-9)
 
 
-def test_the_track_is_thinned_and_keeps_its_clock(record: Record, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_thinned_track_keeps_the_times_of_its_samples(record: Record, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = filtered(record.slice(100))
     np.testing.assert_allclose(whole.time, record.time[100:])
     monkeypatch.setattr("estimation.filters.run.TRACK_ROWS", 225)
@@ -77,7 +77,7 @@ def test_innovations_are_kept_only_when_asked_for(record: Record) -> None:
     assert filtered(record, keep_innovations=True).residuals.shape == (1000, 3)
 
 
-def test_the_noise_of_a_named_state_replaces_the_models(record: Record) -> None:
+def test_the_given_noise_of_a_state_replaces_that_of_the_model(record: Record) -> None:
     same = filtered(record, noise={"velocity_m_s": 1e-2})
     quieter = filtered(record, noise={"velocity_m_s": 1e-6})
     np.testing.assert_array_equal(same.belief.mean, filtered(record).belief.mean)
@@ -98,7 +98,7 @@ def test_the_settled_value_is_the_mean_of_the_last_fifth(record: Record) -> None
     assert estimate.settled("bulk_modulus_pa", 1.0)[0] == pytest.approx(np.mean(mean))
 
 
-def test_an_unknown_state_is_refused_with_the_known_ones(record: Record) -> None:
+def test_an_unknown_state_is_refused_and_the_known_ones_are_listed(record: Record) -> None:
     with pytest.raises(KeyError, match="pressure has no state 'viscosity', it has"):
         filtered(record).track("viscosity")
 
@@ -113,9 +113,7 @@ def test_neither_record_nor_prior_is_changed(record: Record) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
-def test_an_estimate_that_runs_into_a_wall_stays_within_its_bounds(
-    method: Method, record: Record, linear: ProcessModel
-) -> None:
+def test_an_estimate_at_its_bound_does_not_exceed_it(method: Method, record: Record, linear: ProcessModel) -> None:
     force = replace(linear.states[2], lower=-0.02, upper=0.02)
     model = replace(linear, name="linear_held", states=(*linear.states[:2], force))
     estimate = run_filter(method, model, Gaussian(np.zeros(3), np.eye(3)), record, RIG)
@@ -134,7 +132,7 @@ def _observe(state: tuple[Scalar, ...], p: EhaValues) -> Mapping[str, Scalar]:
     return {"position_m": state[0]}
 
 
-def test_a_filter_that_diverges_says_so_in_its_track() -> None:
+def test_the_track_of_a_diverged_filter_is_not_finite() -> None:
     states = (StateVariable("position_m", "m", 1.0, 0.0),)
     model = ProcessModel("explosive", states, _explode, _observe, 2.5e-4, parameters=EhaParameters)
     record = Record(1e-3, {"motor_speed_rad_s": np.zeros(50), "position_m": np.full(50, np.nan)})

@@ -25,7 +25,7 @@ def task(linear: ProcessModel, position: float, layer: float = 5.0) -> FilterPro
 
 
 @pytest.mark.parametrize(("position", "share"), [(0.01, 0.2), (-0.025, 0.5), (0.05, 1.0), (7.0, 1.0)])
-def test_mean_and_covariance_are_those_of_the_published_gain(
+def test_mean_and_covariance_follow_from_the_published_gain(
     linear: ProcessModel, position: float, share: float
 ) -> None:
     H, P = np.array([1.0, 0.0, 0.0]), PRIOR.covariance
@@ -37,25 +37,25 @@ def test_mean_and_covariance_are_those_of_the_published_gain(
     np.testing.assert_allclose(trace.covariance * np.outer(scale, scale), expected, rtol=1e-10, atol=1e-16)
 
 
-def test_beyond_the_layer_the_measured_state_is_the_measurement(linear: ProcessModel) -> None:
+def test_beyond_the_boundary_layer_the_measured_state_equals_the_measurement(linear: ProcessModel) -> None:
     trace, scale = sif(task(linear, 3.0)), linear.states[0].scale
     assert trace.mean[0] * scale == pytest.approx(3.0, rel=1e-12)
     assert trace.covariance[0, 0] * scale**2 == pytest.approx(NOISE, rel=1e-9)
 
 
-def test_a_missing_sample_changes_nothing(linear: ProcessModel) -> None:
+def test_a_missing_sample_leaves_the_belief_unchanged(linear: ProcessModel) -> None:
     problem = task(linear, float("nan"))
     np.testing.assert_array_equal(sif(problem).mean, problem.mean)
     np.testing.assert_array_equal(sif(problem).covariance, problem.covariance)
 
 
-def test_what_is_known_exactly_is_left_alone(linear: ProcessModel) -> None:
+def test_a_state_without_uncertainty_is_not_updated(linear: ProcessModel) -> None:
     problem = task(linear, 0.02)
     sure = replace(problem, covariance=np.diag([0.0, 1.0, 1.0]))
     np.testing.assert_array_equal(sif(sure).mean, sure.mean)
 
 
-def test_what_it_cannot_do_is_refused(linear: ProcessModel) -> None:
+def test_invalid_settings_and_robust_updates_are_refused(linear: ProcessModel) -> None:
     problem = task(linear, 0.01)
     with pytest.raises(HydrostateError, match=r"boundary_layer must be positive, got -1\.0"):
         sif(replace(problem, settings={"boundary_layer": -1.0}))

@@ -94,7 +94,7 @@ def test_filterpys_unscented_filter_agrees_with_other_settings(form: str) -> Non
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_the_cubature_filter_is_the_unscented_one_of_alpha_1_and_beta_and_kappa_0(form: str) -> None:
+def test_the_cubature_filter_equals_the_unscented_filter_with_alpha_1_beta_0_and_kappa_0(form: str) -> None:
     problem = task(form, RIG, 400)
     assert_agrees(problem, ckf(problem), 1.0, 0.0, 0.0)
 
@@ -123,7 +123,9 @@ VARIANCES = {"position_m": 1e-2, "velocity_m_s": 1e-1}
 
 @pytest.mark.parametrize("method", [ukf, ckf])
 @pytest.mark.parametrize("robust", ["none", "student-t"])
-def test_on_a_linear_model_it_is_the_kalman_filter(linear: ProcessModel, method: object, robust: str) -> None:
+def test_on_a_linear_model_sigma_points_equal_the_kalman_filter(
+    linear: ProcessModel, method: object, robust: str
+) -> None:
     kalman, sigma = (
         run_filter(one, linear, PRIOR, noisy_record(), RIG, variances=VARIANCES, robust=robust) for one in (ekf, method)
     )
@@ -133,7 +135,7 @@ def test_on_a_linear_model_it_is_the_kalman_filter(linear: ProcessModel, method:
 
 
 @pytest.mark.parametrize("method", [ukf, ckf])
-def test_points_through_a_linear_model_that_does_not_look_it_are_the_kalman_filter_too(
+def test_on_a_linear_model_in_nonlinear_notation_sigma_points_equal_the_kalman_filter(
     linear: ProcessModel, method: object
 ) -> None:
     roundabout = replace(linear, name="roundabout", step=_roundabout_step)
@@ -183,7 +185,7 @@ def _first(state: tuple[Scalar, ...], p: EhaValues) -> Mapping[str, Scalar]:
     return {"position_m": state[0]}
 
 
-def test_the_model_is_asked_about_physical_states_only() -> None:
+def test_sigma_points_are_clipped_to_physical_states_before_the_model_is_evaluated() -> None:
     state = StateVariable("position_m", "m", 1.0, 0.0, lower=0.0)
     model = ProcessModel("root", (state,), _root_step, _first, 1.0, parameters=EhaParameters)
     record = Record(1e-3, {"motor_speed_rad_s": np.zeros(2), "position_m": np.full(2, np.nan)})
@@ -192,7 +194,7 @@ def test_the_model_is_asked_about_physical_states_only() -> None:
     assert estimate.belief.mean[0] == pytest.approx(0.5 * np.sqrt(1.1), rel=1e-12)
 
 
-def test_settings_that_are_not_known_or_leave_no_points_are_refused() -> None:
+def test_unknown_settings_and_a_kappa_that_leaves_no_spread_of_points_are_refused() -> None:
     problem = task("acceleration", RIG, 10)
     with pytest.raises(HydrostateError, match="ukf can be set alpha, beta, kappa, got 'gamma'"):
         ukf(replace(problem, settings={"gamma": 1.0}))

@@ -104,14 +104,14 @@ def assert_equal(found: SmoothedStretch, means: Array, covariances: Array, toler
     np.testing.assert_allclose(relative, 0.0, atol=tolerance)
 
 
-def test_on_a_linear_model_it_is_the_textbook_smoother_with_missing_samples(linear: ProcessModel) -> None:
+def test_on_a_linear_model_with_missing_samples_the_smoother_equals_the_textbook_one(linear: ProcessModel) -> None:
     problem = linear_task(replace(linear, name="one_step", longest_step=1.0))
     found = smoothed_stretch(problem)
     assert_equal(found, *textbook(problem, found), 1e-9)
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_on_every_form_it_is_the_textbook_smoother_that_starts_from_what_the_filter_said(form: str) -> None:
+def test_on_every_form_the_smoother_equals_the_textbook_one_started_from_the_filtered_beliefs(form: str) -> None:
     problem = bench_task(form, RIG)
     found = smoothed_stretch(problem)
     assert np.min(found.filtered_mean[:, 3]) == 0.0 or form == "acceleration"  # a bound was reached on the way
@@ -120,7 +120,9 @@ def test_on_every_form_it_is_the_textbook_smoother_that_starts_from_what_the_fil
 
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
 @pytest.mark.parametrize("form", FORMS)
-def test_its_covariance_is_a_covariance_and_never_above_the_filters(form: str, condition: Condition) -> None:
+def test_the_smoothed_covariance_is_positive_semidefinite_and_never_above_the_filtered_one(
+    form: str, condition: Condition
+) -> None:
     found = smoothed_stretch(bench_task(form, parameters_for(condition)))
     for matrices, sizes in (
         (found.filtered_covariance - found.covariance, found.filtered_covariance),
@@ -130,7 +132,7 @@ def test_its_covariance_is_a_covariance_and_never_above_the_filters(form: str, c
         assert np.min(np.linalg.eigvalsh(matrices / (size[:, :, None] * size[:, None, :]))) > -1e-12
 
 
-def test_the_last_belief_and_the_scores_are_the_filters(linear: ProcessModel) -> None:
+def test_the_last_belief_log_likelihood_and_innovations_equal_those_of_the_filter(linear: ProcessModel) -> None:
     problem = linear_task(linear)
     smooth, plain = smoother(problem), ekf(problem)
     for name in ("mean", "covariance", "nis", "count"):
@@ -139,13 +141,13 @@ def test_the_last_belief_and_the_scores_are_the_filters(linear: ProcessModel) ->
     np.testing.assert_array_equal(smooth.track[-1], plain.track[-1])
 
 
-def test_a_constant_is_known_as_well_at_the_start_as_at_the_end() -> None:
+def test_a_constant_has_the_same_value_and_deviation_along_the_whole_track() -> None:
     trace = smoother(bench_task("pressure", RIG))
     np.testing.assert_allclose(trace.track[:, 3], trace.mean[3], rtol=1e-9)
     np.testing.assert_allclose(trace.track_variance[:, 3], trace.covariance[3, 3], rtol=1e-6)
 
 
-def test_what_was_missed_is_found_between_its_neighbours() -> None:
+def test_the_smoother_bridges_gaps_better_than_the_filter() -> None:
     problem = bench_task("pressure", RIG)
     gone = np.where((np.arange(2000)[:, None] // 100) % 4 == 3, np.nan, problem.measured)
     gappy = replace(problem, measured=gone)
@@ -155,7 +157,7 @@ def test_what_was_missed_is_found_between_its_neighbours() -> None:
     assert np.mean(smooth) < 0.5 * np.mean(plain)
 
 
-def test_chunks_leave_no_seam_and_a_stretch_is_a_part_of_the_whole(linear: ProcessModel) -> None:
+def test_smoothing_in_chunks_or_of_a_part_gives_the_same_bits_as_of_the_whole_log(linear: ProcessModel) -> None:
     problem = replace(linear_task(linear, 403), every=7)
     whole, part = smoothed_stretch(problem), smoothed_stretch(problem, 101, 260)
     np.testing.assert_array_equal(part.mean, whole.mean[101:260])
@@ -166,7 +168,7 @@ def test_chunks_leave_no_seam_and_a_stretch_is_a_part_of_the_whole(linear: Proce
     np.testing.assert_array_equal(trace.track_variance, np.einsum("kii->ki", whole.covariance)[::7])
 
 
-def test_outliers_count_backwards_as_they_did_forwards(linear: ProcessModel) -> None:
+def test_the_backward_pass_weights_outliers_as_the_forward_pass_did(linear: ProcessModel) -> None:
     problem = linear_task(replace(linear, name="one_step", longest_step=1.0))
     problem.measured[70] = 300.0
     robust = replace(problem, robust="student-t")
@@ -175,7 +177,7 @@ def test_outliers_count_backwards_as_they_did_forwards(linear: ProcessModel) -> 
     np.testing.assert_array_equal(found.filtered_mean[-1], ekf(robust).mean)
 
 
-def test_sub_steps_are_smoothed_as_samples_with_nothing_measured_are(linear: ProcessModel) -> None:
+def test_substeps_are_smoothed_like_samples_without_measurements(linear: ProcessModel) -> None:
     slow = linear_task(replace(linear, name="four_steps", longest_step=0.0025))
     count = 4 * (len(slow.measured) - 1) + 1
     measured = np.full((count, 2), np.nan)
@@ -198,11 +200,11 @@ def test_a_long_log_needs_little_memory() -> None:
     assert peak < 1e6  # the beliefs of all samples would take 45e6
 
 
-def test_a_log_of_one_sample_is_the_filters_answer(linear: ProcessModel) -> None:
+def test_a_log_of_one_sample_gives_the_filtered_estimate(linear: ProcessModel) -> None:
     problem = linear_task(linear, 1)
     np.testing.assert_array_equal(smoother(problem).track, ekf(problem).track)
 
 
-def test_settings_are_refused(linear: ProcessModel) -> None:
+def test_the_smoother_refuses_any_setting(linear: ProcessModel) -> None:
     with pytest.raises(HydrostateError, match="smoother can be set nothing, got 'lag'"):
         smoother(replace(linear_task(linear), settings={"lag": 5.0}))

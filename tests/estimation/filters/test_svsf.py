@@ -50,7 +50,7 @@ def by_hand(first: float, second: float, gamma: float, limit: float) -> tuple[Ar
 
 
 @pytest.mark.parametrize("jump", [0.002, 0.03, 0.3])
-def test_it_is_the_published_filter(linear: ProcessModel, jump: float) -> None:
+def test_the_smooth_variable_structure_filter_agrees_with_its_publication(linear: ProcessModel, jump: float) -> None:
     problem = task(linear, np.array([0.01, 0.01 + jump]), gamma=0.4, boundary_layer=3.0)
     trace = svsf(problem)
     mean, P = by_hand(0.01, 0.01 + jump, 0.4, 3.0 * 0.01)
@@ -59,12 +59,12 @@ def test_it_is_the_published_filter(linear: ProcessModel, jump: float) -> None:
     np.testing.assert_allclose(trace.covariance * np.outer(scale, scale), P, rtol=1e-8, atol=1e-12)
 
 
-def test_with_a_limit_that_nothing_reaches_it_is_the_kalman_filter(linear: ProcessModel) -> None:
+def test_with_a_boundary_layer_that_is_never_reached_it_equals_the_kalman_filter(linear: ProcessModel) -> None:
     problem = task(linear, np.random.default_rng(0).normal(0.0, 0.02, 200), boundary_layer=1e9)
     np.testing.assert_allclose(svsf(problem).track, ekf(replace(problem, settings={})).track, rtol=1e-9, atol=1e-12)
 
 
-def test_it_follows_a_jump_that_the_kalman_filter_is_too_sure_to_see(linear: ProcessModel) -> None:
+def test_it_follows_a_jump_that_an_overconfident_kalman_filter_misses(linear: ProcessModel) -> None:
     position = np.concatenate([np.zeros(2000), np.full(20, 0.5)]) + np.random.default_rng(1).normal(0.0, 0.01, 2020)
     problem = task(linear, position, boundary_layer=10.0)
     problem = replace(problem, noise=np.zeros(3))  # assumes that nothing but the model moves the state
@@ -73,7 +73,7 @@ def test_it_follows_a_jump_that_the_kalman_filter_is_too_sure_to_see(linear: Pro
     assert abs(ekf(replace(problem, settings={})).mean[0] - late) > 0.5 * late
 
 
-def test_missing_samples_change_nothing_but_the_prediction(linear: ProcessModel) -> None:
+def test_missing_samples_give_predictions_without_update(linear: ProcessModel) -> None:
     gone = task(linear, np.array([0.01, np.nan, np.nan]), boundary_layer=3.0)
     speed = gone.drives
     alone = replace(gone, measured=gone.measured[:1], drives=speed[:1])
@@ -83,7 +83,7 @@ def test_missing_samples_change_nothing_but_the_prediction(linear: ProcessModel)
     assert after.count.tolist() == [1.0]
 
 
-def test_what_it_cannot_do_is_refused(linear: ProcessModel) -> None:
+def test_invalid_settings_and_robust_updates_are_refused(linear: ProcessModel) -> None:
     problem = task(linear, np.zeros(3))
     for settings, message in (
         ({"gamma": 1.0}, "gamma must be 0 or more and below 1, got 1.0"),

@@ -10,7 +10,7 @@ from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
 
-def test_air_that_gets_in_has_a_time_at_which_it_does() -> None:
+def test_air_is_reported_as_entering_only_if_its_onset_is_clearly_after_the_start() -> None:
     for onset, told in ((0.0, False), (0.004, False), (0.009, False), (0.4, True)):
         values, stds = {"air_softness": 700.0, "air_onset": onset}, {"air_softness": 9.0, "air_onset": 0.005}
         assert AIR_MIDWAY.told(values, stds) == told

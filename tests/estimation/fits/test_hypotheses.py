@@ -50,7 +50,7 @@ def lagging(lag: float) -> Record:
     return record.replace(**{PRESSURE: lfilter([share], [1.0, share - 1.0], true) + noise})
 
 
-def test_a_speed_that_lags_by_little_more_than_a_sample_is_no_lead_of_the_motor(
+def test_a_speed_that_lags_by_over_a_sample_is_not_mistaken_for_a_motor_lead(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     record = log()
@@ -69,12 +69,12 @@ def late(record: Record, samples: int) -> Record:
     return record.replace(**{PRESSURE: np.concatenate([np.zeros(samples), record[PRESSURE][:-samples]])})
 
 
-def test_a_plain_log_is_not_asked() -> None:
+def test_a_plain_log_needs_no_explanation() -> None:
     clean = clean_log(log(), HEALTHY)
     assert fit_flow(clean.record, HEALTHY, HEALTHY.bulk_modulus, {}, clean.variances).explanation is None
 
 
-def test_a_late_pressure_is_named_with_its_delay_and_brought_forward() -> None:
+def test_a_late_pressure_is_identified_with_its_delay_and_corrected() -> None:
     record = log()
     found = explained(late(record, 5))
     assert found.names == ("pressure_late",)
@@ -87,7 +87,7 @@ def test_a_late_pressure_is_named_with_its_delay_and_brought_forward() -> None:
 
 
 @pytest.mark.slow
-def test_a_lag_and_a_delay_are_known_by_their_sum() -> None:
+def test_the_reported_lateness_is_the_sum_of_lag_and_delay() -> None:
     (note,) = notes_of(explained(late(lagging(2e-3), 3)), HEALTHY)
     assert note.code is RigCode.PRESSURE_LATE
     assert note.data["late_ms"] == pytest.approx(5.0, abs=0.6)
@@ -98,7 +98,7 @@ LATE = ("motor_speed_rad_s", "speed_late"), ("position_m", "position_late")
 
 
 @pytest.mark.parametrize(("channel", "name"), thinned(LATE, [LATE[0]]))
-def test_a_late_speed_or_position_is_named_with_its_delay_and_brought_forward(channel: str, name: str) -> None:
+def test_a_late_speed_or_position_is_identified_with_its_delay_and_corrected(channel: str, name: str) -> None:
     record = log()
     behind = np.concatenate([np.full(3, record[channel][0]), record[channel][:-3]])
     given = record.replace(**{channel: behind})
@@ -113,7 +113,7 @@ def test_a_late_speed_or_position_is_named_with_its_delay_and_brought_forward(ch
     assert np.std((mended - record[channel])[there]) < 0.2 * np.std((behind - record[channel])[there])
 
 
-def test_a_velocity_from_a_late_encoder_comes_forward_with_it_and_one_of_its_own_stays() -> None:
+def test_a_velocity_from_a_late_encoder_is_corrected_with_it_and_a_separate_one_is_not() -> None:
     record = log("steps")
     behind = {name: np.concatenate([np.zeros(5), record[name][:-5]]) for name in ("position_m", "velocity_m_s")}
     fit = cast("GreyBoxFit", None)
@@ -124,7 +124,7 @@ def test_a_velocity_from_a_late_encoder_comes_forward_with_it_and_one_of_its_own
     assert np.array_equal(set_right(alone, found).record["velocity_m_s"], alone.record["velocity_m_s"])
 
 
-def test_an_offset_that_drifts_is_named_and_taken_off() -> None:
+def test_a_drifting_pressure_offset_is_identified_and_subtracted() -> None:
     record = log()
     drifting = record.replace(**{PRESSURE: record[PRESSURE] + np.linspace(0.0, -1e5, len(record))})
     found = explained(drifting)
@@ -136,7 +136,7 @@ def test_an_offset_that_drifts_is_named_and_taken_off() -> None:
     assert np.std(mended - record[PRESSURE]) < 2e3
 
 
-def test_a_pressure_that_reads_a_bar_too_much_is_an_offset_that_is_taken_off_and_no_load_at_the_start() -> None:
+def test_a_pressure_that_reads_a_bar_too_high_is_an_offset_and_not_an_initial_load() -> None:
     record = log()
     off = record.replace(**{PRESSURE: record[PRESSURE] + 1e5})
     found = estimate_log(off, Rig(HEALTHY))
@@ -151,7 +151,7 @@ def test_a_pressure_that_reads_a_bar_too_much_is_an_offset_that_is_taken_off_and
     assert found.quantities["bulk_modulus"].value == pytest.approx(HEALTHY.bulk_modulus, rel=0.01)
 
 
-def test_a_delay_is_sought_no_longer_than_a_sensor_may_have(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_delays_are_searched_only_up_to_the_longest_of_a_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
     (late,) = (one for one in HYPOTHESES if one.name == "pressure_late")
     plain = SimpleNamespace(coarsened=lambda: plain, passes_on=False)
 
@@ -167,7 +167,7 @@ def test_a_delay_is_sought_no_longer_than_a_sensor_may_have(monkeypatch: pytest.
     assert found.delays[late.late] == pytest.approx(LATEST, abs=1e-3)
 
 
-def test_an_encoder_that_was_homed_at_the_end_stop_is_named_and_shifted() -> None:
+def test_an_encoder_that_was_homed_at_the_end_stop_is_identified_and_corrected() -> None:
     record = log("steps", 2.5)
     found = explained(record.replace(position_m=record["position_m"] + 0.12))
     assert "encoder_zero" in found.names
@@ -176,7 +176,7 @@ def test_an_encoder_that_was_homed_at_the_end_stop_is_named_and_shifted() -> Non
 
 
 @pytest.mark.parametrize(("share", "code"), [(1.04, RigCode.AREA_TO_DISPLACEMENT), (0.8, RigCode.PUMP_WORN)])
-def test_a_pump_that_delivers_otherwise_is_named_by_the_ratio(share: float, code: RigCode) -> None:
+def test_a_pump_with_another_delivery_is_identified_with_its_ratio(share: float, code: RigCode) -> None:
     record = log("steps", 2.5, replace(HEALTHY, pump_displacement=share * HEALTHY.pump_displacement))
     found = explained(record)
     note = notes_of(found, HEALTHY)[0]
@@ -186,7 +186,7 @@ def test_a_pump_that_delivers_otherwise_is_named_by_the_ratio(share: float, code
 
 
 @pytest.mark.slow
-def test_a_log_that_begins_under_load_says_so() -> None:
+def test_a_log_that_begins_under_load_is_identified() -> None:
     record = log(duration=2.5)
     begun = record.slice(1500, len(record))
     found = explained(begun)
@@ -194,7 +194,7 @@ def test_a_log_that_begins_under_load_says_so() -> None:
 
 
 @pytest.mark.parametrize("condition", thinned(["major_leakage", "major_leakage_major_friction"], ["major_leakage"]))
-def test_an_encoder_homed_elsewhere_is_named_where_held_volumes_explain_the_log_too(condition: str) -> None:
+def test_an_encoder_homed_elsewhere_is_identified_even_if_held_volumes_explain_the_log(condition: str) -> None:
     p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(5)
     record = simulate(CIRCUIT, make_drive("multisine", 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     assert fit_flow(record, HEALTHY, HEALTHY.bulk_modulus).explanation is None
@@ -206,7 +206,7 @@ def test_an_encoder_homed_elsewhere_is_named_where_held_volumes_explain_the_log_
 
 
 @pytest.mark.parametrize(("times", "begun"), [(19.0, 1), (21.0, 2)])
-def test_a_search_begins_with_usual_valves_too_where_a_fit_ended_with_far_wider_ones(times: float, begun: int) -> None:
+def test_a_search_also_begins_with_usual_valves_if_the_fit_ended_with_far_wider_ones(times: float, begun: int) -> None:
     plain = made_fit(100.0, 1.9e8, 1e6)
     fit = replace(plain, values={**plain.values, "makeup_conductance": times * MAKEUP_TRIED[0]})
     near = near_starts(fit, flow_starts(HEALTHY, 3e8), lambda _: False, in_motion=False)
@@ -215,7 +215,7 @@ def test_a_search_begins_with_usual_valves_too_where_a_fit_ended_with_far_wider_
     assert near[begun]["bulk_modulus"] != 1.9e8
 
 
-def test_a_single_rod_whose_rig_file_gives_one_area_is_named_with_both() -> None:
+def test_a_single_rod_whose_rig_file_gives_one_area_is_identified_with_both_areas() -> None:
     rod = replace(HEALTHY, area_difference=0.18, volume_difference=0.1, pilot_share=1.0)
     found = explained(log(parameters=rod))
     (note,) = notes_of(found, HEALTHY)
@@ -228,7 +228,7 @@ def test_a_single_rod_whose_rig_file_gives_one_area_is_named_with_both() -> None
     assert mended.pilot_share > 0.0
 
 
-def test_play_of_the_encoder_is_named_and_taken_up() -> None:
+def test_encoder_play_is_identified_and_corrected() -> None:
     record, play = log("prbs", 2.5), 3e-5
     read = record["position_m"].copy()
     for i in range(1, len(read)):
@@ -243,7 +243,7 @@ def test_play_of_the_encoder_is_named_and_taken_up() -> None:
     assert np.std(mended - record["position_m"]) < 0.6 * np.std(read - record["position_m"])
 
 
-def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else_must() -> None:
+def test_only_an_encoder_zero_homed_at_a_stop_need_not_gain_over_held_volumes() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
     wanted = partial(wanted_cost, homed=True, late=False)
     assert [wanted(("encoder_zero",), held, one) for one in (swinging, held)] == [110.0, 90.0]
@@ -254,7 +254,7 @@ def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else
     assert wanted(("volume",), held, swinging) == wanted(("encoder_zero", "air"), held, swinging) == 90.0
 
 
-def test_the_lag_of_a_filtered_pressure_is_believed_whatever_it_gains() -> None:
+def test_the_lag_of_a_filtered_pressure_is_accepted_even_without_a_gain() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
     wanted = partial(wanted_cost, best=held, swinging=swinging, homed=False)
     assert wanted(("pressure_late",), late=True) == 100.0 + module.WORTH
@@ -263,7 +263,7 @@ def test_the_lag_of_a_filtered_pressure_is_believed_whatever_it_gains() -> None:
 
 
 @pytest.mark.parametrize(("seed", "seconds"), thinned([(2, 8.0), (2, 20.0), (3, 20.0)], [(2, 8.0)]))
-def test_a_plant_that_holds_its_volumes_is_not_said_to_have_another_zero(seed: int, seconds: float) -> None:
+def test_no_encoder_zero_is_reported_for_a_plant_with_held_volumes(seed: int, seconds: float) -> None:
     """Both explain its log equally well; an encoder homed at a stop reads one sign only, and not zero in mid-stroke.
 
     A test above gives the gain that a zero needs if no stop was seen; on the longer logs the zero is tested.
@@ -276,7 +276,7 @@ def test_a_plant_that_holds_its_volumes_is_not_said_to_have_another_zero(seed: i
     assert abs(value - HEALTHY.bulk_modulus) < 2.5 * std < 3e-3 * HEALTHY.bulk_modulus
 
 
-def test_a_log_cut_out_of_a_run_where_pressure_crosses_zero_is_fitted_from_sides_shut_in_high() -> None:
+def test_bulk_modulus_is_right_in_a_log_cut_at_a_zero_crossing_of_pressure() -> None:
     """Both chambers are then far above the accumulator, which a form without make-up at first explains as well."""
     p = replace(HEALTHY, leakage_coefficient=2.5e-11)
     run = simulate(CIRCUIT, np.repeat([120.0, -120.0, 60.0, -90.0] * 3, 250), 1e-3, p, sensors=BENCH,
@@ -292,7 +292,7 @@ def test_a_log_cut_out_of_a_run_where_pressure_crosses_zero_is_fitted_from_sides
     assert value == pytest.approx(HEALTHY.bulk_modulus, rel=5e-3)
 
 
-def test_where_volume_and_mass_explain_alike_what_they_disagree_on_is_in_the_deviation() -> None:
+def test_disagreement_between_volume_and_mass_balance_is_in_the_deviation() -> None:
     clean = clean_log(log("multisine", 4.0).slice(1500, 4000), HEALTHY)
     fit = fit_flow(clean.record, HEALTHY, HEALTHY.bulk_modulus, {}, clean.variances, LogTraits(loaded=True))
     assert fit.explanation is not None
@@ -317,7 +317,7 @@ def test_wear_of_the_pump_is_not_excluded_by_a_log_at_one_speed() -> None:
     assert RigCode.WEAR_NOT_EXCLUDED not in [note.code for note in estimate_log(log("steps", 1.0), Rig(HEALTHY)).notes]
 
 
-def test_a_worn_pump_that_is_not_excluded_leaves_bulk_modulus_too_low_as_its_note_says() -> None:
+def test_the_note_on_possible_wear_warns_that_bulk_modulus_may_be_too_low_and_it_is() -> None:
     worn = replace(parameters_for(CONDITIONS["major_leakage"]), pump_displacement=0.85 * HEALTHY.pump_displacement)
     one_speed = 100.0 * np.where(np.arange(2000) // 50 % 2, -1.0, 1.0)
     record = simulate(CIRCUIT, one_speed, 1e-3, worn, sensors=BENCH, rng=np.random.default_rng(3))
@@ -327,13 +327,13 @@ def test_a_worn_pump_that_is_not_excluded_leaves_bulk_modulus_too_low_as_its_not
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(0.85 * worn.bulk_modulus, rel=0.05)
 
 
-def test_leakage_may_rise_by_a_share_in_each_minute() -> None:
+def test_leakage_can_rise_exponentially() -> None:
     elapsed = np.linspace(0.0, 1.0, 11)
     risen = grown_leakage(elapsed, 0.0, 0.0, np.log(12.5))
     assert risen == pytest.approx(12.5 ** (elapsed - 0.5), rel=3e-3)
 
 
-def test_absent_additions_leave_the_plain_form() -> None:
+def test_the_wide_form_starts_at_accumulator_pressure_and_leaks_more_with_growth() -> None:
     absent = WideFlowParameters()
     assert WIDE_FLOW_FORM.initial(absent)[0] == HEALTHY.accumulator_pressure
     now = 3e5, 2e5, 0.0, 2.8e5
@@ -343,7 +343,7 @@ def test_absent_additions_leave_the_plain_form() -> None:
     assert grown[0] < plain[0]
 
 
-def test_a_worn_pump_that_passes_for_leakage_is_found_all_the_same() -> None:
+def test_a_worn_pump_that_looks_like_leakage_is_identified() -> None:
     worn = replace(HEALTHY, pump_displacement=0.8 * HEALTHY.pump_displacement, leakage_coefficient=2e-11)
     (note, *_) = notes_of(explained(log("multisine", 2.5, worn)), HEALTHY)
     assert note.code is RigCode.PUMP_WORN

@@ -32,7 +32,7 @@ def logged(crack_a: float, crack_b: float) -> Record:
 @pytest.mark.parametrize(
     ("crack_a", "crack_b", "late"), thinned([(2.8e4, 1.2e4, "A"), (1.2e4, 2.8e4, "B")], [(1.2e4, 2.8e4, "B")])
 )
-def test_valves_that_open_apart_are_named_and_are_no_offset_of_the_pressure(
+def test_unequal_cracking_pressures_are_identified_and_not_mistaken_for_an_offset(
     crack_a: float, crack_b: float, late: str
 ) -> None:
     clean = clean_log(logged(crack_a, crack_b), PAPER)
@@ -47,7 +47,7 @@ def test_valves_that_open_apart_are_named_and_are_no_offset_of_the_pressure(
     assert abs(value - Machine().bulk_modulus) < 3.0 * std
 
 
-def test_a_valve_that_never_opens_tells_no_drop() -> None:
+def test_no_cracking_pressure_is_reported_for_a_valve_that_never_opens() -> None:
     """A valve stuck shut was said to open 1e5 ± 2e8 Pa late, and the log to be healthy."""
     for value, std, told in ((2e4, 1e3, True), (1e5, 2.4e8, False), (1e5, np.inf, False)):
         assert CHECKS_CRACK.told({"crack_pressure": value}, {"crack_pressure": std}) == told

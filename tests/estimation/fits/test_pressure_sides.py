@@ -13,7 +13,7 @@ RUBBING = replace(HEALTHY, friction_quadratic=4.462e6, friction_linear=1.863e4, 
 
 
 @pytest.mark.parametrize("half", [0.015, -0.01])
-def test_gauges_with_unlike_gains_are_named_and_bulk_modulus_is_right_beside_them(half: float) -> None:
+def test_unlike_gains_of_two_gauges_are_identified_and_bulk_modulus_is_right(half: float) -> None:
     record = log("steps", 2.0, RUBBING)
     true = record[PRESSURE]
     above = record["pressure_a_pa"] + record["pressure_b_pa"] - 2.0 * HEALTHY.accumulator_pressure

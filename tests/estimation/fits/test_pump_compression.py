@@ -35,7 +35,7 @@ def filled_at_its_inlet() -> tuple[Record, float]:
     return log.replace(motor_speed_rad_s=speed / (1.0 - SHARE * squeezed)), beta
 
 
-def test_a_pump_that_fills_at_its_inlet_is_named_and_leaves_bulk_modulus_right() -> None:
+def test_a_pump_that_compresses_its_oil_is_identified_and_bulk_modulus_is_right() -> None:
     record, modulus = filled_at_its_inlet()
     log = clean_log(record, RIG)
     fit = fit_flow(log.record, RIG, RIG.bulk_modulus, {}, log.variances)
@@ -50,7 +50,7 @@ def test_a_pump_that_fills_at_its_inlet_is_named_and_leaves_bulk_modulus_right()
     assert note.data["share"] == pytest.approx(share)
 
 
-def test_a_pump_loses_the_compression_of_its_oil_and_of_what_stays_in_its_teeth() -> None:
+def test_a_pump_loses_the_compression_of_its_oil_and_of_the_oil_left_in_its_teeth() -> None:
     assert compressed(0.02, 1.0) == pytest.approx(0.98)
     assert compressed(0.02, 1.5) == pytest.approx(0.97)
     assert compressed(-0.02, 1.0) == pytest.approx(1.02)

@@ -27,12 +27,12 @@ def test_the_root_is_that_of_scipy(
     assert root_between(function, low, high, tolerance) == pytest.approx(wanted, rel=1e-14, abs=1e-300)
 
 
-def test_ends_of_one_sign_are_refused() -> None:
+def test_an_interval_without_a_sign_change_is_refused() -> None:
     with pytest.raises(ValueError, match="unlike signs"):
         root_between(lambda x: x * x + 1.0, -1.0, 1.0, 1e-9)
 
 
-def test_a_root_that_is_not_reached_is_left_where_it_was_nearest(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_approximate_root_is_returned_if_the_steps_run_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("estimation.fits.root.MOST_STEPS", 3)
     found = root_between(lambda x: x**3 - x - 1.0, -5.0, 9.0, 1e-12)
     assert 1e-6 < abs(found - 1.3247179572447460) < 5.0

@@ -65,11 +65,11 @@ def test_windows_that_are_not_steady_are_left_out() -> None:
     assert np.ptp(points.pressure) < 0.01 * np.mean(points.pressure)
 
 
-def test_a_piston_that_sticks_is_no_point() -> None:
+def test_a_sticking_piston_gives_no_steady_point() -> None:
     assert len(steady_points([measure(held(CIRCUIT_RIG, 0.05), BENCH, np.random.default_rng(1))])) == 0
 
 
-def test_velocity_serves_where_position_is_not_logged() -> None:
+def test_velocity_is_used_if_position_is_not_logged() -> None:
     log = measure(held(CIRCUIT_RIG, 3.0), BENCH, np.random.default_rng(1))
     with_position, without = (steady_points([one]) for one in (log, log.replace(position_m=None)))
     assert np.mean(without.velocity) == pytest.approx(np.mean(with_position.velocity), rel=1e-3)
@@ -77,7 +77,7 @@ def test_velocity_serves_where_position_is_not_logged() -> None:
 
 
 @pytest.mark.parametrize("a_volts", [10.0, 1.75])
-def test_leakage_comes_back_from_the_circuit(a_volts: float) -> None:
+def test_leakage_is_recovered_from_circuit_logs(a_volts: float) -> None:
     p, logs = leaking_logs(a_volts)
     fits = [
         fit_leakage(steady_points(measure(log, BENCH, rng) for log in logs), p)
@@ -89,7 +89,7 @@ def test_leakage_comes_back_from_the_circuit(a_volts: float) -> None:
 
 
 @pytest.mark.parametrize("b_volts", [0.0, 2.3, 2.5])
-def test_the_friction_parabola_comes_back_from_the_circuit(b_volts: float) -> None:
+def test_the_friction_parabola_is_recovered_from_circuit_logs(b_volts: float) -> None:
     p, logs = rubbing_logs(b_volts)
     fits = [
         fit_friction(steady_points(measure(log, BENCH, rng) for log in logs), p)
@@ -102,7 +102,7 @@ def test_the_friction_parabola_comes_back_from_the_circuit(b_volts: float) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("a_volts", [10.0, 2.0, 1.75])
-def test_intervals_of_leakage_hold_in_nine_of_ten_seeds(a_volts: float) -> None:
+def test_intervals_of_leakage_cover_the_truth_in_nine_of_ten_seeds(a_volts: float) -> None:
     p, logs = leaking_logs(a_volts)
     fits = [
         fit_leakage(steady_points(measure(log, BENCH, np.random.default_rng(seed)) for log in logs), p)
@@ -114,7 +114,7 @@ def test_intervals_of_leakage_hold_in_nine_of_ten_seeds(a_volts: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("b_volts", [0.0, 2.3, 2.5])
-def test_intervals_of_friction_hold_in_nine_of_ten_seeds(b_volts: float) -> None:
+def test_intervals_of_friction_cover_the_truth_in_nine_of_ten_seeds(b_volts: float) -> None:
     p, logs = rubbing_logs(b_volts)
     fits = [
         fit_friction(steady_points(measure(log, BENCH, np.random.default_rng(seed)) for log in logs), p)

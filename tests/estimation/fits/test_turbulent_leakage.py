@@ -44,7 +44,7 @@ def leaking(share: float) -> tuple[Record, float, float]:
     return Record.from_frame(log), setup.machine.bulk_modulus, setup.machine.leakage
 
 
-def test_a_turbulent_share_of_the_leakage_is_named_and_leaves_bulk_modulus_right() -> None:
+def test_a_turbulent_share_of_leakage_is_identified_and_bulk_modulus_is_right() -> None:
     record, modulus, leakage = leaking(SHARE)
     log = clean_log(record, RIG)
     fit = fit_flow(log.record, RIG, RIG.bulk_modulus, {}, log.variances)
@@ -61,7 +61,7 @@ def test_a_turbulent_share_of_the_leakage_is_named_and_leaves_bulk_modulus_right
     assert note.data["percent"] == pytest.approx(100.0 * share)
 
 
-def test_turbulent_leakage_is_an_orifices_at_high_pressure_and_laminar_at_low() -> None:
+def test_turbulent_leakage_follows_the_orifice_law_at_high_pressure_and_is_laminar_at_low() -> None:
     pressures = TURBULENT_AT * np.array([1.0, 4.0, 16.0])
     assert turbulent_leakage(pressures, 1.0) == pytest.approx([1.0, 0.5, 0.25], rel=1e-3)
     assert turbulent_leakage(pressures, 0.0) == pytest.approx(1.0)
@@ -69,7 +69,7 @@ def test_turbulent_leakage_is_an_orifices_at_high_pressure_and_laminar_at_low() 
     assert low[1] == pytest.approx(low[0], rel=1e-6)
 
 
-def test_only_a_log_that_is_asked_for_a_turbulent_share_or_an_exponent_pays_for_roots_and_powers() -> None:
+def test_the_form_computes_roots_and_powers_only_if_a_hypothesis_needs_them() -> None:
     record, *_ = leaking(0.0)
     sound, variances = without_strays(record)
     log = widened(flow_log(sound, RIG, {}, variances), RIG)

@@ -30,7 +30,7 @@ def fitted(lead_std: float, late: int = 0) -> GreyBoxFit:
     return concluded(problem, problem.at(problem.model.theta(values)), disturbed=late > 0)
 
 
-def test_a_lead_that_is_not_felt_by_its_unit_leaves_bulk_modulus_open() -> None:
+def test_a_motor_lead_with_little_effect_per_unit_widens_the_deviation_of_bulk_modulus() -> None:
     free, held = fitted(25.0), fitted(1e-6)
     place = free.model.unknowns.index("speed_lead")
     assert np.linalg.norm(free.slopes[:, place]) < LEAST_EFFECT
@@ -38,14 +38,14 @@ def test_a_lead_that_is_not_felt_by_its_unit_leaves_bulk_modulus_open() -> None:
     assert free.std[BULK_MODULUS] > 1.1 * held.std[BULK_MODULUS]
 
 
-def test_what_is_known_of_a_lead_goes_with_the_sample_time() -> None:
+def test_the_prior_deviation_of_the_motor_lead_is_proportional_to_the_sample_time() -> None:
     for sample_time in (1e-3, 2e-3):
         value, std = seen(log(1.0, sample_time)).presumed["speed_lead"]
         assert value == 0.0
         assert std * dict(FLOW_FORM.linear)["speed_lead"] == pytest.approx(MOST_LEAD * sample_time)
 
 
-def test_a_lead_that_is_not_felt_by_its_unit_takes_up_no_channel_that_is_late() -> None:
+def test_a_motor_lead_with_little_effect_per_unit_does_not_absorb_a_late_channel() -> None:
     """In the linear approximation it becomes negative: a pressure 2 ms late passed, with bulk modulus 2.3 % too low."""
     free, held = fitted(25.0, late=2), fitted(1e-6, late=2)
     place = free.model.unknowns.index("speed_lead")
@@ -55,7 +55,7 @@ def test_a_lead_that_is_not_felt_by_its_unit_takes_up_no_channel_that_is_late() 
         assert free.late[channel] == pytest.approx(told, rel=1e-3)
 
 
-def test_a_make_up_valve_that_is_barely_felt_leaves_no_leakage_open_that_no_valve_has() -> None:
+def test_a_limited_prior_of_a_barely_felt_make_up_valve_narrows_the_deviation_of_leakage() -> None:
     """Its logarithm was known to within e^30 or not at all, and the deviation of leakage differed fourfold with it."""
     sparse = seen(log(2.0), PAPER)
     values = {"makeup_conductance": 1e-13, "makeup_opening": 1e3, "case_leakage": 1e-13, "speed_lead": 1e-5}

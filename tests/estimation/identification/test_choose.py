@@ -16,7 +16,7 @@ from estimation.identification.model.recursion import filtered
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_orders_from_one_to_four_are_compared_and_the_one_that_made_the_record_is_taken(order: int) -> None:
+def test_orders_from_one_to_four_are_compared_and_the_true_one_is_taken(order: int) -> None:
     rng = np.random.default_rng(2)
     u = np.repeat(rng.choice([-1.0, 1.0], 150), 8)
     denominator = np.poly([0.9, 0.6][:order])
@@ -30,7 +30,7 @@ def test_orders_from_one_to_four_are_compared_and_the_one_that_made_the_record_i
     assert choice.model.structure == choice.structures["fit_percent"].idxmax()
 
 
-def test_of_two_experiments_each_is_fitted_and_held_back_and_a_short_one_is_fitted_alone() -> None:
+def test_each_experiment_is_split_into_a_fitted_and_a_held_back_part_except_a_short_one() -> None:
     rng = np.random.default_rng(4)
     first, second, short = (rng.normal(size=n) for n in (2 * LEAST, 3 * LEAST, LEAST - 1))
     fitted, kept = split_record([first, second], [-first, -second])
@@ -56,7 +56,7 @@ def test_structures_are_compared_on_the_second_of_two_experiments_too() -> None:
     assert compare_structures(u, other, 0.01, form, ("output-error",))["fit_percent"].iloc[0] < 50.0
 
 
-def test_what_a_log_holds_back_is_followed_if_its_plant_stays_and_not_if_it_changes() -> None:
+def test_the_held_back_fit_is_good_for_a_constant_plant_and_negative_for_a_changed_one() -> None:
     rng = np.random.default_rng(6)
     u = np.repeat(rng.choice([-1.0, 1.0], 150), 8)
     y = filtered([0.0, 0.5], [1.0, -0.9], u) + 0.05 * rng.normal(size=u.size)

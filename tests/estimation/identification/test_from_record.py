@@ -50,7 +50,7 @@ def test_a_record_is_resampled_to_the_model_s_sample_time(plant_30hz: LinearMode
     assert model.dc_gain == pytest.approx(fast.dc_gain, rel=0.01)
 
 
-def test_without_velocity_position_is_differentiated_and_said(record: Record) -> None:
+def test_without_velocity_the_position_is_differentiated_with_a_warning(record: Record) -> None:
     position = cumulative_trapezoid(record["velocity_m_s"], dx=1e-3, initial=0.0)
     with pytest.warns(LogWarning) as caught:
         model = identify_record(record.replace(velocity_m_s=None, position_m=position))
@@ -84,7 +84,7 @@ def test_a_record_without_the_channels_is_refused(record: Record) -> None:
         identify_record(Record(1e-3, {"motor_speed_rad_s": np.ones(2), "position_m": np.ones(2)}))
 
 
-def test_three_samples_of_position_have_a_velocity_and_what_is_made_up_is_told_to_who_asked() -> None:
+def test_three_samples_of_position_give_a_velocity_and_warnings_that_point_at_the_caller() -> None:
     short = Record(1e-3, {"motor_speed_rad_s": np.array([1.0, np.nan, 3.0]), "position_m": np.array([0.0, 1e-3, 4e-3])})
     with pytest.warns(LogWarning) as caught:
         u, y = record_signals(short)

@@ -38,5 +38,5 @@ LOG = Record(1e-3, {"motor_speed_rad_s": U, "velocity_m_s": Y, "force_n": -Y})
         (lambda **given: etfe(U, Y, 1e-3).gain_band(**given), {"level": 0.95}),
     ],
 )
-def test_what_is_not_named_is_the_default(made: Callable[..., Any], named: dict[str, Any]) -> None:
+def test_omitted_arguments_have_the_expected_defaults(made: Callable[..., Any], named: dict[str, Any]) -> None:
     np.testing.assert_equal(made(), made(**named))

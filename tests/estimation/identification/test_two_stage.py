@@ -32,7 +32,7 @@ def gain_of(record: Record, references: tuple[str, ...]) -> float:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_a_reference_takes_the_bias_of_a_closed_loop_away() -> None:
+def test_a_reference_removes_the_bias_of_a_closed_loop() -> None:
     told = np.array([[gain_of(record, names) for names in ((), ("r",))] for record in map(closed_loop, range(3))])
     alone, staged = told.mean(axis=0) - 1.0
     # over 20 seeds the gains are 0.58 ± 0.16 and 0.99 ± 0.22
@@ -40,7 +40,7 @@ def test_a_reference_takes_the_bias_of_a_closed_loop_away() -> None:
     assert abs(staged) < 3.0 * 0.22 / np.sqrt(3.0)
 
 
-def test_the_explained_share_of_an_input_is_said_and_fits_are_from_it() -> None:
+def test_the_share_of_the_input_explained_by_the_reference_is_noted_and_the_fit_is_rated_on_it() -> None:
     (found,), (data,) = identify_columns([closed_loop(1)], ["u"], ["y"], references=["r"], options=FORM)
     # the measured input contains noise that is already in the output
     assert found.quality.fit_percent > found.model.quality(data.u, data.y).fit_percent + 10.0
@@ -50,7 +50,7 @@ def test_the_explained_share_of_an_input_is_said_and_fits_are_from_it() -> None:
     assert 0.1 < note.data["share"] < 0.9
 
 
-def test_a_reference_that_drives_nothing_is_refused() -> None:
+def test_a_reference_that_does_not_drive_the_input_or_is_the_output_is_refused() -> None:
     with pytest.raises(HydrostateError, match="does not follow the reference other"):
         identify_columns([closed_loop(1, 200)], ["u"], ["y"], references=["other"])
     with pytest.raises(HydrostateError, match="neither input nor output"):

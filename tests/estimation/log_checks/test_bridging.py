@@ -43,7 +43,7 @@ def noisy_record(samples: int = 400) -> Record:
     return Record(0.01, {name: rng.normal(0.0, size, samples) for name, size in channels.items()})
 
 
-def test_a_walk_across_a_gap_strays_from_the_line_by_less_than_is_opened() -> None:
+def test_the_variance_added_in_a_gap_is_one_to_two_times_that_of_a_random_walk() -> None:
     walks = np.cumsum(np.random.default_rng(1).normal(0.0, 3.0, (4000, 400)), axis=1)
     holed = walks.copy()
     holed[:, 200:230] = np.nan
@@ -52,7 +52,7 @@ def test_a_walk_across_a_gap_strays_from_the_line_by_less_than_is_opened() -> No
     assert np.var(strayed) < opened < 2.0 * np.var(strayed)
 
 
-def test_a_step_in_a_gap_strays_from_the_line_by_the_variance_that_is_opened() -> None:
+def test_the_variance_added_in_a_gap_is_that_of_a_step() -> None:
     whens = np.arange(100, 111)
     speeds = np.where(np.arange(300) < whens[:, None], -100.0, 100.0)
     holed = speeds.copy()
@@ -62,7 +62,7 @@ def test_a_step_in_a_gap_strays_from_the_line_by_the_variance_that_is_opened() -
     assert np.var(strayed) == pytest.approx(opened, rel=1e-9)
 
 
-def test_a_slow_sensor_has_no_gaps_and_opens_its_steps_alone() -> None:
+def test_a_slow_sensor_has_no_gaps_and_adds_variance_only_at_its_steps() -> None:
     speed = np.full(1000, np.nan)
     speed[3::10] = np.where(np.arange(100) < 50, -100.0, 100.0)
     assert not np.any(gaps(speed)[1])
@@ -81,7 +81,7 @@ def test_the_ends_of_a_log_are_gaps_too() -> None:
     assert not np.any(opened[21:-10])
 
 
-def test_a_log_without_gaps_is_filtered_as_it_ever_was(linear: ProcessModel) -> None:
+def test_a_log_without_gaps_is_filtered_with_the_original_model(linear: ProcessModel) -> None:
     record = noisy_record()
     problem = filter_problem(linear, PRIOR, record, HEALTHY, variances=VARIANCES)
     assert problem.model is linear
@@ -89,7 +89,7 @@ def test_a_log_without_gaps_is_filtered_as_it_ever_was(linear: ProcessModel) -> 
 
 
 @pytest.mark.parametrize("method", [filterpy_ekf, ukf])
-def test_every_filter_opens_alike(linear: ProcessModel, method: object) -> None:
+def test_every_filter_adds_the_same_variance_in_a_gap(linear: ProcessModel, method: object) -> None:
     record = without(noisy_record(), "motor_speed_rad_s", 200, 220)
     ours, theirs = (
         run_filter(one, linear, PRIOR, record, HEALTHY, variances=VARIANCES, keep_innovations=True)
@@ -102,7 +102,7 @@ def test_every_filter_opens_alike(linear: ProcessModel, method: object) -> None:
     assert believed[-1] == pytest.approx(believed[199], rel=0.1)
 
 
-def test_what_is_opened_is_the_volume_over_what_takes_it_up(linear: ProcessModel) -> None:
+def test_a_gap_of_motor_speed_adds_the_variance_of_the_swept_position(linear: ProcessModel) -> None:
     record = without(noisy_record(), "motor_speed_rad_s", 200, 220)
     problem = filter_problem(linear, PRIOR, record, HEALTHY, variances=VARIANCES)
     angle = unknown_angle(record["motor_speed_rad_s"], 0.01)
@@ -122,7 +122,7 @@ def test_five_drop_outs_of_a_channel_do_not_move_the_flow_filter(channel: str) -
     assert abs(value - HEALTHY.bulk_modulus) < 2.0 * std
 
 
-def test_pressures_within_a_gap_of_position_are_not_compared() -> None:
+def test_pressures_within_a_gap_of_position_are_not_used() -> None:
     record = without(prbs(0.5), "position_m", 200, 300)
     spoilt = record[PRESSURE].copy()
     spoilt[200:300] += 1e6
@@ -132,7 +132,7 @@ def test_pressures_within_a_gap_of_position_are_not_compared() -> None:
     assert moved.settled("bulk_modulus_pa") == kept.settled("bulk_modulus_pa")
 
 
-def test_a_signal_that_is_all_gaps_cannot_be_bridged() -> None:
+def test_a_signal_without_finite_samples_is_refused() -> None:
     with pytest.raises(HydrostateError, match="at least one finite sample"):
         bridged(np.full(5, np.nan))
     np.testing.assert_array_equal(bridged(np.array([np.nan, 1.0, np.nan, 3.0])), [1.0, 1.0, 2.0, 3.0])

@@ -27,13 +27,13 @@ def guess(record: Record, names: dict[str, str], scale: dict[str, float]) -> dic
     return {one.guess.channel: one for one in guess_channels(headings, values, HEALTHY)}
 
 
-def test_velocity_is_the_slope_of_position_whatever_it_is_called(record: Record) -> None:
+def test_the_slope_of_position_is_guessed_as_velocity_under_any_name(record: Record) -> None:
     found = guess(record, {"velocity_m_s": "Kanal 7", "position_m": "Weg [mm]"}, {"position_m": 1e3})
     assert found["velocity_m_s"].guess.name == "Kanal 7"
     assert "is_slope" in [note.code for note in found["velocity_m_s"].why]
 
 
-def test_a_column_that_is_called_pressure_is_no_velocity_though_it_moves_like_one(record: Record) -> None:
+def test_a_column_named_pressure_is_not_guessed_as_velocity(record: Record) -> None:
     """In a German log without velocity, pressure was taken for velocity in mm/s."""
     named = [("t", record.time), ("Weg", 1e3 * record["position_m"]), ("Druck", 1e3 * record["velocity_m_s"])]
     headings = [Heading(name) for name, _ in named]
@@ -43,12 +43,12 @@ def test_a_column_that_is_called_pressure_is_no_velocity_though_it_moves_like_on
     }
 
 
-def test_swapped_names_lose_against_physics_of_the_clock(record: Record) -> None:
+def test_the_time_column_is_recognised_despite_a_misleading_name(record: Record) -> None:
     found = guess(record, {"time_s": "A", "position_m": "time"}, {})
     assert found["time_s"].guess.name == "A"
 
 
-def test_a_unit_that_is_not_given_is_guessed_and_makes_less_sure(record: Record) -> None:
+def test_a_missing_unit_is_guessed_and_lowers_the_confidence(record: Record) -> None:
     found = guess(record, {"position_m": "Weg", "time_s": "t"}, {"position_m": 1e3, "time_s": 1e3})
     assert (found["position_m"].guess.unit, found["time_s"].guess.unit) == ("mm", "ms")
     assert "unit_guessed" in [note.code for note in found["position_m"].why]
@@ -56,26 +56,26 @@ def test_a_unit_that_is_not_given_is_guessed_and_makes_less_sure(record: Record)
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("in/s", 1.0 / 0.0254), ("mm/s", 1e3), ("m/s", -1.0)])
-def test_a_velocity_without_unit_takes_that_in_which_it_is_the_slope_of_position(
+def test_a_velocity_without_unit_gets_the_unit_of_the_slope_of_position(
     record: Record, unit: str, factor: float
 ) -> None:
-    """By size alone a velocity in in/s, or a slow one in mm/s, is in m/s; a reversed sensor has a unit too."""
+    """By size alone, in/s or a slow velocity in mm/s would be taken for m/s; a reversed sensor has a unit too."""
     scale = {"position_m": 1.0 / 0.0254, "velocity_m_s": factor}
     found = guess(record, {"position_m": "Stroke (in)", "velocity_m_s": "Vel"}, scale)["velocity_m_s"]
     assert (found.guess.unit, found.why[-1].code) == (unit, "unit_of_slope")
 
 
-def test_a_velocity_that_no_unit_makes_the_slope_of_position_is_guessed_by_its_size(record: Record) -> None:
+def test_a_velocity_unlike_the_slope_of_position_gets_its_unit_by_size(record: Record) -> None:
     found = guess(record, {"position_m": "Weg [mm]", "velocity_m_s": "Vel"}, {"position_m": 1e3, "velocity_m_s": 5.0})
     assert found["velocity_m_s"].why[-1].code == "unit_guessed"
 
 
-def test_own_names_are_sure(record: Record) -> None:
+def test_columns_with_the_projects_own_names_are_guessed_with_confidence(record: Record) -> None:
     found = guess(record, {}, {})
     assert {name for name, one in found.items() if one.guess.sure > 0.9} >= set(NAMES)
 
 
-def test_columns_are_alike_whatever_their_offset_and_unit() -> None:
+def test_likeness_of_columns_is_their_correlation() -> None:
     one, other = np.random.default_rng(2).standard_normal((2, 50))
     wanted = np.corrcoef(one, other)[0, 1]
     assert _alike(one + 7.0, 3.0 * other - 2.0) == pytest.approx(wanted)
@@ -96,14 +96,14 @@ def told(one: ChannelGuess) -> list[str]:
     return [str(note.code) for note in one.why]
 
 
-def test_a_column_that_rises_steadily_in_another_unit_is_no_clock() -> None:
+def test_a_steadily_rising_column_in_mm_is_not_guessed_as_time() -> None:
     found = guesses(A=T, Position__mm=100.0 + T)
     assert found["time_s"].guess.name == "A"
     assert "increases" in told(found["time_s"])
     assert "increases" not in told(found["position_m"])
 
 
-def test_the_slope_of_position_is_velocity_and_what_follows_it_less_well_is_the_pump() -> None:
+def test_the_slope_of_position_is_velocity_and_a_similar_column_is_motor_speed() -> None:
     speed = SWING + 0.5 * np.sin(5.0 * T)
     found = guesses(t__s=T, way__mm=np.cumsum(SWING), A=SWING, B=speed)
     assert (found["velocity_m_s"].guess.name, found["motor_speed_rad_s"].guess.name) == ("A", "B")
@@ -112,7 +112,7 @@ def test_the_slope_of_position_is_velocity_and_what_follows_it_less_well_is_the_
     assert "follows" in told(found["motor_speed_rad_s"])
 
 
-def test_a_pressure_that_has_the_slope_of_position_is_neither_velocity_nor_the_pump() -> None:
+def test_a_pressure_equal_to_the_slope_of_position_is_not_guessed_as_velocity() -> None:
     found = guesses(t__s=T, way__mm=np.cumsum(SWING), load__bar=SWING)
     assert "velocity_m_s" not in found
     assert "has_slope" in told(found["position_m"])
@@ -128,7 +128,7 @@ def test_a_pressure_that_is_the_difference_of_two_is_the_differential_one() -> N
     assert all("is_difference" not in told(one) for one in alike.values())
 
 
-def test_a_column_that_is_nearly_another_one_is_no_difference_of_two() -> None:
+def test_nearly_equal_columns_are_not_taken_for_a_difference_of_two() -> None:
     rng = np.random.default_rng(4)
     reference = np.sin(T)
     position = reference + 0.02 * np.sin(7.0 * T) + 1e-3 * rng.standard_normal(len(T))
@@ -138,14 +138,14 @@ def test_a_column_that_is_nearly_another_one_is_no_difference_of_two() -> None:
     assert "is_difference" not in [note.code for one in found for note in one.why]
 
 
-def test_a_pressure_that_goes_with_the_pump_says_so_and_one_that_does_not_says_nothing() -> None:
+def test_only_a_pressure_correlated_with_motor_speed_is_noted_to_follow_it() -> None:
     found = guesses(t__s=T, rpm=SWING, p__bar=SWING + 0.5 * np.sin(9.0 * T))
     assert "follows" in told(found["differential_pressure_pa"])
     found = guesses(t__s=T, rpm=SWING, p__bar=np.sin(9.0 * T))
     assert "follows" not in told(found["differential_pressure_pa"])
 
 
-def test_a_column_that_goes_against_the_motion_may_have_the_wrong_sign() -> None:
+def test_a_column_opposed_to_the_motion_is_noted_to_oppose_it() -> None:
     found = guesses(t__s=T, rpm=SWING, p__bar=-SWING - 0.5 * np.sin(9.0 * T))
     assert "opposes" in told(found["differential_pressure_pa"])
     assert "follows" not in told(found["differential_pressure_pa"])
@@ -158,13 +158,13 @@ def test_a_column_that_goes_against_the_motion_may_have_the_wrong_sign() -> None
     [np.zeros(3000), np.full(3000, 5.0), np.full(3000, 1e250), np.where(T < 0.1, T, np.nan)],
     ids=["zero", "constant", "huge", "hardly there"],
 )
-def test_a_column_in_which_nothing_happens_tells_nothing(dull: np.ndarray) -> None:
+def test_a_constant_or_mostly_missing_column_is_not_guessed_as_motor_speed(dull: np.ndarray) -> None:
     found = guesses(t__s=T, way__mm=np.cumsum(SWING), A=SWING, B=dull)
     assert found["velocity_m_s"].guess.name == "A"
     assert "motor_speed_rad_s" not in found
 
 
-def test_dates_are_the_time_because_they_are_dates() -> None:
+def test_a_column_of_dates_is_guessed_as_time() -> None:
     stamps = np.datetime64("2026-03-01", "ns") + (1e9 * T).astype("timedelta64[ns]")
     (found,) = guess_channels([Heading("when", stamped=True)], {0: stamps}, HEALTHY)
     assert (found.guess.channel, told(found)) == ("time_s", ["dates"])
@@ -189,7 +189,7 @@ def test_the_unit_is_the_first_in_which_a_channel_has_a_usual_size(name: str, si
     assert "unit_guessed" in told(found)
 
 
-def test_columns_of_other_lengths_are_left_alone(record: Record) -> None:
+def test_a_column_of_another_length_does_not_change_the_guesses(record: Record) -> None:
     columns = dict(enumerate([record.time, *record.channels.values(), np.arange(900.0)]))
     headings = [Heading(name) for name in ("time_s", *record.channels, "other")]
     found = {one.guess.channel: one.guess.place for one in guess_channels(headings, columns, HEALTHY)}

@@ -58,7 +58,7 @@ def unsigned(log: Record) -> Record:
 
 
 @pytest.mark.parametrize("speed", [0.0, 50.0])
-def test_a_stuck_piston_under_a_steady_motor_is_no_speed_without_its_sign(speed: float) -> None:
+def test_a_stuck_piston_at_constant_motor_speed_is_no_unsigned_speed(speed: float) -> None:
     noise = 2e-6 * np.random.default_rng(0).normal(size=6000)
     log = Record(1e-3, {SPEED: np.full(6000, speed), POSITION: noise})
     assert channel_mistakes(log, HEALTHY) == ()
@@ -79,7 +79,7 @@ def test_sound_logs_are_not_accused(condition: str, drive: str, leakage: float) 
 
 
 @pytest.mark.parametrize("condition", list(CONDITIONS))
-def test_one_slow_sine_in_which_all_flows_look_alike_accuses_no_channel(condition: str) -> None:
+def test_a_slow_sine_accuses_no_channel_in_any_condition(condition: str) -> None:
     p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(3)
     log = simulate(REDUCED, make_drive("sine", 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     assert channel_mistakes(log, HEALTHY) == ()
@@ -124,7 +124,7 @@ def test_a_wrong_rig_file_accuses_no_channel(wrong: dict[str, float]) -> None:
         (scaled(PRESSURE, 1e3), ChannelCode.CHANNEL_UNIT, PRESSURE),
     ],
 )
-def test_a_mistake_is_named(
+def test_a_wrong_sign_unit_or_name_is_named_with_its_channel(
     mistake: Callable[[Record], Record], code: ChannelCode, channel: str, condition: str
 ) -> None:
     for drive in ("steps", "prbs"):
@@ -132,7 +132,7 @@ def test_a_mistake_is_named(
         assert (said.code, said.data["channel"]) == (code, channel)
 
 
-def test_a_pump_that_turns_one_way_while_a_load_swings_the_piston_through_a_leak_lacks_no_sign() -> None:
+def test_a_piston_swung_by_its_load_through_a_leak_is_no_unsigned_speed() -> None:
     time, leakage = 1e-3 * np.arange(6000), 2e-11
     speed, pressure = 40.0 + 10.0 * np.sin(3.0 * time), 1.1e6 + 1e6 * np.sin(9.0 * time)
     velocity = (HEALTHY.pump_displacement * speed - leakage * pressure) / HEALTHY.piston_area
@@ -153,7 +153,7 @@ def test_a_pump_that_turns_one_way_while_a_load_swings_the_piston_through_a_leak
         (SPEED, 1.0 / 25.0, (), SPEED),
     ],
 )
-def test_a_factor_that_no_known_slip_makes_is_another_unit(
+def test_an_unusual_factor_is_named_as_another_unit(
     channel: str, factor: float, lacking: tuple[str, ...], accused: str, condition: str
 ) -> None:
     """A furlong read as a metre took 17 s to be refused, and only a reader's warning named the channel."""
@@ -164,7 +164,7 @@ def test_a_factor_that_no_known_slip_makes_is_another_unit(
         assert said.data["slip"].startswith("inches read as m" if factor == 39.37 else "another unit")
 
 
-def test_a_piston_too_far_for_its_pump_tells_the_unit_where_the_balance_takes_motion_for_leakage(
+def test_an_impossible_piston_travel_names_the_unit_though_the_balance_is_misled(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     misled = FlowBalance(
@@ -177,7 +177,7 @@ def test_a_piston_too_far_for_its_pump_tells_the_unit_where_the_balance_takes_mo
 
 
 @pytest.mark.parametrize("power", [3, 4])
-def test_a_pump_at_one_speed_that_delivered_more_than_the_piston_swept_has_no_unknown_unit(power: int) -> None:
+def test_a_pump_at_constant_speed_that_delivers_more_than_is_swept_is_no_unit_error(power: int) -> None:
     """Without its mean and trend a path at constant speed is only noise, and any piston goes farther."""
     rng, time = np.random.default_rng(0), 1e-3 * np.arange(1001)
     position = -0.0095 * time**power
@@ -191,7 +191,7 @@ def test_a_pump_at_one_speed_that_delivered_more_than_the_piston_swept_has_no_un
 
 
 @pytest.mark.parametrize(("share", "named"), [(9.0, True), (3.2, True), (2.5, False), (0.8, False)])
-def test_a_pump_that_would_deliver_what_none_can_is_a_speed_in_another_unit(
+def test_an_impossible_pump_delivery_is_a_speed_in_another_unit(
     share: float, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     delivered = {"pump_displacement": (share * HEALTHY.pump_displacement, 1e-9), "bulk_modulus": (2e8, 1e5)}
@@ -205,7 +205,7 @@ def test_a_pump_that_would_deliver_what_none_can_is_a_speed_in_another_unit(
 
 
 @pytest.mark.parametrize("mistake", [scaled(SPEED, -1.0), swapped, scaled(POSITION, -1.0), scaled(VELOCITY, 1e3)])
-def test_a_mistake_shows_without_pressure(mistake: Callable[[Record], Record]) -> None:
+def test_a_wrong_sign_unit_or_name_is_also_found_without_pressure(mistake: Callable[[Record], Record]) -> None:
     for drive in ("steps", "prbs"):
         assert channel_mistakes(mistake(run(drive=drive)).replace(**{PRESSURE: None}), HEALTHY)
 
@@ -223,7 +223,7 @@ RADIANS, TURNS_A_SECOND = "rad/s read as rpm", "rev/s read as rad/s"
         ("major_leakage_major_friction", 1e-3, f"{POSITION} and {VELOCITY} or {SPEED}", channel_physics.LOSSY),
     ],
 )
-def test_without_pressure_lost_flow_leaves_open_which_slip_of_a_unit_it_was(
+def test_without_pressure_several_unit_errors_may_explain_the_lost_flow(
     condition: str, factor: float, accused: str, slip: str
 ) -> None:
     (said,) = channel_mistakes(scaled(SPEED, factor)(run(condition)).replace(**{PRESSURE: None}), HEALTHY)
@@ -231,7 +231,7 @@ def test_without_pressure_lost_flow_leaves_open_which_slip_of_a_unit_it_was(
 
 
 @pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "without"])
-def test_nothing_else_is_concluded_from_a_log_with_a_mistake(*, pressure: bool) -> None:
+def test_a_log_with_a_channel_mistake_gets_no_values_and_no_class(*, pressure: bool) -> None:
     log = scaled(SPEED, -1.0)(run())
     log = log if pressure else log.replace(**{PRESSURE: None})
     for found in (estimate_log(log, Rig()), diagnose_log(log, Rig())):
@@ -245,7 +245,7 @@ def test_nothing_else_is_concluded_from_a_log_with_a_mistake(*, pressure: bool) 
     assert [note.code for note in found.advice] == [AdviceCode.MEND_COLUMNS]
 
 
-def test_a_position_that_hardly_moves_is_judged_by_its_noise_and_an_absent_one_not_at_all() -> None:
+def test_a_position_is_resolved_only_if_its_motion_exceeds_its_noise() -> None:
     rng = np.random.default_rng(1)
     noise = 1e-6 * rng.standard_normal(2000)
     for size, resolved in ((0.1 * channel_physics.RESOLVED, False), (10.0 * channel_physics.RESOLVED, True)):
@@ -257,7 +257,7 @@ def test_a_position_that_hardly_moves_is_judged_by_its_noise_and_an_absent_one_n
     assert not channel_physics._resolved(Record(1e-3, {SPEED: noise}), absent)
 
 
-def test_a_balance_that_explains_little_of_the_flow_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flow_balance_that_explains_too_little_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[FlowBalance | None] = []
     poor = FlowBalance(*([0.5] * len(FlowBalance._fields)))
     monkeypatch.setattr(channel_physics, "_reversed", lambda *given: seen.append(given[-1]) or ())
@@ -270,7 +270,7 @@ def test_a_balance_that_explains_little_of_the_flow_is_not_believed(monkeypatch:
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.45, True), (0.006, False)])
-def test_a_piston_that_hardly_moves_is_no_proof_of_a_unit(share: float, *, told: bool) -> None:
+def test_a_piston_that_hardly_moves_is_no_evidence_of_a_unit_error(share: float, *, told: bool) -> None:
     """In a leaky actuator the unexplained part of the balance looks like ten times the real motion."""
     rng = np.random.default_rng(2)
     held = np.repeat(rng.choice([-1.0, 1.0], 6000), 20) * np.repeat(rng.uniform(20.0, 120.0, 6000), 20)
@@ -284,7 +284,7 @@ def test_a_piston_that_hardly_moves_is_no_proof_of_a_unit(share: float, *, told:
 
 
 @pytest.mark.parametrize("absent", [(), (VELOCITY,), (PRESSURE,)])
-def test_milliseconds_read_as_seconds_are_time_s_mistake_not_the_positions(absent: tuple[str, ...]) -> None:
+def test_milliseconds_read_as_seconds_are_a_unit_error_of_time_not_position(absent: tuple[str, ...]) -> None:
     log = run().replace(**dict.fromkeys(absent))
     (said,) = channel_mistakes(replace(log, sample_time=1e3 * log.sample_time), HEALTHY)
     assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, "time_s")
@@ -301,7 +301,7 @@ def test_a_logger_that_repeats_one_row_is_named_at_once() -> None:
     assert [note.code for note in found.advice] == [AdviceCode.CHECK_LOGGER]
 
 
-def test_position_and_velocity_that_agree_are_not_accused_of_tens() -> None:
+def test_agreeing_position_and_velocity_are_not_accused_of_a_factor_of_ten() -> None:
     """A piston that sticks in one direction drifts, and went 11 times too far if motor speed was in rev/s."""
     (said,) = channel_mistakes(scaled(SPEED, 1.0 / 12.4)(run()).replace(**{PRESSURE: None}), HEALTHY)
     assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, SPEED)
@@ -316,7 +316,7 @@ def test_a_speed_in_degrees_is_not_taken_for_revolutions(times: float, slip: str
     assert (said.data["channel"], said.data["slip"]) == (SPEED, f"{slip} read as rad/s")
 
 
-def test_a_piston_that_pressure_cannot_move_tells_no_unit_of_speed() -> None:
+def test_a_pressure_below_friction_shows_no_unit_error_of_speed() -> None:
     log = scaled(POSITION, 0.1)(scaled(VELOCITY, 0.1)(run("major_leakage")))
     (note,) = channel_mistakes(log, HEALTHY)
     assert note.data["slip"] == "rpm read as rad/s"
@@ -325,7 +325,7 @@ def test_a_piston_that_pressure_cannot_move_tells_no_unit_of_speed() -> None:
     assert channel_mistakes(stuck, HEALTHY) == ()
 
 
-def test_a_spring_that_drives_a_piston_back_while_its_pump_goes_on_reverses_nothing(
+def test_a_piston_moving_back_against_its_pump_is_no_reversed_channel(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The pump leaks all that it delivers; the flow balance still shows that pump and piston have the same sign."""
@@ -342,7 +342,7 @@ def test_a_spring_that_drives_a_piston_back_while_its_pump_goes_on_reverses_noth
 
 
 @pytest.mark.parametrize(("begins", "sign", "named"), [(-80.0, 1.0, False), (0.0, 1.0, False), (0.0, -1.0, True)])
-def test_a_piston_that_lags_a_sine_is_not_opposed_to_it(begins: float, sign: float, *, named: bool) -> None:
+def test_a_piston_that_lags_a_sine_is_no_reversed_channel(begins: float, sign: float, *, named: bool) -> None:
     """A long block is half a period: its means depend on where blocks begin, and a lag reverses their sign."""
     angle = 20.0 * np.pi * 1e-3 * np.arange(3001) + np.deg2rad(begins)
     position = -sign * 1e-3 * np.cos(angle - np.deg2rad(60.0))

@@ -22,7 +22,7 @@ def stepped(record: Record, channel: str, size: float) -> Record:
 
 @pytest.mark.parametrize("sensors", [BENCH, IDEAL])
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
-def test_a_log_that_goes_on_throughout_is_what_it_was(drive: str, sensors: Sensors) -> None:
+def test_a_log_without_discontinuities_is_unchanged(drive: str, sensors: Sensors) -> None:
     record = circuit_log(drive, sensors)
     assert without_discontinuities(record) == (record, ())
     still = record.replace(**{VELOCITY: None})
@@ -30,7 +30,7 @@ def test_a_log_that_goes_on_throughout_is_what_it_was(drive: str, sensors: Senso
 
 
 @pytest.mark.parametrize("drive", ["steps", "multisine", "sine"])
-def test_a_zero_of_position_that_is_set_anew_is_named_and_subtracted(drive: str) -> None:
+def test_a_reset_of_the_position_zero_is_named_and_subtracted(drive: str) -> None:
     record = circuit_log(drive)
     found, (note,) = without_discontinuities(stepped(record, POSITION, 0.004))
     assert note.code is SensorCode.POSITION_REZEROED
@@ -40,7 +40,7 @@ def test_a_zero_of_position_that_is_set_anew_is_named_and_subtracted(drive: str)
 
 
 @pytest.mark.parametrize("drive", ["steps", "multisine", "sine"])
-def test_behind_a_zero_of_pressure_that_is_set_anew_the_longer_part_is_used(drive: str) -> None:
+def test_a_reset_of_the_pressure_zero_is_named_and_the_longer_part_used(drive: str) -> None:
     given = stepped(circuit_log(drive), PRESSURE, 1e6)
     found, (note,) = without_discontinuities(given)
     assert note.code is SensorCode.PRESSURE_REZEROED
@@ -50,7 +50,7 @@ def test_behind_a_zero_of_pressure_that_is_set_anew_the_longer_part_is_used(driv
 
 
 @pytest.mark.parametrize(("rows", "named"), [(1, True), (3, False)])
-def test_a_pressure_that_rises_over_several_rows_was_not_set_anew(rows: int, *, named: bool) -> None:
+def test_a_pressure_that_rises_over_several_rows_was_not_rezeroed(rows: int, *, named: bool) -> None:
     """A piston that bounces off a stop raises a small chamber by 60 bar in four rows: the log was cut there."""
     record = circuit_log("multisine")
     risen = 2e6 * np.clip(np.arange(len(record)) - ROW + 1, 0, rows)
@@ -69,7 +69,7 @@ def test_lost_rows_are_named_and_the_longest_part_is_used(drive: str, rows: int)
     assert np.array_equal(found[PRESSURE], record[PRESSURE][ROW + rows :])
 
 
-def test_a_motor_that_steps_within_a_row_sets_no_pressure_anew() -> None:
+def test_a_motor_step_within_a_row_is_no_reset_of_the_pressure_zero() -> None:
     """In a run without noise nothing else jumps as far, so a step of the motor was called lost rows."""
     record = circuit_log("steps", IDEAL)
     pressure = record[PRESSURE] + np.where(np.arange(len(record)) < ROW, 0.0, 3e6)
@@ -79,7 +79,7 @@ def test_a_motor_that_steps_within_a_row_sets_no_pressure_anew() -> None:
 
 
 @pytest.mark.parametrize(("first", "named"), [(0.0, False), (100.0, True)])
-def test_the_first_rise_of_pressure_from_rest_sets_none_anew(first: float, *, named: bool) -> None:
+def test_the_first_rise_of_pressure_from_rest_is_no_reset_of_its_zero(first: float, *, named: bool) -> None:
     """Until one chamber draws make-up oil, both raise pressure: it rose twice as fast as at any later time."""
     record, rows = circuit_log("multisine"), np.arange(4000)
     speed = np.where(rows < ROW, first, record[SPEED])
@@ -90,7 +90,7 @@ def test_the_first_rise_of_pressure_from_rest_sets_none_anew(first: float, *, na
     assert (SensorCode.PRESSURE_REZEROED in [note.code for note in without_discontinuities(given)[1]]) == named
 
 
-def test_a_pressure_that_is_zeroed_while_the_motor_turns_slowly_is_named() -> None:
+def test_a_reset_of_the_pressure_zero_at_low_motor_speed_is_named() -> None:
     """Everything before the motor reached half its top speed was taken for its start."""
     record, rows = circuit_log("multisine"), np.arange(4000)
     slow = np.where(rows < 500, 0.0, np.where(rows < 3500, 0.2 * record[SPEED], 5.0 * record[SPEED]))
@@ -99,7 +99,7 @@ def test_a_pressure_that_is_zeroed_while_the_motor_turns_slowly_is_named() -> No
     assert SensorCode.PRESSURE_REZEROED in [note.code for note in without_discontinuities(given)[1]]
 
 
-def test_a_piston_that_meets_a_stop_has_lost_no_rows_and_no_zero() -> None:
+def test_a_piston_that_hits_a_stop_is_neither_lost_rows_nor_a_reset_zero() -> None:
     """A load pulls it there; pump and pressure then change within a row. The part after it gave oil 17 % too soft."""
     time = 1e-3 * np.arange(3000)
     free = np.arange(3000) < ROW
@@ -119,7 +119,7 @@ def test_a_piston_that_meets_a_stop_has_lost_no_rows_and_no_zero() -> None:
 
 
 @pytest.mark.parametrize("stopped", [True, False])
-def test_a_stop_yields_over_milliseconds_however_fast_a_log_is(stopped: bool) -> None:
+def test_a_stop_that_yields_over_milliseconds_is_recognised_at_5_khz(stopped: bool) -> None:
     """At 5 kHz a stop of a healthy small cylinder was taken for a reset pressure zero, and its log was unknown."""
     rng, time = np.random.default_rng(3), 2e-4 * np.arange(10000)
     hit = time[5000]
@@ -134,7 +134,7 @@ def test_a_stop_yields_over_milliseconds_however_fast_a_log_is(stopped: bool) ->
     assert (without_discontinuities(Record(2e-4, channels))[1] == ()) == stopped
 
 
-def test_a_position_that_is_held_for_a_while_is_missing_there() -> None:
+def test_a_position_that_is_held_for_a_while_becomes_missing_samples() -> None:
     record = circuit_log("multisine")
     held = record[POSITION].copy()
     held[ROW : ROW + 100] = held[ROW]
@@ -155,7 +155,7 @@ def test_a_spike_a_short_log_and_a_slow_one_have_no_steps() -> None:
     assert without_discontinuities(slow) == (slow, ())
 
 
-def test_a_velocity_under_the_name_of_position_is_named_and_not_mended() -> None:
+def test_a_swapped_position_and_velocity_is_named_and_no_reset_zero_is_found() -> None:
     record = circuit_log("multisine")
     jerky = record[VELOCITY] + np.where(np.arange(len(record)) < ROW, 0.0, 0.004)
     clean = clean_log(record.replace(**{POSITION: jerky, VELOCITY: record[POSITION]}), EhaParameters())
@@ -164,7 +164,7 @@ def test_a_velocity_under_the_name_of_position_is_named_and_not_mended() -> None
 
 
 @pytest.mark.parametrize("noisy", [False, True])
-def test_what_explains_a_change_of_pressure_is_least_squares_of_rows_that_do_not_stray(noisy: bool) -> None:
+def test_pressure_strays_are_residuals_of_a_trimmed_least_squares_fit(noisy: bool) -> None:
     record = circuit_log("steps")
     pressure = record[PRESSURE].copy()
     pressure[700:720] = np.nan

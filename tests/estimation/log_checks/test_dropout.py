@@ -24,12 +24,12 @@ def repeated(record: Record, first: int, behind: int, *names: str) -> Record:
 
 @pytest.mark.parametrize("sensors", [BENCH, IDEAL])
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "sine"])
-def test_a_log_that_is_written_throughout_has_no_dropout(drive: str, sensors: Sensors) -> None:
+def test_a_log_without_repeated_rows_has_no_dropout(drive: str, sensors: Sensors) -> None:
     record = circuit_log(drive, sensors)
     assert without_dropouts(record) == (record, ())
 
 
-def test_repeated_rows_are_left_out_of_all_channels_and_said() -> None:
+def test_repeated_rows_are_left_out_of_all_channels_and_noted() -> None:
     record = circuit_log("multisine")
     clean = clean_log(repeated(record, 1500, 1700), EhaParameters())
     assert {note.code for note in clean.left_out} == {SensorCode.DROPOUT}
@@ -38,13 +38,13 @@ def test_repeated_rows_are_left_out_of_all_channels_and_said() -> None:
         assert np.flatnonzero(np.isnan(clean.record[name])).tolist() == list(range(1500, 1700))
 
 
-def test_few_rows_and_a_channel_that_is_held_alone_are_no_dropout() -> None:
+def test_a_few_repeated_rows_or_a_single_held_channel_are_no_dropout() -> None:
     record = circuit_log("multisine")
     assert without_dropouts(repeated(record, 1500, 1500 + FEWEST_ROWS - 1))[1] == ()
     assert without_dropouts(repeated(record, 1500, 1700, SPEED))[1] == ()
 
 
-def test_a_machine_at_rest_that_goes_on_from_there_is_no_dropout() -> None:
+def test_a_machine_that_rests_and_moves_on_from_the_same_place_is_no_dropout() -> None:
     time = 1e-3 * np.arange(3000)
     moved = np.clip(time, 0.0, 1.0) + np.clip(time - 2.0, 0.0, 1.0)  # rests from 1 to 2 s, without any noise
     record = Record(1e-3, {SPEED: 100.0 * moved, POSITION: 0.05 * moved, PRESSURE: 1e6 * moved})
@@ -61,7 +61,7 @@ def test_a_motor_that_leaves_rest_from_one_row_to_the_next_is_no_dropout() -> No
 
 
 @pytest.mark.parametrize("channel", [SPEED, POSITION])
-def test_a_long_gap_of_speed_or_position_is_one_of_the_balance(channel: str) -> None:
+def test_a_long_gap_of_speed_or_position_removes_all_channels_there(channel: str) -> None:
     record = circuit_log("multisine")
     gone = record[channel].copy()
     gone[1000 : 1000 + LONG_GAP] = gone[2000 : 2000 + LONG_GAP - 1] = np.nan
@@ -72,7 +72,7 @@ def test_a_long_gap_of_speed_or_position_is_one_of_the_balance(channel: str) -> 
         assert len(missing) == (2 * LONG_GAP - 1 if name == channel else LONG_GAP)
 
 
-def test_between_samples_of_a_slow_channel_is_no_gap() -> None:
+def test_rows_between_the_samples_of_a_slow_channel_are_no_gap() -> None:
     slow = np.full(1000, np.nan)
     slow[::10] = 1.0
     assert not np.any(long_gaps(slow))

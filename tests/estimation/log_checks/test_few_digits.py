@@ -38,24 +38,24 @@ def test_digits_are_counted_in_every_decimal_unit(digits: int, scale: float) -> 
 
 
 @pytest.mark.parametrize("step", [1e-6, 2e-5, 2.5e-5, 1e-4, 0.05 / 2**10])
-def test_a_converter_has_no_digits(step: float) -> None:
+def test_a_converters_even_steps_are_not_taken_for_few_digits(step: float) -> None:
     course = 0.05 * np.sin(0.01 * np.arange(3000.0))
     assert written_digits(step * np.rint(course / step)) == 0
 
 
-def test_a_channel_that_hardly_moves_tells_no_digits() -> None:
+def test_a_constant_or_short_channel_has_no_countable_digits() -> None:
     assert written_digits(np.zeros(1000)) == 0
     assert written_digits(np.full(1000, 0.0123)) == 0
     assert written_digits(printed(np.random.default_rng(2).normal(size=FEWEST - 1), 3)) == 0
 
 
 @pytest.mark.parametrize("drive", ["steps", "prbs", "chirp", "sine"])
-def test_logs_of_a_bench_are_left_as_they_are(drive: str) -> None:
+def test_simulated_bench_logs_are_unchanged(drive: str) -> None:
     record = log(drive)
     assert with_even_steps(record) == (record, ())
 
 
-def test_steps_become_the_largest() -> None:
+def test_a_channel_with_few_digits_is_rounded_to_its_largest_step() -> None:
     values = printed(np.arange(-1.0, 30.0, 0.0137), 3)
     even, (note,) = with_even_steps(Record(1e-3, {"motor_speed_rad_s": values, POSITION: values}))
     assert (note.code, dict(note.data)) == (LoggerCode.FEW_DIGITS, {"channel": POSITION, "digits": 3})
@@ -74,7 +74,7 @@ def test_a_spike_does_not_coarsen_the_log(spike: float) -> None:
     assert np.array_equal(np.delete(even[POSITION], 700), np.delete(whole[POSITION], 700))
 
 
-def test_position_of_four_digits_costs_no_number() -> None:
+def test_bulk_modulus_is_estimated_from_a_position_with_four_digits() -> None:
     """A plain log was refused after a search of 20 s."""
     record = log()
     found = estimate_log(record.replace(**{POSITION: printed(record[POSITION], 4)}), Rig())
@@ -84,7 +84,7 @@ def test_position_of_four_digits_costs_no_number() -> None:
     assert low < EhaParameters().bulk_modulus < high
 
 
-def test_pressure_of_two_digits_is_not_taken_for_one_that_was_logged_on_change() -> None:
+def test_a_pressure_with_two_digits_is_not_taken_for_logged_on_change() -> None:
     record = log()
     cleaned = clean_log(record.replace(**{PRESSURE: printed(record[PRESSURE], 2)}), EhaParameters())
     assert cleaned.objections == ()

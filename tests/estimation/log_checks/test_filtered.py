@@ -46,13 +46,13 @@ def lagged(values: Array, corner: float) -> Array:
 
 @pytest.mark.parametrize("sensors", [BENCH, IDEAL])
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
-def test_no_sample_is_left_out_of_a_log_with_white_noise_or_none(drive: str, sensors: Sensors) -> None:
+def test_a_log_with_white_noise_or_none_is_unchanged(drive: str, sensors: Sensors) -> None:
     for sample_time in (1e-3, 1e-4):
         record = log(drive, sensors, sample_time)
         assert without_correlated_noise(record) == (record, ())
 
 
-def test_a_log_as_slow_as_its_actuator_rings_is_left_as_it_is() -> None:
+def test_a_log_that_thinning_would_make_too_slow_for_its_actuator_is_unchanged() -> None:
     record = log("steps")
     smooth = record.replace(**{PRESSURE: averaged(record[PRESSURE], 4)})
     assert without_correlated_noise(smooth, 99.0)[1]
@@ -61,7 +61,7 @@ def test_a_log_as_slow_as_its_actuator_rings_is_left_as_it_is() -> None:
 
 @pytest.mark.parametrize("rows", [2, 3, 4, 5])
 @pytest.mark.parametrize("drive", ["steps", "multisine"])
-def test_an_averaged_pressure_keeps_samples_that_share_no_noise(drive: str, rows: int) -> None:
+def test_an_averaged_pressure_keeps_only_samples_with_independent_noise(drive: str, rows: int) -> None:
     record = log(drive)
     found, (note,) = without_correlated_noise(record.replace(**{PRESSURE: averaged(record[PRESSURE], rows)}))
     assert note.code is SensorCode.FILTERED
@@ -75,7 +75,7 @@ def test_an_averaged_pressure_keeps_samples_that_share_no_noise(drive: str, rows
 
 
 @pytest.mark.parametrize(("corner", "least"), [(0.25, 2), (0.15, 3), (0.1, 4)])
-def test_noise_behind_a_filter_of_first_order_is_left_alike_by_a_tenth_at_most(corner: float, least: int) -> None:
+def test_samples_behind_a_first_order_filter_are_correlated_by_less_than_a_tenth(corner: float, least: int) -> None:
     noise = np.random.default_rng(7).standard_normal(20_000)
     rows = independent_rows(lagged(noise, corner), 1e-3)
     assert rows >= least
@@ -89,7 +89,7 @@ def test_white_noise_is_seldom_taken_for_filtered() -> None:
 
 
 @pytest.mark.parametrize("correlation", [0.2, -0.3])
-def test_a_correlation_that_the_check_would_object_to_shows_in_a_log_of_twenty_seconds(correlation: float) -> None:
+def test_a_correlation_of_a_fifth_is_detected_in_a_log_of_twenty_seconds(correlation: float) -> None:
     noise = np.random.default_rng(9).standard_normal(20_001)
     assert not is_white(noise[1:] + correlation / (1.0 + correlation**2) * 1.1 * noise[:-1])
 
@@ -102,7 +102,7 @@ def turning(teeth: float, amplitude: float, rng: np.random.Generator) -> Record:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_teeth_of_a_fast_pump_are_no_filter_and_an_average_is_seen_beside_them(seed: int) -> None:
+def test_pump_ripple_is_no_filter_and_an_average_is_found_beside_it(seed: int) -> None:
     record = turning(13.0, 7e3, np.random.default_rng(seed))
     assert independent_rows(record[PRESSURE], 1e-3) > 1
     assert without_correlated_noise(record) == (record, ())
@@ -110,7 +110,7 @@ def test_the_teeth_of_a_fast_pump_are_no_filter_and_an_average_is_seen_beside_th
     assert note.code is SensorCode.FILTERED
 
 
-def test_noise_is_judged_where_it_is_quiet_and_not_where_little_is_there() -> None:
+def test_whiteness_is_judged_only_in_quiet_stretches_of_a_long_log() -> None:
     rng = np.random.default_rng(3)
     white, struck = rng.normal(size=(2, 6400))
     rests = np.repeat([False, True, False, False], 1600)
@@ -125,12 +125,12 @@ def test_noise_is_judged_where_it_is_quiet_and_not_where_little_is_there() -> No
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_filter_is_seen_where_a_log_is_quiet_too(seed: int) -> None:
+def test_a_filter_is_also_found_in_quiet_stretches(seed: int) -> None:
     noise = np.random.default_rng(seed).normal(size=10_000)
     assert not any(is_white_when_quiet(one) for one in (averaged(noise, 2), averaged(noise, 4), lagged(noise, 0.1)))
 
 
-def test_what_no_distance_makes_independent_is_left_as_it_is() -> None:
+def test_samples_that_no_thinning_makes_independent_are_kept() -> None:
     walk = np.cumsum(np.random.default_rng(10).standard_normal(20_000))
     assert not is_white(walk)
     assert independent_rows(walk, 1e-3) == 1
@@ -139,7 +139,7 @@ def test_what_no_distance_makes_independent_is_left_as_it_is() -> None:
     assert independent_rows(averaged(np.random.default_rng(11).standard_normal(4000), 4), 0.01) == 1  # log too slow
 
 
-def test_little_or_broken_data_is_no_evidence() -> None:
+def test_a_short_or_broken_log_is_no_evidence_of_a_filter() -> None:
     rng = np.random.default_rng(12)
     short, broken = averaged(rng.standard_normal(200), 5), averaged(rng.standard_normal(8000), 5)
     broken[::50] = np.nan  # no window is complete
@@ -149,13 +149,13 @@ def test_little_or_broken_data_is_no_evidence() -> None:
     assert flatness(np.zeros((9, WINDOW))) == 1.0
 
 
-def test_a_straight_line_in_a_window_is_no_noise() -> None:
+def test_a_linear_trend_in_a_window_does_not_change_its_flatness() -> None:
     windows = np.random.default_rng(13).standard_normal((40, WINDOW))
     steep = windows + np.linspace(-1e6, 1e6, WINDOW)
     assert flatness(steep) == pytest.approx(flatness(windows), rel=1e-6)
 
 
-def test_a_log_is_looked_at_with_its_filter_in_mind() -> None:
+def test_a_cleaned_log_with_averaged_pressure_has_the_reduced_variance() -> None:
     record = log("steps")
     clean = clean_log(record.replace(**{PRESSURE: averaged(record[PRESSURE], 4)}), EhaParameters())
     assert [note.code for note in clean.left_out] == [SensorCode.FILTERED]

@@ -17,8 +17,8 @@ from plant.sensors.sensors import BENCH
 from tests.estimation.log_checks.made_logs import HEALTHY, POSITION, PRESSURE, SPEED
 
 
-def test_a_piston_that_yields_on_its_seals_under_a_quick_sine_takes_up_its_own_flow_within_the_deviation() -> None:
-    """The balance found 6 to 45 times its motion, 3 to 33 deviations from the true one."""
+def test_the_balance_is_correct_for_a_piston_that_only_yields_on_its_seals() -> None:
+    """The balance found 6 to 45 times the piston's motion, 3 to 33 deviations from the true one."""
     p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(5)
     log = simulate(CIRCUIT, make_drive("sine", 1.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     found = flow_balance(log, HEALTHY, MIDDLE)
@@ -29,8 +29,8 @@ def test_a_piston_that_yields_on_its_seals_under_a_quick_sine_takes_up_its_own_f
 
 
 @pytest.mark.parametrize("times", [1.0, 9.55])
-def test_a_pump_of_one_speed_loses_no_more_than_any_flow_bias(times: float) -> None:
-    """The sign of its speed gives its flow, so a bias explained all flow if noise hid the motion of the piston."""
+def test_at_a_single_motor_speed_the_flow_bias_does_not_absorb_the_pumps_flow(times: float) -> None:
+    """The sign of the speed gives the flow, so a bias explained all flow if noise hid the motion of the piston."""
     rng = np.random.default_rng(1)
     speed = np.repeat(rng.choice([-100.0, 100.0], 300), 30) + rng.normal(0.0, 0.05, 9000)
     lost = 0.2 * HEALTHY.pump_displacement * HEALTHY.rated_speed * np.sign(speed)
@@ -43,7 +43,7 @@ def test_a_pump_of_one_speed_loses_no_more_than_any_flow_bias(times: float) -> N
     assert 0.8 * times < found.swept < 1.3 * times
 
 
-def test_a_pump_that_knows_one_speed_leaves_its_flow_bias_open() -> None:
+def test_at_a_single_motor_speed_the_unknown_flow_bias_widens_the_deviations() -> None:
     """A bias absorbed a quarter of all flow, and the piston's factor was 0.75, 23 deviations from the true one."""
     rng = np.random.default_rng(4)
     log = simulate(CIRCUIT, make_drive("prbs", 4.0, 1e-3, HEALTHY, rng), 1e-3, HEALTHY, sensors=BENCH, rng=rng)
@@ -53,7 +53,7 @@ def test_a_pump_that_knows_one_speed_leaves_its_flow_bias_open() -> None:
     assert abs(found.compressed - 1.0) < 3.0 * found.compressed_std
 
 
-def test_of_a_piston_that_stands_still_nothing_is_known_however_well_its_pressure_is_explained() -> None:
+def test_a_still_piston_has_an_infinite_deviation_of_swept_flow() -> None:
     """If every other flow bias was ruled out, the deviation was not a number, and NumPy warned of it."""
     rng = np.random.default_rng(1)
     speed = np.repeat(100.0 * rng.choice([-1.0, 1.0], 3000) * rng.uniform(0.2, 1.0, 3000), 30)
@@ -66,7 +66,7 @@ def test_of_a_piston_that_stands_still_nothing_is_known_however_well_its_pressur
 
 
 @pytest.mark.parametrize("load", [0.0, 500.0])
-def test_a_single_rods_pump_moves_the_side_that_holds_the_pressure(load: float) -> None:
+def test_the_balance_of_a_single_rod_uses_the_area_of_the_loaded_side(load: float) -> None:
     """With its mean area, a rod with 35 % on either side seemed to move by 0.72 and 0.9 times the pumped flow."""
     rod = replace(circuit_of(HEALTHY), area_difference=0.35, pilot_share=1.0, load_force=load)
     log = simulate(CIRCUIT, make_drive("steps", 6.0, 1e-3, rod, np.random.default_rng(2)), 1e-3, rod)
@@ -77,7 +77,7 @@ def test_a_single_rods_pump_moves_the_side_that_holds_the_pressure(load: float) 
     assert abs(by_mean.swept - 1.0) > 0.1
 
 
-def test_noise_of_pressure_does_not_change_the_side_that_a_single_rods_pump_moves() -> None:
+def test_pressure_noise_does_not_switch_the_loaded_side_of_a_single_rod() -> None:
     """By the sign of each sample, a sixth of them belonged to the other side, and the factor was 0.9."""
     rng = np.random.default_rng(6)
     rod = replace(HEALTHY, area_difference=0.35, pilot_share=1.0)

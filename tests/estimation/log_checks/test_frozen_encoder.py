@@ -81,7 +81,7 @@ def test_an_encoder_that_freezes_while_the_piston_yields_on_its_seals_is_named()
     assert (found.value, found.explanation, found.gate.reasons) == (None, None, (said,))
 
 
-def test_a_flow_bias_is_known_though_the_motor_rests_most_of_the_log() -> None:
+def test_flow_bias_explains_a_still_encoder_though_the_motor_rests_most_of_the_log() -> None:
     p, rng, rows = HEALTHY, np.random.default_rng(0), np.arange(10_000)
     bias = 6.0 * p.flow_bias
     speed = np.where(rows % 2500 < 500, np.where(rows // 2500 % 2, -90.0, 90.0), 0.0)

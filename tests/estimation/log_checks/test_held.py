@@ -22,7 +22,7 @@ def held(values: np.ndarray, rows: float) -> np.ndarray:
 
 @pytest.mark.parametrize("sensors", [BENCH, IDEAL])
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
-def test_nothing_is_left_out_of_a_log_that_is_sampled_in_every_row(drive: str, sensors: Sensors) -> None:
+def test_a_log_sampled_in_every_row_is_unchanged(drive: str, sensors: Sensors) -> None:
     record = circuit_log(drive, sensors)
     assert without_held(record) == (record, ())
 
@@ -35,7 +35,7 @@ def test_a_coarse_encoder_is_not_held(quantum: float) -> None:
 
 @pytest.mark.parametrize("rows", [2, 3, 5, 10, 10.0 / 3.0])
 @pytest.mark.parametrize("channel", [PRESSURE, POSITION])
-def test_a_held_channel_is_named_and_its_own_samples_stay(channel: str, rows: float) -> None:
+def test_a_held_channel_is_named_and_keeps_only_its_own_samples(channel: str, rows: float) -> None:
     record = circuit_log("multisine")
     given = held(record[channel], rows)
     found, (note,) = without_held(record.replace(**{channel: given}))
@@ -56,7 +56,7 @@ def test_a_motor_that_is_driven_in_steps_is_not_held() -> None:
     ]
 
 
-def test_a_clean_log_says_what_was_held() -> None:
+def test_a_cleaned_log_notes_a_held_channel() -> None:
     record = circuit_log("multisine")
     clean = clean_log(record.replace(**{PRESSURE: held(record[PRESSURE], 7)}), EhaParameters())
     assert [note.code for note in clean.left_out] == [SensorCode.HELD]
@@ -73,9 +73,7 @@ def bridged(values: np.ndarray, rows: int, first: int) -> np.ndarray:
 @pytest.mark.parametrize("rows", [2, 5, 10])
 @pytest.mark.parametrize("first", [0, 1])
 @pytest.mark.parametrize("code", [SensorCode.HELD, SensorCode.BRIDGED])
-def test_a_slow_log_in_the_rows_of_a_fast_clock_gets_its_own_clock_back(
-    code: SensorCode, first: int, rows: int
-) -> None:
+def test_a_slow_log_written_at_a_faster_rate_gets_its_own_rate_back(code: SensorCode, first: int, rows: int) -> None:
     record = circuit_log("multisine")
     names = ("motor_speed_rad_s", POSITION, "velocity_m_s", PRESSURE)
     late = np.maximum((np.arange(len(record)) - first) // rows * rows + first, 0)
@@ -100,7 +98,7 @@ def test_a_fast_speed_beside_slow_sensors_keeps_all_its_samples() -> None:
 
 
 @pytest.mark.parametrize("channel", [PRESSURE, POSITION])
-def test_a_channel_that_was_bridged_alone_keeps_its_own_samples(channel: str) -> None:
+def test_a_single_interpolated_channel_keeps_only_its_own_samples(channel: str) -> None:
     record = circuit_log("multisine")
     given = bridged(record[channel], 4, 0)
     found, (note,) = without_held(record.replace(**{channel: given}))
@@ -110,6 +108,6 @@ def test_a_channel_that_was_bridged_alone_keeps_its_own_samples(channel: str) ->
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 50])
-def test_a_log_of_a_few_rows_is_neither(rows: int) -> None:
+def test_a_log_of_a_few_rows_is_neither_held_nor_interpolated(rows: int) -> None:
     record = circuit_log("multisine").slice(0, rows)
     assert without_held(record) == (record, ())

@@ -14,7 +14,7 @@ from tests.estimation.log_checks.made_logs import LOG, PRESSURE, SPEED, VELOCITY
 
 @pytest.mark.parametrize("channel", [SPEED, VELOCITY, PRESSURE])
 @pytest.mark.parametrize("rows", [FEWEST_ROWS + 1, 200])
-def test_a_channel_that_is_held_alone_is_missing_there_and_said(channel: str, rows: int) -> None:
+def test_a_channel_that_is_held_alone_becomes_missing_there_and_is_noted(channel: str, rows: int) -> None:
     given = LOG.replace(**{channel: stands(LOG[channel], 700, rows)})
     found, (note,) = without_held_alone(given)
     assert note.code is SensorCode.HELD_ALONE
@@ -32,11 +32,11 @@ def unchanged(values: Array) -> bool:
     return without_held_alone(record) == (record, ())
 
 
-def test_a_sensor_that_never_comes_back_is_left_to_its_accusers() -> None:
+def test_a_sensor_that_freezes_for_good_is_left_to_other_checks() -> None:
     assert unchanged(stands(LOG[PRESSURE], 1200, len(LOG)))
 
 
-def test_what_clips_is_coarse_or_rests_again_is_not_held() -> None:
+def test_a_clipped_coarse_or_repeatedly_resting_channel_is_not_held() -> None:
     pressure = LOG[PRESSURE]
     assert unchanged(np.minimum(pressure, 0.3 * np.max(pressure)))
     assert unchanged(np.round(pressure, -6))
@@ -44,7 +44,7 @@ def test_what_clips_is_coarse_or_rests_again_is_not_held() -> None:
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-5, 1e5])
-def test_noise_is_told_from_rounding_in_any_unit(unit: float) -> None:
+def test_noise_is_distinguished_from_rounding_in_any_unit(unit: float) -> None:
     noise = np.random.default_rng(3).normal(0.0, 1e-3, 1500)
     motion = np.sin(6.0 * np.arange(1500) / 1500)
     assert not unchanged(unit * stands(motion + noise, 700, 60))

@@ -21,7 +21,7 @@ def humming(record: Record, amplitude: float, frequency: float) -> Record:
 
 
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
-def test_nothing_is_taken_off_a_log_without_hum(drive: str) -> None:
+def test_a_log_without_hum_is_unchanged(drive: str) -> None:
     record = circuit_log(drive)
     assert without_hum(record) == (record, ())
 
@@ -46,7 +46,7 @@ def test_the_mains_and_two_harmonics_are_three_tones() -> None:
     assert [round(note.data["frequency_hz"]) for note in without_hum(record)[1]] == [50, 150, 100]
 
 
-def test_a_tone_that_position_has_as_well_is_motion_and_stays() -> None:
+def test_a_tone_that_position_has_too_is_motion_and_is_kept() -> None:
     record = humming(circuit_log("steps"), 2.5e4, 50.0)
     time = record.sample_time * np.arange(len(record))
     shaken = record.replace(position_m=record["position_m"] + 1e-4 * np.sin(2.0 * np.pi * 50.0 * time))
@@ -61,14 +61,14 @@ def test_harmonics_of_a_drive_that_repeats_itself_are_no_hum(repeats: float) -> 
     assert without_hum(record.replace(**{PRESSURE: record[PRESSURE] + square}))[1] == ()
 
 
-def test_a_line_at_a_harmonic_of_a_fast_drive_may_be_the_drive() -> None:
+def test_a_tone_at_a_harmonic_of_a_fast_drive_is_kept() -> None:
     driven = humming(humming(circuit_log("steps"), 1e6, 20.0), 2.5e4, 60.0)
     assert without_hum(driven)[1] == ()
 
 
 @pytest.mark.parametrize("repeats", [2.5, 3.4, 6.2])
-def test_the_mains_are_no_harmonic_of_a_slow_drive_that_has_no_others_near_them(repeats: float) -> None:
-    """Every frequency lies within 1 Hz of a multiple of one below 2 Hz, and for one of 3 Hz most do."""
+def test_mains_hum_is_not_taken_for_a_harmonic_of_a_slow_drive(repeats: float) -> None:
+    """Every frequency lies within 1 Hz of a harmonic of a drive below 2 Hz, and most of one of 3 Hz."""
     speed = 60.0 * np.sin(2.0 * np.pi * repeats * 1e-3 * np.arange(6000))
     record = simulate(CIRCUIT, speed, 1e-3, EhaParameters(), sensors=BENCH, rng=np.random.default_rng(4))
     assert without_hum(record)[1] == ()
@@ -76,7 +76,7 @@ def test_the_mains_are_no_harmonic_of_a_slow_drive_that_has_no_others_near_them(
     assert note.data["frequency_hz"] == pytest.approx(50.0, abs=0.1)
 
 
-def test_a_line_of_every_other_sample_is_no_hum() -> None:
+def test_a_tone_near_half_the_sample_rate_is_no_hum() -> None:
     slow = circuit_log("steps").slice(step=5)
     assert without_hum(humming(slow, 2.5e4, 0.48 / slow.sample_time))[1] == ()
 
@@ -92,20 +92,20 @@ def test_a_hum_beside_the_harmonics_of_a_drive_is_taken_off() -> None:
     assert note.data["frequency_hz"] == pytest.approx(53.0, abs=0.1)
 
 
-def test_no_more_tones_are_taken_off_than_a_mains_has(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_more_than_the_largest_number_of_tones_is_removed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hum, "MOST_TONES", 1)
     record = humming(humming(circuit_log("steps"), 3e4, 50.0), 1e4, 150.0)
     assert [round(note.data["frequency_hz"]) for note in without_hum(record)[1]] == [50]
 
 
-def test_a_line_at_the_end_of_the_spectrum_is_where_it_is() -> None:
+def test_a_line_at_an_end_of_the_spectrum_is_not_interpolated() -> None:
     frequencies = np.arange(5.0)
     lines = np.array([9.0, 1.0, 2.0, 8.0, 4.0])
     assert [hum._between(frequencies, lines, place) for place in (0, 4)] == [0.0, 4.0]
     assert 3.0 < hum._between(frequencies, lines, 3) < 3.5
 
 
-def test_a_stretch_in_which_the_pressure_is_missing_has_no_tone() -> None:
+def test_no_tone_is_fitted_to_a_stretch_with_mostly_missing_pressure() -> None:
     waves = np.column_stack([np.cos(np.arange(20.0)), np.sin(np.arange(20.0))])
     values = 3.0 * waves[:, 0]
     np.testing.assert_allclose(hum._fitted(waves, values), values)
@@ -114,7 +114,7 @@ def test_a_stretch_in_which_the_pressure_is_missing_has_no_tone() -> None:
 
 
 @pytest.mark.parametrize("goes_on", [False, True])
-def test_a_tone_of_a_motor_at_its_limit_of_speed_is_of_its_pump_unless_it_goes_on_without(goes_on: bool) -> None:
+def test_a_tone_is_hum_only_if_it_is_also_there_at_another_motor_speed(goes_on: bool) -> None:
     record = circuit_log("steps")
     time = record.sample_time * np.arange(len(record))
     turning = time > 1.5

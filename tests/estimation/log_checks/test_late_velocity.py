@@ -48,21 +48,21 @@ LATE = {
 
 
 @pytest.mark.parametrize("how", LATE)
-def test_a_late_velocity_is_told_and_not_used(how: str) -> None:
+def test_a_late_velocity_is_noted_and_not_used(how: str) -> None:
     log = clean_log(RECORD.replace(**{VELOCITY: LATE[how]}), HEALTHY)
     assert VELOCITY not in log.record
     (note,) = (one for one in log.left_out if one.code == SensorCode.VELOCITY_LATE)
     assert note.data["late_ms"] == pytest.approx(8.0, rel=0.15)
 
 
-def test_a_velocity_that_wanders_behind_its_filter_is_late_all_the_same() -> None:
-    """Seven tenths of their difference are lateness; the rest is noise that the filter correlated."""
+def test_a_late_velocity_with_filtered_noise_is_still_found() -> None:
+    """Seven tenths of the difference from position are lateness; the rest is noise that the filter correlated."""
     wanders = lagged(3.5e-3 * np.random.default_rng(3).standard_normal(len(RECORD)), 8e-3)
     _, (note,) = without_late_velocity(RECORD.replace(**{VELOCITY: LATE["lag"] + wanders}))
     assert note.data["late_ms"] == pytest.approx(8.0, rel=0.25)
 
 
-def test_a_lateness_that_means_over_a_block_show_is_told_under_fast_binary_noise() -> None:
+def test_a_late_velocity_is_found_under_fast_binary_noise() -> None:
     """Over 50 ms velocity changes slowly, and the effect of lateness is less than a sensor's allowed error."""
     turns = np.repeat(np.random.default_rng(6).choice([-0.02, 0.02], 200), 30)
     velocity = lagged(turns, 4e-3)
@@ -90,12 +90,12 @@ def test_a_gain_that_is_wrong_is_no_lateness() -> None:
     assert without_late_velocity(record) == (record, ())
 
 
-def test_without_both_channels_nothing_is_told() -> None:
+def test_without_position_no_late_velocity_is_found() -> None:
     alone = RECORD.replace(**{POSITION: None})
     assert without_late_velocity(alone) == (alone, ())
 
 
-def test_a_velocity_that_is_late_is_left_out_though_a_sample_of_it_is_missing() -> None:
+def test_a_late_velocity_with_a_missing_sample_is_found() -> None:
     record = moving()
     late = lagged(record[VELOCITY], 10e-3)
     late[10] = np.nan

@@ -69,7 +69,7 @@ def test_even_steps_that_follow_each_other_are_a_ramp_and_no_threshold() -> None
 
 
 @pytest.mark.parametrize("channel", [SPEED, POSITION, PRESSURE])
-def test_the_threshold_is_read_off_the_steps_and_named_where_it_matters(channel: str) -> None:
+def test_the_threshold_is_found_from_the_steps_and_named_if_it_is_large(channel: str) -> None:
     values = log()[channel]
     for share, told in ((0.05, True), (0.5 * MATTERS, False)):
         written = on_change(values, share * float(values.std()))
@@ -78,7 +78,7 @@ def test_the_threshold_is_read_off_the_steps_and_named_where_it_matters(channel:
     assert dead_band(on_change(values, threshold)) == pytest.approx(threshold, rel=0.05)
 
 
-def test_such_a_log_is_refused_by_name_and_the_logger_is_to_be_set() -> None:
+def test_a_pressure_logged_on_change_is_refused_with_advice_to_log_every_row() -> None:
     """Such logs passed the gate with bulk modulus up to 5 % off."""
     values = log()[PRESSURE]
     record = log().replace(**{PRESSURE: on_change(values, 0.05 * float(values.std()))})

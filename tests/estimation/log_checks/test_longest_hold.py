@@ -29,6 +29,6 @@ def test_a_coarse_sensor_that_follows_its_quantity_is_live() -> None:
     require_live(log(np.round(4.0 * WAVE)), ["position_m"])
 
 
-def test_a_short_log_may_repeat_no_value() -> None:
+def test_a_repeated_value_in_a_log_of_three_samples_is_refused() -> None:
     with pytest.raises(LogError, match="position_m holds one value for 2 ms"):
         require_live(Record(1e-3, {"position_m": [0.0, 1.0, 1.0]}), ["position_m"])

@@ -44,14 +44,14 @@ def test_the_estimate_scales_with_the_unit(factor: float) -> None:
     )
 
 
-def test_a_few_jumps_and_a_trend_do_not_count() -> None:
+def test_a_few_jumps_and_a_trend_do_not_change_the_variance() -> None:
     rng = np.random.default_rng(3)
     noise = rng.normal(0.0, 1e-3, 20_000)
     jumps = np.cumsum(np.where(rng.random(20_000) < 1e-3, 0.1, 0.0))
     assert variance_of("velocity_m_s", noise + jumps + np.linspace(0.0, 5.0, 20_000)) == pytest.approx(1e-6, rel=0.05)
 
 
-def test_missing_samples_do_not_count() -> None:
+def test_missing_samples_do_not_change_the_variance() -> None:
     record = Record(1e-3, {"velocity_m_s": np.random.default_rng(4).normal(0.0, 1e-3, 20_000)})
     gappy = drop_samples(record, 0.05, np.random.default_rng(5))
     assert variance_of("velocity_m_s", gappy["velocity_m_s"]) == pytest.approx(1e-6, rel=0.05)
@@ -63,14 +63,14 @@ def test_a_silent_channel_gets_the_smallest_variance_and_not_zero(channel: str, 
     assert variance_of(channel, values) == SMALLEST_VARIANCE[channel]
 
 
-def test_a_coarse_quantum_counts_although_most_samples_repeat() -> None:
+def test_a_coarse_converter_has_its_quantisation_noise_though_most_samples_repeat() -> None:
     pressure = 4e5 * np.sin(2.0 * np.pi * np.arange(10_000) / 5_000.0)
     quantised = 1e4 * np.round(pressure / 1e4)
     assert variance_of("differential_pressure_pa", quantised) == pytest.approx(1e8 / 12.0, rel=1e-9)
 
 
 @pytest.mark.parametrize("step", [0.1, 0.3, 0.5, 0.7, 1.0, 1.2, 1.5, 2.0, 2.5, 3.0])
-def test_noise_that_a_converter_rounds_is_found_between_whole_steps(step: float) -> None:
+def test_noise_is_found_through_a_converters_rounding(step: float) -> None:
     rng = np.random.default_rng(6)
     noisy = 300.0 * np.sin(np.arange(40_000) * 1.3e-3) + rng.normal(0.0, 1.0, 40_000)
     held = np.sqrt(1.0 + step**2 / 12.0)  # a converter that rounds adds noise of its own
@@ -78,7 +78,7 @@ def test_noise_that_a_converter_rounds_is_found_between_whole_steps(step: float)
     assert found / held == pytest.approx(1.0, abs=0.04 if step <= 2.5 else 0.13)
 
 
-def test_a_ramp_with_a_few_kinks_has_no_noise_of_a_step() -> None:
+def test_a_ramp_with_a_spike_in_every_tenth_sample_has_the_smallest_variance() -> None:
     rare = np.zeros(5_000)
     rare[::10] = 1.0
     assert variance_of("velocity_m_s", rare + 1e-4 * np.arange(5_000)) == SMALLEST_VARIANCE["velocity_m_s"]
@@ -88,7 +88,7 @@ def test_a_noiseless_ramp_is_not_taken_for_quantised() -> None:
     assert variance_of("position_m", 4e-5 * np.arange(1_000)) == SMALLEST_VARIANCE["position_m"]
 
 
-def test_a_slow_sensor_has_the_noise_of_the_samples_that_it_has() -> None:
+def test_the_noise_of_a_slow_sensor_is_that_of_its_own_samples() -> None:
     noise = np.random.default_rng(2).normal(0.0, 5e3, 2_000)
     slow = np.full(20_000, np.nan)
     slow[7::10] = noise
@@ -106,11 +106,11 @@ def test_position_noise_of_about_a_quantum_is_not_taken_for_the_quantum_alone() 
 
 
 @pytest.mark.parametrize("position", [np.zeros(100), np.full(100, np.nan), np.arange(3.0)])
-def test_a_position_that_does_not_move_or_is_not_there_has_the_smallest_noise(position: np.ndarray) -> None:
+def test_a_still_missing_or_very_short_position_has_the_smallest_variance(position: np.ndarray) -> None:
     assert position_variance(position) == SMALLEST_VARIANCE["position_m"]
 
 
-def test_a_variance_is_that_of_the_channel_as_it_is_now() -> None:
+def test_the_variance_is_measured_anew_for_each_log() -> None:
     noise = np.random.default_rng(2).normal(0.0, 1e-3, 2000)
     one, other = (
         measurement_variances(Record(1e-3, {"velocity_m_s": k * noise}), ["velocity_m_s"]) for k in (1.0, 2.0)
@@ -119,7 +119,7 @@ def test_a_variance_is_that_of_the_channel_as_it_is_now() -> None:
     assert position_variance(2.0 * noise) == pytest.approx(4.0 * position_variance(noise), rel=1e-9)
 
 
-def test_blows_of_a_binary_drive_do_not_pass_for_noise() -> None:
+def test_impacts_of_a_binary_drive_are_not_taken_for_noise() -> None:
     rng = np.random.default_rng(3)
     blows = np.zeros(15_000)
     blows[::20] = rng.choice((-1.0, 1.0), 750)
@@ -134,7 +134,9 @@ def test_blows_of_a_binary_drive_do_not_pass_for_noise() -> None:
 
 @pytest.mark.parametrize("steps", [1.0, 2.0, 2.4, 3.0])
 @pytest.mark.parametrize("phase", [0.0, 0.25, 0.5])
-def test_a_coarse_converter_has_its_noise_wherever_between_two_steps_it_rests(steps: float, phase: float) -> None:
+def test_noise_of_a_coarse_converter_is_found_at_any_rest_position_between_its_steps(
+    steps: float, phase: float
+) -> None:
     rng, step = np.random.default_rng(5), steps * 5e3
     rests = 5.0 * step * np.repeat(rng.integers(-3, 4, 40), 500) + phase * step  # a drive of steps
     read = step * np.rint((rests + rng.normal(0.0, 5e3, len(rests))) / step)
@@ -152,5 +154,5 @@ def test_a_converter_that_flickers_between_two_levels_has_no_gross_outliers() ->
 
 
 @pytest.mark.parametrize("values", [np.zeros(100), np.arange(5.0), np.full(100, np.nan)])
-def test_a_channel_that_shows_no_noise_has_none_to_be_counted(values: np.ndarray) -> None:
+def test_a_channel_without_noise_has_an_infinite_struck_variance(values: np.ndarray) -> None:
     assert struck_variance(values) == np.inf

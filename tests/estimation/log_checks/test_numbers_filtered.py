@@ -70,5 +70,5 @@ def logs_of_which_samples_are_left_out() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)
-def test_numbers_stand(case: str) -> None:
+def test_kept_numbers_are_unchanged(case: str) -> None:
     NUMBERS.check(case)

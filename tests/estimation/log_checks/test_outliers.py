@@ -34,20 +34,20 @@ def test_a_sound_log_has_no_outliers(condition: str, drive: str) -> None:
 
 
 @pytest.mark.parametrize("sample_time", [2e-3, 1e-4, 5e-5])
-def test_a_sound_log_has_none_whatever_its_rate(sample_time: float) -> None:
+def test_a_sound_log_has_no_outliers_at_any_sample_rate(sample_time: float) -> None:
     for condition, drive in (("normal", "prbs"), ("major_friction", "sine"), ("major_leakage", "steps")):
         assert without_gross_outliers(log(condition, drive, sample_time), CHANNELS)[1] == ()
 
 
 @pytest.mark.parametrize("condition", ["normal", "major_friction"])
-def test_a_piston_that_slips_for_a_few_samples_is_none(condition: str) -> None:
+def test_a_piston_that_slips_for_a_few_samples_is_no_outlier(condition: str) -> None:
     record = log(condition, "prbs", sensors=RIG)
     noise = measurement_variances(record, ("velocity_m_s",))["velocity_m_s"] ** 0.5
     assert np.any(np.isnan(without_outliers(record["velocity_m_s"], noise)))
     assert without_gross_outliers(record, CHANNELS)[1] == ()
 
 
-def test_a_sound_log_of_the_circuit_has_none() -> None:
+def test_a_sound_log_of_the_circuit_has_no_outliers() -> None:
     p, rng = circuit_of(parameters_for(CONDITIONS["minor_friction"])), np.random.default_rng(6)
     record = simulate(CIRCUIT, make_drive("steps", 5.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     assert without_gross_outliers(record, CHANNELS)[1] == ()
@@ -81,7 +81,7 @@ def test_an_outlier_at_an_end_is_found_there(place: int) -> None:
 
 
 @pytest.mark.parametrize("backward", [False, True])
-def test_a_motor_that_goes_from_rest_to_the_one_speed_of_its_log_begins_with_no_outlier(backward: bool) -> None:
+def test_a_run_up_from_rest_to_constant_speed_has_no_outliers(backward: bool) -> None:
     """A motor that a load holds at its full speed had its first two samples left out, 0 and 22 rad/s."""
     rng = np.random.default_rng(3)
     speed = np.full(2000, 125.6) + rng.normal(0.0, 0.05, 2000)
@@ -101,12 +101,12 @@ def test_missing_samples_stay_missing_and_are_not_counted() -> None:
     np.testing.assert_array_equal(cleaned["motor_speed_rad_s"], speed)
 
 
-def test_of_a_few_samples_none_stands_out() -> None:
+def test_a_few_samples_have_no_outliers() -> None:
     few = np.array([0.0, 1e9, np.nan, 0.0])
     np.testing.assert_array_equal(without_outliers(few), few)
 
 
-def test_a_burst_that_rings_on_in_a_pressure_goes_with_its_gross_outlier() -> None:
+def test_the_ringing_after_a_gross_pressure_outlier_is_removed_with_it() -> None:
     record = log("normal", "sine")
     ringing = 3e5 * np.exp(-0.5 * np.arange(8)) * np.cos(2.2 * np.arange(8))
     burst = np.zeros(len(record))
@@ -121,7 +121,7 @@ def test_a_burst_that_rings_on_in_a_pressure_goes_with_its_gross_outlier() -> No
     assert said.data["count"] == len(taken)
 
 
-def test_samples_beside_an_outlier_that_ring_no_more_than_elsewhere_stay() -> None:
+def test_samples_beside_an_outlier_without_ringing_are_kept() -> None:
     values = np.random.default_rng(2).normal(0.0, 1.0, 2000)
     values[::100] += 40.0
     sound = without_outliers(values, 1.0)
@@ -129,7 +129,7 @@ def test_samples_beside_an_outlier_that_ring_no_more_than_elsewhere_stay() -> No
 
 
 @pytest.mark.parametrize("written", [0.0, -9999.0])
-def test_what_a_logger_writes_in_place_of_lost_samples_is_left_out_near_it_too(written: float) -> None:
+def test_a_loggers_placeholder_for_lost_samples_is_removed_near_the_signal_too(written: float) -> None:
     sound = log("minor_leakage", "prbs")
     rng = np.random.default_rng(7)
     changes, lost = {}, {}
@@ -145,7 +145,7 @@ def test_what_a_logger_writes_in_place_of_lost_samples_is_left_out_near_it_too(w
         assert np.count_nonzero(np.isnan(mended[name]) & ~gone) == 0
 
 
-def test_outliers_of_unlike_values_take_no_others_with_them() -> None:
+def test_gross_outliers_remove_no_samples_of_other_values() -> None:
     values = np.random.default_rng(8).normal(0.0, 1.0, 400)
     values[[50, 150, 250, 350]] = 100.0, -90.0, 80.0, 100.0
     values[200] = 5.0

@@ -19,7 +19,7 @@ def log(position: Array, course: Array = COURSE) -> Record:
 
 
 @pytest.mark.parametrize("ends", [(-0.03, 1.0), (-1.0, 0.03), (-0.03, 0.04)])
-def test_the_samples_at_the_end_of_the_range_are_missing(ends: tuple[float, float]) -> None:
+def test_position_samples_at_the_end_of_the_range_are_taken_out(ends: tuple[float, float]) -> None:
     clipped = log(np.clip(COURSE, *ends))
     mended, (note,) = without_position_beyond_range(clipped)
     beyond = (ends[0] >= COURSE) | (ends[1] <= COURSE)
@@ -28,13 +28,13 @@ def test_the_samples_at_the_end_of_the_range_are_missing(ends: tuple[float, floa
     assert note.data["percent"] == pytest.approx(100.0 * np.mean(beyond))
 
 
-def test_a_piston_that_rests_at_its_farthest_is_believed() -> None:
+def test_a_piston_that_rests_at_its_farthest_position_is_not_taken_for_clipped() -> None:
     resting = np.clip(COURSE, -0.03, 0.03)
     record = log(resting, resting)
     assert without_position_beyond_range(record) == (record, ())
 
 
-def test_an_encoder_that_freezes_at_its_farthest_is_left_to_the_check_of_frozen_ones() -> None:
+def test_an_encoder_frozen_at_its_farthest_position_is_not_taken_for_clipped() -> None:
     frozen = COURSE.copy()
     frozen[3100:] = -0.06
     record = log(frozen)
@@ -53,7 +53,7 @@ def test_a_jump_of_twice_the_largest_step_is_no_end_of_a_range() -> None:
         assert bool(without_position_beyond_range(log(stays))[1]) is ends_there
 
 
-def test_the_longest_stays_are_asked_for_motion_wherever_they_lie() -> None:
+def test_clipping_in_one_slow_period_is_found_beside_rests_at_a_stop() -> None:
     # in a slow first period the piston moves on; in five quick ones it rests at a stop
     free = 0.05 * np.sin(2.0 * np.pi * np.interp(TIME, [0.0, 1.5, 4.0], [0.0, 1.0, 6.0]))
     course = np.where(TIME < 1.5, free, np.minimum(free, 0.04))
@@ -68,7 +68,7 @@ def test_without_position_or_velocity_nothing_is_found(missing: str) -> None:
     assert without_position_beyond_range(record) == (record, ())
 
 
-def test_a_position_that_never_moves_or_is_hardly_there_is_left_to_other_checks() -> None:
+def test_a_still_or_mostly_missing_position_is_not_taken_for_clipped() -> None:
     still = log(np.zeros(4000))
     assert without_position_beyond_range(still) == (still, ())
     few = log(np.where(np.arange(4000) < 60, np.clip(COURSE, -1.0, 0.01), np.nan))

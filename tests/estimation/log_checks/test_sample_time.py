@@ -21,16 +21,16 @@ def slow(sample_time: float) -> Record:
     return Record(sample_time, channels)
 
 
-def test_a_log_in_milliseconds_that_are_read_as_seconds_is_refused_with_the_unit() -> None:
+def test_a_log_with_milliseconds_read_as_seconds_is_refused_with_a_hint_at_the_unit() -> None:
     with pytest.raises(LogError, match=SLOW):
         clean_log(slow(1.0), EhaParameters())
 
 
-def test_a_log_at_the_limit_is_looked_at_though_its_stamps_are_rounded() -> None:
+def test_a_log_at_the_slowest_rate_is_accepted_despite_rounded_time_stamps() -> None:
     assert clean_log(slow(SLOWEST * (1.0 + 1e-7)), EhaParameters()).record.sample_time > SLOWEST
 
 
 @pytest.mark.parametrize("form", ["acceleration", "pressure"])
-def test_a_filter_of_such_a_stream_does_not_begin(form: str) -> None:
+def test_a_filter_refuses_a_stream_with_samples_too_far_apart(form: str) -> None:
     with pytest.raises(LogError, match="samples are 1 s apart"):
         begin_filter(StreamFilterOptions(EhaParameters(), form, "ekf"), slow(1.0))

@@ -60,13 +60,13 @@ def test_a_frozen_sensor_is_named(channel: str) -> None:
 
 
 @pytest.mark.parametrize("start", [0.5, 1.5, 2.5, 3.5, 4.5])
-def test_an_encoder_is_not_accused_by_a_velocity_that_froze(start: float) -> None:
+def test_a_frozen_velocity_does_not_accuse_the_encoder(start: float) -> None:
     frozen = with_fault(run(), SensorFault(channel="velocity_m_s", kind="freeze", start=start))
     assert {note.data["channel"] for note in sensor_objections(frozen, RIG_PARAMETERS)} == {"velocity_m_s"}
 
 
 @pytest.mark.parametrize("said", [0.05, 0.08])
-def test_a_velocity_that_stands_is_held_against_the_encoder_from_its_first_sample_on(said: float) -> None:
+def test_a_constant_velocity_is_accused_only_if_it_contradicts_the_encoder_beside_a_drop_out(said: float) -> None:
     time = 1e-3 * np.arange(6000)
     steady = (time >= 2.0) & (time < 4.0)
     true = np.where(steady, 0.05, 0.05 + 0.01 * np.sin(20.0 * (time - 2.0)))
@@ -77,7 +77,7 @@ def test_a_velocity_that_stands_is_held_against_the_encoder_from_its_first_sampl
     assert (found is not None) is (said != 0.05)
 
 
-def test_a_pressure_sensor_that_shows_nothing_is_named() -> None:
+def test_a_constant_pressure_or_one_of_noise_only_is_named() -> None:
     log = run()
     (unplugged,) = sensor_objections(log.replace(**{PRESSURE: np.zeros(len(log))}), RIG_PARAMETERS)
     assert unplugged == SensorCode.SENSOR_CONSTANT.note(channel=PRESSURE, value=0.0)
@@ -88,7 +88,7 @@ def test_a_pressure_sensor_that_shows_nothing_is_named() -> None:
 
 
 @pytest.mark.parametrize("counts", [0, 1])
-def test_a_pump_that_turns_too_slowly_to_move_the_piston_leaves_its_pressure_sensor_alive(counts: int) -> None:
+def test_a_pressure_of_noise_only_is_not_accused_if_a_slow_pump_moves_no_piston(counts: int) -> None:
     log, rng = run(), np.random.default_rng(1)
     still = 1e-6 * rng.integers(0, counts + 1, len(log))
     slow = log.replace(
@@ -98,7 +98,7 @@ def test_a_pump_that_turns_too_slowly_to_move_the_piston_leaves_its_pressure_sen
     assert SensorCode.SENSOR_NOISE_ONLY not in [one.code for one in sensor_objections(slow, RIG_PARAMETERS)]
 
 
-def test_a_pressure_sensor_is_alive_though_the_motor_rests() -> None:
+def test_a_pressure_of_noise_only_is_not_accused_if_the_motor_rests() -> None:
     """The noise of three sensors was taken for a motor that turns and a pressure sensor that is dead."""
     rng = np.random.default_rng(1)
     sizes = {"motor_speed_rad_s": 0.05, "position_m": 1e-6, PRESSURE: 3e3}
@@ -138,7 +138,7 @@ def test_samples_at_the_end_of_a_sensors_range_are_taken_out(condition: str, dri
     assert said.data["percent"] == pytest.approx(100.0 * np.mean(at_the_end), rel=1e-9)
 
 
-def test_of_a_pressure_that_hovers_at_the_end_no_half_of_the_noise_is_kept() -> None:
+def test_a_pressure_that_hovers_at_the_end_of_its_range_is_almost_wholly_taken_out() -> None:
     noise = np.random.default_rng(1).normal(0.0, 5e3, 6000)
     hovering = np.where(np.arange(6000) % 2000 < 1000, 0.0, 4.95e5) + 500.0 * np.round(noise / 500.0)
     log = Record(1e-3, {PRESSURE: np.minimum(hovering, 5e5)})
@@ -157,13 +157,13 @@ def test_a_relief_valves_plateau_is_no_end_of_a_range(noise: float, quantum: flo
     assert without_saturated(log, p) == (log, ())
 
 
-def test_a_sound_pressure_loses_nothing() -> None:
+def test_a_sound_pressure_loses_no_samples() -> None:
     for drive, sensors in product(("sine", "steps", "prbs"), (BENCH, IDEAL, replace(BENCH, pressure_quantum=2e4))):
         log = run(drive, sensors=sensors)
         assert without_saturated(log, RIG_PARAMETERS) == (log, ())
 
 
-def test_a_chambers_sensor_that_clips_takes_the_difference_with_it() -> None:
+def test_a_clipped_chamber_pressure_is_also_taken_out_of_the_difference() -> None:
     log = run()
     low = np.random.default_rng(1).normal(2.758e5, 5e3, len(log))
     chambers = {
@@ -188,7 +188,7 @@ def test_a_slow_sensor_that_froze_is_named_and_a_sound_one_is_not(channel: str) 
         assert len(sensor_objections(slow, RIG_PARAMETERS)) == accused
 
 
-def test_an_encoder_is_not_accused_where_the_pressure_that_held_the_piston_was_clipped() -> None:
+def test_an_encoder_is_not_accused_while_the_pressure_is_clipped() -> None:
     log, stuck = run(), slice(2000, 4000)
     channels = {name: log[name].copy() for name in ("motor_speed_rad_s", "position_m", PRESSURE)}
     for name, value in zip(channels, (10.0, 0.1, np.nan), strict=True):
@@ -202,7 +202,7 @@ def test_a_missing_sample_ends_a_hold() -> None:
 
 
 @pytest.mark.parametrize(("speed", "found"), [(1e-3, (True, False)), (1e-4, (False, True))])
-def test_a_piston_slid_if_its_velocity_makes_more_way_than_the_encoder_resolves(
+def test_velocity_shows_motion_if_its_path_exceeds_the_encoders_resolution(
     speed: float, found: tuple[bool, bool]
 ) -> None:
     noise = 1e-7 * np.random.default_rng(1).standard_normal(400)
@@ -211,7 +211,7 @@ def test_a_piston_slid_if_its_velocity_makes_more_way_than_the_encoder_resolves(
     assert shows_motion(record, slice(100, 300)) == found
 
 
-def test_of_sensors_that_are_hardly_there_nothing_is_said() -> None:
+def test_sensors_with_few_or_no_samples_are_not_accused() -> None:
     record = run()
     few = np.where(np.arange(len(record)) < 5, 1.0, np.nan)
     for channel in ("position_m", "velocity_m_s", PRESSURE):
@@ -220,7 +220,7 @@ def test_of_sensors_that_are_hardly_there_nothing_is_said() -> None:
         assert without_saturated(record.replace(**{channel: few}), RIG_PARAMETERS)[1] == ()
 
 
-def test_a_still_velocity_is_not_accused_by_an_encoder_that_is_not_there() -> None:
+def test_a_still_velocity_is_not_accused_without_an_encoder() -> None:
     frozen = with_fault(run(), SensorFault(channel="velocity_m_s", kind="freeze", start=3.0))
     gone = np.where(frozen.time < 2.9, frozen["position_m"], np.nan)
     for other in (frozen.replace(position_m=None), frozen.replace(position_m=gone)):

@@ -20,14 +20,14 @@ def at(record: Record, rows: np.ndarray) -> Record:
 
 @pytest.mark.parametrize("sensors", [BENCH, IDEAL])
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "sine"])
-def test_a_log_that_is_written_once_has_no_copies(drive: str, sensors: Sensors) -> None:
+def test_a_sound_log_has_no_copied_rows(drive: str, sensors: Sensors) -> None:
     record = circuit_log(drive, sensors)
     assert without_rows_sent_twice(record) == (record, ())
 
 
 @pytest.mark.parametrize("rows", [FEWEST_ROWS, 50, 300])
 @pytest.mark.parametrize("drive", ["steps", "multisine", "sine"])
-def test_a_packet_that_came_again_is_cut_out_and_said(drive: str, rows: int) -> None:
+def test_a_packet_that_was_sent_twice_is_cut_out_and_noted(drive: str, rows: int) -> None:
     record = circuit_log(drive)
     order = np.arange(len(record))
     sent = np.concatenate([order[: 1500 + rows], order[1500 : 2500 + rows], order[2500:]])
@@ -37,7 +37,7 @@ def test_a_packet_that_came_again_is_cut_out_and_said(drive: str, rows: int) -> 
         assert np.array_equal(found[name], record[name])
 
 
-def test_a_copy_in_place_of_rows_that_were_lost_leaves_them_missing() -> None:
+def test_a_copy_that_replaces_lost_rows_becomes_missing_samples() -> None:
     record = circuit_log("multisine")
     order = np.arange(len(record))
     order[1600:1700] = order[1500:1600]
@@ -62,12 +62,12 @@ BEFORE = -0.7 * np.linspace(1.0, 0.0, 2000, endpoint=False) ** 2
 
 
 @pytest.mark.parametrize("times", [2, 3, 12])
-def test_a_run_without_noise_that_repeats_is_no_copy(times: int) -> None:
+def test_a_periodic_run_without_noise_has_no_copied_rows(times: int) -> None:
     record = without_noise(BEFORE, np.tile(PERIOD, times))
     assert without_rows_sent_twice(record) == (record, ())
 
 
-def test_a_packet_without_noise_that_came_again_is_found_by_its_step_back_also_at_the_end_of_the_log() -> None:
+def test_a_noiseless_packet_sent_twice_is_found_by_its_step_back() -> None:
     once = without_noise(BEFORE, PERIOD[:200])
     order = np.arange(len(once))
     for sent in (np.concatenate([order[:1550], order[1500:]]), np.concatenate([order, order[-50:]])):
@@ -87,13 +87,13 @@ def test_a_packet_without_noise_that_came_again_is_found_by_its_step_back_also_a
     ],
     ids=["rest before", "rest behind", "to the end", "another row before", "no longer than the distance"],
 )
-def test_a_copy_is_as_long_as_rows_repeat_rests_at_its_ends_too(
+def test_a_copy_extends_over_all_repeated_rows_including_rests_at_its_ends(
     rows: list[int], known: tuple[int, int], whole: tuple[int, int]
 ) -> None:
     assert _widened(np.array(rows, dtype=np.uint64), *known, 5) == whole
 
 
-def test_coarse_channels_at_rest_are_no_copies() -> None:
+def test_coarse_channels_at_rest_have_no_copied_rows() -> None:
     rng = np.random.default_rng(2)
     record = Record(1e-3, {name: rng.integers(0, 3, 4000).astype(np.float64) for name in (SPEED, POSITION, PRESSURE)})
     assert without_rows_sent_twice(record) == (record, ())
@@ -113,7 +113,7 @@ def again(record: Record) -> Record:
     return at(record, np.concatenate([order[:900], order[880:]]))
 
 
-def test_of_an_input_without_noise_and_one_output_a_copy_is_cut_out() -> None:
+def test_a_copy_is_cut_out_of_a_noiseless_input_and_a_noisy_output() -> None:
     record = relation(0.02, 6)
     found, (note,) = without_rows_sent_twice(again(record), ["u", "y"])
     assert note.data["rows"] == 20
@@ -123,12 +123,12 @@ def test_of_an_input_without_noise_and_one_output_a_copy_is_cut_out() -> None:
 
 
 @pytest.mark.parametrize(("noise", "decimals"), [(0.02, 6), (0.0, 6), (0.02, 2), (0.02, 1), (0.3, 0)])
-def test_two_columns_that_are_written_once_have_no_copies(noise: float, decimals: int) -> None:
+def test_two_sound_columns_have_no_copied_rows(noise: float, decimals: int) -> None:
     for seed in range(5):
         record = relation(noise, decimals, seed)
         assert without_rows_sent_twice(record, ["u", "y"]) == (record, ())
 
 
-def test_a_plant_without_noise_that_repeats_is_no_copy() -> None:
+def test_a_copy_in_a_log_without_noise_is_not_cut_out() -> None:
     sent = again(relation(0.0, 6))
     assert without_rows_sent_twice(sent, ["u", "y"]) == (sent, ())

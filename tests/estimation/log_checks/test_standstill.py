@@ -22,7 +22,7 @@ RIG = EhaParameters()
         (100.0, 0.05, False, False, False),
     ],
 )
-def test_a_piston_that_stands_still_is_stuck_only_where_its_pump_turns(
+def test_a_still_piston_is_stuck_only_if_its_pump_turns(
     speed: float, travel: float, still: bool, at_rest: bool, stuck: bool
 ) -> None:
     """An offset of speed is not a turning pump."""
@@ -43,5 +43,5 @@ def test_without_position_a_small_offset_of_velocity_is_no_motion(velocity: floa
     assert gone.stuck == stuck
 
 
-def test_nothing_is_said_without_position_and_velocity() -> None:
+def test_without_position_and_velocity_there_is_no_travel() -> None:
     assert travels(Record(1e-3, {SPEED: np.ones(2000)}), RIG) is None

@@ -12,27 +12,27 @@ from plant.log.record import Record
 NAN = np.nan
 
 
-def test_a_rest_stands_in_its_middle_and_what_is_missing_stays_so() -> None:
+def test_a_rest_is_reduced_to_its_middle_sample_and_missing_samples_stay_missing() -> None:
     rest = np.full(2 * REST + 3, NAN)
     rest[[0, REST // 2, REST + 3 + (REST - 1) // 2]] = 3.0, 3.0, 4.0
     told = changes_and_rests(np.repeat([3.0, NAN, 4.0, 5.0], [REST + 1, 2, REST, 1]))
     np.testing.assert_array_equal(told, np.append(rest, 5.0))
 
 
-def test_rows_beside_a_slow_change_stay_and_those_between_do_not() -> None:
+def test_rows_beside_a_slow_change_are_kept_and_those_between_dropped() -> None:
     told = changes_and_rests(np.repeat([1.0, 2.0, 3.0, 4.0, 5.0], [1, 2, 4, REST, 1]))
     rest = np.full(REST, NAN)
     rest[[0, (REST - 1) // 2]] = 4.0  # its last row is off by half a step only if the piston was slow
     np.testing.assert_array_equal(told, np.concatenate([[1.0, 2.0, 2.0, 3.0, NAN, NAN, 3.0], rest, [5.0]]))
 
 
-def test_what_is_told_of_a_turn_lies_neither_before_nor_behind_it() -> None:
+def test_kept_rows_around_a_turning_point_have_a_small_mean_error() -> None:
     time = 1e-4 * np.arange(-200, 501)
     turning = -1e6 * np.maximum(np.maximum(-time, time - 0.03), 0.0) ** 2  # rests for 30 ms [um]
     assert abs(mean_error(turning)) < 0.3  # -1.3 with all rows of motion and one of the rest
 
 
-def test_a_channel_without_rows_has_none() -> None:
+def test_an_empty_channel_stays_empty() -> None:
     assert changes_and_rests(np.empty(0)).shape == (0,)
 
 
@@ -42,7 +42,7 @@ def mean_error(position: Array) -> float:
     return float(np.mean([np.nansum(changes_and_rests(np.round(one))[1:] - one[1:]) for one in true]))
 
 
-def test_readings_that_are_equal_by_chance_all_count() -> None:
+def test_equal_readings_of_a_noisy_or_still_encoder_are_all_kept() -> None:
     rng = np.random.default_rng(1)
     noisy = Record(1e-3, {"position_m": np.round(rng.normal(0.0, 2.0, 5000)) * 1e-6})
     assert np.count_nonzero(np.diff(noisy["position_m"]) == 0.0) > 100
@@ -53,7 +53,7 @@ def test_readings_that_are_equal_by_chance_all_count() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("drive", "condition", "seed"), [("steps", "major_leakage", 102), ("prbs", "normal", 201)])
-def test_the_interval_of_a_tuned_filter_covers_where_the_piston_rests_between_moves(
+def test_a_tuned_filters_interval_covers_if_the_piston_rests_between_moves(
     drive: str, condition: str, seed: int
 ) -> None:
     log = logged(Case("lumped", "pressure", 1000, drive, condition, seed))

@@ -25,7 +25,7 @@ def test_a_unit_that_changes_is_named_with_its_time_and_factor(channel: str, fac
     assert note.data["begin_s"] == pytest.approx(LOG.start_time + LOG.sample_time * ROW, abs=0.2)
 
 
-def test_of_such_a_log_nothing_is_concluded() -> None:
+def test_a_log_with_a_unit_change_has_this_one_mistake_and_no_objections() -> None:
     given = LOG.replace(**{PRESSURE: np.where(np.arange(N) < ROW, LOG[PRESSURE], 1e-5 * LOG[PRESSURE])})
     clean = clean_log(given, EhaParameters())
     assert [note.code for note in clean.mistakes] == [ChannelCode.UNIT_CHANGES]
@@ -40,7 +40,7 @@ def test_a_drive_that_grows_tenfold_and_a_sound_log_are_no_change() -> None:
     assert unit_changes(LOG.slice(0, 300)) == ()
 
 
-def test_all_channels_that_grow_noisy_are_no_change_of_unit() -> None:
+def test_growing_noise_in_all_channels_is_no_unit_change() -> None:
     noisy = {name: LOG[name] + 0.3 * np.std(LOG[name]) * np.sin(1e4 * np.arange(N) ** 2) for name in LOG}
     given = {name: np.where(np.arange(N) < ROW, LOG[name], noisy[name]) for name in LOG}
     assert unit_changes(LOG.replace(**given)) == ()

@@ -36,19 +36,19 @@ def test_an_offset_is_subtracted_whatever_the_gain(gain: float) -> None:
     )
 
 
-def test_a_piston_that_stands_tells_an_offset_too() -> None:
+def test_an_offset_is_also_found_from_a_still_piston() -> None:
     _, (note,) = without_velocity_offset(moved(offset=-1e-3, size=0.0))
     assert note.data["offset_m_s"] == pytest.approx(-1e-3, rel=0.05)
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.9])
-def test_noise_and_a_wrong_gain_are_none(gain: float) -> None:
+def test_noise_and_a_wrong_gain_are_no_offset(gain: float) -> None:
     for seed in range(40):
         record = moved(gain=gain, seed=seed)
         assert without_velocity_offset(record) == (record, ())
 
 
-def test_an_offset_counts_from_where_it_is_certain_and_matters() -> None:
+def test_an_offset_is_subtracted_only_if_it_is_large_enough_and_significant() -> None:
     for offset, told in ((1.1 * MATTERS, True), (0.9 * MATTERS, False)):
         size = float(np.sqrt(np.mean(moved(size=1.0)["velocity_m_s"] ** 2)))
         assert bool(without_velocity_offset(moved(size=1.0, offset=offset * size))[1]) is told
@@ -57,7 +57,7 @@ def test_an_offset_counts_from_where_it_is_certain_and_matters() -> None:
         assert bool(without_velocity_offset(moved(size=1e-9, offset=deviations * error))[1]) is told
 
 
-def test_a_log_that_lacks_a_channel_or_most_of_it_is_left() -> None:
+def test_a_log_without_enough_position_or_velocity_is_unchanged() -> None:
     record = moved(offset=2e-3)
     for name in ("position_m", "velocity_m_s"):
         assert without_velocity_offset(record.replace(**{name: None}))[1] == ()
@@ -69,7 +69,7 @@ def test_a_log_that_lacks_a_channel_or_most_of_it_is_left() -> None:
         assert bool(without_velocity_offset(record.replace(position_m=position))[1]) is told
 
 
-def test_missing_samples_are_passed_over() -> None:
+def test_an_offset_is_found_despite_missing_samples() -> None:
     record = moved(offset=2e-3)
     velocity = record["velocity_m_s"].copy()
     velocity[::17] = np.nan
@@ -77,7 +77,7 @@ def test_missing_samples_are_passed_over() -> None:
     assert note.data["offset_m_s"] == pytest.approx(2e-3, rel=0.05)
 
 
-def test_a_class_is_told_with_an_offset_of_the_velocity_sensor() -> None:
+def test_a_log_with_a_velocity_offset_is_still_diagnosed() -> None:
     rng = np.random.default_rng(2)
     record = simulate(CIRCUIT, make_drive("prbs", 3.0, 1e-3, PAPER, rng), 1e-3, PAPER, sensors=BENCH, rng=rng)
     off = record.replace(velocity_m_s=record["velocity_m_s"] + 3e-3)
@@ -88,7 +88,7 @@ def test_a_class_is_told_with_an_offset_of_the_velocity_sensor() -> None:
     assert [note.code for note in found.notes].count(SensorCode.VELOCITY_OFFSET) == 1
 
 
-def test_of_a_velocity_that_froze_no_offset_is_told() -> None:
+def test_a_frozen_velocity_is_named_without_an_offset() -> None:
     """A sensor that froze while the piston moved was said to read 20 mm/s too much, then to have frozen."""
     log = moved(seed=4, size=0.2)
     frozen = log.replace(velocity_m_s=np.where(np.arange(8000) < 1000, log["velocity_m_s"], 0.03))

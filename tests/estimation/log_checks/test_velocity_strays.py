@@ -32,7 +32,7 @@ def log(lag: float, order: int) -> Record:
 
 
 @pytest.mark.parametrize(("lag", "order"), [(8e-3, 1), (3e-3, 1), (4e-3, 2), (3e-3, 4)])
-def test_a_piston_that_rests_behind_a_filtered_velocity_does_not_move(lag: float, order: int) -> None:
+def test_a_filtered_velocity_shows_no_motion_of_a_piston_at_rest(lag: float, order: int) -> None:
     record = log(lag, order)
     assert not strays_unusually(record, INNER, 5e-6)
     assert not shows_motion(record, RESTS)[0]
@@ -40,20 +40,20 @@ def test_a_piston_that_rests_behind_a_filtered_velocity_does_not_move(lag: float
 
 @pytest.mark.parametrize(("lag", "order"), [(8e-3, 1), (3e-3, 4)])
 @pytest.mark.parametrize("stop", [3300, 8000])
-def test_an_encoder_that_freezes_beside_a_filtered_velocity_misses_motion(lag: float, order: int, stop: int) -> None:
+def test_a_filtered_velocity_shows_motion_that_a_frozen_encoder_misses(lag: float, order: int, stop: int) -> None:
     record, hold = log(lag, order), slice(SLIDES.start, stop)
     position = record["position_m"].copy()
     position[hold] = position[hold.start]
     assert shows_motion(record.replace(position_m=position), hold) == (True, False)
 
 
-def test_where_position_moves_nowhere_else_velocity_is_believed() -> None:
+def test_velocity_is_believed_if_position_never_moves() -> None:
     record = log(3e-3, 1)
     assert strays_unusually(record.replace(position_m=np.zeros(len(record))), SLIDES, 5e-6)
 
 
 @pytest.mark.parametrize("sample_time", [0.4, 1.0, 2.0])
-def test_a_log_whose_samples_are_farther_apart_than_the_window_is_compared_by_two_of_them(sample_time: float) -> None:
+def test_a_log_sampled_more_slowly_than_the_window_shows_no_unusual_strays(sample_time: float) -> None:
     place = np.repeat(np.cumsum(MOVING[::40]) * sample_time, 2)
     record = Record(sample_time, {"position_m": place, "velocity_m_s": np.gradient(place, sample_time)})
     assert not strays_unusually(record, slice(40, 44), 5e-6)

@@ -9,7 +9,7 @@ from plant.components.oil import ATMOSPHERE
 
 
 @pytest.mark.parametrize("pressure", [2e5, 7e5, 3e6])
-def test_bubbles_are_squeezed_as_their_exponent_says_and_bulk_modulus_is_that_at_the_stated_pressure(
+def test_stiffness_of_aerated_oil_follows_the_polytropic_law_of_its_bubbles(
     pressure: float,
 ) -> None:
     share, exponent, stated = 0.02, 1.3, 7e5

@@ -30,7 +30,7 @@ def parameters() -> SimpleNamespace:
 
 @pytest.mark.parametrize("name", [name for name in AUGMENTABLE if name != AIR_FRACTION])
 @pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
-def test_at_the_parameters_own_value_the_step_is_the_models(model: ProcessModel, name: str) -> None:
+def test_the_augmented_step_equals_the_models_at_the_rigs_parameter_value(model: ProcessModel, name: str) -> None:
     wide = augmented(model, [name])
     value = getattr(RIG, name)
     plain = model.step(STATE, (100.0, 101.0), parameters(), 1e-4)
@@ -45,7 +45,7 @@ def test_a_parameter_that_is_a_state_is_not_read_from_the_rig() -> None:
     assert wide.step(state, (100.0, 101.0), leaky, 1e-4) == wide.step(state, (100.0, 101.0), parameters(), 1e-4)
 
 
-def test_air_softens_the_oil_and_none_of_it_leaves_it_as_it_is() -> None:
+def test_air_softens_the_oil_and_nearly_no_air_does_not() -> None:
     wide = augmented(PRESSURE_FORM, [AIR_FRACTION])
     plain = PRESSURE_FORM.step(STATE, (100.0, 101.0), parameters(), 1e-4)
     hard, soft = (wide.step((*STATE, air), (100.0, 101.0), parameters(), 1e-4) for air in (1e-9, 5e-3))
@@ -55,7 +55,7 @@ def test_air_softens_the_oil_and_none_of_it_leaves_it_as_it_is() -> None:
     assert soft[3] == STATE[3]
 
 
-def test_what_cannot_be_a_state_is_refused() -> None:
+def test_a_parameter_that_cannot_be_a_state_is_refused() -> None:
     with pytest.raises(HydrostateError, match="got 'piston_area'"):
         augmented(PRESSURE_FORM, ["piston_area"])
     with pytest.raises(HydrostateError, match="once, got 'flow_bias'"):
@@ -64,7 +64,7 @@ def test_what_cannot_be_a_state_is_refused() -> None:
         augmented(ACCELERATION_FORM, [AIR_FRACTION])
 
 
-def test_a_guess_of_nothing_begins_at_a_share_of_the_healthy_value() -> None:
+def test_a_first_guess_of_zero_begins_at_a_share_of_the_healthy_value() -> None:
     model = augmented(PRESSURE_FORM, ["leakage_coefficient"])
     base = first_belief(PRESSURE_FORM, Record(1e-3, {"position_m": np.zeros(3)}), 2e8, 1e8)
     prior = augmented_prior(model, base, replace(RIG, leakage_coefficient=0.0))

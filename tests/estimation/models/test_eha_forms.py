@@ -63,7 +63,7 @@ def test_the_analytic_jacobian_is_the_numerical_one(condition: Condition, model:
     np.testing.assert_allclose(moved * scale, direct, rtol=1e-12, atol=0.0)
 
 
-def test_the_printed_jacobian_stands_with_erratum_4() -> None:
+def test_the_printed_jacobian_is_correct_with_erratum_4() -> None:
     p, T = EhaParameters(), 1e-4
     state = state_of(ACCELERATION_FORM, "sliding")
     _, v, a, beta = state
@@ -81,7 +81,7 @@ def test_the_printed_jacobian_stands_with_erratum_4() -> None:
 
 
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
-def test_each_form_steps_as_its_plant_does(condition: Condition) -> None:
+def test_each_form_makes_the_same_step_as_its_plant(condition: Condition) -> None:
     p = parameters_for(condition)
     x, v, dp, beta = state_of(PRESSURE_FORM, "sliding")
     as_plant = lumped_step((x, v, dp), SPEEDS, replace(p, bulk_modulus=beta), 1e-4)
@@ -92,12 +92,12 @@ def test_each_form_steps_as_its_plant_does(condition: Condition) -> None:
     assert acceleration_step((x, v, a, beta), SPEEDS, p, 1e-4) == (*euler, beta)
 
 
-def test_the_pressure_form_sticks() -> None:
+def test_the_piston_of_the_pressure_form_sticks_at_low_pressure() -> None:
     state = tuple(state_of(PRESSURE_FORM, "stuck"))
     assert float(pressure_step(state, (0.0, 0.0), EhaParameters(), 1e-4)[1]) == 0.0
 
 
-def test_while_it_sticks_motion_says_nothing_of_bulk_modulus() -> None:
+def test_the_motion_of_a_stuck_piston_does_not_depend_on_bulk_modulus() -> None:
     p = EhaParameters()
     scale = np.array([variable.scale for variable in PRESSURE_FORM.states])
     state = state_of(PRESSURE_FORM, "stuck") / scale
@@ -111,7 +111,7 @@ def test_only_the_bulk_modulus_is_replaced() -> None:
     assert vars(with_bulk_modulus(p, 1e8)) == {**asdict(p), "bulk_modulus": 1e8}
 
 
-def test_oil_of_which_nothing_is_known_moves_each_state_as_far_as_it_may() -> None:
+def test_an_unknown_oil_volume_moves_each_state_by_its_largest_possible_amount() -> None:
     p, T = EhaParameters(), 1e-3
     variance, moves = volume_left_open(p, {"motor_speed_rad_s": np.array([0.0, 4.0])}, T)
     np.testing.assert_allclose(variance, [0.0, 4.0 * p.pump_displacement**2])

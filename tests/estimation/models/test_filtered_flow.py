@@ -14,7 +14,7 @@ from plant.log.record import Record
 from tests.estimation.fits.short_logs import PRESSURE, log
 
 
-def test_a_filter_moves_what_is_read_and_not_the_circuit() -> None:
+def test_a_pressure_filter_changes_the_reading_and_not_the_circuit() -> None:
     p = WideFlowParameters(pressure_lag=4e-3, filter_time=3e-3, pressure_offset=2e4)
     still = ((0.0, 0.0),) * 4
     drives = ((100.0, 100.0), (0.0, 0.0), (0.5, 0.5), (0.0, 0.0), *still, 1e-3)
@@ -26,7 +26,7 @@ def test_a_filter_moves_what_is_read_and_not_the_circuit() -> None:
     assert p.filter_time**2 * rates[4] + p.pressure_lag * climbs == pytest.approx(behind + 2e4)
 
 
-def test_a_butterworth_filter_of_30_hz_is_found_and_bulk_modulus_behind_it() -> None:
+def test_a_30_hz_butterworth_filter_and_the_bulk_modulus_are_found_together() -> None:
     """With a delay of whole milliseconds and a lag instead, bulk modulus was up to five deviations off."""
     plain = log(2.0, p=EhaParameters(), drive="prbs")
     over, under = butter(2, 30.0, fs=1e3)

@@ -36,13 +36,13 @@ def settle(p: SimpleNamespace, speed: float, seconds: float, step: float = 1e-3)
     return p1, p2
 
 
-def test_a_blocked_piston_settles_where_leakage_takes_the_pumped_flow() -> None:
+def test_a_blocked_piston_settles_at_the_pressure_at_which_leakage_equals_the_pumped_flow() -> None:
     p = values(relief_pressure=1e9, leakage_coefficient=2.523e-11, flow_bias=1.382e-5)
     p1, p2 = settle(p, 60.0, 6.0)
     assert p1 - p2 == pytest.approx((60.0 * P.pump_displacement - 1.382e-5) / 2.523e-11, rel=1e-6)
 
 
-def test_nothing_moves_inside_the_dead_zone() -> None:
+def test_chamber_pressures_stay_constant_inside_the_dead_zone_of_the_pump() -> None:
     assert settle(values(flow_bias=1e-5), 10.0, 0.1) == (P.accumulator_pressure, P.accumulator_pressure)
 
 
@@ -59,7 +59,7 @@ def test_make_up_holds_the_low_chamber_near_the_inner_circuit() -> None:
     assert without < 0.0
 
 
-def test_a_make_up_valve_that_cracks_holds_its_chamber_lower_by_that() -> None:
+def test_a_make_up_valve_lowers_its_chamber_by_its_cracking_pressure() -> None:
     leaking = {"makeup_conductance": 1e-8, "leakage_coefficient": 2.5e-11}
     _, seated = settle(values(**leaking), 60.0, 2.0)
     _, cracking = settle(values(**leaking, crack_b=2e3), 60.0, 2.0)
@@ -68,7 +68,7 @@ def test_a_make_up_valve_that_cracks_holds_its_chamber_lower_by_that() -> None:
     assert other == pytest.approx(seated, abs=1.0)
 
 
-def test_an_accumulator_without_gas_to_spare_gives_way_by_volume_as_by_mass() -> None:
+def test_the_accumulator_has_the_same_rate_balanced_by_volume_and_by_mass() -> None:
     state, drives = (3e5, 2e5, 2.6e5), ((60.0, 60.0), (0.0, 1e-4), 1e-3)
     p = values(accumulator_stiffness=1e8, case_leakage=1e-13)
     by_volume = completed(FLOW_FORM).rates(state, drives, p, 0.0)
@@ -79,7 +79,7 @@ def test_an_accumulator_without_gas_to_spare_gives_way_by_volume_as_by_mass() ->
 
 
 @pytest.mark.parametrize("form", [FLOW_FORM, MASS_FLOW_FORM])
-def test_a_make_up_valve_that_is_an_orifice_feeds_half_as_much_a_pascal_where_its_flow_has_bent(
+def test_a_make_up_valve_like_an_orifice_feeds_half_the_linear_flow_beyond_its_bend(
     form: GreyBoxModel,
 ) -> None:
     state, drives = (2e5, 1.2e6, 2.6e5), ((60.0, 60.0), (0.0, 1e-4), 1e-3)
@@ -94,7 +94,7 @@ def test_a_make_up_valve_that_is_an_orifice_feeds_half_as_much_a_pascal_where_it
     assert balances_mass(completed(form, bent=True)) == balances_mass(form) == (form is MASS_FLOW_FORM)
 
 
-def test_two_chambers_without_make_up_are_the_lumped_capacitance() -> None:
+def test_two_chambers_without_make_up_have_the_lumped_capacitance() -> None:
     p = values(makeup_conductance=0.0, leakage_coefficient=0.0, flow_bias=0.0)
     p1, p2 = settle(p, 50.0, 0.01)
     pumped = 50.0 * P.pump_displacement * 0.01
@@ -102,7 +102,7 @@ def test_two_chambers_without_make_up_are_the_lumped_capacitance() -> None:
 
 
 @given(pumped=st.floats(-1e-4, 1e-4), velocity=st.floats(-0.1, 0.1), p1=st.floats(3e5, 4e6), p2=st.floats(3e5, 4e6))
-def test_without_make_up_one_chamber_gains_what_the_other_loses(
+def test_without_make_up_one_chamber_gains_the_volume_that_the_other_loses(
     pumped: float, velocity: float, p1: float, p2: float
 ) -> None:
     a, b = chamber_rates((p1, p2), Delivery(pumped, velocity, 0.01), values(), by_mass=False)
@@ -112,7 +112,7 @@ def test_without_make_up_one_chamber_gains_what_the_other_loses(
 
 
 @given(pumped=st.floats(-1e-4, 1e-4), p1=st.floats(3e5, 2.5e7), p2=st.floats(3e5, 2.5e7))
-def test_balanced_by_mass_no_oil_is_lost(pumped: float, p1: float, p2: float) -> None:
+def test_a_balance_by_mass_conserves_the_oil(pumped: float, p1: float, p2: float) -> None:
     """With plain make-up checks, a single rod pumps both sides up to 250 bar: a tenth of bulk modulus."""
     p = values(relief_conductance=0.0)
     a, b = chamber_rates((p1, p2), Delivery(pumped, 0.0, 0.0), p, by_mass=True)
@@ -138,7 +138,7 @@ def test_the_form_for_a_relieving_log_has_the_valve_among_its_unknowns() -> None
     assert set(relieving(FLOW_FORM).unknowns) - set(FLOW_FORM.unknowns) == {"relief_pressure", "relief_conductance"}
 
 
-def test_the_form_of_held_volumes_asks_how_far_the_piston_moves_and_not_where_it_is() -> None:
+def test_the_form_of_held_volumes_depends_on_the_pistons_motion_and_not_its_position() -> None:
     state, p, step = (1e6, 9e5), values(), 1e-4
 
     def rates(begin: float, moved: float) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ def test_deviations_are_roots_of_the_diagonal() -> None:
     assert Gaussian(np.zeros(2), np.array([[4.0, 1.0], [1.0, 9.0]])).std.tolist() == [2.0, 3.0]
 
 
-def test_a_belief_cannot_be_changed_by_itself_or_by_its_maker() -> None:
+def test_a_belief_is_a_read_only_copy_of_its_arguments() -> None:
     mean, covariance = np.zeros(2), np.eye(2)
     belief = Gaussian(mean, covariance)
     mean[0], covariance[0, 0] = 5.0, 5.0
@@ -31,6 +31,8 @@ def test_a_belief_cannot_be_changed_by_itself_or_by_its_maker() -> None:
         (np.zeros(1), np.array([[-1.0]]), "variances must not be negative"),
     ],
 )
-def test_what_is_no_belief_is_refused(mean: np.ndarray, covariance: np.ndarray, message: str) -> None:
+def test_a_mean_or_covariance_of_wrong_shape_or_value_is_refused(
+    mean: np.ndarray, covariance: np.ndarray, message: str
+) -> None:
     with pytest.raises(HydrostateError, match=message):
         Gaussian(mean, covariance)

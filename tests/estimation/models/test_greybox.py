@@ -75,7 +75,7 @@ def test_slopes_are_the_derivatives_of_the_residuals() -> None:
         np.testing.assert_allclose(slopes[:, j], numerical, rtol=1e-5, atol=1e-6 * np.abs(numerical).max())
 
 
-def test_normal_equations_are_those_of_residuals_and_slopes_with_outliers_counted_linearly() -> None:
+def test_normal_equations_weight_outliers_by_the_huber_loss() -> None:
     u, y = noisy_log(2, DEVIATION)
     y[::50] += 10.0 * DEVIATION
     problem = Problem(LAG, log_of(u, y))
@@ -88,14 +88,14 @@ def test_normal_equations_are_those_of_residuals_and_slopes_with_outliers_counte
     np.testing.assert_allclose(point.gram, slopes.T @ (bend[:, None] * slopes), rtol=1e-9)
 
 
-def test_a_block_holds_the_mean_over_the_samples_that_are_there() -> None:
+def test_a_block_holds_the_mean_of_its_samples_that_are_not_missing() -> None:
     y = np.array([1.0, 2.0, 3.0, np.nan, 6.0, 8.0, np.nan, np.nan, np.nan, np.nan, 5.0])
     blocks = Problem(LAG, log_of(np.zeros((len(y), 1)), y, OutputNoise(4.0), sample_time=0.25 * BLOCK))
     # means over the root of the mean's variance, which is 4 over the number of samples
     assert blocks.residuals(TRUTH)[0] == pytest.approx([-2.0 * (3.0 / 4.0) ** 0.5, -7.0 * (2.0 / 4.0) ** 0.5, -2.5])
 
 
-def test_a_random_walk_under_white_noise_comes_out_white() -> None:
+def test_residuals_of_a_random_walk_with_white_noise_are_white() -> None:
     u, rng = np.zeros((20_000, 1)), np.random.default_rng(8)
     y = np.cumsum(0.2 * DEVIATION * rng.standard_normal(len(u))) + DEVIATION * rng.standard_normal(len(u))
     out = Problem(LAG, log_of(u, y, OutputNoise(DEVIATION**2, (0.2 * DEVIATION) ** 2 / T))).residuals(TRUTH)[0]
@@ -103,7 +103,7 @@ def test_a_random_walk_under_white_noise_comes_out_white() -> None:
     assert abs(out[1:] @ out[:-1]) / (out @ out) < 0.03
 
 
-def test_a_walk_goes_on_where_samples_are_missing() -> None:
+def test_the_variance_of_a_random_walk_grows_over_missing_samples() -> None:
     u, y = np.zeros((5, 1)), np.array([0.0, 0.0, np.nan, np.nan, -3.0])
     out = Problem(LAG, log_of(u, y, OutputNoise(1.0, 0.5 / T))).residuals(TRUTH)[0]
     assert out[:4].tolist() == [0.0, 0.0, 0.0, 0.0]
@@ -111,7 +111,7 @@ def test_a_walk_goes_on_where_samples_are_missing() -> None:
     assert out[4] == pytest.approx(3.0 / (1.0 + 1.0 / 3.0 + 1.5) ** 0.5)
 
 
-def test_what_is_left_open_by_a_gap_in_the_drive_is_learnt_from_the_output() -> None:
+def test_the_unknown_jump_over_a_gap_in_the_drive_is_found_from_the_output() -> None:
     u, y = noisy_log(9, DEVIATION)
     bears = replace(LAG, name="lag_gap_test", jump=(1.0,))
     bridged = u.copy()
@@ -137,7 +137,7 @@ def test_parameters_come_back_from_a_noisy_log_within_their_intervals() -> None:
 
 
 @pytest.mark.slow
-def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
+def test_intervals_cover_the_truth_at_their_nominal_rate() -> None:
     inside = 0
     for seed in range(200):
         found = fit(*noisy_log(1000 + seed, DEVIATION), NOISE)
@@ -146,7 +146,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
 
 
 @pytest.mark.slow
-def test_intervals_cover_where_the_drive_is_noisy_and_the_output_hardly() -> None:
+def test_intervals_cover_the_truth_with_a_noisy_drive_and_a_quiet_output() -> None:
     inside = 0
     for seed in range(100):
         u, y = noisy_log(2000 + seed, 0.1 * DEVIATION)
@@ -157,7 +157,7 @@ def test_intervals_cover_where_the_drive_is_noisy_and_the_output_hardly() -> Non
 
 
 @pytest.mark.slow
-def test_intervals_cover_where_a_random_walk_lies_over_the_output() -> None:
+def test_intervals_cover_the_truth_with_a_random_walk_on_the_output() -> None:
     inside = 0
     for seed in range(100):
         u, y = noisy_log(3000 + seed, DEVIATION)
@@ -167,7 +167,7 @@ def test_intervals_cover_where_a_random_walk_lies_over_the_output() -> None:
     assert 88 <= inside <= 100
 
 
-def test_missing_samples_are_left_out() -> None:
+def test_missing_samples_hardly_change_the_fit() -> None:
     u, y = noisy_log(4, DEVIATION)
     whole = fit(u, y, NOISE)
     holed = y.copy()
@@ -185,7 +185,7 @@ def test_gross_outliers_move_the_answer_little() -> None:
     assert found.values["gain"] == pytest.approx(3e-4, rel=0.03)
 
 
-def test_a_parameter_that_the_log_does_not_feel_is_called_undetermined() -> None:
+def test_a_parameter_without_effect_on_the_log_has_an_infinite_deviation() -> None:
     u, y = np.zeros((500, 1)), 1e-3 * np.random.default_rng(6).standard_normal(500)
     found = fit(u, y, NOISE)
     assert found.std["lag"] == np.inf

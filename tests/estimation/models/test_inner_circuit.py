@@ -7,7 +7,7 @@ import pytest
 from estimation.models.inner_circuit import accumulator_rate
 
 
-def test_gas_that_gives_a_third_of_its_oil_follows_its_law() -> None:
+def test_the_accumulator_of_a_single_rod_follows_boyles_law() -> None:
     """With a constant stiffness, the pressure would fall to two thirds instead of three quarters."""
     rod = {"area_difference": 0.3, "accumulator_pressure": 6e5, "accumulator_stiffness": 6e5 / 1e-3}
     p, gas, steps = SimpleNamespace(**rod), 1e-3, 10_000
@@ -17,6 +17,6 @@ def test_gas_that_gives_a_third_of_its_oil_follows_its_law() -> None:
     assert supply == pytest.approx(6e5 * gas / (gas + taken), rel=1e-3)
 
 
-def test_gas_that_a_through_rod_hardly_moves_is_as_stiff_as_at_rest() -> None:
+def test_the_accumulator_of_a_through_rod_has_constant_stiffness() -> None:
     p = SimpleNamespace(area_difference=0.0, accumulator_pressure=6e5, accumulator_stiffness=6e8)
     assert accumulator_rate(1e-6, 9e5, p) == -6e8 * 1e-6

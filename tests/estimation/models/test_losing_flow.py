@@ -25,7 +25,7 @@ def test_a_loss_lowers_the_loaded_chamber_and_raises_the_other() -> None:
     assert with_loss[2] == without[2]
 
 
-def test_a_loss_of_no_size_changes_nothing() -> None:
+def test_a_loss_of_size_zero_changes_no_rates() -> None:
     p = SimpleNamespace(**PARAMETERS)
     without = fed_rates(STATE, (*DRIVES[:2], DRIVES[3]), p, 0.5, by_mass=True)
     assert LOSING_FLOW_FORM.rates(STATE, DRIVES, p, 0.5) == pytest.approx(without)

@@ -33,7 +33,9 @@ def coefficients(law: tuple[float, float, float]) -> SimpleNamespace:
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("friction", [lagging_friction, parallel_friction])
 @pytest.mark.parametrize("velocity", [-0.03, -0.002, 0.001, 0.02])
-def test_sliding_steadily_friction_is_equation_5_10(friction, law: tuple[float, float, float], velocity: float) -> None:
+def test_friction_in_steady_sliding_is_equation_5_10(
+    friction, law: tuple[float, float, float], velocity: float
+) -> None:
     p = coefficients(law)
     low, high = -50.0, 50.0
     for _ in range(200):  # bisection for the bristle deflection that no longer changes
@@ -46,14 +48,14 @@ def test_sliding_steadily_friction_is_equation_5_10(friction, law: tuple[float, 
 
 
 @pytest.mark.parametrize("friction", [lagging_friction, parallel_friction])
-def test_at_rest_the_bristle_holds_without_yielding(friction) -> None:
+def test_the_bristle_holds_its_force_at_rest_without_creep(friction) -> None:
     rate, force = friction(0.0, 0.5, coefficients(LAWS[0]))
     assert (float(rate), float(force)) == (0.0, 218.0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", MOTION_FORMS, ids=lambda form: form.name)
-def test_differences_side_by_side_are_the_exact_sensitivities_of_the_motion(form) -> None:
+def test_sensitivities_by_parallel_differences_agree_with_the_exact_ones(form) -> None:
     n = 300
     drives = np.column_stack([np.full(n, 100.0), np.zeros(n)])
     log = GreyBoxLog(

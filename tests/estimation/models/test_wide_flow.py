@@ -9,14 +9,14 @@ from plant.components.oil import ATMOSPHERE
 
 
 @pytest.mark.parametrize("held", [2e6, 0.0, -2e6])
-def test_at_rest_the_load_is_held_by_one_chamber_and_the_other_has_the_supplys_pressure(held: float) -> None:
+def test_at_rest_one_chamber_holds_the_load_and_the_other_has_the_supply_pressure(held: float) -> None:
     p = SimpleNamespace(start_pressure=held, accumulator_pressure=5e5, start_level=1e5, pressure_offset=3e4)
     first, second, *_ = WIDE_FLOW_FORM.initial(p)
     assert first - second == pytest.approx(held)
     assert min(first, second) == pytest.approx(6e5)
 
 
-def test_a_jump_moves_what_is_shown_by_as_much_and_the_mean_of_the_chambers_not_at_all() -> None:
+def test_a_jump_moves_the_shown_pressure_and_not_the_mean_of_the_chambers() -> None:
     state = (3e6, 1e6, 2e4, 5e5)
     jumped = tuple(value + 1e5 * share for value, share in zip(state, WIDE_FLOW_FORM.jump, strict=True))
     (before,), (after,) = (WIDE_FLOW_FORM.observe(one) for one in (state, jumped))
@@ -26,7 +26,7 @@ def test_a_jump_moves_what_is_shown_by_as_much_and_the_mean_of_the_chambers_not_
 
 
 @pytest.mark.parametrize("quick", [False, True])
-def test_oil_with_bubbles_that_is_pumped_across_is_lost_nowhere(quick: bool) -> None:
+def test_pumping_aerated_oil_between_the_chambers_conserves_its_mass(quick: bool) -> None:
     share, liquid, stated = 0.02, 2e8, 7e5
     exponent = 1.3 if quick else 1.0
     slope = 1.0 / exponent

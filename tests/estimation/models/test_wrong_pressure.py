@@ -7,12 +7,12 @@ from estimation.models.wrong_pressure import MOST_SETTLING, drifted
 
 
 @pytest.mark.parametrize("settling", [1.0, 4.0, MOST_SETTLING])
-def test_an_offset_settles_as_an_exponential_does(settling: float) -> None:
+def test_a_settling_offset_follows_an_exponential(settling: float) -> None:
     elapsed = np.linspace(0.0, 1.0, 101)
     exact = (1.0 - np.exp(-settling * elapsed)) / settling
     np.testing.assert_allclose(drifted(elapsed, settling), exact, atol=0.0025 * exact[-1])
 
 
-def test_an_offset_that_does_not_settle_drifts_evenly() -> None:
+def test_an_offset_that_does_not_settle_drifts_linearly() -> None:
     elapsed = np.linspace(0.0, 1.0, 11)
     np.testing.assert_allclose(drifted(elapsed, 0.0), elapsed, rtol=1e-12)

@@ -77,7 +77,7 @@ def test_one_closed_loop_at_the_benchs_rate_gives_every_parameter_to_two_percent
         assert fit.deviations[name] == pytest.approx(bounds[name] * abs(truth), rel=0.05)
 
 
-def test_no_estimate_from_a_twentieth_of_the_samples_or_from_a_first_loop_can_be_that_good() -> None:
+def test_bounds_exceed_two_percent_with_fewer_samples_and_are_infinite_for_a_first_loop() -> None:
     voltage = 50.0 * (1.0 - np.cos(2.0 * np.pi * np.arange(5001) / 5000))
     closed, first = (loop_bounds(STACK, voltage, NOISE, from_rest=from_rest) for from_rest in (False, True))
     assert 0.02 < max(closed.values()) < 0.03
@@ -85,7 +85,7 @@ def test_no_estimate_from_a_twentieth_of_the_samples_or_from_a_first_loop_can_be
 
 
 @pytest.mark.slow
-def test_intervals_cover_as_often_as_they_say(loop: tuple[np.ndarray, np.ndarray]) -> None:
+def test_intervals_cover_the_truth_at_their_nominal_rate(loop: tuple[np.ndarray, np.ndarray]) -> None:
     voltage, displacement = loop
     covered = 0
     for seed in range(40):
@@ -106,7 +106,7 @@ def test_a_loop_that_does_not_end_where_it_began_is_refused(loop: tuple[np.ndarr
         fit_stack_loop(loop[0][: SAMPLES // 2], loop[1][: SAMPLES // 2])
 
 
-def test_the_printed_procedure_misses_though_its_signs_are_right(loop: tuple[np.ndarray, np.ndarray]) -> None:
+def test_the_printed_procedure_underestimates_hysteresis(loop: tuple[np.ndarray, np.ndarray]) -> None:
     small = slow_loop(5.0, 2)
     settled = float(STACK.free_stroke_a_volt - STACK.hysteresis) * 5.0
     last = slice(-SAMPLES - 1, None)
@@ -118,7 +118,7 @@ def test_the_printed_procedure_misses_though_its_signs_are_right(loop: tuple[np.
     np.testing.assert_allclose(REGIONS.T @ REGIONS, 4.0 * np.eye(4))
 
 
-def test_sensitivities_are_those_of_the_step() -> None:
+def test_sensitivities_agree_with_differences_of_the_step() -> None:
     run = compile_trajectory("slow_stack", sensitivity_step(slow_stack_step, 1, SHAPE), 6, PiezoStackParameters)
     voltage = 50.0 * (1.0 - np.cos(np.arange(300) / 40.0))
 
@@ -169,6 +169,6 @@ def test_the_public_benchmark_is_identified_and_predicted(shared: Path) -> None:
         (np.arange(500.0), np.zeros(500), r"a gap of 100\.0 % of its swing"),
     ],
 )
-def test_what_is_no_loop_is_refused(voltage: Array, displacement: Array, said: str) -> None:
+def test_an_invalid_loop_is_refused(voltage: Array, displacement: Array, said: str) -> None:
     with pytest.raises(LogError, match=said):
         _checked_loop(voltage, displacement)

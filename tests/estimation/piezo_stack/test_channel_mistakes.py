@@ -21,7 +21,7 @@ def changed(**factors: float) -> dict[str, np.ndarray]:
     return {name: factors.get(name, 1.0) * values for name, values in RUN.items()}
 
 
-def test_channels_as_one_of_the_actuators_has_them_are_right() -> None:
+def test_channels_like_those_of_a_likely_actuator_are_not_accused() -> None:
     assert channel_mistakes(RUN, [OTHER, RUN]) == ()
     assert channel_mistakes(changed(position_m=0.7, stack_force_n=1.4), [RUN]) == ()
 
@@ -37,7 +37,7 @@ def test_channels_as_one_of_the_actuators_has_them_are_right() -> None:
         ("chamber_pressure_pa", 1e-3, "kPa"),
     ],
 )
-def test_a_unit_is_named_and_a_sign_beside_it(name: str, factor: float, unit: str) -> None:
+def test_a_wrong_unit_and_a_wrong_sign_are_named_together(name: str, factor: float, unit: str) -> None:
     assert channel_mistakes(changed(**{name: factor}), [RUN]) == (f"{name} is in {unit}",)
     assert channel_mistakes(changed(**{name: -factor}), [RUN]) == (f"{name} has the opposite sign and is in {unit}",)
     assert channel_mistakes(changed(**{name: -1.0}), [RUN]) == (f"{name} has the opposite sign",)
@@ -56,6 +56,6 @@ def test_two_channels_that_are_swapped_are_named_and_nothing_else() -> None:
         assert said == (f"{one} and {other} are swapped",)
 
 
-def test_a_channel_with_a_course_of_its_own_is_left_to_the_fit() -> None:
+def test_a_channel_unlike_any_run_is_not_accused() -> None:
     noise = np.random.default_rng(1).standard_normal(500)
     assert channel_mistakes({**RUN, "stack_force_n": 2e3 * noise, "position_m": np.zeros(500)}, [RUN]) == ()

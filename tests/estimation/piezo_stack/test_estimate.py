@@ -34,7 +34,7 @@ def worn() -> Record:
     return log_of(WORN, 3)
 
 
-def test_air_leaks_and_friction_are_found_together_with_true_intervals(worn: Record) -> None:
+def test_air_leaks_and_friction_are_found_together_within_their_intervals(worn: Record) -> None:
     found = estimate_stack(worn, HEALTHY)
     for name, most in (
         ("air_fraction", 0.01),
@@ -51,13 +51,13 @@ def test_air_leaks_and_friction_are_found_together_with_true_intervals(worn: Rec
     assert friction == pytest.approx(bounds["coulomb_friction"], rel=0.25)
 
 
-def test_an_actuator_that_is_not_the_models_leaves_a_misfit() -> None:
+def test_an_actuator_with_another_delivery_length_leaves_a_misfit() -> None:
     longer = replace(HEALTHY, delivery_length=1.05 * HEALTHY.delivery_length)
     found = estimate_stack(log_of(longer, 4), HEALTHY, unknowns=("coulomb_friction",), starts=({},))
     assert max(found.misfit.values()) > 1.5
 
 
-def test_position_alone_tells_far_less_than_the_stack_does() -> None:
+def test_position_alone_has_far_larger_bounds_than_stack_displacement() -> None:
     alone, stack = (
         stack_bounds(WORN, DRIVE, SAMPLE_TIME, channels=(channel,))
         for channel in ("position_m", "stack_displacement_m")
@@ -65,7 +65,7 @@ def test_position_alone_tells_far_less_than_the_stack_does() -> None:
     assert all(alone[name] > 10.0 * stack[name] for name in DEFAULT_UNKNOWNS)
 
 
-def test_every_unknown_is_a_parameter_and_every_channel_a_sensor() -> None:
+def test_every_unknown_is_a_parameter_of_the_model() -> None:
     known = set(asdict(HEALTHY))
     assert all(set(unknown.names) <= known for unknown in UNKNOWNS.values())
 
@@ -78,12 +78,14 @@ def test_every_unknown_is_a_parameter_and_every_channel_a_sensor() -> None:
         ({"position_m": np.repeat(np.arange(11.0), 91)}, "position_m holds one value for 4.55 ms: the sensor froze"),
     ],
 )
-def test_a_log_that_cannot_be_used_is_refused(worn: Record, change: dict[str, np.ndarray | None], said: str) -> None:
+def test_a_log_with_missing_or_frozen_channels_is_refused(
+    worn: Record, change: dict[str, np.ndarray | None], said: str
+) -> None:
     with pytest.raises(LogError, match=said):
         estimate_stack(worn.replace(**change), HEALTHY)
 
 
-def test_sensors_with_other_noise_and_other_zeros_tell_the_same_with_their_own_deviations(worn: Record) -> None:
+def test_noisier_sensors_with_offsets_give_the_same_values_with_larger_deviations(worn: Record) -> None:
     zeros = {"stack_displacement_m": 3e-4, "stack_force_n": -800.0, "position_m": 0.05}
     rng = np.random.default_rng(5)
     noise = {name: 3.0 * value for name, value in asdict(BENCH_SENSORS).items()}
@@ -98,7 +100,7 @@ def test_sensors_with_other_noise_and_other_zeros_tell_the_same_with_their_own_d
         assert found.deviations[name] == pytest.approx(10.0**0.5 * before.deviations[name], rel=0.2)
 
 
-def test_a_measured_drive_may_leave_the_range_of_the_stack_by_its_own_error(worn: Record) -> None:
+def test_a_measured_drive_may_exceed_the_range_of_the_stack_by_its_noise(worn: Record) -> None:
     found = estimate_stack(worn.replace(drive_voltage_v=DRIVE - 0.02), HEALTHY)
     assert found.values["coulomb_friction"] == pytest.approx(WORN.coulomb_friction, rel=0.05)
     with pytest.raises(DriveError, match="the stack takes 0 to 150 V, got a drive from -4 to 136 V"):
@@ -121,12 +123,12 @@ def test_a_channel_of_another_sign_or_unit_is_named(worn: Record, change: dict[s
         estimate_stack(worn.replace(**{name: factor * worn[name] for name, factor in change.items()}), HEALTHY)
 
 
-def test_an_unknown_that_is_not_known_is_refused(worn: Record) -> None:
+def test_an_unknown_that_is_no_parameter_is_refused(worn: Record) -> None:
     with pytest.raises(HydrostateError, match="an unknown must be one of"):
         estimate_stack(worn, HEALTHY, unknowns=("colour",))
 
 
-def test_what_no_channel_shows_is_unknown_rather_than_known() -> None:
+def test_a_parameter_that_no_channel_shows_has_a_huge_deviation() -> None:
     slopes = np.random.default_rng(3).standard_normal((50, 3)) * [1.0, 1e-3, 0.0]
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -41,14 +41,14 @@ def found(monkeypatch: pytest.MonkeyPatch, one: StackEstimate) -> Any:
     return stack_finding(Record(1e-4, {"drive_voltage_v": np.zeros(3)}), HEALTHY)
 
 
-def test_a_number_is_told_where_its_deviation_is_small_beside_the_healthy_value_or_a_small_fault() -> None:
+def test_a_value_is_reported_only_if_its_deviation_is_small() -> None:
     known, vague = (stack_quantities(estimate(share), HEALTHY) for share in (0.99, 1.01))
     assert {name: one.value for name, one in known.items()} == SIZES
     assert all(one.ci95 is not None and one.unit == UNKNOWNS[name].unit for name, one in known.items())
     assert all(one.value is None and one.ci95 is None and one.std is not None for one in vague.values())
 
 
-def test_a_channel_that_the_model_misses_takes_every_number_back(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_channel_with_a_large_misfit_withholds_every_value(monkeypatch: pytest.MonkeyPatch) -> None:
     said = found(monkeypatch, estimate(0.5, 1.01 * MOST))
     (reason,) = said.gate.reasons
     assert (str(reason.code), dict(reason.data)) == (
@@ -60,7 +60,7 @@ def test_a_channel_that_the_model_misses_takes_every_number_back(monkeypatch: py
     assert found(monkeypatch, estimate(0.5, 0.99 * MOST)).gate.passed
 
 
-def test_what_the_sensors_do_not_determine_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_parameter_that_the_sensors_do_not_determine_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     half = estimate(0.5)
     half = replace(half, deviations={**half.deviations, "air_fraction": 1.0})
     said = found(monkeypatch, half)
@@ -70,7 +70,7 @@ def test_what_the_sensors_do_not_determine_is_named(monkeypatch: pytest.MonkeyPa
     assert found(monkeypatch, estimate(0.5)).not_told == ()
 
 
-def test_a_run_that_is_planned_tells_the_least_deviations() -> None:
+def test_a_planned_run_reports_the_smallest_possible_deviations() -> None:
     drive = sine_drive(275.0, 140.0, 0.01, 1e-4)
     said = stack_prospect(HEALTHY, drive, 1e-4, channels=("stack_displacement_m",))
     bounds = stack_bounds(HEALTHY, drive, 1e-4, channels=("stack_displacement_m",))

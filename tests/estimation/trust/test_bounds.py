@@ -48,25 +48,25 @@ def relative_bound(
 
 
 @EVERY_CONDITION
-def test_steps_with_pressure_tell_bulk_modulus_to_one_percent(condition: Condition) -> None:
+def test_steps_with_pressure_bound_bulk_modulus_to_one_percent(condition: Condition) -> None:
     p = parameters_for(condition)
     assert relative_bound(driven("steps", p), p, ALL) < 0.01
 
 
 @EVERY_CONDITION
-def test_the_papers_sine_without_pressure_tells_nothing(condition: Condition) -> None:
+def test_the_papers_sine_without_pressure_has_a_bound_over_three_percent(condition: Condition) -> None:
     p = parameters_for(condition)
     assert relative_bound(driven("sine", p), p, MOTION) > 0.03  # errata E13
 
 
-def test_a_longer_log_tells_more_and_a_further_sensor_never_less() -> None:
+def test_a_longer_log_and_a_further_sensor_lower_the_bound() -> None:
     p = EhaParameters()
     record = driven("steps", p)
     assert relative_bound(record, p, ALL) < relative_bound(record.slice(0, 3_000), p, ALL)
     assert relative_bound(record, p, ALL) < relative_bound(record, p, MOTION)
 
 
-def test_a_drive_that_is_nothing_tells_nothing_beyond_the_prior() -> None:
+def test_without_a_drive_the_bound_is_the_prior() -> None:
     p = EhaParameters()
     still = Record(1e-3, {"motor_speed_rad_s": np.zeros(500), "position_m": np.zeros(500)})
     assert relative_bound(still, p, MOTION) == pytest.approx(3e8 / p.bulk_modulus, rel=1e-6)
@@ -79,14 +79,14 @@ def test_the_measured_channels_do_not_enter_the_bound() -> None:
     assert relative_bound(record, p, ALL) == relative_bound(spoilt, p, ALL)
 
 
-def test_a_model_whose_own_run_explodes_has_no_bound() -> None:
+def test_a_model_whose_run_diverges_has_an_infinite_bound() -> None:
     p = EhaParameters()
     fast = Record(1e-3, {"motor_speed_rad_s": np.full(10, 1e300), "position_m": np.zeros(10)})
     with np.errstate(all="ignore"):
         assert relative_bound(fast, p, MOTION) == np.inf
 
 
-def test_on_a_linear_model_the_bound_is_the_kalman_filters_own_covariance(linear: ProcessModel) -> None:
+def test_the_bound_of_a_linear_model_is_the_kalman_filters_covariance(linear: ProcessModel) -> None:
     rng = np.random.default_rng(0)
     names = ("motor_speed_rad_s", "position_m", "velocity_m_s")
     record = Record(1e-4, dict(zip(names, rng.standard_normal((3, 300)), strict=True)))
@@ -101,7 +101,7 @@ def test_on_a_linear_model_the_bound_is_the_kalman_filters_own_covariance(linear
     np.testing.assert_allclose(bound.time, filtered.time)
 
 
-def test_every_state_has_a_bound_and_a_parameter_that_is_a_state_too() -> None:
+def test_parameters_as_states_have_bounds_and_raise_that_of_bulk_modulus() -> None:
     p = EhaParameters()
     record, variances = driven("steps", p), dict(noise_variances(BENCH))
     variances = {channel: variances[channel] for channel in ALL}
@@ -126,7 +126,7 @@ def test_bounds_of_constants_fall_along_the_run() -> None:
     assert track[-1] < 0.03 * track[0]
 
 
-def test_a_channel_of_infinite_variance_is_one_that_is_not_logged() -> None:
+def test_a_channel_of_infinite_variance_gives_the_bound_without_it() -> None:
     p = EhaParameters()
     record, prior = driven("steps", p, 4.0), first_belief(PRESSURE_FORM, driven("steps", p, 4.0), p.bulk_modulus, 3e8)
     motion = {"position_m": 1e-12, "velocity_m_s": 1e-6}
@@ -137,7 +137,7 @@ def test_a_channel_of_infinite_variance_is_one_that_is_not_logged() -> None:
     np.testing.assert_allclose(infinite.std, without.std, rtol=1e-9)
 
 
-def test_a_bound_needs_its_drive_and_sensors_with_noise() -> None:
+def test_a_bound_without_drive_or_with_a_noiseless_sensor_is_refused() -> None:
     p, still = EhaParameters(), Record(1e-3, {"position_m": np.zeros(5)})
     prior = first_belief(PRESSURE_FORM, still, p.bulk_modulus, 3e8)
     with pytest.raises(LogError, match="pressure form needs motor_speed_rad_s, the record lacks motor_speed_rad_s"):
@@ -146,7 +146,7 @@ def test_a_bound_needs_its_drive_and_sensors_with_noise() -> None:
         posterior_bound(PRESSURE_FORM, prior, driven("steps", p, 1.0), p, variances={"position_m": 0.0})
 
 
-def test_only_the_bulk_modulus_changes() -> None:
+def test_at_bulk_modulus_changes_only_the_bulk_modulus() -> None:
     assert at_bulk_modulus(EhaParameters(), 1e8) == EhaParameters(bulk_modulus=1e8)
 
 
@@ -170,7 +170,7 @@ def test_no_estimate_is_better_than_the_bound_without_process_noise(
     assert np.sqrt(np.mean(np.square(errors))) > bound
 
 
-def test_the_recursion_run_as_python_gives_what_its_kernel_gives(
+def test_the_recursion_in_plain_python_gives_the_same_result_as_its_kernel(
     linear: ProcessModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drive = Record(1e-3, {"motor_speed_rad_s": np.linspace(0.0, 1.0, 6)})

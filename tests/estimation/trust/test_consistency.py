@@ -74,7 +74,7 @@ def test_nis_of_a_linear_system_lies_in_its_chi_square_band(linear_runs: list[tu
     assert low < total < high
 
 
-def test_the_band_narrows_with_the_count_and_holds_what_it_says() -> None:
+def test_the_chi_square_band_narrows_with_the_count_and_covers_95_percent() -> None:
     narrow, wide = mean_chi_square_bounds(2, 1_000), mean_chi_square_bounds(2, 10)
     assert wide[0] < narrow[0] < 2.0 < narrow[1] < wide[1]
     draws = np.mean(np.random.default_rng(0).chisquare(2, (4_000, 10)), axis=1)
@@ -141,7 +141,9 @@ def test_a_drift_larger_than_its_deviation_allows_is_unsettled(linear: ProcessMo
 
 
 @pytest.mark.parametrize(("nis", "passes"), [(1.0, True), (1.99, True), (2.01, False)])
-def test_residuals_of_twice_the_expected_variance_are_too_many(nis: float, passes: bool, linear: ProcessModel) -> None:
+def test_innovations_of_twice_the_expected_variance_fail_the_gate(
+    nis: float, passes: bool, linear: ProcessModel
+) -> None:
     assert consistency_gate(estimate_with(np.full(100, 2.0), linear, nis), "position_m").passed is passes
 
 
@@ -174,7 +176,7 @@ def judged(
 
 @pytest.mark.parametrize(("drive", "pressure"), [("steps", True), ("steps", False), ("prbs", True), ("sine", True)])
 @EVERY_CONDITION
-def test_innovations_of_the_filters_own_plant_give_no_cause(condition: str, drive: str, pressure: bool) -> None:
+def test_innovations_of_the_filters_own_plant_raise_no_objection(condition: str, drive: str, pressure: bool) -> None:
     gate, deviations = judged(LUMPED, "pressure", drive, condition, pressure=pressure)
     assert gate.reasons == ()
     assert gate.inflation < 2.0
@@ -193,7 +195,7 @@ def test_the_gate_objects_to_the_lumped_model_of_a_circuit(condition: str, press
 
 @pytest.mark.slow
 @pytest.mark.parametrize("condition", ["normal", "minor_friction", "major_leakage", "major_leakage_minor_friction"])
-def test_the_gate_sees_the_step_error_of_the_acceleration_form_where_nis_does_not(condition: str) -> None:
+def test_the_gate_finds_the_step_error_of_the_acceleration_form_that_nis_misses(condition: str) -> None:
     gate, deviations = judged(REDUCED, "acceleration", "sine", condition, sample_time=1e-4)
     assert abs(deviations) > 5.0
     assert not gate.passed
@@ -226,7 +228,7 @@ def own_runs(runs: int, samples: int, rng: np.random.Generator) -> list[Record]:
 
 
 @pytest.mark.slow
-def test_data_of_the_model_itself_are_objected_to_at_most_twice_in_a_hundred() -> None:
+def test_the_gate_objects_to_at_most_two_percent_of_logs_of_its_own_model() -> None:
     variances = {"position_m": 1e-12, "velocity_m_s": 1e-6, "differential_pressure_pa": 2.5e7}
     objections = 0
     squares: list[float] = []
@@ -241,7 +243,7 @@ def test_data_of_the_model_itself_are_objected_to_at_most_twice_in_a_hundred() -
     assert 0.5 < np.mean(squares) < 1.5
 
 
-def test_a_constant_that_moves_as_its_variance_shrinks_wanders_once(linear: ProcessModel) -> None:
+def test_a_constant_that_moves_as_its_variance_shrinks_has_a_wander_of_about_one(linear: ProcessModel) -> None:
     rng = np.random.default_rng(2)
     variance = np.linspace(4.0, 1.0, 1001)
     moves = np.concatenate([[0.0], np.sqrt(-np.diff(variance)) * rng.standard_normal(1000)])
@@ -268,14 +270,14 @@ def constant(model: ProcessModel, mean: Array, nis: float = 1.0) -> Estimate:
     )  # fmt: skip
 
 
-def test_what_moves_before_a_filter_has_settled_is_no_wandering(linear: ProcessModel) -> None:
+def test_motion_of_an_estimate_before_the_filter_settles_is_no_wander(linear: ProcessModel) -> None:
     settled = round(SETTLING * 1000)
     before, after = (np.where(np.arange(1001) < place, 3.0, 0.0) for place in (settled, settled + 1))
     assert wander(constant(linear, before), "position_m") == 0.0
     assert wander(constant(linear, after), "position_m") == pytest.approx(9.0 / (0.8 * 2.0))
 
 
-def test_a_model_describes_a_log_unless_it_misses_by_ten_deviations_or_ends_at_a_bound(linear: ProcessModel) -> None:
+def test_a_model_fails_to_describe_a_log_beyond_ten_deviations_or_at_a_bound(linear: ProcessModel) -> None:
     first = replace(linear.states[0], lower=-1.0, upper=1.0)
     bounded = replace(linear, states=(first, *linear.states[1:]))
     for value, nis, described in ((0.5, 99.0, True), (0.5, 101.0, False), (1.0, 1.0, False), (-1.0, 1.0, False)):

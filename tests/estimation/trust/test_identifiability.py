@@ -38,7 +38,7 @@ def sine() -> Card:
 
 @pytest.mark.slow
 @EVERY_CONDITION
-def test_the_papers_sine_without_pressure_tells_no_bulk_modulus(condition: Condition) -> None:
+def test_bulk_modulus_is_not_observable_from_the_papers_sine_without_pressure(condition: Condition) -> None:
     parameters = parameters_for(condition)
     card = identifiability_card(parameters, speed("sine", parameters), 1e-3, MOTION)
     assert card.relative_std["bulk_modulus"] > 0.03  # errata E13
@@ -48,14 +48,14 @@ def test_the_papers_sine_without_pressure_tells_no_bulk_modulus(condition: Condi
     assert "while it sticks, position and velocity say nothing about bulk modulus (errata E13): log diff" in said
 
 
-def test_where_nothing_moves_nothing_is_learnt() -> None:
+def test_a_stuck_piston_leaves_every_deviation_at_its_prior() -> None:
     parameters = parameters_for(CONDITIONS["major_leakage"])
     card = identifiability_card(parameters, speed("sine", parameters), 1e-3, MOTION)
     assert card.stuck == 1.0
     assert all(std == pytest.approx(1.0, rel=1e-3) for std in card.relative_std.values())
 
 
-def test_pressure_turns_tens_of_percent_into_fractions(sine: Card) -> None:
+def test_logging_pressure_lowers_deviations_at_least_twentyfold(sine: Card) -> None:
     logged = identifiability_card(RIG, speed("sine"), 1e-3)
     for name in ("bulk_modulus", "leakage_coefficient", "friction_coulomb"):
         assert logged.relative_std[name] < 0.05 * sine.relative_std[name]
@@ -63,7 +63,7 @@ def test_pressure_turns_tens_of_percent_into_fractions(sine: Card) -> None:
 
 
 @pytest.mark.parametrize("name", thinned(CONDITIONS, ["normal", "minor_leakage_minor_friction", "major_friction"]))
-def test_a_further_sensor_and_a_longer_log_never_tell_less(name: str) -> None:
+def test_a_further_sensor_or_a_longer_log_never_raises_a_deviation(name: str) -> None:
     parameters = parameters_for(CONDITIONS[name])
     long, short = speed("steps", parameters), speed("steps", parameters)[:4000]
     whole = identifiability_card(parameters, long, 1e-3).relative_std
@@ -75,7 +75,7 @@ def test_a_further_sensor_and_a_longer_log_never_tell_less(name: str) -> None:
         assert all(whole[one] <= std * (1.0 + 1e-6) for one, std in poorer.relative_std.items())
 
 
-def test_the_volumes_uncertainty_is_bulk_modulus_own(steps: Card) -> None:
+def test_the_uncertainty_of_chamber_volume_adds_to_that_of_bulk_modulus_only(steps: Card) -> None:
     card = identifiability_card(RIG, speed("steps"), 1e-3, uncertainties={"chamber_volume": 0.02})
     expected = (steps.relative_std["bulk_modulus"] ** 2 + 0.02**2) ** 0.5
     assert card.relative_std["bulk_modulus"] == pytest.approx(expected, rel=1e-3)
@@ -85,33 +85,33 @@ def test_the_volumes_uncertainty_is_bulk_modulus_own(steps: Card) -> None:
     assert "these bounds take the volume as exact" in " ".join(sentences(steps))
 
 
-def test_the_pumps_uncertainty_goes_to_the_flow_bias_more_than_to_the_friction(steps: Card) -> None:
+def test_uncertainty_of_displacement_widens_the_flow_bias_more_than_the_friction(steps: Card) -> None:
     card = identifiability_card(RIG, speed("steps"), 1e-3, uncertainties={"pump_displacement": 0.01})
     widened = {name: std / steps.relative_std[name] for name, std in card.relative_std.items()}
     assert widened["flow_bias"] > 1.5
     assert widened["flow_bias"] > widened["friction_coulomb"]
 
 
-def test_what_the_drive_cannot_separate_is_named() -> None:
+def test_parameters_that_the_drive_cannot_separate_are_named() -> None:
     card = identifiability_card(RIG, speed("prbs"), 1e-3)
     i, j = card.unknowns.index("leakage_coefficient"), card.unknowns.index("flow_bias")
     assert card.correlation[i, j] < -0.95
     assert "leakage coefficient and flow bias are hard to tell apart (correlation -" in " ".join(sentences(card))
 
 
-def test_what_is_known_need_not_be_learnt(steps: Card) -> None:
+def test_bulk_modulus_as_the_only_unknown_has_a_smaller_deviation(steps: Card) -> None:
     card = identifiability_card(RIG, speed("steps"), 1e-3, unknowns=["bulk_modulus"])
     assert card.relative_std["bulk_modulus"] < steps.relative_std["bulk_modulus"]
     assert card.friction_force == 0.0
 
 
-def test_the_noisier_sensor_tells_less(steps: Card) -> None:
+def test_noisier_sensors_raise_every_deviation(steps: Card) -> None:
     noisy = replace(BENCH, speed_noise=0.5, pressure_noise=5e4)
     card = identifiability_card(RIG, speed("steps"), 1e-3, sensors=noisy)
     assert all(card.relative_std[name] > std for name, std in steps.relative_std.items())
 
 
-def test_drives_are_ranked_by_what_they_tell(steps: Card, sine: Card) -> None:
+def test_drives_are_ranked_by_their_information(steps: Card, sine: Card) -> None:
     cards = {"sine": sine, "steps": steps}
     assert rank_drives(cards) == ["steps", "sine"]
     assert rank_drives(cards, "bulk_modulus") == ["steps", "sine"]
@@ -119,7 +119,7 @@ def test_drives_are_ranked_by_what_they_tell(steps: Card, sine: Card) -> None:
 
 
 @pytest.mark.slow
-def test_the_fit_is_as_sure_as_the_card_says(steps: Card) -> None:
+def test_the_deviations_of_a_fit_agree_with_the_card(steps: Card) -> None:
     rng = np.random.default_rng(0)
     sensors = replace(BENCH, position_noise=1e-6 / 12**0.5, position_quantum=0.0)
     record = simulate(LUMPED, speed("steps"), 1e-3, RIG, sensors=sensors, rng=rng)
@@ -139,17 +139,17 @@ def test_the_fit_is_as_sure_as_the_card_says(steps: Card) -> None:
         ({"sensors": PAPER}, "these sensors give differential_pressure_pa no noise"),
     ],
 )
-def test_what_a_card_cannot_have_is_refused(wrong: dict[str, object], said: str) -> None:
+def test_invalid_channels_unknowns_and_sensors_of_a_card_are_refused(wrong: dict[str, object], said: str) -> None:
     with pytest.raises(HydrostateError, match=said):
         identifiability_card(RIG, np.zeros(10), 1e-3, **wrong)
 
 
-def test_an_actuator_without_leakage_has_none_to_be_relative_to() -> None:
+def test_a_card_relative_to_zero_leakage_is_refused() -> None:
     with pytest.raises(HydrostateError, match="a card tells leakage_coefficient relative to its value"):
         identifiability_card(replace(RIG, leakage_coefficient=0.0), np.zeros(10), 1e-3)
 
 
-def test_percentages_have_two_digits_and_never_round_to_certainty() -> None:
+def test_percentages_below_100_never_round_to_100() -> None:
     assert [percent(value) for value in (1e-5, 0.0304, 0.994, 1.0)] == ["0.001 %", "3 %", "over 99 %", "100 %"]
 
 
@@ -169,7 +169,7 @@ def card(**changes: object) -> Card:
     return Card(**(values | changes))  # type: ignore[arg-type]
 
 
-def test_a_card_is_put_in_sentences_with_its_numbers() -> None:
+def test_the_sentences_of_a_card_hold_its_numbers() -> None:
     lost, sticks, alike, worst, rig = sentences(card())
     assert lost.endswith("(bound over 3 %): bulk modulus (11 %)")
     assert sticks.startswith("the piston sticks for 60 % of the time")
@@ -181,7 +181,7 @@ def test_a_card_is_put_in_sentences_with_its_numbers() -> None:
     assert sentences(with_pressure)[1].endswith("differential pressure does")
 
 
-def test_a_card_says_no_more_than_it_knows() -> None:
+def test_a_card_without_weaknesses_has_no_sentences_about_them() -> None:
     small = {"bulk_modulus": 0.002, "flow_bias": 0.001}
     quiet = card(relative_std=small, stuck=0.5, weakest_std=0.03, correlation=np.eye(2), uncertainties={})
     (rule,) = sentences(quiet)
@@ -195,6 +195,6 @@ def test_a_card_says_no_more_than_it_knows() -> None:
     assert sentences(alone) == ()
 
 
-def test_a_drive_under_which_the_plant_runs_away_has_no_card() -> None:
+def test_a_drive_under_which_the_plant_diverges_is_refused() -> None:
     with np.errstate(all="ignore"), pytest.raises(HydrostateError, match="does not stay finite under this drive"):
         identifiability_card(RIG, np.full(50, 1e300), 1e-3)

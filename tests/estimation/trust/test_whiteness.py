@@ -50,14 +50,14 @@ def test_white_innovations_are_objected_to_less_than_once_in_a_hundred_logs(line
     assert objections <= 2
 
 
-def test_innovations_smaller_than_predicted_are_caution_and_no_objection(linear: ProcessModel) -> None:
+def test_correlated_innovations_smaller_than_predicted_are_no_objection(linear: ProcessModel) -> None:
     coloured = np.cumsum(white(0), axis=0) * 1e-3
     for channel in judged(linear, coloured + 0.3 * white(1)):
         assert not channel.exceeded
         assert channel.ljung_box < 0.05 or abs(channel.autocorrelation) > 0.02
 
 
-def test_a_line_of_the_drive_is_found_named_and_sized(linear: ProcessModel) -> None:
+def test_a_tone_of_the_drive_is_found_with_its_frequency_and_share(linear: ProcessModel) -> None:
     residuals = white(2)
     residuals[:, 0] += 0.2 * np.sin(2.0 * np.pi * FREQUENCY * TIME)
     position, velocity = judged(linear, residuals)
@@ -70,7 +70,7 @@ def test_a_line_of_the_drive_is_found_named_and_sized(linear: ProcessModel) -> N
     assert velocity.with_drive < 0.005
 
 
-def test_the_drives_mean_plays_no_part(linear: ProcessModel) -> None:
+def test_the_mean_of_the_drive_has_no_effect(linear: ProcessModel) -> None:
     residuals = white(2)
     residuals[:, 0] += 0.2 * np.sin(2.0 * np.pi * FREQUENCY * TIME) + 0.1
     about_zero, about_a_mean = (judged(linear, residuals, mean=mean) for mean in (0.0, 1e3))
@@ -81,7 +81,7 @@ def test_the_drives_mean_plays_no_part(linear: ProcessModel) -> None:
         assert other.with_drive == pytest.approx(one.with_drive, abs=1e-6)
 
 
-def test_a_disturbance_beside_the_drive_is_said_to_be_so(linear: ProcessModel) -> None:
+def test_a_tone_at_another_frequency_is_not_attributed_to_the_drive(linear: ProcessModel) -> None:
     residuals = white(3)
     residuals[:, 1] += 0.3 * np.sin(2.0 * np.pi * 17.0 * TIME)
     _, velocity = judged(linear, residuals)
@@ -90,7 +90,9 @@ def test_a_disturbance_beside_the_drive_is_said_to_be_so(linear: ProcessModel) -
 
 
 @pytest.mark.parametrize(("missed", "exceeded"), [(0.0, False), (0.8, True)])  # in quantisation steps
-def test_rounding_that_beats_with_the_clock_is_no_misfit(linear: ProcessModel, missed: float, exceeded: bool) -> None:
+def test_a_beat_of_rounding_with_the_sample_rate_is_no_misfit(
+    linear: ProcessModel, missed: float, exceeded: bool
+) -> None:
     step = 12.0**0.5  # its rounding has a variance of 1
     true = np.cumsum(np.where(np.arange(SAMPLES) < 1000, 0.3, 40.043))  # in quantisation steps
     residuals = white(9)
@@ -99,27 +101,27 @@ def test_rounding_that_beats_with_the_clock_is_no_misfit(linear: ProcessModel, m
     assert found.exceeded is exceeded
 
 
-def test_what_lies_far_above_the_drives_band_does_not_count(linear: ProcessModel) -> None:
+def test_a_tone_far_above_the_drives_band_is_no_objection(linear: ProcessModel) -> None:
     residuals = white(4)
     residuals[:, 0] += 0.5 * np.sin(2.0 * np.pi * 480.0 * TIME)
     assert not judged(linear, residuals)[0].exceeded
 
 
-def test_a_drift_counts(linear: ProcessModel) -> None:
+def test_a_constant_offset_of_innovations_is_an_objection_at_frequency_zero(linear: ProcessModel) -> None:
     residuals = white(5)
     residuals[:, 0] += 0.1
     assert judged(linear, residuals)[0].exceeded
     assert judged(linear, residuals)[0].frequency == 0.0
 
 
-def test_channels_that_fail_together_are_correlated(linear: ProcessModel) -> None:
+def test_channels_with_common_innovations_are_reported_as_correlated(linear: ProcessModel) -> None:
     residuals = white(6)
     residuals[:, 1] = 0.8 * residuals[:, 0] + 0.6 * residuals[:, 1]
     assert [channel.crosses for channel in judged(linear, residuals)] == pytest.approx([0.8, 0.8], abs=0.02)
     assert abs(judged(linear, white(6))[0].crosses) < 0.05
 
 
-def test_missing_samples_change_nothing_but_the_count(linear: ProcessModel) -> None:
+def test_missing_samples_lower_the_count_and_cause_no_objection(linear: ProcessModel) -> None:
     residuals = white(7)
     residuals[np.random.default_rng(8).random(SAMPLES) < 0.4, 0] = np.nan
     position, velocity = judged(linear, residuals)
@@ -136,7 +138,7 @@ def test_a_pattern_within_the_quantum_of_a_stuck_sensor_is_no_objection(linear: 
     assert not judged(linear, residuals, position=coarse)[0].exceeded
 
 
-def test_what_never_moves_cannot_be_judged(linear: ProcessModel) -> None:
+def test_a_channel_that_never_moves_has_no_excess(linear: ProcessModel) -> None:
     residuals = white(10)
     residuals[:, 0] += 5.0
     assert quantum(np.zeros(5)) == float("inf")
@@ -144,7 +146,7 @@ def test_what_never_moves_cannot_be_judged(linear: ProcessModel) -> None:
 
 
 @pytest.mark.parametrize(("repeats", "coarse"), [(2, False), (4, True)])
-def test_a_channel_that_repeats_itself_once_in_a_thousand_samples_is_quantised(repeats: int, coarse: bool) -> None:
+def test_a_channel_that_repeats_a_value_once_in_a_thousand_samples_is_quantised(repeats: int, coarse: bool) -> None:
     values = np.cumsum(np.where(np.arange(3000) < repeats, 0.0, 0.5))
     assert quantum(values) == (0.5 if coarse else 0.0)
 
@@ -153,13 +155,13 @@ def test_noise_has_no_quantum() -> None:
     assert quantum(np.random.default_rng(0).standard_normal(1000)) == 0.0
 
 
-def test_a_log_of_a_few_samples_or_none_kept_says_nothing(linear: ProcessModel) -> None:
+def test_a_log_of_few_samples_or_without_innovations_is_not_judged(linear: ProcessModel) -> None:
     assert judged(linear, np.empty((0, 2))) == []
     assert judged(linear, white(0)[:200]) == []
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.05, 0.1])
-def test_the_test_for_remaining_structure_is_ljungs_and_boxs(memory: float) -> None:
+def test_the_ljung_box_test_equals_that_of_statsmodels(memory: float) -> None:
     values = np.random.default_rng(7).standard_normal(2000)
     values[1:] += memory * values[:-1]
     values -= values.mean()
@@ -168,7 +170,7 @@ def test_the_test_for_remaining_structure_is_ljungs_and_boxs(memory: float) -> N
 
 
 @pytest.mark.parametrize(("driven", "share"), [(0.0, 0.0), (1.0, 0.5), (2.0, 0.8), (1e3, 1.0)])
-def test_the_share_that_the_drive_explains_is_without_bias_in_so_few_segments(driven: float, share: float) -> None:
+def test_the_share_that_the_drive_explains_is_unbiased(driven: float, share: float) -> None:
     rng = np.random.default_rng(7)
     found: list[float] = []
     for _ in range(20):
@@ -177,7 +179,7 @@ def test_the_share_that_the_drive_explains_is_without_bias_in_so_few_segments(dr
     assert np.mean(found) == pytest.approx(share, abs=0.02)
 
 
-def test_a_pattern_of_quantisation_that_follows_the_drive_is_no_excess(linear: ProcessModel) -> None:
+def test_quantisation_that_follows_the_drive_is_subtracted_from_the_excess(linear: ProcessModel) -> None:
     length, first = (SAMPLES - int(SETTLING * SAMPLES)) // SEGMENTS, int(SETTLING * SAMPLES)
     frequency = 8.0 / (length * SAMPLE_TIME)
     push, quantum = np.sin(2.0 * np.pi * frequency * TIME), 1e-5
@@ -202,7 +204,7 @@ def test_a_pattern_of_quantisation_that_follows_the_drive_is_no_excess(linear: P
     assert fine - coarse == pytest.approx(share * often / 12.0 * length / 2.0, rel=0.02)
 
 
-def test_where_nothing_is_driven_a_tenth_of_all_frequencies_counts(linear: ProcessModel) -> None:
+def test_without_a_drive_only_the_lowest_tenth_of_frequencies_is_judged(linear: ProcessModel) -> None:
     still = np.zeros(SAMPLES)
     record = Record(SAMPLE_TIME, {"motor_speed_rad_s": still, "position_m": TIME, "velocity_m_s": TIME})
 
@@ -223,7 +225,7 @@ def test_where_nothing_is_driven_a_tenth_of_all_frequencies_counts(linear: Proce
     assert at(40.0).with_drive == 0.0
 
 
-def test_innovations_that_are_zero_are_neither_alike_nor_explained(linear: ProcessModel) -> None:
+def test_zero_innovations_have_no_excess_and_no_correlation(linear: ProcessModel) -> None:
     residuals = white(12)
     residuals[:, 0] = 0.0
     position, velocity = judged(linear, residuals)

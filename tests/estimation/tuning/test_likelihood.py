@@ -38,7 +38,7 @@ def deviations(fit: LikelihoodFit, truth: EhaParameters) -> list[float]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("condition", ["normal", "major_leakage_minor_friction", "minor_leakage_major_friction"])
-def test_condition_and_bulk_modulus_come_back_together_from_wrong_guesses(condition: str) -> None:
+def test_condition_and_bulk_modulus_are_found_together_from_wrong_first_guesses(condition: str) -> None:
     truth = parameters_for(CONDITIONS[condition])
     fit = fit_likelihood(log_of(truth, 1), off(truth))
     assert fit.converged
@@ -49,7 +49,7 @@ def test_condition_and_bulk_modulus_come_back_together_from_wrong_guesses(condit
 
 
 @pytest.mark.slow
-def test_without_pressure_all_is_found_to_a_percent() -> None:
+def test_without_pressure_all_parameters_are_found_to_one_percent() -> None:
     truth = EhaParameters()
     fit = fit_likelihood(log_of(truth, 2).replace(differential_pressure_pa=None), off(truth))
     for name, (value, _) in fit.parameters.items():
@@ -57,7 +57,7 @@ def test_without_pressure_all_is_found_to_a_percent() -> None:
 
 
 @pytest.mark.slow
-def test_intervals_hold_what_they_say_over_seeds() -> None:
+def test_intervals_are_calibrated_over_seeds() -> None:
     truth = EhaParameters()
     found = np.array([deviations(fit_likelihood(log_of(truth, seed), truth), truth) for seed in range(10, 18)])
     assert 0.7 < np.sqrt(np.mean(found**2)) < 1.3
@@ -75,7 +75,7 @@ def test_the_noise_levels_found_are_the_sensors_own() -> None:
 
 
 @pytest.mark.slow
-def test_what_is_known_is_left_and_makes_the_rest_surer() -> None:
+def test_a_parameter_fitted_alone_has_a_smaller_deviation_than_among_all() -> None:
     truth = EhaParameters()
     record = log_of(truth, 4)
     alone, among = fit_likelihood(record, truth, ["flow_bias"]), fit_likelihood(record, truth)
@@ -88,7 +88,7 @@ def a_fit(**parameters: tuple[float, float]) -> LikelihoodFit:
     return LikelihoodFit(parameters, covariance, 4.0 * covariance, 1.0, {}, {}, {}, 0.0, True)
 
 
-def test_the_interval_of_a_logarithm_is_even_in_ratio_and_that_of_linear_friction_in_difference() -> None:
+def test_intervals_are_symmetric_in_ratio_and_that_of_linear_friction_in_difference() -> None:
     fit = a_fit(bulk_modulus=(2e8, 4e7), friction_linear=(-100.0, 10.0))
     low, high = fit.interval("bulk_modulus")
     assert (high / 2e8, 2e8 / low) == pytest.approx([exp(0.2 * NORMAL_95)] * 2)
@@ -109,7 +109,7 @@ def test_unknowns_that_cannot_be_fitted_are_refused(unknowns: list[str], said: s
         fit_likelihood(Record(1e-3, {"position_m": np.zeros(9)}), EhaParameters(), unknowns)
 
 
-def test_a_first_guess_of_nothing_has_no_logarithm() -> None:
+def test_a_first_guess_of_zero_is_refused() -> None:
     record = Record(1e-3, {"motor_speed_rad_s": np.zeros(9), "position_m": np.zeros(9)})
     with pytest.raises(HydrostateError, match=r"the first guess of flow_bias must be positive, got 0\.0"):
         fit_likelihood(record, EhaParameters(flow_bias=0.0))

@@ -67,7 +67,7 @@ def test_the_gradient_of_the_likelihood_is_exact(model: ProcessModel) -> None:
 
 
 @pytest.mark.slow
-def test_the_gradient_by_the_prior_is_exact() -> None:
+def test_the_gradient_with_respect_to_the_prior_is_exact() -> None:
     problem = task(PRESSURE_FORM)
     belief = np.zeros((len(belief_names(4)), 2))
     belief[3, 0] = 1.0
@@ -113,7 +113,7 @@ def test_the_information_is_the_covariance_of_the_scores() -> None:
     np.testing.assert_allclose(np.diag(scores.T @ scores), np.diag(found.information), rtol=0.25)
 
 
-def test_the_loop_run_as_python_gives_what_its_kernel_gives(
+def test_the_loop_in_plain_python_gives_the_same_result_as_its_kernel(
     linear: ProcessModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rng = np.random.default_rng(4)

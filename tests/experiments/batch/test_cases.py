@@ -17,7 +17,7 @@ def test_a_study_has_every_combination_once() -> None:
     assert len(plan) == len(set(plan.keys)) == 2 * 4 * 3
 
 
-def test_a_changed_study_shares_the_keys_of_what_did_not_change() -> None:
+def test_a_changed_study_keeps_the_keys_of_its_unchanged_cases() -> None:
     before, more_seeds = set(small_plan().keys), set(small_plan(seeds=5).keys)
     other_starts = set(small_plan(starts_pa=[2e8, 3e8]).keys)
     assert before < more_seeds
@@ -25,21 +25,21 @@ def test_a_changed_study_shares_the_keys_of_what_did_not_change() -> None:
     assert not before & set(small_plan(duration_s=0.06).keys)
 
 
-def test_a_key_hashes_the_rig_too() -> None:
+def test_keys_depend_on_the_rig() -> None:
     plan = small_plan()
     parameters = replace(plan.rig.parameters, moving_mass=21.0)
     assert not set(plan.keys) & set(replace(plan, rig=replace(plan.rig, parameters=parameters)).keys)
 
 
 @pytest.mark.parametrize("workers", [1, 2, 40])
-def test_tasks_hold_every_case_that_is_left_once(workers: int) -> None:
+def test_tasks_contain_every_unfinished_case_exactly_once(workers: int) -> None:
     plan = small_plan()
     done = set(plan.keys[3:9])
     given = [key for task in plan.tasks(done, workers) for key in task.keys]
     assert sorted(given) == sorted(set(plan.keys) - done)
 
 
-def test_a_task_ends_where_its_lanes_are_full_or_its_motion_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_task_contains_one_condition_and_fills_its_filter_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cases, "MOST_CASES", 2048)
     tasks = list(small_plan(seeds=64).tasks(set(), 2))
     conditions = [{group.series.condition for group in task.groups} for task in tasks]  # pyright: ignore -- simulated, not logs
@@ -48,13 +48,13 @@ def test_a_task_ends_where_its_lanes_are_full_or_its_motion_ends(monkeypatch: py
     assert sum(-(-size // LANES) for size in sizes) == 2 * 64 * 3 // LANES
 
 
-def test_severities_stand_where_conditions_would() -> None:
+def test_a_study_can_give_severities_instead_of_conditions() -> None:
     plan = small_plan(conditions=None, severities=[[0.5, 0.0], [1.0, 1.5]])
     places = {(one.condition, one.leakage_severity, one.friction_severity) for one in plan.blocks[0][0]}  # pyright: ignore
     assert places == {(None, 0.5, 0.0), (None, 1.0, 1.5)}
 
 
-def test_a_logs_key_follows_its_content_not_its_folder(tmp_path: Path) -> None:
+def test_the_key_of_a_log_depends_on_its_content_and_not_on_its_folder(tmp_path: Path) -> None:
     def keys(folder: str, text: str, notes: str = "") -> list[str]:
         (tmp_path / folder).mkdir(exist_ok=True)
         (tmp_path / folder / "run.csv").write_text(text, encoding="utf-8")
@@ -73,13 +73,13 @@ def test_a_glob_without_a_file_is_an_error(tmp_path: Path) -> None:
         plan_study(study, tmp_path)
 
 
-def test_more_series_than_can_be_listed_are_refused_before_they_are() -> None:
+def test_a_block_of_more_than_a_million_series_is_refused_before_it_is_listed() -> None:
     study = parse_study({"name": "s", "runs": [{"seeds": 1_000_000, "methods": [DIAGNOSE]}]}, "s.toml")
     with pytest.raises(StudyError, match=r"runs\[0\] must be at most 1,000,000 series, got up to 9,000,000"):
         plan_study(study, Path())
 
 
-def test_a_log_takes_the_rig_file_of_the_nearest_folder_and_its_key_hashes_it(tmp_path: Path) -> None:
+def test_a_log_uses_the_rig_file_of_the_nearest_folder_and_its_key_depends_on_it(tmp_path: Path) -> None:
     for name in ("small/a.csv", "large/b.csv", "large/worn/c.csv"):
         (tmp_path / name).parent.mkdir(exist_ok=True, parents=True)
         (tmp_path / name).write_text(f"{name}\n", encoding="utf-8")

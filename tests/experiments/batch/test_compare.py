@@ -45,14 +45,14 @@ def overall(table: pd.DataFrame, measure: str = "error of bulk modulus") -> dict
 
 
 @pytest.mark.parametrize(("change", "verdict"), [(-0.3, "better"), (0.3, "worse")])
-def test_a_small_change_is_seen_through_noise_that_cases_share(change: float, verdict: str) -> None:
+def test_a_small_change_is_detected_despite_noise_that_both_studies_share(change: float, verdict: str) -> None:
     row = overall(compare_studies(study(20, 0.0), study(20, change, seed=2)))
     assert row["verdict"] == verdict
     assert row["difference"] == pytest.approx(change, abs=0.05)
     assert (row["cases"], row["series"]) == (80, 40)
 
 
-def test_chance_is_called_a_difference_in_about_one_study_of_twenty() -> None:
+def test_equal_studies_are_rarely_called_different() -> None:
     verdicts = [
         overall(compare_studies(study(20, 0.0, seed=2 * number), study(20, 0.0, seed=2 * number + 1)))["verdict"]
         for number in range(15)
@@ -60,7 +60,7 @@ def test_chance_is_called_a_difference_in_about_one_study_of_twenty() -> None:
     assert sum(verdict != "no difference shown" for verdict in verdicts) <= 4  # 5 or more by chance: 1 in 1500
 
 
-def test_first_guesses_on_one_noise_count_as_one_piece_of_evidence() -> None:
+def test_repeated_first_guesses_on_the_same_noise_do_not_narrow_the_interval() -> None:
     first, second = study(20, 0.0), study(20, 0.0, seed=2)
     repeated = [pd.concat([frame.assign(start_pa=start) for start in (0.0, 1e8, 2e8)]) for frame in (first, second)]
     narrow, wide = (overall(compare_studies(*pair)) for pair in ((first, second), repeated))
@@ -68,12 +68,12 @@ def test_first_guesses_on_one_noise_count_as_one_piece_of_evidence() -> None:
     assert widths[1] > 0.9 * widths[0]
 
 
-def test_what_each_study_does_in_one_way_of_its_own_is_what_is_compared() -> None:
+def test_two_studies_with_one_method_each_are_compared_by_method() -> None:
     row = overall(compare_studies(study(6, 0.0), study(6, 1.0, "ukf")))
     assert (row["changed"], row["verdict"], row["cases"]) == ("method: ekf to ukf", "worse", 24)
 
 
-def test_cases_without_an_answer_are_counted_not_averaged() -> None:
+def test_cases_without_an_answer_are_counted_and_not_averaged() -> None:
     table = compare_studies(study(6, 0.0), study(6, 0.0, outcome="diverged", error_percent=float("nan")))
     assert overall(table, "cases with an answer")["verdict"] == "worse"
     assert "error of bulk modulus" not in set(table["measure"])
@@ -89,7 +89,7 @@ def test_studies_without_a_case_in_common_are_an_error() -> None:
         compare_studies(study(3, 0.0, condition="normal"), study(3, 0.0, condition="minor_friction"))
 
 
-def test_few_series_have_no_interval_and_the_sentence_has_none_either() -> None:
+def test_the_sentence_about_few_series_gives_no_interval() -> None:
     few, many = (compare_studies(study(seeds, 0.0), study(seeds, -0.3, seed=2)) for seeds in (2, 20))
     for table, there in ((few, False), (many, True)):
         sentences = in_sentences(table, ("A", "B"))

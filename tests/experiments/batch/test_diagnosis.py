@@ -22,7 +22,7 @@ from plant.sensors.sensors import BENCH
 RIG = Rig()
 
 
-def test_a_batch_finds_what_diagnose_finds() -> None:
+def test_a_batch_finds_the_same_condition_as_diagnose() -> None:
     log = next(iter(draw_logs([TEST], drives=("prbs",), duration=3.0)))
     row, found = diagnosed(log.record, RIG), diagnose_log(log.record, RIG)
     first, second = sorted(found.probabilities, key=lambda name: -found.probabilities[name])[:2]
@@ -31,7 +31,7 @@ def test_a_batch_finds_what_diagnose_finds() -> None:
 
 
 @pytest.mark.slow
-def test_a_log_in_none_of_the_nine_conditions_is_a_mismatch_with_a_reason() -> None:
+def test_a_log_outside_the_nine_conditions_is_a_mismatch_with_its_reasons() -> None:
     log = next(iter(draw_logs([TEST], drives=("prbs",), duration=3.0)))
     spoilt = OUT_OF_MODEL["encoder gain, - 30 %"](log)
     row = diagnosed(spoilt, RIG)
@@ -41,7 +41,7 @@ def test_a_log_in_none_of_the_nine_conditions_is_a_mismatch_with_a_reason() -> N
     assert row["reason"].startswith("; ".join(map(str, diagnose_log(spoilt, RIG).against)))
 
 
-def test_a_log_at_rest_is_in_no_class() -> None:
+def test_a_log_at_rest_gets_no_condition_but_a_reason() -> None:
     rng = np.random.default_rng(0)
     still = {"motor_speed_rad_s": np.zeros(2000), "position_m": 1e-7 * rng.standard_normal(2000)}
     row = diagnosed(Record(1e-3, still), RIG)
@@ -54,14 +54,14 @@ def steps(duration: float = 3.0) -> Record:
     return simulate(LUMPED, make_drive("steps", duration, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
 
-def test_a_rig_around_which_no_circuit_fits_fails_as_a_row_that_says_why() -> None:
+def test_a_rig_without_a_possible_circuit_gives_a_failed_row_with_the_reason() -> None:
     row = diagnosed(steps(), Rig("no circuit", replace(EhaParameters(), relief_pressure=1e9)))
     assert (row["outcome"], row["trusted"]) == ("failed", False)
     assert "accumulator_oil must fill both chambers" in row["reason"]
     assert "found_condition" not in row
 
 
-def test_what_was_left_out_of_a_log_is_a_warning_of_its_row() -> None:
+def test_outliers_left_out_of_a_log_are_warned_about_and_its_condition_is_still_found() -> None:
     velocity = steps()["velocity_m_s"].copy()
     velocity[::150] += 1.0
     with pytest.warns(LogWarning) as caught:
@@ -71,7 +71,7 @@ def test_what_was_left_out_of_a_log_is_a_warning_of_its_row() -> None:
     assert (row["outcome"], row["found_condition"]) == ("ok", "minor_leakage")
 
 
-def test_conditions_that_move_alike_are_no_class() -> None:
+def test_two_equally_probable_conditions_make_a_row_not_observable() -> None:
     log = diagnose_log(steps(), RIG)
     best, second = sorted(log.probabilities, key=lambda name: -log.probabilities[name])[:2]
     alike = replace(log, probabilities={**dict.fromkeys(log.probabilities, 0.0), best: 0.5001, second: 0.4999})

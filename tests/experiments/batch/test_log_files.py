@@ -19,12 +19,12 @@ def logs(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("pattern", ["**/*.csv", "*.csv", "**", "*/**/*.csv", "**/run/**/c.*", "run/b.csv", "none/**"])
-def test_a_pattern_finds_what_glob_finds(logs: Path, pattern: str) -> None:
+def test_a_pattern_finds_the_same_files_as_glob(logs: Path, pattern: str) -> None:
     wanted = [path for path in glob(f"{logs}/{pattern}", recursive=True) if Path(path).is_file()]  # noqa: PTH207
     assert matching(f"{logs}/{pattern}") == sorted(wanted)
 
 
-def test_links_in_a_circle_lead_to_each_folder_once(logs: Path, tmp_path: Path) -> None:
+def test_circular_links_are_followed_to_each_folder_only_once(logs: Path, tmp_path: Path) -> None:
     (logs / "loop").symlink_to(".")
     (logs / "run/up").symlink_to("..")
     (logs / "run/out").symlink_to(tmp_path)
@@ -38,6 +38,6 @@ def test_links_in_a_circle_lead_to_each_folder_once(logs: Path, tmp_path: Path) 
     assert found == ["a.csv", "f.csv", "linked/e.csv", "run/[1]/c.csv", "run/b.csv"]
 
 
-def test_a_folder_that_is_a_link_itself_is_searched(logs: Path, tmp_path: Path) -> None:
+def test_a_folder_that_is_a_link_is_searched(logs: Path, tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(logs)
     assert len(matching(f"{tmp_path}/link/**/*.csv")) == 3

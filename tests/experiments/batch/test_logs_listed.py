@@ -29,7 +29,7 @@ def files(plan: Plan) -> list[str]:
     return [one.file for one in plan.blocks[0][0]]  # pyright: ignore -- logs, not simulated
 
 
-def test_links_to_a_log_count_once_and_it_is_read_with_its_own_notes(tmp_path: Path) -> None:
+def test_a_log_with_two_links_to_it_is_listed_once(tmp_path: Path) -> None:
     write_record(small_log().annotate(condition="normal"), tmp_path / "run.csv")
     (tmp_path / "below").mkdir()
     (tmp_path / "below" / "link.csv").symlink_to(tmp_path / "run.csv")
@@ -42,14 +42,14 @@ def test_links_to_a_log_count_once_and_it_is_read_with_its_own_notes(tmp_path: P
     assert (files(linked), failures) == (["a.csv"], ())
 
 
-def test_two_names_of_one_file_on_the_disk_are_one_log(tmp_path: Path) -> None:
+def test_two_hard_links_to_one_file_are_one_log(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t,u\n0,1\n")
     os.link(tmp_path / "a.csv", tmp_path / "b.csv")
     (tmp_path / "copy.csv").write_text("t,u\n0,1\n")
     assert files(planned(tmp_path)) == ["a.csv", "copy.csv"]
 
 
-def test_a_link_into_a_folder_with_a_rig_file_of_its_own_counts_too(tmp_path: Path) -> None:
+def test_a_link_to_a_log_in_a_folder_with_its_own_rig_file_is_a_second_log(tmp_path: Path) -> None:
     (tmp_path / "large").mkdir()
     (tmp_path / "large" / "rig.toml").write_text("name = 'large'\n[parameters]\npiston_area = 3e-3\n")
     (tmp_path / "a.csv").write_text("t,u\n0,1\n")
@@ -58,7 +58,7 @@ def test_a_link_into_a_folder_with_a_rig_file_of_its_own_counts_too(tmp_path: Pa
 
 
 @pytest.mark.parametrize("rows", [400, 4])
-def test_a_name_that_is_no_utf_8_is_spelt_out_and_its_log_read(tmp_path: Path, rows: int) -> None:
+def test_a_file_name_that_is_not_utf_8_is_escaped_and_its_log_is_read(tmp_path: Path, rows: int) -> None:
     name = os.fsdecode(b"l\xf6g.csv")
     write_record(small_log(), tmp_path / "plain.csv")
     lines = (tmp_path / "plain.csv").read_text().splitlines(keepends=True)
@@ -70,14 +70,14 @@ def test_a_name_that_is_no_utf_8_is_spelt_out_and_its_log_read(tmp_path: Path, r
     assert [one.series for one in said] == (["l\\xf6g.csv"] if rows == 4 else [])
 
 
-def test_a_store_among_logs_holds_no_logs(tmp_path: Path) -> None:
+def test_parquet_files_of_a_store_among_logs_are_not_logs(tmp_path: Path) -> None:
     for name in ("run.parquet", "fleet/store/cases.parquet", "fleet/store/parts/0a.parquet", "x/parts/1.parquet"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("x")
     assert files(planned(tmp_path, "**/*.parquet")) == ["run.parquet", "x/parts/1.parquet"]
 
 
-def test_a_folder_whose_name_looks_like_a_pattern_is_taken_by_its_name(tmp_path: Path) -> None:
+def test_a_folder_name_with_brackets_is_not_taken_for_a_pattern(tmp_path: Path) -> None:
     (tmp_path / "old [1]").mkdir()
     (tmp_path / "old [1]" / "a.csv").write_text("t,u\n0,1\n")
     assert files(planned(tmp_path / "old [1]")) == ["a.csv"]

@@ -25,7 +25,7 @@ def test_every_condition_is_run_with_every_seed_and_sensor_set() -> None:
     assert {one.plant for one in series} == {"piezo-stack"}
 
 
-def test_the_kind_s_own_length_stands_unless_the_study_gives_one() -> None:
+def test_a_duration_in_the_study_replaces_that_of_the_kind_of_actuator() -> None:
     kind = actuator("piezo-stack")
     own = next(simulated_of(kind, runs_of("piezo-stack", conditions=["normal"])))
     given = next(simulated_of(kind, runs_of("piezo-stack", conditions=["normal"], duration_s=0.03)))
@@ -33,7 +33,7 @@ def test_the_kind_s_own_length_stands_unless_the_study_gives_one() -> None:
     assert (own.duration_s, given.duration_s) == (0.0, 0.03)
 
 
-def test_a_row_says_what_the_kind_s_verb_found() -> None:
+def test_a_row_contains_the_condition_that_the_kind_s_diagnosis_found() -> None:
     kind = actuator("piezo-stack")
     rig = kind.rig
     (one,) = simulated_of(kind, runs_of("piezo-stack", conditions=["major_leakage"], duration_s=0.03))
@@ -45,7 +45,7 @@ def test_a_row_says_what_the_kind_s_verb_found() -> None:
     assert all(np.isfinite(one["value"]) for one in quantities.values() if one["value"] is not None)
 
 
-def test_a_condition_among_several_has_a_runner_up_and_says_by_how_much_it_leads() -> None:
+def test_a_diagnosis_row_has_the_runner_up_and_its_margin() -> None:
     kind = actuator("diaphragm-motor")
     rig = kind.rig
     (one,) = simulated_of(kind, runs_of("diaphragm-motor", duration_s=0.15))

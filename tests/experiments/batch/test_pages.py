@@ -15,7 +15,7 @@ from experiments.page.numbers import MISSING
 from tests.experiments.fleet.conftest import store_row
 
 
-def test_quantities_are_told_with_their_intervals_and_those_without_a_value_are_left_out() -> None:
+def test_quantities_are_listed_with_their_intervals_and_those_without_a_value_are_omitted() -> None:
     entries = {
         "spring_stiffness": {"value": 1e4, "unit": "N/m", "ci95": [9e3, 1.1e4]},
         "gain": {"value": 2.0, "unit": "1", "ci95": None},
@@ -28,12 +28,12 @@ def test_quantities_are_told_with_their_intervals_and_those_without_a_value_are_
     assert second.rstrip() == "gain 2.000"
 
 
-def test_what_is_not_there_is_a_dash() -> None:
+def test_a_missing_entry_is_shown_as_a_dash() -> None:
     assert _quantities(None) == _quantities(np.nan) == MISSING
     assert [_or_dash(one) for one in (None, np.nan, "", "normal")] == [MISSING] * 3 + ["normal"]
 
 
-def test_what_was_found_in_a_log_is_short_and_its_path_names_no_machine() -> None:
+def test_the_report_rounds_quantities_and_shows_logs_without_their_folder() -> None:
     noise = {"value": 1.1e-15, "unit": "%", "ci95": [-0.025, 0.027], "healthy": 0.0}
     found = {
         "velocity_lost": noise,
@@ -56,7 +56,7 @@ def test_what_was_found_in_a_log_is_short_and_its_path_names_no_machine() -> Non
     assert page.count("pages/") == 1
 
 
-def test_a_log_that_was_asked_two_questions_has_one_row() -> None:
+def test_two_verbs_on_one_log_share_a_row() -> None:
     table = pd.DataFrame(
         {
             "file": ["a.csv", "b.csv", "a.csv", "b.csv", "c.csv", "c.csv", None, None],
@@ -74,7 +74,7 @@ def test_a_log_that_was_asked_two_questions_has_one_row() -> None:
     assert made["reason"].tolist()[1] == "no columns"
 
 
-def test_a_ratio_of_probabilities_has_no_digits_beyond_a_thousand() -> None:
+def test_a_ratio_of_probabilities_over_1000_is_shown_as_over_1000() -> None:
     assert [_times(one).text for one in (None, 1.0, 113.2, 1.13e5)] == [MISSING, "1.00", "113", "over 1000"]
 
 

@@ -24,7 +24,9 @@ def parts(store: PartStore) -> list[Path]:
     return sorted(Path(store.name).glob("parts/*.parquet"))
 
 
-def test_rows_come_in_the_studys_order_and_can_be_read_while_it_grows(store: PartStore, reference: pa.Table) -> None:
+def test_rows_are_in_the_order_of_the_study_and_can_be_read_while_it_runs(
+    store: PartStore, reference: pa.Table
+) -> None:
     seen: list[int] = []
 
     def look(count: int, part: object) -> None:
@@ -43,9 +45,7 @@ def _places(reference: pa.Table, rows: pa.Table) -> list[int]:
     return [keys.index(key) for key in rows["key"].to_pylist()]
 
 
-def test_a_store_is_read_by_one_thread_for_others_may_outlive_the_process(
-    store: PartStore, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_store_is_read_without_threads(store: PartStore, monkeypatch: pytest.MonkeyPatch) -> None:
     run_into(store, small_plan())
     told: list[object] = []
 
@@ -79,7 +79,7 @@ def test_a_damaged_part_is_set_aside_and_its_cases_run_again(
     assert store.rows().equals(reference)
 
 
-def test_a_full_disk_is_a_sentence_and_what_is_kept_stays(
+def test_a_full_disk_is_reported_and_loses_no_kept_row(
     store: PartStore, reference: pa.Table, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     written = [0]
@@ -100,7 +100,7 @@ def test_a_full_disk_is_a_sentence_and_what_is_kept_stays(
     assert store.rows().equals(reference)
 
 
-def test_a_folder_without_permission_is_a_sentence(store: PartStore, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_store_without_write_permission_is_refused(store: PartStore, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*_: object, **__: object) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
@@ -110,12 +110,12 @@ def test_a_folder_without_permission_is_a_sentence(store: PartStore, monkeypatch
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc, where not even root may write")
-def test_a_read_only_place_is_a_sentence() -> None:
+def test_a_store_on_a_read_only_file_system_is_refused() -> None:
     with pytest.raises(HydrostateError, match="store /proc/store cannot be written: "):
         run_into(open_store("/proc/store"), small_plan())
 
 
-def test_a_second_writer_is_turned_away_and_a_reader_is_not(store: PartStore) -> None:
+def test_a_second_writer_is_refused_and_a_reader_is_not(store: PartStore) -> None:
     run_into(store, small_plan(seeds=1))
     with store.writing():
         with (
@@ -126,7 +126,7 @@ def test_a_second_writer_is_turned_away_and_a_reader_is_not(store: PartStore) ->
         assert len(open_store(store.name).rows()) == 6
 
 
-def test_other_peoples_files_are_not_written_among(store: PartStore) -> None:
+def test_a_folder_with_other_files_is_refused_as_a_store(store: PartStore) -> None:
     folder = Path(store.name)
     folder.mkdir()
     (folder / "thesis.doc").write_text("mine", encoding="utf-8")
@@ -143,12 +143,12 @@ def test_leftovers_of_a_killed_writer_are_removed(store: PartStore) -> None:
     assert rows_in_parts(store) == 6
 
 
-def test_a_place_without_a_store_says_so(store: PartStore) -> None:
+def test_reading_a_missing_store_is_refused(store: PartStore) -> None:
     with pytest.raises(HydrostateError, match="there is no batch study there"):
         store.rows()
 
 
-def test_a_store_may_be_any_place_that_fsspec_reaches(reference: pa.Table) -> None:
+def test_a_store_on_an_fsspec_file_system_is_resumed(reference: pa.Table) -> None:
     pytest.importorskip("fsspec", reason="the extra `remote` is not installed")
     store = open_store("memory://hydrostate-test/store")
     run_into(store, small_plan(seeds=2))
@@ -158,13 +158,13 @@ def test_a_store_may_be_any_place_that_fsspec_reaches(reference: pa.Table) -> No
     assert not [name for name in store.folder.files("parts") if name.endswith(".tmp")]
 
 
-def test_an_unknown_protocol_is_a_sentence() -> None:
+def test_an_unknown_protocol_is_refused() -> None:
     pytest.importorskip("fsspec", reason="the extra `remote` is not installed")
     with pytest.raises(HydrostateError, match="store nowhere://a"):
         open_store("nowhere://a")
 
 
-def test_a_store_of_another_format_is_refused_and_one_without_parts_has_no_rows(store: PartStore) -> None:
+def test_a_store_of_another_format_is_refused_and_an_empty_one_has_no_rows(store: PartStore) -> None:
     run_into(store, small_plan(seeds=1))
     manifest = Path(store.name) / "manifest.json"
     content = json.loads(manifest.read_text())

@@ -11,7 +11,7 @@ from tests.experiments.batch.conftest import run_into, small_plan
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "batch-studies.md").read_text(encoding="utf-8")
 
 
-def test_the_query_of_the_page_runs_on_a_store(tmp_path: Path) -> None:
+def test_the_documented_sql_query_runs_on_a_store(tmp_path: Path) -> None:
     duckdb = pytest.importorskip("duckdb", reason="the extra `query` is not installed")
     store = open_store(tmp_path / "store")
     run_into(store, small_plan())
@@ -24,7 +24,7 @@ def test_the_query_of_the_page_runs_on_a_store(tmp_path: Path) -> None:
     assert duckdb.sql(joined).fetchall() == [(6,)]
 
 
-def test_the_study_file_of_the_page_is_one() -> None:
+def test_the_documented_study_file_is_valid() -> None:
     found = re.search(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
     assert found is not None
     study = parse_study(tomllib.loads(found[1]), "the page")

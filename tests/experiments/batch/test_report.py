@@ -39,7 +39,7 @@ def estimate(error: float, std: float = 2e6) -> dict[str, Any]:
     return row(**entries, true_bulk_modulus_pa=truth, bulk_modulus_pa=value, bulk_modulus_std_pa=std)
 
 
-def test_errors_are_summed_up_against_the_truth() -> None:
+def test_the_report_gives_median_rms_and_coverage_of_errors() -> None:
     tables = summary_tables(frame(estimate(0.0), estimate(1.0), estimate(5.0)))
     (found,) = tables["bulk modulus"].to_dict("records")
     assert found["median_percent"] == pytest.approx(1.0)
@@ -47,7 +47,7 @@ def test_errors_are_summed_up_against_the_truth() -> None:
     assert found["near_percent"] == found["covered_percent"] == pytest.approx(200.0 / 3.0)
 
 
-def test_a_class_that_was_not_given_is_not_right() -> None:
+def test_a_diagnosis_without_a_condition_is_not_counted_as_right() -> None:
     seen = [
         row(verb="diagnose", condition="normal", found_condition=name) for name in ("normal", "minor_friction", None)
     ]
@@ -57,12 +57,12 @@ def test_a_class_that_was_not_given_is_not_right() -> None:
     assert int(tables["confusion"].to_numpy().sum()) == 2
 
 
-def test_severities_without_a_name_are_named_by_their_numbers() -> None:
+def test_a_simulated_condition_without_a_name_is_named_by_its_severities() -> None:
     free = row(verb="diagnose", leakage_severity=0.5, friction_severity=1.0)
     assert frame(free)["condition"].tolist() == ["leakage 0.5, friction 1"]
 
 
-def test_the_report_comes_from_the_store_alone_and_says_what_is_missing(tmp_path: Path) -> None:
+def test_the_report_needs_only_the_store_and_counts_the_missing_cases(tmp_path: Path) -> None:
     store = open_store(tmp_path / "store")
     run_into(store, small_plan())
     copy = PartStore(open_folder((tmp_path / "store").rename(tmp_path / "moved")))
@@ -76,7 +76,7 @@ def test_the_report_comes_from_the_store_alone_and_says_what_is_missing(tmp_path
     assert (tmp_path / "page" / "figures" / "bulk_modulus.png").exists()
 
 
-def test_a_report_that_cannot_be_written_is_a_sentence(tmp_path: Path) -> None:
+def test_a_report_that_cannot_be_written_is_an_error_with_its_path(tmp_path: Path) -> None:
     store = open_store(tmp_path / "store")
     run_into(store, small_plan(seeds=1))
     (tmp_path / "file").write_text("", encoding="utf-8")

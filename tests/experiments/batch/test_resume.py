@@ -67,7 +67,7 @@ def test_a_store_is_resumed_after_any_damage_at_any_moment(
     assert rows_in_parts(store) == len(reference)
 
 
-def test_a_damaged_manifest_says_how_to_go_on(tmp_path: Path, reference: pa.Table) -> None:
+def test_a_damaged_manifest_is_refused_with_the_remedy_which_works(tmp_path: Path, reference: pa.Table) -> None:
     store = begun(tmp_path, 2)
     manifest = Path(store.name, "manifest.json")
     manifest.write_bytes(manifest.read_bytes()[:40])
@@ -78,7 +78,7 @@ def test_a_damaged_manifest_says_how_to_go_on(tmp_path: Path, reference: pa.Tabl
     assert store.rows().equals(reference)
 
 
-def test_an_interruption_after_the_last_case_stops_nothing(tmp_path: Path) -> None:
+def test_an_interruption_after_the_last_case_does_not_mark_the_study_as_stopped(tmp_path: Path) -> None:
     stop, plan = Event(), small_plan()
     done: list[int] = []
 
@@ -91,7 +91,7 @@ def test_an_interruption_after_the_last_case_stops_nothing(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_first_request_to_end_is_a_wish_and_the_second_is_obeyed(number: int) -> None:
+def test_the_first_signal_asks_the_study_to_stop_and_the_second_interrupts_it(number: int) -> None:
     before = signal.getsignal(number)
     with run_on_terminal._interruptible() as stop:
         signal.raise_signal(number)

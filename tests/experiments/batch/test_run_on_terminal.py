@@ -21,7 +21,7 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return notes
 
 
-def test_kept_rows_of_other_software_are_said_with_what_made_them(said: list[str]) -> None:
+def test_a_store_of_other_package_versions_is_reported_with_those_versions(said: list[str]) -> None:
     old = {"versions": {"numpy": "1.0", "scipy": "2.0"}, "commit": "0123456789abcdef"}
     run_on_terminal._say_differences(old, {"versions": {"numpy": "1.1", "scipy": "2.0"}, "commit": "fedcba"})
     (one,) = said
@@ -29,14 +29,14 @@ def test_kept_rows_of_other_software_are_said_with_what_made_them(said: list[str
     assert "scipy" not in one
 
 
-def test_kept_rows_of_code_that_was_edited_since_are_said(said: list[str]) -> None:
+def test_a_store_of_since_edited_code_is_reported(said: list[str]) -> None:
     old = {"versions": {}, "commit": "a", "sources": "one"}
     run_on_terminal._say_differences(old, {**old, "sources": "two"})
     (one,) = said
     assert "other code in plant, estimation, faults; --no-resume" in one
 
 
-def test_an_edit_of_the_code_or_of_its_numbers_changes_the_hash_of_the_sources(tmp_path: Path) -> None:
+def test_the_hash_of_the_sources_changes_with_models_and_numbers_but_not_with_pages(tmp_path: Path) -> None:
     law, numbers, page = (
         tmp_path / name for name in ("plant/law.py", "faults/deep/widths.json", "experiments/page.py")
     )
@@ -52,7 +52,7 @@ def test_an_edit_of_the_code_or_of_its_numbers_changes_the_hash_of_the_sources(t
 
 
 @pytest.mark.parametrize("old", [None, {"versions": {"numpy": "1.0"}, "commit": "a"}])
-def test_nothing_is_said_of_the_same_software_or_of_a_new_store(old: Any, said: list[str]) -> None:
+def test_the_same_software_or_a_new_store_is_not_reported(old: Any, said: list[str]) -> None:
     run_on_terminal._say_differences(old, {"versions": {"numpy": "1.0"}, "commit": "a"})
     assert said == []
 
@@ -66,14 +66,14 @@ def test_only_the_first_failures_are_named(said: list[str]) -> None:
     assert said.count("more cases failed; the report names all") == 1
 
 
-def test_a_log_that_cannot_be_read_is_named_once_with_all_that_was_asked_of_it(said: list[str]) -> None:
+def test_an_unreadable_log_is_reported_once_with_all_its_verbs(said: list[str]) -> None:
     failures = [Failure("a.csv", verb, "it is empty") for verb in ("diagnose", "estimate", "estimate")]
     with run_on_terminal._shown(4, 0) as advance:
         advance(4, SimpleNamespace(failures=[*failures, Failure("b.csv", "estimate", "no time")]))  # type: ignore[arg-type]
     assert said == ["a.csv (diagnose, estimate): it is empty", "b.csv (estimate): no time"]
 
 
-def test_pace_counts_only_what_this_run_did(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pace_counts_only_cases_of_this_run(monkeypatch: pytest.MonkeyPatch) -> None:
     now = iter([100.0, 110.0, 110.0, 110.0, 110.0, 110.0])
     monkeypatch.setattr(run_on_terminal.time, "monotonic", lambda: next(now))
     pace = run_on_terminal.Pace(total=60, before=20)
@@ -84,7 +84,7 @@ def test_pace_counts_only_what_this_run_did(monkeypatch: pytest.MonkeyPatch) -> 
     assert str(pace).startswith("24 of 60 cases, 2.5 s each")
 
 
-def test_logs_of_the_command_line_replace_those_of_a_study_that_has_some() -> None:
+def test_option_logs_replaces_the_logs_of_a_study_and_needs_a_study_with_logs() -> None:
     methods = [{"verb": "diagnose"}]
     study = parse_study({"name": "a", "logs": [{"glob": "old/*.csv", "methods": methods}]}, "a.toml")
     assert [one.glob for one in batch._with_logs(study, "new/*.csv").logs] == ["new/*.csv"]

@@ -16,14 +16,14 @@ from plant.errors import HydrostateError
 from tests.experiments.batch.conftest import rows_in_parts, run_into, small_plan
 
 
-def test_a_repeated_study_runs_nothing(tmp_path: Path, reference: pa.Table) -> None:
+def test_a_repeated_study_runs_no_case_again(tmp_path: Path, reference: pa.Table) -> None:
     store = open_store(tmp_path / "store")
     assert run_into(store, small_plan()).done == 24
     assert run_into(store, small_plan()).done == 0
     assert store.rows().equals(reference)
 
 
-def test_a_changed_study_runs_only_what_changed_and_a_study_changed_back_nothing(
+def test_a_changed_study_runs_only_its_new_cases_and_a_study_changed_back_runs_none(
     tmp_path: Path, reference: pa.Table
 ) -> None:
     store = open_store(tmp_path / "store")
@@ -34,7 +34,7 @@ def test_a_changed_study_runs_only_what_changed_and_a_study_changed_back_nothing
     assert store.rows().equals(reference)
 
 
-def test_an_interrupted_study_keeps_what_was_in_flight_and_goes_on(tmp_path: Path, reference: pa.Table) -> None:
+def test_an_interrupted_study_keeps_its_finished_cases_and_can_be_resumed(tmp_path: Path, reference: pa.Table) -> None:
     store, stop = open_store(tmp_path / "store"), Event()
     tally = run_into(store, small_plan(), stop=stop, on_part=lambda *_: stop.set())
     assert (tally.stopped, tally.done) == ("interrupted", len(store.rows()))
@@ -80,7 +80,7 @@ class _Deadly(SerialExecutor):
         return super().submit(fn, *args, **kwargs)
 
 
-def test_a_case_that_ends_its_worker_is_found_and_costs_no_other(tmp_path: Path, reference: pa.Table) -> None:
+def test_a_case_that_ends_its_worker_fails_alone(tmp_path: Path, reference: pa.Table) -> None:
     plan, store = small_plan(), open_store(tmp_path / "store")
     deadly = plan.keys[10]
 
@@ -124,7 +124,7 @@ def _open_failing(key: str, error: BaseException) -> Any:
     return opener
 
 
-def test_a_cluster_s_worker_that_ended_costs_the_case_and_not_the_cluster(tmp_path: Path, reference: pa.Table) -> None:
+def test_a_case_that_ends_its_worker_on_a_cluster_fails_alone(tmp_path: Path, reference: pa.Table) -> None:
     plan, store = small_plan(), open_store(tmp_path / "store")
     tally = run_into(store, plan, opener=_open_failing(plan.keys[10], KilledWorker("it ended")))
     rows = store.rows().to_pylist()
@@ -141,7 +141,7 @@ def test_a_cluster_s_worker_that_ended_costs_the_case_and_not_the_cluster(tmp_pa
         (ZeroDivisionError("ours"), ZeroDivisionError, "ours"),
     ],
 )
-def test_a_cluster_that_goes_away_and_an_error_of_ours_end_the_study_and_lose_nothing_that_was_kept(
+def test_a_lost_cluster_or_an_internal_error_ends_the_study_and_loses_no_kept_row(
     error: BaseException, raised: type[Exception], words: str, tmp_path: Path, reference: pa.Table
 ) -> None:
     plan, store = small_plan(), open_store(tmp_path / "store")

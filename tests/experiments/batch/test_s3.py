@@ -15,7 +15,7 @@ from tests.experiments.batch.conftest import run_into, small_plan
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
 
-def test_a_store_on_s3_is_resumed_and_holds_the_same_bits(reference: pa.Table, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_store_on_s3_is_resumed_and_has_the_same_rows(reference: pa.Table, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("s3fs", reason="the extra `remote` is not installed")
     server = pytest.importorskip("moto.server", reason="moto[server] is not installed").ThreadedMotoServer(port=0)
     server.start()

@@ -44,7 +44,7 @@ def rows_of(plan: Plan, places: list[int]) -> pa.Table:
     return table_of(work.run_task(Task(plan.rig, (group,))))
 
 
-def test_cases_together_have_the_rows_that_they_have_alone(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cases_that_share_an_estimate_get_the_same_rows_as_alone(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     alone = pa.concat_tables([rows_of(plan, [place]) for place in range(len(METHODS))])
     made: list[int] = []
     usual = work.estimated
@@ -61,7 +61,7 @@ def test_cases_together_have_the_rows_that_they_have_alone(plan: Plan, monkeypat
 
 
 @pytest.mark.parametrize("place", [[0], [0, 1]])
-def test_a_log_without_a_number_gets_the_sentence_that_estimate_gives_it(tmp_path: Path, place: list[int]) -> None:
+def test_a_row_without_a_bulk_modulus_gives_the_reason_of_the_verb_estimate(tmp_path: Path, place: list[int]) -> None:
     rng, p = np.random.default_rng(8), severity(0.6, 0.0)
     record = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     reversed_speed = record.replace(motor_speed_rad_s=-record["motor_speed_rad_s"])

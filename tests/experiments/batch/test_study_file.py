@@ -47,11 +47,11 @@ def test_every_error_names_its_field(content: dict[str, Any], said: str) -> None
     assert str(caught.value).startswith(f"small.toml: {said}")
 
 
-def test_every_study_that_comes_along_can_be_read() -> None:
+def test_every_study_file_of_the_package_can_be_read() -> None:
     assert [read_study(name).name for name in shipped_studies()] == list(shipped_studies())
 
 
-def test_a_file_that_is_no_toml_or_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_or_invalid_toml_file_is_refused_by_its_path(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("name = ", encoding="utf-8")
     for name, said in (("a.toml", "a TOML file is needed"), ("b.toml", "cannot be read: No such file")):
         with pytest.raises(StudyError, match=said) as caught:

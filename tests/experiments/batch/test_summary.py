@@ -28,7 +28,7 @@ def rows(errors: list[float | None], std: float = 1e6) -> pd.DataFrame:
     )
 
 
-def test_errors_are_given_by_quantiles_and_by_shares_of_the_estimates() -> None:
+def test_errors_are_summarized_by_median_rms_and_shares_of_the_estimates() -> None:
     errors = [-2.0, -0.5, 0.0, 0.5, 6.0]
     (row,) = bulk_modulus_table(rows([*errors, None])).to_dict("records")
     assert (row["cases"], row["estimates"]) == (6, 5)
@@ -39,7 +39,7 @@ def test_errors_are_given_by_quantiles_and_by_shares_of_the_estimates() -> None:
     assert row["covered_percent"] == pytest.approx(60.0)
 
 
-def test_a_way_that_never_gave_an_estimate_has_counts_and_no_errors() -> None:
+def test_a_method_without_any_estimate_has_counts_but_no_error_statistics() -> None:
     (row,) = bulk_modulus_table(rows([None, None])).to_dict("records")
     assert (row["cases"], row["estimates"]) == (2, 0)
     assert row["median_percent"] is None

@@ -81,7 +81,7 @@ def end(driver: "subprocess.Popen[str]") -> int:
     return int(line)
 
 
-def test_a_batch_struck_at_moments_spread_over_its_parts_loses_and_doubles_no_row(
+def test_a_batch_killed_at_random_moments_neither_loses_nor_duplicates_a_row(
     tmp_path: Path, driver: "subprocess.Popen[str]"
 ) -> None:
     undisturbed, store = open_store(tmp_path / "undisturbed"), open_store(tmp_path / "store")
@@ -152,7 +152,7 @@ def _wait_for(condition: Any, seconds: float = 60.0) -> None:
         time.sleep(0.05)
 
 
-def test_ctrl_c_finishes_what_is_in_flight_and_says_how_to_go_on(tmp_path: Path) -> None:
+def test_ctrl_c_finishes_the_running_cases_and_says_how_to_go_on(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "experiments.cli", "batch", study_file(tmp_path, {**LONGER, "seeds": 4000})]
     store = open_store(tmp_path / "store")
     with subprocess.Popen(  # noqa: S603 -- our own command
@@ -176,14 +176,14 @@ def test_ctrl_c_finishes_what_is_in_flight_and_says_how_to_go_on(tmp_path: Path)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_processes_give_the_bits_of_one_process(tmp_path: Path, reference: pa.Table, workers: int) -> None:
+def test_several_processes_give_exactly_the_rows_of_one(tmp_path: Path, reference: pa.Table, workers: int) -> None:
     store = open_store(tmp_path / "store")
     run_into(store, small_plan(), opener=lambda: open_executor(workers))
     assert store.rows().equals(reference)
 
 
 @pytest.mark.filterwarnings("default")
-def test_dask_gives_the_same_bits_with_a_worker_killed(tmp_path: Path) -> None:
+def test_dask_gives_exactly_the_same_rows_with_a_worker_killed(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     plan = small_plan(**LONGER)
     undisturbed, store = open_store(tmp_path / "undisturbed"), open_store(tmp_path / "store")

@@ -24,7 +24,7 @@ def table_of(part: Part) -> pa.Table:
     return pq.read_table(BytesIO(part.content), use_threads=False)
 
 
-def test_one_seed_reproduces_one_case_alone_to_the_last_bit(reference: pa.Table) -> None:
+def test_a_case_run_alone_has_exactly_the_row_of_the_whole_study(reference: pa.Table) -> None:
     plan = small_plan()
     for place in (0, 7, 23):
         series, keys, works = plan.groups[place // 3]
@@ -32,7 +32,7 @@ def test_one_seed_reproduces_one_case_alone_to_the_last_bit(reference: pa.Table)
         assert table_of(alone).equals(reference.slice(place, 1))
 
 
-def test_neither_order_nor_grouping_changes_a_bit(reference: pa.Table) -> None:
+def test_neither_order_nor_grouping_of_series_changes_a_row(reference: pa.Table) -> None:
     plan = small_plan()
     for pieces in (1, 3, 8):
         shuffled = np.random.default_rng(pieces).permutation(len(plan.groups))
@@ -45,7 +45,7 @@ def test_neither_order_nor_grouping_changes_a_bit(reference: pa.Table) -> None:
         assert table.take([order[key] for key in plan.keys]).combine_chunks().equals(reference)
 
 
-def test_the_filter_finds_bulk_modulus_on_its_own_plant() -> None:
+def test_the_filter_estimates_bulk_modulus_within_1_percent_on_its_own_model() -> None:
     (task,) = small_plan(duration_s=0.5, conditions=["normal"], seeds=1, starts_pa=[2e8]).tasks(set(), 1)
     row = table_of(run_task(task)).to_pylist()[0]
     assert row["outcome"] == "ok"
@@ -53,7 +53,7 @@ def test_the_filter_finds_bulk_modulus_on_its_own_plant() -> None:
     assert row["error_percent"] == pytest.approx(100.0 * (row["bulk_modulus_pa"] / row["true_bulk_modulus_pa"] - 1.0))
 
 
-def test_a_series_that_cannot_be_run_is_rows_with_their_reason() -> None:
+def test_each_case_of_a_series_that_cannot_be_run_is_a_failed_row_with_the_reason() -> None:
     plan = small_plan(seeds=1)
     good, bad = plan.groups
     impossible = replace(bad.series, drive="nothing")  # pyright: ignore -- simulated, not a log
@@ -82,7 +82,7 @@ def test_a_log_that_cannot_be_read_is_a_row_and_the_others_are_diagnosed(tmp_pat
     assert "there is no such file" in rows[3]["reason"]
 
 
-def test_a_log_that_changes_after_the_study_began_is_not_taken_for_what_it_was(tmp_path: Path) -> None:
+def test_a_log_that_was_changed_after_the_study_began_fails(tmp_path: Path) -> None:
     text = "time_s,motor_speed_rad_s,velocity_m_s\n" + "".join(f"{0.001 * k:.3f},1,0\n" for k in range(50))
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     logs = [{"glob": "*.csv", "methods": [{"verb": "diagnose"}]}]
@@ -92,20 +92,20 @@ def test_a_log_that_changes_after_the_study_began_is_not_taken_for_what_it_was(t
     assert "was changed after the study began" in failure.reason
 
 
-def test_drives_that_are_drawn_once_hold_nothing_random() -> None:
+def test_exactly_the_drives_drawn_once_are_the_same_for_every_seed() -> None:
     for name, drive in DRIVES.items():
         one, other = (drive(1.0, 1e-3, EhaParameters(), np.random.default_rng(seed)) for seed in (1, 2))
         assert np.array_equal(one, other) == (name in DRAWN_ONCE), name
 
 
-def test_a_filter_without_lanes_gives_rows_too() -> None:
+def test_a_filter_without_lanes_gives_the_same_estimate() -> None:
     methods = [FILTER, {**FILTER, "method": "filterpy-ekf"}]
     (task,) = small_plan(seeds=1, conditions=["normal"], starts_pa=[2e8], methods=methods).tasks(set(), 1)
     ours, theirs = table_of(run_task(task))["bulk_modulus_pa"].to_pylist()
     assert ours == pytest.approx(theirs, rel=1e-6)
 
 
-def test_a_filter_that_diverges_beside_others_is_a_row_without_numbers() -> None:
+def test_a_diverged_filter_is_a_row_without_numbers_and_the_others_keep_theirs() -> None:
     methods = [FILTER, {**FILTER, "start_std_pa": 1e150}]
     plan = small_plan(seeds=1, conditions=["normal"], starts_pa=[2e8], methods=methods)
     fine, diverged = table_of(run_task(Task(plan.rig, plan.groups))).to_pylist()
@@ -120,7 +120,7 @@ def rows_of(plan: Plan) -> list[dict[str, Any]]:
     return table_of(run_task(Task(plan.rig, plan.groups, plan.study.plant))).to_pylist()
 
 
-def test_a_filter_uses_pressure_only_if_it_may_and_starts_from_the_rig_s_guess_unless_told() -> None:
+def test_a_filter_uses_pressure_only_if_allowed_and_starts_from_the_rig_s_guess_by_default() -> None:
     pressure = {"verb": "filter", "form": "pressure", "method": "ekf"}
     methods = [pressure, {**pressure, "pressure": False}]
     change = {"plants": ["lumped"], "drives": ["steps"], "conditions": ["normal"], "seeds": 1, "duration_s": 0.5}
@@ -136,7 +136,7 @@ def test_a_filter_uses_pressure_only_if_it_may_and_starts_from_the_rig_s_guess_u
         assert row["bulk_modulus_pa"] != other["bulk_modulus_pa"]
 
 
-def test_a_method_knows_the_simulated_condition_or_the_healthy_rig_as_the_study_says() -> None:
+def test_a_filter_is_given_the_simulated_condition_or_the_healthy_rig_as_the_study_says() -> None:
     filters = [{**FILTER, "told": told} for told in ("condition", "healthy")]
     change = {"conditions": ["major_leakage"], "seeds": 1, "starts_pa": [2e8], "duration_s": 0.5}
     knowing, healthy = rows_of(small_plan(**change, methods=filters))
@@ -144,7 +144,7 @@ def test_a_method_knows_the_simulated_condition_or_the_healthy_rig_as_the_study_
     assert 5.0 * abs(knowing["error_percent"]) < abs(healthy["error_percent"])
 
 
-def test_an_estimate_of_a_simulated_run_has_its_error_and_its_filter_s_innovations() -> None:
+def test_the_row_of_a_simulated_run_has_the_error_and_the_innovations_of_its_filter() -> None:
     change = {"plants": ["lumped"], "drives": ["steps"], "conditions": ["normal"], "seeds": 1}
     asked = [{"verb": "estimate", "form": "pressure", "method": "ekf"}, {"verb": "estimate"}]
     plan = small_plan(**change, duration_s=1.0, sample_time_s=1e-3, starts_pa=[], methods=asked)
@@ -175,7 +175,7 @@ def logs_plan(folder: Path, *methods: dict[str, Any], plant: str = "eha") -> Pla
     return plan_study(parse_study(content, "logs.toml"), folder)
 
 
-def test_what_the_reader_says_of_a_log_stands_in_each_of_its_rows_and_a_filter_reads_its_noise(tmp_path: Path) -> None:
+def test_warnings_of_reading_a_log_are_in_each_of_its_rows(tmp_path: Path) -> None:
     speed = 100.0 * np.sin(20.0 * np.arange(0.0, 0.5, 1e-3))
     speed[100:103] = np.nan
     (tmp_path / "a.csv").write_text(log_of(motor_speed_rad_s=speed), encoding="utf-8")
@@ -190,7 +190,7 @@ def test_what_the_reader_says_of_a_log_stands_in_each_of_its_rows_and_a_filter_r
     assert whole[0]["duration_s"] == pytest.approx(0.5, abs=2e-3)
 
 
-def test_a_method_that_breaks_on_a_log_is_a_row_and_the_other_methods_are_run(
+def test_a_method_that_fails_on_a_log_is_a_failed_row_and_the_others_are_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: object) -> None:
@@ -205,7 +205,7 @@ def test_a_method_that_breaks_on_a_log_is_a_row_and_the_other_methods_are_run(
     assert reason == "an internal error, ZeroDivisionError: by nothing"
 
 
-def test_a_study_of_another_actuator_has_its_conditions_as_simulated_and_as_found(tmp_path: Path) -> None:
+def test_a_study_of_another_actuator_has_simulated_and_found_conditions_of_that_kind(tmp_path: Path) -> None:
     methods = [{"verb": "diagnose"}]
     runs = [{"conditions": ["normal"], "duration_s": 0.03, "methods": methods}]
     content = {"name": "stack", "plant": "piezo-stack", "runs": runs}
@@ -219,7 +219,7 @@ def test_a_study_of_another_actuator_has_its_conditions_as_simulated_and_as_foun
     assert (logged["plant"], logged["file"], logged["found_condition"]) == ("piezo-stack", "run.csv", "major_leakage")
 
 
-def test_cases_of_a_worker_that_ended_are_failed_rows_with_their_keys() -> None:
+def test_cases_of_a_worker_that_ended_become_failed_rows_with_their_keys() -> None:
     plan = small_plan(seeds=1)
     task = Task(plan.rig, plan.groups)
     part = lost_task(task, "the worker ended")

@@ -21,7 +21,7 @@ def test_every_figure_from_3_to_11_has_its_experiment() -> None:
     assert sorted({int(number) for number in re.findall(r"figure (\d+)", names)}) == list(range(3, 12))
 
 
-def test_tables_and_what_made_them_are_written_together(tmp_path: Path) -> None:
+def test_tables_are_written_together_with_a_manifest(tmp_path: Path) -> None:
     table = pd.DataFrame({"velocity_m_s": [0.04, 0.03]})
     path = write_tables({"figure 3": table}, {"study": "circuit", "settings": {"seed": 1}}, tmp_path / "result")
     manifest = json.loads(path.read_text(encoding="utf-8"))
@@ -38,7 +38,7 @@ def test_tables_never_replace_a_folder_that_no_study_wrote(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_the_circuit_reproduces_the_definitions_that_tables_3_and_4_give(tmp_path: Path) -> None:
+def test_the_circuit_study_writes_its_tables_and_the_leakage_levels_of_the_circuit(tmp_path: Path) -> None:
     line = [COMMAND, "circuit", "--quick", "--out", tmp_path / "circuit", "--seed", "7"]
     subprocess.run(line, capture_output=True, check=True)  # noqa: S603 - our own command
     tables = tmp_path / "circuit" / "tables"

@@ -63,7 +63,7 @@ def test_around_a_mean_the_low_frequency_gain_is_the_slope_of_the_steady_state(
     assert abs(lowest["gain"] / expected - 1.0) < 3.0 * deviation
 
 
-def test_at_rest_the_dead_zone_takes_most_of_the_signal(means: pd.DataFrame) -> None:
+def test_with_a_zero_mean_the_dead_zone_lowers_the_gain(means: pd.DataFrame) -> None:
     at_rest = means[means["mean_v"] == 0.0].iloc[0]
     dead = RIG.flow_bias + RIG.leakage_coefficient * RIG.friction_coulomb / RIG.piston_area
     left = 1.0 - dead / (RIG.pump_displacement * AMPLITUDE_V * RIG.motor_speed_per_volt)
@@ -76,7 +76,7 @@ def test_the_gain_at_ten_hertz_falls_as_the_mean_rises(means: pd.DataFrame) -> N
     assert (moving["gain"].diff().dropna() < 0.0).all()
 
 
-def test_a_moving_piston_is_explained_by_its_input(means: pd.DataFrame) -> None:
+def test_the_coherence_of_a_moving_piston_is_high(means: pd.DataFrame) -> None:
     moving = means[(means["mean_v"] > 0.0) & (means["frequency_hz"] <= 10.0)]
     assert moving["coherence"].min() > 0.9
 
@@ -89,7 +89,7 @@ def test_the_gain_rises_with_the_amplitude_towards_that_of_the_steady_state(ampl
     assert np.all(shares < 1.0)
 
 
-def test_under_leakage_the_dead_zone_takes_every_amplitude_below_it() -> None:
+def test_under_leakage_amplitudes_within_the_dead_zone_hardly_move_the_piston() -> None:
     table = frequency_responses(RIG, SEED, [(0.0, v) for v in (0.5, 1.0, 4.0)], "minor_leakage")
     gains = low_frequency_gains(table, "amplitude_v")
     assert (gains[gains.index < 1.2] < gains[4.0] / 50.0).all()
@@ -105,7 +105,7 @@ def test_a_mean_past_the_motors_limit_is_refused() -> None:
         prbs_around(RIG, 8.0, AMPLITUDE_V, np.random.default_rng(SEED))
 
 
-def test_a_test_depends_on_its_seed_alone() -> None:
+def test_a_prbs_test_depends_on_its_seed_alone() -> None:
     one, same, other = (
         prbs_around(RIG, 4.0, 1.0, np.random.default_rng(seed), 4.0)["velocity_m_s"] for seed in (1, 1, 2)
     )
@@ -121,7 +121,7 @@ def test_the_circuit_is_second_order_with_minor_higher_dynamics() -> None:
     assert values[2] < floor[2]
 
 
-def test_the_validation_input_is_nine_steps_that_turn_round() -> None:
+def test_the_validation_input_has_nine_steps_of_alternating_sign() -> None:
     table = validation_input(RIG, StudySettings())
     volts = table["motor_voltage_v"].to_numpy()
     steps = volts[np.concatenate([[True], np.diff(volts) != 0.0])]
@@ -131,7 +131,7 @@ def test_the_validation_input_is_nine_steps_that_turn_round() -> None:
 
 
 @pytest.mark.slow
-def test_the_flow_form_finds_it_from_every_start(estimates: pd.DataFrame) -> None:
+def test_the_flow_form_finds_bulk_modulus_from_every_first_guess(estimates: pd.DataFrame) -> None:
     found = estimates[estimates["form"] == "flow"]
     assert len(found) == 2
     assert (found["outcome"] == "ok").all()
@@ -139,7 +139,7 @@ def test_the_flow_form_finds_it_from_every_start(estimates: pd.DataFrame) -> Non
     assert found.groupby("condition")["value_pa"].agg(spread).max() < 1.001
 
 
-def test_the_pressure_form_says_how_little_it_knows_of_chambers_that_change(estimates: pd.DataFrame) -> None:
+def test_the_interval_of_the_pressure_form_covers_its_error_on_the_circuit(estimates: pd.DataFrame) -> None:
     found = estimates[estimates["form"] == "pressure"]
     assert len(found) == 2
     assert (found["outcome"] == "ok").all()
@@ -147,7 +147,7 @@ def test_the_pressure_form_says_how_little_it_knows_of_chambers_that_change(esti
     assert (found["error_percent"] < 0.0).all()
 
 
-def test_the_published_form_does_not_find_it_on_the_circuit(estimates: pd.DataFrame) -> None:
+def test_the_published_form_does_not_observe_bulk_modulus_on_the_circuit(estimates: pd.DataFrame) -> None:
     found = estimates[estimates["form"] == "acceleration"]
     assert len(found) == 2
     assert (found["outcome"] == "not_observable").all()
@@ -156,6 +156,6 @@ def test_the_published_form_does_not_find_it_on_the_circuit(estimates: pd.DataFr
     assert not found["gate_passed"].any()
 
 
-def test_the_truth_stands_beside_every_estimate(estimates: pd.DataFrame) -> None:
+def test_every_estimate_of_bulk_modulus_is_listed_with_its_true_value(estimates: pd.DataFrame) -> None:
     assert set(estimates["form"]) == {experiment.form for experiment in CIRCUIT_FORMS}
     assert (estimates["truth_pa"] == RIG.bulk_modulus).all()

@@ -81,7 +81,7 @@ def test_every_figure_has_a_title_and_units_and_stays_inside(name: str, drawn: M
     assert box.y1 <= height + 0.02
 
 
-def test_the_published_definitions_stand_beside_the_throttles(
+def test_figures_3_and_4_mark_the_published_definitions(
     tables: Mapping[str, pd.DataFrame], drawn: Mapping[str, Figure]
 ) -> None:
     left, right = drawn["figures_3_and_4"].axes
@@ -93,7 +93,9 @@ def test_the_published_definitions_stand_beside_the_throttles(
     np.testing.assert_array_equal(np.asarray(curve.get_ydata()), shown)
 
 
-def test_every_input_has_its_curve(tables: Mapping[str, pd.DataFrame], drawn: Mapping[str, Figure]) -> None:
+def test_figures_5_and_6_have_one_curve_per_input(
+    tables: Mapping[str, pd.DataFrame], drawn: Mapping[str, Figure]
+) -> None:
     axes = drawn["figures_5_and_6"].axes
     for axis, name, by in (
         (axes[0], "figure 5 frequency response over input means", "mean_v"),
@@ -104,12 +106,12 @@ def test_every_input_has_its_curve(tables: Mapping[str, pd.DataFrame], drawn: Ma
         ]
 
 
-def test_what_is_not_observable_is_said(drawn: Mapping[str, Figure]) -> None:
+def test_figure_11_writes_not_observable_in_words(drawn: Mapping[str, Figure]) -> None:
     *_, last = drawn["figure_11"].axes
     assert [text.get_text() for text in last.texts] == ["not observable"]
 
 
-def test_the_page_needs_nothing_beside_it_and_shows_every_figure(
+def test_the_page_contains_every_figure_and_loads_nothing(
     tables: Mapping[str, pd.DataFrame], drawn: Mapping[str, Figure]
 ) -> None:
     # the other figures are empty on this page, since writing them takes as long as the rest of the test

@@ -30,14 +30,14 @@ def of(table: pd.DataFrame, test: str) -> pd.DataFrame:
     return table[table["test"] == test].set_index("at")
 
 
-def test_the_dead_zones_are_those_of_errata_e8(table: pd.DataFrame) -> None:
+def test_the_dead_zones_have_the_values_of_errata_e8(table: pd.DataFrame) -> None:
     zones = of(table, "dead zone")
     assert cell(zones, "minor_leakage", "value") == pytest.approx(1.20, abs=0.01)
     assert cell(zones, "major_leakage", "value") == pytest.approx(1.82, abs=0.01)
     assert (abs(zones["value"] - zones["expected"]) < 0.01).all()
 
 
-def test_the_steady_gain_is_that_of_the_tables_over_the_whole_range(table: pd.DataFrame) -> None:
+def test_the_steady_gain_at_2_to_8_v_agrees_with_the_tables_and_rises(table: pd.DataFrame) -> None:
     gains = of(table, "steady-state gain")
     assert list(gains.index) == ["2 V", "4 V", "8 V"]
     assert (abs(gains["value"] / gains["expected"] - 1.0) < 0.01).all()
@@ -64,7 +64,7 @@ def test_the_linearised_break_frequency_is_near_the_one_that_is_measured(table: 
     assert linear == pytest.approx(measured, rel=0.2)
 
 
-def test_breaking_loose_delays_the_start(table: pd.DataFrame) -> None:
+def test_the_dead_time_is_longer_from_rest_than_in_motion(table: pd.DataFrame) -> None:
     at_rest, moving = (cell(of(table, "dead time"), step, "value") for step in ("0 V to 4 V", "2 V to 4 V"))
     assert 0.0 < moving < at_rest < 0.02
 

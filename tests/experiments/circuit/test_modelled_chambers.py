@@ -8,7 +8,7 @@ from experiments.papers.eha_claims import _modelled_chambers
 from plant.eha.circuit_parameters import CircuitParameters
 
 
-def test_a_condition_that_is_not_told_comes_within_a_percent_and_passes_the_gate() -> None:
+def test_bulk_modulus_under_an_unknown_condition_is_within_1_percent_and_passes_the_gate() -> None:
     found = modelled_chambers(CircuitParameters(), 3, 5.0, ("major_leakage",))
     assert found["condition"].tolist() == ["major_leakage"]
     assert (found["error_percent"].abs() < 1.0).all()
@@ -18,7 +18,7 @@ def test_a_condition_that_is_not_told_comes_within_a_percent_and_passes_the_gate
     ).tolist() == pytest.approx(found["z"].tolist())
 
 
-def test_a_number_that_is_not_let_out_leaves_the_row_without_one() -> None:
+def test_a_missing_estimate_leaves_the_worst_error_without_a_value() -> None:
     table = pd.DataFrame({"error_percent": [0.1, float("nan")], "z": [0.5, float("nan")], "gate_passed": [True, False]})
     ours = _modelled_chambers(table)["chambers_worst"].value
     assert ours != ours

@@ -37,7 +37,7 @@ def test_the_piston_slows_as_throttle_a_opens(velocities: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize(("volts", "percent", "published"), [(2.0, 71.0, 75.0), (1.75, 53.0, 50.0)])
-def test_leakage_levels_take_what_errata_e7_says(
+def test_velocity_at_the_leakage_levels_is_as_errata_e7_says(
     velocities: pd.DataFrame, volts: float, percent: float, published: float
 ) -> None:
     row = velocities.set_index("throttle_a_v").loc[volts]
@@ -52,7 +52,7 @@ def test_pressure_rises_as_throttle_b_shuts_and_saturates_at_the_relief_valve(pr
     assert found[-1] - found[-2] < 0.01 * found[-1]
 
 
-def test_minor_friction_takes_what_errata_e7_says(pressures: pd.DataFrame) -> None:
+def test_pressure_at_minor_friction_is_as_errata_e7_says(pressures: pd.DataFrame) -> None:
     row = pressures.set_index("throttle_b_v").loc[2.3]
     assert row["percent_of_normal"] == pytest.approx(320.0, abs=4.0)
     assert row["published_percent"] == 200.0

@@ -9,19 +9,19 @@ from experiments.command.json_output import csv_text, json_text, plain, prepare_
 from plant.errors import HydrostateError
 
 
-def test_no_number_that_json_lacks_gets_through() -> None:
+def test_nan_and_infinity_are_written_as_null() -> None:
     text = json_text([{"value": float("nan"), "ci95": (-np.inf, np.float64(1.5)), "rows": np.array([[np.nan, 2.0]])}])
     assert json.loads(text) == [{"value": None, "ci95": [None, 1.5], "rows": [[None, 2.0]]}]
 
 
-def test_words_paths_and_counts_are_plain() -> None:
+def test_enumerations_paths_and_numpy_scalars_become_plain_values() -> None:
     values = {"outcome": Outcome.OK, "file": Path("a.csv"), "count": np.int64(3), "passed": np.bool_(True)}
     found = plain(values)
     assert found == {"outcome": "ok", "file": "a.csv", "count": 3, "passed": True}
     assert type(found["outcome"]) is str
 
 
-def test_the_document_is_ascii_and_keeps_every_name() -> None:
+def test_the_json_text_is_ascii_and_keeps_file_names() -> None:
     text = json_text([{"file": "Prüfstand \udc80.csv"}])
     assert text.isascii()
     assert json.loads(text)[0]["file"] == "Prüfstand \udc80.csv"
@@ -32,7 +32,7 @@ def test_table_has_a_column_for_every_entry_of_any_log() -> None:
     assert text.splitlines() == ["file,gate.passed,scores.normal", "a,True,", "b,,1.0"]
 
 
-def test_results_replace_older_ones_and_leave_nothing_else(tmp_path: Path) -> None:
+def test_results_replace_older_ones_without_leaving_other_files(tmp_path: Path) -> None:
     out = tmp_path / "new" / "folder"
     prepare_output(out)
     write_results([{"file": "old"}], out)
@@ -41,7 +41,7 @@ def test_results_replace_older_ones_and_leave_nothing_else(tmp_path: Path) -> No
     assert sorted(path.name for path in out.iterdir()) == ["results.csv", "results.json"]
 
 
-def test_a_name_in_json_is_one_file(tmp_path: Path) -> None:
+def test_results_to_a_name_ending_in_json_are_one_file(tmp_path: Path) -> None:
     out = tmp_path / "model.json"
     prepare_output(out)
     assert write_results([{"file": "a"}], out) == [out]
@@ -61,7 +61,7 @@ def test_results_that_cannot_be_written_leave_the_old_ones(tmp_path: Path, monke
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results.csv", "results.json"]
 
 
-def test_a_file_is_no_folder_for_results(tmp_path: Path) -> None:
+def test_a_file_in_place_of_the_results_folder_is_refused_and_kept(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("mine")
     with pytest.raises(HydrostateError, match=r"--out .*taken: the folder cannot be made"):
         prepare_output(tmp_path / "taken")
@@ -71,7 +71,7 @@ def test_a_file_is_no_folder_for_results(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("log", "out"), [("run.json", "run.json"), ("run.csv", "run.csv.json"), ("results.csv", "."), ("a/run.json", "b")]
 )
-def test_a_log_and_what_stands_beside_it_are_never_overwritten(log: str, out: str, tmp_path: Path) -> None:
+def test_results_never_overwrite_a_log_or_its_side_file(log: str, out: str, tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "b").symlink_to("a")
     for name in (log, "run.csv.json"):
@@ -82,7 +82,7 @@ def test_a_log_and_what_stands_beside_it_are_never_overwritten(log: str, out: st
     prepare_output(tmp_path / out, [tmp_path / "other.csv"])
 
 
-def test_a_folder_that_may_not_be_written_and_a_folder_in_a_file_s_place_are_refused(
+def test_a_folder_in_place_of_the_file_and_missing_write_permission_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "model.json").mkdir()
@@ -93,6 +93,6 @@ def test_a_folder_that_may_not_be_written_and_a_folder_in_a_file_s_place_are_ref
         prepare_output(tmp_path / "out")
 
 
-def test_a_page_on_a_file_whose_name_is_no_text_is_written(tmp_path: Path) -> None:
+def test_a_page_with_a_file_name_that_is_not_utf_8_is_written(tmp_path: Path) -> None:
     write_whole(tmp_path / "page.html", "<p>l\udcf6g.csv ü</p>")
     assert (tmp_path / "page.html").read_text(encoding="utf-8") == "<p>l?g.csv ü</p>"

@@ -24,7 +24,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_an_estimate_is_drawn_and_written_as_a_page_where_asked(log: Path, tmp_path: Path) -> None:
+def test_an_estimate_is_written_as_a_figure_and_a_page_on_request(log: Path, tmp_path: Path) -> None:
     wanted = ("--figure", tmp_path / "run.png", "--report", tmp_path / "run")
     done = invoke("estimate", log, "--form", "pressure", "--method", "ekf", "--no-tune", *wanted)
     assert done.exit_code == 0, done.output
@@ -35,7 +35,7 @@ def test_an_estimate_is_drawn_and_written_as_a_page_where_asked(log: Path, tmp_p
 
 
 @pytest.mark.parametrize("call", [("estimate", "--form", "pressure"), ("diagnose",)], ids=lambda call: call[0])
-def test_a_page_says_first_what_reading_the_log_brought_up(call: tuple[str, ...], log: Path, tmp_path: Path) -> None:
+def test_a_page_lists_the_warnings_of_reading_the_log(call: tuple[str, ...], log: Path, tmp_path: Path) -> None:
     rows = [line.split(",")[:5] for line in log.read_text().splitlines()[:300]]  # without the chamber pressures
     assert rows[0][4] == '"differential_pressure_pa"'
     rows[0][4] = "dp"
@@ -49,7 +49,7 @@ def test_a_page_says_first_what_reading_the_log_brought_up(call: tuple[str, ...]
     assert f"<li>C{said[1:]}." in page
 
 
-def test_the_command_says_where_the_page_went(log: Path, tmp_path: Path) -> None:
+def test_the_path_of_the_page_is_printed_on_standard_error(log: Path, tmp_path: Path) -> None:
     done = invoke("diagnose", log, "--report", tmp_path / "page")
     assert done.exit_code == 0, done.output
     assert f"written: {tmp_path / 'page.html'}; open it in a browser" in done.stderr.splitlines()
@@ -64,7 +64,7 @@ def test_the_command_says_where_the_page_went(log: Path, tmp_path: Path) -> None
         ("moving_mass = 8.0", ""),
     ],
 )
-def test_the_command_says_where_nothing_was_told_of_the_actuator(
+def test_a_missing_description_of_the_actuator_is_noted_once(
     entry: str | None, said: str, log: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "rig.toml").write_text(f"[parameters]\n{entry or ''}\n")
@@ -75,7 +75,7 @@ def test_the_command_says_where_nothing_was_told_of_the_actuator(
     assert "the paper's actuator" not in done.stdout
 
 
-def test_a_page_that_cannot_be_written_costs_no_verdict(
+def test_the_verdict_is_printed_even_if_its_page_cannot_be_written(
     log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(path: Path, *_: object) -> None:
@@ -88,7 +88,7 @@ def test_a_page_that_cannot_be_written_costs_no_verdict(
     assert "No space left on device" in done.stderr
 
 
-def test_files_of_other_loggers_go_with_one_log(log: Path, tmp_path: Path) -> None:
+def test_option_with_joins_a_second_file_to_one_log_and_refuses_several(log: Path, tmp_path: Path) -> None:
     lines = [line.replace('"', "").split(",") for line in log.read_text().splitlines()]
     names = lines[0]
     pressure = names.index("differential_pressure_pa")
@@ -104,7 +104,7 @@ def test_files_of_other_loggers_go_with_one_log(log: Path, tmp_path: Path) -> No
     assert "--with goes with one log, got several" in refused.stderr
 
 
-def test_a_sentence_about_a_file_has_the_files_name_alone_in_front(log: Path, tmp_path: Path) -> None:
+def test_an_error_about_a_file_begins_with_the_path_of_that_file(log: Path, tmp_path: Path) -> None:
     absent = tmp_path / "absent.csv"
     beside = invoke("estimate", log, "--with", absent)
     assert beside.stderr.splitlines() == [f"{absent}: there is no such file"]

@@ -60,7 +60,7 @@ def hostile(folder: Path, good: Path) -> dict[str, Path]:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_hostile_logs_among_good_ones_are_named_and_the_rest_done(verb: str, good: Path, tmp_path: Path) -> None:
+def test_hostile_logs_are_named_and_the_good_ones_among_them_processed(verb: str, good: Path, tmp_path: Path) -> None:
     bad = list(hostile(tmp_path, good).values())
     done = invoke(verb, good, *bad, good, "--json")
     results = json.loads(done.stdout)
@@ -75,21 +75,21 @@ def test_hostile_logs_among_good_ones_are_named_and_the_rest_done(verb: str, goo
     assert "Traceback" not in done.output
 
 
-def test_each_hostile_log_gets_a_sentence_of_its_own(good: Path, tmp_path: Path) -> None:
+def test_each_hostile_log_gets_its_own_message(good: Path, tmp_path: Path) -> None:
     files = hostile(tmp_path, good)
     results = json.loads(invoke("diagnose", *files.values(), "--json").stdout)
     assert [sentence for sentence, one in zip(files, results, strict=True) if sentence not in one["message"]] == []
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_nothing_readable_is_exit_code_2(verb: str, tmp_path: Path) -> None:
+def test_the_exit_code_is_2_if_no_log_can_be_read(verb: str, tmp_path: Path) -> None:
     done = invoke(verb, tmp_path / "a.csv", tmp_path / "b.csv", "--out", tmp_path / "out", "--json")
     assert done.exit_code == 2
     assert [one["outcome"] for one in json.loads(done.stdout)] == ["failed", "failed"]
     assert json.loads((tmp_path / "out" / "results.json").read_text()) == json.loads(done.stdout)
 
 
-def test_an_internal_error_on_one_log_costs_the_others_nothing(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_internal_error_on_one_log_leaves_the_others_processed(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(path: Path, beside: str | None) -> tuple[Table, ...]:
         if path.name == "broken.csv":
             raise RuntimeError("the mill is broken")
@@ -102,7 +102,7 @@ def test_an_internal_error_on_one_log_costs_the_others_nothing(good: Path, monke
     assert "broken.csv: an internal error (RuntimeError: the mill is broken), please report it" in done.stderr
 
 
-def test_an_interruption_keeps_what_is_done(good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interruption_keeps_the_results_so_far(good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(path: Path, beside: str | None) -> tuple[Table, ...]:
         if path.name == "second.csv":
             raise KeyboardInterrupt
@@ -145,7 +145,7 @@ def test_a_warning_is_printed_with_the_log_and_kept_in_the_result(good: Path, tm
     assert f"{tmp_path / 'gappy.csv'}: warning: {masked}" in done.stderr.splitlines()
 
 
-def test_what_a_pressure_sensor_could_not_show_is_named_and_the_estimate_stands(good: Path, tmp_path: Path) -> None:
+def test_clipped_slow_or_outlying_pressure_is_noted_and_bulk_modulus_still_found(good: Path, tmp_path: Path) -> None:
     record = read_record(good)
     pressure = record["differential_pressure_pa"]
     limit = 0.7 * np.max(np.abs(pressure))
@@ -190,7 +190,7 @@ def test_exit_code_follows_from_the_outcomes(outcomes: tuple[str, ...], total: i
     assert Batch(tuple({"outcome": outcome} for outcome in outcomes), total).exit_code == code
 
 
-def test_results_beside_the_screen_are_those_of_the_document(good: Path, tmp_path: Path) -> None:
+def test_results_written_beside_the_screen_are_the_same_as_with_json(good: Path, tmp_path: Path) -> None:
     shown = invoke("diagnose", good, "--out", tmp_path / "new")
     printed = json.loads(invoke("diagnose", good, "--json").stdout)
     assert shown.exit_code == 0
@@ -198,7 +198,7 @@ def test_results_beside_the_screen_are_those_of_the_document(good: Path, tmp_pat
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["results.csv", "results.json"]
 
 
-def test_a_full_disk_costs_the_file_and_not_the_screen(
+def test_a_full_disk_loses_the_results_file_and_not_the_printed_results(
     good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: Path) -> None:
@@ -212,7 +212,7 @@ def test_a_full_disk_costs_the_file_and_not_the_screen(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_rigs_columns_that_a_log_lacks_are_named(good: Path) -> None:
+def test_columns_of_the_rig_file_missing_from_a_log_give_a_warning(good: Path) -> None:
     columns = {"position_m": "POS_MM:mm", "differential_pressure_pa": "DP_BAR:bar"}
     with pytest.warns(LogWarning) as caught:
         record = read_log(good, columns, {})
@@ -220,13 +220,13 @@ def test_a_rigs_columns_that_a_log_lacks_are_named(good: Path) -> None:
     assert "differential_pressure_pa" in record
 
 
-def test_a_column_asked_for_on_the_command_line_must_be_there(good: Path) -> None:
+def test_a_missing_column_of_the_option_columns_is_an_error(good: Path) -> None:
     done = invoke("estimate", good, "--columns", "position_m=POS_MM:mm", "--json")
     assert done.exit_code == 2
     assert "column 'POS_MM' is needed for position_m" in json.loads(done.stdout)[0]["message"]
 
 
-def test_the_command_line_goes_before_the_rig(good: Path) -> None:
+def test_columns_of_the_command_line_take_precedence_over_the_rig_file(good: Path) -> None:
     with pytest.raises(MissingColumnError) as caught:
         read_log(good, {"position_m": "position_m"}, {"position_m": "OTHER"})
     assert (caught.value.channel, caught.value.column, caught.value.source) == ("position_m", "OTHER", str(good))

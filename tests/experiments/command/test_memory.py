@@ -21,7 +21,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only the GNU C library has mallopt")
-def test_arrays_of_200000_rows_take_the_memory_of_those_before_them() -> None:
+def test_arrays_of_200000_rows_reuse_freed_memory() -> None:
     faults = {
         how: int(subprocess.check_output([sys.executable, "-c", CODE, how]))  # noqa: S603 -- our own
         for how in ("kept", "as it is")

@@ -18,7 +18,7 @@ def shown() -> Table:
 
 
 @pytest.mark.parametrize("width", [20, 30, 44, 60, 80, 120])
-def test_every_number_and_verdict_is_there_at_any_width(monkeypatch: pytest.MonkeyPatch, width: int) -> None:
+def test_every_number_and_verdict_is_shown_complete_at_any_width(monkeypatch: pytest.MonkeyPatch, width: int) -> None:
     monkeypatch.setattr(terminal.sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("COLUMNS", str(width))
     text = re.sub("\x1b\\[[0-9;]*m", "", rendered(shown()))
@@ -29,7 +29,7 @@ def test_every_number_and_verdict_is_there_at_any_width(monkeypatch: pytest.Monk
     assert re.search(r"204\.8\s+to\s+207\.2", text)
 
 
-def test_headings_stand_in_lines_before_a_table_is_given_up() -> None:
+def test_headings_are_broken_into_lines_before_the_table_is_given_up() -> None:
     wide, narrow = narrowed(shown(), 100), narrowed(shown(), 78)
     assert wide is not None
     assert str(wide.columns[1].header) == "bulk modulus [MPa]"
@@ -38,7 +38,7 @@ def test_headings_stand_in_lines_before_a_table_is_given_up() -> None:
     assert narrowed(shown(), 60) is None
 
 
-def test_a_row_as_lines_leaves_out_empty_cells_and_sets_further_lines_below_the_first() -> None:
+def test_a_row_shown_as_lines_omits_empty_cells_and_indents_further_lines() -> None:
     made = table("log", "gain", "coefficients", title="two")
     made.add_row("a.csv", "", "b 1\nf 2")
     assert as_lines(made) == "two\n\na.csv\n  coefficients   b 1\n                 f 2"

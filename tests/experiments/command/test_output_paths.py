@@ -8,11 +8,11 @@ from experiments.command.output_paths import own_paths, page_place, require_fold
 from plant.errors import HydrostateError
 
 
-def test_nothing_is_written_where_nothing_is_asked_for() -> None:
+def test_without_an_output_option_no_log_has_an_output_file() -> None:
     assert own_paths(None, [Path("run.csv")]) == {}
 
 
-def test_one_log_has_the_file_that_was_asked_for() -> None:
+def test_the_output_of_one_log_has_the_given_name() -> None:
     assert own_paths(Path("fit.png"), [Path("run.csv")]) == {Path("run.csv"): Path("fit.png")}
     assert own_paths(Path("fit.png"), [Path("run.csv")] * 2) == {Path("run.csv"): Path("fit.png")}
 
@@ -28,7 +28,7 @@ def test_one_log_has_the_file_that_was_asked_for() -> None:
         (["a-b/run.csv", "a/b-run.csv"], ["p-run.html", "p-b-run.html"]),
     ],
 )
-def test_logs_of_one_name_keep_their_files_apart(logs: list[str], files: list[str] | None) -> None:
+def test_outputs_of_logs_with_equal_names_have_different_paths(logs: list[str], files: list[str] | None) -> None:
     found = own_paths(Path("out/p.html"), [Path(log) for log in logs])
     assert list(found) == [Path(log) for log in logs]
     assert len({str(path).casefold() for path in found.values()}) == len(logs)
@@ -36,18 +36,18 @@ def test_logs_of_one_name_keep_their_files_apart(logs: list[str], files: list[st
         assert list(found.values()) == [Path("out") / file for file in files]
 
 
-def test_outputs_have_names_that_a_file_may_have_and_are_numbered_where_these_are_alike() -> None:
+def test_names_of_outputs_become_valid_file_names_and_equal_ones_are_numbered() -> None:
     found = own_paths(Path("s.csv"), ["flow [l/min]", "flow (l/min)", "p.1", "p.2"])
     names = [path.name for path in found.values()]
     assert names == ["s-flow_l_min.csv", "s-flow_l_min-2.csv", "s-p.1.csv", "s-p.2.csv"]
 
 
-def test_several_files_end_as_one_alone_would() -> None:
+def test_several_files_keep_the_ending_of_the_given_name() -> None:
     assert own_paths(Path("fit"), ["a", "b"])["a"] == Path("fit-a")
     assert own_paths(Path("fit.csv"), ["a", "b"])["a"] == Path("fit-a.csv")
 
 
-def test_a_page_ends_in_html_whatever_is_given(tmp_path: Path) -> None:
+def test_the_path_of_a_page_ends_in_html_with_any_given_ending(tmp_path: Path) -> None:
     assert page_place(None) is None
     assert page_place(tmp_path / "run") == tmp_path / "run.html"
     assert page_place(tmp_path / "run.htm") == tmp_path / "run.html"
@@ -55,13 +55,13 @@ def test_a_page_ends_in_html_whatever_is_given(tmp_path: Path) -> None:
         page_place(tmp_path)
 
 
-def test_a_figure_is_not_written_under_the_name_of_another_kind_of_file(tmp_path: Path) -> None:
+def test_a_figure_with_another_ending_than_png_is_refused(tmp_path: Path) -> None:
     require_place("--figure", tmp_path / "a.PNG", ".png")
     with pytest.raises(HydrostateError, match=r"--figure must end in \.png, got"):
         require_place("--figure", tmp_path / "a.pdf", ".png")
 
 
-def test_a_place_that_is_not_there_is_refused_first(tmp_path: Path) -> None:
+def test_a_folder_as_a_file_and_a_missing_folder_are_refused(tmp_path: Path) -> None:
     require_place("--figure", None)
     require_place("--figure", tmp_path / "a.png")
     with pytest.raises(HydrostateError, match="--figure must be a file, got the folder"):
@@ -70,7 +70,7 @@ def test_a_place_that_is_not_there_is_refused_first(tmp_path: Path) -> None:
         require_place("--report", tmp_path / "pages" / "a.html")
 
 
-def test_a_folder_is_no_file_and_has_no_name_of_one(tmp_path: Path) -> None:
+def test_a_file_or_a_name_like_a_file_s_is_refused_as_a_folder(tmp_path: Path) -> None:
     (file := tmp_path / "afile").write_text("")
     (folder := tmp_path / "pages.html").mkdir()
     for fine in (None, tmp_path / "new", folder, tmp_path / "v1.2"):

@@ -64,13 +64,13 @@ def said_by(group: type[TyperGroup], words: Sequence[str]) -> tuple[list[Any], s
         [],
     ],
 )
-def test_a_command_is_given_what_typer_gives_it(tmp_path: Path, words: Sequence[str]) -> None:
+def test_a_command_gets_the_same_values_as_from_typer(tmp_path: Path, words: Sequence[str]) -> None:
     (tmp_path / "here.csv").write_text("1")
     put = [word.replace("FOLDER", str(tmp_path)) for word in words]
     assert said_by(HydrostateGroup, put) == said_by(TyperGroup, put)
 
 
-def test_a_typer_that_works_in_another_way_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parameters_of_an_unknown_typer_version_are_left_unchanged(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "typer._coercion", None)
     command = typer.main.get_command(taking(TyperGroup))
     take_plainly(command.params)
@@ -85,5 +85,5 @@ def test_a_typer_that_works_in_another_way_is_left_alone(monkeypatch: pytest.Mon
         ("--count", "6", "must be less than or equal to 5, got '6'"),
     ],
 )
-def test_a_value_that_cannot_be_is_repeated(option: str, text: str, said: str) -> None:
+def test_an_invalid_value_is_quoted_in_the_error(option: str, text: str, said: str) -> None:
     assert said_by(HydrostateGroup, ["a.csv", option, text]) == ([], said)

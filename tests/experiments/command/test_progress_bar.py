@@ -20,7 +20,7 @@ def shown_on(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     return shown
 
 
-def test_one_piece_alone_shows_a_bar_once_it_tells_what_it_tries(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_single_task_shows_a_bar_once_it_reports_a_trial(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = shown_on(monkeypatch)
     with progress(1, "identifying") as advance:
         assert terminal.getvalue() == ""
@@ -30,7 +30,7 @@ def test_one_piece_alone_shows_a_bar_once_it_tells_what_it_tries(monkeypatch: py
     assert "identifying: linear models, 3 tried" in terminal.getvalue()
 
 
-def test_several_pieces_count_what_each_of_them_tries(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_several_tasks_the_trials_of_each_are_counted_separately(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = shown_on(monkeypatch)
     with progress(2, "identifying") as advance:
         tell("linear models")
@@ -40,7 +40,7 @@ def test_several_pieces_count_what_each_of_them_tries(monkeypatch: pytest.Monkey
     assert "1/2" in terminal.getvalue()
 
 
-def test_nothing_is_shown_where_standard_error_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_progress_is_shown_if_standard_error_is_not_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     with progress(2, "identifying") as advance:
         tell("linear models")
         advance()

@@ -88,17 +88,17 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         [("inspect", "txt"), ("diagnose", "csv"), ("identify", "csv")],
     ),
 )
-def test_a_verb_on_a_log_imports_nothing_dear(logs: dict[str, Path], verb: str, suffix: str) -> None:
+def test_a_verb_on_a_log_imports_no_slow_module(logs: dict[str, Path], verb: str, suffix: str) -> None:
     dear = DEAR | (set() if verb == "inspect" else OTHERS)
     assert not dear & loaded_by([verb, str(logs[suffix]), "--json"])
 
 
-def test_help_imports_no_arithmetic() -> None:
+def test_help_imports_neither_numpy_nor_pyarrow() -> None:
     assert not (DEAR - {"rich"} | {"numpy", "pyarrow"}) & loaded_by(["estimate", "--help"])
 
 
 @pytest.mark.parametrize(("arguments", "code"), [(["conditions", "--json"], 0), (["estimate"], 2)])
-def test_an_end_at_once_keeps_exit_code_and_what_was_to_run_at_exit(arguments: list[str], code: int) -> None:
+def test_the_immediate_exit_keeps_the_exit_code_and_runs_the_atexit_functions(arguments: list[str], code: int) -> None:
     text = "import atexit, experiments.cli\natexit.register(print, 'called')\nexperiments.cli.main()"
     done = python(text, *arguments)
     assert done.returncode == code

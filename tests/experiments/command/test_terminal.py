@@ -27,7 +27,7 @@ def raising(error: BaseException) -> int:
         (MemoryError(), SOME_FAILED, "this log needs more memory than there is"),
     ],
 )
-def test_whatever_goes_wrong_is_one_sentence_and_a_code(
+def test_every_error_is_one_sentence_and_an_exit_code(
     error: BaseException, code: int, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert raising(error) == code
@@ -37,7 +37,7 @@ def test_whatever_goes_wrong_is_one_sentence_and_a_code(
     assert "Traceback" not in said.err
 
 
-def test_the_traceback_is_printed_where_it_is_asked_for(
+def test_the_traceback_of_an_internal_error_is_printed_on_request(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("HYDROSTATE_DEBUG", "1")
@@ -45,7 +45,7 @@ def test_the_traceback_is_printed_where_it_is_asked_for(
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_a_model_that_cannot_be_compiled_is_its_authors_slip_and_no_internal_error(
+def test_a_model_that_cannot_be_compiled_is_a_usage_error(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert guarded(lambda: symbol("x") ** 0.5) == USAGE
@@ -55,11 +55,11 @@ def test_a_model_that_cannot_be_compiled_is_its_authors_slip_and_no_internal_err
 
 
 @pytest.mark.parametrize("values", [[], [1.0], [2.0, 2.0, 2.0]])
-def test_what_does_not_vary_has_no_curve(values: list[float]) -> None:
+def test_constant_values_have_no_sparkline(values: list[float]) -> None:
     assert terminal.sparkline(values, 8) == ""
 
 
-def test_an_interrupted_command_says_so_and_ends_with_its_code(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupted_command_prints_this_and_ends_with_its_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
     app = typer.Typer(cls=terminal.HydrostateGroup, callback=lambda: None)
 
     @app.command()
@@ -72,7 +72,7 @@ def test_an_interrupted_command_says_so_and_ends_with_its_code(capsys: pytest.Ca
     assert capsys.readouterr().err == "hydrostate: interrupted\n"
 
 
-def test_compiling_is_said_once_and_every_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compiling_is_announced_once_and_every_warning_is_printed(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
     monkeypatch.setattr(terminal, "note", said.append)
     notice = terminal._KernelNotice()
@@ -82,7 +82,7 @@ def test_compiling_is_said_once_and_every_warning(monkeypatch: pytest.MonkeyPatc
     assert said[1] == "warning: no compiler"
 
 
-def test_a_terminal_folds_lines_between_words_and_a_pipe_keeps_them_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_lines_are_wrapped_between_words_on_a_terminal_and_not_in_a_pipe(monkeypatch: pytest.MonkeyPatch) -> None:
     line = "  reliable  " + "yes: a circuit reproduces the log; " * 8
     assert rendered(line).splitlines() == [line.rstrip()]
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
@@ -94,7 +94,7 @@ def test_a_terminal_folds_lines_between_words_and_a_pipe_keeps_them_whole(monkey
     assert " ".join(one.strip() for one in (first, *others)) == line.strip()
 
 
-def test_no_name_of_a_file_reaches_a_terminal_as_more_than_text() -> None:
+def test_control_characters_in_file_names_are_escaped_on_the_terminal() -> None:
     name = "a\x1b[31m\x9b\u202evsc.\u2066\n.csv"
     shown = terminal.table(name, title=name)
     shown.add_row(*terminal.short_names([{"file": name}]))

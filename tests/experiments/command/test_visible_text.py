@@ -7,7 +7,7 @@ from experiments.command.visible_text import visible_page
 from experiments.page import render
 
 
-def test_a_page_keeps_its_lines_and_spells_out_what_no_browser_shows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_keeps_its_lines_and_escapes_invisible_characters(monkeypatch: pytest.MonkeyPatch) -> None:
     assert visible_page("a\tb\r\n\x1b[31m\u202ec\x85") == "a\tb\r\n\\x1b[31m\\u202ec\\x85"
     words = Environment(loader=DictLoader({"page": "<p>{{ name }}</p>"}), autoescape=True)
     monkeypatch.setattr(render, "_templates", lambda: words)

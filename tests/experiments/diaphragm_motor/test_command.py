@@ -14,7 +14,7 @@ from plant.log.files import read_record
 RUN = CliRunner()
 
 
-def test_a_run_is_written_as_its_sensors_would_log_it_and_read_again(tmp_path: Path) -> None:
+def test_a_simulated_run_is_written_with_the_channels_of_its_sensors_and_can_be_read(tmp_path: Path) -> None:
     out = tmp_path / "run.csv"
     words = ["simulate", "--plant", "diaphragm-motor", "--load", "10", "--duration", "0.1", "--out", str(out)]
     done = RUN.invoke(app, [*words, "--json"])
@@ -37,14 +37,14 @@ def test_a_run_is_written_as_its_sensors_would_log_it_and_read_again(tmp_path: P
         (["--sensors", "paper"], "must be one of"),
     ],
 )
-def test_what_does_not_apply_is_refused(words: list[str], said: str, tmp_path: Path) -> None:
+def test_options_that_do_not_apply_to_the_motor_are_refused(words: list[str], said: str, tmp_path: Path) -> None:
     done = RUN.invoke(app, ["simulate", "--plant", "diaphragm-motor", *words, "--out", str(tmp_path / "run.csv")])
     assert done.exit_code == 2
     assert said in " ".join(done.stderr.split())
 
 
 @pytest.mark.slow
-def test_the_study_writes_its_report_with_every_figure_and_says_what_fails(tmp_path: Path) -> None:
+def test_the_study_writes_its_report_with_every_figure_and_lists_claims_that_fail(tmp_path: Path) -> None:
     done = RUN.invoke(app, ["diaphragm-motor", "--out", str(tmp_path / "motor")])
     assert done.exit_code == 0, done.output
     page = (tmp_path / "motor" / "report.html").read_text(encoding="utf-8")

@@ -43,7 +43,7 @@ def test_the_best_frequency_of_each_load_is_marked(motor_tables: Tables, drawn: 
     assert marks == best
 
 
-def test_the_spool_s_parts_of_a_run_are_named_in_order(drawn: Mapping[str, Figure]) -> None:
+def test_the_phases_of_the_spool_valve_are_labelled_in_order(drawn: Mapping[str, Figure]) -> None:
     (axis,) = drawn["reversal"].axes
     assert [text.get_text() for text in axis.texts] == ["extends", "holds", "retracts", "holds"]
 
@@ -54,7 +54,7 @@ def test_every_run_under_control_has_a_panel(motor_tables: Tables, drawn: Mappin
         assert [line.get_label() for line in axis.lines] == ["as the controller sees it", "true", "wanted"]
 
 
-def test_two_cycles_are_drawn_in_three_panels_and_the_averaged_motor_beside_the_fast_one(
+def test_two_pump_cycles_have_three_panels_and_the_averaged_motor_agrees_with_the_fast_one(
     motor_tables: Tables, drawn: Mapping[str, Figure]
 ) -> None:
     assert [len(axis.lines) for axis in drawn["pump_cycle"].axes] == [3, 2, 4]
@@ -66,7 +66,7 @@ def test_two_cycles_are_drawn_in_three_panels_and_the_averaged_motor_beside_the_
     assert settled["averaged_m_s"].to_numpy() == pytest.approx(settled["fast_m_s"].to_numpy(), rel=0.05)
 
 
-def test_the_piston_stands_at_its_blocking_force_and_moves_below_it(motor_tables: Tables) -> None:
+def test_the_piston_stops_at_its_blocking_force_and_moves_below_it(motor_tables: Tables) -> None:
     table = motor_tables["load sweep"]
     assert len(table) == 3 * len(SHARES)
     for _, rows in table.groupby("voltage_v"):
@@ -79,7 +79,7 @@ def test_the_piston_stands_at_its_blocking_force_and_moves_below_it(motor_tables
 
 
 @pytest.mark.slow
-def test_other_plates_give_the_published_peak_with_other_forces() -> None:
+def test_other_sets_of_plates_give_the_published_peak_with_other_blocking_forces() -> None:
     sets = SWEEPS["other sets"](RIG)
     assert sets["frequency_hz"].to_numpy() == pytest.approx(PEAK, abs=5.0)
     assert sets["flow_m3_s"].to_numpy() == pytest.approx(PUBLISHED_FLOW, rel=0.01)
@@ -92,7 +92,7 @@ def test_gas_lowers_the_best_frequency_and_bulk_modulus_hardly_moves_the_flow(mo
     assert table.loc["halved", "flow_percent"] == pytest.approx(0.0, abs=0.2)
 
 
-def test_claims_that_fail_are_named(motor_tables: Tables) -> None:
+def test_the_table_of_claims_marks_the_one_that_fails(motor_tables: Tables) -> None:
     table = motor_tables["reproduced"]
     assert table.loc[~table["holds"], "claim"].tolist() == [
         "the same to 0.95 of blocking, where valves leak and friction smooths"

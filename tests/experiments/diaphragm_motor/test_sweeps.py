@@ -9,7 +9,7 @@ from experiments.diaphragm_motor.study import RIG
 
 
 @pytest.mark.parametrize(("peak", "most"), [(483.0, 3), (470.0, 4), (441.0, 5), (352.0, 7), (700.0, 7)])
-def test_a_peak_is_found_uphill_with_few_runs_and_none_twice(
+def test_the_search_for_the_peak_makes_few_runs_and_repeats_none(
     monkeypatch: pytest.MonkeyPatch, peak: float, most: int
 ) -> None:
     tried: list[float] = []

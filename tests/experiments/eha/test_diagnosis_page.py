@@ -41,7 +41,7 @@ def page(diagnosed: tuple[Finding, Record]) -> str:
     return diagnosis_page({**result, "not_told": ["one thing is not told", "another neither"]}, found, log)
 
 
-def test_the_page_says_what_how_bad_and_what_to_do(page: str) -> None:
+def test_the_page_gives_the_fault_its_severity_and_the_work_to_do(page: str) -> None:
     assert "<h1>The actuator leaks inside more than it should (minor leakage); friction is normal.</h1>" in page
     assert page.index("What to do") < page.index("How far from the limits") < page.index("Measured and fitted")
     assert "Plan a check of pump and piston seal." in page
@@ -57,9 +57,7 @@ def test_every_paragraph_begins_with_a_capital_and_ends_with_a_full_stop(page: s
     assert [one for one in paragraphs if not (one[0].isupper() and one.endswith("."))] == []
 
 
-def test_severities_of_a_log_that_no_fit_explains_are_marked_as_not_reliable(
-    page: str, diagnosed: tuple[Finding, Record]
-) -> None:
+def test_severities_of_an_unknown_log_are_marked_as_not_reliable(page: str, diagnosed: tuple[Finding, Record]) -> None:
     found, log = diagnosed
     unknown = diagnosis_page(
         {
@@ -80,7 +78,7 @@ def test_severities_of_a_log_that_no_fit_explains_are_marked_as_not_reliable(
     assert not re.search("<input[^>]* data-doubted>", page)
 
 
-def test_severities_of_which_the_log_says_nothing_are_in_no_state(diagnosed: tuple[Finding, Record]) -> None:
+def test_severities_that_the_log_does_not_determine_have_no_state(diagnosed: tuple[Finding, Record]) -> None:
     found, log = diagnosed
     codes = [ClassCode.FRICTION_NOT_VISIBLE]
     unseen = replace(found, severities=without_undetermined(found.severities, codes))
@@ -96,14 +94,14 @@ def test_severities_of_which_the_log_says_nothing_are_in_no_state(diagnosed: tup
     assert set(json.loads(class_row(unseen)["quantities"])) == {"leakage_flow", "bulk_modulus", "entrained_air"}
 
 
-def test_a_page_says_with_which_actuator_a_log_was_compared(page: str, diagnosed: tuple[Finding, Record]) -> None:
+def test_a_page_names_the_rig_that_the_log_was_compared_with(page: str, diagnosed: tuple[Finding, Record]) -> None:
     assert "diagnosis of run.csv, no rig file of your own: the paper&#39;s actuator is assumed" in page
     found, log = diagnosed
     named = diagnosis_page({"file": "run.csv", "rig": "bench 7", **diagnosis_entries(found)}, found, log)
     assert "diagnosis of run.csv, rig bench 7<" in named
 
 
-def test_what_other_faults_take_from_the_nine_is_said(diagnosed: tuple[Finding, Record]) -> None:
+def test_the_probability_of_faults_outside_the_nine_is_given(diagnosed: tuple[Finding, Record]) -> None:
     found, log = diagnosed
     told = sum(found.probabilities.values())
     worn = replace(found, probabilities={name: 0.25 / told * share for name, share in found.probabilities.items()})

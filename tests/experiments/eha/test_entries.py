@@ -64,12 +64,12 @@ def codes(entries: dict[str, object]) -> list[str]:
     return [note["code"] for note in entries["notes"]]
 
 
-def test_the_codes_that_entries_know_by_name_are_codes() -> None:
+def test_the_codes_in_the_tables_of_entries_exist() -> None:
     known: set[Code] = {*EstimateCode, *ClassCode}
     assert set(COSTS) | set(NO_CLASS) <= {str(code) for code in known}
 
 
-def test_an_estimate_has_the_entries_that_it_promises() -> None:
+def test_an_estimate_has_exactly_the_documented_entries() -> None:
     entries = estimate_entries(estimate_log(log(), Rig()))
     assert set(entries) | TOLD_BY_THE_VERB == set(NO_ESTIMATE) | ALWAYS
     assert set(entries["bulk_modulus_pa"]) == {"value", "std", "ci95", "ci95_total"}
@@ -86,7 +86,7 @@ def test_an_estimate_has_the_entries_that_it_promises() -> None:
 @pytest.mark.parametrize(
     ("channel", "refused"), thinned([("velocity_m_s", False), (PRESSURE, True)], [("velocity_m_s", False)])
 )
-def test_notes_are_codes_with_data_that_json_takes(channel: str, *, refused: bool) -> None:
+def test_a_note_of_a_frozen_sensor_is_a_code_with_data_in_json(channel: str, *, refused: bool) -> None:
     record = log(duration=1.0)
     values = record[channel].copy()
     values[500:] = values[500]
@@ -105,7 +105,7 @@ def test_notes_are_codes_with_data_that_json_takes(channel: str, *, refused: boo
     assert (AdviceCode.CHECK_SENSOR in codes(entries)) == refused
 
 
-def test_a_diagnosis_has_the_entries_that_it_promises() -> None:
+def test_a_diagnosis_has_exactly_the_documented_entries() -> None:
     entries = diagnosis_entries(diagnosed())
     assert set(entries) == set(NO_DIAGNOSIS) | ALWAYS
     assert (entries["condition"], entries["unknown"]) == ("minor_leakage", False)
@@ -116,7 +116,7 @@ def test_a_diagnosis_has_the_entries_that_it_promises() -> None:
     assert EstimateCode.KNOWN_AS_THE_RIG in codes(entries)
 
 
-def test_a_log_at_rest_is_in_no_class_and_its_message_alone_says_why() -> None:
+def test_a_log_at_rest_has_no_condition_and_the_reason_is_in_its_message() -> None:
     entries = diagnosis_entries(diagnosed_at_rest())
     assert (entries["outcome"], entries["condition"], entries["runner_up"]) == ("not_observable", None, None)
     assert (entries["unknown"], entries["reasons"], entries["advice"]) == (None, [], [])
@@ -129,7 +129,7 @@ def test_a_log_at_rest_is_in_no_class_and_its_message_alone_says_why() -> None:
 NO_CIRCUIT = Rig("no circuit", replace(EhaParameters(), relief_pressure=1e9))
 
 
-def test_a_rig_around_which_no_circuit_fits_gets_a_condition_without_probabilities() -> None:
+def test_a_rig_without_a_possible_circuit_gets_a_condition_without_probabilities() -> None:
     found = diagnose_log(log(), NO_CIRCUIT)
     entries = diagnosis_entries(found)
     assert set(entries) <= set(NO_DIAGNOSIS) | ALWAYS
@@ -143,7 +143,7 @@ def test_a_rig_around_which_no_circuit_fits_gets_a_condition_without_probabiliti
     assert entries["bulk_modulus_pa"]["value"] == pytest.approx(2.07e8, rel=0.01)
 
 
-def test_without_a_circuit_an_accused_sensor_makes_the_condition_unknown_too() -> None:
+def test_without_a_circuit_a_frozen_sensor_also_makes_the_condition_unknown() -> None:
     frozen = with_fault(log(), SensorFault(channel="position_m", kind="freeze", start=1.5))
     entries = diagnosis_entries(diagnose_log(frozen, NO_CIRCUIT))
     assert entries["unknown"]
@@ -152,14 +152,14 @@ def test_without_a_circuit_an_accused_sensor_makes_the_condition_unknown_too() -
     assert entries["advice"] == [str(AdviceCode.CHECK_SENSOR.note(channels="position_m"))]
 
 
-def test_a_log_too_short_for_a_circuit_says_so_and_keeps_its_scores() -> None:
+def test_a_log_too_short_for_a_circuit_has_scores_but_no_probabilities() -> None:
     entries = diagnosis_entries(diagnose_log(log("major_leakage").slice(600, 650), Rig()))
     assert list(entries["scores"]) == list(CONDITIONS)
     assert "probabilities" not in entries
     assert {ClassCode.NO_PROBABILITIES, ClassCode.MODELS_ALIKE} & set(codes(entries))
 
 
-def test_what_was_left_out_of_any_channel_is_a_warning_of_a_diagnosis() -> None:
+def test_outliers_left_out_of_a_log_are_a_warning_of_its_diagnosis() -> None:
     velocity = log()["velocity_m_s"].copy()
     velocity[::150] += 1.0
     entries = diagnosis_entries(diagnose_log(log().replace(velocity_m_s=velocity), Rig()))
@@ -168,7 +168,7 @@ def test_what_was_left_out_of_any_channel_is_a_warning_of_a_diagnosis() -> None:
     assert (entries["condition"], entries["unknown"]) == ("minor_leakage", False)
 
 
-def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> None:
+def test_the_cost_of_a_missing_channel_is_noted_once_for_all_logs() -> None:
     entries = diagnosis_entries(diagnose_log(log().replace(position_m=None, **{PRESSURE: None}), Rig()))
     assert ClassCode.PRESSURE_ABSENT_CLASS in codes(entries)
     assert str(ClassCode.PRESSURE_ABSENT_CLASS.note()) not in entries["warnings"]
@@ -188,7 +188,7 @@ def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> N
         ({"chamber_volume": 2.0}, False),
     ],
 )
-def test_another_pump_or_piston_with_the_papers_leakage_and_friction_is_noted(
+def test_a_rig_of_another_size_with_the_papers_leakage_and_friction_is_noted(
     changed: dict[str, float], *, said: bool
 ) -> None:
     paper = EhaParameters()
@@ -198,13 +198,13 @@ def test_another_pump_or_piston_with_the_papers_leakage_and_friction_is_noted(
     assert any(str(ClassCode.HEALTHY_OF_THE_PAPER.note()) in line for line in costs([entries])) == said
 
 
-def test_an_entry_of_the_rig_is_named_once_of_all_logs_that_it_limits() -> None:
+def test_a_rig_entry_that_limits_several_logs_is_named_once() -> None:
     found = [estimate_entries(estimate_log(log(condition), Rig())) for condition in ("normal", "major_leakage")]
     (said,) = costs(found)
     assert said.startswith("2 of 2 logs: measure chamber_volume: ")
 
 
-def test_nominal_models_that_miss_a_log_are_named_beside_what_the_circuit_says() -> None:
+def test_nominal_models_that_do_not_fit_a_log_make_its_condition_unknown() -> None:
     odd = log().replace(velocity_m_s=0.2 * log()["velocity_m_s"], position_m=None, **{PRESSURE: 5.0 * log()[PRESSURE]})
     found = diagnose_log(odd, Rig())
     assert found.unknown
@@ -212,7 +212,7 @@ def test_nominal_models_that_miss_a_log_are_named_beside_what_the_circuit_says()
     assert none_fits.data["percent"] > 50.0
 
 
-def test_a_log_in_no_class_names_the_frozen_sensor_first() -> None:
+def test_the_message_of_a_log_without_a_condition_names_the_frozen_sensor_first() -> None:
     found = diagnosed_at_rest()
     froze = SensorCode.SENSOR_FROZE.note(channel=PRESSURE, value=4e5, begin_s=1.0, length_s=3.0)
     entries = diagnosis_entries(replace(found, gate=replace(found.gate, passed=False, reasons=(froze,))))
@@ -222,7 +222,7 @@ def test_a_log_in_no_class_names_the_frozen_sensor_first() -> None:
 
 
 @pytest.mark.parametrize("pressure", [True, False])
-def test_pressure_is_asked_for_where_it_was_not_used(pressure: bool) -> None:
+def test_the_advice_to_log_differential_pressure_appears_only_if_it_was_not_used(pressure: bool) -> None:
     found = estimate_log(log(), Rig("rig", EhaParameters()))
     unseen = replace(
         found,
@@ -235,7 +235,7 @@ def test_pressure_is_asked_for_where_it_was_not_used(pressure: bool) -> None:
     assert "larger, slower steps" in message
 
 
-def test_another_drive_is_not_asked_for_where_the_fit_does_not_explain_the_log() -> None:
+def test_another_drive_is_not_recommended_if_the_model_does_not_describe_the_log() -> None:
     """The bound of a fit that leaves 6.6 times the noise says little; the cause was a shifted zero of pressure."""
     found = estimate_log(log(), Rig("rig", EhaParameters()))
     large = EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=6.6)
@@ -252,7 +252,7 @@ def test_another_drive_is_not_asked_for_where_the_fit_does_not_explain_the_log()
     assert "slower steps" not in message
 
 
-def test_a_sensor_alone_is_no_fault_of_the_model() -> None:
+def test_a_dead_sensor_is_not_reported_as_a_model_mismatch() -> None:
     """Before, estimate said "the model does not describe the log" when the only objection was a dead sensor."""
     found = estimate_log(log(), Rig("rig", EhaParameters()))
     dead = SensorCode.SENSOR_NOISE_ONLY.note(channel=PRESSURE, noise=4e3)
@@ -265,7 +265,7 @@ def test_a_sensor_alone_is_no_fault_of_the_model() -> None:
     assert estimate_entries(refused)["message"] == f"no value of bulk modulus: {dead}"
 
 
-def test_a_wrong_volume_in_the_rig_file_is_mended_before_another_drive_is_tried() -> None:
+def test_a_wrong_volume_in_the_rig_file_is_named_instead_of_another_drive() -> None:
     found = estimate_log(log(), Rig("rig", EhaParameters()))
     differs = RigCode.VOLUME_DIFFERS.note(percent=53.0, half_width=5.0)
     unseen = replace(
@@ -279,7 +279,7 @@ def test_a_wrong_volume_in_the_rig_file_is_mended_before_another_drive_is_tried(
     assert "slower steps" not in message
 
 
-def test_a_piston_that_stands_still_is_the_reason_why_there_is_no_number() -> None:
+def test_a_piston_at_rest_is_the_reason_for_a_missing_bulk_modulus() -> None:
     """Before, the reason was a Cramér-Rao bound over 3 %; it is 0.4 %, and with a resting pump none was calculated."""
     rng, p = np.random.default_rng(8), replace(EhaParameters(), friction_coulomb=1e6)
     seized = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)

@@ -42,7 +42,7 @@ def linear_of(rig: Rig, **options: Any) -> Any:
     return linear
 
 
-def test_the_library_is_that_of_the_paper_s_rig_and_no_test_is_simulated_for_it(asked: list[Any]) -> None:
+def test_the_paper_s_rig_uses_the_stored_library_without_simulation(asked: list[Any]) -> None:
     for wanted in (None, True):
         found = linear_of(Rig(), transfer_functions=wanted)()
         assert found.keys() == read_library().keys()
@@ -52,7 +52,7 @@ def test_the_library_is_that_of_the_paper_s_rig_and_no_test_is_simulated_for_it(
     assert asked == []
 
 
-def test_another_rig_s_transfer_functions_are_identified_only_if_asked_for_and_once(
+def test_transfer_functions_of_another_rig_are_identified_once_and_only_on_request(
     asked: list[Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert linear_of(OTHER) is None
@@ -69,7 +69,7 @@ def log() -> Record:
     return simulate(LUMPED, sine(2.0, 1e-3, p.rated_speed, 5.0), 1e-3, p, sensors=BENCH, rng=rng)
 
 
-def test_the_library_is_not_compared_with_a_velocity_that_is_found_wrong() -> None:
+def test_the_library_ignores_a_velocity_channel_that_is_found_wrong() -> None:
     p, rng = EhaParameters(), np.random.default_rng(8)
     record = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     velocity, verb = record["velocity_m_s"], EHA.diagnose
@@ -81,7 +81,7 @@ def test_the_library_is_not_compared_with_a_velocity_that_is_found_wrong() -> No
     assert wrong.by_condition == absent.by_condition
 
 
-def test_a_log_that_was_fitted_has_no_figure_and_the_reader_is_told_how_to_get_one(
+def test_a_fitted_log_has_no_innovations_figure_and_the_option_for_one_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert EHA.estimate is not None
@@ -91,7 +91,7 @@ def test_a_log_that_was_fitted_has_no_figure_and_the_reader_is_told_how_to_get_o
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_rig_s_leakage_is_said_to_be_taken_as_known_unless_a_condition_is_named_or_it_is_estimated() -> None:
+def test_the_remark_on_assumed_leakage_is_omitted_if_a_condition_is_given_or_leakage_estimated() -> None:
     assert EHA.estimate is not None
     remarks = EHA.estimate.remarks
     told = {"condition": None, "form": "pressure", "rig": "mine"}
@@ -101,7 +101,7 @@ def test_the_rig_s_leakage_is_said_to_be_taken_as_known_unless_a_condition_is_na
         assert list(remarks([{**told, **change}])) == []
 
 
-def test_a_verb_refuses_samples_that_are_far_apart_before_anything_is_computed_of_them(tmp_path: Path) -> None:
+def test_a_sample_time_over_100_ms_is_refused(tmp_path: Path) -> None:
     """Otherwise the transfer functions would be run with ten million of their steps per sample."""
     path, speed = tmp_path / "run.csv", 90.0 * np.sin(np.arange(40.0) / 9.0)
     rows = np.column_stack([1e4 * np.arange(40.0), speed, 1e-5 * np.cumsum(speed)])

@@ -29,7 +29,7 @@ def said_of(condition: str, share: float = 1.0, **more: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
-def test_every_condition_has_a_verdict_and_work_that_name_what_is_wrong(condition: str) -> None:
+def test_the_verdict_on_every_condition_names_its_faults(condition: str) -> None:
     result = said_of(condition)
     for fault in ("leakage", "friction"):
         level = getattr(CONDITIONS[condition], fault)
@@ -55,7 +55,7 @@ def test_every_condition_has_a_verdict_and_work_that_name_what_is_wrong(conditio
         (AgainstCode.OIL_STIFF.note(share=2.0), "the log does not fit any known condition of this actuator."),
     ],
 )
-def test_without_a_verdict_the_heading_says_what_hinders_it(note: Note, said: str) -> None:
+def test_the_heading_of_a_log_without_a_verdict_gives_the_reason(note: Note, said: str) -> None:
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
     assert verdict(result).startswith("No verdict: ")
     assert verdict(result).endswith(said)
@@ -73,7 +73,9 @@ def test_without_a_verdict_the_heading_says_what_hinders_it(note: Note, said: st
         (0.0, 0.0, "No verdict: the log does not fit any known condition of this actuator."),
     ],
 )
-def test_a_fault_of_another_size_is_in_the_verdict(leakage: float, friction: float, said: str) -> None:
+def test_a_fault_between_the_nine_sizes_is_in_the_verdict_and_the_work(
+    leakage: float, friction: float, said: str
+) -> None:
     note = AgainstCode.BETWEEN_CONDITIONS.note(leakage=leakage, friction=friction)
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
     assert verdict(result).startswith(said)
@@ -90,7 +92,7 @@ def test_a_fault_of_another_size_is_in_the_verdict(leakage: float, friction: flo
     assert "to the nearest quarter" in str(note)
 
 
-def test_a_circuit_beside_the_nine_is_told_by_its_levels_and_by_what_does_not_go_with_them() -> None:
+def test_a_circuit_outside_the_nine_is_described_by_its_levels_and_the_part_that_deviates() -> None:
     note = AgainstCode.OUTSIDE_CONDITIONS.note(leakage=1.25, friction=0.0, part="flow bias", ratio=0.19)
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
     assert verdict(result) == "The actuator leaks more inside than a healthy one, or the rig file or a sensor is wrong."
@@ -99,20 +101,20 @@ def test_a_circuit_beside_the_nine_is_told_by_its_levels_and_by_what_does_not_go
     assert work_on(result)[0].startswith("If rig file and sensors are right: plan a check of pump and piston seal.")
 
 
-def test_a_size_beside_another_reason_is_no_ground_for_work() -> None:
+def test_an_intermediate_size_beside_another_reason_leads_to_no_work() -> None:
     note = AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.0)
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note), "the pressure froze"])
     assert work_on(result) == []
     assert "do not rely on the numbers" in sureness(result)
 
 
-def test_a_fault_that_has_a_name_comes_before_its_size() -> None:
+def test_a_named_fault_takes_precedence_over_an_intermediate_size() -> None:
     notes = [RigCode.MAKEUP_BLOCKED.note(side="B"), AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.5)]
     result = said_of("normal", unknown=True, notes=[one.to_dict() for one in notes])
     assert verdict(result) == "A make-up valve is stuck shut."
 
 
-def test_what_may_follow_from_a_frozen_sensor_is_not_said_beside_it() -> None:
+def test_reasons_that_may_follow_from_a_frozen_sensor_are_omitted() -> None:
     froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.016, length_s=3.0, begin_s=3.0)
     follows = AgainstCode.UNEXPLAINED.note(percent=102.0, channel="velocity")
     notes: list[Any] = [one.to_dict() for one in (follows, froze)]
@@ -130,7 +132,7 @@ def test_several_reasons_against_a_verdict_are_a_list() -> None:
     assert reasons_apart(result) == ["One does not fit.", "Nor does another."]
 
 
-def test_soft_oil_is_in_the_verdict_and_leaves_something_to_repair() -> None:
+def test_soft_oil_is_in_the_verdict_and_is_never_nothing_to_repair() -> None:
     soft: dict[str, Any] = {"notes": [AdviceCode.BLEED.note(percent=27.0, volume=1.5e-3).to_dict()]}
     assert "softer than its limit; leakage and friction are normal" in verdict(said_of("normal", **soft))
     assert verdict(said_of("minor_leakage", **soft)).endswith("; its oil is softer than its limit.")
@@ -138,13 +140,13 @@ def test_soft_oil_is_in_the_verdict_and_leaves_something_to_repair() -> None:
     assert sureness(said_of("normal", **soft)) == "The verdict on leakage and friction is certain (over 99 %)."
 
 
-def test_what_is_not_certain_is_not_called_certain() -> None:
+def test_the_verdict_is_called_certain_only_above_99_percent() -> None:
     assert sureness(said_of("minor_leakage", 0.999)).startswith("This is certain (over 99 %).")
     assert sureness(said_of("minor_leakage", 0.9)).startswith("This is probable (90 %).")
     assert "several explanations (55 %)" in sureness(said_of("minor_leakage", 0.55))
 
 
-def test_a_fault_says_what_it_costs_and_since_when() -> None:
+def test_a_fault_is_described_with_its_loss_of_speed_and_its_begin() -> None:
     assert "28 % slower" in sureness(said_of("minor_leakage"))
     assert "The fault was there before the log began." in sureness(said_of("minor_leakage"))
     changed = said_of("minor_leakage", since_s=2.5, since_ci95_s=[2.4, 2.6], condition_before="normal")
@@ -154,21 +156,21 @@ def test_a_fault_says_what_it_costs_and_since_when() -> None:
     assert "fault" not in sureness(said_of("major_friction", probabilities=open_friction))
 
 
-def test_an_unknown_log_gets_no_verdict_no_work_and_its_reasons() -> None:
+def test_an_unknown_log_gets_reasons_but_no_verdict_and_no_work() -> None:
     result = said_of("minor_leakage", unknown=True, reasons=["motor speed reads wrong by 3 rad/s"])
     assert verdict(result).startswith("No verdict")
     assert what_to_do(result) == ["Log again."]
     assert "motor speed reads wrong by 3 rad/s" in sureness(result)
 
 
-def test_a_fault_that_is_none_of_the_nine_is_the_verdict_and_its_numbers_are_doubted() -> None:
+def test_a_named_fault_outside_the_nine_is_the_verdict_and_the_numbers_are_doubted() -> None:
     note = RigCode.MAKEUP_BLOCKED.note(side="B").to_dict()
     result = said_of("major_friction", unknown=True, reasons=[note["text"]], notes=[note])
     assert verdict(result) == "A make-up valve is stuck shut."
     assert "do not rely on the numbers below: the make-up valve of chamber B" in sureness(result)
 
 
-def test_friction_that_a_log_does_not_show_is_not_called_normal() -> None:
+def test_friction_that_a_log_does_not_determine_is_not_called_normal() -> None:
     even = dict.fromkeys(("minor_leakage", "minor_leakage_minor_friction", "minor_leakage_major_friction"), 1 / 3)
     result = said_of("minor_leakage", probabilities=even)
     told = "The actuator leaks inside more than it should (minor leakage); friction cannot be told from this log."
@@ -191,7 +193,7 @@ def test_a_level_below_nine_in_ten_is_called_probable(share: float, word: str) -
     assert verdict(said_of("minor_friction", probabilities=rubs)).startswith(f"The actuator {word}has more friction")
 
 
-def test_an_actuator_of_which_nothing_is_told_is_not_called_healthy() -> None:
+def test_an_actuator_with_undetermined_friction_is_not_called_healthy() -> None:
     even = dict.fromkeys(("normal", "minor_friction", "major_friction"), 1 / 3)
     result = said_of("normal", probabilities=even)
     assert verdict(result) == "Leakage is normal; friction cannot be told from this log."

@@ -25,14 +25,14 @@ def test_a_value_has_both_intervals_in_megapascals_and_its_verdict() -> None:
     assert " ".join(line.split()) == "run1.csv 207 200 to 210 180 to 240 0.5 ok"
 
 
-def test_a_value_that_is_not_to_be_relied_on_is_called_doubtful_and_its_reason_is_given() -> None:
+def test_a_value_that_the_gate_refuses_is_called_doubtful_and_its_reason_is_given() -> None:
     told = shown([estimate(1), estimate(2, passed=False)])
     assert "run2.csv: reason 2" in told
     assert "reason 1" not in told
     assert told.count("doubtful") == 1
 
 
-def test_the_reasons_against_a_value_stand_below_it_a_line_each() -> None:
+def test_each_reason_against_a_value_has_a_line_below_it() -> None:
     against = {"message": "207 MPa; do not rely on it: friction; play", "gate": {"passed": False}}
     against["gate"]["reasons"] = ["friction", "play"]
     assert "run1.csv: 207 MPa; do not rely on it\n  reasons   friction\n            play" in shown(
@@ -50,7 +50,7 @@ def test_a_log_without_a_value_or_an_interval_has_dashes() -> None:
     assert line.split() == ["run1.csv", "200.0", "-", "-", "0.5", "ok"]
 
 
-def test_of_many_logs_the_doubtful_are_counted_and_not_explained_one_by_one() -> None:
+def test_doubtful_values_of_many_logs_are_counted_and_not_explained_singly() -> None:
     many = [estimate(number, passed=number % 2 == 0) for number in range(MOST_MESSAGES + 3)]
     told = shown(many)
     assert f"3 of {len(many)} logs gave no reliable value" in told
@@ -77,7 +77,7 @@ def diagnosed(results: list[dict[str, Any]], **options: Any) -> str:
     return rendered(*diagnoses_shown(results, {"scores": False, "transfer_functions": None, **options}))
 
 
-def test_an_empty_line_stands_between_logs_and_before_notes() -> None:
+def test_an_empty_line_separates_logs_from_each_other_and_from_notes() -> None:
     noted = diagnosis(2, notes=[{"code": "known_as_the_rig", "data": {}, "text": "the rig limits it"}])
     said = diagnosed([{**one, "severity": found_severity(), "message": ""} for one in (diagnosis(1), noted)]).split(
         "\n"
@@ -87,7 +87,7 @@ def test_an_empty_line_stands_between_logs_and_before_notes() -> None:
     assert all(said[place - 1] == "" for place in first)
 
 
-def test_many_diagnoses_are_a_table_with_a_line_each() -> None:
+def test_many_diagnoses_are_shown_as_a_table_with_one_line_for_each() -> None:
     many = [diagnosis(number) for number in range(MOST_TABLES)]
     many += [
         diagnosis(7, severity={**found_severity(), "leakage_flow": {"value": 6.04, "unit": "L/min"}}),
@@ -106,7 +106,7 @@ def test_many_diagnoses_are_a_table_with_a_line_each() -> None:
 
 
 @pytest.mark.parametrize("channels", [["differential_pressure_pa"], ["velocity_m_s"]])
-def test_the_errors_of_a_log_are_a_table_if_asked_for_with_the_best_and_the_runner_up_marked(
+def test_the_table_of_model_errors_marks_the_best_and_the_runner_up(
     channels: list[str],
 ) -> None:
     others = {"transfer_function_scores": {"normal": 0.3, "minor_leakage": 0.05}}
@@ -127,7 +127,7 @@ def test_the_errors_of_a_log_are_a_table_if_asked_for_with_the_best_and_the_runn
         ({"expected": "normal", "unknown": True}, "  expected  normal: does not agree"),
     ],
 )
-def test_what_was_expected_is_compared_in_a_line_that_repeats_nothing(changes: dict[str, Any], said: str) -> None:
+def test_the_expected_condition_is_compared_in_one_line(changes: dict[str, Any], said: str) -> None:
     told = diagnosed([diagnosis(1, severity=found_severity(), **changes)]).split("\n")
     assert told.count(said) == 1
     assert "said 1" not in " ".join(told)

@@ -54,7 +54,9 @@ def test_a_condition_planted_in_an_fmu_is_found_in_its_log(fmu: Path, tmp_path: 
         (("--columns", "position_m=rod:mm"), "rod"),
     ],
 )
-def test_what_does_not_go_with_an_fmu_is_said(fmu: Path, tmp_path: Path, further: tuple[str, ...], said: str) -> None:
+def test_options_that_do_not_fit_an_fmu_are_refused(
+    fmu: Path, tmp_path: Path, further: tuple[str, ...], said: str
+) -> None:
     log = tmp_path / "none.csv"
     refused = invoke("simulate", "--fmu", fmu, "--sample-time", T, *further, "--out", log)
     assert refused.exit_code != 0
@@ -72,7 +74,7 @@ def test_a_condition_that_the_fmu_has_no_parameters_for_is_refused(fmu: Path, tm
     assert "the condition changes leakage_coefficient, and the FMU has no variables" in " ".join(refused.stderr.split())
 
 
-def test_options_of_an_fmu_need_one(tmp_path: Path) -> None:
+def test_options_of_an_fmu_are_refused_without_an_fmu(tmp_path: Path) -> None:
     for option in (("--parameter", "x=1"), ("--columns", "position_m=x")):
         refused = invoke("simulate", *option, "--out", tmp_path / "none.csv")
         assert refused.exit_code != 0
@@ -80,6 +82,6 @@ def test_options_of_an_fmu_need_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["x", "=1", "x=one", ""])
-def test_a_start_value_is_a_name_and_a_number(text: str) -> None:
+def test_a_start_value_that_is_not_a_name_and_a_number_is_refused(text: str) -> None:
     with pytest.raises(HydrostateError, match="NAME=VALUE"):
         start_values([text])

@@ -59,13 +59,13 @@ def test_a_change_within_the_log_is_dated_with_its_interval() -> None:
     assert "since 3.21 s (3.10 to 3.30 s), normal before" in headline(found)
 
 
-def test_a_fault_without_a_change_was_there_before_the_log_began() -> None:
+def test_a_fault_without_a_change_is_dated_before_the_log_began() -> None:
     found = diagnosis_entries(found_as("minor_leakage"))
     assert (found["since_s"], found["since_ci95_s"], found["condition_before"]) == (None, None, None)
     assert "since before the log began" in headline(found)
 
 
-def test_a_healthy_actuator_is_healthy_since_no_time_unless_it_was_ill() -> None:
+def test_a_healthy_actuator_has_a_date_only_if_a_fault_came_before() -> None:
     assert since(diagnosis_entries(found_as("normal"))) == ""
     mended = diagnosis_entries(found_as("normal", Change(2.0, (1.9, 2.2), "minor_friction")))
     assert since(mended).endswith("minor friction before")
@@ -93,9 +93,7 @@ AGAINST = (AgainstCode.SPEED_BIAS.note(bias_rad_s=3.0), AgainstCode.OIL_SOFT.not
         (("normal", "minor_leakage_minor_friction"), "leakage and friction cannot be told: normal or minor leakage + "),
     ],
 )
-def test_conditions_that_a_log_does_not_tell_apart_are_not_told_as_one_that_was_found(
-    alike: tuple[str, ...], said: str
-) -> None:
+def test_equally_probable_conditions_are_named_together_in_the_headline(alike: tuple[str, ...], said: str) -> None:
     """Before, three equal percentages read as if the first condition had been found."""
     shares = {**dict.fromkeys(CONDITIONS, 0.04 / (9 - len(alike))), **dict.fromkeys(alike, 0.96 / len(alike))}
     result = {**diagnosis_entries(found_as(alike[0])), "probabilities": shares}
@@ -105,7 +103,7 @@ def test_conditions_that_a_log_does_not_tell_apart_are_not_told_as_one_that_was_
     assert "second most likely" in headline(unlike)
 
 
-def test_a_fault_outside_the_nine_that_is_likelier_than_a_condition_is_in_the_headline() -> None:
+def test_a_fault_outside_the_nine_can_be_second_most_likely_in_the_headline() -> None:
     """Before, it read "minor leakage, probability 90.0 %; second most likely major leakage, < 0.1 %" and no more."""
     result = diagnosis_entries(found_as("minor_leakage"))
     said = headline({**result, "probabilities": {"minor_leakage": 0.9, "major_leakage": 1e-5}})
@@ -113,7 +111,7 @@ def test_a_fault_outside_the_nine_that_is_likelier_than_a_condition_is_in_the_he
     assert said.endswith("second most likely none of the nine conditions, 10.0 %")
 
 
-def test_where_the_part_that_is_told_is_normal_no_fault_is_present_since_before_the_log() -> None:
+def test_normal_leakage_with_undetermined_friction_is_not_dated_as_a_fault() -> None:
     shares = {"normal": 0.3, "minor_friction": 0.35, "major_friction": 0.35}
     result = {**diagnosis_entries(found_as("major_friction")), "probabilities": shares}
     assert headline(result) == (
@@ -121,7 +119,7 @@ def test_where_the_part_that_is_told_is_normal_no_fault_is_present_since_before_
     )
 
 
-def test_a_verdict_that_something_speaks_against_says_so_first_and_why() -> None:
+def test_a_verdict_with_reasons_against_it_begins_with_unknown_and_lists_them() -> None:
     entries = diagnosis_entries(found_as("minor_leakage", against=AGAINST))
     assert headline(entries).startswith("UNKNOWN: none of the nine conditions fits; the nearest is minor leakage")
     assert believed(entries) == "no: " + NEXT_LINE.join(map(str, AGAINST))
@@ -132,7 +130,9 @@ def test_a_verdict_that_something_speaks_against_says_so_first_and_why() -> None
 
 
 @pytest.mark.parametrize(("against", "begins"), [((), "minor_leakage, by a wide margin"), (AGAINST, "UNKNOWN")])
-def test_nominal_models_alone_name_the_nearest_with_its_margin(against: tuple[Note, ...], begins: str) -> None:
+def test_without_a_circuit_the_message_gives_the_nearest_condition_and_its_margin(
+    against: tuple[Note, ...], begins: str
+) -> None:
     entries = diagnosis_entries(found_as("minor_leakage", against=against, judged=False))
     assert entries["message"] == models_sentence(entries)
     assert entries["message"].startswith(begins)
@@ -140,7 +140,7 @@ def test_nominal_models_alone_name_the_nearest_with_its_margin(against: tuple[No
     assert (entries["condition"], entries["runner_up"]) == ("minor_leakage", "normal")
 
 
-def test_a_severity_that_is_not_told_is_not_determined() -> None:
+def test_a_severity_without_a_value_is_called_not_determined() -> None:
     entries = diagnosis_entries(found_as("normal"))
     assert entries["severity"]["entrained_air"] == {
         "value": None,
@@ -161,7 +161,7 @@ def with_library(found: Finding, best: str) -> Finding:
     return replace(found, severities={**unknown, **found.severities}, evidence=evidence)
 
 
-def test_a_mechanic_reads_the_verdict_and_the_work_to_do_on_the_terminal_as_on_the_page() -> None:
+def test_the_terminal_shows_the_verdict_and_the_work_of_the_page() -> None:
     entries = diagnosis_entries(with_library(found_as("minor_leakage"), "minor_leakage"))
     said = verdict_lines({"file": "run.csv", **entries})
     assert said[1] == f"  verdict   {verdict(entries)}"
@@ -171,7 +171,7 @@ def test_a_mechanic_reads_the_verdict_and_the_work_to_do_on_the_terminal_as_on_t
     assert following.endswith(".")
 
 
-def test_an_unknown_verdict_gives_no_plain_probability_and_nothing_to_repair() -> None:
+def test_an_unknown_verdict_gives_no_unconditional_probability_and_no_repair() -> None:
     entries = diagnosis_entries(with_library(found_as("minor_leakage", against=AGAINST), "minor_leakage"))
     said = verdict_lines({"file": "run.csv", **entries})
     assert "probability" not in said[0]
@@ -186,7 +186,7 @@ def test_the_nearest_condition_of_an_unknown_verdict_is_one_of_the_nine() -> Non
     assert "99.9 % if it had to be" in said
 
 
-def test_the_numbers_of_an_unknown_log_are_preceded_by_a_warning() -> None:
+def test_a_warning_precedes_the_severities_of_an_unknown_log() -> None:
     warned = "  numbers   do not rely on them: they are those of the nearest model, which does not fit the log"
     for against, there in ((AGAINST, True), ((), False)):
         entries = diagnosis_entries(with_library(found_as("minor_leakage", against=against), "minor_leakage"))
@@ -196,9 +196,7 @@ def test_the_numbers_of_an_unknown_log_are_preceded_by_a_warning() -> None:
 
 
 @pytest.mark.parametrize(("shown", "said"), [(2.07e8, True), (2.2e8, False)])
-def test_a_bulk_modulus_that_its_check_refused_is_not_relied_on_beside_a_class_that_stands(
-    shown: float, said: bool
-) -> None:
+def test_a_bulk_modulus_that_the_gate_refuses_is_doubted_beside_a_reliable_condition(shown: float, said: bool) -> None:
     """Before, a number that estimate calls doubtful stood below "reliable: yes"; the circuit's own number differs."""
     small = EstimateCode.PRESSURE_RESIDUALS_SMALL.note(ratio=1.6)
     found = found_as("normal")
@@ -207,7 +205,7 @@ def test_a_bulk_modulus_that_its_check_refused_is_not_relied_on_beside_a_class_t
     assert (f"do not rely on bulk modulus: {small}" in believed(entries)) is said
 
 
-def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
+def test_the_library_of_transfer_functions_agrees_or_disagrees_without_changing_the_verdict() -> None:
     alone = {**diagnosis_entries(found_as("minor_leakage")), "severity": None}
     agrees = diagnosis_entries(with_library(found_as("minor_leakage"), "minor_leakage"))
     differs = diagnosis_entries(with_library(found_as("minor_leakage"), "major_friction"))
@@ -233,19 +231,19 @@ def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
         found_as("minor_leakage", Change(3.21, (3.1, 3.3), "normal")),
     ],
 )
-def test_the_library_is_silent_where_the_log_is_not_of_one_known_condition(found: Finding) -> None:
+def test_the_library_is_not_mentioned_for_an_unknown_or_changing_condition(found: Finding) -> None:
     assert library_sentence(diagnosis_entries(with_library(found, "normal"))) == ""
     assert library_sentence(diagnosis_entries(found_as("minor_leakage"))) == ""
 
 
-def test_a_library_in_which_one_condition_alone_ran_says_nothing() -> None:
+def test_the_library_is_not_mentioned_if_only_one_of_its_models_could_be_run() -> None:
     errors = {"normal": 0.0012, "minor_leakage": 0.0019}
     found = {"condition": "normal", "unknown": False, "since_s": None, "transfer_function_scores": errors}
     assert "agrees" in library_sentence(found)
     assert library_sentence({**found, "transfer_function_scores": {**errors, "minor_leakage": float("inf")}}) == ""
 
 
-def test_how_far_the_runner_up_of_nine_models_is_behind_is_told_in_the_words_of_its_size() -> None:
+def test_the_margin_of_the_nominal_models_is_a_percentage_or_a_factor_by_its_size() -> None:
     about = {"condition": "normal", "runner_up": "minor_leakage", "unknown": False}
     said = {margin: models_sentence({**about, "margin": margin}) for margin in (1.001, 1.5, 3.0, float("inf"))}
     assert "only 0.1 % larger" in said[1.001]

@@ -35,7 +35,7 @@ def test_a_pattern_that_cannot_be_used_is_refused(pattern: str) -> None:
         by_pattern(["a.csv"], pattern)
 
 
-def test_a_later_date_is_a_larger_number_whatever_its_form() -> None:
+def test_a_later_date_has_a_larger_place_in_every_date_format() -> None:
     places = [
         place_of(date, "log") for date in ("20261121", "2026-11-22", "2026-11-22T12:00", "2026-11-22T14:00+01:00")
     ]
@@ -46,7 +46,7 @@ def test_a_later_date_is_a_larger_number_whatever_its_form() -> None:
     )
 
 
-def test_a_date_is_shown_with_hyphens_and_colons_and_what_is_none_as_it_was_given() -> None:
+def test_a_date_is_shown_in_iso_form_and_another_number_unchanged() -> None:
     named = [Named("P-1", date, place_of(date, "log")) for date in ("20261122_143000", "2026-11-22", "812.5")]
     assert [one.shown for one in named] == ["2026-11-22 14:30", "2026-11-22", "812.5"]
     assert [one.day for one in named] == ["2026-11-22", "2026-11-22", "812.5"]
@@ -64,7 +64,7 @@ def test_a_date_is_shown_with_hyphens_and_colons_and_what_is_none_as_it_was_give
         (["A_20261121.csv", "A_20261122.csv", "A_20261123.csv", "A_20261124.csv", "notes.csv"], ["A"] * 4 + [""]),
     ],
 )
-def test_names_that_hold_one_date_each_say_which_actuator(files: list[str], actuators: list[str]) -> None:
+def test_file_names_with_one_date_each_give_the_actuator(files: list[str], actuators: list[str]) -> None:
     found = by_dates(files, "press 4")
     assert [found[file].actuator for file in files] == actuators
     assert all(found[file].place is not None for file in files if found[file].actuator)
@@ -82,18 +82,18 @@ def test_names_that_hold_one_date_each_say_which_actuator(files: list[str], actu
         [],
     ],
 )
-def test_names_that_do_not_group_logs_by_date_are_left_alone(files: list[str]) -> None:
+def test_file_names_that_do_not_group_logs_by_date_give_no_actuator(files: list[str]) -> None:
     assert by_dates(files) == {}
 
 
-def test_one_bad_date_costs_its_own_log_a_name_and_no_other() -> None:
+def test_an_invalid_date_excludes_only_its_own_log() -> None:
     found = by_pattern(["P_2026-13-45.csv", "P_2026-11-22.csv"], "{actuator}_{date}.csv")
     assert found["P_2026-11-22.csv"].actuator == "P"
     assert found["P_2026-13-45.csv"].actuator == ""
     assert found["P_2026-13-45.csv"].problem.startswith("its name: date must be ISO 8601")
 
 
-def test_names_of_which_no_date_can_be_read_are_refused_with_the_file(tmp_path: Path) -> None:
+def test_file_names_without_any_readable_date_are_refused_by_the_file(tmp_path: Path) -> None:
     with pytest.raises(HydrostateError, match=r"P_22-11-2026.csv: its name: date must be ISO 8601"):
         by_pattern(["P_22-11-2026.csv", "notes.txt"], "{actuator}_{date}.csv")
     table = tmp_path / "names.csv"
@@ -102,7 +102,7 @@ def test_names_of_which_no_date_can_be_read_are_refused_with_the_file(tmp_path: 
         by_table([], table)
 
 
-def test_a_table_names_files_by_path_or_by_name(tmp_path: Path) -> None:
+def test_a_table_of_names_lists_files_by_path_or_by_file_name(tmp_path: Path) -> None:
     table = tmp_path / "names.csv"
     table.write_text("\ufefffile,actuator,date\na.csv,P-1,2026-11-22\nhall/b.csv,P-2,\n", encoding="utf-8")
     found = by_table(["x/a.csv", "hall/b.csv", "c.csv"], table)
@@ -110,7 +110,7 @@ def test_a_table_names_files_by_path_or_by_name(tmp_path: Path) -> None:
     assert found["hall/b.csv"].place is None
 
 
-def test_a_table_without_its_columns_is_refused_with_those_it_has(tmp_path: Path) -> None:
+def test_a_table_without_the_needed_columns_is_refused_with_a_list_of_its_columns(tmp_path: Path) -> None:
     table = tmp_path / "names.csv"
     table.write_text("log,actuator\n", encoding="utf-8")
     with pytest.raises(HydrostateError, match="must have a column 'file', it has log, actuator"):
@@ -125,7 +125,7 @@ def test_dates_with_dots_have_the_day_first() -> None:
     assert (first.date, first.day, second.place) == ("2026-11-02", "2026-11-02", (first.place or 0.0) + 1.0)
 
 
-def test_a_date_of_a_clock_that_was_never_set_places_no_log() -> None:
+def test_a_date_years_away_from_the_others_excludes_its_log() -> None:
     files = [f"P_2026-11-{day}.csv" for day in range(10, 22)]
     wrong = ["P_1970-01-01.csv"]
     found = by_pattern([*files, *wrong], "{actuator}_{date}.csv")
@@ -136,6 +136,6 @@ def test_a_date_of_a_clock_that_was_never_set_places_no_log() -> None:
     assert "its date 2062-11-01 is years away" in late.problem
 
 
-def test_a_fleet_that_stood_still_for_years_has_no_wrong_dates() -> None:
+def test_a_gap_of_ten_years_within_a_fleet_does_not_exclude_logs() -> None:
     files = [f"P_{year}-11-{day}.csv" for year in (2016, 2026) for day in range(10, 14)]
     assert {one.actuator for one in by_pattern(files, "{actuator}_{date}.csv").values()} == {"P"}

@@ -35,7 +35,7 @@ def actuator(leakages: Any, maintained: tuple[float, ...] = (), **more: Any) -> 
 GROWING = 1.0 + 0.05 * np.arange(30)
 
 
-def test_an_actuator_that_grows_towards_its_limit_is_in_alarm_before_it_is_past() -> None:
+def test_leakage_that_grows_towards_its_limit_raises_an_alarm_before_the_limit() -> None:
     row = actuator(GROWING)
     assert (row.last.state, row.state) == ("within", "alarm")
     assert row.outlook is not None
@@ -52,7 +52,7 @@ def test_an_actuator_that_grows_towards_its_limit_is_in_alarm_before_it_is_past(
         ("P-1_{}.csv", r"limit in \d+ logs \(\d+ to \d+\)"),  # names with running hours
     ],
 )
-def test_a_forecast_is_told_in_dates_where_logs_have_them_and_holds_the_crossing(name: str, words: str) -> None:
+def test_a_forecast_contains_the_true_crossing_and_uses_dates_if_logs_are_dated(name: str, words: str) -> None:
     files = [name.format(place + 1) for place in range(18)]
     rows = [store_row(file, 1.0 + 0.09 * place, 0.2) for place, file in enumerate(files)]
     (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
@@ -65,7 +65,7 @@ def test_a_forecast_is_told_in_dates_where_logs_have_them_and_holds_the_crossing
     assert whole_dates(row.outlook.when(0, 4)) in page
 
 
-def test_what_has_been_past_its_limit_since_a_log_says_so_even_if_its_logs_are_few() -> None:
+def test_the_outlook_of_few_logs_gives_since_when_the_limit_is_passed() -> None:
     files = [f"P-1_2026070{day}.csv" for day in range(1, 7)]
     rows = [store_row(file, 1.0 if place < 4 else 3.6) for place, file in enumerate(files)]
     (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
@@ -79,21 +79,21 @@ def test_what_has_been_past_its_limit_since_a_log_says_so_even_if_its_logs_are_f
     assert always.words == "past the limit in every log"
 
 
-def test_an_actuator_that_rests_is_in_no_alarm() -> None:
+def test_constant_leakage_raises_no_alarm() -> None:
     row = actuator(np.full(30, 1.5))
     assert row.state == "within"
     assert row.outlook is not None
     assert row.outlook.words == "no certain growth"
 
 
-def test_few_logs_have_no_outlook_and_a_repair_makes_them_few() -> None:
+def test_few_logs_give_no_outlook_and_only_logs_after_a_repair_count() -> None:
     assert actuator(GROWING[:3]).outlook is None
     repaired = actuator(GROWING, maintained=(27.0,)).outlook
     assert repaired is not None
     assert repaired.words == "too few logs"
 
 
-def test_the_line_follows_a_lasting_change_from_its_first_log_on() -> None:
+def test_the_trend_line_follows_a_lasting_change_from_its_first_log() -> None:
     outlook = actuator([1.0] * 6 + [2.0] * 5).outlook
     assert outlook is not None
     # up to two logs after the change, it might be chance
@@ -103,13 +103,13 @@ def test_the_line_follows_a_lasting_change_from_its_first_log_on() -> None:
     assert levels[-1] == outlook.trend.level[0]
 
 
-def test_what_is_past_its_limit_says_so() -> None:
+def test_the_outlook_of_growing_leakage_gives_the_log_at_which_the_limit_was_passed() -> None:
     outlook = actuator(1.0 + 0.1 * np.arange(30)).outlook
     assert outlook is not None
     assert outlook.words == "past the limit since 21"
 
 
-def test_an_alarm_without_certain_growth_says_that_the_trend_is_past_the_limit() -> None:
+def test_without_certain_growth_the_outlook_is_that_the_trend_is_past_the_limit() -> None:
     row = actuator([3.4, 3.2] * 14 + [2.8])
     assert (row.last.state, row.state) == ("open", "alarm")
     assert row.outlook is not None
@@ -117,11 +117,11 @@ def test_an_alarm_without_certain_growth_says_that_the_trend_is_past_the_limit()
     assert row.outlook.words == "the trend is past the limit"
 
 
-def test_logs_without_a_verdict_play_no_part() -> None:
+def test_logs_without_a_verdict_give_no_outlook() -> None:
     assert outlook_of(actuator(GROWING, outcome="mismatch").logs, "leakage_flow") is None
 
 
-def test_logs_between_two_conditions_are_part_of_the_trend_and_may_raise_the_alarm() -> None:
+def test_logs_between_two_conditions_count_in_the_trend_and_can_raise_the_alarm() -> None:
     row = actuator(GROWING, outcome="mismatch", found_condition=None, against=between(0.5, 0.0))
     assert row.outlook is not None
     assert len(row.outlook.logs) == 30
@@ -129,7 +129,7 @@ def test_logs_between_two_conditions_are_part_of_the_trend_and_may_raise_the_ala
     assert "<h1>P-1: nearing a limit (leakage between none and minor).</h1>" in actuator_page(row, {})
 
 
-def test_a_page_tells_logs_that_have_no_place_in_the_trend() -> None:
+def test_the_page_counts_logs_without_a_reliable_severity() -> None:
     logs = actuator(GROWING).logs
     lost = replace(logs[3], state="unknown")
     page = actuator_page(ActuatorRow("P-1", (*logs[:3], lost, *logs[4:])), {})
@@ -137,7 +137,7 @@ def test_a_page_tells_logs_that_have_no_place_in_the_trend() -> None:
     assert "relied on" not in actuator_page(actuator(GROWING), {})
 
 
-def test_the_level_of_a_trend_has_its_date_where_the_newest_log_has_no_place_in_it() -> None:
+def test_the_level_of_a_trend_is_dated_if_the_newest_log_is_not_part_of_it() -> None:
     logs = actuator(GROWING[:5]).logs
     lost = replace(logs[-1], state="unknown")
     assert ", as of 4" not in actuator_page(ActuatorRow("P-1", logs), {})
@@ -146,13 +146,13 @@ def test_the_level_of_a_trend_has_its_date_where_the_newest_log_has_no_place_in_
     assert page.count(", as of 3") == 2  # one for leakage, one for bulk modulus
 
 
-def test_an_actuator_without_any_severity_has_a_page_that_says_why() -> None:
+def test_the_page_of_an_actuator_without_severities_gives_the_reason_of_each_log() -> None:
     page = actuator_page(actuator(GROWING[:5], outcome="failed", found_condition=None, reason="no time"), {})
     assert page.count("no time") == 5
     assert "When a limit is reached" not in page
 
 
-def test_a_chart_shows_the_limit_and_no_forecast_that_would_flatten_the_logs() -> None:
+def test_the_chart_range_includes_the_limit_but_not_the_whole_forecast() -> None:
     page = actuator_page(actuator(1.0 + 0.1 * np.arange(10)), {})
     low, high = json.loads(re.findall(r'"ends": ?(\[[^]]*\])', page)[0])
     assert low < 1.0
@@ -182,7 +182,7 @@ def abscissa_of(page: str) -> dict[str, Any]:
     return json.loads(data)["x"]
 
 
-def test_charts_of_dated_logs_have_dates_and_go_on_to_where_a_limit_may_be_reached() -> None:
+def test_charts_of_dated_logs_have_a_date_axis_that_extends_to_a_forecast_crossing() -> None:
     grows, rests = (abscissa_of(actuator_page(weekly(one), {})) for one in (1.0 + 0.1 * np.arange(12), np.ones(12)))
     assert grows["label"] == rests["label"] == "date"
     assert rests["count"] == 12 + 5
@@ -194,13 +194,13 @@ def test_charts_of_dated_logs_have_dates_and_go_on_to_where_a_limit_may_be_reach
     assert (undated["label"], undated["dates"], undated["start"]) == ("number of the log", False, 1.0)
 
 
-def test_logs_of_one_day_are_numbered_since_an_axis_of_dates_has_no_hours() -> None:
+def test_logs_of_a_single_day_are_numbered_instead_of_dated() -> None:
     files = [f"P-1_2026-01-05_{hour:02d}-00.csv" for hour in range(12)]
     logs = log_rows([store_row(file, 1.0) for file in files], by_pattern(files, "{actuator}_{date}.csv"), {})
     assert not abscissa_of(actuator_page(actuator_rows(logs)[0], {}))["dates"]
 
 
-def test_logs_that_are_dated_without_an_hour_have_no_forecast_with_one() -> None:
+def test_the_forecast_of_logs_dated_by_day_has_no_time_of_day() -> None:
     row = weekly(1.0 + 0.18 * np.arange(12), std=0.01)
     assert row.outlook is not None
     assert row.outlook.left is not None
@@ -208,7 +208,7 @@ def test_logs_that_are_dated_without_an_hour_have_no_forecast_with_one() -> None
     assert row.outlook.when(0, 4) == "23 March 2026"
 
 
-def test_a_severity_that_recedes_from_its_limit_has_no_date_at_which_it_reaches_it() -> None:
+def test_a_severity_that_recedes_from_its_limit_has_no_forecast_date() -> None:
     """Before, reversed futures gave a pressure that fell by 1 % per log a limit reached in "2029 to 2038"."""
     outlook = outlook_of(weekly(1.0 + 2.0 * np.exp(-np.arange(12) / 4.0), std=0.01).logs, "leakage_flow")
     assert outlook is not None
@@ -217,7 +217,7 @@ def test_a_severity_that_recedes_from_its_limit_has_no_date_at_which_it_reaches_
     assert (outlook.when(1, 3), outlook.when(0, 4)) == ("not within sight", "not within sight")
 
 
-def test_what_decides_is_read_first_and_logs_lead_to_their_pages() -> None:
+def test_the_deciding_severity_is_listed_first_and_logs_link_to_their_pages() -> None:
     row = actuator(1.0 + 0.1 * np.arange(30))
     page = actuator_page(row, {"P-1_28.csv": "logs/28", "P-1_29.csv": "logs/29"})
     stiffness_decides = actuator_page(weekly(np.ones(12)), {})
@@ -228,25 +228,25 @@ def test_what_decides_is_read_first_and_logs_lead_to_their_pages() -> None:
     assert '<td class="name" data-head="log">P-1_27.csv</td>' in page
 
 
-def test_no_line_ends_within_a_date() -> None:
+def test_dates_on_the_page_do_not_break_across_lines() -> None:
     page = actuator_page(weekly([1.0] * 6 + [4.0] * 6), {})
     assert 'past the limit since <span class="date">2026-02-16</span>.</p>' in page
 
 
-def test_a_limit_that_the_last_logs_are_past_is_reached_whatever_the_trend_says() -> None:
+def test_a_limit_passed_by_the_last_logs_is_reached_even_with_the_trend_within_it() -> None:
     page = actuator_page(weekly([1.0] * 8 + [4.0] * 2), {})
     assert "still within it: log again" in page
     assert page.count(">reached</td>") == 2
 
 
-def test_a_repair_is_named_on_the_page() -> None:
+def test_the_page_names_the_repair_from_which_a_trend_restarts() -> None:
     page = actuator_page(actuator(GROWING, maintained=(9.5,)), {})
     assert "Every severity is followed from the log of 10 on, after a repair." in page
     few = actuator_page(actuator(GROWING, maintained=(27.0,)), {}).replace("\N{NO-BREAK SPACE}", " ")
     assert re.search("no forecast yet, since it needs 4 logs, and there are [23] since the trend restarted", few)
 
 
-def test_a_lasting_change_is_no_repair() -> None:
+def test_a_lasting_change_is_not_called_a_repair() -> None:
     page = actuator_page(actuator([1.0] * 15 + [2.0] * 15), {})
     assert "Leakage is followed from the log of 15 on, after a lasting change." in page
 
@@ -286,7 +286,7 @@ def test_the_page_of_an_actuator_works_in_a_browser(browser: Any, tmp_path: Path
     page.close()
 
 
-def test_a_last_log_past_the_limit_beside_a_trend_within_it_says_so_and_what_to_do() -> None:
+def test_a_last_log_past_the_limit_with_the_trend_within_it_asks_for_another_log() -> None:
     """Before, the page said "past the limit" beside a level far within it."""
     leaks = np.append(np.full(12, 1.2), 6.0)
     row = actuator(leaks)
@@ -297,7 +297,7 @@ def test_a_last_log_past_the_limit_beside_a_trend_within_it_says_so_and_what_to_
     assert "still within" not in actuator_page(actuator(np.full(12, 6.0)), {})
 
 
-def test_each_of_the_last_logs_has_the_severity_that_was_its_worst() -> None:
+def test_each_of_the_last_logs_is_listed_with_its_worst_severity() -> None:
     page = actuator_page(actuator(np.append(np.full(5, 1.2), 6.0)), {})
     worst = re.findall(r'<td data-head="worst">(.*?)</td>', page)
     assert [one.split()[0] for one in worst] == ["leakage", *5 * ["bulk"]]

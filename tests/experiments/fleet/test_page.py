@@ -26,13 +26,13 @@ def page_of(count: int, links: bool = False) -> str:
     return fleet_page(found, {found[0].name: "pages/first.html"} if links else {}, "hall")
 
 
-def test_the_page_says_how_many_are_sick_and_with_which_to_begin() -> None:
+def test_the_page_counts_actuators_past_a_limit_and_names_those_to_begin_with() -> None:
     page = page_of(9)
     assert "<h1>2 of 9 actuators are past a limit.</h1>" in page
     assert "Start with P-5, P-1." in page
 
 
-def test_an_actuator_that_is_named_like_an_erratum_is_no_link_to_one() -> None:
+def test_an_actuator_named_like_an_erratum_is_not_linked_to_one() -> None:
     files = ["P1_1.csv", "E9_1.csv"]
     rows = log_rows([store_row(file, 4.0) for file in files], by_pattern(files, "{actuator}_{date}.csv"), {})
     page = fleet_page(actuator_rows(rows), {}, "hall")
@@ -41,7 +41,7 @@ def test_an_actuator_that_is_named_like_an_erratum_is_no_link_to_one() -> None:
     assert 'id="errata"' not in page
 
 
-def test_actuators_that_near_a_limit_are_in_the_title_and_named_where_none_is_past_one() -> None:
+def test_the_title_counts_actuators_near_a_limit_and_names_them_if_none_is_past_one() -> None:
     def row(name: str, state: str) -> ActuatorRow:
         (log,) = log_rows([store_row(f"{name}.csv", 1.0)], {}, {})
         made = ActuatorRow(name, (log,))
@@ -58,7 +58,7 @@ def test_actuators_that_near_a_limit_are_in_the_title_and_named_where_none_is_pa
     assert sickest_of([sick, near]) == ["C"]
 
 
-def test_paper_lists_what_is_not_sound_and_counts_the_rest() -> None:
+def test_the_printed_page_lists_faulty_actuators_and_counts_the_rest() -> None:
     def paper(**counts: int) -> tuple[int, str]:
         found: list[ActuatorRow] = []
         for state in STATES:
@@ -82,7 +82,7 @@ def test_paper_lists_what_is_not_sound_and_counts_the_rest() -> None:
     assert paper(within=30, failed=2) == (2, "Not listed on paper: 30 within limits.")
 
 
-def test_many_actuators_without_a_verdict_put_the_rig_file_in_doubt() -> None:
+def test_many_actuators_without_a_verdict_lead_to_a_hint_on_the_rig_file() -> None:
     def rows(unknown: int) -> list[ActuatorRow]:
         outcomes = ["mismatch"] * unknown + ["ok"] * (8 - unknown)
         return actuator_rows(
@@ -95,7 +95,7 @@ def test_many_actuators_without_a_verdict_put_the_rig_file_in_doubt() -> None:
     assert title_of(rows(3)) == "None of 8 actuators is past a limit; 3 have no verdict."
 
 
-def test_an_outlook_is_no_better_known_than_the_last_log() -> None:
+def test_an_actuator_whose_last_log_is_unknown_has_no_forecast() -> None:
     files = [f"A_{place}.csv" for place in range(6)]
     rows = [store_row(file, 3.6) for file in files[:5]]
     rows.append(store_row(files[5], 3.6, outcome="mismatch", found_condition=None, reason="the pump is worn"))
@@ -104,7 +104,7 @@ def test_an_outlook_is_no_better_known_than_the_last_log() -> None:
     assert (state, outlook, left) == ("unknown", "no verdict since 5", None)
 
 
-def test_what_cannot_be_read_is_no_actuator_within_limits() -> None:
+def test_actuators_without_a_readable_log_are_not_counted_in_the_title() -> None:
     def title(*outcomes: str) -> str:
         rows = [store_row(f"{i}.csv", 1.0, outcome=one) for i, one in enumerate(outcomes)]
         return fleet_page(actuator_rows(log_rows(rows, {}, {})), {}, "hall").split("<h1>")[1].split("</h1>")[0]
@@ -114,7 +114,7 @@ def test_what_cannot_be_read_is_no_actuator_within_limits() -> None:
     assert title("failed", "failed") == "No log could be read."
 
 
-def test_pages_of_a_store_wait_for_no_plotting_library() -> None:
+def test_fleet_pages_import_neither_matplotlib_nor_scipy() -> None:
     code = (
         "import sys\nimport experiments.fleet.log_pages\nimport experiments.fleet.page\n"
         "print(sorted({'matplotlib', 'scipy', 'faults.diagnosis'} & set(sys.modules)))"
@@ -123,14 +123,14 @@ def test_pages_of_a_store_wait_for_no_plotting_library() -> None:
     assert done.stdout.splitlines() == ["[]"]
 
 
-def test_a_page_has_relative_links_and_no_folder() -> None:
+def test_a_fleet_page_has_relative_links_and_shows_no_folder() -> None:
     page = page_of(30, links=True)
     assert "pages/first.html" in page
     assert "/private" not in page
     assert "file:" not in page
 
 
-def test_why_a_log_was_not_read_is_told_without_its_folder() -> None:
+def test_the_reason_of_an_unreadable_log_is_shown_without_its_folder() -> None:
     row = store_row(
         "a.csv", 1.0, outcome="failed", quantities=None, found_condition=None, reason="/private/a.csv: no time"
     )
@@ -139,7 +139,7 @@ def test_why_a_log_was_not_read_is_told_without_its_folder() -> None:
     assert "/private" not in page
 
 
-def test_amounts_of_a_model_that_does_not_fit_are_not_shown() -> None:
+def test_severities_of_a_model_that_does_not_fit_are_not_shown() -> None:
     row = store_row(
         "a.csv", 9.0, outcome="mismatch", found_condition=None, reason="the pump is worn; in none of the nine"
     )
@@ -148,7 +148,7 @@ def test_amounts_of_a_model_that_does_not_fit_are_not_shown() -> None:
     assert (state, said, worst, share) == ("unknown", "the pump is worn; in none of the nine", "", None)
 
 
-def test_a_log_between_two_conditions_is_shown_by_its_levels_and_amounts() -> None:
+def test_a_log_between_two_conditions_is_shown_with_its_levels_and_severity() -> None:
     row = store_row("a.csv", 1.8, outcome="mismatch", found_condition=None, against=between(0.5, 1.0))
     (found,) = actuator_rows(log_rows([row], {}, {}))
     _, state, said, worst, share, *_ = row_cells(found)
@@ -173,7 +173,7 @@ def test_logs_that_could_not_be_read_are_listed_with_the_reason() -> None:
     assert "Logs that could not be read" not in fleet_page(actuator_rows(log_rows(rows[:1], named, {})), {}, "hall")
 
 
-def test_paper_hides_the_rows_beyond_those_that_the_page_says_it_lists(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_printed_page_hides_rows_beyond_the_stated_number(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subject, "MOST_LISTED", 3)
     bad: dict[str, Any] = {"outcome": "failed", "found_condition": None, "reason": "no time"}
     rows = [store_row(f"A_{number}.csv", 1.0, **bad) for number in range(4)]
@@ -187,13 +187,13 @@ def test_the_page_says_how_many_rows_have_a_page() -> None:
     assert "1 of 9 rows have a page" in page_of(9, links=True).replace("\n", " ")
 
 
-def test_the_page_explains_each_state_by_the_word_that_it_shows() -> None:
+def test_the_page_explains_each_state_under_its_displayed_name() -> None:
     page = page_of(2)
     told = set(re.findall(r"<dt>([^<]+)</dt>", page))
     assert told >= set(STATES.values()) - {"within limits"}
 
 
-def test_a_name_cannot_end_the_script_that_holds_it() -> None:
+def test_a_file_name_with_a_script_tag_is_escaped_in_the_page() -> None:
     row = store_row("a</script><b>.csv", 1.0)
     page = fleet_page(actuator_rows(log_rows([row], {}, {})), {}, "hall")
     assert "</script><b>" not in page
@@ -264,7 +264,7 @@ def test_the_last_row_is_reached_by_scrolling(page: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [390, 768, 1280])
-def test_a_table_says_how_many_rows_are_below_and_at_the_last_one_none(page: Any, width: int) -> None:
+def test_a_table_counts_the_rows_below_until_the_last_is_reached(page: Any, width: int) -> None:
     from playwright.sync_api import expect  # not every developer has it
 
     page.set_viewport_size({"width": width, "height": 800})
@@ -275,7 +275,7 @@ def test_a_table_says_how_many_rows_are_below_and_at_the_last_one_none(page: Any
 
 
 @pytest.mark.slow
-def test_axe_finds_nothing_serious_and_the_page_fits_a_phone(page: Any) -> None:
+def test_the_page_is_accessible_and_fits_a_phone(page: Any) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
     found = axe.Axe().run(page).response["violations"]
     assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
@@ -284,7 +284,7 @@ def test_axe_finds_nothing_serious_and_the_page_fits_a_phone(page: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [390, 768, 1280])
-def test_a_long_condition_and_a_reason_are_read_whole(browser: Any, tmp_path: Path, width: int) -> None:
+def test_a_long_condition_and_a_long_reason_are_not_cut_off(browser: Any, tmp_path: Path, width: int) -> None:
     reason = "differential_pressure_pa is missing in 900 of 1000 samples"
     rows = [
         store_row("P-12_2026-11-22.csv", 4.0, found_condition="minor_leakage_minor_friction"),
@@ -312,7 +312,7 @@ def in_sight(page: Any, heading: str) -> bool:
 
 
 @pytest.mark.slow
-def test_a_phone_shows_what_is_worst_and_a_wide_screen_every_column(page: Any) -> None:
+def test_a_phone_shows_the_most_important_columns_and_a_wide_screen_further_ones(page: Any) -> None:
     assert all(in_sight(page, heading) for heading in ("found", "worst", "of the limit", "outlook"))
     assert page.locator(".window").evaluate("one => one.scrollWidth <= one.clientWidth")
     page.set_viewport_size({"width": 1280, "height": 800})

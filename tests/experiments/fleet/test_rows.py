@@ -17,7 +17,9 @@ from tests.experiments.fleet.conftest import beside, between, store_row
     ("leakage", "spread", "state"),
     [(1.2, 0.2, "within"), (2.9, 0.2, "open"), (3.1, 0.2, "likely"), (3.5, 0.2, "over")],
 )
-def test_the_state_says_where_value_and_interval_lie(leakage: float, spread: float, state: str) -> None:
+def test_the_state_follows_from_value_and_interval_relative_to_the_limit(
+    leakage: float, spread: float, state: str
+) -> None:
     (row,) = log_rows([store_row("a.csv", leakage, spread)], {}, {})
     assert row.state == state
     assert row.worst is not None
@@ -30,11 +32,11 @@ def test_bulk_modulus_is_bad_below_its_limit() -> None:
     assert row.amounts["bulk_modulus"].share > 1.0
 
 
-def test_a_limit_of_the_reader_replaces_that_of_the_store() -> None:
+def test_a_given_limit_replaces_the_limit_of_the_store() -> None:
     assert log_rows([store_row("a.csv", 2.0)], {}, {"leakage_flow": 1.5})[0].state == "over"
 
 
-def test_what_has_no_verdict_is_not_called_sound() -> None:
+def test_logs_without_a_verdict_have_the_state_unknown_or_failed() -> None:
     unknown, failed = log_rows(
         [store_row("a.csv", 1.0, outcome="mismatch"), store_row("b.csv", 1.0, outcome="failed", quantities=None)],
         {},
@@ -43,7 +45,7 @@ def test_what_has_no_verdict_is_not_called_sound() -> None:
     assert (unknown.state, failed.state) == ("unknown", "failed")
 
 
-def test_a_log_between_two_conditions_has_severities_and_is_never_surely_past_a_limit() -> None:
+def test_a_log_between_two_conditions_is_at_most_probably_past_a_limit() -> None:
     doubt: dict[str, Any] = {"outcome": "mismatch", "found_condition": None, "reason": "none of the nine"}
     rows = [
         store_row("a.csv", 1.8, against=between(0.5, 0.0), **doubt),
@@ -54,7 +56,7 @@ def test_a_log_between_two_conditions_has_severities_and_is_never_surely_past_a_
     assert [(one.state, one.told) for one in found] == [("open", True), ("likely", True), ("unknown", False)]
 
 
-def test_a_circuit_beside_the_nine_has_no_verdict_but_is_shown_and_named_if_few_are() -> None:
+def test_a_circuit_outside_the_nine_has_no_verdict_but_is_named_if_few_actuators_are() -> None:
     doubt: dict[str, Any] = {"outcome": "mismatch", "found_condition": None, "against": beside(1.25, 0.0)}
     files = [f"P-{number}_{place}.csv" for number in range(9) for place in range(5)]
     rows = [store_row(one, 4.0, **(doubt if one > "P-8_1.csv" else {})) for one in files]
@@ -80,13 +82,13 @@ def test_a_circuit_beside_the_nine_has_no_verdict_but_is_shown_and_named_if_few_
     assert "move their logs" in rig_hint(fleet([store_row(one, 4.0, **doubt) for one in files]))
 
 
-def test_a_log_against_which_more_speaks_than_its_size_has_no_severities() -> None:
+def test_an_intermediate_log_with_a_further_reason_against_it_is_unknown() -> None:
     against = json.dumps([*json.loads(between(0.5, 0.0)), {"code": "oil_soft", "data": {}}])
     (row,) = log_rows([store_row("a.csv", 9.0, outcome="mismatch", against=against)], {}, {})
     assert (row.state, row.told) == ("unknown", False)
 
 
-def test_a_log_whose_date_cannot_be_read_has_a_row_of_its_own_and_keeps_its_verdict() -> None:
+def test_a_log_with_an_unreadable_date_has_its_own_row_and_keeps_its_verdict() -> None:
     files = ["A_2026-99-01.csv", "A_2026-11-22.csv"]
     rows = [store_row(files[0], 4.0), store_row(files[1], 1.0)]
     logs = log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {})
@@ -99,16 +101,16 @@ def test_a_log_whose_date_cannot_be_read_has_a_row_of_its_own_and_keeps_its_verd
     assert "could not be read" not in page
 
 
-def test_of_another_kind_of_actuator_the_condition_decides() -> None:
+def test_the_state_of_another_kind_of_actuator_follows_from_its_condition() -> None:
     rows = [store_row("a.csv", 1.0, quantities=None, found_condition=name) for name in ("healthy", "cracked_flap")]
     assert [one.state for one in log_rows(rows, {}, {})] == ["within", "over"]
 
 
-def test_estimates_and_simulated_runs_are_no_logs_of_a_fleet() -> None:
+def test_estimates_and_simulated_runs_are_left_out_of_a_fleet() -> None:
     assert log_rows([store_row("a.csv", 1.0, verb="estimate"), store_row("", 1.0)], {}, {}) == []
 
 
-def test_the_sickest_actuators_come_first_by_their_last_log() -> None:
+def test_actuators_are_sorted_by_the_severity_of_their_last_log() -> None:
     files = {"A_3.csv": 3.4, "A_1.csv": 1.0, "B_1.csv": 9.0, "B_2.csv": 1.1, "C_1.csv": 4.4, "D_1.csv": 3.1}
     rows = [store_row(file, leakage) for file, leakage in files.items()]
     found = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
@@ -116,11 +118,11 @@ def test_the_sickest_actuators_come_first_by_their_last_log() -> None:
     assert [len(one.logs) for one in found] == [1, 2, 1, 2]
 
 
-def test_a_log_that_could_not_be_read_does_not_hide_the_one_before() -> None:
+def test_the_state_of_an_actuator_is_that_of_its_last_readable_log() -> None:
     rows = [store_row("A_1.csv", 3.6), store_row("A_2.csv", 1.0, outcome="failed", quantities=None)]
     (row,) = actuator_rows(log_rows(rows, by_pattern(["A_1.csv", "A_2.csv"], "{actuator}_{date}.csv"), {}))
     assert row.last.state == "over"
 
 
-def test_every_state_has_words() -> None:
+def test_every_state_has_a_description() -> None:
     assert all(words for words in STATES.values())

@@ -35,7 +35,7 @@ def stopped(found: Identified, inputs: tuple[str, ...]) -> Identified:
     return replace(found, model=FreeRunModel(inputs, "y", 0.01, "output-error", by, dynamics), gain_std=())
 
 
-def test_one_input_has_the_types_of_a_linear_model_where_stops_leave_no_deviations(found: Identified) -> None:
+def test_a_model_with_end_stops_has_the_same_entry_types_as_a_linear_one(found: Identified) -> None:
     linear, limited = column_entries(found), column_entries(stopped(found, ("u",)))
     assert limited["dc_gain"] == {"value": pytest.approx(2.0), "std": None}
     assert limited["numerator"] == [0.0, 0.0, 0.2]
@@ -46,13 +46,13 @@ def test_one_input_has_the_types_of_a_linear_model_where_stops_leave_no_deviatio
     assert gains_shown(limited) == "2"
 
 
-def test_several_inputs_say_that_there_is_no_deviation(found: Identified) -> None:
+def test_gains_of_several_inputs_are_given_without_standard_deviation(found: Identified) -> None:
     limited = column_entries(stopped(found, ("u", "v")))
     assert limited["dc_gain"] == {"value": pytest.approx([2.0, 2.0]), "std": None}
     assert gains_shown(limited) == "2 2"
 
 
-def test_a_mismatch_gives_the_note_that_speaks_against_the_model(found: Identified) -> None:
+def test_the_message_of_a_mismatch_contains_the_note_against_the_model(found: Identified) -> None:
     swapped = IdentificationCode.SWAPPED.note(input="u", output="y", back=0.1, left=0.4)
     other = IdentificationCode.NO_NONLINEARITY.note(output="y")
     doubted = replace(found, notes=(other, swapped), sound=False)

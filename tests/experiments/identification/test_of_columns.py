@@ -37,7 +37,7 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["identify", *map(str, arguments)])
 
 
-def test_several_logs_give_one_model_an_output_that_is_tested_and_simulated_again(
+def test_several_logs_give_one_model_per_output_that_is_validated_and_simulated(
     logs: list[Path], tmp_path: Path
 ) -> None:
     saved, table = tmp_path / "model.json", tmp_path / "sim.csv"
@@ -84,7 +84,7 @@ def test_a_test_log_that_is_too_short_is_named(logs: list[Path], tmp_path: Path)
     assert f"--validate {short} {why}" in said
 
 
-def test_a_reference_is_what_a_loop_is_identified_from(logs: list[Path]) -> None:
+def test_a_closed_loop_is_identified_from_its_reference(logs: list[Path]) -> None:
     form = ("--input", "flow", "--output", "heat", "--order", 1, "--delay", 1)
     ran = run(logs[0], *form, "--reference", "Valve [%],load", "--json")
     (one,) = json.loads(ran.stdout)
@@ -95,7 +95,7 @@ def test_a_reference_is_what_a_loop_is_identified_from(logs: list[Path]) -> None
     assert "neither input nor output" in refused.output
 
 
-def test_a_state_space_is_one_model_of_all_outputs(logs: list[Path], tmp_path: Path) -> None:
+def test_a_state_space_model_has_all_outputs(logs: list[Path], tmp_path: Path) -> None:
     saved = tmp_path / "model.json"
     channels = ("--input", "Valve [%],load", "--output", "flow,heat", "--structure", "state-space", "--order", 3)
     ran = run(*logs[:2], *channels, "--delay", 1, "--validate", logs[2], "--out", saved, "--json")
@@ -133,13 +133,15 @@ def test_a_state_space_is_one_model_of_all_outputs(logs: list[Path], tmp_path: P
         (("--simulate", "none.json"), "none.json: the model cannot be read"),
     ],
 )
-def test_a_slip_is_answered_with_a_sentence(arguments: tuple[object, ...], said: str, logs: list[Path]) -> None:
+def test_wrong_options_are_refused_with_a_precise_message(
+    arguments: tuple[object, ...], said: str, logs: list[Path]
+) -> None:
     ran = run(logs[0], *arguments)
     assert ran.exit_code == 2
     assert said in " ".join(ran.output.split())
 
 
-def test_a_model_at_a_longer_sample_time(logs: list[Path]) -> None:
+def test_option_resample_gives_a_model_of_longer_sample_time(logs: list[Path]) -> None:
     form = ("--input", "load", "--output", "heat", "--order", 1, "--delay", 1)
     ran = run(logs[0], *form, "--resample", 0.06, "--json")
     (one,) = json.loads(ran.stdout)
@@ -209,7 +211,7 @@ def test_a_saved_model_is_simulated_on_each_log_and_each_run_is_written_to_its_o
     assert [path.name for path in (tmp_path / "alone").iterdir()] == ["run.csv"]
 
 
-def test_a_saved_model_is_asked_for_one_of_its_outputs_or_for_columns_of_other_names(
+def test_a_saved_model_simulates_one_of_its_outputs_or_columns_of_other_names(
     logs: list[Path], saved: Path, tmp_path: Path
 ) -> None:
     (one,) = json.loads(run(logs[1], "--simulate", saved, "--output", "heat", "--json").stdout)
@@ -226,7 +228,7 @@ def test_a_saved_model_is_asked_for_one_of_its_outputs_or_for_columns_of_other_n
         assert "the model goes from 2 inputs to 2 outputs, got columns for" in " ".join(refused.output.split())
 
 
-def test_names_of_a_saved_model_are_its_own_in_whatever_order_they_are_asked_for(logs: list[Path], saved: Path) -> None:
+def test_a_saved_model_matches_columns_by_name_in_any_order(logs: list[Path], saved: Path) -> None:
     """Before, with the outputs in reverse order, each model was compared with the column of the other output."""
     (one,) = json.loads(run(logs[1], "--simulate", saved, "--json").stdout)
     turned = ("--input", "load,Valve [%]", "--output", "heat,flow")
@@ -235,7 +237,7 @@ def test_names_of_a_saved_model_are_its_own_in_whatever_order_they_are_asked_for
     assert other["outputs"] == one["outputs"][::-1]
 
 
-def test_a_frequency_response_has_one_input(logs: list[Path], tmp_path: Path) -> None:
+def test_a_frequency_response_of_two_inputs_is_refused(logs: list[Path], tmp_path: Path) -> None:
     channels = ("--input", "Valve [%],load", "--output", "heat", "--order", 1, "--delay", 1)
     ran = run(logs[0], *channels, "--response", tmp_path / "response.png")
     assert ran.exit_code == 2
@@ -243,7 +245,7 @@ def test_a_frequency_response_has_one_input(logs: list[Path], tmp_path: Path) ->
     assert not (tmp_path / "response.png").exists()
 
 
-def test_a_backlash_is_said_with_its_interval(tmp_path: Path) -> None:
+def test_a_backlash_is_reported_with_the_interval_of_its_half_width(tmp_path: Path) -> None:
     data = logged(PLANTED[2], 1)
     table = pd.DataFrame({"u": data.u[0][:, 0], "y": data.y[0]}, index=0.01 * np.arange(data.y[0].size))
     table.to_csv(tmp_path / "play.csv", index_label="time_s")
@@ -258,7 +260,7 @@ def test_a_backlash_is_said_with_its_interval(tmp_path: Path) -> None:
     assert model.nonlinearity["half_width"] == width
 
 
-def test_an_output_without_its_sign_is_said_at_the_output(tmp_path: Path) -> None:
+def test_an_output_measured_without_its_sign_is_modelled_as_an_absolute_value(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     u = np.repeat(rng.uniform(-1.5, 1.5, 60), 5)
     y = np.abs(filtered([0.0, 0.2], [1.0, -1.6, 0.8], u)) + 0.01 * rng.normal(size=300)
@@ -301,11 +303,11 @@ def test_a_test_log_whose_input_leaves_the_fitted_range_is_named(tmp_path: Path)
         ({"value": [1.0, 2.0], "std": [0.1, 3.0]}, "1 ± 0.1 undetermined"),
     ],
 )
-def test_a_gain_less_than_its_deviation_is_not_shown_as_a_number(gain: dict[str, object] | None, shown: str) -> None:
+def test_a_gain_smaller_than_its_deviation_is_shown_as_undetermined(gain: dict[str, object] | None, shown: str) -> None:
     assert gains_shown({"dc_gain": gain, "notes": []}) == shown
 
 
-def test_a_gain_that_means_nothing_is_not_shown_as_a_number() -> None:
+def test_the_gain_of_an_integrating_model_is_shown_as_undetermined() -> None:
     assert gains_shown({"dc_gain": {"value": 9.7e6, "std": 1e6}, "notes": [{"code": "integrates"}]}) == "undetermined"
 
 

@@ -44,7 +44,7 @@ def tables() -> Mapping[str, pd.DataFrame]:
     }
 
 
-def test_the_library_that_ships_is_shown_and_its_json_holds_the_models() -> None:
+def test_the_library_of_the_package_is_shown_and_json_contains_its_models() -> None:
     ran = CliRunner().invoke(app, ["library", "--json"])
     assert ran.exit_code == 0, ran.output
     entries = json.loads(ran.stdout)
@@ -54,7 +54,7 @@ def test_the_library_that_ships_is_shown_and_its_json_holds_the_models() -> None
     assert all(name in shown for name in CONDITIONS)
 
 
-def test_a_file_that_is_no_library_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_library_is_refused(tmp_path: Path) -> None:
     (tmp_path / "other.json").write_text("{}")
     ran = CliRunner().invoke(app, ["library", str(tmp_path / "other.json")])
     assert ran.exit_code == 2
@@ -64,7 +64,9 @@ def test_a_file_that_is_no_library_is_refused(tmp_path: Path) -> None:
     assert "shown or built" in both.output
 
 
-def test_output_error_runs_free_best_and_predicts_one_step_worst(tables: Mapping[str, pd.DataFrame]) -> None:
+def test_output_error_fits_best_in_free_run_and_worst_in_one_step_prediction(
+    tables: Mapping[str, pd.DataFrame],
+) -> None:
     for _, rows in tables["structures"].groupby("condition"):
         found = rows.set_index("structure")
         assert found.loc["output-error", "behind_percent"] < 0.5
@@ -72,21 +74,23 @@ def test_output_error_runs_free_best_and_predicts_one_step_worst(tables: Mapping
         assert found["one_step_percent"].idxmin() == "output-error"
 
 
-def test_the_rivals_criteria_look_above_25_hz(tables: Mapping[str, pd.DataFrame]) -> None:
+def test_other_structures_weigh_frequencies_above_25_hz_more_than_output_error(
+    tables: Mapping[str, pd.DataFrame],
+) -> None:
     weight = tables["structures"].pivot_table(index="condition", columns="structure", values="weight_above_percent")
     ours = weight.pop("output-error")
     assert ours.between(3.0, 10.0).all()  # the share above 25 Hz of the spectrum of a 50 ms clock
     assert (weight.min(axis=1) > 2.0 * ours).all()
 
 
-def test_the_sentences_say_what_the_table_holds(tables: Mapping[str, pd.DataFrame]) -> None:
+def test_the_sentences_quote_the_table_of_structures(tables: Mapping[str, pd.DataFrame]) -> None:
     who, _, why = structure_sentences(tables["structures"])
     arx = tables["structures"].set_index(["structure", "condition"]).loc["ARX"]
     assert f"{arx['behind_percent'].min():.2g} to {arx['behind_percent'].max():.2g} points behind" in who
     assert f"ARX has {arx['weight_above_percent'].mean():.0f} %" in why
 
 
-def test_the_page_needs_nothing_beside_it_and_shows_every_figure(tables: Mapping[str, pd.DataFrame]) -> None:
+def test_the_page_contains_every_figure_and_loads_nothing(tables: Mapping[str, pd.DataFrame]) -> None:
     figures = figure_files(LIBRARY_FIGURES, tables)
     facts = {**tables, **LIBRARY.facts(tables, Seeded(7)), "settings": Seeded(7)}
     page = render_page(LIBRARY.template, facts, LIBRARY.columns, figures)
@@ -98,7 +102,7 @@ def test_the_page_needs_nothing_beside_it_and_shows_every_figure(tables: Mapping
 
 
 @pytest.mark.slow
-def test_what_is_built_is_a_library_with_its_report(tmp_path: Path) -> None:
+def test_the_study_writes_a_valid_library_and_its_report(tmp_path: Path) -> None:
     report = run_study(LIBRARY, Seeded(2024), tmp_path / "library", Console(stderr=True, quiet=True))
     models = read_library(report.with_name("library.json"))
     assert list(models) == list(CONDITIONS)

@@ -29,7 +29,7 @@ from plant.errors import HydrostateError
 from plant.sensors.sensors import BENCH
 
 
-def test_the_library_that_ships_has_nine_stable_models_with_both_covariances() -> None:
+def test_the_library_of_the_package_has_nine_stable_models_with_both_covariances() -> None:
     models = read_library()
     assert list(models) == list(CONDITIONS)
     for model in models.values():
@@ -48,7 +48,7 @@ def test_gains_fall_with_leakage_and_with_friction() -> None:
     assert (gains < 1.1 * 5.57e-7 / 1.52e-3).all()  # the pump's flow limits the piston's velocity
 
 
-def test_nothing_jumps_as_the_printed_models_do() -> None:
+def test_models_of_the_library_jump_less_than_the_printed_ones() -> None:
     """Errata E15: eight of nine printed models do not roll off; ours jump if the piston sticks, by half as much."""
     table, moving = library_table(read_library()), library_table(read_library(which="around_mean"))
     assert (moving["jump_ratio"].abs() < 0.15).all()
@@ -56,7 +56,7 @@ def test_nothing_jumps_as_the_printed_models_do() -> None:
     assert (table["published_jump_ratio"] > 0.7).sum() == 8
 
 
-def test_the_printed_digits_leave_the_normal_gain_open() -> None:
+def test_the_printed_digits_leave_the_normal_gain_uncertain_by_a_factor_of_20() -> None:
     """Errata E14."""
     low, high = printed_model("normal")["dc_gain"]["interval"]
     assert low == pytest.approx(3.2e-5, rel=0.02)
@@ -64,7 +64,7 @@ def test_the_printed_digits_leave_the_normal_gain_open() -> None:
     assert printed_model("normal")["pole_half_width"][0][0] > 0.0
 
 
-def test_a_written_library_is_read_back_in_every_bit(tmp_path: Path) -> None:
+def test_a_written_library_is_read_back_exactly(tmp_path: Path) -> None:
     models = read_library()
     entries = {name: {"model": model.to_dict()} for name, model in models.items()}
     (tmp_path / "library.json").write_text(library_text({"format": FORMAT, "version": VERSION, "conditions": entries}))
@@ -82,13 +82,13 @@ def test_a_written_library_is_read_back_in_every_bit(tmp_path: Path) -> None:
         json.dumps({"format": FORMAT}),
     ],
 )
-def test_another_file_is_no_library(text: str, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_library_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "file.json").write_text(text)
     with pytest.raises(HydrostateError, match="library"):
         read_library(tmp_path / "file.json")
 
 
-def test_passes_have_no_mean_and_alternate_without_changing_sign() -> None:
+def test_velocities_of_both_passes_have_zero_mean_and_correlate_with_speed() -> None:
     speeds, velocities = circuit_passes(CircuitParameters(), "normal", np.random.default_rng(1), duration=8.0)
     assert len(speeds) == len(velocities) == 2
     assert all(abs(one.mean()) < 1e-9 for one in velocities)
@@ -96,13 +96,13 @@ def test_passes_have_no_mean_and_alternate_without_changing_sign() -> None:
     assert all(np.corrcoef(u, v)[0, 1] > 0.5 for u, v in zip(speeds, velocities, strict=True))
 
 
-def test_a_literal_five_hertz_clock_is_the_worst_at_25_hz() -> None:
+def test_a_clock_of_5_hz_has_the_largest_error_at_25_hz() -> None:
     table = clock_table(read_library(which="around_mean")["major_leakage"], Limits(125.66), 1)
     assert table["at_25_hz"].idxmax() == "200 ms"
     assert table.loc[MADE_FOR, "at_25_hz"] < 1.1 * table["at_25_hz"].min()
 
 
-def test_roots_of_both_stand_side_by_side_with_what_they_may_be_off_by() -> None:
+def test_poles_and_zeros_are_listed_with_the_published_ones_and_their_spread() -> None:
     roots = root_table(read_library())
     printed = roots[
         (roots["condition"] == "minor_friction") & (roots["source"] == "Table 6") & (roots["kind"] == "pole")
@@ -112,7 +112,7 @@ def test_roots_of_both_stand_side_by_side_with_what_they_may_be_off_by() -> None
     assert set(roots["condition"]) == set(CONDITIONS)
 
 
-def test_a_higher_order_never_fits_several_short_experiments_worse() -> None:
+def test_a_higher_order_never_fits_worse() -> None:
     condition = "major_leakage_major_friction"
     u, y = circuit_passes(CircuitParameters(), condition, stream(2024, "order", condition), duration=8.0)
     table = order_table(u, y, 1e-3)
@@ -120,7 +120,7 @@ def test_a_higher_order_never_fits_several_short_experiments_worse() -> None:
 
 
 @pytest.mark.parametrize("drive", ["prbs", "steps"])
-def test_the_library_alone_tells_85_percent_of_circuit_logs_apart(drive: str) -> None:
+def test_the_library_classifies_at_least_85_percent_of_circuit_logs(drive: str) -> None:
     """Section 6's rule, least RMSE in velocity, on circuits spread about the nine, without seeds of the library."""
     library, right = read_library(), []
     for seed in range(3):
@@ -132,7 +132,7 @@ def test_the_library_alone_tells_85_percent_of_circuit_logs_apart(drive: str) ->
     assert np.mean(right) >= 0.85  # 108 of 108 and 101 of 108 were measured over twelve seeds
 
 
-def test_study_library_and_diagnose_hold_the_same_models() -> None:
+def test_the_study_and_diagnose_use_the_models_of_the_library() -> None:
     shown = {name: model.to_dict() for name, model in read_library().items()}
     of_study, _ = identification_study(EhaParameters(), replace(StudySettings(), identification_duration=1.0))
     options = {"no_pressure": False, "transfer_functions": True, "seed": 1}
@@ -145,7 +145,7 @@ def test_study_library_and_diagnose_hold_the_same_models() -> None:
 @pytest.mark.parametrize(
     ("asked", "of_paper", "of_another"), [(None, True, False), (False, False, False), (True, True, True)]
 )
-def test_transfer_functions_are_left_out_where_they_are_refused(
+def test_transfer_functions_of_another_rig_are_prepared_only_on_request(
     asked: bool | None,
     of_paper: bool,
     of_another: bool,
@@ -167,7 +167,7 @@ def test_a_model_of_the_library_is_a_transfer_function_of_python_control() -> No
 
 
 @pytest.mark.slow
-def test_the_library_is_what_the_study_builds() -> None:
+def test_the_study_rebuilds_the_gains_of_the_library() -> None:
     stored = read_library()
     built = build_library(2024)["conditions"]
     for name, model in stored.items():

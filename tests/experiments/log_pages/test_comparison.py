@@ -18,7 +18,7 @@ def result(value: float | None, half: float | None, **more: Any) -> dict[str, An
 @pytest.mark.parametrize(
     ("second", "half", "changed"), [(13.0, 1.0, True), (11.0, 1.0, False), (7.0, 1.0, True), (13.0, 4.0, False)]
 )
-def test_a_quantity_changed_where_the_interval_of_the_difference_leaves_out_zero(
+def test_a_quantity_has_changed_if_the_interval_of_the_difference_excludes_zero(
     second: float, half: float, changed: bool
 ) -> None:
     (row,) = compared(result(10.0, 1.0), result(second, half))
@@ -28,7 +28,7 @@ def test_a_quantity_changed_where_the_interval_of_the_difference_leaves_out_zero
     assert row["changed"] is changed
 
 
-def test_a_lopsided_interval_gives_a_lopsided_difference() -> None:
+def test_an_asymmetric_interval_gives_an_asymmetric_interval_of_the_difference() -> None:
     """Before, leakage of 6 L/min (3 to 16) less one of 6.04 was said to be between -7 and 6."""
     wide = {"value": 6.0, "std": None, "ci95": [3.0, 16.0], "unit": "N"}
     (row,) = compared(result(6.0, 0.02), {"file": "b", "message": "so", "severity": {"added_friction": wide}})
@@ -38,7 +38,7 @@ def test_a_lopsided_interval_gives_a_lopsided_difference() -> None:
 
 
 @pytest.mark.parametrize("second", [result(None, None), result(12.0, None), {"file": "b", "message": "no"}])
-def test_without_both_intervals_nothing_is_said_to_have_changed(second: dict[str, Any]) -> None:
+def test_a_quantity_without_both_intervals_has_not_changed(second: dict[str, Any]) -> None:
     (row,) = compared(result(10.0, 1.0), second)
     assert (row["interval"], row["changed"]) == (None, False)
 
@@ -52,7 +52,7 @@ def test_quantities_of_every_kind_of_result_are_found() -> None:
     }
 
 
-def test_the_page_of_two_logs_shows_readers_units_and_no_tag_of_a_name() -> None:
+def test_the_page_of_two_logs_uses_mpa_and_escapes_file_names() -> None:
     bulk = {"value": 2.0e8, "std": 1e6, "ci95": [1.98e8, 2.02e8]}
     first = {"file": "<img src=x>.csv", "message": "one", "bulk_modulus_pa": bulk, "probabilities": {"normal": 0.9}}
     lower = {"value": 1.5e8, "std": 1e6, "ci95": [1.48e8, 1.52e8]}
@@ -72,7 +72,7 @@ def test_logs_without_a_quantity_in_common_are_not_called_alike() -> None:
     assert "&lt; 0.1" not in page  # the second log was not diagnosed, so no condition has a small probability
 
 
-def test_logs_of_one_name_are_told_apart_and_a_date_that_is_none_leaves_a_log_without_an_actuator() -> None:
+def test_logs_of_equal_name_are_shown_with_their_ids_and_an_invalid_date_is_accepted() -> None:
     row = {"outcome": "ok", "found_condition": "normal"}
     rows = [("0" * 16, "run.csv", row), ("1" * 16, "run.csv", row), ("2" * 16, "P_2026-99-99.csv", row)]
     page = fleet_view([*rows, ("3" * 16, "P_2026-01-02.csv", row)], "{actuator}_{date}.csv", {}, {}, "here")
@@ -83,7 +83,7 @@ def test_logs_of_one_name_are_told_apart_and_a_date_that_is_none_leaves_a_log_wi
     assert "None of 4 actuators" in page
 
 
-def test_the_title_says_what_the_second_log_has_more_of_and_less() -> None:
+def test_the_title_lists_higher_and_lower_quantities_of_the_second_log() -> None:
     first = {"file": "a", "message": "so", "quantities": {n: {"value": 1.0, "std": 0.01, "unit": ""} for n in "abc"}}
     values = {"a": 2.0, "b": 0.5, "c": 0.2}
     second = {**first, "quantities": {name: {"value": one, "std": 0.01, "unit": ""} for name, one in values.items()}}
@@ -105,7 +105,7 @@ HALF_MINOR = AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.0).to_d
         ({}, "Major leakage in both logs."),
     ],
 )
-def test_the_heading_of_two_diagnoses_says_which_conditions_they_found(second: dict[str, Any], title: str) -> None:
+def test_the_heading_of_two_diagnoses_names_both_conditions(second: dict[str, Any], title: str) -> None:
     first = result(2.0, 0.1, condition="major_leakage", unknown=False, probabilities={"major_leakage": 1.0}, notes=[])
     first |= {"reasons": []}
     page = compare_view(first, {**first, **second})
@@ -113,7 +113,7 @@ def test_the_heading_of_two_diagnoses_says_which_conditions_they_found(second: d
     assert '<p class="answer">No certain difference between the two logs.</p>' in page
 
 
-def test_a_comparison_leads_to_both_logs_back_and_the_other_way_round() -> None:
+def test_a_comparison_links_to_both_logs_the_list_and_the_reverse_comparison() -> None:
     one = {"file": "a.csv", "message": "so"}
     page = compare_view(one, {**one, "file": "b.csv"}, ("0" * 16, "1" * 16))
     for link in (f"logs/{'0' * 16}", f"logs/{'1' * 16}", ".", f"compare?first={'1' * 16}&amp;second={'0' * 16}"):
@@ -121,7 +121,7 @@ def test_a_comparison_leads_to_both_logs_back_and_the_other_way_round() -> None:
     assert "href" not in compare_view(one, one).split("<nav")[0].split("<header")[1]
 
 
-def test_a_diagnosis_is_told_in_the_words_of_its_page_and_an_unknown_one_with_a_warning() -> None:
+def test_a_comparison_uses_the_verdicts_of_the_pages_and_warns_of_an_unknown_one() -> None:
     leaks = {
         "file": "a.csv",
         "message": "so",
@@ -140,7 +140,7 @@ def test_a_diagnosis_is_told_in_the_words_of_its_page_and_an_unknown_one_with_a_
     assert page.count("Do not rely on its numbers") == 1
 
 
-def test_an_actuator_of_several_logs_has_a_page_with_its_last_logs() -> None:
+def test_an_actuator_with_several_logs_has_a_page_that_lists_its_last_logs() -> None:
     row = {"outcome": "ok", "found_condition": "normal"}
     rows = [(f"{day}" * 16, f"P 1_2026-01-0{day}.csv", row) for day in (1, 2)]
     named = ("{actuator}_{date}.csv", dict[str, float](), dict[str, list[float]]())
@@ -156,7 +156,7 @@ def test_an_actuator_of_several_logs_has_a_page_with_its_last_logs() -> None:
     assert actuator_view(rows, *named, "none") == ""
 
 
-def test_what_has_no_value_is_shown_as_missing_and_what_is_no_quantity_is_left_out() -> None:
+def test_a_quantity_without_a_value_has_no_difference_and_other_entries_are_omitted() -> None:
     first = {
         "file": "a.csv",
         "message": "one",

@@ -46,11 +46,11 @@ def found(**changes: object) -> Finding:
         ),
     ],
 )
-def test_the_title_promises_no_more_than_was_found(changes: dict[str, object], title: str) -> None:
+def test_the_title_states_result_gate_and_outcome(changes: dict[str, object], title: str) -> None:
     assert _title(found(**changes)).startswith(title)
 
 
-def test_a_page_opens_with_the_first_of_several_reasons() -> None:
+def test_the_opening_sentence_gives_the_first_reason_and_counts_the_others() -> None:
     whole = "Bulk modulus 144 MPa; do not rely on it: A is off; B is off; C is off"
     assert _shortened(whole, ["A is off.", "B is off", "C is off"]).endswith("A is off; 2 more reasons stand below")
     assert _shortened("do not rely on it: A is off; B is off", ["A is off", "B is off"]).endswith(
@@ -59,7 +59,7 @@ def test_a_page_opens_with_the_first_of_several_reasons() -> None:
     assert _shortened("do not rely on it: A is off", ["A is off"]) == "do not rely on it: A is off"
 
 
-def test_a_condition_that_the_gate_doubts_is_said_with_the_doubt() -> None:
+def test_a_condition_that_the_gate_doubts_is_reported_with_the_reason() -> None:
     named = {"condition": "minor_leakage", "probabilities": {"minor_leakage": 0.9}}
     assert "not to be relied on" not in message_of(found(**named))
     said = message_of(found(**named, gate=DOUBTED))
@@ -67,7 +67,7 @@ def test_a_condition_that_the_gate_doubts_is_said_with_the_doubt() -> None:
     assert f"not to be relied on: {EstimateCode.DIVERGED.note()}" in said
 
 
-def test_bulk_modulus_is_given_in_mpa_and_no_number_breaks_before_its_power_of_ten() -> None:
+def test_bulk_modulus_is_shown_in_mpa_and_numbers_contain_no_breaking_space() -> None:
     row = _row("bulk_modulus", Quantity.normal(2.07e8, 1e6, "Pa"))
     assert (row["quantity"], row["value"], row["interval"]) == ("bulk modulus [MPa]", "207.0", "205.0 to 209.0")
     leak = _row("leakage_coefficient", Quantity.normal(2.5e-11, 1e-13, "m^3/(s Pa)"))
@@ -77,12 +77,12 @@ def test_bulk_modulus_is_given_in_mpa_and_no_number_breaks_before_its_power_of_t
     assert small["interval"].split(" ")[1] == "to"
 
 
-def test_what_the_title_says_is_not_said_again() -> None:
+def test_the_part_of_the_message_that_the_title_gives_is_not_repeated() -> None:
     assert _beyond("Air in the oil: 4.9 %.", "air in the oil: 4.9 %; leakage is normal") == "leakage is normal"
     assert _beyond("Found: minor leakage.", "minor leakage; it grows") == "minor leakage; it grows"
     assert _beyond("No fault.", "no fault") == ""
 
 
-def test_a_share_is_told_in_percent() -> None:
+def test_a_fraction_is_shown_in_percent() -> None:
     row = _row("air_fraction", Quantity.normal(0.049, 1e-5, "1"))
     assert (row["quantity"], row["value"], row["interval"]) == ("air fraction [%]", "4.900", "4.898 to 4.902")

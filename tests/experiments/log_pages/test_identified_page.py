@@ -63,7 +63,9 @@ def seen(model: LinearModel = TRUTH, held: float | None = 95.0, **changes: Any) 
         ),
     ],
 )
-def test_the_title_is_the_verdict(view: Callable[[], IdentifiedView], usable: bool, title: str) -> None:
+def test_the_title_says_whether_the_model_is_usable(
+    view: Callable[[], IdentifiedView], usable: bool, title: str
+) -> None:
     one = view()
     assert is_usable(one) == usable
     assert title_of(one).startswith(title)
@@ -72,7 +74,7 @@ def test_the_title_is_the_verdict(view: Callable[[], IdentifiedView], usable: bo
     assert any(said.startswith("Diagnosis") for said in bad)
 
 
-def test_a_model_of_an_output_that_wanders_is_used_whatever_its_free_run_fits() -> None:
+def test_a_model_of_a_wandering_output_is_usable_for_changes_despite_a_poor_free_run() -> None:
     view = seen(held=-30.0, fit_percent=-5.0, notes=[{"code": "random_walk"}])
     assert is_usable(view)
     assert title_of(view).endswith("(linear, order 2), fitted to changes: the output also wanders by itself.")
@@ -82,7 +84,7 @@ def test_a_model_of_an_output_that_wanders_is_used_whatever_its_free_run_fits() 
     assert "no better than the mean" not in answer_of(view)
 
 
-def test_a_right_model_may_be_used_for_control_and_a_wrong_one_not() -> None:
+def test_controller_design_is_recommended_for_a_right_model_and_not_for_a_wrong_one() -> None:
     for model, allowed in ((TRUTH, True), (replace(TRUTH, numerator=1.6 * TRUTH.numerator), False)):
         view = seen(model)
         good, bad = uses_of(view, measured_curve(view))
@@ -91,7 +93,7 @@ def test_a_right_model_may_be_used_for_control_and_a_wrong_one_not() -> None:
 
 
 @pytest.mark.parametrize("kind", ["cut-off", "stops"])
-def test_a_model_with_limits_is_not_compared_with_a_response_that_holds_them(kind: str) -> None:
+def test_a_model_with_limits_is_not_compared_with_the_measured_response(kind: str) -> None:
     view = seen(replace(TRUTH, numerator=1.6 * TRUTH.numerator), nonlinearity={"kind": kind})
     good, bad = uses_of(view, measured_curve(view))
     assert not any("differs from the measured response" in said for said in [*good, *bad])
@@ -100,7 +102,7 @@ def test_a_model_with_limits_is_not_compared_with_a_response_that_holds_them(kin
     assert "The output also has limits" in control_text(view)
 
 
-def test_what_tests_and_gain_forbid_is_said() -> None:
+def test_failed_residual_tests_and_an_uncertain_gain_restrict_the_use_of_the_model() -> None:
     tests = {"whiteness_p": 1e-9, "cross_correlation_p": 1e-9}
     view = seen(validation=tests, dc_gain={"value": 1e-4, "std": 1e-4, "ci95": (-1e-4, 3e-4)})
     _, bad = uses_of(view, None)
@@ -113,7 +115,7 @@ def test_what_tests_and_gain_forbid_is_said() -> None:
     )
 
 
-def test_lines_of_noise_that_are_large_by_chance_are_not_known() -> None:
+def test_the_known_band_of_a_response_excludes_lines_of_noise() -> None:
     rng = np.random.default_rng(2)
     frequency = np.linspace(0.1, 100.0, 1000)
     noise = rng.standard_normal(1000) + 1j * rng.standard_normal(1000)
@@ -131,7 +133,9 @@ def taken(page: str) -> dict[str, str]:
     return {name: base64.b64decode(content).decode() for name, content in found}
 
 
-def test_the_model_is_taken_along_whole_and_without_the_place_of_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_model_can_be_downloaded_completely_and_without_the_folder_of_the_log(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     page = identified_page(seen())
     assert "/private/place" not in page
     files = taken(page)
@@ -148,7 +152,7 @@ def test_the_model_is_taken_along_whole_and_without_the_place_of_the_log(monkeyp
     assert names == {"inputs": ["motor_speed_rad_s"], "outputs": ["velocity_m_s"]}
 
 
-def test_a_model_in_continuous_time_is_taken_along_as_such_and_its_step_has_a_band() -> None:
+def test_a_continuous_time_model_is_downloaded_as_such_and_its_step_response_has_a_band() -> None:
     model = LinearModel(np.array([30.0]), np.array([1.0, 100.0]), 1e-3, "u", "y", continuous=True, dead_time=0.002)
     view = seen(replace(TRUTH))
     fitted = replace(model, structure="continuous", fit_percent=90.0, rmse=0.1, covariance=np.diag([0.01, 0.1]))
@@ -195,7 +199,7 @@ def columns(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ),
     ],
 )
-def test_models_between_any_columns_have_a_page(
+def test_each_output_of_models_between_any_columns_has_a_page(
     columns: Path, tmp_path: Path, arguments: tuple[str, ...], names: list[str], words: tuple[str, ...]
 ) -> None:
     form = ("--order", "1", "--delay", "1", "--html", str(tmp_path / "page.html"))
@@ -209,7 +213,7 @@ def test_models_between_any_columns_have_a_page(
     assert model.output in arguments[3]
 
 
-def test_a_response_of_nothing_draws_no_dots() -> None:
+def test_a_response_below_its_noise_draws_no_dots() -> None:
     view = seen()
     charts = bode_charts(view, None, "run")
     assert charts is not None

@@ -26,7 +26,7 @@ def filtered() -> BulkModulusEstimate:
     return estimate_bulk_modulus(log(), EhaParameters(), form="pressure", method="ekf")
 
 
-def test_it_says_what_was_believed_and_whether_to_believe_it() -> None:
+def test_the_figure_names_log_form_and_gate_and_labels_its_axes() -> None:
     found = filtered()
     figure = draw_innovations(found, "run.csv")
     title = figure.get_suptitle()
@@ -37,13 +37,13 @@ def test_it_says_what_was_believed_and_whether_to_believe_it() -> None:
     assert figure.axes[-1].get_xlabel() == "time [s]"
 
 
-def test_it_is_written_as_a_png_and_nothing_is_left_beside_it(tmp_path: Path) -> None:
+def test_the_figure_is_written_as_a_single_png_file(tmp_path: Path) -> None:
     write_innovations(filtered(), "run.csv", tmp_path / "run.png")
     assert [path.name for path in tmp_path.iterdir()] == ["run.png"]
     assert (tmp_path / "run.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_a_log_that_was_fitted_has_no_track_to_draw() -> None:
+def test_the_innovations_of_a_fitted_log_cannot_be_drawn() -> None:
     fitted = estimate_bulk_modulus(log(), EhaParameters())
     with pytest.raises(ValueError, match="fitted, not filtered"):
         draw_innovations(fitted, "run.csv")

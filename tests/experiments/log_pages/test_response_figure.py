@@ -7,7 +7,7 @@ from estimation.identification.signals.measured_response import MeasuredResponse
 from experiments.log_pages.response_figure import _draw_response
 
 
-def test_phase_is_drawn_where_it_is_known_and_noise_turns_it_no_further() -> None:
+def test_phase_is_drawn_only_at_known_frequencies_and_not_unwrapped_through_noise() -> None:
     """Unwrapped through noise, the phase of this plant rose by more than 1000 degrees."""
     frequency, rng = np.linspace(0.1, 50.0, 500), np.random.default_rng(1)
     noisy = frequency > 25.0

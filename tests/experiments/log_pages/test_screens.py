@@ -34,7 +34,7 @@ def shown(said: dict[str, Any] | None = None, **entry: Any) -> str:
         (None, None, ["-"]),
     ],
 )
-def test_the_ends_of_an_interval_are_told_apart(
+def test_interval_ends_have_enough_digits_to_differ(
     value: float | None, ends: list[float] | None, words: list[str]
 ) -> None:
     found = shown(value=value, ci95=ends)
@@ -42,13 +42,13 @@ def test_the_ends_of_an_interval_are_told_apart(
     assert "with rig error" not in found
 
 
-def test_the_interval_with_rig_error_stands_beside_the_other() -> None:
+def test_the_interval_with_rig_error_has_its_own_column() -> None:
     found = shown(value=1e4, ci95=[9999.3, 10000.7], ci95_total=[9000.0, 11000.0])
     assert "with rig error" in found
     assert "9000 to 11000" in found
 
 
-def test_a_diagnosis_says_how_probable_its_condition_is_and_what_to_do_next() -> None:
+def test_a_diagnosis_is_shown_with_its_probability_and_the_next_step() -> None:
     said = {
         "condition": "leaking",
         "probabilities": {"normal": 0.127, "leaking": 0.873},
@@ -60,7 +60,7 @@ def test_a_diagnosis_says_how_probable_its_condition_is_and_what_to_do_next() ->
     assert "probability" not in shown({**said, "condition": None}, value=1e4, ci95=None)
 
 
-def test_a_share_is_told_in_percent_and_a_pressure_as_gauges_show_it() -> None:
+def test_fractions_are_shown_in_percent_and_pressures_in_mpa() -> None:
     entries = {
         "air_fraction": {"value": 0.049, "ci95": [0.0489, 0.0491], "unit": "1"},
         "bulk_modulus": {"value": 2.07e8, "ci95": [2.06e8, 2.08e8], "unit": "Pa"},
@@ -71,12 +71,12 @@ def test_a_share_is_told_in_percent_and_a_pressure_as_gauges_show_it() -> None:
     assert oil == ["bulk", "modulus", "207", "206", "to", "208", "MPa"]
 
 
-def test_a_name_with_an_end_of_line_stays_on_one_line() -> None:
+def test_a_file_name_with_a_line_break_is_shown_on_one_line() -> None:
     (line,) = messages_shown([{"file": "a\nb: no fault.csv", "message": "said", "advice": []}])
     assert line == "a\\x0ab: no fault.csv: said"
 
 
-def test_each_reason_against_a_result_has_its_line_once_and_of_many_the_rest_are_counted() -> None:
+def test_each_reason_has_one_line_and_reasons_beyond_the_maximum_are_counted() -> None:
     many = [f"reason {number}" for number in range(MOST_REASONS + 2)]
     told = {"message": "; ".join(["no value", *many, "nothing else"]), "gate": {"reasons": many}, "reasons": many[:1]}
     first, *lines = told_in_lines(told, "run.csv").splitlines()
@@ -87,7 +87,7 @@ def test_each_reason_against_a_result_has_its_line_once_and_of_many_the_rest_are
     ]
 
 
-def test_a_message_that_is_a_reason_alone_is_one_line() -> None:
+def test_a_message_with_one_reason_alone_is_one_line() -> None:
     alone = {"message": "the sign is wrong", "gate": {"reasons": ["the sign is wrong."]}}
     assert told_in_lines(alone, "run.csv") == "run.csv: the sign is wrong"
     both = {"message": "the sign is wrong; it lags", "gate": {"reasons": ["the sign is wrong", "it lags"]}}

@@ -28,7 +28,7 @@ def test_the_study_writes_its_report_with_every_figure_and_erratum(tmp_path: Pat
     assert regression["relative_difference"].max() < 1e-6
 
 
-def test_a_file_in_the_way_is_refused(tmp_path: Path) -> None:
+def test_a_file_in_place_of_the_result_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("mine", encoding="utf-8")
     done = RUN.invoke(app, ["motor-paper", "--out", str(tmp_path / "taken")])
     assert done.exit_code == 2

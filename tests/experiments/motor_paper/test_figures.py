@@ -40,7 +40,7 @@ def test_the_bode_plot_shows_each_model_s_gain(tables: Tables, drawn: Mapping[st
         assert shown[str(name)].tolist() == rows["gain"].tolist()
 
 
-def test_poles_right_of_zero_are_those_of_the_printed_signs(drawn: Mapping[str, Figure]) -> None:
+def test_only_the_equations_as_printed_have_unstable_poles(drawn: Mapping[str, Figure]) -> None:
     crosses = [line for line in drawn["poles"].axes[0].lines if line.get_marker() == "x"]
     unstable = [line.get_label() for line in crosses if float(np.asarray(line.get_xdata())[0]) > 0.0]
     assert len(crosses) == 3
@@ -53,7 +53,7 @@ def test_a_loop_s_step_is_drawn_in_micrometres(tables: Tables, drawn: Mapping[st
         np.testing.assert_array_equal(shown[str(name)], 1e6 * rows["output_m"])
 
 
-def test_each_law_s_hysteresis_has_a_curve_a_frequency(tables: Tables, drawn: Mapping[str, Figure]) -> None:
+def test_each_hysteresis_law_has_one_curve_per_frequency(tables: Tables, drawn: Mapping[str, Figure]) -> None:
     for panel, law in enumerate(("mended", "printed")):
         rows = tables["hysteresis loops"].groupby("law").get_group(law)
         shown = curves(drawn["hysteresis_loops"], panel)
@@ -78,7 +78,7 @@ def test_residuals_of_every_reading_are_drawn(tables: Tables, drawn: Mapping[str
         assert np.concatenate([line.get_ydata() for line in marks]).tolist() == rows["residual"].tolist()
 
 
-def test_line_fits_are_of_the_reading_that_figure_12_has(tables: Tables, drawn: Mapping[str, Figure]) -> None:
+def test_line_fits_use_the_reading_of_figure_12(tables: Tables, drawn: Mapping[str, Figure]) -> None:
     rows = tables["regression residuals"].query("reading == 'anova'")
     shown = curves(drawn["line_fits"], 0)
     assert shown["Table 2"].tolist() == rows["flow"].tolist()

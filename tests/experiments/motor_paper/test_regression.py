@@ -21,13 +21,13 @@ from experiments.published import load
 from plant.errors import HydrostateError
 
 
-def test_figure_12_is_reproduced_in_all_its_figures() -> None:
+def test_every_number_of_figure_12_is_reproduced() -> None:
     table = anova_table()
     assert len(table) == 22
     assert table["relative_difference"].max() < 1e-6
 
 
-def test_figure_12_s_intervals_are_those_of_its_fit() -> None:
+def test_the_intervals_of_figure_12_are_those_of_its_regression() -> None:
     printed = [[-0.074924071, 0.07625904], [-0.001613371, 0.019799738], [2.389416288, 4.48304371]]
     assert fit(reading("anova")).conf_int().to_numpy() == pytest.approx(np.array(printed), rel=1e-6)
 
@@ -48,7 +48,7 @@ def test_the_other_readings_have_the_fits_of_the_errata(name: str, r_square: flo
     assert numbers["f"] == pytest.approx(f, rel=1e-8)
 
 
-def test_readings_change_only_what_they_say() -> None:
+def test_each_reading_changes_only_its_listed_cells() -> None:
     printed = load("table2")
     for name, changes in READINGS.items():
         changed = {(row, column) for row, column in np.argwhere((reading(name) != printed).to_numpy()).tolist()}
@@ -60,7 +60,7 @@ def test_an_unknown_reading_is_refused() -> None:
         reading("best")
 
 
-def test_deformation_fails_table_3s_own_rule_where_figure_12_was_made() -> None:
+def test_deformation_fails_the_rule_of_table_3_on_the_data_of_figure_12() -> None:
     table = decisions().set_index(["reading", "quantity"])
     assert table.loc[("anova", "P of deformation"), "decision"] == "remove"
     assert table.loc[("physical", "P of deformation"), "decision"] == "retain"
@@ -88,12 +88,12 @@ def test_the_probability_output_shows_which_flow_was_fitted() -> None:
     assert table.loc[table["reading"] == "anova", "sorted_flow"].tolist()[2] == 0.0868
 
 
-def test_flow_and_velocity_are_one_number_twice() -> None:
+def test_flow_and_velocity_are_the_same_data_and_the_claimed_fits_are_far_lower() -> None:
     table = circularity()
     assert table["r_square"].tolist()[0] > 0.99999
     claimed = table.loc[table["meaning"] == "what the text claims", "r_square"]
     assert claimed.tolist() == pytest.approx([0.729, 0.506], abs=5e-4)
 
 
-def test_the_table_says_flow_and_velocity() -> None:
+def test_table_2_has_columns_for_flow_and_velocity() -> None:
     assert {FLOW, VELOCITY} <= set(load("table2").columns)

@@ -28,7 +28,7 @@ def spectra() -> pd.DataFrame:
     return motor_spectra(MOTOR)
 
 
-def test_the_middle_electrodes_are_inflated_a_thousandfold(points: pd.DataFrame) -> None:
+def test_the_variance_inflation_of_the_middle_electrodes_exceeds_1000(points: pd.DataFrame) -> None:
     table = sensing_regressions(points).set_index("regressors")
     assert table.loc[WANTED, "largest_vif"] > 1000.0
     assert table.loc[WANTED, "smallest_coefficient"] < 0.0 < table.loc[WANTED, "largest_coefficient"]
@@ -42,12 +42,12 @@ def test_one_electrode_and_the_drive_explain_velocity(points: pd.DataFrame) -> N
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_no_seed_makes_the_paper_s_regression_good(seed: int) -> None:
+def test_the_paper_s_regression_predicts_poorly_for_every_seed(seed: int) -> None:
     table = sensing_regressions(operating_points(MOTOR, seed)).set_index("regressors")
     assert table.loc[WANTED, "predictive_r_square"] < 0.9 < table.loc[WORKING, "predictive_r_square"]
 
 
-def test_a_low_electrode_throws_the_paper_s_regression_beyond_the_velocity_itself(points: pd.DataFrame) -> None:
+def test_a_low_electrode_shifts_the_paper_s_regression_by_more_than_the_velocity(points: pd.DataFrame) -> None:
     table = sensing_faults(MOTOR, points).set_index("fault")
     low = table.loc["A4 reads 20 % low"]
     assert abs(low[WANTED]) > low["velocity_m_s"] > abs(low[WORKING])
@@ -60,13 +60,13 @@ def test_predictions_average_to_the_velocity(points: pd.DataFrame) -> None:
     assert means["fitted_m_s"].tolist() == pytest.approx(means["velocity_m_s"].tolist())
 
 
-def test_the_middle_has_odd_harmonics_only_and_the_outlet_has_even_ones(spectra: pd.DataFrame) -> None:
+def test_the_middle_electrode_has_odd_harmonics_and_the_outlet_flow_even_ones(spectra: pd.DataFrame) -> None:
     rows = spectra[spectra["peak_to_peak_v"] == 200.0].set_index(["signal", "harmonic"])["relative_percent"]
     assert rows["deflection of A4 [m]", 3] > 50.0 * rows["deflection of A4 [m]", 2]
     assert rows["outlet flow [m³/s]", 2] > 1.0
 
 
-def test_the_mean_flow_is_the_spectrum_s_first_line(spectra: pd.DataFrame) -> None:
+def test_the_zeroth_harmonic_of_the_outlet_flow_is_the_mean_flow(spectra: pd.DataFrame) -> None:
     rows = spectra[(spectra["signal"] == "outlet flow [m³/s]") & (spectra["harmonic"] == 0)]
     means = rows.set_index("peak_to_peak_v")["amplitude"]
     assert means.is_monotonic_increasing

@@ -18,7 +18,7 @@ from experiments.motor_paper.tables import (
 from experiments.published import MotorTableName, load
 
 
-def test_every_table_of_the_motor_loads() -> None:
+def test_every_table_of_the_motor_can_be_loaded() -> None:
     assert all(len(load(name)) for name in get_args(MotorTableName))
 
 
@@ -34,26 +34,26 @@ def test_no_other_reading_has_one_efficiency_of_0_850() -> None:
     assert works.tolist() == [True, False, False, False, False]
 
 
-def test_printed_errors_of_table_4_are_by_the_flow_meter() -> None:
+def test_printed_errors_of_table_4_are_relative_to_the_flow_meter() -> None:
     table = table_4()
     assert table["error_by_flowmeter_percent"].round(2).tolist() == table["error_percent"].tolist()
     assert (table["error_by_theory_percent"].round(2) != table["error_percent"]).all()
 
 
-def test_table_4s_theory_is_a_piston_of_38_mm_but_for_its_first_row() -> None:
+def test_the_theoretical_flow_of_table_4_fits_one_piston_area_except_in_row_1() -> None:
     table = table_4()
     off = (table["theory_ml_per_min"] / table["theoretical_flow_ml_per_min"] - 1.0).abs()
     assert off.tolist()[0] > 0.01
     assert (off[1:] < 1e-4).all()
 
 
-def test_table_2_obeys_17_and_18_and_neither_14_nor_15() -> None:
+def test_table_2_satisfies_equations_17_and_18_and_neither_14_nor_15() -> None:
     holds = relations().set_index("relation")["holds"]
     assert holds[[name for name in holds.index if "equation 17" in name or "equation 18" in name]].all()
     assert not holds[[name for name in holds.index if "equation 14" in name or "equation 15" in name]].any()
 
 
-def test_equation_18_gives_one_piston_but_for_row_4s_slip() -> None:
+def test_equation_18_gives_one_piston_area_except_in_row_4() -> None:
     area = table_2().set_index("row")["piston_area_cm2"]
     assert area.drop(4).tolist() == pytest.approx([3.7934] * 5, rel=1e-4)
     assert area[4] / 3.7934 - 1.0 == pytest.approx(-0.0024, abs=1e-4)
@@ -70,6 +70,6 @@ def test_the_published_velocity_does_not_follow_from_the_published_flow() -> Non
     assert pressure == pytest.approx(12.9, abs=0.05)
 
 
-def test_tables_1_and_5_stand_as_printed() -> None:
+def test_tables_1_and_5_are_shown_as_printed() -> None:
     assert table_1().drop(columns="remark").equals(load("table1_geometry"))
     assert table_5().drop(columns="most_power_w").equals(load("table5_actuators"))

@@ -20,12 +20,12 @@ from plant.motor_paper.vibration_model import VibrationParameters
 MODEL, DIAPHRAGM = VibrationParameters(), HysteresisParameters()
 
 
-def test_only_the_printed_signs_are_unstable() -> None:
+def test_only_the_equations_with_the_printed_signs_are_unstable() -> None:
     stable = pole_table(MODEL).groupby("model")["stable"].all()
     assert stable[~stable].index.tolist() == ["equations 1 and 2, as printed"]
 
 
-def test_nyquist_counts_what_the_closed_poles_say() -> None:
+def test_the_nyquist_count_equals_the_number_of_unstable_closed_loop_poles() -> None:
     table = margin_table(MODEL)
     assert (table["turns"] + table["open_unstable_poles"]).tolist() == table["closed_unstable_poles"].tolist()
 
@@ -43,18 +43,18 @@ def test_damping_halves_the_peak_and_stiffness_moves_it() -> None:
     assert table.loc[("load_stiffness", 2.0), "frequency_hz"] > table.loc[("load_stiffness", 1.0), "frequency_hz"]
 
 
-def test_sampled_figures_7_to_9_lie_on_the_exact_ones() -> None:
+def test_sampled_orders_in_figures_7_to_9_agree_with_the_exact_ones() -> None:
     last = figures_7_to_9().groupby("order").last()
     assert last["sampled_integral"].tolist() == pytest.approx(last["integral"].tolist(), rel=3e-3)
     assert last["sampled_derivative"].tolist() == pytest.approx(last["derivative"].tolist(), rel=1e-3)
 
 
-def test_oustaloups_states_draw_the_exact_response() -> None:
+def test_the_oustaloup_approximation_has_the_exact_gain() -> None:
     table = fractional_table(MODEL)
     assert (table["imitated_gain"] / table["gain"] - 1.0).abs().max() < 6e-3
 
 
-def test_the_mended_loop_is_the_same_at_every_frequency_and_the_printed_one_is_not() -> None:
+def test_the_width_of_the_mended_hysteresis_loop_does_not_depend_on_frequency() -> None:
     table = hysteresis_table(hysteresis_loops(DIAPHRAGM)).groupby("law")["width_percent"]
     assert table.max()["mended"] == pytest.approx(table.min()["mended"], rel=1e-9)
     assert table.max()["mended"] == pytest.approx(10.55, abs=0.01)
@@ -71,19 +71,19 @@ def runs() -> pd.DataFrame:
     return loop_runs(MODEL, 2024)
 
 
-def test_only_an_integral_leaves_no_error_and_the_derivative_settles_sooner(runs: pd.DataFrame) -> None:
+def test_integral_action_removes_the_steady_error_and_derivative_action_settles_sooner(runs: pd.DataFrame) -> None:
     table = loop_table(runs).set_index("controller")
     assert table.loc["P", "error_percent"] > 50.0
     assert table.loc[["PI", "PID"], "error_percent"].abs().max() < 0.5
     assert table.loc["PID", "settling_time_s"] < 0.3 * table.loc["PI", "settling_time_s"]
 
 
-def test_the_derivative_pays_in_noise(runs: pd.DataFrame) -> None:
+def test_derivative_action_amplifies_noise_above_1_khz(runs: pd.DataFrame) -> None:
     table = spectrum_table(runs)
     loudest = table[table["frequency_hz"] > 1e3].groupby("controller")["amplitude_n"].max()
     assert loudest["PID"] > 3.0 * loudest["PI"]
 
 
-def test_a_relay_finds_the_models_half_turn() -> None:
+def test_a_relay_test_finds_the_ultimate_gain_and_frequency_of_the_model() -> None:
     table = relay_table(MODEL).set_index("quantity")
     assert np.abs(table["relay"] / table["model"] - 1.0).max() < 0.03

@@ -78,7 +78,7 @@ def test_convergence_shows_every_first_guess_in_every_condition(drawn: Mapping[s
         assert firsts == starts
 
 
-def test_convergence_is_of_the_experiment_that_its_title_names(study: Found) -> None:
+def test_the_convergence_figure_draws_the_given_experiment(study: Found) -> None:
     with styled():
         figure = draw_convergence(OURS, study.series["convergence"], 2.07e8)
     line = max(figure.axes[0].lines, key=lambda curve: len(curve.get_xdata()))
@@ -99,19 +99,19 @@ def _only(estimates: pd.DataFrame, **changes: object) -> pd.DataFrame:
     return estimates[chosen].assign(**changes)
 
 
-def test_what_is_not_observable_is_said_in_words(study: Found) -> None:
+def test_estimates_that_are_not_observable_are_labelled_in_words(study: Found) -> None:
     rows = _only(study.tables["bulk_modulus"], outcome="not_observable", value_pa=np.nan, error_percent=np.nan)
     with styled():
         assert _texts(draw_estimates(rows, 2.07e8)).count("not observable") == len(CONDITIONS)
 
 
-def test_an_estimate_off_the_axis_says_how_far(study: Found) -> None:
+def test_an_estimate_off_the_axis_is_labelled_with_its_error(study: Found) -> None:
     rows = _only(study.tables["bulk_modulus"], outcome="ok", value_pa=0.2e8, error_percent=-90.0)
     with styled():
         assert _texts(draw_estimates(rows, 2.07e8)).count("off the axis: -90 %") == len(CONDITIONS)
 
 
-def test_a_filter_that_diverged_leaves_the_figures_standing(study: Found) -> None:
+def test_figures_are_drawn_even_if_every_filter_diverged(study: Found) -> None:
     table = study.tables["bulk_modulus"]
     rows = table[(table["plant"] == PRESSURE_SINE.plant) & (table["drive"] == PRESSURE_SINE.drive)].assign(
         outcome="diverged", value_pa=np.nan, error_percent=np.nan, filter_settled_at_pa=np.nan
@@ -124,7 +124,7 @@ def test_a_filter_that_diverged_leaves_the_figures_standing(study: Found) -> Non
     assert _texts(figure).count("diverged") == cells
 
 
-def test_confusions_write_the_counts() -> None:
+def test_the_confusion_figure_writes_counts_and_accuracy() -> None:
     matrix = pd.DataFrame(np.diag(np.arange(1, 10)), index=list(CONDITIONS), columns=list(CONDITIONS))
     matrix.iloc[2, 5] = 17
     summary = pd.DataFrame({"bank": ["a"], "variant": ["nominal"], "accuracy": [0.5]})
@@ -134,13 +134,13 @@ def test_confusions_write_the_counts() -> None:
     assert "50.0 % right" in figure.axes[0].get_title(loc="left")
 
 
-def test_scores_frame_the_smallest_of_each_row(study: Found, drawn: Mapping[str, Figure]) -> None:
+def test_the_scores_figure_frames_the_smallest_score_of_each_row(study: Found, drawn: Mapping[str, Figure]) -> None:
     axis = drawn["scores"].axes[0]
     framed = [(round(patch.get_y() + 0.5), round(patch.get_x() + 0.5)) for patch in axis.patches]
     assert framed == list(enumerate(study.tables["score_example"].to_numpy().argmin(axis=1)))
 
 
-def test_each_panel_of_singular_values_says_how_many_stand_above_its_noise(study: Found) -> None:
+def test_each_panel_of_singular_values_counts_those_above_its_noise(study: Found) -> None:
     order = study.series["order"]
     edges = {"hankel_floor": order["hankel"].nlargest(3).iloc[-1], "projected_floor": order["projected"].max() / 2.0}
     with styled():
@@ -152,7 +152,7 @@ def test_each_panel_of_singular_values_says_how_many_stand_above_its_noise(study
     ]
 
 
-def test_figures_leave_the_tables_as_they_were(study: Found) -> None:
+def test_drawing_figures_does_not_change_the_tables(study: Found) -> None:
     rows = _only(study.tables["bulk_modulus"])
     before = rows.copy(deep=True)
     with styled():
@@ -168,6 +168,6 @@ def test_the_truth_is_the_simulated_parameter(study: Found) -> None:
     assert "truth 150" in _texts(figure)
 
 
-def test_marks_of_one_row_are_spread_around_it() -> None:
+def test_marks_in_one_row_are_spread_evenly_around_it() -> None:
     assert spread_out(1, 0.5) == [0.0]
     assert sum(spread_out(7, 0.5)) == pytest.approx(0.0)

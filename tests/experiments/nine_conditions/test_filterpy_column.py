@@ -19,7 +19,7 @@ from plant.sensors.sensors import BENCH
 P = EhaParameters()
 
 
-def test_filterpy_gives_what_ours_gives_in_nine_conditions(study: Found) -> None:
+def test_filterpy_gives_the_same_estimates_as_our_filter_in_nine_conditions(study: Found) -> None:
     table = study.tables["filterpy"]
     assert len(table) == 3 * len(CONDITIONS)
     assert (table["steps"] == 99).all()
@@ -36,7 +36,7 @@ def _filtered() -> Estimate:
     return run_filter(METHODS["ekf"], model, first_belief(model, record, 2e8, 3e8), record, P)
 
 
-def test_a_filter_that_fails_or_differs_is_told() -> None:
+def test_a_filter_that_fails_or_differs_gets_that_verdict() -> None:
     ours = _filtered()
     assert compared(ours, ours)["verdict"] == "equal"
     column = ours.model.index(BULK_MODULUS)

@@ -30,7 +30,7 @@ def _estimates(errors: dict[str, list[float | None]], outcome: str = "ok") -> pd
     return pd.DataFrame(rows)
 
 
-def test_a_condition_is_recovered_if_every_first_guess_is() -> None:
+def test_a_condition_is_recovered_if_the_estimate_from_every_first_guess_is() -> None:
     found = recoveries(_estimates({"normal": [0.2, -0.9], "minor_leakage": [0.1, -1.1]}))[PRESSURE_SINE]
     assert (found.recovered, found.conditions, found.estimates) == (1, 2, 4)
     assert found.worst_error_percent is not None
@@ -38,18 +38,18 @@ def test_a_condition_is_recovered_if_every_first_guess_is() -> None:
     assert found.missed == ("minor leakage (1.1 % off)",)
 
 
-def test_gates_and_intervals_are_counted_beside() -> None:
+def test_passed_gates_and_covering_intervals_are_counted() -> None:
     found = recoveries(_estimates({"normal": [0.2, -0.9], "minor_leakage": [0.1, None]}))[PRESSURE_SINE]
     assert (found.passed, found.covered, found.estimates) == (2, 2, 4)
 
 
-def test_not_observable_is_neither_recovered_nor_missed() -> None:
+def test_a_condition_that_is_not_observable_is_neither_recovered_nor_missed() -> None:
     found = recoveries(_estimates({"normal": [None, None]}, "not_observable"))[PRESSURE_SINE]
     assert (found.recovered, found.unobservable, found.missed) == (0, ("normal",), ())
     assert found.mean_pa is None
 
 
-def test_a_divergence_is_a_miss_and_is_named() -> None:
+def test_a_diverged_estimate_counts_as_missed_and_is_named() -> None:
     found = recoveries(_estimates({"normal": [None, 0.1]}, "diverged"))[PRESSURE_SINE]
     assert found.missed == ("normal (diverged, 0.1 % off)",)
 
@@ -65,7 +65,7 @@ def test_the_most_frequent_confusion_is_named(study: Found) -> None:
     assert entry.likeliest_error.startswith("minor leakage taken for major friction, 12 of 1")
 
 
-def test_accuracy_is_the_table_s(study: Found) -> None:
+def test_the_classification_accuracies_are_taken_from_the_table(study: Found) -> None:
     shares = [entry.percent / 100.0 for entry in class_accuracies(study.tables)]
     assert np.allclose(shares, study.tables["classification"]["accuracy"])
 

@@ -54,7 +54,7 @@ class _Balance(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_every_section_is_there_and_every_link_lands(page: str) -> None:
+def test_every_section_exists_and_every_internal_link_has_a_target(page: str) -> None:
     parser = _Balance()
     parser.feed(page)
     assert parser.open == []
@@ -68,7 +68,7 @@ def test_the_page_loads_nothing(page: str) -> None:
     assert not re.search(r"https?:|src=|@import|url\(|<script|<link", without_images)
 
 
-def test_every_figure_is_inside(page: str) -> None:
+def test_the_page_contains_every_figure(page: str) -> None:
     assert page.count('src="data:image/svg+xml;base64,') == len(FIGURES)
     assert all(f'id="figure-{name}"' in page for name in FIGURES)
 
@@ -79,7 +79,7 @@ def test_the_verdict_opens_the_page(page: str, study: Found) -> None:
     assert places[-1] < page.index("<figure")
 
 
-def test_errors_in_velocity_are_those_of_the_table(page: str, study: Found) -> None:
+def test_the_page_shows_the_velocity_errors_of_the_table(page: str, study: Found) -> None:
     for row in study.tables["validation_rmse"].itertuples():
         cells = [
             number(1e3 * value, digits)
@@ -93,14 +93,14 @@ def test_errors_in_velocity_are_those_of_the_table(page: str, study: Found) -> N
         assert "".join(f'<td class="number">{cell}</td>' for cell in cells) in page
 
 
-def test_transfer_functions_stand_beside_the_published_ones(page: str, study: Found) -> None:
+def test_the_page_lists_transfer_functions_beside_the_published_ones(page: str, study: Found) -> None:
     for row in study.tables["transfer_functions"].to_dict("records"):
         names = ("b0", "b1", "b2", "a1", "a2")
         assert "".join(f'<td class="number">{number(row[name])}</td>' for name in names) in page
         assert "".join(f'<td class="number">{exact(row[f"published_{name}"])}</td>' for name in names) in page
 
 
-def test_scalars_stand_beside_the_published_ones_with_their_notes(page: str, study: Found) -> None:
+def test_the_page_lists_scalars_with_their_notes_and_bulk_modulus_in_mpa(page: str, study: Found) -> None:
     for row in study.tables["scalars"].to_dict("records"):
         assert row["note"].split(" (errata")[0].replace("'", "&#39;") in page
     first = study.tables["scalars"].iloc[0]
@@ -111,7 +111,7 @@ def test_scalars_stand_beside_the_published_ones_with_their_notes(page: str, stu
     )  # bulk modulus has one unit, in text and tables
 
 
-def test_estimates_are_those_of_the_table(page: str, study: Found) -> None:
+def test_the_page_shows_the_recovered_conditions_and_worst_errors_of_the_table(page: str, study: Found) -> None:
     for found in recoveries(study.tables["bulk_modulus"]).values():
         assert f"{found.recovered} of {found.conditions}" in page
         assert number(found.worst_error_percent, 2) in page
@@ -123,13 +123,13 @@ def test_every_parameter_is_listed_with_unit_and_source(page: str, study: Found)
         assert exact(float(row["value"])) in page
 
 
-def test_cited_errata_are_told_in_a_line(page: str) -> None:
+def test_exactly_the_cited_errata_are_listed(page: str) -> None:
     cited = set(re.findall(r'href="#(E\d+)"', page))
     assert {"E9", "E13", "E14", "E15"} <= cited
     assert all(f'<dt id="{erratum}">' in page for erratum in cited)
     assert not any(f'<dt id="{erratum}">' in page for erratum in set(ERRATA) - cited)
 
 
-def test_the_page_says_how_to_run_it_again(page: str) -> None:
+def test_the_page_states_the_seed_and_package_versions(page: str) -> None:
     assert f"--seed {SMALL.seed}" in page
     assert versions()["numpy"] in page

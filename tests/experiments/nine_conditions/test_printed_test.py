@@ -27,7 +27,7 @@ def table() -> pd.DataFrame:
     return printed_test(RIG, 1, 4.0).set_index("condition")
 
 
-def test_cells_that_are_held_are_counted_by_their_own_intervals(table: pd.DataFrame) -> None:
+def test_printed_coefficients_far_outside_their_interval_are_not_counted_as_covered(table: pd.DataFrame) -> None:
     printed = load("transfer_functions").set_index("condition")
     for name in CONDITIONS:
         far = sum(
@@ -43,7 +43,7 @@ def test_more_leakage_lowers_the_gain_that_the_printed_test_finds(table: pd.Data
     assert gains == sorted(gains, reverse=True)
 
 
-def test_on_circuits_the_mathematical_error_is_no_floor_and_still_the_smaller_one() -> None:
+def test_on_circuits_the_mathematical_model_has_the_smaller_error_in_most_conditions() -> None:
     settings = replace(StudySettings(seed=3), seeds=2)
     found = validation_on_circuit(RIG, read_library(), settings).set_index("condition")
     assert (found["circuits"] == 2).all()

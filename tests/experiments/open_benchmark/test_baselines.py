@@ -33,7 +33,7 @@ def waves(seed: int, each: int = 12) -> tuple[Array, NDArray[np.str_]]:
 
 
 @pytest.mark.parametrize("name", LEARNT)
-def test_what_learns_tells_two_kinds_of_logs_apart(name: str) -> None:
+def test_every_learner_separates_two_kinds_of_logs(name: str) -> None:
     if "forest" in name:
         pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra learn)")
     verdicts = LEARNT[name](*waves(0))
@@ -41,13 +41,13 @@ def test_what_learns_tells_two_kinds_of_logs_apart(name: str) -> None:
     assert np.mean(verdicts(series) == wanted) >= 0.9
 
 
-def test_the_forest_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_forest_without_scikit_learn_names_the_missing_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
     with pytest.raises(HydrostateError, match="learn"):
         forest_on_features(*waves(0, each=1))
 
 
-def test_a_ridge_of_noise_stays_at_the_shares_of_the_classes() -> None:
+def test_a_ridge_classifier_on_noise_mostly_chooses_the_most_frequent_class() -> None:
     rng = np.random.default_rng(0)
     y = np.array(["a"] * 30 + ["b"] * 10)
     verdicts = ridge_classifier(rng.standard_normal((40, 200)), y)
@@ -60,13 +60,13 @@ def test_features_are_finite_for_a_channel_that_is_not_logged() -> None:
     assert np.isfinite(simple_features(series)).all()
 
 
-def test_right_verdicts_are_those_that_the_truth_accepts(tmp_path: Path) -> None:
+def test_a_verdict_counts_as_right_if_the_truth_accepts_it(tmp_path: Path) -> None:
     truth = pd.DataFrame({"file": ["a", "b"], "accept": ["normal;unknown", "unknown"]})
     truth.to_csv(tmp_path / "truth.csv", index=False)
     assert right_shares([tmp_path], np.array(["normal", "normal"])) == {tmp_path.name: 50.0}
 
 
-def test_the_page_has_a_row_a_method_and_says_what_is_strange(tmp_path: Path) -> None:
+def test_the_page_has_a_row_for_each_method_and_the_number_of_each_kind(tmp_path: Path) -> None:
     table = pd.DataFrame([{"method": "hydrostate diagnose", **dict.fromkeys(STRANGE, 50.0)}])
     write_result(BASELINES, BaselineSettings(9, 1), Found({"baselines": table}), tmp_path / "page")
     page = (tmp_path / "page" / "report.html").read_text("utf-8")

@@ -13,7 +13,7 @@ RUN = CliRunner()
 
 
 @pytest.mark.usefixtures("_short")
-def test_make_writes_a_folder_a_kind(tmp_path: Path) -> None:
+def test_make_writes_one_folder_for_each_kind(tmp_path: Path) -> None:
     asked = ["benchmark", "make", "--kind", "plain", "--kind", "single_rod", "--count", "2", "--out", str(tmp_path)]
     done = RUN.invoke(app, [*asked, "--json"])
     assert done.exit_code == 0, done.output
@@ -24,13 +24,13 @@ def test_make_writes_a_folder_a_kind(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("wrong", [["--kind", "plane"], ["--split", "tests"], ["--count", "0"]])
-def test_make_refuses_what_there_is_not(wrong: list[str], tmp_path: Path) -> None:
+def test_make_refuses_unknown_kinds_and_splits_and_a_count_of_zero(wrong: list[str], tmp_path: Path) -> None:
     done = RUN.invoke(app, ["benchmark", "make", "--out", str(tmp_path), *wrong])
     assert done.exit_code == 2
     assert not any(tmp_path.iterdir())
 
 
-def test_kinds_lists_them_all() -> None:
+def test_the_command_kinds_lists_every_kind() -> None:
     done = RUN.invoke(app, ["benchmark", "kinds", "--json"])
     assert [entry["kind"] for entry in json.loads(done.stdout)] == list(KINDS)
     assert len(RUN.invoke(app, ["benchmark", "kinds"]).stdout.splitlines()) == len(KINDS)

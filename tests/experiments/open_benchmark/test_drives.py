@@ -19,9 +19,7 @@ ROOM = DriveLimits(duration=6.0, rated=125.0, travel=0.03, glide=4e-4)
 
 @pytest.mark.parametrize("drive", [steps, prbs, multisine, sines])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_speed_is_within_its_rating_and_leads_the_piston_no_farther_than_from_side_to_side(
-    drive: object, seed: int
-) -> None:
+def test_a_speed_drive_stays_within_rated_speed_and_the_travel(drive: object, seed: int) -> None:
     assert callable(drive)
     speed = drive(ROOM, np.random.default_rng(seed))
     assert speed.shape == (ROOM.ticks,)
@@ -31,7 +29,7 @@ def test_a_speed_is_within_its_rating_and_leads_the_piston_no_farther_than_from_
 
 
 @pytest.mark.parametrize("drive", [position_steps, tracking])
-def test_a_position_is_asked_for_within_the_travel_and_no_faster_than_the_motor_turns(drive: object) -> None:
+def test_a_position_drive_stays_within_the_travel_and_tracking_within_the_motor_speed(drive: object) -> None:
     assert callable(drive)
     for seed in range(4):
         asked = drive(ROOM, np.random.default_rng(seed))
@@ -42,7 +40,7 @@ def test_a_position_is_asked_for_within_the_travel_and_no_faster_than_the_motor_
     assert np.max(np.abs(np.diff(followed))) / TICK <= 0.8 * ROOM.glide * ROOM.rated * (1.0 + 1e-9)
 
 
-def test_a_binary_signal_has_one_size_and_comes_back_from_where_it_is_drawn_to() -> None:
+def test_a_binary_signal_has_one_amplitude_and_both_signs() -> None:
     speed = prbs(ROOM, np.random.default_rng(2))
     assert len(np.unique(np.abs(speed))) == 1
     assert np.any(speed > 0.0)

@@ -27,7 +27,7 @@ def estimate(value: float | None, half: float = 1e5, *, passed: bool = True, **m
     ],
     ids=["within the range", "a little off", "far off", "flagged", "far off, total interval admits it", "no number"],
 )
-def test_an_error_is_silent_if_nothing_warns_of_it(
+def test_a_large_error_without_a_warning_is_silent(
     said: dict[str, Any], covered: bool | None, silent: bool, narrow: bool
 ) -> None:
     row = judge_bulk_modulus(said, TRUTH)
@@ -49,7 +49,7 @@ def diagnosis(name: str | None, p: float, *, unknown: bool = False) -> dict[str,
         (diagnosis(None, 0.0), "normal", "failed", False, False),
     ],
 )
-def test_a_class_is_silent_if_it_is_wrong_and_sure(
+def test_a_wrong_and_confident_condition_is_silent(
     said: dict[str, Any], accept: str, verdict: str, silent: bool, false_unknown: bool
 ) -> None:
     row = judge_class(said, {"accept": accept})
@@ -67,7 +67,7 @@ def test_a_class_is_silent_if_it_is_wrong_and_sure(
         (None, False, "5.25", False, False),
     ],
 )
-def test_a_condition_that_began_within_a_log_is_dated_and_one_that_did_not_is_not(
+def test_the_date_of_a_condition_is_right_false_or_missing_against_the_truth(
     ends: list[float] | None, *, steady: bool, began: str, false: bool, dated: bool | None
 ) -> None:
     said = diagnosis("normal", 0.99) | {"since_ci95_s": ends}
@@ -76,7 +76,7 @@ def test_a_condition_that_began_within_a_log_is_dated_and_one_that_did_not_is_no
     assert judge_class(said, {"accept": "normal"})["since"] is None  # data sets of other authors do not state it
 
 
-def test_a_cause_is_named_in_any_sentence() -> None:
+def test_a_cause_counts_as_named_in_any_message_or_warning() -> None:
     assert named("", {"message": "lag"}) is None
     assert named(r"\blag", {"message": "ok", "warnings": ["pressure lags by 2 ms"]}) is True
     assert named(r"\blag", {"message": "ok"}, {"reasons": ["the flag is set"]}) is False
@@ -89,7 +89,7 @@ def test_the_summary_counts_logs_by_set_and_sensors() -> None:
     assert (line["logs"], line["silent_beta"], line["silent_class"], line["severities_%"]) == (2, 2, 1, 50.0)
 
 
-def test_coverage_is_of_each_quantity_of_a_set_and_leaves_out_what_was_not_told() -> None:
+def test_coverage_is_counted_for_each_quantity_over_the_logs_with_a_value() -> None:
     told = [{"z_leakage_flow": 1.0}, {"z_leakage_flow": -3.0}, {"z_flow_bias": 0.5}]
     (leakage, bias) = coverage([row | {"set": "a", "pressure": True} for row in told]).to_dict("records")
     assert (leakage["quantity"], leakage["numbers"], leakage["covered"]) == ("leakage_flow", 2, 1)

@@ -38,7 +38,7 @@ COLUMNS = [
 
 
 @pytest.mark.usefixtures("_short")
-def test_the_same_name_gives_the_same_bits_and_another_index_others() -> None:
+def test_the_same_kind_split_and_index_give_the_same_log_and_another_index_another() -> None:
     first, again, other = make("plain", "test", 3), make("plain", "test", 3), make("plain", "test", 4)
     assert first.log.equals(again.log)
     assert not first.log.equals(other.log)
@@ -52,7 +52,7 @@ def test_the_same_name_gives_the_same_bits_and_another_index_others() -> None:
         ("single_rod", 169516984.38, 0.0563541723),
     ],
 )
-def test_logs_are_those_of_the_version(kind: str, modulus: float, position: float) -> None:
+def test_logs_are_the_same_within_a_version(kind: str, modulus: float, position: float) -> None:
     assert VERSION == "1.0", "a new version has new figures here"
     made = make(kind, "test", 1)
     assert made.setup.machine.bulk_modulus == pytest.approx(modulus, rel=1e-9)
@@ -67,12 +67,12 @@ def test_no_two_logs_share_a_seed() -> None:
 @pytest.mark.parametrize(
     ("kind", "split", "index"), [("plane", "test", 0), ("plain", "tests", 0), ("plain", "test", -1)]
 )
-def test_what_is_not_there_is_refused(kind: str, split: str, index: int) -> None:
+def test_an_unknown_kind_or_split_and_a_negative_index_are_refused(kind: str, split: str, index: int) -> None:
     with pytest.raises(HydrostateError):
         make(kind, split, index)
 
 
-def test_every_kind_reaches_its_conditions_and_names_ones_that_are_there() -> None:
+def test_every_kind_uses_known_conditions_and_drives_and_reaches_each_condition() -> None:
     for kind in KINDS.values():
         assert gcd(STRIDE, len(kind.conditions)) == 1
         assert {*kind.accept, *kind.conditions} <= {*CONDITIONS, "condition", "unknown"}
@@ -107,7 +107,7 @@ def test_the_truth_says_whether_and_when_an_actuator_changes(tmp_path: Path) -> 
 
 @pytest.mark.usefixtures("_short")
 @pytest.mark.parametrize("kind", ["plain", "chamber_pressures", "single_rod"])
-def test_the_project_reads_what_was_written(kind: str, tmp_path: Path) -> None:
+def test_a_written_log_can_be_read_with_its_rig_file(kind: str, tmp_path: Path) -> None:
     write_set(kind, "validation", 1, tmp_path)
     (row,) = read_truth(tmp_path / kind).to_dict("records")
     log = hs.read(tmp_path / kind / row["file"], rig=tmp_path / kind / row["rig"] if row["rig"] else None)
@@ -133,7 +133,7 @@ def test_logs_become_frames_and_arrays(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("_short")
-def test_sensors_do_what_their_kind_says() -> None:
+def test_a_plain_sensor_adds_noise_and_a_late_one_a_delay() -> None:
     plain = make("plain", "test", 0)
     states = plain.states[::10]
     assert np.std(plain.log[SPEED] - states[:, 0]) == pytest.approx(0.05, rel=0.1)
@@ -142,7 +142,7 @@ def test_sensors_do_what_their_kind_says() -> None:
     assert np.std(late.log[DIFFERENCE].to_numpy()[5:] - true[:-5]) == pytest.approx(5e3, rel=0.1)
 
 
-def test_a_sensor_holds_drifts_follows_with_play_and_passes_slow_waves_alone() -> None:
+def test_a_sensor_can_hold_drift_have_play_and_be_a_low_pass() -> None:
     time, rng = 1e-3 * np.arange(2000), np.random.default_rng(1)
     fine = RECORD * np.arange(20_000)
 
@@ -159,7 +159,7 @@ def test_a_sensor_holds_drifts_follows_with_play_and_passes_slow_waves_alone() -
     assert np.std(read(1.0, corner=30.0) - true) == pytest.approx(np.std(np.gradient(true, time)) * 7.5e-3, rel=0.02)
 
 
-def test_a_kind_that_is_not_there_is_answered_with_the_nearest() -> None:
+def test_an_unknown_kind_is_refused_with_the_nearest_known_name() -> None:
     with pytest.raises(HydrostateError, match=r"^kind 'plane' is unknown, did you mean 'plain'\?$"):
         kind_of("plane")
     with pytest.raises(HydrostateError, match=r"^kind 'q' is unknown, `hydrostate benchmark kinds` lists"):
@@ -167,14 +167,14 @@ def test_a_kind_that_is_not_there_is_answered_with_the_nearest() -> None:
 
 
 @pytest.mark.usefixtures("_short")
-def test_the_truth_of_what_changes_is_that_of_the_middle() -> None:
+def test_the_true_value_of_a_growing_leakage_is_that_at_mid_log() -> None:
     grown = make("leakage_grows", "test", 0)
     healthy, row = grown.setup.machine.leakage, truth_of(grown, "test", 0)
     assert row["leak_coeff"] == pytest.approx(np.sqrt(healthy * 6.006e-11))
 
 
 @pytest.mark.parametrize(("index", "opened"), [(0, True), (1, False)])
-def test_a_relief_valve_that_never_opened_need_not_be_named(index: int, *, opened: bool) -> None:
+def test_the_truth_names_the_relief_valve_only_if_it_opened(index: int, *, opened: bool) -> None:
     made = make("relief_set_low", "test", index)
     row = truth_of(made, "test", index)
     assert (row["dpmax"] > made.setup.machine.relief) == opened

@@ -17,7 +17,7 @@ from plant.errors import HydrostateError
 
 
 @pytest.mark.usefixtures("_short")
-def test_both_are_in_the_log_of_a_pair() -> None:
+def test_the_log_of_a_pair_contains_both_faults() -> None:
     made = make("pressure_1_bar_off+worn_pump", "training", 2)
     true = (made.states[:, 4] - made.states[:, 5])[::10]
     assert made.setup.machine.efficiency == 0.8
@@ -27,7 +27,7 @@ def test_both_are_in_the_log_of_a_pair() -> None:
 
 @pytest.mark.usefixtures("_short")
 @pytest.mark.parametrize("pair", ["speed_in_rpm+big_actuator", "big_actuator+speed_in_rpm"])
-def test_a_kind_that_draws_another_actuator_keeps_the_other_kind(pair: str) -> None:
+def test_a_pair_with_another_actuator_keeps_the_fault_of_the_other_kind(pair: str) -> None:
     made = make(pair, "training", 15)
     assert made.setup.logger.sensors["motor_speed_rad_s"].gain == pytest.approx(60.0 / (2.0 * np.pi))
     assert made.setup.rig["piston_area"] == pytest.approx(3.0 * 1.52e-3)
@@ -44,11 +44,11 @@ def test_a_kind_that_draws_another_actuator_keeps_the_other_kind(pair: str) -> N
         ("intermittent_friction+leakage_grows", ("unknown",)),
     ],
 )
-def test_right_is_what_both_kinds_allow(pair: str, accept: tuple[str, ...]) -> None:
+def test_a_pair_accepts_the_verdicts_that_both_kinds_accept(pair: str, accept: tuple[str, ...]) -> None:
     assert kind_of(pair).accept == accept
 
 
-def test_both_causes_must_be_named() -> None:
+def test_the_verdict_on_a_pair_must_name_both_causes() -> None:
     pattern = kind_of("pressure_lags_2_ms+worn_pump").named
     told = ("the pump is worn\nthe pressure is late", "the pressure is late\nthe pump is worn")
     assert all(re.search(pattern, text, re.IGNORECASE) for text in told)
@@ -56,7 +56,7 @@ def test_both_causes_must_be_named() -> None:
     assert kind_of("stiff_oil+no_velocity").named == ""
 
 
-def test_a_kind_with_drives_or_conditions_of_its_own_gives_them_to_the_pair() -> None:
+def test_a_pair_takes_the_drives_and_conditions_that_one_kind_prescribes() -> None:
     for pair in ("coarse_converters+spring_load", "spring_load+coarse_converters"):
         assert kind_of(pair).drives == KINDS["spring_load"].drives
     assert kind_of("coarse_converters+leakage_grows").conditions == ("normal",)
@@ -81,7 +81,7 @@ def test_kinds_that_collide_are_refused(pair: str) -> None:
         make(pair, "training", 0)
 
 
-def test_pairs_are_drawn_alike_and_hold_every_kind_but_the_plain_one() -> None:
+def test_pairs_are_drawn_reproducibly_and_include_every_kind_except_plain() -> None:
     every = drawn_pairs("training", len(KINDS) ** 2)
     assert every[:9] == drawn_pairs("training", 9) != drawn_pairs("test", 9)
     assert len(set(every)) == len(every) > 1000
@@ -97,7 +97,7 @@ def test_no_pair_shares_a_seed_with_another_or_with_a_kind() -> None:
 
 
 @pytest.mark.usefixtures("_short")
-def test_a_set_may_begin_at_any_index(tmp_path: Path) -> None:
+def test_a_set_of_logs_can_begin_at_any_index(tmp_path: Path) -> None:
     folder = write_set("pressure_lags_2_ms+single_rod", "validation", 1, tmp_path, first=5).parent
     (row,) = read_truth(folder).to_dict("records")
     assert folder.name == row["set"] == "pressure_lags_2_ms+single_rod"

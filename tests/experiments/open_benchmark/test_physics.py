@@ -50,7 +50,7 @@ def energy(states: Array, m: Machine) -> Array:
     ],
     ids=["healthy", "leaking, relieved, with air", "boiling", "single rod"],
 )
-def test_no_oil_is_lost(machine: Machine, air: float) -> None:
+def test_the_volume_of_oil_is_conserved(machine: Machine, air: float) -> None:
     t = TICK * np.arange(2000)
     states = run(machine, course(120.0 * np.sign(np.sin(9.0 * t)), 2.0, air))
     held = oil(states, air, machine)
@@ -65,7 +65,7 @@ def test_a_frictionless_piston_between_sealed_chambers_keeps_its_energy() -> Non
     assert np.ptp(held) < 1e-3 * held[0]
 
 
-def test_friction_and_leakage_only_take_energy() -> None:
+def test_friction_and_leakage_only_dissipate_energy() -> None:
     m = LOSSLESS._replace(spring=2e4, leakage=2e-11, linear=50.0, coulomb=20.0)
     start = at_rest(m) + np.array([0.0, 0.0, 0.0, 0.1, 2e5, 0.0, 0.0])
     held = energy(run(m, course(0.0, 0.5), start), m)
@@ -75,7 +75,7 @@ def test_friction_and_leakage_only_take_energy() -> None:
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_the_steady_state_is_that_of_the_equations(sense: float) -> None:
+def test_the_steady_state_satisfies_the_flow_and_force_balances(sense: float) -> None:
     m = Machine(ripple=0.0, drain=0.0, leakage=2.5e-11)
     states = run(m, course(sense * 125.66, 1.5))
     v, dp = abs(states[-1, 3]), abs(states[-1, 4] - states[-1, 5])
@@ -83,21 +83,21 @@ def test_the_steady_state_is_that_of_the_equations(sense: float) -> None:
     assert m.area_a * dp == pytest.approx(m.quadratic * v**2 + m.linear * v + m.coulomb, rel=2e-3)
 
 
-def test_steps_are_fine_enough() -> None:
+def test_a_finer_integration_step_changes_pressure_by_less_than_500_pa() -> None:
     drive = course(100.0 * np.sign(np.sin(20.0 * TICK * np.arange(1000))), 1.0)
     m = Machine(bulk_modulus=1.2e9, quadratic=4.462e6, linear=1.863e4, coulomb=551.0)
     coarse, fine = run(m, drive), run(m, drive, refine=4)
     assert np.max(np.abs(coarse - fine)[:, 4]) < 500.0
 
 
-def test_a_piston_that_is_pushed_too_little_stays() -> None:
+def test_a_piston_under_a_load_below_static_friction_stays() -> None:
     m = Machine(load=300.0)
     states = run(m, course(0.0, 1.0))
     assert np.max(np.abs(states[:, 2])) < max(SLIPS) * m.presliding
     assert np.ptp(states[-2000:, 2]) < 1e-6
 
 
-def test_blocks_that_all_slip_carry_the_conditions_curve() -> None:
+def test_friction_with_every_block_slipping_follows_the_steady_curve() -> None:
     m = Machine(quadratic=1.162e6, linear=-7440.0, coulomb=500.0)
     slipping = m.presliding * np.array(SLIPS)
     for v in (0.002, 0.01, 0.06):
@@ -105,13 +105,13 @@ def test_blocks_that_all_slip_carry_the_conditions_curve() -> None:
         assert min(steady_friction(v, 1.0, m)) >= 0.0
 
 
-def test_stiffness_is_the_slope_of_the_oils_volume() -> None:
+def test_bulk_stiffness_is_the_slope_of_the_specific_volume() -> None:
     for m, air in ((Machine(), 0.0), (Machine(), 0.02), (Machine(stiffening=8.0), 0.0)):
         below, at, above = (specific_volume(p, air, m) for p in (3.999e5, 4e5, 4.001e5))
         assert -at * 200.0 / (above - below) == pytest.approx(stiffness(4e5, air, m), rel=1e-4)
 
 
-def test_a_chamber_that_draws_no_make_up_boils() -> None:
+def test_a_chamber_without_make_up_flow_cavitates() -> None:
     states = run(Machine(check_b=0.0, coulomb=3000.0), course(120.0, 0.5))
     emptiest = np.min(states[:, 5])
     assert emptiest < 0.0
@@ -128,7 +128,7 @@ def test_valves_open_one_way_unless_a_pilot_opens_them() -> None:
     assert check_flow(3.1e5, 6e5, 3e5, piloted) < 0.0
 
 
-def test_losses_never_drive_the_pump_and_leakage_is_the_conditions_at_its_reference() -> None:
+def test_pump_losses_never_reverse_the_flow_and_turbulent_leakage_matches_at_its_reference() -> None:
     assert pump_flow(3.0, 0.0, Machine()) == 0.0
     assert pump_flow(-125.66, 0.4, Machine(ripple=0.0)) == pytest.approx(-(5.57e-7 * 125.66 - 2.413e-6))
     m = Machine(turbulent=0.3)
@@ -142,7 +142,7 @@ def test_the_motor_keeps_to_its_current_limit() -> None:
     assert out[0] == m.acceleration
 
 
-def test_the_end_stops_push_out_of_their_way_and_never_pull() -> None:
+def test_end_stops_only_push_the_piston_inwards() -> None:
     m = Machine()
     end = 0.5 * m.stroke
     assert [stop_force(x, 5.0, m) for x in (0.0, 0.999 * end, -0.999 * end)] == [0.0] * 3
@@ -154,7 +154,7 @@ def test_the_end_stops_push_out_of_their_way_and_never_pull() -> None:
     assert stop_force(end + 1e-6, -10.0, m) == 0.0  # the piston leaves faster than the stop can follow
 
 
-def test_a_run_that_ran_away_is_no_log() -> None:
+def test_a_run_that_diverged_is_refused_as_a_log() -> None:
     states = run(Machine(), course(50.0, 0.2))
     logger = Logger(sample_time=1e-3, channels=PLAIN)
     assert len(logger.log(states, np.random.default_rng(0))) > 0

@@ -9,7 +9,7 @@ from experiments.open_benchmark.run import at_rest, compiled, trajectory
 
 
 @pytest.mark.parametrize("loop_gain", [0.0, 30.0])
-def test_the_compiled_run_is_the_python_run(loop_gain: float) -> None:
+def test_the_compiled_simulation_gives_the_result_of_the_python_one(loop_gain: float) -> None:
     machine = Machine()._replace(loop_gain=loop_gain)
     course = np.ones((12, 5))
     course[:, 3] = 0.01

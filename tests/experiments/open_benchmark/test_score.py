@@ -14,7 +14,7 @@ NAMES = [name for name in KINDS if name.startswith(OF_PRESSURE)]
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_of_such_kinds_the_pressure_sensor_alone_is_strange(name: str) -> None:
+def test_kinds_named_after_pressure_change_only_the_pressure_sensors(name: str) -> None:
     plain = draw_plain("normal", "steps", np.random.default_rng(0))
     strange = KINDS[name].draw(plain, np.random.default_rng(1))
     assert strange != plain
@@ -23,7 +23,7 @@ def test_of_such_kinds_the_pressure_sensor_alone_is_strange(name: str) -> None:
     assert replace(strange, logger=replace(strange.logger, sensors=sensors, channels=channels)) == plain
 
 
-def test_without_pressure_their_condition_is_right_and_nothing_need_be_named() -> None:
+def test_without_pressure_a_pressure_fault_counts_as_its_plain_condition() -> None:
     reversed_ = {"set": "pressure_reversed", "accept": "unknown", "condition": "minor_leakage", "named": "sign"}
     assert without_pressure(reversed_) == {**reversed_, "accept": "minor_leakage", "named": ""}
     for other in ({**reversed_, "set": "speed_sign_reversed"}, {"set": "pressure_reversed", "accept": "unknown"}):

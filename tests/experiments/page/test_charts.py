@@ -21,14 +21,14 @@ def two_curves(count: int) -> Charts:
     return Charts(time, "time [s]", [Panel("velocity", "mm/s", curves, [Mark("x", 0.6, "change")])], "run")
 
 
-def test_a_figure_has_a_still_picture_its_numbers_and_a_table() -> None:
+def test_a_chart_has_a_still_picture_and_a_table_and_escapes_its_names() -> None:
     html = two_curves(50).html("one", "A caption.")
     assert '<img alt="A caption." src="data:image/svg+xml;base64,' in html
     assert '<th scope="row">velocity, measured</th>' in html
     assert "<b>" not in html
 
 
-def test_the_still_picture_of_many_channels_is_not_a_thin_strip() -> None:
+def test_the_still_picture_of_seven_channels_is_wider_than_high() -> None:
     x = np.arange(20.0)
     many = [Panel(f"channel {i}", "m", [Curve("value", x)]) for i in range(7)]
     html = Charts(x, "time [s]", many, "run").html("one", "A caption.")
@@ -39,21 +39,21 @@ def test_the_still_picture_of_many_channels_is_not_a_thin_strip() -> None:
     assert all(f"channel {i}" in drawn for i in range(7))
 
 
-def test_a_uniform_axis_is_a_start_and_a_step() -> None:
+def test_a_uniform_axis_is_stored_as_start_step_and_count() -> None:
     x = numbers_of(two_curves(50))["x"]
     assert isinstance(x, dict)
     assert (x["start"], x["count"]) == (0.5, 50)
     assert abs(x["step"] - 1e-3) < 1e-12
 
 
-def test_a_longer_log_is_carried_by_its_ends_on_a_coarser_axis() -> None:
+def test_a_long_log_is_stored_on_a_coarser_axis_of_the_same_length() -> None:
     x = numbers_of(two_curves(3 * MOST_DRAWN))["x"]
     assert isinstance(x, dict)
     assert x["count"] <= MOST_DRAWN
     assert abs(x["start"] + x["step"] * x["count"] - (0.5 + 3e-3 * MOST_DRAWN)) < 0.01
 
 
-def test_an_uneven_axis_is_carried_as_values() -> None:
+def test_a_non_uniform_axis_is_stored_as_values() -> None:
     charts = Charts(np.array([0.0, 1.0, 5.0]), "log", [Panel("leakage", "L/min", [Curve("value", np.ones(3))])], "run")
     x = numbers_of(charts)["x"]
     assert isinstance(x, dict)
@@ -70,7 +70,7 @@ def test_a_log_of_twenty_seconds_at_ten_kilohertz_stays_under_three_megabytes() 
     assert len(Charts(time, "time [s]", panels, "run").html("one", "The log.")) < 2.4e6
 
 
-def test_a_curve_without_a_number_has_an_empty_row_in_the_table() -> None:
+def test_a_curve_without_values_has_an_empty_row_in_the_table() -> None:
     x = np.arange(20.0)
     curves = [Curve("silent", np.full(20, np.nan)), Curve("half", np.where(x < 10, x, np.nan))]
     html = Charts(x, "time [s]", [Panel("velocity", "mm/s", curves)], "run").html("one", "A caption.")

@@ -9,7 +9,7 @@ from experiments.page.figure_files import write_png
 from plant.errors import HydrostateError
 
 
-def test_a_figure_that_the_system_refuses_is_told_with_its_place(
+def test_a_figure_that_cannot_be_written_is_refused_by_its_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object, **__: object) -> None:

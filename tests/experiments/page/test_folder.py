@@ -52,7 +52,7 @@ def _listing(folder: Path) -> list[str]:
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
 
 
-def test_the_folder_holds_all_that_was_found(written: Path, study: Found) -> None:
+def test_the_folder_contains_all_figures_tables_series_and_the_manifest(written: Path, study: Found) -> None:
     present = _listing(written)
     for name in FIGURES:
         assert {f"figures/{name}.png", f"figures/{name}.svg"} <= set(present)
@@ -85,7 +85,7 @@ def test_figures_are_the_same_at_every_run(written: Path, study: Found) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_an_earlier_study_is_replaced_whole(short: Found, tmp_path: Path) -> None:
+def test_an_earlier_study_is_replaced_completely(short: Found, tmp_path: Path) -> None:
     target = tmp_path / "out"
     write_study(short, target)
     (target / "tables/bulk_modulus.csv").write_text("stale", encoding="utf-8")
@@ -96,7 +96,7 @@ def test_an_earlier_study_is_replaced_whole(short: Found, tmp_path: Path) -> Non
 
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("failure", [HydrostateError("no report"), KeyboardInterrupt(), OSError(28, "No space left")])
-def test_a_failure_midway_leaves_the_earlier_result(
+def test_a_failure_while_writing_keeps_the_earlier_result(
     short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException
 ) -> None:
     target = tmp_path / "out"
@@ -119,7 +119,7 @@ def test_a_failure_midway_leaves_the_earlier_result(
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_swap_that_fails_brings_the_earlier_result_back(
+def test_a_failed_exchange_of_folders_restores_the_earlier_result(
     short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "out"
@@ -156,7 +156,7 @@ def test_a_manifest_of_something_else_is_refused(tmp_path: Path, manifest: str) 
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_notes_laid_beside_a_study_are_not_deleted(short: Found, tmp_path: Path) -> None:
+def test_a_study_folder_with_a_foreign_file_is_not_overwritten(short: Found, tmp_path: Path) -> None:
     target = tmp_path / "out"
     write_study(short, target)
     (target / "tables/annotated.png").write_bytes(b"x")
@@ -167,7 +167,7 @@ def test_notes_laid_beside_a_study_are_not_deleted(short: Found, tmp_path: Path)
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_an_empty_folder_and_missing_parents_will_do(short: Found, tmp_path: Path) -> None:
+def test_a_study_is_written_to_an_empty_folder_and_below_missing_parents(short: Found, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     assert write_study(short, tmp_path / "empty") == tmp_path / "empty/report.html"
     assert write_study(short, tmp_path / "a/b/c").is_file()
@@ -189,22 +189,20 @@ def test_the_current_folder_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
         check_target(tmp_path.parent)
 
 
-def test_a_place_that_cannot_be_written_is_said_before_the_study_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_target_without_write_permission_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(HydrostateError, match="must be in a place that can be written, got"):
         check_target(tmp_path / "out")
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_path_that_no_file_system_takes_is_said_in_a_sentence(short: Found, tmp_path: Path) -> None:
+def test_a_path_too_long_for_the_file_system_is_refused(short: Found, tmp_path: Path) -> None:
     with pytest.raises(HydrostateError, match="result folder"):
         write_study(short, tmp_path / ("x" * 300))
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_what_a_killed_run_left_is_tidied_and_an_earlier_result_gets_its_name_back(
+def test_temporary_folders_of_a_killed_run_are_removed_and_the_earlier_result_is_restored(
     short: Found, tmp_path: Path
 ) -> None:
     write_study(short, tmp_path / "out")
@@ -221,7 +219,7 @@ def test_what_a_killed_run_left_is_tidied_and_an_earlier_result_gets_its_name_ba
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.skipif(sys.platform != "linux", reason="the system has no call that exchanges two names")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
-def test_a_study_that_is_ended_as_it_replaces_another_leaves_a_whole_result(
+def test_a_study_ended_while_replacing_another_leaves_a_complete_result(
     short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
     write_study(short, target := tmp_path / "out")
@@ -253,7 +251,7 @@ def test_a_study_that_is_ended_as_it_replaces_another_leaves_a_whole_result(
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_study_that_takes_the_name_meanwhile_is_replaced(
+def test_a_result_that_another_study_writes_meanwhile_is_replaced(
     short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_study(short, target := tmp_path / "out")
@@ -273,7 +271,7 @@ def test_a_study_that_takes_the_name_meanwhile_is_replaced(
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_result_reaches_the_disk_before_it_takes_its_name(
+def test_every_file_of_a_result_is_flushed_to_disk_before_it_is_renamed(
     short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     synced: list[str] = []
@@ -283,9 +281,7 @@ def test_a_result_reaches_the_disk_before_it_takes_its_name(
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_study_that_is_asked_to_end_is_interrupted(
-    number: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_termination_signal_interrupts_a_study(number: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(runner, "run_study", lambda *_: os.kill(os.getpid(), number))
     before = {one: signal.getsignal(one) for one in (signal.SIGTERM, signal.SIGHUP)}
     signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -103,7 +103,7 @@ def brightness(page: Any, selector: str) -> float:
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_page_draws_its_charts_without_a_complaint_or_a_request(opened: Any, name: str) -> None:
+def test_a_page_draws_its_charts_without_errors_or_network_requests(opened: Any, name: str) -> None:
     page = opened(name)
     assert page.locator(".live canvas").count() >= 3
     assert page.complaints == []
@@ -113,7 +113,7 @@ def test_a_page_draws_its_charts_without_a_complaint_or_a_request(opened: Any, n
 
 @pytest.mark.parametrize("name", PAGES)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_serious(opened: Any, name: str, scheme: str) -> None:
+def test_pages_have_no_serious_accessibility_violation(opened: Any, name: str, scheme: str) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
     found = axe.Axe().run(opened(name, 390, scheme)).response["violations"]
     assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
@@ -121,7 +121,7 @@ def test_axe_finds_nothing_serious(opened: Any, name: str, scheme: str) -> None:
 
 @pytest.mark.parametrize("name", PAGES)
 @pytest.mark.parametrize("width", WIDTHS)
-def test_a_page_is_as_wide_as_its_screen(opened: Any, name: str, width: int) -> None:
+def test_a_page_is_not_wider_than_the_screen(opened: Any, name: str, width: int) -> None:
     page = opened(name, width)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.locator(".live canvas").first.bounding_box()["width"] <= width
@@ -151,7 +151,7 @@ def test_zoom_by_button_key_and_drag_moves_every_chart_of_the_log(opened: Any) -
     assert labels()[1] != whole[1]
 
 
-def test_the_cursor_is_moved_by_keys_and_its_values_are_told(opened: Any) -> None:
+def test_arrow_keys_move_the_cursor_and_its_values_are_shown(opened: Any) -> None:
     page = opened("diagnosis")
     page.locator(".live .panel").first.focus()
     page.keyboard.press("ArrowRight")
@@ -169,7 +169,7 @@ def test_a_curve_is_hidden_by_its_button(opened: Any) -> None:
     assert page.locator(".live .panel").first.screenshot() != before
 
 
-def test_a_log_that_no_fit_explains_has_no_severity_within_its_limit(opened: Any) -> None:
+def test_severities_of_an_unknown_log_stay_not_reliable_with_any_limit(opened: Any) -> None:
     page = opened("unknown")
     assert set(page.locator(".state").all_inner_texts()) == {"not reliable"}
     page.locator("input.limit[name=leakage_flow]").fill("50")
@@ -202,12 +202,12 @@ def test_the_numbers_beneath_a_figure_are_downloaded_as_csv(opened: Any, tmp_pat
 
 @pytest.mark.parametrize(("scheme", "low", "high"), [("light", DARKEST_LIGHT, 256), ("dark", -1, LIGHTEST_DARK)])
 @pytest.mark.parametrize("script", [True, False])
-def test_figures_have_the_ground_of_their_page(opened: Any, scheme: str, low: int, high: int, script: bool) -> None:
+def test_figures_have_the_background_of_their_page(opened: Any, scheme: str, low: int, high: int, script: bool) -> None:
     page = opened("diagnosis", 900, scheme, script)
     assert low < brightness(page, ".live .panel" if script else ".still img") < high
 
 
-def test_without_scripts_the_verdict_and_a_still_picture_are_there(opened: Any) -> None:
+def test_without_scripts_the_verdict_and_a_still_picture_are_shown(opened: Any) -> None:
     page = opened("diagnosis", script=False)
     assert "leaks inside" in page.locator("h1").inner_text()
     assert page.locator(".still img").first.is_visible()
@@ -229,7 +229,7 @@ def test_a_page_prints_on_two_sheets_and_names_no_folder(opened: Any, name: str)
     assert max(page.evaluate(ends)) <= SHEET
 
 
-def test_a_logarithmic_axis_zooms_by_shares_of_decades_and_its_model_is_downloaded(opened: Any, tmp_path: Path) -> None:
+def test_a_logarithmic_chart_zooms_in_decades_and_its_model_can_be_downloaded(opened: Any, tmp_path: Path) -> None:
     page = opened("identified")
     figure = page.locator("#figure-bode")
     panel = figure.locator(".panel").first

@@ -22,7 +22,7 @@ def unpacked(one: dict[str, object]) -> Array:
 
 
 @given(arrays(np.float64, st.integers(1, 300), elements=st.floats(-1e9, 1e9) | st.just(float("nan"))))
-def test_a_series_comes_back_to_half_a_quantum_and_gaps_stay_gaps(values: Array) -> None:
+def test_a_packed_series_is_restored_to_within_half_a_quantum_with_its_gaps(values: Array) -> None:
     one = dict(packed(values))
     back = unpacked(one)
     assert np.array_equal(np.isnan(back), np.isnan(values))
@@ -31,19 +31,19 @@ def test_a_series_comes_back_to_half_a_quantum_and_gaps_stay_gaps(values: Array)
     assert np.all(np.abs(back[there] - values[there]) <= allowed)
 
 
-def test_a_series_without_any_value_is_all_gaps() -> None:
+def test_a_packed_series_without_values_is_restored_as_gaps() -> None:
     assert np.all(np.isnan(unpacked(dict(packed(np.full(5, np.nan))))))
 
 
 @given(arrays(np.float64, st.integers(1, 2000), elements=st.floats(-1e6, 1e6)), st.integers(2, 200))
-def test_ends_of_stretches_keep_the_peaks_and_hold_to_the_number_that_is_allowed(values: Array, most: int) -> None:
+def test_reducing_a_series_keeps_its_extremes_within_the_allowed_number_of_points(values: Array, most: int) -> None:
     ends = ends_of_stretches(values, most)
     assert len(ends) <= most
     assert (np.nanmin(ends), np.nanmax(ends)) == (values.min(), values.max())
     assert (stretch_length(len(values), most) == 1) == (len(values) <= most)
 
 
-def test_a_stretch_without_a_sample_is_a_gap() -> None:
+def test_a_stretch_without_samples_is_a_gap() -> None:
     values = np.array([1.0, 2.0, np.nan, np.nan, 5.0, 4.0])
     assert np.array_equal(ends_of_stretches(values, 4), [1.0, 2.0, 5.0, 4.0], equal_nan=True)
     assert np.isnan(ends_of_stretches(np.array([1.0, 2.0, np.nan, np.nan, 5.0, 4.0, 7.0, 8.0]), 8)[2])

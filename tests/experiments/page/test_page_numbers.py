@@ -18,5 +18,5 @@ from experiments.page.numbers import MINUS, MISSING, TIMES, number
         (math.inf, MISSING),
     ],
 )
-def test_a_number_of_any_size_has_its_digits(value: float, text: str) -> None:
+def test_numbers_of_any_magnitude_are_shown_with_four_digits(value: float, text: str) -> None:
     assert number(value) == text

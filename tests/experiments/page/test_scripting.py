@@ -17,7 +17,7 @@ def policy(page: str) -> str:
     return found
 
 
-def test_a_page_without_charts_runs_nothing_and_loads_nothing() -> None:
+def test_a_page_without_charts_contains_and_allows_no_script() -> None:
     page = with_scripts(page_with(""))
     assert "<script" not in page
     assert "default-src 'none'" in policy(page)
@@ -40,7 +40,7 @@ def test_the_library_keeps_its_licence_and_its_version() -> None:
     assert f"(v{version})" in place.joinpath("uPlot.iife.min.js").read_text("utf-8")[:300]
 
 
-def test_only_a_page_of_a_server_may_ask_it_for_more() -> None:
+def test_only_pages_of_the_server_may_send_requests_to_it() -> None:
     for mark in ("dropped-logs", "live-stream"):
         assert policy(with_scripts(page_with(f'<div class="{mark}"></div>'))).endswith("; connect-src 'self'")
     assert "connect-src" not in policy(with_scripts(page_with('<figure class="charts"></figure>')))

@@ -19,11 +19,11 @@ from experiments.page.severity_rows import severity_row
         Quantity(3.0, "N", (math.nan, 4.0)),
     ],
 )
-def test_what_a_log_does_not_tell_has_no_row(one: Quantity) -> None:
+def test_a_severity_without_value_or_finite_interval_has_no_row(one: Quantity) -> None:
     assert severity_row("added_friction", "added friction", one, 0.0, 10.0) is None
 
 
-def test_the_bar_reaches_from_zero_over_the_interval_to_the_limit() -> None:
+def test_the_bar_covers_zero_and_the_limit_which_has_three_digits() -> None:
     row = severity_row("added_friction", "added friction", Quantity(3.0, "N", (1.0, 5.0)), 0.0, 10.0)
     assert row is not None
     assert row.first <= 0.0

@@ -35,7 +35,7 @@ def test_a_line_is_broken_where_a_value_is_missing() -> None:
     assert re.sub(r"[^MLh]", "", path_of(drawn([0.0, np.nan, 3.0], look="dots"), "dots")) == "MhMh"
 
 
-def test_the_largest_value_stands_highest_and_the_last_place_at_the_right() -> None:
+def test_the_largest_value_is_drawn_highest_and_the_last_at_the_right() -> None:
     points = [
         (float(a), float(b)) for a, b in re.findall(r"[ML](\S+) ([\d.]+)", path_of(drawn([1.0, 9.0, 5.0]), "line"))
     ]
@@ -43,7 +43,7 @@ def test_the_largest_value_stands_highest_and_the_last_place_at_the_right() -> N
     assert [one[0] for one in points] == pytest.approx([0.0, 322.0, 644.0], abs=0.1)
 
 
-def test_a_line_across_is_within_the_picture_and_where_it_should_be() -> None:
+def test_marks_at_a_value_and_at_a_place_are_drawn_there_within_the_picture() -> None:
     mark = path_of(drawn([0.0, 1.0], Mark("y", 3.0, "limit")), "mark")
     height = float(re.findall(r"M0 ([\d.]+)H", mark)[0])
     assert 0.0 < height < 10.0
@@ -60,14 +60,14 @@ def test_a_line_across_is_within_the_picture_and_where_it_should_be() -> None:
         ([np.nan, np.nan], ["0.5"]),
     ],
 )
-def test_ticks_are_round_and_told_apart(values: list[float], words: list[str]) -> None:
+def test_ticks_have_distinct_round_values(values: list[float], words: list[str]) -> None:
     found = words_of(drawn(values))
     assert set(words) <= set(found)
     heights = [one for one in found if one.lstrip("\N{MINUS SIGN}").replace(".", "").isdigit()]
     assert len(heights) >= 3
 
 
-def test_a_line_across_is_named_and_an_axis_may_be_given() -> None:
+def test_marks_are_labelled_and_the_range_of_an_axis_can_be_set() -> None:
     picture = drawn([0.0, 1.0], Mark("y", 3.0, "limit"), Mark("x", 1.0, "last log"))
     assert {"limit", "last log"} <= set(words_of(picture))
     panel = Panel("force", "N", [Curve("a", np.array([0.0, 1.0]))], ends=(0.0, 1000.0))
@@ -100,7 +100,7 @@ def test_a_logarithmic_axis_has_powers_of_ten_at_equal_distances() -> None:
 
 
 @pytest.mark.parametrize(("days", "step"), [(20.0, 7), (100.0, 28), (4000.0, 1825)])
-def test_an_axis_of_dates_has_whole_days_that_do_not_touch(days: float, step: int) -> None:
+def test_ticks_of_a_date_axis_are_whole_days_with_labels_that_do_not_overlap(days: float, step: int) -> None:
     x = 20700.0 + np.linspace(0.0, days, 50)
     panels = [Panel("level", "N", [Curve("a", np.ones(50))])] * 5  # five panels are drawn in two columns
     picture = ET.fromstring(still_picture(x, "date", panels, dates=True))  # noqa: S314 -- our own picture
@@ -120,7 +120,7 @@ def test_names_are_escaped_and_a_long_log_keeps_its_peak_with_few_points() -> No
     assert min(float(one) for one in re.findall(r"[ML]\S+ ([\d.]+)", path)) < 10.0
 
 
-def test_ticks_are_where_a_plotting_library_puts_them() -> None:
+def test_ticks_are_at_the_same_values_as_in_matplotlib() -> None:
     rng = np.random.default_rng(3)
     for most in (4, 8):
         for size, where in zip(10.0 ** rng.uniform(-6, 6, 300), rng.uniform(-1.0, 30.0, 300), strict=True):

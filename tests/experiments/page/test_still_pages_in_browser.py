@@ -35,7 +35,7 @@ def test_figures_can_be_read_on_a_phone(browser: Any, pages: dict[str, Path], na
 
 
 @pytest.mark.parametrize("width", [390, 768])
-def test_no_column_of_a_log_is_out_of_sight(browser: Any, pages: dict[str, Path], width: int) -> None:
+def test_the_columns_of_a_log_fit_on_the_screen(browser: Any, pages: dict[str, Path], width: int) -> None:
     page = browser.new_page(viewport={"width": width, "height": 800})
     page.goto(pages["inspect"].as_uri())
     cells = page.locator("#columns td")
@@ -56,9 +56,7 @@ def test_the_name_of_a_log_above_a_value_breaks_on_a_phone(browser: Any) -> None
     page.close()
 
 
-def test_a_wide_table_shows_on_a_phone_that_it_goes_on_and_keeps_its_first_column(
-    browser: Any, pages: dict[str, Path]
-) -> None:
+def test_a_wide_table_on_a_phone_has_a_gradient_and_a_fixed_first_column(browser: Any, pages: dict[str, Path]) -> None:
     page = browser.new_page(viewport={"width": 390, "height": 800})
     page.goto(pages["study"].as_uri())
     wide = page.locator(".scroll:not(:has(.cards))").first
@@ -69,7 +67,9 @@ def test_a_wide_table_shows_on_a_phone_that_it_goes_on_and_keeps_its_first_colum
 
 
 @pytest.mark.parametrize("name", ["inspect", "study"])
-def test_a_still_page_is_quiet_dark_and_as_wide_as_a_phone(browser: Any, pages: dict[str, Path], name: str) -> None:
+def test_a_still_page_on_a_dark_phone_fits_and_is_accessible_without_errors(
+    browser: Any, pages: dict[str, Path], name: str
+) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
     page = browser.new_page(viewport={"width": 390, "height": 800}, color_scheme="dark")
     complaints: list[str] = []
@@ -85,7 +85,7 @@ def test_a_still_page_is_quiet_dark_and_as_wide_as_a_phone(browser: Any, pages: 
     page.close()
 
 
-def test_paper_has_the_colours_of_paper_whatever_the_screen_has(browser: Any, pages: dict[str, Path]) -> None:
+def test_printing_uses_the_same_colours_for_light_and_dark_screens(browser: Any, pages: dict[str, Path]) -> None:
     """Before, marks of states were printed in the pale colours of dark pages."""
     found: list[Any] = []
     for scheme in ("light", "dark"):
@@ -102,7 +102,7 @@ def test_paper_has_the_colours_of_paper_whatever_the_screen_has(browser: Any, pa
     assert found[0] == found[1]
 
 
-def test_paper_has_the_rows_that_are_open_and_a_box_opens_them_all(browser: Any, tmp_path: Path) -> None:
+def test_printing_shows_the_open_tables_and_the_checkbox_opens_all(browser: Any, tmp_path: Path) -> None:
     """Before, the page of the papers printed on 60 sheets, since paper showed all rows."""
     style = (Path(__file__).parents[3] / "experiments/page/templates/report.css").read_text(encoding="utf-8")
     frame = pd.DataFrame({"where": ["Table 1"] * 40 + ["Table 2"] * 40, "verdict": ["reproduced"] * 80})

@@ -19,7 +19,7 @@ def test_every_figure_of_each_paper_has_one_row(paper: str, count: int) -> None:
     assert [int(row["figure"]) for row in FIGURES if row["paper"] == paper] == list(range(1, count + 1))
 
 
-def test_a_figure_is_drawn_by_a_study_or_has_a_reason() -> None:
+def test_every_figure_is_drawn_by_a_study_or_has_a_reason_why_not() -> None:
     for row in FIGURES:
         if row["drawing"]:
             assert row["drawing"] in DRAWN_BY[row["study"]][0], row
@@ -56,7 +56,7 @@ def test_every_claim_has_a_tolerance_that_can_be_read_and_errata_that_exist() ->
             assert low <= value <= high, row
 
 
-def test_the_number_that_is_compared_is_the_one_that_is_printed() -> None:
+def test_the_compared_value_of_each_claim_is_the_printed_number() -> None:
     words = {"linearly", "the same value", "second", "third", "nine", "each", "all", "1/2", "√5", "eight"}
     superscripts = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
     for row in CLAIMS:

@@ -56,14 +56,14 @@ def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path, monkeypatch
     assert list(found) == ["one", "two", "three"]
 
 
-def test_what_is_read_is_what_was_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_table_is_read_back_unchanged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stand_in(monkeypatch)
     table = gather(tmp_path, QUICK, untracked)["two"]["a_table_named"]
     assert table.to_dict("records") == [{"level": "none", "value": 0.1 + 0.2, "seed": 7}]
 
 
 @pytest.mark.parametrize("change", ["settings", "sources", "a file"])
-def test_a_part_is_made_anew_when_anything_changed(
+def test_a_part_is_run_again_after_a_change_of_sources_settings_or_files(
     change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stand_in(monkeypatch)
@@ -77,7 +77,7 @@ def test_a_part_is_made_anew_when_anything_changed(
     assert made == (["two"] if change == "a file" else ["one", "two", "three"])
 
 
-def test_a_row_that_names_a_figure_counts_for_it() -> None:
+def test_a_claim_counts_for_each_figure_that_it_names() -> None:
     def row(where: str, ours: float) -> Row:
         words = {"paper": "002", "where": where, "claim": "a claim", "printed": "1", "unit": "", "accept": "digits"}
         return Row(**words, value=1.0, basis="model", ours=Ours(ours), shown_by="hydrostate circuit")
@@ -122,12 +122,12 @@ def page_of_the_papers(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_page_is_built_and_no_row_is_without_a_verdict(tmp_path: Path) -> None:
+def test_every_claim_on_the_page_of_the_papers_has_a_verdict(tmp_path: Path) -> None:
     page_of_the_papers(tmp_path)
 
 
 @pytest.mark.slow
-def test_every_row_has_a_verdict_and_none_is_without_its_number(
+def test_every_claim_has_a_verdict_with_tables_of_the_other_studies(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     study: Found,

@@ -36,26 +36,26 @@ def row(
 @pytest.mark.parametrize(
     ("basis", "verdict"), [("computed", "reproduced"), ("model", "predicted"), ("target", "calibrated")]
 )
-def test_what_agrees_is_called_by_where_ours_is_from(basis: Basis, verdict: str) -> None:
+def test_the_verdict_on_an_agreeing_value_follows_from_its_basis(basis: Basis, verdict: str) -> None:
     assert verdict_of(row(basis=basis)) == verdict
     assert verdict_of(row(basis=basis, errata="E7")) == verdict
 
 
-def test_what_does_not_agree_is_an_erratum_only_where_one_is_cited() -> None:
+def test_a_disagreeing_value_is_an_erratum_only_if_one_is_cited() -> None:
     assert verdict_of(row(ours=Ours(2.06))) == "not reproduced"
     assert verdict_of(row(ours=Ours(2.06), errata="E7")) == "erratum"
     assert verdict_of(row(ours=Ours(None), errata="E7")) == "erratum"
     assert verdict_of(row(ours=Ours(math.nan), basis="target")) == "not reproduced"
 
 
-def test_digits_are_half_a_unit_of_the_last_one_printed() -> None:
+def test_the_tolerance_digits_is_half_a_unit_of_the_last_printed_digit() -> None:
     assert agrees(row(ours=Ours(2.05)))
     assert not agrees(row(ours=Ours(2.0501)))
     assert not agrees(row(ours=Ours(2.05), printed="2.00"))
     assert digits_half("-7.440e3") == 0.5
 
 
-def test_an_interval_of_ours_agrees_where_it_meets_the_tolerance() -> None:
+def test_an_interval_agrees_if_it_overlaps_the_tolerance() -> None:
     assert agrees(row(ours=Ours(3.0, 2.04, 3.96)))
     assert not agrees(row(ours=Ours(3.0, 2.06, 3.94)))
     assert not agrees(row(ours=Ours(1.0, 0.0, 1.94)))
@@ -81,18 +81,18 @@ def test_a_tolerance_that_cannot_be_read_is_refused(accept: str) -> None:
         verdict_of(row(accept=accept))
 
 
-def test_a_tolerance_about_a_value_needs_one() -> None:
+def test_a_relative_tolerance_without_a_printed_number_is_refused() -> None:
     with pytest.raises(HydrostateError, match="needs a printed number"):
         verdict_of(row(value=None, accept="± 1 %"))
 
 
-def test_words_are_compared_as_they_are() -> None:
+def test_words_are_compared_exactly() -> None:
     assert agrees(row("Brass", Ours("Brass"), accept="same"))
     assert not agrees(row("Brass", Ours("brass"), accept="same"))
     assert not agrees(row("never falls", Ours(9.7), accept="same"))
 
 
-def test_a_figure_with_a_row_that_did_not_come_back_is_drawn_with_a_difference() -> None:
+def test_a_figure_with_a_claim_that_is_not_reproduced_is_drawn_with_a_difference() -> None:
     assert drawn_as(True, "", ["predicted", "not reproduced"]) == "drawn with a difference"
     assert drawn_as(True, "signs mended", ["predicted"]) == "drawn with a difference"
     assert drawn_as(True, "", []) == "drawn"
@@ -108,11 +108,11 @@ def test_a_figure_with_a_row_that_did_not_come_back_is_drawn_with_a_difference()
         ("at least 2", "at least 2"),
     ],
 )
-def test_a_reader_sees_a_tolerance_in_words_and_few_digits(accept: str, said: str) -> None:
+def test_a_tolerance_is_shown_in_words_with_four_digits(accept: str, said: str) -> None:
     assert _tolerance(accept) == said
 
 
-def test_an_interval_that_excludes_the_printed_value_is_said() -> None:
+def test_an_interval_that_excludes_the_printed_value_is_detected() -> None:
     assert excluded(row(2.0, Ours(2.5, 2.4, 2.6)))
     assert not excluded(row(2.0, Ours(2.1, 1.9, 2.3)))
     assert not excluded(row(2.0, Ours(2.5)))
@@ -127,6 +127,6 @@ def test_an_interval_that_excludes_the_printed_value_is_said() -> None:
         ("58", 62.11, "62.11"),
     ],
 )
-def test_ours_stands_in_the_power_of_ten_that_is_printed(printed: str, value: float, shown: str) -> None:
+def test_our_value_is_shown_with_the_power_of_ten_of_the_printed_one(printed: str, value: float, shown: str) -> None:
     cell = _ours({"ours": value, "printed": printed})
     assert shown in str(getattr(cell, "text", cell))

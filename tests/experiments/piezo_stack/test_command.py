@@ -39,7 +39,7 @@ def test_a_run_is_written_as_its_bench_would_log_it(tmp_path: Path) -> None:
         (["--plant", "piezo-stack", "--fault", "bias_lost", "--condition", "normal"], "got both"),
     ],
 )
-def test_what_does_not_go_together_is_refused(words: list[str], said: str, tmp_path: Path) -> None:
+def test_options_that_do_not_apply_to_the_plant_are_refused(words: list[str], said: str, tmp_path: Path) -> None:
     done = RUN.invoke(app, ["simulate", *words, "--out", str(tmp_path / "run.csv")])
     assert done.exit_code == 2
     assert said in " ".join(done.stderr.split())
@@ -87,7 +87,7 @@ def test_a_log_of_another_load_is_a_mismatch_without_numbers(tmp_path: Path) -> 
     assert {entry["value"] for entry in said["quantities"].values()} == {None}
 
 
-def test_what_is_no_log_of_the_plant_is_refused(tmp_path: Path) -> None:
+def test_a_log_without_the_channels_of_the_plant_is_refused(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("time_s,position_m\n" + "".join(f"{k * 1e-3},0\n" for k in range(20)), encoding="utf-8")
     done = RUN.invoke(app, ["diagnose", "--plant", "piezo-stack", str(log)])

@@ -20,7 +20,9 @@ def drawn(stack_tables: Tables) -> Mapping[str, Figure]:
         return {name: draw(stack_tables) for name, draw in STACK_FIGURES.items()}
 
 
-def test_a_curve_a_frequency_and_its_width_beside_it(stack_tables: Tables, drawn: Mapping[str, Figure]) -> None:
+def test_figure_10_has_one_loop_per_frequency_and_a_curve_of_their_widths(
+    stack_tables: Tables, drawn: Mapping[str, Figure]
+) -> None:
     left, right = drawn["figure_10"].axes
     assert [line.get_label() for line in left.lines] == [f"{f:g} Hz" for f in LOOP_FREQUENCIES]
     widths = stack_tables["figure 10 loop widths"]["width_percent"]
@@ -37,7 +39,7 @@ def test_a_curve_a_frequency_and_its_width_beside_it(stack_tables: Tables, drawn
         ("figures_13_and_14", 1, "figure 14 flow over load", "frequency_hz"),
     ],
 )
-def test_flows_are_drawn_in_litres_a_minute_a_curve_a_setting(
+def test_flows_are_drawn_in_litres_per_minute_with_one_curve_per_setting(
     figure: str, panel: int, table: str, by: str, stack_tables: Tables, drawn: Mapping[str, Figure]
 ) -> None:
     curves = [line for line in drawn[figure].axes[panel].lines if line.get_marker() == "o"]
@@ -45,7 +47,7 @@ def test_flows_are_drawn_in_litres_a_minute_a_curve_a_setting(
         assert np.asarray(line.get_ydata()) == pytest.approx(rows["flow_m3_s"].to_numpy() / LITRE_PER_MINUTE)
 
 
-def test_the_quoted_flow_stands_inside_its_panel(drawn: Mapping[str, Figure]) -> None:
+def test_the_flow_that_the_paper_quotes_is_marked_within_its_panel(drawn: Mapping[str, Figure]) -> None:
     for name, panel, flow in (
         ("figures_11_and_12", 0, 1.6),
         ("figures_11_and_12", 1, 1.6),
@@ -57,7 +59,7 @@ def test_the_quoted_flow_stands_inside_its_panel(drawn: Mapping[str, Figure]) ->
         assert flow < axis.get_ylim()[1]
 
 
-def test_stages_follow_one_another_and_their_names_stand_above_the_first_panel_alone(
+def test_stages_of_the_pump_cycle_are_shaded_in_every_panel_and_named_in_the_first(
     stack_tables: Tables, drawn: Mapping[str, Figure]
 ) -> None:
     first, *others = drawn["pump_cycle"].axes
@@ -68,7 +70,7 @@ def test_stages_follow_one_another_and_their_names_stand_above_the_first_panel_a
     assert not any(axis.texts for axis in others)
 
 
-def test_the_part_that_limits_the_flow_most_stands_on_top(stack_tables: Tables, drawn: Mapping[str, Figure]) -> None:
+def test_the_part_that_limits_the_flow_most_is_at_the_top(stack_tables: Tables, drawn: Mapping[str, Figure]) -> None:
     (axis,) = drawn["limits"].axes
     names = [label.get_text() for label in axis.get_yticklabels()]
     assert sorted(names) == sorted(LIMITS)
@@ -77,7 +79,7 @@ def test_the_part_that_limits_the_flow_most_stands_on_top(stack_tables: Tables, 
     assert table.loc[names].is_monotonic_increasing
 
 
-def test_maps_have_a_panel_a_bias_pressure_and_one_scale(drawn: Mapping[str, Figure]) -> None:
+def test_design_maps_share_one_colour_scale_and_name_their_bias_pressures(drawn: Mapping[str, Figure]) -> None:
     *maps, scale = drawn["design_maps"].axes
     assert [axis.get_title("left") for axis in maps] == ["bias pressure 0.6 MPa", "bias pressure 1 MPa", "", ""]
     limits = {axis.collections[0].get_clim() for axis in maps}
@@ -85,7 +87,7 @@ def test_maps_have_a_panel_a_bias_pressure_and_one_scale(drawn: Mapping[str, Fig
     assert scale.get_ylim()[0] == 0.0
 
 
-def test_best_points_obey_both_limits_and_none_in_reach_gives_more(stack_tables: Tables) -> None:
+def test_best_points_satisfy_both_limits_and_have_the_largest_flow_within_them(stack_tables: Tables) -> None:
     design = stack_tables["design map"]
     power = float(design["stack_power_w"].median())
     best = best_points(design, 120.0, power)
@@ -98,7 +100,7 @@ def test_best_points_obey_both_limits_and_none_in_reach_gives_more(stack_tables:
         assert mine["flow_m3_s"].tolist() == [rows["flow_m3_s"].max()]
 
 
-def test_more_sensors_never_tell_less(stack_tables: Tables) -> None:
+def test_all_four_sensors_are_never_less_informative_than_fewer(stack_tables: Tables) -> None:
     for _, rows in stack_tables["identifiability"].groupby("frequency_hz"):
         card = rows.set_index("sensors").drop(columns="frequency_hz")
         assert list(card.index) == list(SENSOR_SETS)
@@ -106,7 +108,7 @@ def test_more_sensors_never_tell_less(stack_tables: Tables) -> None:
             assert (card.loc["all four"] <= card.loc[name] * (1.0 + 1e-6)).all(), name
 
 
-def test_a_loop_of_the_stack_is_fitted_within_its_interval_and_what_the_procedure_printed_is_not(
+def test_hysteresis_parameters_are_fitted_within_5_percent_with_correct_coverage_flags(
     stack_tables: Tables,
 ) -> None:
     table = stack_tables["hysteresis parameters"].set_index("parameter")

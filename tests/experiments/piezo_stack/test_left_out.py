@@ -35,7 +35,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return voltages
 
 
-def test_a_calibration_sees_no_run_at_the_lower_voltage_and_reaches_its_targets(seen: list[float]) -> None:
+def test_the_calibration_uses_only_runs_at_the_higher_voltage_and_recovers_the_rig(seen: list[float]) -> None:
     start = left_out.changed(RIG, np.where(np.arange(len(left_out.FREED)) == 0, 0.3, 0.2))
     found = left_out.calibrated(start)
     assert set(seen) == {HIGH_VOLTAGE}
@@ -43,14 +43,14 @@ def test_a_calibration_sees_no_run_at_the_lower_voltage_and_reaches_its_targets(
     assert found.line_area == pytest.approx(RIG.line_area, rel=0.05)
 
 
-def test_figure_12_is_asked_of_what_was_calibrated_without_it(seen: list[float]) -> None:
+def test_figure_12_is_predicted_by_rigs_calibrated_without_it(seen: list[float]) -> None:
     table = left_out.figure_12_left_out(RIG, 1, 2)
     assert table["ratio"].tolist() == pytest.approx([100.0 / 140.0] * 2)
     assert (abs(table["best_weak_hz"] - 275.0) <= 12.5).all()
     assert seen.count(100.0) == 2 * 18
 
 
-def test_values_that_stand_together_change_by_one_factor() -> None:
+def test_parameters_of_one_group_change_by_one_factor() -> None:
     one = left_out.changed(RIG, np.log(np.full(len(left_out.FREED), 1.1)))
     for name in ("outlet_reed_stiffness", "inlet_reed_stiffness", "return_length", "air_fraction"):
         assert getattr(one, name) == pytest.approx(1.1 * getattr(RIG, name))

@@ -20,7 +20,7 @@ CONDITIONS = tuple(load("conditions")["condition"])
 
 
 @pytest.mark.parametrize("name", ["conditions", "rmse", "transfer_functions"])
-def test_tables_by_condition_have_the_nine(name: TableName) -> None:
+def test_tables_by_condition_have_exactly_the_nine_conditions(name: TableName) -> None:
     table = load(name)
     assert len(table) == 9
     assert set(table["condition"]) == set(CONDITIONS)
@@ -63,7 +63,7 @@ def test_an_unknown_table_is_refused_by_name() -> None:
 
 
 @pytest.mark.parametrize("name", SCALARS)
-def test_a_scalar_in_si_is_the_printed_one_converted(name: str) -> None:
+def test_a_scalar_in_si_units_is_the_converted_printed_value(name: str) -> None:
     scalar = SCALARS[name]
     factor, offset = conversion_to(scalar.unit, scalar.si_unit)
     assert scalar.si_value == pytest.approx(scalar.value * factor + offset, rel=1e-12)
@@ -88,7 +88,7 @@ def _dc_gain_intervals(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame({"least": least, "most": most})
 
 
-def test_rounding_leaves_the_normal_dc_gain_open_by_a_factor_of_twenty() -> None:
+def test_rounding_leaves_the_normal_dc_gain_uncertain_by_a_factor_of_twenty() -> None:
     intervals = _dc_gain_intervals(load("transfer_functions"))
     assert intervals.loc["normal"].to_numpy() == pytest.approx([0.32e-4, 7.8e-4], rel=0.02)
     others = intervals.drop("normal")
@@ -129,26 +129,26 @@ AS_TYPED = {
 """First 16 digits of the SHA-256 of each published table as it was typed from the paper and proofread."""
 
 
-def test_no_digit_of_a_published_table_changes_unnoticed() -> None:
+def test_the_files_of_the_published_tables_are_unchanged() -> None:
     found = {
         path.name: sha256(path.read_bytes()).hexdigest()[:16] for path in Path(str(files(published))).glob("*.csv")
     }
     assert found == AS_TYPED
 
 
-def test_table_5_by_the_digits_that_the_paper_prints() -> None:
+def test_table_5_has_the_printed_digits() -> None:
     table = load("rmse").set_index("condition")
     in_tenths_of_a_millimetre = (1e4 * table).round(9)
     assert in_tenths_of_a_millimetre["rmse_system_id_m_per_s"].tolist() == [23, 23, 35, 27, 44, 18, 12, 32, 29]
     assert in_tenths_of_a_millimetre["rmse_mathematical_m_per_s"].tolist() == [15, 18, 14, 11, 13, 13, 11, 7, 11]
 
 
-def test_published_mathematical_models_are_better_everywhere() -> None:
+def test_published_mathematical_models_have_the_smaller_error_in_every_condition() -> None:
     table = load("rmse")
     assert (table["rmse_mathematical_m_per_s"] < table["rmse_system_id_m_per_s"]).all()
 
 
-def test_normal_pressure_of_the_text_occurs_below_the_test_voltage() -> None:
+def test_the_quoted_normal_pressure_occurs_at_3_49_v() -> None:
     p = EhaParameters()
     drop = SCALARS["normal_differential_pressure"].si_value
     push = p.piston_area * drop - p.friction_coulomb

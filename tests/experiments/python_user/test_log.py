@@ -19,7 +19,7 @@ def log() -> hs.Log:
     return hs.simulate(duration=0.5, sample_time=1e-3)
 
 
-def test_a_table_has_a_row_a_sample_by_time_and_a_column_a_channel(log: hs.Log) -> None:
+def test_a_table_has_one_row_per_sample_by_time_and_one_column_per_channel(log: hs.Log) -> None:
     table = log.to_frame()
     assert table.index.name == "time_s"
     assert table.index.to_numpy() == pytest.approx(1e-3 * np.arange(len(table)))
@@ -48,7 +48,7 @@ def test_an_option_of_the_wrong_kind_is_refused_before_any_work(log: hs.Log) -> 
         log.estimate(forms="auto")
 
 
-def test_a_part_of_a_log_runs_from_an_earlier_to_a_later_time(log: hs.Log) -> None:
+def test_between_cuts_a_log_and_refuses_a_range_that_is_not_forward(log: hs.Log) -> None:
     part = log.between(0.1, 0.2)
     assert (part.record.start_time, len(part.record)) == (pytest.approx(0.1), 101)
     np.testing.assert_array_equal(part.record["position_m"], log.record["position_m"][100:201])
@@ -58,7 +58,7 @@ def test_a_part_of_a_log_runs_from_an_earlier_to_a_later_time(log: hs.Log) -> No
             log.between(begin, end)
 
 
-def test_an_answer_has_what_was_found_and_says_what_it_has_not(log: hs.Log) -> None:
+def test_an_answer_has_the_entries_of_the_finding_and_suggests_names_for_a_misspelt_one(log: hs.Log) -> None:
     answer = log.estimate()
     assert answer.outcome == answer.finding.outcome
     assert "outcome" in dir(answer)
@@ -81,7 +81,7 @@ def test_two_answers_are_compared_as_a_table(log: hs.Log) -> None:
     assert not modulus["changed"]
 
 
-def test_errors_give_options_the_names_that_python_users_know(log: hs.Log) -> None:
+def test_errors_name_the_python_arguments(log: hs.Log) -> None:
     with pytest.raises(hs.HydrostateError, match=r"^form must be one of auto, "):
         log.estimate(form="best")
     with pytest.raises(hs.HydrostateError, match=r"^start_std must be positive"):
@@ -91,12 +91,12 @@ def test_errors_give_options_the_names_that_python_users_know(log: hs.Log) -> No
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, True])
-def test_a_seed_is_a_whole_number_from_0_up(seed: int) -> None:
+def test_a_seed_that_is_not_a_whole_number_from_0_up_is_refused(seed: int) -> None:
     with pytest.raises(hs.HydrostateError, match="seed must be a whole number from 0 up"):
         hs.simulate(seed=seed)
 
 
-def test_an_answer_writes_its_page_whole_or_says_why_not(log: hs.Log, tmp_path: Path) -> None:
+def test_an_answer_writes_its_page_or_is_refused_with_the_reason(log: hs.Log, tmp_path: Path) -> None:
     answer = log.estimate()
     page = answer.report(tmp_path / "page", title="bench 7, Monday")
     assert page == tmp_path / "page.html"
@@ -140,7 +140,7 @@ def _checked_again(*_: object) -> None:
 
 
 @pytest.mark.parametrize("verbs", [("estimate", "diagnose"), ("diagnose", "estimate")])
-def test_both_verbs_of_a_log_share_its_estimate_and_say_what_each_says_alone(
+def test_estimate_and_diagnose_share_one_fit_and_give_the_same_results_as_alone(
     log: hs.Log, fits: list[tuple[str, ...]], verbs: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     alone = [getattr(hs.Log(log.record, log.rig), verb)().to_dict() for verb in verbs]
@@ -156,7 +156,7 @@ def test_both_verbs_of_a_log_share_its_estimate_and_say_what_each_says_alone(
     assert len(fits) == 4
 
 
-def test_an_estimate_is_shared_only_where_channels_rig_and_method_are_the_same(
+def test_a_fit_is_shared_only_with_the_same_channels_rig_record_and_method(
     log: hs.Log, fits: list[tuple[str, ...]]
 ) -> None:
     both = hs.Log(log.record, log.rig)
@@ -172,14 +172,14 @@ def test_an_estimate_is_shared_only_where_channels_rig_and_method_are_the_same(
     assert len(fits) == 6
 
 
-def test_a_warning_points_at_the_line_that_read_the_log(log: hs.Log) -> None:
+def test_a_warning_points_to_the_file_of_the_caller(log: hs.Log) -> None:
     table = log.to_frame().assign(position_m=1e3 * log["position_m"])
     with pytest.warns(LogWarning) as caught:
         hs.read(table)
     assert {one.filename for one in caught} == {__file__}
 
 
-def test_a_log_made_of_what_is_no_record_says_what_opens_it(log: hs.Log) -> None:
+def test_a_log_made_of_a_path_is_refused_with_a_hint(log: hs.Log) -> None:
     with pytest.raises(hs.HydrostateError, match="made of a Record, got str; hydrostate"):
         hs.Log("run.csv", hs.Rig())  # type: ignore[arg-type]
     with pytest.raises(hs.HydrostateError, match="must be a Rig, got str; hydrostate"):
@@ -187,7 +187,7 @@ def test_a_log_made_of_what_is_no_record_says_what_opens_it(log: hs.Log) -> None
 
 
 @pytest.mark.parametrize("verb", ["estimate", "diagnose"])
-def test_an_answer_comes_back_from_another_process_as_it_was(log: hs.Log, verb: str, tmp_path: Path) -> None:
+def test_a_pickled_answer_is_restored_unchanged(log: hs.Log, verb: str, tmp_path: Path) -> None:
     answer = getattr(log, verb)()
     copied = pickle.loads(pickle.dumps(answer))  # noqa: S301 - our own
     assert str(copied) == str(answer)
@@ -195,12 +195,12 @@ def test_an_answer_comes_back_from_another_process_as_it_was(log: hs.Log, verb: 
     assert pages[0] == pages[1]
 
 
-def test_a_seed_of_numpy_is_a_seed() -> None:
+def test_a_numpy_integer_is_accepted_as_a_seed() -> None:
     runs = [hs.simulate(duration=0.1, sample_time=1e-3, seed=seed) for seed in (3, np.int64(3))]
     assert np.array_equal(runs[0]["position_m"], runs[1]["position_m"])
 
 
-def test_what_is_no_time_and_no_size_is_refused_in_a_sentence(log: hs.Log) -> None:
+def test_invalid_times_and_model_sizes_are_refused(log: hs.Log) -> None:
     with pytest.raises(hs.HydrostateError, match="must be seconds, got 'a' and 1"):
         log.between("a", 1)  # type: ignore[arg-type]
     for size, said in (
@@ -215,7 +215,7 @@ def test_what_is_no_time_and_no_size_is_refused_in_a_sentence(log: hs.Log) -> No
             log.identify(input="motor_speed_rad_s", output="velocity_m_s", **size)
 
 
-def test_a_channel_without_a_sample_is_left_out_of_a_record_made_by_hand_and_of_a_part(log: hs.Log) -> None:
+def test_a_channel_without_samples_is_left_out_of_a_part_with_a_warning(log: hs.Log) -> None:
     """Before, the fit asked for "a signal with at least one finite sample", without naming file or channel."""
     late = log["differential_pressure_pa"].copy()
     late[: len(log) // 2] = np.nan

@@ -41,7 +41,7 @@ def found(log: pd.DataFrame) -> Any:
     return oven().fit(log)
 
 
-def test_a_fit_says_what_it_found(found: Any) -> None:
+def test_a_fit_gives_quantities_noise_and_outcome(found: Any) -> None:
     assert found.believed
     assert found.quantities["rate"].covers(0.5)
     assert found.quantities["rate"].unit == "1/s"
@@ -55,7 +55,7 @@ def test_a_fit_says_what_it_found(found: Any) -> None:
     assert 1.0 <= found.condition < 100.0
 
 
-def test_it_turns_into_json_and_tables(found: Any) -> None:
+def test_a_fit_can_be_converted_to_json_and_a_table(found: Any) -> None:
     entries = json.loads(json.dumps(found.to_dict()))
     assert entries["parameters"]["rate"]["unit"] == "1/s"
     assert entries["outcome"] == "ok"
@@ -63,7 +63,7 @@ def test_it_turns_into_json_and_tables(found: Any) -> None:
     assert table.loc["rate", "ci95_low"] < 0.5 < table.loc["rate", "ci95_high"]
 
 
-def test_it_draws_what_was_measured_and_what_is_left(found: Any, log: pd.DataFrame) -> None:
+def test_the_plot_of_a_fit_shows_the_measurement_and_the_residual(found: Any, log: pd.DataFrame) -> None:
     above, below = found.plot()
     np.testing.assert_allclose(above.lines[0].get_ydata(), log["warm"])
     left = np.asarray(above.lines[1].get_ydata()) - log["warm"].to_numpy()
@@ -71,7 +71,7 @@ def test_it_draws_what_was_measured_and_what_is_left(found: Any, log: pd.DataFra
     assert above.get_ylabel() == "warm [degC]"
 
 
-def test_a_free_run_follows_a_log_of_any_kind(found: Any, log: pd.DataFrame) -> None:
+def test_a_simulation_follows_a_record_or_a_table(found: Any, log: pd.DataFrame) -> None:
     record = hs.Record(0.05, {name: log[name].to_numpy() for name in log})
     run = found.simulate(record)
     np.testing.assert_allclose(run["warm"], log["warm"], atol=0.25)
@@ -92,6 +92,6 @@ def test_a_free_run_follows_a_log_of_any_kind(found: Any, log: pd.DataFrame) -> 
         (lambda log: oven().fit(log).beleived, "did you mean 'believed'"),
     ],
 )
-def test_a_slip_is_answered_with_the_remedy(log: pd.DataFrame, slip: Any, said: str) -> None:
+def test_wrong_arguments_are_refused_with_a_precise_message(log: pd.DataFrame, slip: Any, said: str) -> None:
     with pytest.raises(hs.HydrostateError, match=said):
         slip(log)

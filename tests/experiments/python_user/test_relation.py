@@ -46,14 +46,14 @@ def shared() -> Relation:
     return identified([record(1)], ["valve", "load"], ["flow", "heat"], form)
 
 
-def test_two_outputs_are_one_object_of_python_control_with_a_row_each(both: Relation) -> None:
+def test_models_of_two_outputs_become_one_transfer_matrix_of_python_control(both: Relation) -> None:
     system = both.to_control()
     assert isinstance(system, control.TransferFunction)
     assert (system.noutputs, system.ninputs, system.dt) == (2, 2, T)
     np.testing.assert_allclose(system.dcgain(), list(GAINS.values()), atol=0.05)
 
 
-def test_a_state_space_is_shared_as_long_as_all_its_outputs_are_there(shared: Relation) -> None:
+def test_a_shared_state_space_model_becomes_one_state_space_of_python_control(shared: Relation) -> None:
     system = shared.to_control()
     assert isinstance(system, control.StateSpace)
     assert list(system.output_labels) == ["flow", "heat"]
@@ -61,7 +61,7 @@ def test_a_state_space_is_shared_as_long_as_all_its_outputs_are_there(shared: Re
     np.testing.assert_allclose(sorted(system.poles().real)[-2:], [0.5, 0.8], atol=0.05)
 
 
-def test_each_model_writes_the_page_that_the_command_does(both: Relation, tmp_path: Path) -> None:
+def test_report_writes_one_page_for_each_output(both: Relation, tmp_path: Path) -> None:
     places = both.report(tmp_path / "loop", title="bench 7, Monday")
     assert [one.name for one in places] == ["loop-flow.html", "loop-heat.html"]
     for place, output in zip(places, GAINS, strict=True):
@@ -75,7 +75,7 @@ def test_each_model_writes_the_page_that_the_command_does(both: Relation, tmp_pa
         Relation(both.models).report(tmp_path / "loop")
 
 
-def test_one_model_has_what_it_was_fitted_with_as_attributes_and_two_have_not(both: Relation) -> None:
+def test_entries_are_attributes_of_a_single_model_and_not_of_two(both: Relation) -> None:
     one = identified([record(1)], "load", "heat", {"order": 1, "delay": 1})
     assert one.output == "heat"
     assert one.fit_percent > 95.0  # an attribute from the entries
@@ -88,7 +88,7 @@ def test_one_model_has_what_it_was_fitted_with_as_attributes_and_two_have_not(bo
         _ = both._nothing
 
 
-def test_inputs_alone_are_simulated_too_and_a_log_begins_from_its_measured_output(both: Relation) -> None:
+def test_a_simulation_starts_from_the_measured_output_of_a_log_but_not_with_inputs_alone(both: Relation) -> None:
     log = record(2)
     alone = both.simulate(np.column_stack([log["valve"], log["load"]]))
     begun = both.simulate(opened(log))
@@ -99,14 +99,14 @@ def test_inputs_alone_are_simulated_too_and_a_log_begins_from_its_measured_outpu
     assert abs(begun[0, 0] - log["flow"][0]) < abs(alone[0, 0] - log["flow"][0])
 
 
-def test_another_log_is_followed_output_by_output(both: Relation) -> None:
+def test_validation_on_another_log_has_one_row_per_output(both: Relation) -> None:
     told = both.validate(opened(record(2)))
     assert list(told.index) == ["flow", "heat"]
     assert (told["fit_percent"] > 95.0).all()
     assert told["rmse"].to_numpy() == pytest.approx(0.02, rel=0.2)  # the noise is all that is left
 
 
-def test_rows_that_were_sent_twice_are_left_out_of_all_outputs_and_told(both: Relation) -> None:
+def test_repeated_rows_are_left_out_of_simulation_and_validation_with_a_warning(both: Relation) -> None:
     once = record(2)
     rows = np.r_[0:220, 200:400]
     twice = Record(T, {name: once[name][rows] for name in once})
@@ -118,7 +118,7 @@ def test_rows_that_were_sent_twice_are_left_out_of_all_outputs_and_told(both: Re
     np.testing.assert_allclose(told["rmse"], both.validate(once)["rmse"])
 
 
-def test_saved_models_are_loaded_without_what_was_fitted(both: Relation, tmp_path: Path) -> None:
+def test_saved_models_are_loaded_without_the_results_of_the_fit(both: Relation, tmp_path: Path) -> None:
     both.save(tmp_path / "model.json")
     loaded = Relation(load_models(tmp_path / "model.json"))
     assert loaded.to_dict() == both.to_dict()
@@ -129,7 +129,7 @@ def test_saved_models_are_loaded_without_what_was_fitted(both: Relation, tmp_pat
     assert loaded.plot() == []  # a loaded model has no log to draw
 
 
-def test_every_output_has_two_drawings(both: Relation) -> None:
+def test_every_output_is_drawn_with_its_residual(both: Relation) -> None:
     axes = both.plot()
     labels = [axis.get_ylabel() for axis in axes]
     assert labels == ["flow [its unit]"] * 2 + ["heat [its unit]"] * 2
@@ -137,13 +137,13 @@ def test_every_output_has_two_drawings(both: Relation) -> None:
     assert np.std(np.asarray(left_over)) == pytest.approx(0.02, rel=0.2)
 
 
-def test_a_slower_model_is_simulated_on_its_own_clock() -> None:
+def test_a_model_of_longer_sample_time_is_simulated_at_its_own_sample_time() -> None:
     slow = identified([record(1)], "load", "heat", {"order": 1, "delay": 1, "sample_time": 2 * T})
     assert slow.sample_time == pytest.approx(2 * T)
     assert slow.simulate(opened(record(2))).shape == (200,)
 
 
-def test_a_table_is_taken_by_the_names_of_its_columns(both: Relation) -> None:
+def test_columns_of_a_table_are_matched_by_name(both: Relation) -> None:
     log = record(2)
     table = opened(log).to_frame()
     begun = both.simulate(opened(log))
@@ -166,22 +166,22 @@ def test_a_table_is_taken_by_the_names_of_its_columns(both: Relation) -> None:
         ([[0.0, 1.0], [0.0, np.nan]], "finite at every sample, row 1 is not"),
     ],
 )
-def test_what_is_no_input_is_refused(given: object, said: str, both: Relation) -> None:
+def test_inputs_that_are_not_finite_numbers_are_refused(given: object, said: str, both: Relation) -> None:
     with pytest.raises(HydrostateError, match=said):
         both.simulate(given)
 
 
-def test_only_a_log_or_a_table_is_validated_on(both: Relation) -> None:
+def test_validation_on_an_array_is_refused(both: Relation) -> None:
     with pytest.raises(HydrostateError, match="got ndarray"):
         both.validate(np.zeros(30))
 
 
-def test_names_of_channels_are_texts() -> None:
+def test_a_channel_name_that_is_not_a_string_is_refused() -> None:
     with pytest.raises(HydrostateError, match="input must be the name of a channel or a list of names, got 3"):
         opened(record(1)).identify(input=3, output="heat")
 
 
-def test_completion_offers_what_a_model_has(both: Relation) -> None:
+def test_completion_offers_the_attributes_of_a_single_model(both: Relation) -> None:
     one = identified([record(1)], "load", "heat", {"order": 1, "delay": 1})
     assert {"fit_percent", "sample_time", "simulate"} <= {*dir(one)}
     assert "fit_percent" not in dir(both)
@@ -193,7 +193,7 @@ def bent(seed: int, size: float) -> Record:
     return Record(T, {"valve": u, "heat": y + 0.01 * np.random.default_rng(seed).normal(size=y.size)})
 
 
-def test_inputs_beyond_the_fit_of_a_polynomial_model_are_told() -> None:
+def test_inputs_beyond_the_fitted_range_of_a_polynomial_model_give_a_warning() -> None:
     found = identified([bent(1, 1.0)], "valve", "heat", {"structure": "narx", "order": 1, "delay": 1})
     found.simulate(bent(1, 1.0))  # pytest turns a warning into an error
     far = bent(2, 4.0)
@@ -202,7 +202,7 @@ def test_inputs_beyond_the_fit_of_a_polynomial_model_are_told() -> None:
             ask(far)
 
 
-def test_a_linear_model_that_stands_in_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_linear_model_that_replaces_a_polynomial_one_gives_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     found = identified([bent(1, 1.0)], "valve", "heat", {"structure": "auto", "order": 1, "delay": 1})
     dynamics = found.models[0].dynamics
     assert isinstance(dynamics, PolynomialDynamics)
@@ -224,7 +224,7 @@ def test_a_linear_model_that_stands_in_is_told(monkeypatch: pytest.MonkeyPatch) 
     assert len(told) == 3  # the fits that leave out a block run once, for both the result and the warning
 
 
-def test_rows_that_a_logger_wrote_twice_are_told_and_left_out() -> None:
+def test_repeated_rows_are_left_out_of_identification_with_a_warning() -> None:
     once = bent(1, 1.0)
     rows = np.concatenate([np.arange(300), np.arange(280, len(once))])
     sent = Record(T, {name: once[name][rows] for name in once})

@@ -10,14 +10,14 @@ from experiments.running.executors import SerialExecutor, open_executor
 from plant.errors import HydrostateError
 
 
-def test_what_a_task_raises_is_raised_where_its_result_is_asked_for() -> None:
+def test_the_exception_of_a_task_is_raised_by_its_result() -> None:
     future = SerialExecutor().submit(int, "no number")
     assert isinstance(future.exception(), ValueError)
     with pytest.raises(ValueError, match="no number"):
         future.result()
 
 
-def test_a_cluster_needs_dask(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cluster_without_dask_is_refused_with_the_extra_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with (
         pytest.raises(HydrostateError, match=r"pip install 'hydrostate\[cluster\]'"),
@@ -27,7 +27,7 @@ def test_a_cluster_needs_dask(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("error", [OSError("timed out"), ValueError("no port")])
-def test_a_scheduler_that_does_not_answer_is_said_with_its_address(
+def test_a_scheduler_that_does_not_answer_is_named_by_its_address(
     error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def client(*_: Any, **__: Any) -> None:
@@ -66,7 +66,7 @@ def test_a_cluster_runs_as_many_tasks_as_it_has_cores(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("stopped", [False, True])
-def test_processes_in_flight_are_ended_only_when_the_user_will_not_wait_and_no_others_are(
+def test_an_interruption_ends_the_processes_of_the_pool_and_no_others(
     stopped: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from experiments.running import executors

@@ -10,7 +10,7 @@ SAID = "out is a file, and a folder is needed there: choose another name, or mov
 
 
 @pytest.mark.parametrize("below", ["", "b"])
-def test_a_file_where_a_folder_is_needed_is_named_with_what_to_do(tmp_path: Path, below: str) -> None:
+def test_a_file_in_place_of_a_folder_is_named_with_the_remedy(tmp_path: Path, below: str) -> None:
     out = tmp_path / "out"
     out.write_text("x")
     with pytest.raises(HydrostateError, match=SAID), refused("--out: the folder cannot be made"):

@@ -33,7 +33,7 @@ def dropped(client: TestClient, name: str, content: bytes, verb: str = "inspect"
     return finished(client, answer.json()["id"])
 
 
-def test_a_dropped_log_is_worked_on_and_its_page_may_run_its_own_scripts_alone(served: Served, log: bytes) -> None:
+def test_an_uploaded_log_is_processed_and_its_page_allows_only_its_own_scripts(served: Served, log: bytes) -> None:
     client = served()
     found = dropped(client, "run 1.csv", log, "estimate")
     assert (found["state"], found["outcome"], found["name"]) == ("done", "ok", "run 1.csv")
@@ -50,9 +50,7 @@ def test_a_dropped_log_is_worked_on_and_its_page_may_run_its_own_scripts_alone(s
     assert "run 1.csv" in page.text
 
 
-def test_a_file_that_is_no_log_is_told_so_without_a_place_on_the_servers_machine(
-    served: Served, tmp_path: Path
-) -> None:
+def test_a_file_that_is_not_a_log_fails_without_naming_a_path_of_the_server(served: Served, tmp_path: Path) -> None:
     client = served()
     found = dropped(client, "words.csv", b"these are, words\nand no, numbers\n", "diagnose")
     assert found["state"] == "failed"
@@ -67,7 +65,9 @@ def test_a_file_that_is_no_log_is_told_so_without_a_place_on_the_servers_machine
     ("name", "kept"),
     [("../../evil.csv", "evil.csv"), ("C:\\x\\a.csv", "a.csv"), ("..", "log"), ("a\x00\x1b[2J.csv", "a[2J.csv")],
 )
-def test_a_name_leads_nowhere(served: Served, tmp_path: Path, name: str, kept: str) -> None:
+def test_a_file_name_with_a_path_writes_nothing_outside_the_folder(
+    served: Served, tmp_path: Path, name: str, kept: str
+) -> None:
     before = set(tmp_path.rglob("*"))
     client = served()
     found = dropped(client, name, b"a,b\n1,2\n2,3\n")
@@ -104,7 +104,7 @@ def test_a_name_leads_nowhere(served: Served, tmp_path: Path, name: str, kept: s
         ("POST", "/api/logs?name=a", {"content-type": "multipart/form-data; boundary=x"}, 415),
     ],
 )
-def test_what_cannot_be_done_is_refused_in_a_sentence_with_every_header(
+def test_invalid_requests_are_refused_with_a_message_and_every_security_header(
     served: Served, method: str, path: str, headers: dict[str, str], status: int
 ) -> None:
     answer = served().request(method, path, headers=headers)
@@ -113,7 +113,7 @@ def test_what_cannot_be_done_is_refused_in_a_sentence_with_every_header(
     assert {name.decode() for name in HEADERS} <= set(answer.headers)
 
 
-def test_without_its_token_nothing_is_answered(served: Served) -> None:
+def test_requests_without_the_token_are_refused(served: Served) -> None:
     client = served(host="0.0.0.0", token="sixteen-letters-!")  # noqa: S104, S106
     paths = ("/", "/api/logs", "/openapi.json", "/nowhere", "/?token=wrong")
     assert {client.get(path).status_code for path in paths} == {401}
@@ -125,15 +125,13 @@ def test_without_its_token_nothing_is_answered(served: Served) -> None:
     assert client.get("/api/logs").status_code == 200  # the client keeps the cookie
 
 
-def test_a_full_queue_says_when_to_come_again(served: Served) -> None:
+def test_a_full_queue_refuses_a_log_with_a_retry_time(served: Served) -> None:
     answer = served(waiting=0).post("/api/logs", params={"name": "a.csv"}, content=b"a")
     assert answer.status_code == 429
     assert int(answer.headers["retry-after"]) > 0
 
 
-def test_no_more_logs_come_in_at_once_than_may_and_no_more_views_are_open(
-    served: Served, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_simultaneous_uploads_and_open_views_are_limited(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server, "MOST_UPLOADS", 0)
     monkeypatch.setattr(server, "MOST_LOOKING", 0)
     monkeypatch.setattr("experiments.serve.live.Stream.start", lambda _: None)
@@ -148,14 +146,14 @@ def test_no_more_logs_come_in_at_once_than_may_and_no_more_views_are_open(
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_one_foreign_origin_among_several_is_foreign(served: Served, turned: bool) -> None:
+def test_a_request_with_a_foreign_origin_among_several_is_refused(served: Served, turned: bool) -> None:
     origins = ["http://127.0.0.1", "http://evil.example"]
     headers = [("origin", one) for one in (reversed(origins) if turned else origins)]
     assert served().post("/api/logs?name=a", content=b"a", headers=headers).status_code == 403
 
 
 @pytest.mark.parametrize("settings", [{"largest": 1000}, {"room": 1000}])
-def test_a_body_that_is_too_large_is_refused_while_it_comes(
+def test_a_body_that_is_too_large_is_refused_and_leaves_no_file(
     served: Served, tmp_path: Path, settings: dict[str, int]
 ) -> None:
     client, sent = served(**settings), list[int]()
@@ -171,7 +169,7 @@ def test_a_body_that_is_too_large_is_refused_while_it_comes(
     assert client.get("/api/logs").json()["logs"] == []
 
 
-def test_a_deleted_log_is_gone_with_its_page(served: Served, tmp_path: Path) -> None:
+def test_deleting_a_log_also_deletes_its_page(served: Served, tmp_path: Path) -> None:
     client = served()
     found = dropped(client, "a.csv", b"a,b\n1,2\n2,3\n")
     assert client.get(f"/logs/{found['id']}").status_code == 200
@@ -181,7 +179,7 @@ def test_a_deleted_log_is_gone_with_its_page(served: Served, tmp_path: Path) -> 
     assert not list((tmp_path / "kept").rglob(f"*{found['id']}*"))
 
 
-def test_what_is_not_done_yet_is_neither_a_result_nor_a_page(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_waiting_log_has_neither_a_result_nor_a_page(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     client = served()
     monkeypatch.setattr("experiments.serve.jobs.Jobs.submit", lambda *_: None)
     identity = client.post("/api/logs", params={"name": "a.csv"}, content=b"a").json()["id"]
@@ -190,7 +188,9 @@ def test_what_is_not_done_yet_is_neither_a_result_nor_a_page(served: Served, mon
     assert client.get("/compare", params={"first": identity, "second": identity}).status_code == 409
 
 
-def test_two_logs_are_compared_and_the_fleet_has_both(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_logs_can_be_compared_and_the_fleet_follows_uploads_and_deletions(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from experiments.serve.work import LogResult
 
     def stand_in(task: Any) -> LogResult:
@@ -228,14 +228,14 @@ def test_logs_are_listed_the_latest_first_and_page_by_page(served: Served) -> No
     assert sum(first["counts"].values()) == 3
 
 
-def test_openapi_tells_every_refusal(served: Served) -> None:
+def test_openapi_documents_every_status_of_an_upload(served: Served) -> None:
     paths = served().get("/openapi.json").json()["paths"]
     assert {"/api/logs", "/api/compare", "/api/streams/{name}/events", "/fleet"} <= set(paths)
     told = set(paths["/api/logs"]["post"]["responses"])
     assert {str(status) for status in server.WHY} - {"404", "409"} | {"202"} == told
 
 
-def test_an_error_that_nobody_foresaw_is_told_in_a_sentence(
+def test_an_unexpected_error_is_answered_with_a_message_and_every_security_header(
     served: Served, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     client = served()
@@ -248,7 +248,7 @@ def test_an_error_that_nobody_foresaw_is_told_in_a_sentence(
     assert "Traceback" not in capsys.readouterr().err
 
 
-def test_a_folder_that_cannot_be_had_ends_the_server_with_its_reason(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_ends_the_server_with_the_reason(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     settings = Settings(folder=tmp_path / "file" / "kept")
     for told in (None, list[HydrostateError]()):
@@ -269,7 +269,7 @@ def test_a_refusal_is_a_page_for_a_browser_and_data_for_a_program(served: Served
     assert set(client.get(path).json()) == {"detail"}
 
 
-def test_a_browser_without_the_token_reads_what_to_do(served: Served) -> None:
+def test_a_browser_without_the_token_gets_a_page_that_explains_it(served: Served) -> None:
     client = served(token=16 * "a")
     page = client.get("/", params={"token": "<b>"}, headers={"Accept": "text/html"})
     assert (page.status_code, "<b>" in page.text) == (401, False)

@@ -77,7 +77,7 @@ async def answered(wire: Wire) -> None:
         await asyncio.sleep(0.5 * SOON)
 
 
-def test_a_client_that_sends_no_headers_is_told_that_it_is_late() -> None:
+def test_a_client_that_does_not_complete_its_headers_in_time_is_refused() -> None:
     async def said() -> Wire:
         protocol, wire = connected()
         protocol.data_received(ASKED[:20])
@@ -92,7 +92,7 @@ def test_a_client_that_sends_no_headers_is_told_that_it_is_late() -> None:
     assert wire.written == LATE
 
 
-def test_an_answer_may_take_longer_than_headers() -> None:
+def test_an_answer_may_take_longer_than_the_time_limit_for_headers() -> None:
     async def said() -> bytes:
         protocol, wire = connected()
         protocol.data_received(ASKED)
@@ -103,7 +103,7 @@ def test_an_answer_may_take_longer_than_headers() -> None:
     assert asyncio.run(said()).startswith(b"HTTP/1.1 204")
 
 
-def test_a_connection_that_is_lost_is_not_told_that_it_is_late() -> None:
+def test_a_lost_connection_gets_no_timeout_answer() -> None:
     async def said() -> Wire:
         protocol, wire = connected()
         protocol.connection_lost(None)
@@ -113,7 +113,7 @@ def test_a_connection_that_is_lost_is_not_told_that_it_is_late() -> None:
     assert asyncio.run(said()).written == b""
 
 
-def test_a_connection_that_is_closing_is_not_told_either() -> None:
+def test_a_closing_connection_gets_no_timeout_answer() -> None:
     async def said() -> Wire:
         _, wire = connected()
         wire.close()
@@ -123,7 +123,7 @@ def test_a_connection_that_is_closing_is_not_told_either() -> None:
     assert asyncio.run(said()).written == b""
 
 
-def test_one_connection_too_many_is_refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_connection_beyond_the_maximum_is_refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connection, "most_connections", lambda: 0)
 
     async def said() -> Wire:
@@ -135,7 +135,7 @@ def test_one_connection_too_many_is_refused_at_once(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("reads", [False, True])
-def test_only_a_client_that_does_not_read_is_cut_off(reads: bool) -> None:
+def test_only_a_client_that_does_not_read_its_answer_is_disconnected(reads: bool) -> None:
     async def said() -> Wire:
         protocol, wire = connected()
         protocol.data_received(ASKED)
@@ -149,7 +149,7 @@ def test_only_a_client_that_does_not_read_is_cut_off(reads: bool) -> None:
     assert asyncio.run(said()).aborted is not reads
 
 
-def test_what_is_no_http_is_refused_and_who_works_on_an_answer_is_told() -> None:
+def test_a_malformed_body_is_refused_and_the_application_gets_a_disconnect() -> None:
     heard: Heard = []
 
     async def listens(_: Any, receive: Any, send: Any) -> None:
@@ -195,12 +195,14 @@ def test_a_broken_body_after_the_answer_began_ends_the_connection() -> None:
 
 
 @pytest.mark.parametrize(("files", "most"), [(-1, 512), (1024, 480), (100_000, 512), (32, 8)])
-def test_connections_leave_files_for_everything_else(files: int, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_maximum_of_connections_leaves_file_descriptors_free(
+    files: int, most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(connection.resource, "getrlimit", lambda _: (files, files))
     assert connection.most_connections() == most
 
 
-def test_a_client_that_reads_again_though_it_never_stopped_is_left_alone() -> None:
+def test_a_resume_without_a_pause_does_not_end_the_connection() -> None:
     async def said() -> Wire:
         protocol, wire = connected()
         protocol.data_received(ASKED)
@@ -214,7 +216,7 @@ def test_a_client_that_reads_again_though_it_never_stopped_is_left_alone() -> No
     assert not wire.aborted
 
 
-def test_noise_before_any_request_is_refused_and_nobody_is_told() -> None:
+def test_noise_before_any_request_is_refused() -> None:
     async def said() -> Wire:
         protocol, wire = connected()
         protocol.data_received(b"\x16\x03\x01 no request\r\n\r\n")

@@ -42,7 +42,7 @@ def watching(sent: list[Any]) -> Gauges:
     return found
 
 
-def test_gauges_come_no_more_often_than_they_may_and_lose_no_extreme_meanwhile(sent: list[Any], clock: Clock) -> None:
+def test_gauges_are_sent_at_most_once_per_interval_and_keep_the_extremes(sent: list[Any], clock: Clock) -> None:
     found = watching(sent)
     found.saw({"a": np.array([1.0])}, 0.1, False)
     for seconds, value in ((0.2, 9.0), (0.6, -9.0), (1.01, 0.0)):
@@ -53,7 +53,7 @@ def test_gauges_come_no_more_often_than_they_may_and_lose_no_extreme_meanwhile(s
     assert (last["low"], last["high"], last["values"]) == ({"a": -9.0}, {"a": 9.0}, {"a": 0.0})
 
 
-def test_an_alarm_is_a_peak_of_its_balance_though_the_balance_begins_again(sent: list[Any], clock: Clock) -> None:
+def test_the_score_of_an_alarm_is_sent_even_if_its_balance_is_reset(sent: list[Any], clock: Clock) -> None:
     found = watching(sent)
     found.events([Alarm(6.9, "flow", 6.5, (6.4, 6.6), 4.3, 4.0)])
     found.saw({"a": np.array([1.0])}, 7.0, False)
@@ -62,7 +62,7 @@ def test_an_alarm_is_a_peak_of_its_balance_though_the_balance_begins_again(sent:
     assert [told["scores"] for kind, told in sent if kind == "gauges"] == [{"flow": 4.3}, {"flow": 1.0}]
 
 
-def test_a_channel_that_is_silent_has_no_range_and_its_rows_are_not_whole(sent: list[Any], clock: Clock) -> None:
+def test_a_channel_without_values_has_no_range_and_its_rows_are_not_counted(sent: list[Any], clock: Clock) -> None:
     del clock
     watching(sent).saw({"a": np.array([np.nan, np.nan]), "b": np.array([1.0, 2.0])}, 0.1, False)
     ((_, told),) = sent
@@ -70,7 +70,7 @@ def test_a_channel_that_is_silent_has_no_range_and_its_rows_are_not_whole(sent: 
     assert told["values"] == {"a": None, "b": 2.0}
 
 
-def test_before_the_watch_has_begun_there_are_no_gauges(sent: list[Any], clock: Clock) -> None:
+def test_no_gauges_are_sent_before_the_watch_begins(sent: list[Any], clock: Clock) -> None:
     del clock
     Gauges(SimpleNamespace(send=sent.append)).saw({"a": np.array([1.0])}, 0.1, False)  # type: ignore[arg-type]
     assert sent == []
@@ -110,7 +110,7 @@ def rows(*_: object) -> list[str]:
     return [HEADER, *(f"{0.01 * k:.2f},20,0.01\n" for k in range(300)), *["x,x,0\n"] * 60]
 
 
-def test_a_stream_that_breaks_tells_its_last_gauges_before_its_end(
+def test_a_failed_stream_sends_its_last_gauges_before_its_end_event(
     bound: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("experiments.streams.watching.stream_lines", rows)
@@ -125,7 +125,7 @@ def test_a_stream_that_breaks_tells_its_last_gauges_before_its_end(
     assert (tmp_path / "state.npz").exists()
 
 
-def test_a_server_that_is_gone_is_told_nothing_and_raises_nothing(
+def test_a_closed_pipe_to_the_server_raises_no_error(
     bound: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     del bound

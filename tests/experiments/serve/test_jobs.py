@@ -63,7 +63,7 @@ def until(asked: Callable[[], bool], seconds: float = 30.0) -> None:
         time.sleep(0.01)
 
 
-def test_what_is_unfinished_is_taken_up_in_its_order_and_what_ended_servers_is_given_up(
+def test_unfinished_logs_are_resumed_in_order_except_those_that_ended_the_server(
     settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     taken: list[str] = []
@@ -98,7 +98,7 @@ def test_what_is_unfinished_is_taken_up_in_its_order_and_what_ended_servers_is_g
         (ValueError("odd"), "please report it"),
     ],
 )
-def test_work_that_is_lost_is_told_so(
+def test_a_log_whose_process_fails_gets_the_reason(
     settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch, error: Exception, words: str
 ) -> None:
     monkeypatch.setattr(Ending, "ends", staticmethod(lambda future: future.set_exception(error)), raising=False)
@@ -111,7 +111,7 @@ def test_work_that_is_lost_is_told_so(
     assert words in str(found.message)
 
 
-def test_a_result_that_cannot_be_kept_is_noted_and_its_log_is_worked_on_again_later(
+def test_a_log_whose_result_cannot_be_stored_stays_unfinished(
     settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     worked = LogResult({"outcome": "ok", "message": "x" * 100_000}, None)
@@ -145,7 +145,7 @@ def files_of(settings: Settings, identity: str) -> list[Path]:
 
 
 @pytest.mark.parametrize(("outcome", "state"), [("ok", "done"), ("mismatch", "done"), ("failed", "failed")])
-def test_work_that_is_done_is_kept_with_its_page_and_leaves_the_queue(
+def test_a_finished_log_keeps_its_page_and_leaves_the_queue(
     settings: Settings, store: Store, pending: list["Future[Any]"], outcome: str, state: str
 ) -> None:
     jobs = Jobs(settings, store)
@@ -161,7 +161,7 @@ def test_work_that_is_done_is_kept_with_its_page_and_leaves_the_queue(
     assert files_of(settings, "a") == [log_file(settings, "a"), page_file(settings, "a")]
 
 
-def test_a_log_that_is_taken_back_leaves_no_file_even_if_its_page_is_written_afterwards(
+def test_a_cancelled_log_leaves_no_file_even_if_its_page_is_written_later(
     settings: Settings, store: Store, pending: list["Future[Any]"]
 ) -> None:
     jobs = Jobs(settings, store)
@@ -179,7 +179,7 @@ def test_a_log_that_is_taken_back_leaves_no_file_even_if_its_page_is_written_aft
     assert unfinished == ["a", "b"]  # the caller of `cancel` deletes the log in the store
 
 
-def test_a_log_that_is_deleted_in_the_store_meanwhile_leaves_no_page(
+def test_a_log_deleted_during_its_processing_leaves_no_page(
     settings: Settings, store: Store, pending: list["Future[Any]"]
 ) -> None:
     jobs = Jobs(settings, store)
@@ -191,7 +191,7 @@ def test_a_log_that_is_deleted_in_the_store_meanwhile_leaves_no_page(
     assert (store.get("a"), jobs.waiting) == (None, 0)
 
 
-def test_what_is_under_way_when_a_server_closes_stays_unfinished(
+def test_a_log_in_progress_stays_unfinished_if_the_server_closes(
     settings: Settings, store: Store, pending: list["Future[Any]"]
 ) -> None:
     jobs = Jobs(settings, store)
@@ -202,7 +202,7 @@ def test_what_is_under_way_when_a_server_closes_stays_unfinished(
     assert files_of(settings, "a") == [log_file(settings, "a")]
 
 
-def test_a_diagnosis_that_is_lost_has_a_row_in_the_fleet_and_another_verb_has_none(
+def test_a_cancelled_diagnosis_has_a_failed_row_in_the_fleet_and_an_estimate_has_none(
     settings: Settings, store: Store, pending: list["Future[Any]"]
 ) -> None:
     jobs = Jobs(settings, store)
@@ -217,7 +217,7 @@ def test_a_diagnosis_that_is_lost_has_a_row_in_the_fleet_and_another_verb_has_no
     assert said == ["it was cancelled"] * 2
 
 
-def test_no_more_pages_over_many_logs_are_made_at_once_than_may_be(
+def test_the_number_of_fleet_pages_in_progress_is_limited(
     settings: Settings, store: Store, pending: list["Future[Any]"]
 ) -> None:
     jobs = Jobs(settings, store)
@@ -234,7 +234,7 @@ def test_no_more_pages_over_many_logs_are_made_at_once_than_may_be(
         jobs.view(len, "page")
 
 
-def test_files_of_work_that_stopped_are_cleared_and_phases_of_work_are_not(
+def test_resuming_removes_partial_uploads_and_keeps_other_files(
     settings: Settings, store: Store, pending: list["Future[Any]"]
 ) -> None:
     (settings.work / "half.part").write_bytes(b"x")
@@ -244,7 +244,7 @@ def test_files_of_work_that_stopped_are_cleared_and_phases_of_work_are_not(
     assert pending == []
 
 
-def test_a_folder_has_one_server_and_no_files_of_logs_that_are_gone(
+def test_a_second_server_on_a_folder_is_refused_and_stray_pages_are_removed(
     tmp_path: Path,
     in_threads: None,  # noqa: ARG001
 ) -> None:
@@ -268,7 +268,7 @@ def test_a_folder_has_one_server_and_no_files_of_logs_that_are_gone(
     ("limits", "words"),
     [({"seconds": 1.0}, "took longer than 1 s"), ({"memory": 500 * MB}, "memory")],
 )
-def test_work_in_a_process_ends_at_its_limits_and_the_next_log_is_worked_on(
+def test_a_log_beyond_its_limits_fails_and_the_next_one_is_processed(
     settings: Settings, store: Store, log: bytes, limits: dict[str, Any], words: str
 ) -> None:
     jobs = Jobs(replace(settings, **limits), store)

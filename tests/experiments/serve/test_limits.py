@@ -23,7 +23,7 @@ def received(body: AsyncIterator[bytes], path: Path, most: int = 100, room: int 
     return asyncio.run(receive_file(body, path, most, room))
 
 
-def test_a_body_is_written_as_it_comes(tmp_path: Path) -> None:
+def test_the_chunks_of_a_body_are_written_in_order(tmp_path: Path) -> None:
     assert received(chunks(b"ab", b"", b"c"), tmp_path / "a") == 3
     assert (tmp_path / "a").read_bytes() == b"abc"
 
@@ -32,7 +32,7 @@ def test_a_body_is_written_as_it_comes(tmp_path: Path) -> None:
     ("parts", "most", "room", "status"),
     [((b"x" * 60, b"x" * 60), 100, 1000, 413), ((b"x" * 60, b"x" * 60), 1000, 100, 413), ((), 100, 100, 422)],
 )
-def test_what_is_refused_leaves_no_file(
+def test_a_refused_body_leaves_no_file(
     tmp_path: Path, parts: tuple[bytes, ...], most: int, room: int, status: int
 ) -> None:
     with pytest.raises(RefusedError) as refused:
@@ -41,7 +41,7 @@ def test_what_is_refused_leaves_no_file(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_body_that_stops_or_drips_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_body_that_stops_or_is_too_slow_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limits, "IDLE", 0.05)
     with pytest.raises(RefusedError, match="stopped coming"):
         received(chunks(b"a", b"b", pause=0.2), tmp_path / "a")
@@ -52,14 +52,14 @@ def test_a_body_that_stops_or_drips_is_given_up(tmp_path: Path, monkeypatch: pyt
     assert not list(tmp_path.iterdir())
 
 
-def test_a_disk_that_takes_no_more_is_told_as_a_refusal(tmp_path: Path) -> None:
+def test_a_body_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RefusedError, match="takes no more") as refused:
         received(chunks(b"a"), tmp_path / "missing" / "a")
     assert refused.value.status == 413
 
 
 @pytest.mark.parametrize("token", [None, "short", "sixteen-létters-!"])
-def test_a_host_that_others_reach_wants_a_token(tmp_path: Path, token: str | None) -> None:
+def test_a_host_reachable_by_others_needs_a_token_of_16_ascii_characters(tmp_path: Path, token: str | None) -> None:
     with pytest.raises(HydrostateError, match="token"):
         Settings(folder=tmp_path, host="192.168.0.7", token=token)
     assert Settings(folder=tmp_path, host="192.168.0.7", token="0123456789abcdef").token  # noqa: S106
@@ -79,7 +79,7 @@ def guarded(app: Any, folder: Path, **settings: Any) -> tuple[Guard, list[dict[s
     return guard, sent, lambda: guard(scope, receive, send)
 
 
-def test_requests_beyond_the_most_are_told_to_come_again_and_the_others_are_answered(
+def test_a_request_beyond_the_maximum_gets_status_429_and_the_others_an_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(limits, "MOST_REQUESTS", 1)
@@ -103,7 +103,7 @@ def test_requests_beyond_the_most_are_told_to_come_again_and_the_others_are_answ
     assert asyncio.run(both()) == [429, 204, 204]
 
 
-def test_a_refusal_in_the_middle_of_an_answer_sends_no_second_one(tmp_path: Path) -> None:
+def test_a_refusal_after_an_answer_has_begun_sends_no_second_answer(tmp_path: Path) -> None:
     async def half(_scope: Any, _receive: Any, send: Any) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": []})
         raise RefusedError(408, "too late")

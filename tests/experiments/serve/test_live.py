@@ -52,7 +52,9 @@ def heard(stream: Stream, *messages: tuple[str, dict[str, Any]]) -> None:
     saying.join()
 
 
-def test_gauges_have_the_range_since_the_last_ones_and_count_whole_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gauges_contain_the_range_since_the_previous_ones_and_the_number_of_whole_rows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(module, "EVERY", 0.0)
     sent: list[Any] = []
     found = Gauges(SimpleNamespace(send=sent.append))  # type: ignore[arg-type]
@@ -66,14 +68,14 @@ def test_gauges_have_the_range_since_the_last_ones_and_count_whole_rows(monkeypa
     assert (first["thresholds"], first["unlearnt_s"]) == ({"flow": None}, 87.0)
 
 
-def test_a_view_that_comes_back_gets_what_it_missed_and_no_more_than_is_kept(stream: Stream) -> None:
+def test_a_reconnected_view_gets_the_missed_messages_up_to_the_number_kept(stream: Stream) -> None:
     heard(stream, *[("gauges", {"time_s": float(k)}) for k in range(KEPT + 5)])
     assert [one["number"] for one in stream.since(KEPT + 3)] == [KEPT + 4, KEPT + 5]
     assert len(stream.since(0)) == KEPT
     assert stream.since(KEPT + 5) == []
 
 
-def test_the_state_of_a_stream_is_that_of_its_last_event_and_events_are_kept(stream: Stream) -> None:
+def test_the_state_of_a_stream_follows_its_last_event_and_events_are_stored(stream: Stream) -> None:
     assert stream.state["state"] == "connecting"
     heard(stream, ("event", {"event": "start", "time_s": 0.0, "message": "learning"}))
     assert stream.state["state"] == "failed"  # its process ended without a final event
@@ -84,7 +86,7 @@ def test_the_state_of_a_stream_is_that_of_its_last_event_and_events_are_kept(str
     assert [one["event"] for one in stream.events()] == ["start", "end", "ready"]
 
 
-def test_an_alarm_that_cannot_be_kept_is_told_all_the_same_and_the_watch_goes_on(
+def test_an_alarm_that_cannot_be_stored_is_still_reported_and_the_watch_goes_on(
     stream: Stream, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Before, the listening thread ended when the disk was full, and the stream stayed "watching" for ever."""
@@ -94,7 +96,7 @@ def test_an_alarm_that_cannot_be_kept_is_told_all_the_same_and_the_watch_goes_on
     assert "alarm is told, but not kept" in capsys.readouterr().err
 
 
-def test_a_stream_for_which_no_process_can_be_had_says_so_and_is_tried_again(
+def test_a_stream_without_a_process_fails_with_the_reason_and_is_retried(
     stream: Stream, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tried: list[str] = []
@@ -113,7 +115,7 @@ def test_a_stream_for_which_no_process_can_be_had_says_so_and_is_tried_again(
     assert stream.state["state"] == "failed"
 
 
-def test_a_stream_whose_rig_file_is_gone_says_so_and_is_tried_again(
+def test_a_stream_without_its_rig_file_fails_with_the_reason_and_is_retried(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "press.toml").write_text("")
@@ -133,7 +135,7 @@ def test_a_stream_whose_rig_file_is_gone_says_so_and_is_tried_again(
     store.close()
 
 
-def test_a_view_is_told_the_history_and_then_what_is_new(stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_view_gets_the_history_and_then_new_messages(stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.serve.events.EVERY", 0.0)
     heard(stream, ("gauges", {"time_s": 1.0}))
     streams = SimpleNamespace(looking=0)
@@ -159,7 +161,7 @@ def test_a_view_is_told_the_history_and_then_what_is_new(stream: Stream, monkeyp
     assert streams.looking == 0
 
 
-def test_a_stream_that_ended_is_watched_anew_and_a_process_that_hangs_is_killed(
+def test_a_stream_that_ended_is_watched_again_and_its_hung_process_is_killed(
     stream: Stream, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     happened: list[str] = []
@@ -201,9 +203,7 @@ def test_a_stream_that_ended_is_watched_anew_and_a_process_that_hangs_is_killed(
     assert [one["number"] for one in stream.since(0)] == [1, 2]
 
 
-def test_a_quiet_stream_says_now_and_then_that_it_is_still_there(
-    stream: Stream, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_quiet_stream_sends_keep_alive_comments(stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.serve.events.EVERY", 0.0)
     monkeypatch.setattr("experiments.serve.events.ALIVE", -1.0)
     looks = iter([False, False, True])
@@ -219,7 +219,7 @@ def test_a_quiet_stream_says_now_and_then_that_it_is_still_there(
     assert rest == [b": still here\n\n"] * 2
 
 
-def test_a_server_that_closes_ends_the_process_of_every_stream_and_begins_none_anew(
+def test_closing_the_server_ends_the_process_of_every_stream_and_starts_no_new_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     happened: list[str] = []
@@ -265,7 +265,7 @@ def test_a_server_that_closes_ends_the_process_of_every_stream_and_begins_none_a
 
 
 @pytest.mark.slow
-def test_a_stream_is_watched_in_a_process_whose_end_is_noticed(tmp_path: Path) -> None:
+def test_a_stream_is_watched_in_a_process_up_to_its_end(tmp_path: Path) -> None:
     store = Store(tmp_path / "a.sqlite")
     with feeding(3.0, 1000.0) as (address, sent):
         streams = Streams(Settings(folder=tmp_path, streams={"bench": address}), store)

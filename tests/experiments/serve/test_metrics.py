@@ -11,7 +11,7 @@ from experiments.serve.metrics import exposition
 LINE = re.compile(r'[a-z_]+(\{([a-z]+="([^"\\\n]|\\[\\"n])*",?)+\})? [0-9.e+-]+|# (HELP|TYPE) [a-z_]+ .+')
 
 
-def test_every_stream_tells_rows_values_and_how_far_each_balance_is_from_an_alarm() -> None:
+def test_metrics_of_every_stream_contain_rows_values_and_alarm_shares() -> None:
     gauges = {"rows": 5000, "gaps": 1, "left_out": 3, "received": 97.5, "values": {"position_m": 0.25, "speed": None}}
     gauges |= {"scores": {"flow": 3.0, "force": 1.0}, "thresholds": {"flow": 12.0, "force": None}}
     state = {"name": "press", "state": "watching", "message": "", "gauges": gauges}
@@ -33,7 +33,7 @@ def test_every_stream_tells_rows_values_and_how_far_each_balance_is_from_an_alar
     assert [line for line in lines if not LINE.fullmatch(line)] == []
 
 
-def test_a_number_that_is_none_is_left_out_and_not_written_as_a_word() -> None:
+def test_metrics_omit_values_that_are_not_finite() -> None:
     gauges = {"rows": 1, "gaps": 0, "left_out": 0, "received": 0.0}
     gauges |= {"values": {"a": float("inf"), "b": float("nan"), "c": 2.0}}
     gauges |= {"scores": {"flow": float("nan")}, "thresholds": {"flow": 1.0}}
@@ -46,12 +46,12 @@ def test_a_number_that_is_none_is_left_out_and_not_written_as_a_word() -> None:
 
 
 @pytest.mark.parametrize("name", ['a"b', "a\\b", "a\nb"])
-def test_no_name_breaks_a_line(name: str) -> None:
+def test_names_with_quotes_or_line_breaks_are_escaped_in_metrics(name: str) -> None:
     text = exposition({name: 1}, 0, [], 0.0)
     assert [line for line in text.splitlines() if not LINE.fullmatch(line)] == []
 
 
-def test_the_server_offers_them(served: Callable[..., TestClient]) -> None:
+def test_the_server_offers_metrics_as_text(served: Callable[..., TestClient]) -> None:
     answer = served().get("/metrics")
     assert answer.headers["content-type"].startswith("text/plain; version=0.0.4")
     assert "hydrostate_logs_waiting 0" in answer.text.splitlines()

@@ -8,7 +8,7 @@ import pytest
 from experiments.serve import process
 
 
-def test_a_process_keeps_to_one_thread_unless_told_and_ends_with_its_server(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_uses_one_thread_by_default_and_ends_with_its_server(monkeypatch: pytest.MonkeyPatch) -> None:
     begun, slept, ended = list[Any](), list[float](), list[int]()
     parents, environment = iter([41, 41, 1]), {"OMP_NUM_THREADS": "2"}
 

@@ -35,13 +35,13 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("P-1_someday.csv", "{actuator}_{date}.csv", "others.toml"),
     ],
 )
-def test_a_log_takes_the_rig_file_of_the_actuator_that_its_name_tells(
+def test_a_log_uses_the_rig_file_of_the_actuator_in_its_name(
     two: Path, name: str, pattern: str | None, rig: str
 ) -> None:
     assert rig_of(name, pattern, two, two / "others.toml") == two / rig
 
 
-def test_a_log_of_no_actuator_with_a_rig_file_is_refused_rather_than_compared_with_another(two: Path) -> None:
+def test_a_log_without_a_rig_file_for_its_actuator_is_refused(two: Path) -> None:
     with pytest.raises(HydrostateError, match=r"the actuator is 'P-13', and the server has rig files of P-1, P-12"):
         rig_of("P-13_2026-11-22.csv", None, two, None)
     with pytest.raises(HydrostateError, match=r"no rig file: run\.csv names no actuator"):
@@ -49,7 +49,7 @@ def test_a_log_of_no_actuator_with_a_rig_file_is_refused_rather_than_compared_wi
     assert rig_of("run.csv", None, None, None) is None
 
 
-def test_a_stream_takes_the_rig_file_of_its_name(tmp_path: Path) -> None:
+def test_a_stream_uses_the_rig_file_of_its_name(tmp_path: Path) -> None:
     own = tmp_path / "press-8.toml"
     own.write_text("")
     assert rig_of_stream("press-8", tmp_path, None) == own
@@ -60,13 +60,13 @@ def test_a_stream_takes_the_rig_file_of_its_name(tmp_path: Path) -> None:
     assert "no rig file: the actuator is 'x'" in " ".join(done.stderr.split())
 
 
-def test_a_folder_of_rig_files_must_hold_one(tmp_path: Path) -> None:
+def test_a_folder_without_rig_files_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("none")
     with pytest.raises(HydrostateError, match=r"must hold a rig file of each actuator, such as P-12\.toml"):
         require_rigs(None, tmp_path, None)
 
 
-def test_a_folder_that_has_lost_its_rig_files_refuses_logs_and_leaves_the_page(tmp_path: Path) -> None:
+def test_an_emptied_folder_of_rig_files_refuses_logs_and_the_page_still_loads(tmp_path: Path) -> None:
     with pytest.raises(
         HydrostateError, match=r"^no rig file: the actuator is 'P-1', and the server has rig files of none"
     ):
@@ -77,7 +77,7 @@ def test_a_folder_that_has_lost_its_rig_files_refuses_logs_and_leaves_the_page(t
     )
 
 
-def test_an_own_rig_file_may_be_of_another_kind_than_the_server_was_told(tmp_path: Path) -> None:
+def test_an_actuator_s_rig_file_may_name_another_kind_than_the_server_s(tmp_path: Path) -> None:
     own = tmp_path / "S-1.toml"
     own.write_text('plant = "piezo-stack"\n')
     assert load_actuator_of_log("eha", own, None)[0].name == "piezo-stack"
@@ -100,7 +100,9 @@ def task(log: Path, folder: Path, name: str) -> Task:
     return Task(log, name, "estimate", page, phase, None, None, (), folder / "rigs")
 
 
-def test_work_takes_the_rig_file_as_it_is_now_and_names_no_folder(rig_folder: Path, tmp_path: Path) -> None:
+def test_a_log_is_processed_with_the_current_rig_file_and_errors_show_no_folder(
+    rig_folder: Path, tmp_path: Path
+) -> None:
     log = tmp_path / "kept-under-a-number"
     log.write_bytes(b"\x00")  # not a log: the result names the rig even so
 
@@ -123,7 +125,7 @@ def test_work_takes_the_rig_file_as_it_is_now_and_names_no_folder(rig_folder: Pa
     assert "o rig file: the actuator is 'P-3'" in other.said
 
 
-def test_the_page_says_how_logs_are_to_be_named_and_what_becomes_of_others(rig_folder: Path, tmp_path: Path) -> None:
+def test_the_home_page_explains_how_to_name_logs_and_what_happens_to_others(rig_folder: Path, tmp_path: Path) -> None:
     told = home_page(Settings(folder=tmp_path, rigs=rig_folder))
     assert "such as P-1_2026-11-22.csv" in told
     assert "rig files of P-1, P-2. Other logs are refused." in " ".join(told.split())
@@ -135,14 +137,14 @@ def test_the_page_says_how_logs_are_to_be_named_and_what_becomes_of_others(rig_f
 @pytest.mark.parametrize(
     ("name", "text", "words"), [("P-1.toml", "moving_mass = 1", "P-1.toml"), ("P-1.txt", "", "must hold a rig file")]
 )
-def test_a_server_starts_with_no_wrong_rig_file(tmp_path: Path, name: str, text: str, words: str) -> None:
+def test_a_server_with_an_invalid_rig_file_does_not_start(tmp_path: Path, name: str, text: str, words: str) -> None:
     (tmp_path / name).write_text(text)
     done = CliRunner().invoke(app, ["serve", str(tmp_path / "kept"), "--rigs", str(tmp_path)])
     assert done.exit_code == 2
     assert words in " ".join(done.stderr.split())
 
 
-def test_the_page_leads_to_fleet_and_streams_first_and_names_the_formats_that_can_be_read(
+def test_the_home_page_links_to_fleet_and_streams_and_lists_the_readable_formats(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told = home_page(Settings(folder=tmp_path, streams={"press": "tcp://h:1"}))
@@ -154,13 +156,13 @@ def test_the_page_leads_to_fleet_and_streams_first_and_names_the_formats_that_ca
     assert "PAPER" not in home_page(Settings(folder=tmp_path))
 
 
-def test_logs_with_dates_in_their_names_are_one_actuator_on_a_server_without_a_pattern() -> None:
+def test_without_a_pattern_logs_with_dates_in_their_names_are_grouped_by_actuator() -> None:
     row = {"outcome": "ok", "found_condition": "normal"}
     rows = [(f"{day}" * 16, f"P-1_2026-01-0{day}.csv", row) for day in (1, 2)]
     assert "actuator?name=P-1" in fleet_view(rows, None, {}, {}, "here")
 
 
-def test_a_server_s_fleet_without_verdicts_says_how_a_server_gets_rig_files() -> None:
+def test_a_served_fleet_without_verdicts_hints_at_the_option_rigs() -> None:
     row = {"outcome": "mismatch", "reason": "no model fits"}
     page = fleet_view([(str(k) * 16, f"P-{k}.csv", row) for k in range(4)], None, {}, {}, "here")
     assert "start the server with --rigs FOLDER" in page

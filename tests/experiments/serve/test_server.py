@@ -30,7 +30,7 @@ MARK = """([selector, name]) => new MutationObserver(() => { document.documentEl
 attributes, but not for expressions, since the page's policy forbids eval."""
 
 
-def test_hostile_clients_get_no_server_error_no_file_outside_the_folder_and_no_memory(tmp_path: Path) -> None:
+def test_hostile_clients_cause_no_server_error_no_stray_file_and_no_memory_growth(tmp_path: Path) -> None:
     found = attack(tmp_path, 240, 80, {**MIX, "chunked": 0.5})
     assert not server_errors(found.answers)
     assert not found.strange
@@ -41,7 +41,7 @@ def test_hostile_clients_get_no_server_error_no_file_outside_the_folder_and_no_m
     assert set(slow) <= {"slow 408", "huge 413", "huge 429", "chunked 413", "chunked 429"}
 
 
-def test_a_kill_in_the_middle_of_uploads_loses_no_finished_result_and_the_rest_is_done_later(tmp_path: Path) -> None:
+def test_killing_the_server_during_uploads_loses_no_result_and_the_rest_is_resumed(tmp_path: Path) -> None:
     found = kill(tmp_path, 8, 2)
     assert found.finished >= 2
     assert found.accepted > found.finished
@@ -49,13 +49,13 @@ def test_a_kill_in_the_middle_of_uploads_loses_no_finished_result_and_the_rest_i
     assert not found.unfinished
 
 
-def test_a_stream_of_10_khz_is_taken_without_loss(tmp_path: Path) -> None:
+def test_a_stream_of_10_khz_is_received_without_loss(tmp_path: Path) -> None:
     found = stream(tmp_path, 5.0, 10_000.0)
     assert found.taken == found.sent == 50_000
     assert found.gaps == 0
 
 
-def test_what_openapi_allows_and_what_it_does_not_is_answered_as_it_says(tmp_path: Path) -> None:
+def test_generated_requests_are_answered_as_the_openapi_schema_says(tmp_path: Path) -> None:
     pytest.importorskip("schemathesis", reason="needs schemathesis")
     with Server(tmp_path / "kept") as server:
         command = [str(Path(sys.executable).with_name("schemathesis")), "run", f"{server.base}/openapi.json"]
@@ -114,7 +114,7 @@ def opened(browser: Any, served: Server, paths: dict[str, str]) -> Iterator[Any]
 
 @pytest.mark.parametrize("name", ["home", "log", "fleet", "compare", "live"])
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
-def test_a_page_of_the_server_fits_asks_nobody_else_and_axe_finds_nothing_serious(
+def test_server_pages_fit_the_screen_are_accessible_and_load_nothing_from_elsewhere(
     opened: Any, served: Server, name: str, width: int, scheme: str
 ) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
@@ -126,7 +126,7 @@ def test_a_page_of_the_server_fits_asks_nobody_else_and_axe_finds_nothing_seriou
     assert [url for url in page.asked if not url.startswith((served.base, "data:", "blob:"))] == []
 
 
-def test_a_log_that_is_chosen_is_sent_worked_on_and_listed_and_two_are_compared(
+def test_a_chosen_log_is_uploaded_and_listed_and_two_ticked_ones_are_compared(
     opened: Any, log: bytes, tmp_path: Path
 ) -> None:
     (tmp_path / "<i>three.csv").write_bytes(log)
@@ -141,9 +141,7 @@ def test_a_log_that_is_chosen_is_sent_worked_on_and_listed_and_two_are_compared(
     assert page.locator("h1").inner_text() == "Normal in both logs."
 
 
-def test_a_log_that_failed_says_how_to_look_into_it_and_one_that_was_looked_into_does_not(
-    opened: Any, tmp_path: Path
-) -> None:
+def test_a_failed_diagnosis_suggests_inspect_and_a_failed_inspection_does_not(opened: Any, tmp_path: Path) -> None:
     page = opened("home")
     rows: list[Any] = []
     for verb, name, content in (("diagnose", "no log.csv", b"a,b\n1,2\n3,4\n"), ("inspect", "nothing.mat", b"\0\1\2")):
@@ -156,7 +154,7 @@ def test_a_log_that_failed_says_how_to_look_into_it_and_one_that_was_looked_into
     assert said == [1, 0]
 
 
-def test_a_log_that_the_server_does_not_delete_stays_and_the_page_says_why(opened: Any, tmp_path: Path) -> None:
+def test_a_log_that_could_not_be_deleted_stays_listed_with_the_reason(opened: Any, tmp_path: Path) -> None:
     page = opened("home")
     (tmp_path / "stays.csv").write_text("a,b\n1,2\n3,4\n")
     page.set_input_files("#file", str(tmp_path / "stays.csv"))
@@ -171,7 +169,7 @@ def test_a_log_that_the_server_does_not_delete_stays_and_the_page_says_why(opene
     row.wait_for(state="detached")
 
 
-def test_a_log_may_be_dropped_anywhere_and_a_refusal_stays_in_sight(opened: Any) -> None:
+def test_a_log_can_be_dropped_anywhere_and_a_refusal_stays_visible(opened: Any) -> None:
     page = opened("home")
     drop = """([name, text]) => {
         const files = new DataTransfer();
@@ -189,7 +187,7 @@ def test_a_log_may_be_dropped_anywhere_and_a_refusal_stays_in_sight(opened: Any)
     assert "Not taken" not in page.get_by_role("status").inner_text()
 
 
-def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_path: Path) -> None:
+def test_a_late_answer_does_not_overwrite_a_newer_one(opened: Any, tmp_path: Path) -> None:
     """Before, a log that had failed was shown as waiting again, until the next request to the server."""
     page, asked, held = opened("home"), list[Any](), list[Any]()
 
@@ -224,7 +222,9 @@ def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_pa
         (0, "failed", "Failed: learning is over. It is tried again every few seconds."),
     ],
 )
-def test_an_alarm_stays_in_the_heading_of_the_live_view(opened: Any, raised: int, state: str, begin: str) -> None:
+def test_the_heading_of_the_live_view_shows_alarms_or_the_state(
+    opened: Any, raised: int, state: str, begin: str
+) -> None:
     alarm = {"event": "alarm", "time_s": 9.0, "received": 1.7e9, "message": "the flow balance changed"}
     ready = {"event": "ready", "time_s": 5.0, "received": 1.7e9, "message": "learning is over"}
     told = {"name": "bench", "state": state, "message": "learning is over", "gauges": None, "history": []}
@@ -242,7 +242,7 @@ def test_an_alarm_stays_in_the_heading_of_the_live_view(opened: Any, raised: int
     assert page.locator(".live-state").evaluate("one => one.classList.contains('alarmed')") is (raised > 0)
 
 
-def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> None:
+def test_the_live_view_shows_gauges_charts_and_events(opened: Any) -> None:
     from playwright.sync_api import expect  # not every developer has it
 
     page = opened("live")
@@ -257,7 +257,7 @@ def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> Non
     assert int(told.inner_text().replace(",", "")) > int(rows.replace(",", ""))
 
 
-def test_many_events_leave_the_charts_in_sight(opened: Any) -> None:
+def test_many_events_scroll_in_a_box_of_limited_height(opened: Any) -> None:
     alarm = {"event": "alarm", "time_s": 9.0, "received": 1.7e9, "message": "the flow balance changed"}
     told = {"name": "bench", "state": "watching", "message": "", "gauges": None, "history": [], "events": [alarm] * 200}
     page = opened("live")
@@ -270,7 +270,7 @@ def test_many_events_leave_the_charts_in_sight(opened: Any) -> None:
     assert box.evaluate("one => one.scrollHeight > one.clientHeight")
 
 
-def test_a_negative_gauge_has_a_minus_and_a_balance_that_is_learnt_no_empty_chart(opened: Any) -> None:
+def test_negative_gauges_have_a_minus_sign_and_a_balance_being_learnt_has_no_chart(opened: Any) -> None:
     gauge = {"time_s": 1.0, "rows": 9, "gaps": 0, "left_out": 0, "number": 1}
     channels = {"values": {"pressure_a_pa": -2.5e5}, "low": {"pressure_a_pa": -3e5}, "high": {"pressure_a_pa": 1e5}}
     learnt = {"scores": {"flow": 0.0, "loss": 1.0}, "thresholds": {"flow": None, "loss": 4.0}, "unlearnt_s": 86.2}

@@ -64,7 +64,7 @@ def views(service: Service, monkeypatch: pytest.MonkeyPatch) -> Views:
     return one
 
 
-def test_the_page_of_the_fleet_is_made_once_for_all_who_ask_and_anew_when_a_log_came_or_went(
+def test_the_fleet_page_is_shared_by_all_requests_and_remade_after_a_change_of_logs(
     service: Service, views: Views
 ) -> None:
     async def asked() -> list[str]:
@@ -88,7 +88,7 @@ def test_the_page_of_the_fleet_is_made_once_for_all_who_ask_and_anew_when_a_log_
         (BusyError(), "too many pages"),
     ],
 )
-def test_a_page_that_could_not_be_made_is_made_when_it_is_asked_for_again(
+def test_a_fleet_page_that_failed_is_made_at_the_next_request(
     service: Service, views: Views, error: Exception, words: str
 ) -> None:
     async def asked() -> str:
@@ -104,7 +104,7 @@ def test_a_page_that_could_not_be_made_is_made_when_it_is_asked_for_again(
     assert asyncio.run(asked()) == "page 2"
 
 
-def test_a_repair_counts_as_soon_as_the_table_has_it_and_a_broken_table_is_named(
+def test_a_change_of_the_table_of_repairs_takes_effect_and_an_invalid_table_is_refused(
     tmp_path: Path,
     in_threads: None,  # noqa: ARG001
     monkeypatch: pytest.MonkeyPatch,
@@ -132,7 +132,7 @@ def test_a_repair_counts_as_soon_as_the_table_has_it_and_a_broken_table_is_named
     assert [list(one[3]) for one in views.args] == [[], ["press"], ["press"]]
 
 
-def test_one_who_stops_waiting_takes_the_page_from_no_one_else(
+def test_a_cancelled_request_does_not_cancel_the_page_for_others(
     service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pending: Future[str] = Future()
@@ -151,7 +151,7 @@ def test_one_who_stops_waiting_takes_the_page_from_no_one_else(
     assert asyncio.run(asked()) == "page"
 
 
-def test_files_of_logs_that_are_kept_stay_and_those_of_no_log_go(service: Service, tmp_path: Path) -> None:
+def test_opening_removes_files_without_a_log_and_keeps_the_others(service: Service, tmp_path: Path) -> None:
     kept(service, "a")
     for identity in ("a", "gone"):
         page_file(service.settings, identity).write_text("page")
@@ -166,7 +166,7 @@ def test_files_of_logs_that_are_kept_stay_and_those_of_no_log_go(service: Servic
     service.open()
 
 
-def test_a_log_that_failed_has_no_page_and_its_reason_is_told(service: Service) -> None:
+def test_the_page_of_a_failed_log_is_refused_with_the_reason(service: Service) -> None:
     kept(service, "a", FAILED)
     page_file(service.settings, "a").write_text("half")
     with pytest.raises(RefusedError, match=r"there is no page of a\.csv\. normal") as refused:
@@ -177,7 +177,7 @@ def test_a_log_that_failed_has_no_page_and_its_reason_is_told(service: Service) 
         service.page("b")
 
 
-def test_a_stream_is_known_by_its_name(service: Service) -> None:
+def test_an_unknown_stream_is_refused_by_its_name(service: Service) -> None:
     with pytest.raises(RefusedError, match="no stream 'press' is watched"):
         service.stream("press")
 
@@ -186,7 +186,7 @@ def test_the_folder_is_for_the_server_s_user_alone(service: Service) -> None:
     assert service.settings.folder.stat().st_mode & 0o077 == 0
 
 
-def test_a_log_that_the_database_cannot_take_is_refused_and_leaves_no_file(service: Service, tmp_path: Path) -> None:
+def test_a_log_that_the_database_cannot_store_is_refused_and_leaves_no_file(service: Service, tmp_path: Path) -> None:
     part = tmp_path / "a.part"
     part.write_bytes(b"a,b\n")
     service.store._connection.execute("PRAGMA max_page_count = 1")
@@ -197,7 +197,7 @@ def test_a_log_that_the_database_cannot_take_is_refused_and_leaves_no_file(servi
     assert service.jobs.waiting == 0
 
 
-def test_a_folder_that_could_not_be_opened_is_free_for_the_next_server(tmp_path: Path, in_threads: None) -> None:  # noqa: ARG001
+def test_a_folder_with_an_invalid_database_is_released_for_the_next_server(tmp_path: Path, in_threads: None) -> None:  # noqa: ARG001
     settings = Settings(folder=tmp_path / "kept")
     settings.folder.mkdir()
     settings.database.write_bytes(b"no database, but long enough to be taken for one" * 100)
@@ -214,7 +214,7 @@ def test_a_folder_that_could_not_be_opened_is_free_for_the_next_server(tmp_path:
     ("host", "begin"),
     [("127.0.0.1", "http://127.0.0.1:"), ("0.0.0.0", f"http://{socket.gethostname()}:"), ("::1", "http://[::1]:")],  # noqa: S104
 )
-def test_the_address_that_is_printed_can_be_opened_where_the_server_can_be_reached(host: str, begin: str) -> None:
+def test_the_printed_address_is_reachable_and_contains_the_token(host: str, begin: str) -> None:
     token = None if host.startswith(("127", "::1")) else 16 * "a"
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))

@@ -24,7 +24,7 @@ def opened(tmp_path: Path) -> Iterator[Opened]:
         yield lambda name: stack.enter_context(closing(Store(tmp_path / name)))
 
 
-def test_what_was_finished_is_there_when_the_file_is_opened_beside_one_that_was_never_closed(opened: Opened) -> None:
+def test_finished_results_are_read_by_a_second_connection(opened: Opened) -> None:
     first = opened("a.sqlite")
     first.add("a", "run.csv", "diagnose", 10)
     first.add("b", "rest.csv", "diagnose", 10)
@@ -36,7 +36,7 @@ def test_what_was_finished_is_there_when_the_file_is_opened_beside_one_that_was_
     assert list(second.diagnosed()) == [("a", "run.csv", {"outcome": "ok"})]
 
 
-def test_a_log_that_was_deleted_stays_so_when_its_work_ends(opened: Opened) -> None:
+def test_a_deleted_log_stays_deleted_if_its_processing_ends(opened: Opened) -> None:
     store = opened("a.sqlite")
     store.add("a", "run.csv", "diagnose", 10)
     assert store.delete("a")
@@ -46,7 +46,7 @@ def test_a_log_that_was_deleted_stays_so_when_its_work_ends(opened: Opened) -> N
     assert not store.delete("a")
 
 
-def test_the_revision_changes_with_what_the_fleet_is_made_of(opened: Opened) -> None:
+def test_the_revision_changes_with_each_finished_or_deleted_log(opened: Opened) -> None:
     store = opened("a.sqlite")
     seen = [store.revision()]
     for identity in ("a", "b"):
@@ -59,7 +59,9 @@ def test_the_revision_changes_with_what_the_fleet_is_made_of(opened: Opened) -> 
     assert len(set(seen)) == 4
 
 
-def test_events_are_kept_by_stream_and_the_oldest_go(opened: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_events_are_stored_by_stream_and_the_oldest_are_removed(
+    opened: Opened, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(module, "MOST_EVENTS", 3)
     store = opened("a.sqlite")
     for number in range(5):
@@ -68,7 +70,7 @@ def test_events_are_kept_by_stream_and_the_oldest_go(opened: Opened, monkeypatch
     assert [one["time_s"] for one in store.events("press", 10)] == [3.0]
 
 
-def test_a_result_that_is_no_json_changes_nothing(opened: Opened) -> None:
+def test_a_result_that_is_not_valid_json_leaves_its_log_unfinished(opened: Opened) -> None:
     store = opened("a.sqlite")
     store.add("a", "run.csv", "diagnose", 10)
     with pytest.raises(ValueError, match="JSON"):
@@ -76,7 +78,7 @@ def test_a_result_that_is_no_json_changes_nothing(opened: Opened) -> None:
     assert [one.id for one in store.unfinished()] == ["a"]
 
 
-def test_a_file_that_is_no_such_database_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_database_of_this_version_is_refused(tmp_path: Path) -> None:
     (tmp_path / "words.sqlite").write_text("no database, but words enough to be taken for a header of one" * 10)
     with pytest.raises(HydrostateError, match=r"words\.sqlite: must be a database of this server"):
         Store(tmp_path / "words.sqlite")
@@ -87,7 +89,7 @@ def test_a_file_that_is_no_such_database_is_refused(tmp_path: Path) -> None:
         Store(tmp_path / "later.sqlite")
 
 
-def test_a_log_that_goes_while_it_is_added_is_said_to_be_gone(tmp_path: Path, opened: Opened) -> None:
+def test_a_log_deleted_while_it_is_added_is_refused(tmp_path: Path, opened: Opened) -> None:
     store = opened("a.sqlite")
     with sqlite3.connect(tmp_path / "a.sqlite") as connection:
         connection.execute("CREATE TRIGGER gone AFTER INSERT ON logs BEGIN DELETE FROM logs WHERE id = new.id; END")
@@ -96,7 +98,7 @@ def test_a_log_that_goes_while_it_is_added_is_said_to_be_gone(tmp_path: Path, op
         store.add("a", "run.csv", "diagnose", 10)
 
 
-def test_a_full_disk_is_told_in_a_sentence_and_what_was_there_stays(opened: Opened) -> None:
+def test_a_full_disk_is_reported_and_the_store_works_again_afterwards(opened: Opened) -> None:
     store = opened("a.sqlite")
     store.add("a", "run.csv", "diagnose", 10)
     store._connection.execute("PRAGMA max_page_count = 1")
@@ -108,7 +110,7 @@ def test_a_full_disk_is_told_in_a_sentence_and_what_was_there_stays(opened: Open
 
 
 @pytest.mark.skipif(os.name == "nt", reason="modes are another system's")
-def test_nobody_else_on_the_machine_may_read_the_results(tmp_path: Path, opened: Opened) -> None:
+def test_database_files_are_readable_by_their_owner_only(tmp_path: Path, opened: Opened) -> None:
     opened("a.sqlite").add("a", "run.csv", "diagnose", 10)
     kept = sorted(tmp_path.iterdir())
     assert [one.name for one in kept] == ["a.sqlite", "a.sqlite-shm", "a.sqlite-wal"]

@@ -26,7 +26,7 @@ def task(log: Path, folder: Path, **changes: Any) -> Task:
     return Task(**{"log": log, "page": folder / "page.html", "phase": folder / "phase", **given, **changes})
 
 
-def test_another_actuator_s_log_gets_its_condition_its_page_and_a_row(stack_log: Path, tmp_path: Path) -> None:
+def test_a_log_of_the_stack_gets_a_condition_a_page_and_a_row(stack_log: Path, tmp_path: Path) -> None:
     found = work_on(task(stack_log, tmp_path))
     assert (found.result["outcome"], found.result["condition"]) == ("ok", "major_leakage")
     assert found.entries is not None
@@ -35,7 +35,7 @@ def test_another_actuator_s_log_gets_its_condition_its_page_and_a_row(stack_log:
     assert (tmp_path / "phase").read_text(encoding="utf-8") == work.WRITING
 
 
-def test_the_page_says_what_reading_the_log_brought_up(tmp_path: Path) -> None:
+def test_the_page_contains_the_notes_of_reading_the_log(tmp_path: Path) -> None:
     log = tmp_path / "other.csv"
     words = ["simulate", "--duration", "0.5", "--sample-time", "0.001", "--out", str(log)]
     assert CliRunner().invoke(app, words).exit_code == 0
@@ -46,7 +46,7 @@ def test_the_page_says_what_reading_the_log_brought_up(tmp_path: Path) -> None:
     assert "differential pressure also needs pressure_b_pa.</li>" in page
 
 
-def test_an_estimate_has_no_row_and_no_place_on_the_server_is_told(stack_log: Path, tmp_path: Path) -> None:
+def test_an_estimate_has_no_row_and_its_result_names_no_path_of_the_server(stack_log: Path, tmp_path: Path) -> None:
     found = work_on(task(stack_log, tmp_path, verb="estimate"))
     assert found.entries is None
     assert "crossport_leakage" in found.result["quantities"]
@@ -55,7 +55,7 @@ def test_an_estimate_has_no_row_and_no_place_on_the_server_is_told(stack_log: Pa
 
 
 @pytest.mark.parametrize("verb", ["diagnose", "estimate", "inspect"])
-def test_what_is_no_log_fails_with_a_reason_that_has_the_client_s_name(verb: str, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_log_fails_without_the_server_s_file_name(verb: str, tmp_path: Path) -> None:
     log = tmp_path / "kept-under-a-number.csv"
     log.write_bytes(b"\x00\x01\x02")
     found = work_on(task(log, tmp_path, verb=verb))
@@ -68,7 +68,7 @@ def test_what_is_no_log_fails_with_a_reason_that_has_the_client_s_name(verb: str
 
 
 @pytest.mark.parametrize("columns", [(), (("position_m", "Weg:mm"),)])
-def test_wrong_columns_are_told_without_options_of_a_command_line(
+def test_the_message_on_wrong_columns_contains_no_command_line_options(
     columns: tuple[tuple[str, str], ...], tmp_path: Path
 ) -> None:
     log = tmp_path / "odd.csv"
@@ -83,9 +83,7 @@ def test_wrong_columns_are_told_without_options_of_a_command_line(
     assert inspected.said == work.GUESSED[False]
 
 
-def test_an_error_of_ours_is_told_to_the_client_and_ends_nothing(
-    stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_internal_error_is_a_failed_result(stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(_: Task) -> None:
         raise ZeroDivisionError("by nothing")
 
@@ -95,7 +93,7 @@ def test_an_error_of_ours_is_told_to_the_client_and_ends_nothing(
     assert "internal error" in found.result["message"]
 
 
-def test_a_log_that_wants_too_much_memory_ends_the_process_with_its_own_code(
+def test_a_log_that_needs_too_much_memory_ends_the_process_with_a_special_code(
     stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Ended(BaseException):
@@ -118,7 +116,7 @@ def test_a_log_that_wants_too_much_memory_ends_the_process_with_its_own_code(
     ("error", "words"),
     [(None, ""), (gauges.HydrostateError("no such stream"), "no such stream"), (KeyError("x"), "internal error")],
 )
-def test_a_stream_s_process_says_how_it_ended(
+def test_the_process_of_a_stream_sends_an_end_event_with_its_outcome(
     error: Exception | None, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def watched(*_: Any) -> None:
@@ -137,7 +135,7 @@ def test_a_stream_s_process_says_how_it_ended(
     assert words in json.dumps(last)
 
 
-def test_a_worker_is_bound_to_its_server_and_its_limit_of_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_ends_with_its_server_and_has_a_memory_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     import resource
 
     limits, servers, environment = dict[int, Any](), list[int](), dict[str, str]()
@@ -149,9 +147,7 @@ def test_a_worker_is_bound_to_its_server_and_its_limit_of_memory(monkeypatch: py
     assert limits == {resource.RLIMIT_DATA: (1000, 1000), resource.RLIMIT_CORE: (0, 0)}
 
 
-def test_a_log_that_is_looked_into_gets_a_page_with_its_columns_and_the_client_s_name(
-    stack_log: Path, tmp_path: Path
-) -> None:
+def test_an_inspected_log_gets_a_page_with_its_columns_and_original_name(stack_log: Path, tmp_path: Path) -> None:
     found = work_on(task(stack_log, tmp_path, verb="inspect"))
     assert found.result["outcome"] == "ok"
     assert found.result["reads"] is True
@@ -183,7 +179,7 @@ def test_a_rig_that_cannot_be_read_fails_a_log_with_its_reason(stack_log: Path, 
     assert "rig.toml" in found.entries["reason"]
 
 
-def test_a_log_that_is_deleted_while_its_page_is_written_leaves_none(
+def test_a_log_deleted_while_its_page_is_written_leaves_no_page(
     stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from experiments.log_pages import inspect_page

@@ -54,7 +54,7 @@ def estimates(told: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [one for one in told if one["event"] == "estimate"]
 
 
-def test_a_stream_shorter_than_what_a_filter_begins_from_is_filtered_as_far_as_it_goes(bench: Record) -> None:
+def test_a_stream_with_fewer_rows_than_a_filter_starts_from_is_still_filtered(bench: Record) -> None:
     lines = lines_of(bench)[: FEWEST // 2 + 1]
     told, one = filtered(lines)
     assert [event["event"] for event in told] == ["start", "estimate"]
@@ -64,7 +64,7 @@ def test_a_stream_shorter_than_what_a_filter_begins_from_is_filtered_as_far_as_i
     assert told[-1]["message"] == f"{FEWEST // 2} samples filtered"
 
 
-def test_the_end_of_a_stream_is_told_once_whether_or_not_it_falls_on_an_estimate(bench: Record) -> None:
+def test_the_end_of_a_stream_gives_exactly_one_estimate(bench: Record) -> None:
     lines = lines_of(bench)
     for rows, times in ((401, [1.0, 2.0]), (500, [1.0, 2.0, 2.495])):
         told, _ = filtered(lines[: rows + 1])
@@ -72,7 +72,7 @@ def test_the_end_of_a_stream_is_told_once_whether_or_not_it_falls_on_an_estimate
         assert estimates(told)[-1]["samples"] == rows
 
 
-def test_a_piece_before_a_gap_that_is_too_short_to_begin_from_is_left_out_and_said(
+def test_too_few_rows_before_a_gap_are_left_out_with_a_warning(
     bench: Record, capsys: pytest.CaptureFixture[str]
 ) -> None:
     header, *rows = lines_of(bench)
@@ -86,7 +86,7 @@ def test_a_piece_before_a_gap_that_is_too_short_to_begin_from_is_left_out_and_sa
     assert estimates(told)[-1]["values"] == pytest.approx(estimates(alone)[-1]["values"], rel=1e-9)
 
 
-def test_rows_of_a_sensor_that_is_silent_are_skipped_and_its_innovations_are_no_number(bench: Record) -> None:
+def test_a_sensor_without_values_is_skipped_and_has_no_innovation_statistic(bench: Record) -> None:
     position = bench["position_m"].copy()
     position[800:1400] = np.nan
     told, _ = filtered(lines_of(bench, position_m=position)[:1401])
@@ -97,7 +97,7 @@ def test_rows_of_a_sensor_that_is_silent_are_skipped_and_its_innovations_are_no_
     assert silent["std"]["position_m"] > 2.0 * before["std"]["position_m"]
 
 
-def test_what_speaks_against_an_estimate_is_told_by_how_large_innovations_were(bench: Record) -> None:
+def test_large_innovations_mark_an_estimate_as_overconfident_or_a_mismatch(bench: Record) -> None:
     rng = np.random.default_rng(1)
     for size, gate in ((0.0, []), (8.0, ["overconfident"]), (60.0, ["mismatch", "overconfident"])):
         noise = size * BENCH.velocity_noise * rng.normal(size=len(bench))
@@ -110,7 +110,7 @@ def test_what_speaks_against_an_estimate_is_told_by_how_large_innovations_were(b
         assert ("mismatch" in gate) is (worst > MISMATCH_NIS)
 
 
-def test_chambers_pressures_are_the_differential_pressure_where_that_is_not_logged(bench: Record) -> None:
+def test_a_missing_differential_pressure_is_calculated_from_the_chamber_pressures(bench: Record) -> None:
     difference = bench["differential_pressure_pa"]
     channels = {name: bench[name] for name in bench if "." not in name}
     channels.pop("differential_pressure_pa")
@@ -121,7 +121,7 @@ def test_chambers_pressures_are_the_differential_pressure_where_that_is_not_logg
     assert found[0] == pytest.approx(found[1], rel=1e-6)
 
 
-def test_the_state_is_kept_while_the_stream_runs(
+def test_the_state_is_saved_while_the_stream_runs(
     bench: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     times: list[float] = []
@@ -132,7 +132,7 @@ def test_the_state_is_kept_while_the_stream_runs(
     assert end == pytest.approx(SECONDS - T, abs=1e-6)
 
 
-def test_a_disk_that_is_full_for_a_while_ends_no_filter(
+def test_a_temporarily_full_disk_does_not_end_the_filter(
     bench: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked: list[float] = []
@@ -149,7 +149,7 @@ def test_a_disk_that_is_full_for_a_while_ends_no_filter(
     assert "No space left on device" in capsys.readouterr().err
 
 
-def test_a_stream_that_breaks_leaves_the_state_of_its_last_whole_piece(bench: Record, tmp_path: Path) -> None:
+def test_a_failed_stream_saves_the_state_of_its_last_complete_piece(bench: Record, tmp_path: Path) -> None:
     state, (header, *rows) = tmp_path / "state.npz", lines_of(bench)
     with pytest.raises(LogError, match="must hold numbers"):
         filtered([header, *rows[:1000], *["x,x,0,0,0\n"] * 60], state=state)
@@ -159,7 +159,7 @@ def test_a_stream_that_breaks_leaves_the_state_of_its_last_whole_piece(bench: Re
     assert one.filtered.taken == 1400
 
 
-def test_a_state_is_not_continued_without_a_channel_it_was_begun_with(bench: Record, tmp_path: Path) -> None:
+def test_a_saved_filter_is_not_continued_without_one_of_its_channels(bench: Record, tmp_path: Path) -> None:
     state, lines = tmp_path / "state.npz", lines_of(bench)
     filtered(lines[:601], state=state)
     place = lines[0].strip().split(",").index("position_m")
@@ -169,7 +169,9 @@ def test_a_state_is_not_continued_without_a_channel_it_was_begun_with(bench: Rec
     assert refused.value.source == "bench"
 
 
-def test_a_column_of_the_rig_that_the_stream_has_not_is_said(bench: Record, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_rig_column_missing_from_the_stream_gives_a_warning(
+    bench: Record, capsys: pytest.CaptureFixture[str]
+) -> None:
     told: list[dict[str, Any]] = []
     rig = {"pressure_a_pa": "PA:bar"}
     Filtering(told.append, StreamFilterOptions(P, "pressure", "ekf"), (rig, {}), 1.0, source="bench").follow(
@@ -181,7 +183,7 @@ def test_a_column_of_the_rig_that_the_stream_has_not_is_said(bench: Record, caps
     assert estimates(told)[-1]["samples"] == 400
 
 
-def test_a_last_row_that_is_cut_is_left_out_and_said(bench: Record, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_incomplete_last_row_is_left_out_with_a_warning(bench: Record, capsys: pytest.CaptureFixture[str]) -> None:
     told, _ = filtered([*lines_of(bench)[:401], "2.0,1"])
     assert estimates(told)[-1]["samples"] == 400
     assert "the last row is incomplete and was left out" in capsys.readouterr().err

@@ -52,7 +52,7 @@ def asked(port: int, path: str = "/metrics") -> tuple[str, str]:
         return answer.headers["Content-Type"], answer.read().decode()
 
 
-def test_every_event_reaches_a_real_broker_as_the_line_that_is_printed(broker: int) -> None:
+def test_every_printed_event_is_published_to_the_broker(broker: int) -> None:
     from paho.mqtt import client as mqtt
     from paho.mqtt.enums import CallbackAPIVersion
 
@@ -86,7 +86,7 @@ def test_every_event_reaches_a_real_broker_as_the_line_that_is_printed(broker: i
 @pytest.mark.parametrize(
     "address", ["mqtt://127.0.0.1", "tcp://127.0.0.1:9/x", "mqtt://h/a/+", "mqtt://h/a/#", "mqtt://h:x/a"]
 )
-def test_an_address_that_cannot_be_published_on_is_refused_with_what_is_wanted(address: str) -> None:
+def test_an_invalid_address_to_publish_to_is_refused_with_the_expected_form(address: str) -> None:
     done = CliRunner().invoke(app, ["watch", "-", "--publish", address], input=rows(1.0))
     assert done.exit_code != 0
     (end,) = [json.loads(line) for line in done.stdout.splitlines()]
@@ -103,7 +103,7 @@ def test_a_broker_that_does_not_answer_is_named() -> None:
     assert "no broker answers" in json.loads(done.stdout)["message"]
 
 
-def test_metrics_tell_how_far_each_balance_is_from_an_alarm() -> None:
+def test_metrics_contain_the_alarm_share_of_each_learnt_balance() -> None:
     with metrics_offered("0", watching()) as port:
         kind, text = asked(port)
         with pytest.raises(urllib.error.HTTPError, match="404"):
@@ -121,7 +121,7 @@ def test_metrics_tell_how_far_each_balance_is_from_an_alarm() -> None:
 
 
 @pytest.mark.parametrize("where", ["", "x", "70000", ":9464", "-1"])
-def test_where_metrics_cannot_be_offered_is_refused(where: str) -> None:
+def test_an_invalid_address_for_metrics_is_refused(where: str) -> None:
     with pytest.raises(HydrostateError, match="--metrics must be PORT or HOST:PORT"):
         endpoint(where)
 
@@ -135,7 +135,7 @@ def test_a_port_that_is_taken_is_named() -> None:
             pass
 
 
-def test_the_view_shows_gauges_values_and_events_and_no_control_character() -> None:
+def test_the_view_shows_gauges_values_and_events_without_control_characters() -> None:
     page = io.StringIO()
     Console(file=page, width=100, force_terminal=False).print(drawn(watching()))
     shown = page.getvalue()
@@ -148,14 +148,14 @@ def test_the_view_shows_gauges_values_and_events_and_no_control_character() -> N
     assert "\x1b" not in shown
 
 
-def test_the_last_picture_of_a_view_is_that_of_the_end() -> None:
+def test_the_view_shows_the_end_of_the_stream_last() -> None:
     page, told = io.StringIO(), watching()
     with viewed(told, Console(file=page, width=100, force_terminal=True)):
         told.end("ok", "")
     assert "ended" in page.getvalue().rsplit("watching", 1)[-1]
 
 
-def test_lines_stay_on_standard_output_beside_a_view_that_is_not_on_the_same_terminal(tmp_path: Path) -> None:
+def test_with_the_view_on_another_terminal_events_are_still_printed(tmp_path: Path) -> None:
     log = tmp_path / "run.csv"
     log.write_text(rows(3.0))
     done = CliRunner().invoke(app, ["watch", str(log), "--view", "--metrics", "0"])

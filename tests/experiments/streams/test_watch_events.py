@@ -21,7 +21,7 @@ def alarm(balance: str) -> Alarm:
     return Alarm(time=12.0, balance=balance, since=11.25, interval=(11.0, 11.5), score=9.0, threshold=4.0)
 
 
-def test_a_sudden_change_has_its_time_and_a_slow_one_is_told_as_growth() -> None:
+def test_a_sudden_change_is_dated_and_a_slow_one_reported_as_growth() -> None:
     (sudden,), (slow,) = told(alarm("flow")), told(alarm(SLOW))
     assert sudden["message"] == (
         "the flow balance changed at 11.25 s of the stream: "
@@ -31,7 +31,7 @@ def test_a_sudden_change_has_its_time_and_a_slow_one_is_told_as_growth() -> None
     assert (sudden["since_s"], sudden["since_ci95_s"]) == (11.25, [11.0, 11.5])
 
 
-def test_what_a_change_did_to_lost_flow_and_pressure_is_in_percent_or_is_not_known() -> None:
+def test_a_change_gives_lost_flow_and_pressure_in_percent_or_as_unknown() -> None:
     known, blind = told(
         Change(time=14.0, alarm=alarm("flow"), lost=(0.1, 0.4), pressure=-0.05),
         Change(time=14.0, alarm=alarm("motion"), lost=None, pressure=None),
@@ -52,7 +52,7 @@ def test_what_a_change_did_to_lost_flow_and_pressure_is_in_percent_or_is_not_kno
         ("failed", "no", "no"),
     ],
 )
-def test_the_end_counts_the_alarms_whoever_ended_it(outcome: str, why: str, words: str) -> None:
+def test_the_end_event_counts_the_alarms_unless_the_watch_failed(outcome: str, why: str, words: str) -> None:
     lines: list[dict[str, Any]] = []
     events = WatchEvents(lines.append)
     watch: Any = SimpleNamespace(last=12.0, thresholds=(1.0,), balances=("flow",))
@@ -62,7 +62,7 @@ def test_the_end_counts_the_alarms_whoever_ended_it(outcome: str, why: str, word
     assert lines[-1]["message"] == words
 
 
-def test_a_heartbeat_in_thousands_of_years_is_none_and_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_heartbeat_interval_of_thousands_of_years_raises_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
     failed: list[object] = []
     monkeypatch.setattr(threading, "excepthook", failed.append)
     with beating(WatchEvents(lambda _: None), 1e20):
@@ -70,7 +70,7 @@ def test_a_heartbeat_in_thousands_of_years_is_none_and_no_error(monkeypatch: pyt
     assert failed == []
 
 
-def test_a_start_says_how_much_motion_is_to_be_learnt_or_that_it_was_learnt_before() -> None:
+def test_the_start_event_gives_the_motion_left_to_learn() -> None:
     lines: list[dict[str, Any]] = []
     for unlearnt, threshold in ((120.0, float("inf")), (0.0, 4.0)):
         watch: Any = SimpleNamespace(

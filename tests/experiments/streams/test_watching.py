@@ -64,11 +64,11 @@ def position(lines: list[str], offset: float = 0.0, T: float = T) -> list[str]:
     return [f"{time},{speed},{x:.12f}\n" for (time, speed, _), x in zip(cells, place, strict=True)]
 
 
-def test_the_command_learns_as_long_as_the_engine_unless_told() -> None:
+def test_command_and_engine_have_the_same_default_learning_time() -> None:
     assert watching.LEARNING == engine.LEARNING
 
 
-def test_what_changes_during_a_gap_is_no_alarm_for_it_is_learnt_again(capsys: pytest.CaptureFixture[str]) -> None:
+def test_after_a_long_gap_a_change_is_learnt_again_instead_of_an_alarm(capsys: pytest.CaptureFixture[str]) -> None:
     healthy, leaking = rows(0.0, 70.0), [rows(start, 5.0, share=0.6, seed=1) for start in (72.0, 70.5)]
     events, told = watched(healthy + leaking[0])
     assert "bench: warning: rows are missing before 72" in capsys.readouterr().err
@@ -79,7 +79,7 @@ def test_what_changes_during_a_gap_is_no_alarm_for_it_is_learnt_again(capsys: py
     assert capsys.readouterr().err == ""
 
 
-def test_velocity_is_summed_over_all_pieces_as_if_position_came() -> None:
+def test_a_stream_of_velocity_gives_the_same_events_as_one_of_position() -> None:
     lines = rows(0.0, 70.0) + rows(70.0, 5.0, share=0.6, seed=1)
     by_velocity, _ = watched(lines)
     by_position, _ = watched(position(lines), header=HEADER.replace("velocity_m_s", "position_m"))
@@ -88,9 +88,7 @@ def test_velocity_is_summed_over_all_pieces_as_if_position_came() -> None:
     assert by_velocity[2]["score"] == pytest.approx(by_position[2]["score"], rel=1e-4)
 
 
-def test_the_state_is_kept_while_the_stream_runs_and_not_only_at_its_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_state_is_saved_at_intervals_while_the_stream_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import faults.watch.saved as saved
 
     times: list[float] = []
@@ -111,7 +109,7 @@ def test_the_state_is_kept_while_the_stream_runs_and_not_only_at_its_end(
     assert travelled == pytest.approx(T * sum(float(line.split(",")[2]) for line in lines), abs=1e-9)
 
 
-def test_a_disk_that_is_full_for_a_while_ends_no_watch_and_is_told_once(
+def test_a_temporarily_full_disk_does_not_end_the_watch_and_is_reported_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Before, a watch ended at its first save on a full disk, and never reached its alarms."""
@@ -132,7 +130,7 @@ def test_a_disk_that_is_full_for_a_while_ends_no_watch_and_is_told_once(
     assert (tmp_path / "state.npz").exists()
 
 
-def test_a_broken_row_costs_nothing_of_what_was_learnt_before_it(tmp_path: Path) -> None:
+def test_what_was_learnt_before_a_broken_row_is_saved(tmp_path: Path) -> None:
     state = tmp_path / "state.npz"
     with pytest.raises(LogError, match=r"time_s must increase|'motor_speed_rad_s' must hold numbers, got 'x'"):
         watched([*rows(0.0, 70.0), *["70.000,x,0\n"] * 60], state)
@@ -140,7 +138,7 @@ def test_a_broken_row_costs_nothing_of_what_was_learnt_before_it(tmp_path: Path)
     assert named(events) == ["start", "ready", "alarm", "change"]
 
 
-def test_a_restarted_watch_knows_how_far_the_piston_had_come(tmp_path: Path) -> None:
+def test_a_restarted_watch_continues_from_the_travel_of_the_piston(tmp_path: Path) -> None:
     lines, state = rows(0.0, 70.0) + rows(70.0, 5.0, share=0.6, seed=1), tmp_path / "state.npz"
     whole, _ = watched(lines)
     before, _ = watched(lines[:6500], state)
@@ -151,7 +149,7 @@ def test_a_restarted_watch_knows_how_far_the_piston_had_come(tmp_path: Path) -> 
     assert named(after)[:2] == ["start", "ready"]
 
 
-def test_a_stream_that_goes_on_elsewhere_is_learnt_again_and_that_is_said(
+def test_a_stream_that_continues_at_another_time_is_learnt_again_with_a_warning(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for start, follows in ((70.5, True), (80.0, False), (10.0, False)):
@@ -171,7 +169,7 @@ def test_a_state_of_another_rate_is_refused(tmp_path: Path) -> None:
         watched(rows(10.0, 10.0, T=0.02), state)
 
 
-def test_a_last_row_that_is_cut_is_left_out_and_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_incomplete_last_row_is_left_out_with_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
     _, told = watched([*rows(0.0, 5.0), "5.000,1"])
     assert told.rows == 500
     assert "the last row is incomplete and was left out" in capsys.readouterr().err
@@ -183,12 +181,12 @@ def test_a_stream_without_motion_is_refused_by_its_name() -> None:
     assert refused.value.source == "bench"
 
 
-def test_nothing_at_all_is_no_stream() -> None:
+def test_an_empty_stream_is_refused() -> None:
     with pytest.raises(LogError, match="a header line is needed, but nothing came"):
         watch_rows(WatchEvents(lambda _: None), ["\n", "  \n"], asked(), "bench", None)
 
 
-def test_empty_lines_before_the_header_are_no_header() -> None:
+def test_empty_lines_before_the_header_are_skipped() -> None:
     events: list[dict[str, Any]] = []
     watch_rows(WatchEvents(events.append), ["\n", HEADER + "\n", *rows(0.0, 5.0)], asked(), "bench", None)
     assert named(events) == ["start"]
@@ -199,7 +197,7 @@ def written(path: Path, lines: list[str], header: str = HEADER) -> Path:
     return path
 
 
-def test_alarms_in_a_log_that_is_called_healthy_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_alarms_in_a_healthy_log_give_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wrong = written(tmp_path / "wrong.csv", rows(0.0, 80.0) + rows(80.0, 10.0, share=0.6, seed=1))
     watched(rows(0.0, 5.0), healthy=wrong)
     assert f"{wrong}: warning: 1 alarms in this healthy log" in capsys.readouterr().err
@@ -218,7 +216,7 @@ def test_a_healthy_log_without_the_pressure_of_the_stream_is_refused(tmp_path: P
     assert named(events) == ["start", "ready"]
 
 
-def test_batches_that_are_missing_are_counted_by_their_fate(capsys: pytest.CaptureFixture[str]) -> None:
+def test_lost_late_and_dropped_batches_are_counted_separately(capsys: pytest.CaptureFixture[str]) -> None:
     warn_of_lost("mqtt://bench/press", BatchCounts(batches=7, late=1, lost=2, dropped=3))
     assert capsys.readouterr().err.splitlines() == [
         "mqtt://bench/press: warning: 2 batches never came beside 7 that were read",
@@ -229,7 +227,7 @@ def test_batches_that_are_missing_are_counted_by_their_fate(capsys: pytest.Captu
     assert capsys.readouterr().err == ""
 
 
-def test_what_is_missing_is_told_even_if_the_stream_ends_in_an_error(
+def test_lost_batches_are_reported_even_if_the_stream_ends_in_an_error(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def lines(_: str, received: BatchCounts) -> Any:
@@ -243,7 +241,7 @@ def test_what_is_missing_is_told_even_if_the_stream_ends_in_an_error(
     assert "4 batches never came" in capsys.readouterr().err
 
 
-def test_a_column_of_the_rig_that_the_stream_has_not_is_said_once_and_one_that_was_asked_for_is_refused(
+def test_a_missing_column_gives_a_warning_from_the_rig_file_and_an_error_from_the_option(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     bench = Rig(columns={"differential_pressure_pa": "DP:bar"})

@@ -69,7 +69,7 @@ def test_a_batch_is_run_once_reported_and_compared(study: Path, tmp_path: Path) 
     assert {"config_hash", "versions", "commit", "config"} <= set(manifest)
 
 
-def test_cases_that_fail_are_named_and_the_exit_code_says_so(study: Path, tmp_path: Path) -> None:
+def test_failed_cases_are_named_and_the_exit_code_is_2(study: Path, tmp_path: Path) -> None:
     study.write_text(STUDY.format(sensors="rig", sample_time=4e-3), encoding="utf-8")
     shown = invoke("batch", study, "--out", tmp_path / "store", "--workers", 1)
     assert shown.exit_code == 2
@@ -80,7 +80,7 @@ def test_cases_that_fail_are_named_and_the_exit_code_says_so(study: Path, tmp_pa
     assert "the same command goes on from there" in stopped.stderr
 
 
-def test_a_dry_run_tells_a_program_what_is_left(study: Path, tmp_path: Path) -> None:
+def test_a_dry_run_as_json_gives_the_number_of_cases_left(study: Path, tmp_path: Path) -> None:
     store = tmp_path / "store"
     for left in (18, 0):
         (plan,) = json.loads(invoke("batch", study, "--dry-run", "--json", "--workers", 2, "--out", store).stdout)
@@ -100,7 +100,7 @@ def test_a_part_that_was_damaged_is_set_aside_and_its_cases_are_run_again(study:
     assert "18 of 18 cases done" in again.stderr
 
 
-def test_an_interrupted_study_has_its_own_exit_code_and_says_how_to_go_on(
+def test_an_interrupted_study_ends_with_exit_code_130_and_counts_the_kept_cases(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*_: object, on_part: Callable[..., None], stop: Event, **__: object) -> Tally:
@@ -117,7 +117,7 @@ def test_an_interrupted_study_has_its_own_exit_code_and_says_how_to_go_on(
     assert "interrupted: 18 of 18 cases are kept in" in done.stderr
 
 
-def test_a_long_study_speaks_now_and_then_where_nobody_sees_its_bar(
+def test_a_long_study_without_a_terminal_prints_its_progress_at_intervals(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     quiet = invoke("batch", study, "--out", tmp_path / "quiet", "--workers", 1).stderr
@@ -137,7 +137,7 @@ def test_a_long_study_speaks_now_and_then_where_nobody_sees_its_bar(
         (("batch", "eha-paper", "--logs", "*.csv"), "--logs replaces the logs of a study, and eha-paper has none"),
     ],
 )
-def test_what_cannot_be_used_is_a_sentence(words: tuple[str, ...], said: str) -> None:
+def test_missing_files_and_stores_are_refused(words: tuple[str, ...], said: str) -> None:
     shown = invoke(*words)
     assert shown.exit_code == 2
     assert said in shown.stderr

@@ -41,7 +41,7 @@ def results(*arguments: object) -> list[dict[str, Any]]:
 
 
 @pytest.mark.slow
-def test_bulk_modulus_of_all_foreign_logs_comes_within_a_tenth(truth: dict[str, dict[str, str]]) -> None:
+def test_bulk_modulus_of_every_foreign_log_is_within_10_percent(truth: dict[str, dict[str, str]]) -> None:
     errors: dict[str, float] = {}
     for name in CONDITIONS:
         logs = [log for log, row in truth.items() if row["name"] == name]
@@ -51,7 +51,7 @@ def test_bulk_modulus_of_all_foreign_logs_comes_within_a_tenth(truth: dict[str, 
     assert max(abs(error) for error in errors.values()) < 0.1  # measured: all 18, largest error 6.7 %; required: 14
 
 
-def test_a_constant_would_miss_some_foreign_logs(truth: dict[str, dict[str, str]]) -> None:
+def test_a_constant_bulk_modulus_would_miss_some_foreign_logs(truth: dict[str, dict[str, str]]) -> None:
     within = [abs(2.07e8 / float(row["bulk_modulus_pa"]) - 1.0) < 0.1 for row in truth.values()]
     assert sum(within) < 14
 
@@ -60,7 +60,7 @@ EACH_LEVEL = ("normal", "minor_leakage_major_friction", "major_leakage_minor_fri
 """Conditions that together contain every level of leakage and of friction."""
 
 
-def test_a_foreign_log_of_each_level_gets_its_class(truth: dict[str, dict[str, str]]) -> None:
+def test_a_foreign_log_of_each_level_gets_its_condition(truth: dict[str, dict[str, str]]) -> None:
     one_each = {row["name"]: log for log, row in truth.items() if row["name"] in EACH_LEVEL}
     assert len(one_each) == len(EACH_LEVEL)
     found = {one["file"]: one["condition"] for one in results("diagnose", *one_each.values())}
@@ -68,13 +68,13 @@ def test_a_foreign_log_of_each_level_gets_its_class(truth: dict[str, dict[str, s
 
 
 @pytest.mark.slow
-def test_every_foreign_log_gets_its_class(truth: dict[str, dict[str, str]]) -> None:
+def test_every_foreign_log_gets_its_condition(truth: dict[str, dict[str, str]]) -> None:
     found = {one["file"]: one["condition"] for one in results("diagnose", *truth)}
     assert found == {log: row["name"] for log, row in truth.items()}  # measured: all 18; required: 15
 
 
 @pytest.mark.slow
-def test_without_pressure_every_foreign_log_gets_its_class_and_is_close_or_not_called_good(
+def test_without_pressure_foreign_logs_get_their_condition_and_no_wrong_value_passes_the_gate(
     truth: dict[str, dict[str, str]],
 ) -> None:
     found = results("diagnose", *truth, "--no-pressure")

@@ -31,7 +31,7 @@ def stores(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return folder / "near", folder / "far"
 
 
-def test_a_program_gets_the_rows_that_the_screen_shows(stores: tuple[Path, Path]) -> None:
+def test_json_contains_the_rows_of_the_screen(stores: tuple[Path, Path]) -> None:
     words = ["compare", *map(str, stores)]
     shown = CliRunner().invoke(app, words)
     (told,) = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
@@ -65,7 +65,7 @@ def test_two_logs_are_compared_on_the_terminal_on_a_page_and_for_a_program(tmp_p
     assert (same.exit_code, "twice" in same.output) == (2, True)
 
 
-def test_a_page_of_another_ending_is_refused_before_any_work(tmp_path: Path) -> None:
+def test_a_page_with_another_ending_than_html_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("")
     both = [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
     done = CliRunner().invoke(app, ["compare", *both, "--out", str(tmp_path / "x.pdf")])
@@ -73,14 +73,14 @@ def test_a_page_of_another_ending_is_refused_before_any_work(tmp_path: Path) -> 
     assert "--out must end in .html, got 'x.pdf'; a browser prints the page as PDF" in " ".join(done.output.split())
 
 
-def test_a_log_that_is_not_there_is_told_as_such(tmp_path: Path) -> None:
+def test_a_missing_log_is_refused_by_its_name(tmp_path: Path) -> None:
     (tmp_path / "before.csv").touch()
     done = CliRunner().invoke(app, ["compare", str(tmp_path / "before.csv"), str(tmp_path / "after.csv")])
     assert done.exit_code == 2
     assert "after.csv: there is no such file" in " ".join(done.stderr.split())
 
 
-def test_logs_without_time_are_compared_with_the_time_between_rows_given(tmp_path: Path) -> None:
+def test_logs_without_time_are_compared_with_a_given_sample_time(tmp_path: Path) -> None:
     logs = [tmp_path / f"{name}.csv" for name in ("before", "after")]
     for log in logs:
         how = ["--duration", "0.5", "--sample-time", "2e-3", "--out", str(log)]

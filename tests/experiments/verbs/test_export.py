@@ -30,7 +30,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_filter_gets_the_rate_and_channels_of_a_log_and_compiles(log: Path, tmp_path: Path) -> None:
+def test_an_exported_filter_has_the_rate_and_channels_of_the_log_and_compiles(log: Path, tmp_path: Path) -> None:
     done = export("c", log, "--out", tmp_path, "--name", "mine", "--no-pressure", "--json")
     assert done.exit_code == 0, done.output
     (found,) = json.loads(done.stdout)
@@ -41,7 +41,7 @@ def test_a_filter_gets_the_rate_and_channels_of_a_log_and_compiles(log: Path, tm
     compiled(tmp_path, read(tmp_path))
 
 
-def test_blanks_between_states_are_no_part_of_their_names(log: Path, tmp_path: Path) -> None:
+def test_spaces_between_states_are_ignored(log: Path, tmp_path: Path) -> None:
     asked = ("leakage_coefficient,flow_bias", "leakage_coefficient, flow_bias")
     sources: list[dict[str, str]] = []
     for number, states in enumerate(asked):
@@ -51,7 +51,7 @@ def test_blanks_between_states_are_no_part_of_their_names(log: Path, tmp_path: P
     assert sources[0] == sources[1]
 
 
-def test_without_a_log_it_is_made_for_a_simulated_bench_and_a_plant_for_none(tmp_path: Path) -> None:
+def test_without_a_log_a_filter_or_a_plant_can_be_exported(tmp_path: Path) -> None:
     assert export("c", "--out", tmp_path / "filter", "--method", "imm", "--precision", "float").exit_code == 0
     assert "float" in (tmp_path / "filter" / "pressure_imm.h").read_text()
     assert export("c", "--plant", "circuit", "--sample-time", "2e-4", "--out", tmp_path / "plant").exit_code == 0
@@ -59,7 +59,9 @@ def test_without_a_log_it_is_made_for_a_simulated_bench_and_a_plant_for_none(tmp
 
 
 @pytest.mark.parametrize(("form", "warned"), [("pressure", False), ("acceleration", True)])
-def test_a_form_that_float_is_too_coarse_for_is_written_with_a_warning(form: str, warned: bool, tmp_path: Path) -> None:
+def test_a_form_that_needs_double_precision_is_exported_in_float_with_a_warning(
+    form: str, warned: bool, tmp_path: Path
+) -> None:
     done = export("c", "--form", form, "--precision", "float", "--out", tmp_path)
     assert done.exit_code == 0
     assert ("needs double" in done.stderr) == warned
@@ -85,7 +87,7 @@ def test_an_fmu_of_a_plant_and_of_a_filter_is_written(tmp_path: Path) -> None:
         (("--sample-time", "0"), "--sample-time must be"),
     ],
 )
-def test_what_cannot_be_exported_is_said_in_a_sentence(given: tuple[str, ...], said: str, tmp_path: Path) -> None:
+def test_invalid_export_options_are_refused(given: tuple[str, ...], said: str, tmp_path: Path) -> None:
     done = export("c", "--out", tmp_path, *given)
     assert done.exit_code == 2
     assert said in " ".join(done.stderr.split())
@@ -110,7 +112,7 @@ def test_an_identified_model_is_written_for_c_and_for_matlab(log: Path, tmp_path
         (("nowhere.json", "--to", "ada"), "--to must be one of c, mat"),
     ],
 )
-def test_a_model_that_is_not_there_and_an_unknown_kind_are_refused(given: tuple[str, ...], said: str) -> None:
+def test_a_missing_model_and_an_unknown_target_are_refused(given: tuple[str, ...], said: str) -> None:
     done = export("model", *given)
     assert done.exit_code == 2
     assert said in done.stderr
@@ -132,7 +134,7 @@ def test_one_model_is_exported_and_a_file_of_two_is_refused(tmp_path: Path) -> N
         assert ("one model is needed, got 2" in done.output) is (code == 2)
 
 
-def test_what_the_reader_doubts_of_the_log_that_a_filter_is_made_for_is_said(log: Path, tmp_path: Path) -> None:
+def test_warnings_of_reading_the_log_of_an_exported_filter_are_printed(log: Path, tmp_path: Path) -> None:
     lines = log.read_text().splitlines()
     cells = lines[500].split(",")
     lines[500] = ",".join([cells[0], "", *cells[2:]])

@@ -36,7 +36,7 @@ def run(*arguments: object, given: str | None = None) -> tuple[int, list[dict[st
     return result.exit_code, [json.loads(line) for line in result.stdout.splitlines()], result.stderr
 
 
-def test_a_stream_tells_bulk_modulus_with_its_deviation_while_it_comes(log: Path) -> None:
+def test_a_filtered_stream_gives_bulk_modulus_with_its_standard_deviation(log: Path) -> None:
     code, told, said = run("-", given=log.read_text())
     assert (code, "warning" in said) == (0, False)  # not `said == ""`: the first run may announce that it compiles
     assert [one["event"] for one in told] == ["start", *["estimate"] * 4, "end"]
@@ -46,7 +46,7 @@ def test_a_stream_tells_bulk_modulus_with_its_deviation_while_it_comes(log: Path
     assert (last["gate"], last["samples"], told[-1]["outcome"]) == ([], 4000, "ok")
 
 
-def test_a_restart_between_two_rows_changes_no_digit(log: Path, tmp_path: Path) -> None:
+def test_a_restart_between_two_rows_does_not_change_the_result(log: Path, tmp_path: Path) -> None:
     state, (header, *rows) = tmp_path / "filter.npz", log.read_text().splitlines(keepends=True)
     run("-", "--state", state, given=header + "".join(rows[:2345]))
     told = run("-", "--state", state, given=header + "".join(rows[2346:]))[1]
@@ -61,7 +61,7 @@ def test_a_restart_between_two_rows_changes_no_digit(log: Path, tmp_path: Path) 
     assert (told[-2]["values"], told[-2]["std"]) == (whole[-2]["values"], whole[-2]["std"])
 
 
-def test_after_a_long_gap_it_begins_again_and_says_so(log: Path, tmp_path: Path) -> None:
+def test_after_a_long_gap_the_filter_begins_again_with_a_warning(log: Path, tmp_path: Path) -> None:
     state, (header, *rows) = tmp_path / "filter.npz", log.read_text().splitlines(keepends=True)
     code, told, said = run("-", given=header + "".join(rows[:1000] + rows[2500:]))
     assert code == 0
@@ -74,7 +74,7 @@ def test_after_a_long_gap_it_begins_again_and_says_so(log: Path, tmp_path: Path)
     assert "the stream does not continue at" in said
 
 
-def test_noise_of_another_log_is_taken_where_one_is_named(log: Path) -> None:
+def test_option_like_takes_the_sensor_noise_from_another_log(log: Path) -> None:
     record = bench()
     asked = StreamFilterOptions(P, "pressure", "ekf")
     loud = record.replace(position_m=record["position_m"] + 1e-4 * np.random.default_rng(0).normal(size=len(record)))
@@ -111,14 +111,14 @@ def test_a_state_of_another_filter_actuator_or_rate_is_refused(log: Path, tmp_pa
         (("--like", "nowhere.csv"), "nowhere.csv"),
     ],
 )
-def test_what_cannot_be_asked_is_refused(log: Path, arguments: tuple[str, ...], said: str) -> None:
+def test_invalid_options_are_refused(log: Path, arguments: tuple[str, ...], said: str) -> None:
     code, _, error = run(log, *arguments)
     assert code == 2
     assert said in error
     assert "Traceback" not in error
 
 
-def test_a_stream_that_lacks_a_channel_or_is_not_there_is_refused_in_a_sentence(tmp_path: Path) -> None:
+def test_a_stream_without_a_needed_channel_and_a_missing_file_are_refused(tmp_path: Path) -> None:
     code, told, error = run("-", "--form", "flow", given="time_s,motor_speed_rad_s\n0.0,1\n0.1,1\n0.2,1\n")
     assert code == 2
     assert told[-1]["outcome"] == "failed"

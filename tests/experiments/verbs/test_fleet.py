@@ -50,7 +50,7 @@ def test_a_limit_that_cannot_be_used_is_refused(tmp_path: Path, option: str, wor
     assert words in " ".join(said.split())
 
 
-def test_a_folder_of_logs_becomes_a_page_with_the_sick_one_first(tmp_path: Path) -> None:
+def test_a_folder_of_logs_becomes_a_page_that_lists_the_faulty_actuator_first(tmp_path: Path) -> None:
     logs = tmp_path / "logs"
     for name, condition in (("A_1", "normal"), ("A_2", "normal"), ("B_1", "normal"), ("B_2", "minor_leakage")):
         options = ("--plant", "circuit", "--duration", 4, "--sample-time", 1e-3, "--condition", condition)
@@ -103,7 +103,7 @@ def test_the_exit_code_of_a_fleet_says_whether_all_some_or_none_could_be_read(
     assert ("could not be read" in said) is (code > 0)
 
 
-def test_a_store_without_diagnoses_is_no_fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_store_without_diagnoses_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stored = Stored([{**ROW, "file": "a.csv", "verb": "estimate"}])
     monkeypatch.setattr("experiments.batch.part_store.open_store", lambda _: stored)
     code, _, said = invoke("fleet", tmp_path, "--out", tmp_path / "fleet")
@@ -111,7 +111,7 @@ def test_a_store_without_diagnoses_is_no_fleet(tmp_path: Path, monkeypatch: pyte
     assert "must contain logs that were diagnosed" in said
 
 
-def test_names_that_hold_a_date_group_logs_without_an_option_and_it_says_so(
+def test_file_names_with_a_date_are_grouped_without_an_option_and_this_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored = Stored([{**ROW, "file": f"{name}.csv"} for name in ("A_20261121", "A_20261122", "B_20261122")])
@@ -126,7 +126,7 @@ def test_names_that_hold_a_date_group_logs_without_an_option_and_it_says_so(
     assert "None of 3 actuators is past a limit." in (tmp_path / "apart" / "index.html").read_text("utf-8")
 
 
-def test_files_are_named_by_a_table_or_by_a_pattern_and_not_by_both(
+def test_a_table_of_names_is_accepted_and_refused_together_with_a_pattern(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored = Stored([{**ROW, "file": "a.csv"}, {**ROW, "file": "b.csv"}])
@@ -141,7 +141,7 @@ def test_files_are_named_by_a_table_or_by_a_pattern_and_not_by_both(
     assert "--pattern and --names say the same" in said
 
 
-def test_a_date_that_is_none_is_refused_before_any_log_is_diagnosed(
+def test_an_invalid_date_is_refused_before_any_log_is_diagnosed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ran = list[Any]()
@@ -152,7 +152,7 @@ def test_a_date_that_is_none_is_refused_before_any_log_is_diagnosed(
     assert "date must be ISO 8601 such as 2026-11-22, or a number, got '2026-99'" in said
 
 
-def test_names_that_do_not_match_and_repairs_that_restart_nothing_are_told(
+def test_unmatched_file_names_and_repairs_without_effect_give_warnings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored = Stored([{**ROW, "file": "P-1_2026-01-02.csv"}, {**ROW, "file": "run.csv"}, {**ROW, "file": "P-2_x.csv"}])
@@ -169,13 +169,13 @@ def test_names_that_do_not_match_and_repairs_that_restart_nothing_are_told(
     assert "a repair of 'P-1', but its logs have no dates" in said
 
 
-def test_a_file_is_no_fleet(tmp_path: Path) -> None:
+def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time_s\n")
     code, _, said = invoke("fleet", tmp_path / "a.csv")
     assert (code, "must be a folder with logs or a store, got a file" in said) == (2, True)
 
 
-def test_the_logs_of_another_rig_are_diagnosed_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fleet_is_diagnosed_with_the_given_rig_and_columns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rig, logs, asked = tmp_path / "rig.toml", tmp_path / "logs", list[Any]()
     assert invoke("rig", "init", rig)[0] == 0
     logs.mkdir()
@@ -195,7 +195,7 @@ def test_the_logs_of_another_rig_are_diagnosed_with_it(tmp_path: Path, monkeypat
     assert not any("md" in one.glob for one in plan.study.logs)
 
 
-def test_an_interrupted_fleet_writes_no_page_and_says_how_to_go_on(
+def test_an_interrupted_fleet_writes_no_page_and_counts_the_kept_logs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "logs").mkdir()
@@ -212,7 +212,9 @@ def test_an_interrupted_fleet_writes_no_page_and_says_how_to_go_on(
     assert not (tmp_path / "fleet" / "index.html").exists()
 
 
-def test_rig_files_that_lie_among_logs_are_found_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rig_files_in_folders_of_logs_are_found_and_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     logs = [tmp_path / name for name in ("a.csv", "large/b.csv", "small/deep/c.csv")]
     for folder in (tmp_path, tmp_path / "large"):
         folder.mkdir(exist_ok=True)
@@ -224,7 +226,7 @@ def test_rig_files_that_lie_among_logs_are_found_and_told(tmp_path: Path, capsys
     assert "logs in no folder" not in capsys.readouterr().err
 
 
-def test_a_fleet_of_logs_whose_stamps_are_too_coarse_takes_the_time_between_rows(tmp_path: Path) -> None:
+def test_a_fleet_of_logs_with_coarse_time_stamps_needs_a_sample_time(tmp_path: Path) -> None:
     (logs := tmp_path / "logs").mkdir()
     assert invoke("simulate", "--duration", 0.5, "--sample-time", 2e-3, "--out", tmp_path / "run.csv")[0] == 0
     heading, *rows = (tmp_path / "run.csv").read_text("utf-8").splitlines()

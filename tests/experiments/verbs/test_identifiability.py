@@ -27,7 +27,7 @@ def test_the_card_is_printed_with_units_and_sentences() -> None:
     assert "errata E13" in shown
 
 
-def test_json_holds_what_was_asked_and_found() -> None:
+def test_json_contains_options_and_results() -> None:
     (found,) = results("--drive", "prbs", "--seconds", 4, "--rate", 500, "--condition", "minor_leakage", "--seed", 3)
     assert (found["drive"], found["seconds"], found["rate_hz"], found["seed"]) == ("prbs", 4.0, 500.0, 3)
     assert (found["condition"], found["outcome"]) == ("minor_leakage", "ok")
@@ -40,7 +40,7 @@ def test_the_order_of_the_sensors_does_not_matter() -> None:
     assert results("--sensors", "dp, position", "--seconds", 2) == results("--sensors", "position,dp", "--seconds", 2)
 
 
-def test_drives_are_ranked_the_best_first() -> None:
+def test_drives_are_ranked_from_best_to_worst() -> None:
     found = results("--rank", "--sensors", "position,velocity")
     overall = [one["overall_percent"] for one in found]
     assert overall == sorted(overall)
@@ -51,7 +51,7 @@ def test_drives_are_ranked_the_best_first() -> None:
     assert "overall [%]" in shown
 
 
-def test_the_rigs_uncertain_volume_bounds_bulk_modulus(tmp_path: Path) -> None:
+def test_the_uncertainty_of_the_rigs_volume_limits_that_of_bulk_modulus(tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text(rig_template().replace("[uncertainty]", "[uncertainty]\nchamber_volume = 0.05"), encoding="utf-8")
     (found,) = results("--rig", rig)
@@ -60,7 +60,7 @@ def test_the_rigs_uncertain_volume_bounds_bulk_modulus(tmp_path: Path) -> None:
     assert "chamber volume 5 %" in found["message"]
 
 
-def test_results_are_written_too(tmp_path: Path) -> None:
+def test_results_are_written_as_csv_and_json(tmp_path: Path) -> None:
     assert invoke("--seconds", 2, "--out", tmp_path / "cards").exit_code == 0
     assert sorted(path.name for path in (tmp_path / "cards").iterdir()) == ["results.csv", "results.json"]
 
@@ -80,7 +80,7 @@ def test_results_are_written_too(tmp_path: Path) -> None:
         (("--drive", "sine", "--rate", "12"), "frequency"),
     ],
 )
-def test_wrong_options_are_refused_in_a_sentence(arguments: tuple[str, ...], said: str) -> None:
+def test_wrong_options_are_refused_with_a_precise_message(arguments: tuple[str, ...], said: str) -> None:
     refused = invoke(*arguments)
     assert refused.exit_code == 2
     expected = said.replace("bench, paper, rig", "bench, rig, paper")

@@ -34,7 +34,9 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return paths
 
 
-def test_order_delay_and_structure_are_found_and_the_library_is_written(logs: list[Path], tmp_path: Path) -> None:
+def test_automatic_order_delay_and_structure_are_right_and_the_models_are_written(
+    logs: list[Path], tmp_path: Path
+) -> None:
     out = tmp_path / "library.json"
     arguments = ["--structure", "auto", "--order", "auto", "--delay", "auto", "--out", str(out)]
     ran = CliRunner().invoke(app, ["identify", *map(str, logs), *arguments])
@@ -49,7 +51,7 @@ def test_order_delay_and_structure_are_found_and_the_library_is_written(logs: li
         assert entry["poles"][0]["imag_std"] > 0.0
 
 
-def test_the_residual_is_tested_and_drawn(logs: list[Path], tmp_path: Path) -> None:
+def test_the_residual_of_each_model_is_tested_and_drawn(logs: list[Path], tmp_path: Path) -> None:
     arguments = ["--delay", "3", "--numerator", "2", "--figure", str(tmp_path / "fit.png"), "--json"]
     ran = CliRunner().invoke(app, ["identify", *map(str, logs), *arguments])
     for entry in json.loads(ran.stdout):
@@ -60,7 +62,7 @@ def test_the_residual_is_tested_and_drawn(logs: list[Path], tmp_path: Path) -> N
         assert (tmp_path / f"fit-{log.stem}.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_an_order_chosen_for_a_piston_that_sticks_warns_and_for_a_linear_plant_not(
+def test_an_automatic_order_warns_of_a_sticking_piston_and_not_with_a_linear_plant(
     logs: list[Path], tmp_path: Path
 ) -> None:
     rng, p = np.random.default_rng(4), EhaParameters()
@@ -72,7 +74,7 @@ def test_an_order_chosen_for_a_piston_that_sticks_warns_and_for_a_linear_plant_n
 
 
 @pytest.mark.parametrize("structure", ["arx", "armax", "box-jenkins"])
-def test_a_structure_can_be_named(structure: str, logs: list[Path]) -> None:
+def test_the_structure_of_the_model_can_be_chosen(structure: str, logs: list[Path]) -> None:
     arguments = ["--structure", structure, "--delay", "3", "--json"]
     ran = CliRunner().invoke(app, ["identify", str(logs[0]), *arguments])
     (entry,) = json.loads(ran.stdout)
@@ -84,19 +86,19 @@ def test_a_structure_can_be_named(structure: str, logs: list[Path]) -> None:
     ("option", "value"),
     [("--order", "0"), ("--order", "two"), ("--order", "100"), ("--delay", "-1"), ("--structure", "oe")],
 )
-def test_what_is_not_known_is_refused_before_any_work(option: str, value: str, logs: list[Path]) -> None:
+def test_invalid_orders_delays_and_structures_are_refused(option: str, value: str, logs: list[Path]) -> None:
     ran = CliRunner().invoke(app, ["identify", str(logs[0]), option, value])
     assert ran.exit_code == 2
     assert option in ran.output
 
 
-def test_auto_is_no_number() -> None:
+def test_an_order_or_delay_may_be_auto_and_not_a_fraction() -> None:
     assert whole_or_auto("--delay", "auto", 0) is None
     with pytest.raises(HydrostateError, match="from 1 on, or auto, got '1"):
         whole_or_auto("--order", "1.5", 1)
 
 
-def test_the_figure_of_an_unstable_model_is_missed_out_loud(tmp_path: Path) -> None:
+def test_the_missing_figure_of_an_unstable_model_is_reported(tmp_path: Path) -> None:
     u = np.random.default_rng(3).choice([-1.0, 1.0], 400)
     y = LinearModel([0.0, 1.0], [1.0, -1.01], 1e-3, "u", "y").simulate(u)
     write_record(Record(1e-3, {"motor_speed_rad_s": u, "velocity_m_s": y}), tmp_path / "run.csv")

@@ -38,7 +38,7 @@ def test_the_terminal_shows_columns_guesses_block_and_option(strange: Path) -> N
     assert "with these columns the log reads: 2.999 s at 1000 Hz" in done.stdout
 
 
-def test_the_rig_file_that_it_writes_reads_the_log(strange: Path, tmp_path: Path) -> None:
+def test_inspect_writes_a_rig_file_with_the_columns_of_the_log_once(strange: Path, tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     written = invoke(strange, "--write", rig)
     assert written.exit_code == 0
@@ -49,7 +49,7 @@ def test_the_rig_file_that_it_writes_reads_the_log(strange: Path, tmp_path: Path
     assert again.stderr.startswith(f"hydrostate: --write {rig}: the file exists already and is not overwritten")
 
 
-def test_a_page_that_cannot_be_written_costs_nothing_that_was_found(
+def test_the_findings_are_printed_even_if_the_page_cannot_be_written(
     strange: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(path: Path, *_: object) -> None:
@@ -69,7 +69,7 @@ def test_advice_to_inspect_is_not_given_by_inspect_itself(tmp_path: Path) -> Non
     assert "hydrostate inspect" not in done.stdout
 
 
-def test_json_says_how_sure_each_guess_is_and_why(strange: Path) -> None:
+def test_json_gives_the_probability_and_reasons_of_each_guess(strange: Path) -> None:
     (found,) = json.loads(invoke(strange, "--json").stdout)
     (table,) = found["tables"]
     weg = table["columns"][2]
@@ -86,14 +86,14 @@ def test_the_page_draws_every_column(strange: Path, tmp_path: Path) -> None:
     assert "image/svg+xml" in page
 
 
-def test_page_and_results_go_where_those_of_other_verbs_would(strange: Path, tmp_path: Path) -> None:
+def test_page_and_results_are_written_to_the_given_paths(strange: Path, tmp_path: Path) -> None:
     done = invoke(strange, "--report", tmp_path / "page", "--out", tmp_path / "new" / "results")
     assert done.exit_code == 0, done.output
     assert (tmp_path / "page.html").is_file()
     assert (tmp_path / "new" / "results" / "results.json").is_file()
 
 
-def test_a_file_that_cannot_be_opened_is_one_sentence(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_opened_is_refused_with_the_remedy(tmp_path: Path) -> None:
     (tmp_path / "x.xls").write_bytes(b"\xd0\xcf\x11\xe0" + bytes(600))
     done = invoke(tmp_path / "x.xls")
     assert done.exit_code == 2
@@ -107,9 +107,7 @@ def test_names_with_escape_codes_do_not_reach_the_terminal(tmp_path: Path) -> No
     assert "\x1b" not in done.stdout + done.stderr
 
 
-def test_several_files_are_looked_into_together_unless_what_is_written_goes_with_one(
-    strange: Path, tmp_path: Path
-) -> None:
+def test_several_files_are_inspected_together_except_with_options_for_one_file(strange: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.csv"
     other.write_text("time_s,x\n" + "".join(f"{0.1 * k:.1f},{k}\n" for k in range(20)))
     assert len(json.loads(invoke(strange, other, "--json").stdout)) == 2
@@ -122,7 +120,7 @@ def test_several_files_are_looked_into_together_unless_what_is_written_goes_with
     assert {path.name for path in tmp_path.glob("page*")} == {f"page-{strange.stem}.html", "page-other.html"}
 
 
-def test_each_channel_is_the_surest_column_of_all_files_of_a_test(tmp_path: Path) -> None:
+def test_each_channel_is_the_most_probable_column_of_all_files(tmp_path: Path) -> None:
     named, vague = tmp_path / "named.csv", tmp_path / "vague.csv"
     weg = np.cumsum(4e-4 * SPEED) * 1e-3
     for path, heading in ((named, "position [mm]"), (vague, "ch2")):
@@ -133,7 +131,7 @@ def test_each_channel_is_the_surest_column_of_all_files_of_a_test(tmp_path: Path
         assert found["columns"]["position_m"] == "position [mm]:mm"
 
 
-def test_what_a_clock_lacks_is_said_in_the_unit_of_its_column(tmp_path: Path) -> None:
+def test_flaws_of_the_clock_are_given_in_the_unit_of_its_column(tmp_path: Path) -> None:
     steps = np.ones(40)
     steps[7] = 5.0  # a gap
     steps[20] = 0.0
@@ -154,7 +152,7 @@ def test_what_a_clock_lacks_is_said_in_the_unit_of_its_column(tmp_path: Path) ->
     assert "clock: steps of 0.1 s; no gaps" in " ".join(invoke(dated).stdout.split())
 
 
-def test_a_log_without_a_clock_or_a_known_column_is_told_what_to_give(tmp_path: Path) -> None:
+def test_a_log_without_a_clock_or_known_columns_gets_the_options_to_give(tmp_path: Path) -> None:
     path = tmp_path / "blank.csv"
     rng = np.random.default_rng(0)
     path.write_text("k,note\n" + "".join(f"{one:.4f},word\n" for one in rng.normal(size=50)))
@@ -164,7 +162,7 @@ def test_a_log_without_a_clock_or_a_known_column_is_told_what_to_give(tmp_path: 
     assert "or add to one command" not in told
 
 
-def test_a_log_of_one_row_has_no_clock_and_is_shown(tmp_path: Path) -> None:
+def test_a_log_of_one_row_is_shown_without_a_clock(tmp_path: Path) -> None:
     path = tmp_path / "short.csv"
     path.write_text("time,motor speed,position\ns,rad/s,m\n0.0,1.0,0.5\n")
     found = invoke(path)

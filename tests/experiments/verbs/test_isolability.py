@@ -20,7 +20,7 @@ def test_the_card_shows_structure_and_nearest_rivals() -> None:
     assert "all conditions can be told apart" in done.stdout
 
 
-def test_json_holds_all_pairs() -> None:
+def test_json_contains_all_pairs_of_conditions() -> None:
     (found,) = json.loads(_run("--drive", "sine", "--sensors", "position,velocity", "--json").stdout)
     assert len(found["nats_per_second"]) == len(found["conditions"]) == 9
     assert "friction" in found["not_told_from"]["leakage"]
@@ -28,7 +28,7 @@ def test_json_holds_all_pairs() -> None:
     assert "cannot be told apart" in found["message"]
 
 
-def test_a_length_may_be_called_as_simulate_calls_it() -> None:
+def test_the_option_duration_is_an_alias_of_seconds() -> None:
     (found,) = json.loads(_run("--duration", "2", "--json").stdout)
     assert found["seconds"] == 2.0
 
@@ -49,13 +49,13 @@ def test_drives_are_ranked_by_their_hardest_pair() -> None:
         (("--seconds", "-1"), "--seconds (--duration) must be positive"),
     ],
 )
-def test_what_is_not_known_is_refused(arguments: tuple[str, ...], said: str) -> None:
+def test_invalid_options_are_refused(arguments: tuple[str, ...], said: str) -> None:
     done = _run(*arguments)
     assert done.exit_code == 2
     assert said in done.stderr
 
 
-def test_the_ranking_is_a_line_a_drive_and_names_the_best() -> None:
+def test_the_ranking_has_one_line_per_drive_and_names_the_best() -> None:
     done = _run("--rank")
     assert done.exit_code == 0
     ranked = json.loads(_run("--rank", "--json").stdout)

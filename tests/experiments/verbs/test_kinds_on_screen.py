@@ -24,13 +24,13 @@ def stack_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_the_stack_s_condition_stands_with_what_to_do_below(stack_log: Path) -> None:
+def test_the_condition_of_the_stack_is_followed_by_the_work_to_do(stack_log: Path) -> None:
     done = invoke("diagnose", "--plant", "piezo-stack", "--load", 10, stack_log)
     assert done.exit_code == 0, done.output
     assert f"{stack_log}: major leakage next Inspect the seal" in " ".join(done.stdout.split())
 
 
-def test_logs_of_two_kinds_of_actuator_are_told_apart_by_their_columns(
+def test_logs_of_two_kinds_of_actuator_are_distinguished_by_their_columns(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[str] = []
@@ -73,13 +73,13 @@ def test_a_sensor_that_the_stack_does_not_have_is_refused(stack_log: Path) -> No
     assert "--sensors must be of stack, force, position, pressure, got 'thermometer'" in " ".join(done.stderr.split())
 
 
-def test_what_the_stack_s_sensors_could_tell_is_said_before_a_run() -> None:
+def test_identifiability_of_the_stack_is_given_for_its_sensors() -> None:
     done = invoke("identifiability", "--plant", "piezo-stack", "--sensors", "position", "--seconds", 0.05)
     assert done.exit_code == 0, done.output
     assert "leakage" in done.stdout
 
 
-def test_a_motor_s_log_that_no_fault_explains_is_unknown_on_screen(tmp_path: Path) -> None:
+def test_a_motor_log_that_no_fault_explains_is_shown_as_unknown(tmp_path: Path) -> None:
     logs = {}
     for name, words in {"leaky": ("--load", 10, "--fault", "valve_4_leak=0.1"), "rust": ("--load", 10)}.items():
         logs[name] = tmp_path / f"{name}.csv"
@@ -98,7 +98,7 @@ def test_a_motor_s_log_that_no_fault_explains_is_unknown_on_screen(tmp_path: Pat
 
 
 @pytest.mark.parametrize("wrong", ["chamber_5_gas", "rust=1", "chamber_5_gas=7"])
-def test_a_fault_of_the_motor_needs_a_name_and_a_severity_that_it_can_have(wrong: str, tmp_path: Path) -> None:
+def test_a_fault_of_the_motor_without_a_valid_name_and_severity_is_refused(wrong: str, tmp_path: Path) -> None:
     out = tmp_path / "run.csv"
     done = invoke("simulate", "--plant", "diaphragm-motor", "--fault", wrong, "--out", out)
     assert done.exit_code == 2

@@ -43,7 +43,7 @@ def test_a_fault_is_diagnosed_with_its_severity(tmp_path: Path) -> None:
     assert said("estimate", log)["outcome"] == "mismatch"
 
 
-def test_a_fault_that_is_simulated_is_the_one_diagnosed(tmp_path: Path) -> None:
+def test_the_simulated_fault_is_diagnosed(tmp_path: Path) -> None:
     log = tmp_path / "run.csv"
     words = ["simulate", "--plant", "diaphragm-motor", "--load", "10", "--out", str(log), "--fault"]
     assert RUN.invoke(app, [*words, "chamber_5_gas=0.03"]).exit_code == 0
@@ -72,7 +72,7 @@ def test_leakage_and_load_are_estimated_and_bulk_modulus_is_not(tmp_path: Path) 
     assert "the piston leaks" in entries["findings"][0]
 
 
-def test_another_motor_is_a_mismatch_until_a_healthy_run_is_given(tmp_path: Path) -> None:
+def test_another_motor_is_a_mismatch_without_a_healthy_run_and_diagnosed_with_one(tmp_path: Path) -> None:
     other = replace(MOTOR, sensor_gain=(0.9,) * 7)
     log = logged(tmp_path, motor_with_fault(other, "electrode_2_gain", 0.2))
     entries = said("diagnose", log)
@@ -90,7 +90,9 @@ def test_another_motor_is_a_mismatch_until_a_healthy_run_is_given(tmp_path: Path
         (["--load", "nan"], "--load must be finite"),
     ],
 )
-def test_what_does_not_apply_is_refused(words: list[str], message: str, tmp_path: Path) -> None:
+def test_options_and_logs_that_do_not_apply_to_the_motor_are_refused(
+    words: list[str], message: str, tmp_path: Path
+) -> None:
     log = tmp_path / "log.csv"
     log.write_text("time_s,position_m\n" + "".join(f"{k * 1e-3},0\n" for k in range(20)), encoding="utf-8")
     done = RUN.invoke(app, ["diagnose", "--plant", "diaphragm-motor", *words, str(log)])

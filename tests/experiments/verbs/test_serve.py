@@ -27,7 +27,7 @@ def refused(*arguments: object) -> str:
         (("--host", "203.0.113.1", "--port", "0"), "cannot listen there"),
     ],
 )
-def test_what_cannot_be_served_is_refused_in_a_sentence(tmp_path: Path, options: tuple[str, ...], words: str) -> None:
+def test_invalid_server_options_are_refused(tmp_path: Path, options: tuple[str, ...], words: str) -> None:
     assert words in refused(tmp_path / "kept", *options)
 
 
@@ -50,7 +50,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("named", [True, False])
-def test_the_folder_that_keeps_everything_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: bool) -> None:
+def test_the_folder_of_the_server_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: bool) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("experiments.serve.server.run_server", lambda _, say: say("http://here"))
     done = CliRunner().invoke(app, ["serve", *(["kept"] if named else [])])
@@ -60,19 +60,19 @@ def test_the_folder_that_keeps_everything_is_told(tmp_path: Path, monkeypatch: p
     assert ("hydrostate serve FOLDER" in done.stderr) is not named
 
 
-def test_a_missing_package_is_named_with_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_is_reported_with_the_extra_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "experiments.serve.server", None)  # as if a package that it imports were missing
     assert "pip install 'hydrostate[serve]'" in refused()
 
 
-def test_a_system_without_locks_is_told_apart_from_a_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_system_without_fcntl_gets_its_own_message(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("server", "service", "app"):
         monkeypatch.delitem(sys.modules, f"experiments.serve.{name}", raising=False)
     monkeypatch.setitem(sys.modules, "fcntl", None)
     assert "serve runs on Linux and macOS, this system has no fcntl" in refused()
 
 
-def test_a_stream_is_refused_where_the_plant_is_another_kind_of_actuator(tmp_path: Path) -> None:
+def test_a_stream_with_another_kind_of_actuator_as_the_plant_is_refused(tmp_path: Path) -> None:
     told = refused(tmp_path / "kept", "--plant", "piezo-stack", "--watch", "x=tcp://127.0.0.1:1")
     assert "--watch works for the gear-pump actuator (eha) only, got --plant piezo-stack" in told
     assert not (tmp_path / "kept").exists()

@@ -20,7 +20,7 @@ def test_the_smallest_standard_cylinder_is_found() -> None:
     assert found["extend_force"] > 10000.0
 
 
-def test_the_screen_shows_shop_units() -> None:
+def test_the_screen_shows_mm_bar_and_litres_per_minute() -> None:
     done = RUN.invoke(app, DUTY)
     assert done.exit_code == 0, done.output
     words = " ".join(done.stdout.split())
@@ -38,13 +38,13 @@ def test_the_screen_shows_shop_units() -> None:
         (["--retract-speed", "-1"], "retract_speed must not be negative"),
     ],
 )
-def test_what_cannot_be_is_refused(more: list[str], said: str) -> None:
+def test_an_impossible_cylinder_or_duty_is_refused(more: list[str], said: str) -> None:
     done = RUN.invoke(app, [*DUTY, *more])
     assert done.exit_code == 2
     assert said in " ".join(done.stderr.split())
 
 
-def test_a_cylinder_that_is_named_is_worked_out_if_it_suffices() -> None:
+def test_a_given_cylinder_is_calculated_if_it_is_large_enough() -> None:
     (found,) = json.loads(RUN.invoke(app, [*DUTY, "--bore", "0.05", "--rod", "0.03", "--json"]).stdout)
     assert (found["bore"], found["rod"]) == (0.05, 0.03)
     assert 10000.0 < found["extend_force"] < 1e7 * math.pi / 4.0 * 0.05**2

@@ -75,7 +75,7 @@ def sine(folder: Path) -> Path:
     return path
 
 
-def test_a_simulated_run_says_what_made_it(steps: dict[str, Path]) -> None:
+def test_a_simulated_run_contains_its_options_and_versions(steps: dict[str, Path]) -> None:
     made = {suffix: dict(read_record(path).metadata) for suffix, path in steps.items()}
     assert made[".csv"] == made[".parquet"] == made[".mat"]
     found = made[".mat"]
@@ -89,7 +89,7 @@ def test_a_simulated_run_says_what_made_it(steps: dict[str, Path]) -> None:
     assert {"hydrostate", "numpy", "llvmlite", "python"} <= set(found["versions"])
 
 
-def test_simulate_prints_what_was_written(folder: Path) -> None:
+def test_simulate_as_json_describes_the_written_log(folder: Path) -> None:
     path = folder / "chirp.parquet"
     arguments = ("simulate", "--drive", "chirp", "--duration", 2, "--sample-time", 1e-3, "--plant", "reduced")
     (found,) = results(*arguments, "--leakage-severity", 0.5, "--friction-severity", 0.25, "-o", path)
@@ -98,7 +98,7 @@ def test_simulate_prints_what_was_written(folder: Path) -> None:
     assert found["channels"] == list(read_record(path))
 
 
-def test_the_seed_alone_decides_a_run(folder: Path) -> None:
+def test_a_run_is_reproduced_by_its_seed(folder: Path) -> None:
     arguments = ("simulate", "--drive", "prbs", "--duration", 1, "--sample-time", 1e-3, "-o")
     runs: list[Any] = []
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
@@ -112,7 +112,7 @@ def test_the_seed_alone_decides_a_run(folder: Path) -> None:
 
 # `tests/log_formats` covers all formats, each with one record
 @pytest.mark.parametrize("formats", [".csv .mat", pytest.param(".csv .parquet .mat", marks=pytest.mark.slow)])
-def test_estimate_comes_back_from_every_format(steps: dict[str, Path], formats: str) -> None:
+def test_estimate_gives_the_same_value_from_every_file_format(steps: dict[str, Path], formats: str) -> None:
     paths = [steps[suffix] for suffix in formats.split()]
     arguments = ("--condition", "minor_friction", "--start", 0, "--start-std", 1e8)
     found = results("estimate", *paths, *arguments)
@@ -132,7 +132,7 @@ def test_estimate_comes_back_from_every_format(steps: dict[str, Path], formats: 
         (("--form", "pressure"), "ekf", "pressure", {"position_m", "velocity_m_s", PRESSURE}),
     ],
 )
-def test_estimate_keeps_its_contract(
+def test_estimate_has_the_documented_entries(
     steps: dict[str, Path], options: tuple[str, ...], method: str, form: str, channels: set[str]
 ) -> None:
     (one,) = asked("estimate", steps[".csv"], "--condition", "minor_friction", *options)
@@ -148,7 +148,7 @@ def test_estimate_keeps_its_contract(
 
 
 @pytest.mark.parametrize(("further", "tuned"), [((), True), (("--no-tune",), False), (("--no-pressure",), False)])
-def test_the_pressure_form_is_tuned_where_it_has_pressure_unless_told_otherwise(
+def test_the_pressure_form_is_tuned_by_default_if_pressure_is_logged(
     steps: dict[str, Path], further: tuple[str, ...], tuned: bool
 ) -> None:
     (one,) = asked("estimate", steps[".csv"], "--condition", "minor_friction", "--form", "pressure", *further)
@@ -170,7 +170,7 @@ def test_both_engines_and_both_forms_can_be_chosen(folder: Path) -> None:
     assert (oracle["method"], oracle["form"]) == ("filterpy-ekf", "acceleration")
 
 
-def test_no_number_is_given_where_none_is_observable(sine: Path) -> None:
+def test_an_unobservable_bulk_modulus_has_no_value(sine: Path) -> None:
     (one,) = results("estimate", sine)
     assert one["outcome"] == "not_observable"
     assert one["bulk_modulus_pa"] == {"value": None, "std": None, "ci95": None, "ci95_total": None}
@@ -187,7 +187,7 @@ def test_no_number_is_given_where_none_is_observable(sine: Path) -> None:
         pytest.param("diagnose", ClassCode.PRESSURE_ABSENT_CLASS, marks=pytest.mark.slow),
     ],
 )
-def test_every_verb_says_what_the_absence_of_pressure_costs(verb: str, code: Code, steps: dict[str, Path]) -> None:
+def test_every_verb_notes_the_cost_of_missing_pressure(verb: str, code: Code, steps: dict[str, Path]) -> None:
     arguments = (verb, steps[".csv"], "--condition", "minor_friction")
     (one,) = results(*arguments, "--no-pressure")
     assert PRESSURE not in one["channels"]
@@ -196,7 +196,7 @@ def test_every_verb_says_what_the_absence_of_pressure_costs(verb: str, code: Cod
     assert str(code.note()) not in " ".join(invoke(*arguments).stdout.split())
 
 
-def test_identify_says_that_the_absence_of_pressure_costs_nothing() -> None:
+def test_the_help_of_identify_says_that_missing_pressure_costs_nothing() -> None:
     assert "its absence costs nothing" in " ".join(invoke("identify", "--help").stdout.replace("│", " ").split())
 
 
@@ -231,7 +231,7 @@ def test_diagnose_marks_the_best_on_the_screen(steps: dict[str, Path]) -> None:
     assert marked.split()[0] == "minor_friction"
 
 
-def test_no_class_is_given_where_nothing_moves(folder: Path) -> None:
+def test_a_log_without_motion_gets_no_condition(folder: Path) -> None:
     still = pd.DataFrame({"time_s": 1e-3 * np.arange(500), "motor_speed_rad_s": 0.0})
     still["velocity_m_s"] = np.random.default_rng(1).normal(0.0, 1e-3, 500)
     still.to_csv(folder / "still.csv", index=False)
@@ -242,7 +242,7 @@ def test_no_class_is_given_where_nothing_moves(folder: Path) -> None:
     assert one["message"] == str(ClassCode.MODELS_ALIKE.note())
 
 
-def test_a_log_that_no_model_fits_is_called_so(steps: dict[str, Path], folder: Path) -> None:
+def test_a_log_that_no_model_fits_is_unknown(steps: dict[str, Path], folder: Path) -> None:
     frame = read_record(steps[".csv"]).to_frame()
     frame["velocity_m_s"] *= 0.2
     frame[PRESSURE] *= 5.0
@@ -302,7 +302,7 @@ def test_identify_gives_a_model_that_can_be_loaded_again(folder: Path) -> None:
     assert LinearModel.from_dict(stored).dc_gain == one["dc_gain"]["value"]
 
 
-def test_identify_takes_another_structure(steps: dict[str, Path]) -> None:
+def test_identify_takes_order_numerator_delay_and_sample_time(steps: dict[str, Path]) -> None:
     arguments = ("--order", 1, "--numerator", 2, "--delay", 3, "--sample-time", 2e-3, "--filter-hz", 40)
     (one,) = results("identify", steps[".parquet"], *arguments)
     assert (len(one["numerator"]), len(one["denominator"]), one["sample_time_s"]) == (5, 2, 2e-3)
@@ -310,7 +310,7 @@ def test_identify_takes_another_structure(steps: dict[str, Path]) -> None:
 
 
 @pytest.mark.slow
-def test_an_actuator_that_is_not_the_papers_comes_back_through_its_rig_file(folder: Path) -> None:
+def test_another_actuator_is_estimated_and_diagnosed_with_its_rig_file(folder: Path) -> None:
     rig = folder / "rig.toml"
     text = rig_template().replace("piston_area = 0.00152", "piston_area = 0.00304")
     text = text.replace("pump_displacement = 5.57e-07", "pump_displacement = 9.0e-07").replace('"paper"', '"bench 2"')

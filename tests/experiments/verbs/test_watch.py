@@ -44,7 +44,7 @@ def _run(*arguments: str, given: str | None = None) -> tuple[int, list[dict[str,
     return result.exit_code, [json.loads(line) for line in result.stdout.splitlines()], result.stderr
 
 
-def test_a_stream_and_its_log_give_the_same_events_one_json_object_a_line(log: Path) -> None:
+def test_a_stream_and_its_log_give_the_same_events(log: Path) -> None:
     code, streamed, _ = _run("-", "--learning", "60", given=log.read_text())
     assert code == 0
     assert [one["event"] for one in streamed] == ["start", "ready", "alarm", "change", "end"]
@@ -57,7 +57,7 @@ def test_a_stream_and_its_log_give_the_same_events_one_json_object_a_line(log: P
     assert [one.get("since_s") for one in read] == [one.get("since_s") for one in streamed]
 
 
-def test_a_healthy_log_is_learnt_first(log: Path, tmp_path: Path) -> None:
+def test_with_a_healthy_log_the_watch_is_ready_from_the_start(log: Path, tmp_path: Path) -> None:
     healthy = tmp_path / "healthy.csv"
     write_record(_record(leak_from=np.inf, seed=1), healthy)
     code, events, _ = _run(str(log), "--learning", "60", "--healthy", str(healthy))
@@ -74,13 +74,13 @@ def test_foreign_columns_and_units_are_read_from_a_stream(log: Path) -> None:
     assert [one["event"] for one in events][2] == "alarm"
 
 
-def test_a_stream_too_short_to_learn_from_says_so(log: Path) -> None:
+def test_a_stream_too_short_to_learn_from_ends_with_that_message(log: Path) -> None:
     code, events, _ = _run("-", given="".join(log.read_text().splitlines(keepends=True)[:3000]))
     assert code == 0
     assert "before learning was over" in events[-1]["message"]
 
 
-def test_a_row_of_garbage_does_not_end_the_watch_and_is_counted(log: Path) -> None:
+def test_a_row_of_garbage_is_left_out_and_counted(log: Path) -> None:
     lines = log.read_text().splitlines(keepends=True)
     code, events, said = _run("-", given="".join([*lines[:3001], lines[3001].replace(",", ",x", 1), *lines[3002:]]))
     assert code == 0
@@ -89,7 +89,7 @@ def test_a_row_of_garbage_does_not_end_the_watch_and_is_counted(log: Path) -> No
     assert "in row 3001" in said
 
 
-def test_a_stream_of_nothing_but_garbage_ends_the_watch_with_a_sentence(log: Path) -> None:
+def test_a_stream_that_turns_into_garbage_ends_the_watch_with_the_row(log: Path) -> None:
     lines = log.read_text().splitlines(keepends=True)
     garbage = [line.replace(",", ",x", 1) for line in lines[3001:]]
     code, events, said = _run("-", given="".join([*lines[:3001], *garbage]))
@@ -125,7 +125,7 @@ def _channels(record: Record) -> dict[str, np.ndarray]:
     return {name: record[name] for name in record}
 
 
-def test_a_stream_on_standard_input_is_read_as_it_comes(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_alarm_is_printed_before_standard_input_ends(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
 
     class Growing(io.StringIO):
@@ -143,7 +143,7 @@ def test_a_stream_on_standard_input_is_read_as_it_comes(log: Path, monkeypatch: 
     assert alarm + 1 in seen
 
 
-def test_a_stream_over_tcp_that_is_restarted_goes_on_where_it_was(log: Path, tmp_path: Path) -> None:
+def test_a_restarted_tcp_stream_continues_from_its_saved_state(log: Path, tmp_path: Path) -> None:
     header, *rows = log.read_text().splitlines(keepends=True)
     _, wanted, _ = _run("-", "--learning", "60", given="".join([header, *rows]))
     state, found = tmp_path / "state.npz", list[dict[str, Any]]()
@@ -168,7 +168,7 @@ def test_a_stream_over_tcp_that_is_restarted_goes_on_where_it_was(log: Path, tmp
     assert [one["event"] for one in told[0]] == ["ready", "alarm", "change"]
 
 
-def test_a_heartbeat_comes_while_no_row_does_and_every_event_has_the_clock(
+def test_heartbeats_are_sent_without_rows_and_every_event_has_the_wall_clock(
     log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     header, *rows = log.read_text().splitlines(keepends=True)
@@ -205,7 +205,7 @@ def test_a_heartbeat_comes_while_no_row_does_and_every_event_has_the_clock(
 
 
 @pytest.mark.parametrize("every", ["0", "-1", "nan"])
-def test_a_heartbeat_that_is_no_time_is_refused(log: Path, every: str) -> None:
+def test_a_heartbeat_interval_that_is_not_positive_is_refused(log: Path, every: str) -> None:
     code, _, said = _run(str(log), "--heartbeat", every)
     assert code == 2
     assert "--heartbeat must be positive" in said

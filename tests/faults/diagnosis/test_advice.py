@@ -52,13 +52,11 @@ def codes(notes: tuple[Note, ...]) -> list[str]:
         ([0.0, 30.0, 0.0, -60.0, 90.0, -120.0, 60.0, 30.0, -90.0], 4),
     ],
 )
-def test_speeds_are_counted_as_they_were_held(
-    levels: list[float], count: int, sample_time: float, noise: float
-) -> None:
+def test_held_speeds_are_counted(levels: list[float], count: int, sample_time: float, noise: float) -> None:
     assert speeds_held(staircase(levels, sample_time=sample_time, noise=noise)) == count
 
 
-def test_a_drive_that_never_settles_holds_none_and_rest_is_no_speed() -> None:
+def test_a_drive_that_never_settles_and_a_motor_at_rest_hold_no_speed() -> None:
     time = 1e-3 * np.arange(5000)
     assert speeds_held(Record(1e-3, {"motor_speed_rad_s": 100.0 * np.sin(2.0 * np.pi * 5.0 * time)})) == 0
     assert speeds_held(Record(1e-3, {"motor_speed_rad_s": np.zeros(5000)})) == 0
@@ -66,7 +64,7 @@ def test_a_drive_that_never_settles_holds_none_and_rest_is_no_speed() -> None:
     assert speeds_held(Record(1e-3, {"motor_speed_rad_s": np.full(100, np.nan)})) == 0
 
 
-def test_gaps_slow_sensors_and_long_logs_hide_no_speed() -> None:
+def test_held_speeds_are_counted_despite_gaps_slow_sensors_and_long_logs() -> None:
     record = staircase([40.0, -80.0, 120.0, 80.0], dwell=1.0, noise=0.05)
     assert speeds_held(drop_samples(record, 0.05, np.random.default_rng(1))) == 3
     slow = np.where(np.arange(len(record)) % 10 == 3, record["motor_speed_rad_s"], np.nan)
@@ -74,13 +72,13 @@ def test_gaps_slow_sensors_and_long_logs_hide_no_speed() -> None:
     assert speeds_held(staircase([40.0, 80.0] * 100, dwell=0.15)) == 2
 
 
-def test_a_slow_log_shows_a_speed_in_four_samples() -> None:
+def test_a_slow_log_shows_a_held_speed_by_four_samples() -> None:
     speed = np.tile(np.repeat([100.0, 60.0], 4), 5)
     assert speeds_held(Record(0.05, {"motor_speed_rad_s": speed})) == 2
     assert speeds_held(Record(0.05, {"motor_speed_rad_s": np.tile(np.repeat([100.0, 60.0], 2), 10)})) == 0
 
 
-def test_speeds_that_a_motor_creeps_through_are_more_than_one() -> None:
+def test_a_slow_ramp_counts_as_two_held_speeds() -> None:
     ramp = np.linspace(0.0, 100.0, 20_000)
     assert speeds_held(Record(1e-3, {"motor_speed_rad_s": ramp})) == 2
 
@@ -98,7 +96,7 @@ def test_the_published_sine_holds_one_speed_at_most_and_steps_hold_several() -> 
 
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("sample_time", [5e-4, 2e-3])
-def test_a_log_that_holds_two_or_more_speeds_is_never_told_to_hold_two_or_more(seed: int, sample_time: float) -> None:
+def test_closer_speeds_are_advised_for_a_log_with_two_or_more_held_speeds(seed: int, sample_time: float) -> None:
     rng = np.random.default_rng(seed)
     count = int(rng.integers(2, 12))
     levels = rng.permutation(np.linspace(1.0, 0.15, count)) * rng.choice([-1.0, 1.0], count) * 120.0
@@ -110,44 +108,44 @@ def test_a_log_that_holds_two_or_more_speeds_is_never_told_to_hold_two_or_more(s
         assert first.data["speeds"] >= 2
 
 
-def test_a_log_that_holds_one_speed_is_told_to_hold_more() -> None:
+def test_more_speeds_are_advised_for_a_log_with_one_held_speed() -> None:
     (said,) = advice_for(staircase([100.0, -100.0]), SURE, (), ALIKE, ALL)
     assert said == AdviceCode.MORE_SPEEDS.note(speeds=1)
 
 
-def test_more_speeds_are_asked_for_where_a_worn_pump_is_not_told() -> None:
+def test_more_speeds_are_advised_if_a_worn_pump_is_not_excluded() -> None:
     worn = (ClassCode.WEAR_NOT_TOLD.note(percent=5.0, limit=90.0),)
     (said,) = advice_for(staircase([100.0, -100.0]), SURE, (), worn, ALL)
     assert said == AdviceCode.MORE_SPEEDS.note(speeds=1)
     assert codes(advice_for(staircase([100.0, -50.0, 20.0]), SURE, (), worn, ALL)) == [AdviceCode.NOTHING]
 
 
-def test_a_drive_that_draws_oil_is_asked_for_where_a_valve_never_opened() -> None:
+def test_a_drive_that_draws_oil_is_advised_if_a_make_up_valve_never_opened() -> None:
     unseen = (RigCode.MAKEUP_UNSEEN.note(side="B"),)
     assert advice_for(staircase([100.0]), SURE, (), unseen, ALL) == (AdviceCode.DRAW_OIL.note(side="B"),)
 
 
-def test_a_log_that_decides_needs_nothing() -> None:
+def test_nothing_is_advised_after_a_sure_verdict() -> None:
     assert codes(advice_for(staircase([100.0]), SURE, (), (), ALL)) == [AdviceCode.NOTHING]
 
 
-def test_what_is_absent_or_not_visible_is_asked_for_before_more_of_the_same() -> None:
+def test_logging_pressure_and_moving_the_piston_are_advised_before_a_longer_log() -> None:
     unseen = (ClassCode.FRICTION_NOT_VISIBLE.note(),)
     said = advice_for(staircase([100.0]), UNSURE, (), unseen, ("velocity_m_s",))
     assert codes(said) == [AdviceCode.LOG_PRESSURE, AdviceCode.MOVE_PISTON, AdviceCode.LOG_LONGER]
     assert said[-1].data["duration_s"] == pytest.approx(0.499)
 
 
-def test_a_long_log_that_leaves_conditions_open_is_not_asked_to_be_longer() -> None:
+def test_no_longer_log_is_advised_after_a_long_log_with_undecided_conditions() -> None:
     assert codes(advice_for(staircase([100.0] * 24), UNSURE, (), (), ALL)) == [AdviceCode.CONDITIONS_OPEN]
 
 
-def test_larger_steps_are_asked_for_once() -> None:
+def test_larger_steps_are_advised_once() -> None:
     unseen = (ClassCode.FRICTION_NOT_VISIBLE.note(),)
     assert codes(advice_for(staircase([100.0] * 24), UNSURE, (), unseen, ALL)) == [AdviceCode.MOVE_PISTON]
 
 
-def test_where_something_speaks_against_a_log_that_is_mended_first() -> None:
+def test_advice_on_an_objection_replaces_all_other_advice() -> None:
     record = staircase([100.0])
     froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
     clipped = SensorCode.SENSOR_CLIPPED.note(channel=PRESSURE, levels="1e6", percent=3.0)
@@ -166,7 +164,7 @@ def test_where_something_speaks_against_a_log_that_is_mended_first() -> None:
     assert codes(advice_for(record, UNSURE, (contradicted, residuals), (), ALL)) == [AdviceCode.CHECK_RIG]
 
 
-def test_a_log_without_a_sure_verdict_at_100_hz_or_less_is_to_be_sampled_faster() -> None:
+def test_faster_sampling_is_advised_for_an_unsure_log_at_100_hz_or_less() -> None:
     slow = Record(0.01, {"motor_speed_rad_s": np.full(200, 100.0)})
     assert codes(advice_for(slow, UNSURE, (), (), ALL)) == [AdviceCode.LOG_FASTER, AdviceCode.LOG_LONGER]
     doubted = (AgainstCode.NONE_FITS.note(percent=90.0),)
@@ -174,13 +172,13 @@ def test_a_log_without_a_sure_verdict_at_100_hz_or_less_is_to_be_sampled_faster(
     assert codes(advice_for(slow, SURE, (), (), ALL)) == [AdviceCode.NOTHING]
 
 
-def test_without_probabilities_nothing_is_said_to_be_decided() -> None:
+def test_without_probabilities_only_objections_get_advice() -> None:
     assert advice_for(staircase([100.0]), {}, (), (), ALL) == ()
     (mend,) = advice_for(staircase([100.0]), {}, (AgainstCode.NONE_FITS.note(percent=90.0),), (), ALL)
     assert mend.code == AdviceCode.FIT_DOUBTED
 
 
-def test_a_fault_outside_the_nine_is_worked_on_before_the_rig_file() -> None:
+def test_repair_of_a_fault_outside_the_nine_is_advised_before_a_check_of_the_rig_file() -> None:
     grows = RigCode.LEAKAGE_GROWS.note(factor=12.0, first=5e-12, last=6e-11)
     blocked = RigCode.MAKEUP_BLOCKED.note(side="B")
     outside = AgainstCode.OUTSIDE_CONDITIONS.note()
@@ -213,12 +211,12 @@ STARVES = RigCode.PUMP_STARVES.note(from_rad_s=80.0, percent=12.0, half_width=1.
     ],
     ids=lambda note: note.code.name,
 )
-def test_each_fault_has_its_own_work(fault: Note, work: Note) -> None:
+def test_each_fault_has_its_own_repair_advice(fault: Note, work: Note) -> None:
     assert advice_for(staircase([100.0]), SURE, (fault,), (), ALL) == (work,)
 
 
 @pytest.mark.parametrize(("ends", "percent"), [((1.4e8, 1.5e8), 27.5), ((1.6e8, 1.7e8), None), (None, None)])
-def test_soft_oil_is_to_be_bled_where_its_interval_lies_below_the_limit(
+def test_bleeding_is_advised_only_if_the_interval_of_bulk_modulus_is_below_the_limit(
     ends: tuple[float, float] | None, percent: float | None
 ) -> None:
     modulus = Quantity(None, "Pa") if ends is None else Quantity(0.5 * sum(ends), "Pa", ends)
@@ -230,7 +228,7 @@ def test_soft_oil_is_to_be_bled_where_its_interval_lies_below_the_limit(
     assert [note.data["volume"] for note in said] == volumes
 
 
-def test_a_chamber_volume_that_contradicts_the_log_is_to_be_corrected_to_its_value() -> None:
+def test_a_correction_is_advised_for_a_chamber_volume_that_contradicts_the_log() -> None:
     true, written = replace(HEALTHY, chamber_volume=5.4e-4), replace(HEALTHY, chamber_volume=1.08e-3)
     (explained,) = rig_advice([RigCode.VOLUME_DIFFERS.note(percent=50.0, half_width=5.0)], true, written)
     assert str(explained) == (

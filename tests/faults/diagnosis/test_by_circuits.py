@@ -75,7 +75,7 @@ def test_a_log_that_travels_150_to_200_mm_gets_its_class(condition: str, fastest
 
 
 @pytest.mark.parametrize("condition", ["normal", "minor_leakage"])
-def test_an_actuator_whose_friction_is_all_coulombs_gets_its_class_and_severities(condition: str) -> None:
+def test_an_actuator_with_coulomb_friction_only_gets_its_class_and_severities(condition: str) -> None:
     rig = replace(HEALTHY, friction_quadratic=0.0, friction_linear=0.0)
     speed = 91.0 * np.repeat([0.48, 1.0, 0.72, -1.0, -0.56, -0.8], 1000)
     record = simulate(
@@ -89,7 +89,7 @@ def test_an_actuator_whose_friction_is_all_coulombs_gets_its_class_and_severitie
 
 @pytest.mark.slow
 @PRESSURES
-def test_severities_come_with_intervals_that_mostly_cover(
+def test_intervals_of_severities_cover_the_truth_in_over_85_percent(
     population: list[Drawn], verdicts: Mapping[bool, list[Diagnosis]], *, pressure: bool
 ) -> None:
     covered: list[bool] = []
@@ -130,7 +130,7 @@ def stuck(condition: str) -> Diagnosis:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("condition", ["normal", "minor_leakage_minor_friction", "major_friction"])
-def test_a_stuck_piston_shows_leakage_and_leaves_friction_open(condition: str) -> None:
+def test_a_stuck_piston_shows_its_leakage_level_and_not_its_friction_level(condition: str) -> None:
     found = stuck(condition)
     level = CONDITIONS[condition].leakage
     alike = [share for name, share in found.probabilities.items() if CONDITIONS[name].leakage == level]
@@ -139,7 +139,7 @@ def test_a_stuck_piston_shows_leakage_and_leaves_friction_open(condition: str) -
     assert ClassCode.FRICTION_NOT_VISIBLE in [note.code for note in found.not_told]
 
 
-def test_the_shipped_numbers_say_where_they_come_from() -> None:
+def test_the_shipped_calibration_states_its_provenance() -> None:
     shipped = shipped_calibration()
     assert set(shipped.weights(True)) == set(shipped.weights(False)) == set(EVIDENCES)
     assert shipped.provenance["script"] == "python -m benchmarks fit_diagnosis"
@@ -161,7 +161,7 @@ def stretched(by: float, weight: float) -> Calibration:
 
 
 @PRESSURES
-def test_intervals_and_probabilities_are_those_of_the_calibration(*, pressure: bool) -> None:
+def test_the_calibration_scales_intervals_and_probabilities(*, pressure: bool) -> None:
     speed = 90.0 * np.repeat([0.48, 1.0, -1.0, -0.56], 700)
     record = simulate(CIRCUIT, speed, 1e-3, HEALTHY, sensors=BENCH, rng=np.random.default_rng(1))
     log = clean_log(record if pressure else record.replace(**{PRESSURE: None}), HEALTHY)
@@ -178,7 +178,7 @@ def test_intervals_and_probabilities_are_those_of_the_calibration(*, pressure: b
     assert once.probabilities[once.condition] > 0.5
 
 
-def test_without_pressure_classes_are_summed_over_what_a_pump_may_deliver(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pressure_classes_are_summed_over_deliveries_of_the_pump(monkeypatch: pytest.MonkeyPatch) -> None:
     speed = 90.0 * np.repeat([0.48, 1.0, -1.0, -0.56], 700)
     record = simulate(CIRCUIT, speed, 1e-3, HEALTHY, sensors=BENCH, rng=np.random.default_rng(1))
     sound = diagnosed(record, pressure=False)
@@ -200,7 +200,7 @@ def test_a_sure_classifier_that_is_always_right_has_no_calibration_error() -> No
     assert calibration_error(np.full(1000, 0.5), coin) == pytest.approx(0.0, abs=0.01)
 
 
-def test_an_exact_interval_holds_the_share() -> None:
+def test_the_interval_of_a_share_is_that_of_clopper_and_pearson() -> None:
     low, high = share_interval(90, 100)
     assert low < 0.9 < high
     assert (low, high) == pytest.approx((0.8238, 0.9510), abs=1e-4)

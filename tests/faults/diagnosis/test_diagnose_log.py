@@ -44,7 +44,7 @@ def plain() -> Finding:
     return diagnose_log(log(), RIG)
 
 
-def test_a_plain_log_has_its_class_and_nothing_against_it() -> None:
+def test_a_plain_log_has_its_class_and_no_objection() -> None:
     found = plain()
     assert (found.outcome, found.condition, found.unknown) == (Outcome.OK, "minor_leakage", False)
     assert found.against == ()
@@ -53,7 +53,7 @@ def test_a_plain_log_has_its_class_and_nothing_against_it() -> None:
 
 
 @pytest.mark.parametrize("rows", thinned([2, 5], [5]))
-def test_a_pressure_that_its_logger_averaged_is_believed_and_its_lag_found(rows: int) -> None:
+def test_a_pressure_averaged_by_its_logger_is_used_and_its_lag_estimated(rows: int) -> None:
     p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(8)
     record = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     pressure = np.concatenate([np.full(rows - 1, record[PRESSURE][0]), record[PRESSURE]])
@@ -79,7 +79,7 @@ def test_circuits_are_fitted_to_the_speed_without_its_offset() -> None:
         assert found.severities[name].value == pytest.approx(sound.severities[name].value, abs=0.3 * (high - low))
 
 
-def test_a_channel_with_a_wrong_sign_gives_no_probabilities_and_says_which_to_mend() -> None:
+def test_a_channel_with_a_wrong_sign_gives_no_probabilities_and_advice_on_the_columns() -> None:
     record = log().replace(differential_pressure_pa=-log()["differential_pressure_pa"])
     found = diagnose_log(record, RIG)
     assert (found.outcome, found.unknown) == (Outcome.MISMATCH, True)
@@ -97,7 +97,7 @@ def test_a_refused_fit_makes_the_class_unknown_for_the_same_reason(monkeypatch: 
     assert found.condition == "minor_leakage"
 
 
-def test_what_nominal_models_object_to_counts_only_beside_another_objection(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_objection_of_nominal_models_counts_only_beside_another_objection(monkeypatch: pytest.MonkeyPatch) -> None:
     poor = AgainstCode.NONE_FITS.note(percent=70.0)
     verdict = diagnose.models_verdict
 
@@ -118,7 +118,7 @@ def test_a_log_too_short_for_a_circuit_has_a_condition_without_probabilities() -
     assert ClassCode.NO_PROBABILITIES in codes(found)
 
 
-def test_a_rig_around_which_no_circuit_fits_has_a_condition_without_probabilities(
+def test_a_rig_file_without_a_valid_circuit_gives_a_condition_without_probabilities(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
 
@@ -134,18 +134,18 @@ def test_a_rig_around_which_no_circuit_fits_has_a_condition_without_probabilitie
 
 
 @pytest.mark.parametrize(("share", "code"), [(0.45, RigCode.OIL_STIFFER), (2.2, RigCode.OIL_SOFTER)])
-def test_an_oil_that_is_no_kin_of_the_rigs_is_named_and_the_class_is_still_found(share: float, code: RigCode) -> None:
+def test_an_oil_unlike_the_rig_files_is_named_and_the_class_is_still_found(share: float, code: RigCode) -> None:
     found = diagnose_log(log(), replace(RIG, parameters=replace(HEALTHY, bulk_modulus=share * HEALTHY.bulk_modulus)))
     assert code in codes(found)
     assert found.condition == "minor_leakage"
 
 
-def test_an_oil_within_a_third_of_the_rigs_is_no_other_oil() -> None:
+def test_an_oil_within_a_third_of_the_rig_files_is_not_named() -> None:
     found = diagnose_log(log(), replace(RIG, parameters=replace(HEALTHY, bulk_modulus=1.3 * HEALTHY.bulk_modulus)))
     assert not {RigCode.OIL_STIFFER, RigCode.OIL_SOFTER} & codes(found)
 
 
-def test_a_drive_that_is_nothing_tells_no_class() -> None:
+def test_a_log_without_drive_and_motion_has_no_class() -> None:
     record = log()
     still = Record(record.sample_time, {name: np.zeros(len(record)) for name in ("motor_speed_rad_s", "position_m")})
     found = diagnose_log(still, RIG)
@@ -154,7 +154,7 @@ def test_a_drive_that_is_nothing_tells_no_class() -> None:
     assert ClassCode.CHANNEL_ZERO.note(channels="the velocity from position_m") in found.notes
 
 
-def test_nominal_models_of_a_plain_log_are_run_beside_the_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nominal_models_of_a_plain_log_are_started_before_the_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
     order: list[str] = []
 
     def noted(name: str) -> None:
@@ -173,7 +173,7 @@ def test_nominal_models_of_a_plain_log_are_run_beside_the_estimate(monkeypatch: 
     assert order == ["score_mathematical", "estimated"]
 
 
-def test_nominal_models_of_a_log_that_is_set_right_are_run_anew() -> None:
+def test_nominal_models_are_run_again_for_a_corrected_log() -> None:
     came = clean_log(log(), HEALTHY)
     of_another = partial(pytest.fail, "these are of another log")
     begun = diagnose._Plain(came, HEALTHY, None, of_another)  # pyright: ignore[reportPrivateUsage]
@@ -181,7 +181,7 @@ def test_nominal_models_of_a_log_that_is_set_right_are_run_anew() -> None:
 
 
 @pytest.mark.parametrize(("share", "advised"), [(0.5, AdviceCode.BLEED), (2.0, AdviceCode.CORRECT_VOLUME_OR_OIL)])
-def test_oil_that_is_no_kin_of_the_rigs_is_compared_with_the_rigs(share: float, advised: AdviceCode) -> None:
+def test_an_oil_unlike_the_rig_files_is_judged_by_the_rig_files_bulk_modulus(share: float, advised: AdviceCode) -> None:
     rig = Rig("another volume", replace(HEALTHY, chamber_volume=share * HEALTHY.chamber_volume))
     found = diagnose_log(log(), rig)
     assert found.healthy["bulk_modulus"] == pytest.approx(HEALTHY.bulk_modulus)
@@ -190,7 +190,7 @@ def test_oil_that_is_no_kin_of_the_rigs_is_compared_with_the_rigs(share: float, 
     assert said.data["volume"] == pytest.approx(HEALTHY.chamber_volume, rel=0.02)
 
 
-def test_without_pressure_a_refused_fit_of_motion_leaves_the_circuits_bulk_modulus() -> None:
+def test_without_pressure_the_circuits_bulk_modulus_replaces_that_of_a_refused_motion_fit() -> None:
     """Before, a rejected number with a narrow interval was reported, and no number if it was not observable."""
     record = log(duration=1.0).replace(**{PRESSURE: None})
     large = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=4.0, motion_percent=2.0)
@@ -204,7 +204,7 @@ def test_without_pressure_a_refused_fit_of_motion_leaves_the_circuits_bulk_modul
     assert found.severities["entrained_air"].ci95_total is not None
 
 
-def test_without_position_a_refused_filter_leaves_the_circuits_bulk_modulus() -> None:
+def test_without_position_the_circuits_bulk_modulus_replaces_that_of_a_refused_filter() -> None:
     """Before, a filter's number that its own check rejected, a third of the truth, stood beside a reliable class."""
     record = log(duration=1.0).replace(position_m=None)
     gate = Gate(False, (EstimateCode.ESTIMATE_WANDERS.note(state="bulk_modulus_pa", ratio=47.0),))
@@ -215,7 +215,7 @@ def test_without_position_a_refused_filter_leaves_the_circuits_bulk_modulus() ->
     assert (told.value, told.ci95) == (circuits.value, circuits.ci95)
 
 
-def test_where_nothing_moves_pump_wear_is_no_matter() -> None:
+def test_a_log_without_motion_has_no_note_on_pump_wear() -> None:
     rng, count = np.random.default_rng(17410), 1500
     noise = {"motor_speed_rad_s": 0.05, "position_m": 1e-6, PRESSURE: 2e3}
     still = {name: size * rng.standard_normal(count) for name, size in noise.items()}
@@ -228,7 +228,7 @@ def test_where_nothing_moves_pump_wear_is_no_matter() -> None:
 
 
 @pytest.mark.parametrize("drive", thinned(["steps", "prbs"], ["steps"]))
-def test_a_blocked_rod_without_pressure_is_not_accused_of_leakage(drive: str) -> None:
+def test_without_pressure_a_blocked_rod_is_not_diagnosed_as_leakage(drive: str) -> None:
     rng, blocked = np.random.default_rng(11), replace(HEALTHY, friction_coulomb=6e4)
     record = simulate(CIRCUIT, make_drive(drive, 3.0, 1e-3, HEALTHY, rng), 1e-3, blocked, sensors=BENCH, rng=rng)
     hidden = dict.fromkeys((PRESSURE, "pressure_a_pa", "pressure_b_pa"))
@@ -242,7 +242,7 @@ def test_a_blocked_rod_without_pressure_is_not_accused_of_leakage(drive: str) ->
         assert [note.code for note in seen.against] == [AgainstCode.ROD_BLOCKED]
 
 
-def test_that_the_drive_does_not_show_bulk_modulus_is_said_unless_the_balance_gives_it(
+def test_bulk_modulus_is_noted_as_not_visible_unless_the_flow_balance_gives_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     for module in (by_circuits, known_losses):

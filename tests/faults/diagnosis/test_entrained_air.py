@@ -48,7 +48,7 @@ def estimate() -> BulkModulusEstimate:
     )
 
 
-def test_the_class_of_a_log_with_air_is_told_in_its_oil_and_the_air_as_it_was_found() -> None:
+def test_a_log_with_entrained_air_gets_its_class_and_the_estimated_air() -> None:
     """With oil equally soft at every pressure, a circuit left 23 % of the velocity, and the class was unknown."""
     record = aerated_log()
     found = diagnose_log(record, Rig("paper", HEALTHY), (clean_log(record, HEALTHY), estimate()))

@@ -66,11 +66,11 @@ def test_a_log_without_pressure_has_weights_of_its_own() -> None:
     assert without["normal"] / without["minor_leakage"] == pytest.approx(np.exp(3.0))
 
 
-def test_an_evidence_alone_names_its_best() -> None:
+def test_a_single_evidence_names_its_likeliest_condition() -> None:
     assert board(blocks(None), models=odds_for(major_friction=0.0)).choice("models") == "major_friction"
 
 
-def test_no_evidence_is_surer_than_its_bound_and_the_order_stays() -> None:
+def test_scores_of_an_evidence_are_bounded_and_keep_their_order() -> None:
     scores = np.array([0.0, -1.0, -50.0, -1e6, np.nan])
     found = bounded(scores)
     assert found[0] == 0.0
@@ -85,7 +85,7 @@ RESTING = np.exp(ACTUATOR.conditions[:, COORDINATES.index("friction_rest")]) / A
 """Pressures at which the piston breaks loose in each condition [Pa]."""
 
 
-def test_frictions_that_would_hold_the_piston_alike_score_alike_and_leakage_still_counts() -> None:
+def test_friction_levels_of_a_stuck_piston_get_equal_scores_at_each_leakage_level() -> None:
     scores = -np.arange(len(NAMES), dtype=np.float64)
     found = friction_left_open(scores, blocks(1e4), ACTUATOR)
     for level in ("none", "minor", "major"):
@@ -94,7 +94,9 @@ def test_frictions_that_would_hold_the_piston_alike_score_alike_and_leakage_stil
 
 
 @pytest.mark.parametrize(("share", "open_still"), [(1.1, True), (1.3, False)])
-def test_a_friction_is_left_open_up_to_a_fifth_beyond_its_breakaway_force(share: float, *, open_still: bool) -> None:
+def test_a_friction_level_can_hold_the_piston_up_to_a_fifth_above_its_breakaway_force(
+    share: float, *, open_still: bool
+) -> None:
     scores = np.random.default_rng(1).normal(size=len(NAMES))
     # the strongest friction cannot be confused with a stronger one
     second = sorted(set(RESTING.round(-2).tolist()))[-2]
@@ -103,7 +105,7 @@ def test_a_friction_is_left_open_up_to_a_fifth_beyond_its_breakaway_force(share:
     assert (found.tolist() != scores.tolist()) == open_still
 
 
-def test_without_pressure_every_friction_may_hold() -> None:
+def test_without_pressure_every_friction_level_can_hold_a_stuck_piston() -> None:
     scores = np.random.default_rng(0).normal(size=len(NAMES))
     found = friction_left_open(scores, blocks(None), ACTUATOR)
     assert len(set(found.tolist())) == 3
@@ -131,7 +133,7 @@ def test_a_library_adds_the_evidence_of_its_transfer_functions() -> None:
         np.testing.assert_array_equal(found.log_odds[name], odds)
 
 
-def test_of_a_stuck_piston_every_evidence_leaves_the_friction_open() -> None:
+def test_no_evidence_determines_the_friction_level_of_a_stuck_piston() -> None:
     found = weigh(driven("sine", "major_friction"), ACTUATOR)
     assert is_stuck(found.blocks, ACTUATOR)
     for odds in found.log_odds.values():
@@ -140,7 +142,7 @@ def test_of_a_stuck_piston_every_evidence_leaves_the_friction_open() -> None:
             assert len({float(odds[i]) for i in alike}) < 3
 
 
-def test_nominal_circuits_say_no_more_than_the_log_tells_and_where_it_tells_all_they_say_all() -> None:
+def test_scores_of_nominal_circuits_are_limited_by_the_distances_of_conditions() -> None:
     scores = np.array([-5.0, 0.0, -40.0])
     apart = np.array([[0.0, 2.0, 60.0], [2.0, 0.0, 60.0], [60.0, 60.0, 0.0]])
     assert within_reach(scores, apart).tolist() == [-2.0, 0.0, -40.0]
@@ -151,7 +153,7 @@ def test_nominal_circuits_say_no_more_than_the_log_tells_and_where_it_tells_all_
     assert within_reach(np.array([-np.inf, 0.0]), np.array([[0.0, 3.0], [3.0, 0.0]])).tolist() == [-3.0, 0.0]
 
 
-def test_where_a_log_tells_no_condition_from_another_only_fitted_circuits_speak(
+def test_only_fitted_circuits_count_if_the_log_separates_no_conditions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     record = driven("prbs", "normal")

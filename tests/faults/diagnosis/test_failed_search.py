@@ -50,32 +50,34 @@ def left(
 
 
 @pytest.mark.parametrize(("share", "kept"), [(0.09, False), (0.11, True), (np.inf, True), (np.nan, True)])
-def test_a_search_failed_where_the_circuits_values_leave_half_as_much(
+def test_a_failed_motion_fit_is_not_an_objection_if_the_circuits_values_leave_half_as_much(
     monkeypatch: pytest.MonkeyPatch, share: float, *, kept: bool
 ) -> None:
     assert left(monkeypatch, share) == ((FAR, LAWS, FROZE) if kept else (FROZE,))
 
 
-def test_however_badly_it_failed_no_more_is_left_than_a_circuit_may(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_motion_fit_is_an_objection_if_the_circuits_values_leave_too_much(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(failed_search, "LESS", 100.0)
     assert left(monkeypatch, 0.11) == (FROZE,)
     assert left(monkeypatch, 0.13) == (FAR, LAWS, FROZE)
 
 
-def test_a_fit_with_pressure_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_objections_to_a_fit_with_pressure_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     assert left(monkeypatch, 0.0, "flow") == (FAR, LAWS, FROZE)
 
 
 @pytest.mark.parametrize(
     ("pump", "noises", "kept"), [(7.0, 40.0, True), (10.0, 10.0, False), (10.0, 20.0, True), (40.0, 40.0, False)]
 )
-def test_a_piston_that_hardly_moves_is_followed_by_a_circuit_alone(
+def test_for_a_piston_that_hardly_moves_the_fit_of_the_circuit_decides(
     monkeypatch: pytest.MonkeyPatch, pump: float, noises: float, *, kept: bool
 ) -> None:
     assert left(monkeypatch, np.inf, noises=noises, pump=pump) == ((FAR, LAWS, FROZE) if kept else (FROZE,))
 
 
-def test_a_circuit_has_values_for_what_the_motion_form_leaves_open() -> None:
+def test_a_circuit_gives_values_for_the_unknowns_of_the_motion_form() -> None:
     at = list(CONDITIONS).index("normal")
     one = log(pressure=False)
     fit = leaving(1.0, 1.0, one)

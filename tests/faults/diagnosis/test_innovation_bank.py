@@ -12,7 +12,7 @@ from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
 
-def test_most_lanes_of_the_kernel_have_a_filter(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_filters_fill_more_than_half_of_the_kernels_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
     used = []
 
     def filtered(problems: Iterable[object], lanes: int) -> list[SimpleNamespace]:

@@ -48,7 +48,7 @@ def record(
 
 
 @pytest.mark.parametrize("load", [0.0, 200.0])
-def test_friction_at_rated_velocity_is_told_as_well_as_is_said(load: float) -> None:
+def test_the_stated_deviation_of_friction_at_rated_velocity_matches_its_errors(load: float) -> None:
     found = [friction_by_forces(record(seed, load=load), RIG, RATED) for seed in range(40)]
     z = [(one.forces[2] - WHOLE) / one.covariance[2, 2] ** 0.5 for one in found if one is not None]
     assert len(z) == len(found)
@@ -56,7 +56,7 @@ def test_friction_at_rated_velocity_is_told_as_well_as_is_said(load: float) -> N
     assert all(one is not None and one.covariance[2, 2] ** 0.5 < 5.0 for one in found)
 
 
-def test_a_piston_that_rings_and_a_coarse_encoder_leave_friction_where_it_is() -> None:
+def test_ringing_and_a_coarse_encoder_do_not_bias_friction() -> None:
     """At 55 Hz, a straight line over 2 ms lost 2 % of the velocity, and noise from rounding was taken for velocity."""
     found = [friction_by_forces(record(seed, rings=6e-3, quantum=3e-6, step=1e-4), RIG, RATED) for seed in range(6)]
     off = np.mean([one.forces - (REST, BENT, WHOLE) for one in found if one is not None], axis=0)
@@ -65,19 +65,19 @@ def test_a_piston_that_rings_and_a_coarse_encoder_leave_friction_where_it_is() -
     assert np.all(np.abs(off) < 1.3 * left)  # three standard deviations of a mean of six logs
 
 
-def test_a_mass_that_is_a_tenth_off_is_not_taken_for_friction() -> None:
+def test_a_moving_mass_off_by_a_tenth_does_not_bias_friction() -> None:
     found = friction_by_forces(record(mass=1.1 * RIG.moving_mass), RIG, RATED)
     assert found is not None
     assert abs(found.forces[2] - WHOLE) < 3.0 * found.covariance[2, 2] ** 0.5
 
 
-def test_a_law_of_another_shape_leaves_more_open() -> None:
+def test_an_unknown_shape_of_the_friction_law_widens_the_covariance() -> None:
     found = friction_by_forces(record(), RIG, RATED)
     assert found is not None
     assert np.all(np.diag(found.bent) > np.diag(found.covariance))
 
 
-def test_no_friction_is_told_where_the_law_does_not_hold_or_a_log_does_not_show_it() -> None:
+def test_no_friction_is_returned_if_the_law_fails_or_the_log_does_not_show_it() -> None:
     one = record()
     for other in (
         record(by_place=0.2),
@@ -91,7 +91,7 @@ def test_no_friction_is_told_where_the_law_does_not_hold_or_a_log_does_not_show_
 
 
 @pytest.mark.parametrize(("step", "told"), [(2e3, True), (2e4, False)])
-def test_no_friction_is_told_by_a_converter_that_is_coarse_beside_the_pressure_s_noise(step: float, told: bool) -> None:
+def test_no_friction_is_returned_if_pressure_is_rounded_more_coarsely_than_its_noise(step: float, told: bool) -> None:
     one = record()
     rounded = np.round(one["differential_pressure_pa"] / step) * step
     found = friction_by_forces(Record(STEP, {**one.channels, "differential_pressure_pa": rounded}), RIG, RATED)
@@ -99,7 +99,7 @@ def test_no_friction_is_told_by_a_converter_that_is_coarse_beside_the_pressure_s
 
 
 @pytest.mark.parametrize("channel", ["differential_pressure_pa", "position_m"])
-def test_samples_that_are_missing_are_left_out(channel: str) -> None:
+def test_missing_samples_are_left_out(channel: str) -> None:
     one, whole = record(), friction_by_forces(record(), RIG, RATED)
     holed = np.where(np.arange(len(one)) % 500 < 100, np.nan, one[channel])
     found = friction_by_forces(Record(STEP, {**one.channels, channel: holed}), RIG, RATED)
@@ -109,7 +109,7 @@ def test_samples_that_are_missing_are_left_out(channel: str) -> None:
     assert found.covariance[2, 2] > whole.covariance[2, 2]
 
 
-def test_severities_take_the_friction_and_leave_leakage() -> None:
+def test_severities_use_the_friction_of_the_force_balance_and_keep_leakage() -> None:
     known = friction_by_forces(record(), RIG, RATED)
     circuit, told = severities(fits(NARROW), ACTUATOR), severities(fits(NARROW), ACTUATOR, rubbing=known)
     assert known is not None

@@ -56,7 +56,7 @@ def told(one: Diagnosis, by: BulkModulusEstimate, log: Record = NOTHING) -> Diag
     return by_the_balance(one, by, log, RIG)
 
 
-def test_leakage_is_the_balances_and_friction_the_circuits() -> None:
+def test_leakage_is_that_of_the_flow_balance_and_friction_that_of_the_circuit() -> None:
     circuit, found = diagnosis().severity, told(diagnosis(), estimate()).severity
     assert found["leakage_flow"].value == pytest.approx(6e4 * (LEAKAGE * RIG.relief_pressure + BIAS))
     assert extent(found["leakage_flow"]) < 0.1 * extent(circuit["leakage_flow"])
@@ -65,7 +65,7 @@ def test_leakage_is_the_balances_and_friction_the_circuits() -> None:
     assert found["added_friction"].value == circuit["added_friction"].value
 
 
-def test_friction_is_that_of_the_balance_of_forces_where_it_knows_it_better() -> None:
+def test_friction_is_that_of_the_force_balance_if_it_is_more_accurate() -> None:
     circuit, forces = told(diagnosis(), estimate()).severity, told(diagnosis(), estimate(), sliding()).severity
     assert forces["added_friction"].value == pytest.approx(WHOLE - HEALTHY, abs=20.0)
     assert extent(forces["added_friction"]) < 0.5 * extent(circuit["added_friction"])
@@ -73,7 +73,7 @@ def test_friction_is_that_of_the_balance_of_forces_where_it_knows_it_better() ->
     assert forces["leakage_flow"] == circuit["leakage_flow"]
 
 
-def test_forces_tell_friction_beside_another_cause_too_but_not_where_pressure_came_late() -> None:
+def test_the_force_balance_gives_friction_beside_another_cause_but_not_with_late_pressure() -> None:
     circuit = diagnosis().severity
     found = told(diagnosis(), estimate(explanation=explained()), sliding()).severity
     assert found["added_friction"].value == pytest.approx(WHOLE - HEALTHY, abs=20.0)
@@ -82,7 +82,7 @@ def test_forces_tell_friction_beside_another_cause_too_but_not_where_pressure_ca
     assert told(diagnosis(), estimate(explanation=late), sliding()).severity == circuit
 
 
-def test_the_circuits_friction_stays_where_the_balance_of_forces_has_no_steady_state() -> None:
+def test_the_circuits_friction_is_kept_if_the_force_balance_has_no_steady_state() -> None:
     one = diagnosis()
     assert one.told_by is not None
     by_circuit = one.told_by
@@ -95,7 +95,7 @@ def test_the_circuits_friction_stays_where_the_balance_of_forces_has_no_steady_s
     assert found == by_circuit(known_losses(estimate()), None)
 
 
-def test_notes_of_others_than_the_circuit_stay() -> None:
+def test_notes_from_other_sources_than_the_circuit_are_kept() -> None:
     of_the_pump = ClassCode.WEAR_NOT_TOLD.note(percent=5.0, limit=90.0)
     assert told(replace(diagnosis(), not_told=(of_the_pump,)), estimate()).not_told == (of_the_pump,)
 
@@ -111,16 +111,16 @@ def test_notes_of_others_than_the_circuit_stay() -> None:
         {"others": {"leakage_coefficient": (LEAKAGE, np.inf), "flow_bias": (BIAS, 1e-3 * BIAS)}},
     ],
 )
-def test_a_balance_that_is_refused_or_needs_another_cause_tells_no_leakage(changed: dict[str, Any]) -> None:
+def test_a_flow_balance_that_is_refused_or_needs_another_cause_gives_no_leakage(changed: dict[str, Any]) -> None:
     assert known_losses(estimate(**changed)) is None
     assert told(one := diagnosis(), estimate(**changed)) is one
 
 
 @pytest.mark.parametrize("changed", [{"onset": object()}, {"drift": object()}])
-def test_a_leakage_that_changes_within_a_log_is_not_that_of_the_whole(changed: dict[str, Any]) -> None:
+def test_the_flow_balance_does_not_replace_a_leakage_that_changes_within_the_log(changed: dict[str, Any]) -> None:
     assert told(one := diagnosis(**changed), estimate()) is one
 
 
-def test_what_the_circuit_knows_better_stays() -> None:
+def test_a_flow_balance_less_accurate_than_the_circuit_changes_no_severity() -> None:
     open_by = {"leakage_coefficient": (LEAKAGE, 0.5 * LEAKAGE), "flow_bias": (BIAS, 0.5 * BIAS)}
     assert told(one := diagnosis(), estimate(others=open_by)) is one

@@ -24,7 +24,7 @@ def scored(*least: float, channels: int = 1, rest: float = 0.09) -> Scores:
     return Scores(values, dict.fromkeys(names, values))
 
 
-def test_the_least_error_comes_first_and_one_that_ran_away_last() -> None:
+def test_models_are_ranked_by_error_with_diverged_models_last() -> None:
     order = ranked(scored(0.02, math.inf, 0.01))
     assert [name for name, _ in order[:2]] == [list(CONDITIONS)[2], next(iter(CONDITIONS))]
     assert order[-1][0] == list(CONDITIONS)[1]
@@ -34,11 +34,13 @@ def test_the_least_error_comes_first_and_one_that_ran_away_last() -> None:
     ("least", "wanted"),
     [((0.01, 0.02), 2.0), ((0.0, 0.02), math.inf), ((0.0, 0.0), 1.0), ((0.03, math.inf), 3.0)],
 )
-def test_the_margin_is_the_runner_up_over_the_best(least: tuple[float, float], wanted: float) -> None:
+def test_the_margin_is_the_error_of_the_runner_up_over_that_of_the_best(
+    least: tuple[float, float], wanted: float
+) -> None:
     assert margin(scored(*least)) == pytest.approx(wanted)
 
 
-def test_where_every_model_ran_away_there_is_no_class_and_it_is_said() -> None:
+def test_the_outcome_is_diverged_if_every_model_diverged() -> None:
     found = models_verdict(scored(rest=math.inf), RECORD)
     assert (found.outcome, [note.code for note in found.notes]) == (Outcome.DIVERGED, [ClassCode.MODELS_DIVERGED])
 
@@ -46,14 +48,16 @@ def test_where_every_model_ran_away_there_is_no_class_and_it_is_said() -> None:
 @pytest.mark.parametrize(
     ("runner_up", "outcome"), [(1.0005, Outcome.NOT_OBSERVABLE), (1.002, Outcome.OK), (2.0, Outcome.OK)]
 )
-def test_models_that_differ_by_less_than_a_thousandth_are_alike(runner_up: float, outcome: Outcome) -> None:
+def test_models_whose_errors_differ_by_less_than_a_thousandth_are_indistinguishable(
+    runner_up: float, outcome: Outcome
+) -> None:
     found = models_verdict(scored(0.01, 0.01 * runner_up), RECORD)
     assert found.outcome is outcome
     assert [note.code for note in found.notes] == ([] if outcome is Outcome.OK else [ClassCode.MODELS_ALIKE])
     assert found.against == ()
 
 
-def test_channels_that_are_0_throughout_are_named_and_tell_no_class() -> None:
+def test_channels_that_are_0_throughout_are_named_and_give_no_class() -> None:
     still, moved = np.zeros(100), RECORD["velocity_m_s"]
     for velocity, named in ((still, f"velocity_m_s and {PRESSURE}"), (moved, PRESSURE)):
         log = RECORD.replace(velocity_m_s=velocity, differential_pressure_pa=still)
@@ -64,9 +68,7 @@ def test_channels_that_are_0_throughout_are_named_and_tell_no_class() -> None:
 
 @pytest.mark.parametrize(("share", "said"), [(0.45, False), (0.55, True)])
 @pytest.mark.parametrize("channels", [1, 2])
-def test_a_best_model_that_leaves_more_than_half_of_the_signal_fits_none(
-    share: float, said: bool, channels: int
-) -> None:
+def test_no_model_fits_if_the_best_leaves_more_than_half_of_the_signal(share: float, said: bool, channels: int) -> None:
     # the error of one channel has its unit, those of two are already shares
     least = share * (0.1 if channels == 1 else 1.0)
     found = models_verdict(scored(least, channels=channels, rest=2.0), RECORD)
@@ -84,7 +86,7 @@ def test_a_best_model_that_leaves_more_than_half_of_the_signal_fits_none(
         ((0.8, 0.8001), math.inf, Outcome.NOT_OBSERVABLE),
     ],
 )
-def test_where_no_model_fits_only_errors_of_all_that_are_alike_tell_none_apart(
+def test_if_no_model_fits_there_is_no_class_only_if_all_errors_are_alike(
     least: tuple[float, float], rest: float, outcome: Outcome
 ) -> None:
     """Under a load, two different models left 77.6 % each, and the others 80 to 96 %."""

@@ -31,14 +31,14 @@ def blind(*names: str) -> np.ndarray:
     return np.diag(sizes)
 
 
-def test_what_a_log_does_not_narrow_is_said_to_be_not_visible() -> None:
+def test_coordinates_that_a_log_does_not_narrow_are_noted_as_not_visible() -> None:
     assert not_told(NARROW) == set()
     assert not_told(blind("bulk_modulus")) == {ClassCode.BULK_MODULUS_NOT_VISIBLE.name}
     assert ClassCode.FRICTION_NOT_VISIBLE.name in not_told(blind(*FRICTION))
     assert ClassCode.FRICTION_NOT_VISIBLE.name not in not_told(blind("friction_rest"))
 
 
-def test_leakage_and_bias_that_trade_places_are_not_told_apart_but_the_velocity_lost_is() -> None:
+def test_inseparable_leakage_and_bias_still_determine_the_velocity_lost() -> None:
     one, two = (COORDINATES.index(name) for name in ("leakage", "bias"))
     leaking = parameters_for(CONDITIONS["minor_leakage"])
     assert ACTUATOR.conditions[list(CONDITIONS).index("minor_leakage")][one] == np.log(leaking.leakage_coefficient)
@@ -52,7 +52,7 @@ def test_leakage_and_bias_that_trade_places_are_not_told_apart_but_the_velocity_
     }
 
 
-def test_without_pressure_one_scale_is_never_told() -> None:
+def test_without_pressure_one_scale_is_always_noted_as_undetermined() -> None:
     assert not_told(NARROW, pressure=False) == {ClassCode.ONE_SCALE.name, ClassCode.VELOCITY_LOST_TOLD.name}
 
 
@@ -64,7 +64,7 @@ def test_without_pressure_one_scale_is_never_told() -> None:
         ((ClassCode.ONE_SCALE,), 1e-5, False),
     ],
 )
-def test_a_piston_that_stands_still_for_an_unknown_reason_has_no_condition(
+def test_a_piston_that_does_not_move_for_an_unknown_reason_has_no_condition(
     said: tuple[ClassCode, ...], travel: float, doubted: bool
 ) -> None:
     time = 1e-3 * np.arange(2000)
@@ -74,7 +74,7 @@ def test_a_piston_that_stands_still_for_an_unknown_reason_has_no_condition(
 
 
 @pytest.mark.parametrize(("pressure", "reason"), [(None, AgainstCode.STUCK_OR_LEAKS), (3e6, AgainstCode.ROD_BLOCKED)])
-def test_without_position_velocity_tells_that_a_piston_stands_still(
+def test_without_position_velocity_shows_that_a_piston_does_not_move(
     pressure: float | None, reason: AgainstCode
 ) -> None:
     """Velocity noise hides friction; a circuit had 50 times the friction, or leakage and friction were inseparable."""
@@ -90,7 +90,7 @@ def test_without_position_velocity_tells_that_a_piston_stands_still(
 
 
 @pytest.mark.parametrize(("pressure", "travel", "blocked"), [(3e6, 1e-5, True), (3e5, 1e-5, False), (3e6, 5e-3, False)])
-def test_a_piston_that_stands_still_at_a_pressure_that_no_friction_of_the_nine_holds_is_blocked(
+def test_a_piston_held_against_a_pressure_beyond_the_friction_of_the_nine_is_blocked(
     pressure: float, travel: float, blocked: bool
 ) -> None:
     time = 1e-3 * np.arange(2000)
@@ -101,7 +101,7 @@ def test_a_piston_that_stands_still_at_a_pressure_that_no_friction_of_the_nine_h
     assert [note.code for note in found] == ([AgainstCode.ROD_BLOCKED] if blocked else [])
 
 
-def test_a_velocity_without_a_number_is_not_told() -> None:
+def test_a_velocity_lost_without_a_number_or_an_interval_is_not_noted() -> None:
     found = fits(NARROW)
     known = severities(found, ACTUATOR)
     for lost in (Quantity(None, "%"), replace(known["velocity_lost"], ci95=None)):
@@ -109,7 +109,7 @@ def test_a_velocity_without_a_number_is_not_told() -> None:
         assert [note.code for note in said] == [ClassCode.ONE_SCALE]
 
 
-def test_the_velocity_that_is_lost_is_told_with_its_interval() -> None:
+def test_the_velocity_lost_is_noted_with_its_interval() -> None:
     found = fits(NARROW)
     known = severities(found, ACTUATOR)
     (said,) = (
@@ -120,7 +120,7 @@ def test_the_velocity_that_is_lost_is_told_with_its_interval() -> None:
     assert (said.data["percent"], said.data["low"], said.data["high"]) == (lost.value, *lost.ci95)
 
 
-def test_what_the_log_does_not_narrow_has_no_number_since_it_would_be_the_priors() -> None:
+def test_a_severity_that_the_log_does_not_narrow_has_no_number() -> None:
     known = severities(fits(NARROW), ACTUATOR)
     told = without_undetermined(known, [ClassCode.BULK_MODULUS_NOT_VISIBLE])
     assert told["bulk_modulus"] == Quantity(None, "Pa")

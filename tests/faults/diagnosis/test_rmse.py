@@ -93,7 +93,7 @@ def test_velocity_comes_from_position_at_any_sample_time(sample_time: float) -> 
     np.testing.assert_allclose(measured_velocity(log), 0.04, rtol=1e-9)
 
 
-def test_the_smallest_score_wins_and_one_channel_can_stand_alone() -> None:
+def test_the_smallest_score_gives_the_condition_and_one_channel_can_be_scored_alone() -> None:
     scores = score_mathematical(bench_log("major_leakage", 0), BANK)
     assert scores.channels == ("velocity_m_s", "differential_pressure_pa")
     assert min(scores.by_condition, key=scores.by_condition.__getitem__) == scores.condition == "major_leakage"
@@ -108,7 +108,7 @@ def test_the_rmse_of_the_right_model_is_the_noise_of_the_sensor() -> None:
     assert table.loc["normal", "rmse_differential_pressure_pa"] == pytest.approx(BENCH.pressure_noise, rel=0.05)
 
 
-def test_two_channels_are_weighed_by_their_own_size() -> None:
+def test_two_channels_are_weighted_by_their_own_size() -> None:
     log = bench_log("normal", 0)
     table = score_mathematical(log, BANK).table
     shares = [table[f"rmse_{c}"] / np.sqrt(np.mean(log[c] ** 2)) for c in ("velocity_m_s", "differential_pressure_pa")]
@@ -131,7 +131,7 @@ def test_a_log_without_motion_is_refused() -> None:
         score_mathematical(bare, BANK)
 
 
-def test_rmse_ignores_what_is_missing() -> None:
+def test_rmse_ignores_missing_samples() -> None:
     assert rmse(np.array([1.0, np.nan, 3.0]), np.array([0.0, 5.0, 4.0])) == 1.0
 
 
@@ -173,7 +173,7 @@ def test_the_mathematical_model_errs_less_than_the_transfer_function_in_eight_of
     assert better >= 8  # Table 5
 
 
-def test_all_18_foreign_logs_are_put_in_their_class(shared: Path) -> None:
+def test_all_18_foreign_logs_get_their_class(shared: Path) -> None:
     truth = pd.read_csv(shared / "bench" / "truth.csv")
     by_levels = {(condition.leakage, condition.friction): name for name, condition in CONDITIONS.items()}
     true = [by_levels[row] for row in zip(truth["leakage"], truth["friction"], strict=True)]
@@ -191,5 +191,5 @@ def test_one_channel_is_scored_in_its_own_unit_and_two_as_shares() -> None:
     assert both.by_condition["normal"] == pytest.approx(float(np.sqrt(np.mean(np.square(shares)))))
 
 
-def test_a_model_that_ran_away_errs_without_end() -> None:
+def test_a_diverged_model_has_an_infinite_rmse() -> None:
     assert rmse(np.array([1.0, np.nan, 2.0]), np.array([1.0, np.nan, 2.0])) == np.inf

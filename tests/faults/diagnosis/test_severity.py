@@ -43,7 +43,7 @@ def test_a_healthy_actuator_has_lost_nothing() -> None:
 
 
 @pytest.mark.parametrize("name", CONDITIONS)
-def test_velocity_lost_and_pressure_rise_are_those_of_the_steady_state(name: str) -> None:
+def test_velocity_lost_and_pressure_rise_follow_from_the_steady_state(name: str) -> None:
     found = severities_of(parameters_for(CONDITIONS[name]))
     (velocity, pressure), (sound, low) = (
         steady_state(RIG.rated_speed, p) for p in (parameters_for(CONDITIONS[name]), RIG)
@@ -52,7 +52,7 @@ def test_velocity_lost_and_pressure_rise_are_those_of_the_steady_state(name: str
     assert found["pressure_rise"] == pytest.approx(100.0 * (pressure / low - 1.0), abs=1e-6)
 
 
-def test_air_is_what_would_make_the_oil_so_soft() -> None:
+def test_entrained_air_is_the_share_that_explains_a_soft_oil() -> None:
     share = 0.01
     soft = float(effective_bulk_modulus(RIG.accumulator_pressure, RIG.bulk_modulus, share, 0.0))
     assert severities_of(replace(RIG, bulk_modulus=soft))["entrained_air"] == pytest.approx(100.0 * share, rel=0.05)
@@ -92,7 +92,7 @@ def ratio(one: Quantity) -> float:
     return math.log(one.ci95[1] / one.ci95[0])
 
 
-def test_what_hangs_on_friction_is_known_less_well_where_the_law_of_friction_may_be_bent() -> None:
+def test_a_bent_friction_law_widens_the_total_intervals_of_friction_and_pressure_rise() -> None:
     moved = np.zeros((7, 1))
     moved[COORDINATES.index("friction_rated")] = 0.3
     straight, bent = (severities(one, ACTUATOR) for one in (fits(NARROW), replace(fits(NARROW), moved=moved)))
@@ -103,7 +103,7 @@ def test_what_hangs_on_friction_is_known_less_well_where_the_law_of_friction_may
     assert bent["leakage_flow"] == straight["leakage_flow"]
 
 
-def test_the_ends_of_an_interval_are_those_of_the_covariance_whichever_way_a_severity_goes() -> None:
+def test_the_width_of_an_interval_follows_from_covariance_and_slopes_of_either_sign() -> None:
     tight, step = np.diag(np.full(7, 1e-4**2)), 1e-5
     for place in range(len(CONDITIONS)):
         centre, found = ACTUATOR.conditions[place], severities(fits(tight, place), ACTUATOR)
@@ -114,7 +114,7 @@ def test_the_ends_of_an_interval_are_those_of_the_covariance_whichever_way_a_sev
             assert extent(found[name]) == pytest.approx(expected, rel=0.06), (place, name)
 
 
-def test_a_calibrated_width_stretches_its_own_interval_and_no_other() -> None:
+def test_a_calibration_width_scales_only_its_own_interval() -> None:
     plain = severities(fits(NARROW), ACTUATOR)
     for name in ("leakage_flow", "velocity_lost", "added_friction", "pressure_rise", "bulk_modulus"):
         wide = severities(fits(NARROW), ACTUATOR, {name: 2.5})
@@ -127,14 +127,14 @@ def test_a_calibrated_width_stretches_its_own_interval_and_no_other() -> None:
     assert 0.0 < loose.ci95[0] < 1e8  # the lower end was negative
 
 
-def test_intervals_are_95_percent_of_what_is_believed() -> None:
+def test_an_interval_covers_95_percent_of_the_posterior() -> None:
     found = severities(fits(NARROW), ACTUATOR)["bulk_modulus"]
     assert found.ci95 is not None
     assert extent(found) == pytest.approx(2.0 * 1.96 * 0.01 * 2.07e8, rel=0.15)
     assert found.ci95[0] < found.value < found.ci95[1]  # type: ignore[operator]
 
 
-def test_twice_the_doubt_is_twice_the_interval() -> None:
+def test_twice_the_deviation_gives_twice_the_interval() -> None:
     once, twice = (severities(fits(factor * NARROW), ACTUATOR) for factor in (1.0, 4.0))
     for name in ("leakage_flow", "added_friction", "bulk_modulus"):
         assert extent(twice[name]) == pytest.approx(2.0 * extent(once[name]), rel=0.1)
@@ -146,7 +146,7 @@ def soft(share: float, width: float) -> Quantity:
     return Quantity(value, "Pa", ends, ci95_total=(0.9 * ends[0], 1.1 * ends[1]))
 
 
-def test_air_is_certain_only_where_no_sound_oil_of_the_kind_is_so_soft() -> None:
+def test_air_is_certain_only_in_oil_softer_than_any_sound_oil_of_its_kind() -> None:
     plain = severities(fits(NARROW), ACTUATOR)
     sure, unsure = (with_bulk_modulus(plain, soft(share, 0.02), ACTUATOR) for share in (0.5, 0.95 - OF_KIND + 0.08))
     assert sure["bulk_modulus"].value == 0.5 * RIG.bulk_modulus
@@ -158,7 +158,7 @@ def test_air_is_certain_only_where_no_sound_oil_of_the_kind_is_so_soft() -> None
     assert unsure["entrained_air"].ci95[0] == 0.0
 
 
-def test_a_softer_oil_holds_more_air_and_the_total_interval_is_the_wider() -> None:
+def test_a_softer_oil_holds_more_air_with_a_total_interval_around_its_interval() -> None:
     plain = severities(fits(NARROW), ACTUATOR)
     less, more = (with_bulk_modulus(plain, soft(share, 0.02), ACTUATOR)["entrained_air"] for share in (0.6, 0.4))
     assert less.value is not None
@@ -169,7 +169,7 @@ def test_a_softer_oil_holds_more_air_and_the_total_interval_is_the_wider() -> No
     assert more.ci95_total[0] < more.ci95[0] < more.value < more.ci95[1] < more.ci95_total[1]
 
 
-def test_without_an_estimate_of_bulk_modulus_no_air_is_told() -> None:
+def test_without_an_estimate_of_bulk_modulus_air_has_no_number() -> None:
     found = with_bulk_modulus(severities(fits(NARROW), ACTUATOR), Quantity(None, "Pa"), ACTUATOR)
     assert found["bulk_modulus"].value is None
     assert found["entrained_air"].value is None
@@ -182,7 +182,7 @@ def test_a_circuit_without_a_steady_state_has_no_number_and_no_interval() -> Non
     assert found["leakage_flow"].ci95 is None
 
 
-def test_a_limit_lies_halfway_from_a_healthy_actuator_to_a_minor_fault() -> None:
+def test_a_limit_is_halfway_between_a_healthy_actuator_and_a_minor_fault() -> None:
     limits, healthy = limits_of(ACTUATOR), severities_of(RIG)
     leaking, rubbing = (severities_of(parameters_for(CONDITIONS[name])) for name in ("minor_leakage", "minor_friction"))
     for name, faulty in (
@@ -195,7 +195,7 @@ def test_a_limit_lies_halfway_from_a_healthy_actuator_to_a_minor_fault() -> None
     assert limits["bulk_modulus"] == pytest.approx(0.8 * RIG.bulk_modulus)
 
 
-def test_what_an_actuator_has_by_itself_is_found_once() -> None:
+def test_healthy_severities_and_limits_of_an_actuator_are_cached() -> None:
     sound = healthy_severities(ACTUATOR)
     assert sound == severities_at(ACTUATOR.conditions[0], ACTUATOR)
     assert healthy_severities(ACTUATOR) is sound

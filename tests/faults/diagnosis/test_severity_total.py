@@ -55,7 +55,7 @@ def added_by(entry: str) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("entry", ["pump_displacement", "piston_area", PRESSURE_GAIN])
-def test_laws_of_scale_are_what_another_rig_would_say_or_more(entry: str) -> None:
+def test_scaling_laws_cover_the_change_of_severities_with_another_rig(entry: str) -> None:
     first, again, law = severities_of(), severities_of(entry, 1.0 + STEP), added_by(entry)
     for name in ASKED:
         moved = abs((again[name].value or 0.0) - (first[name].value or 0.0))
@@ -63,7 +63,7 @@ def test_laws_of_scale_are_what_another_rig_would_say_or_more(entry: str) -> Non
         assert moved < 1.5 * law[name] + 0.01 * size, name
 
 
-def test_leakage_and_velocity_answer_the_ratio_of_displacement_and_area_as_much_as_the_laws_say() -> None:
+def test_leakage_and_velocity_lost_change_with_displacement_by_the_scaling_laws() -> None:
     first, again, law = severities_of(), severities_of("pump_displacement", 1.0 + STEP), added_by("pump_displacement")
     for name in ("leakage_flow", "velocity_lost"):
         moved = (again[name].value or 0.0) - (first[name].value or 0.0)
@@ -72,7 +72,7 @@ def test_leakage_and_velocity_answer_the_ratio_of_displacement_and_area_as_much_
 
 @pytest.mark.parametrize("entry", ["pump_displacement", "piston_area"])
 @pytest.mark.parametrize("lost", [5.0, 28.0, 60.0])
-def test_leakage_answers_an_entry_as_what_is_pumped_less_what_the_piston_sweeps(lost: float, entry: str) -> None:
+def test_leakage_changes_with_an_entry_like_pump_flow_less_swept_flow(lost: float, entry: str) -> None:
     actuator, doubt = actuator_of(HEALTHY), 1e-3
     pumped = HEALTHY.pump_displacement * HEALTHY.rated_speed
     swept = HEALTHY.piston_area * actuator.rated * (1.0 - lost / 100.0)
@@ -96,7 +96,7 @@ def test_leakage_answers_an_entry_as_what_is_pumped_less_what_the_piston_sweeps(
         ),
     ],
 )
-def test_with_pressure_friction_is_area_times_gauge_and_leakage_is_flow_over_gauge(name: str, entry: str) -> None:
+def test_with_pressure_total_intervals_scale_with_displacement_area_and_pressure_gain(name: str, entry: str) -> None:
     actuator, doubt = actuator_of(HEALTHY), 1e-3
     exact = {"velocity_lost": 20.0, "leakage_flow": 5.0, "added_friction": 30.0, "pressure_rise": 4.0}
     p, v = HEALTHY, actuator.rated
@@ -112,7 +112,7 @@ def test_with_pressure_friction_is_area_times_gauge_and_leakage_is_flow_over_gau
     assert (total[1] - total[0]) / 2.0 == pytest.approx(1.96 * doubt * wanted[entry], rel=0.02, abs=1e-9)
 
 
-def test_a_diagnosis_has_both_intervals_of_every_severity_and_the_totals_hold_the_others() -> None:
+def test_every_severity_of_a_diagnosis_has_a_total_interval_around_its_interval() -> None:
     found = diagnose_log(log(), Rig())
     for name, one in found.severities.items():
         assert one.ci95 is not None, name
@@ -123,7 +123,7 @@ def test_a_diagnosis_has_both_intervals_of_every_severity_and_the_totals_hold_th
     assert not found.unknown
 
 
-def test_the_air_follows_the_total_interval_of_bulk_modulus() -> None:
+def test_the_total_interval_of_air_follows_that_of_bulk_modulus() -> None:
     estimated = Quantity(1.5e8, "Pa", (1.49e8, 1.51e8), 5e5, (1.1e8, 2.05e8))
     air = with_bulk_modulus({}, estimated, actuator_of(HEALTHY))["entrained_air"]
     assert air.ci95 is not None
@@ -133,12 +133,12 @@ def test_the_air_follows_the_total_interval_of_bulk_modulus() -> None:
     assert air.ci95_total[1] > 2.0 * air.ci95[1]
 
 
-def test_where_the_velocity_lost_is_not_determined_there_are_no_totals() -> None:
+def test_undetermined_severities_have_no_total_intervals() -> None:
     none = {name: Quantity(None, "1") for name in ASKED}
     assert with_totals(none, actuator_of(HEALTHY), Rig().spreads, pressure=True) == none
 
 
-def test_without_pressure_the_gain_of_its_sensor_widens_nothing() -> None:
+def test_without_pressure_the_gain_of_its_sensor_widens_no_interval() -> None:
     found = {name: replace(one, ci95_total=None) for name, one in severities_of().items()}
     doubted = {PRESSURE_GAIN: Spread.of(0.1)}
     seen, unseen = (with_totals(found, actuator_of(HEALTHY), doubted, pressure=logged) for logged in (True, False))
@@ -148,7 +148,7 @@ def test_without_pressure_the_gain_of_its_sensor_widens_nothing() -> None:
 
 
 @pytest.mark.parametrize("reached", [4e5, 2e6])
-def test_a_leakage_may_be_less_at_rated_pressure_the_lower_the_pressures_that_were_logged(reached: float) -> None:
+def test_lower_logged_pressures_extend_the_total_interval_of_leakage_downward(reached: float) -> None:
     found = {name: Quantity(5.0, "1", (4.5, 5.5)) for name in ASKED}
     actuator, share = actuator_of(HEALTHY), 1.0 - float(np.exp(-1.96 * TURBULENT.down))
     near, far = (with_totals(found, actuator, {}, pressure=True, reached=one) for one in (1e9, reached))

@@ -55,14 +55,14 @@ def stuck_when_slow(velocity: Array) -> Array:
     [lambda v: 0.8 * v, stuck_when_slow, lambda v: 0.0 * v],
     ids=["its gain is 20 % low", "it sticks", "it reads 0"],
 )
-def test_a_wrong_velocity_costs_no_class_and_is_named(wrong: Callable[[Array], Array]) -> None:
+def test_a_wrong_velocity_sensor_is_named_and_the_class_is_kept(wrong: Callable[[Array], Array]) -> None:
     found = diagnosed(wrong(log()[VELOCITY]))
     assert (found.condition, found.unknown, found.against) == ("minor_leakage", False, ())
     assert [note.data["channel"] for note in found.notes if note.code is ClassCode.VELOCITY_CONTRADICTED] == [VELOCITY]
     assert [note.data["channel"] for note in found.advice if note.code is AdviceCode.MEND_SENSOR] == [VELOCITY]
 
 
-def test_a_position_that_is_wrong_leaves_both_sensors_accused() -> None:
+def test_a_wrong_position_makes_the_class_unknown_and_both_sensors_suspect() -> None:
     brief = log().slice(0, 600)
     wave = 2e-3 * np.sin(12.0 * brief.time)
     found = diagnose_log(brief.replace(**{POSITION: brief[POSITION] + wave}), RIG)
@@ -71,7 +71,7 @@ def test_a_position_that_is_wrong_leaves_both_sensors_accused() -> None:
     assert any(note.code is AdviceCode.CHECK_SENSOR for note in found.advice)
 
 
-def test_a_velocity_is_left_out_only_where_the_balance_of_flows_confirms_the_position() -> None:
+def test_a_velocity_is_left_out_only_if_the_flow_balance_confirms_the_position() -> None:
     clean, estimate = seen()
     assert without_wrong_velocity(clean, (), estimate, ()) is None
     assert without_wrong_velocity(clean, DIFFERS, estimate, ()) is not None
@@ -81,7 +81,7 @@ def test_a_velocity_is_left_out_only_where_the_balance_of_flows_confirms_the_pos
 
 
 @pytest.mark.parametrize(("gain", "offset", "told"), [(0.9, 0.0, False), (1.0, 2e-3, True)])
-def test_at_one_motor_speed_a_wrong_gain_may_be_that_of_position(gain: float, offset: float, *, told: bool) -> None:
+def test_at_one_motor_speed_a_gain_error_may_belong_to_position(gain: float, offset: float, *, told: bool) -> None:
     """At one speed, the flow balance cannot separate it from a worn pump; any other error of position breaks it."""
     clean, estimate = seen()
     wave = offset * np.sin(4.0 * clean.record.time)

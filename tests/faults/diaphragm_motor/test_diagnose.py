@@ -63,7 +63,7 @@ def test_a_healthy_motor_is_healthy() -> None:
     assert found.best.probability > 0.9
 
 
-def test_a_fault_s_probability_falls_with_the_share_of_its_severities_that_the_log_leaves() -> None:
+def test_odds_of_a_fault_are_prior_times_likelihood_times_the_share_of_severities_left() -> None:
     found = diagnose_motor(log_of(MOTOR), MOTOR)
     share = {match.name: match for match in found.matches}
     assert (share[HEALTHY].severity, share[HEALTHY].interval) == (0.0, (0.0, 0.0))
@@ -96,7 +96,7 @@ def test_friction_and_load_are_named_together(name: str) -> None:
         ("clogged_ports", 0.3, "load"),
     ],
 )
-def test_what_bends_the_electrodes_alike_is_said_to(name: str, severity: float, other: str) -> None:
+def test_faults_with_similar_signatures_are_reported_as_lookalikes(name: str, severity: float, other: str) -> None:
     found = diagnosed(name, severity)
     assert found.best.name == name
     assert other in found.lookalikes
@@ -104,7 +104,7 @@ def test_what_bends_the_electrodes_alike_is_said_to(name: str, severity: float, 
 
 
 @pytest.mark.slow
-def test_only_friction_and_load_are_not_told_apart() -> None:
+def test_only_friction_and_load_are_indistinguishable() -> None:
     apart = separations(MOTOR, 480.0, 200.0, {**SINGLE, "friction": 8.0, "load": 8.0, "soft_clamp": 0.2})
     close = {(first, other) for first, others in apart.items() for other, far in others.items() if far < TOLD_APART}
     assert close == {("friction", "load"), ("load", "friction")}
@@ -116,7 +116,7 @@ def test_two_faults_at_once_are_unknown() -> None:
     assert diagnose_motor(log_of(both), MOTOR).unknown
 
 
-def test_another_motor_is_unknown_until_a_healthy_run_of_it_is_given() -> None:
+def test_a_fault_of_another_motor_is_unknown_without_a_healthy_run_of_that_motor() -> None:
     faulty = log_of(motor_with_fault(OTHER, "chamber_3_gas", 0.02))
     assert diagnose_motor(faulty, MOTOR).unknown
     found = diagnose_motor(faulty, MOTOR, calibration=logged_signature(log_of(OTHER, 2)))
@@ -131,7 +131,7 @@ def test_a_healthy_run_under_another_drive_is_refused() -> None:
 
 
 @pytest.mark.slow
-def test_over_seeds_faults_are_named_on_motors_within_tolerance() -> None:
+def test_95_percent_of_faults_are_named_on_motors_within_tolerance() -> None:
     from benchmarks.plants.diaphragm_faults import isolate
 
     share, unknown, *_ = isolate(4, 1.0, calibrated=False)
@@ -139,7 +139,7 @@ def test_over_seeds_faults_are_named_on_motors_within_tolerance() -> None:
     assert unknown <= 0.05
 
 
-def test_a_healthy_run_is_of_the_same_drive_and_of_a_healthy_motor() -> None:
+def test_a_healthy_run_under_another_drive_or_of_a_faulty_motor_is_refused() -> None:
     seen = logged_signature(log_of(MOTOR))
     for swing in (180.0, 220.0):
         with pytest.raises(LogError, match="the healthy run must be under the log's drive"):

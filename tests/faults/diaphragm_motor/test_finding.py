@@ -18,11 +18,11 @@ def diagnosis(velocity: float, *, unknown: bool) -> Any:
 
 
 @pytest.mark.parametrize("velocity", [2.0 * STANDING, -2.0 * STANDING])
-def test_a_rod_that_moves_and_a_fault_that_fits_are_not_doubted(velocity: float) -> None:
+def test_a_moving_rod_with_a_fitting_fault_has_no_objection(velocity: float) -> None:
     assert _against(diagnosis(velocity, unknown=False)) == ()
 
 
-def test_a_nearest_fault_that_misses_and_a_rod_that_stands_are_told() -> None:
+def test_a_poorly_fitting_nearest_fault_and_a_stationary_rod_are_objections() -> None:
     misses, stands = _against(diagnosis(-0.5 * STANDING, unknown=True))
     assert misses == MotorFaultCode.NEAREST_MISSES.note(fault="valve_1_leak", chi_square=40.0, freedom=12)
     assert stands.code is MotorFaultCode.ROD_STANDS
@@ -42,7 +42,7 @@ MATCHES = {name: Match(name, 0.5, 0.1, 9.0, 0.3) for name in (HEALTHY, "friction
         (("friction", "valve_1_leak"), True, ("valve_1_leak",), [], [], ""),
     ],
 )
-def test_a_finding_names_the_faults_of_the_nearest_and_measures_the_first(
+def test_a_finding_names_the_group_of_nearest_faults_and_quantifies_the_first(
     group: tuple[str, ...],
     unknown: bool,
     alike: tuple[str, ...],
@@ -74,7 +74,7 @@ def test_a_finding_names_the_faults_of_the_nearest_and_measures_the_first(
         assert (one.value, one.ci95) == (0.5, pytest.approx((0.5 - 0.196, 0.5 + 0.196), abs=1e-4))
 
 
-def test_every_kind_of_fault_has_a_remedy_of_its_own_at_its_own_place() -> None:
+def test_every_kind_of_fault_has_its_own_remedy_with_its_location() -> None:
     remedies = {fault.kind: _remedy(Match(name, 0.5, 0.1, 9.0, 0.3)) for name, fault in MOTOR_FAULTS.items()}
     assert len({note.code for note in remedies.values()}) == len(remedies)
     assert {kind: str(note) for kind, note in remedies.items() if kind in {"valve_blocked", "gas", "slow_valves"}} == {

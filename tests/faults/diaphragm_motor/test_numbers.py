@@ -160,5 +160,5 @@ def faults_that_are_told_apart() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)
-def test_numbers_stand(case: str) -> None:
+def test_kept_numbers_are_unchanged(case: str) -> None:
     NUMBERS.check(case)

@@ -37,11 +37,11 @@ def test_the_mathematical_bank_is_the_nine_conditions_of_the_rig() -> None:
     assert all(found[name] == parameters_for(condition, other) for name, condition in CONDITIONS.items())
 
 
-def test_the_bank_is_kept_for_the_next_log_of_the_rig() -> None:
+def test_the_bank_of_a_rig_is_cached() -> None:
     assert mathematical_bank(RIG) is mathematical_bank(EhaParameters())
 
 
-def test_shorter_steps_change_no_error_of_a_model_by_more_than_its_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shorter_integration_steps_hardly_change_the_error_of_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
     p = parameters_for(CONDITIONS["minor_friction"])
     drive = make_drive("prbs", 4.0, 1e-3, p, np.random.default_rng(3))
     record = simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=np.random.default_rng(4))
@@ -50,13 +50,13 @@ def test_shorter_steps_change_no_error_of_a_model_by_more_than_its_rounding(monk
     assert usual == pytest.approx(score_mathematical(record, mathematical_bank(RIG)).by_condition, rel=3e-4)
 
 
-def test_a_prediction_is_the_simulated_run() -> None:
+def test_a_prediction_equals_the_simulated_run() -> None:
     record = run_of(RIG)
     for channel, predicted in predict_run(record, RIG).items():
         np.testing.assert_allclose(predicted, record[channel], atol=1e-3 * np.max(np.abs(record[channel])))
 
 
-def test_a_prediction_reads_the_drive_alone_and_bridges_its_gaps() -> None:
+def test_a_prediction_needs_only_the_drive_and_bridges_its_gaps() -> None:
     record = run_of(RIG)
     bare = Record(record.sample_time, {"motor_speed_rad_s": record["motor_speed_rad_s"]})
     gappy = drop_samples(bare, 0.02, np.random.default_rng(1))
@@ -66,7 +66,7 @@ def test_a_prediction_reads_the_drive_alone_and_bridges_its_gaps() -> None:
         np.testing.assert_allclose(bridged[channel], values, atol=0.2 * np.max(np.abs(values)))
 
 
-def test_predictions_side_by_side_are_those_of_each_model_alone() -> None:
+def test_joint_predictions_equal_those_of_each_model_alone() -> None:
     record, models = run_of(RIG), mathematical_bank(RIG)
     found = predict_runs(record, models)
     assert list(found) == list(models)
@@ -76,7 +76,7 @@ def test_predictions_side_by_side_are_those_of_each_model_alone() -> None:
 
 
 @pytest.mark.parametrize("name", CONDITIONS)
-def test_an_identification_run_is_four_volts_either_way_in_its_condition(name: str) -> None:
+def test_an_identification_run_has_4_volts_of_either_sign_in_its_condition(name: str) -> None:
     record = identification_run(RIG, CONDITIONS[name], np.random.default_rng(3), sensors=IDEAL, duration=2.0)
     assert record.sample_time == IDENTIFICATION_TIME
     assert set(np.round(record["motor_speed_rad_s"], 6)) == {-125.663706, 125.663706}
@@ -84,7 +84,7 @@ def test_an_identification_run_is_four_volts_either_way_in_its_condition(name: s
 
 
 @pytest.mark.slow
-def test_every_condition_is_identified_from_a_stream_of_its_own() -> None:
+def test_identification_of_every_condition_is_reproducible_from_a_seed() -> None:
     bank, again = (identify_bank(RIG, np.random.default_rng(5), duration=10.0) for _ in range(2))
     assert list(bank) == list(CONDITIONS)
     for name, model in bank.items():

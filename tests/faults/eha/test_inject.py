@@ -23,13 +23,13 @@ HALF_WIDTHS = {
 }
 
 
-def test_an_abrupt_fault_is_absent_before_its_time_and_whole_from_it_on() -> None:
+def test_an_abrupt_fault_is_absent_before_its_time_and_full_from_then_on() -> None:
     rows = abrupt(RIG, FAULTY, at=5.0).sample([0.0, 4.9999, 5.0, 10.0])
     before, after = (list(asdict(p).values()) for p in (RIG, FAULTY))
     np.testing.assert_array_equal(rows, [before, before, after, after])
 
 
-def test_a_growing_fault_passes_linearly_from_none_to_whole() -> None:
+def test_a_growing_fault_rises_linearly_from_none_to_full() -> None:
     rows = growing(RIG, FAULTY, start=2.0, end=6.0).sample([0.0, 3.0, 8.0])
     column = NAMES.index("friction_linear")
     quarter = RIG.friction_linear + 0.25 * (FAULTY.friction_linear - RIG.friction_linear)
@@ -44,7 +44,7 @@ def test_air_ingress_lowers_the_bulk_modulus_alone() -> None:
 
 
 @pytest.mark.parametrize("at", [0.0, -1.0, np.nan, np.inf])
-def test_an_abrupt_fault_without_a_time_to_come_is_refused(at: float) -> None:
+def test_an_abrupt_fault_without_a_positive_time_is_refused(at: float) -> None:
     with pytest.raises(HydrostateError, match="must come at a positive time"):
         abrupt(RIG, FAULTY, at)
 
@@ -57,14 +57,14 @@ def test_a_fault_that_ends_growing_before_it_starts_is_refused(start: float, end
 
 @given(seed=st.integers(0, 2**32 - 1), condition=st.sampled_from(list(CONDITIONS.values())))
 @settings(max_examples=50)
-def test_spread_stays_within_its_widths_and_leaves_geometry_and_pump(seed: int, condition: Condition) -> None:
+def test_spread_stays_within_its_widths_and_keeps_geometry_and_pump(seed: int, condition: Condition) -> None:
     nominal = parameters_for(condition, RIG)
     drawn = spread(nominal, np.random.default_rng(seed))
     for name, value in asdict(nominal).items():
         assert abs(getattr(drawn, name) - value) <= HALF_WIDTHS.get(name, 0.0) * (1.0 + 1e-12) * abs(value)
 
 
-def test_spread_fills_its_widths_independently() -> None:
+def test_spread_draws_are_uniform_and_independent() -> None:
     rng = np.random.default_rng(1)
     ratios = np.array(
         [[getattr(p, n) / getattr(RIG, n) for n in HALF_WIDTHS] for p in (spread(RIG, rng) for _ in range(2000))]
@@ -74,7 +74,7 @@ def test_spread_fills_its_widths_independently() -> None:
     assert np.max(np.abs(np.corrcoef(ratios.T) - np.eye(len(HALF_WIDTHS)))) < 0.1
 
 
-def test_narrowing_one_spread_leaves_the_draws_of_the_others() -> None:
+def test_a_narrower_spread_does_not_change_the_draws_of_the_others() -> None:
     wide = spread(FAULTY, np.random.default_rng(7))
     narrow = spread(FAULTY, np.random.default_rng(7), leakage=0.0)
     assert (narrow.leakage_coefficient, narrow.flow_bias) == (FAULTY.leakage_coefficient, FAULTY.flow_bias)
@@ -82,6 +82,6 @@ def test_narrowing_one_spread_leaves_the_draws_of_the_others() -> None:
 
 
 @pytest.mark.parametrize("width", [-0.1, 1.0, np.nan])
-def test_a_spread_that_could_turn_a_sign_is_refused(width: float) -> None:
+def test_a_spread_that_could_change_a_sign_is_refused(width: float) -> None:
     with pytest.raises(HydrostateError, match="bulk_modulus spread must be at least 0 and below 1"):
         spread(RIG, np.random.default_rng(0), bulk_modulus=width)

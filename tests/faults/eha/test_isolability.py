@@ -22,18 +22,18 @@ def _drive(name: str) -> np.ndarray:
     return make_drive(name, 4.0, T, P, np.random.default_rng(0))
 
 
-def test_pressure_tells_friction_from_leakage_by_structure() -> None:
+def test_pressure_makes_friction_structurally_isolable_from_leakage() -> None:
     assert structural_isolability(SENSED)["friction"] == ()
     assert structural_isolability(SENSED)["leakage"] == ("air", "speed sensor")
     assert "friction" in (structural_isolability(WITHOUT_PRESSURE)["leakage"] or ())
 
 
-def test_without_a_second_equation_nothing_is_detected() -> None:
+def test_without_redundant_equations_no_fault_is_detectable() -> None:
     assert overdetermined({"flow balance", "force balance", "kinematics"}) == set()
     assert set(structural_isolability(()).values()) == {None}
 
 
-def test_faults_of_sensors_that_are_not_there_are_left_out() -> None:
+def test_faults_of_absent_sensors_are_left_out() -> None:
     assert "pressure sensor" not in structural_isolability(WITHOUT_PRESSURE)
 
 
@@ -43,7 +43,7 @@ def test_more_sensors_never_make_a_fault_harder_to_isolate() -> None:
         assert set(more[fault] or ()) <= set(rivals or ())
 
 
-def test_nine_steps_tell_all_conditions_apart_and_a_stuck_sine_does_not() -> None:
+def test_steps_separate_all_nine_conditions_and_a_sine_with_a_stuck_piston_does_not() -> None:
     steps = condition_distances(P, _drive("steps"), T)
     assert steps.conditions == tuple(CONDITIONS)
     assert wrong_verdicts(steps.least) < 0.01
@@ -54,23 +54,23 @@ def test_nine_steps_tell_all_conditions_apart_and_a_stuck_sine_does_not() -> Non
     assert leaking == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_sensor_more_brings_conditions_no_nearer() -> None:
+def test_an_additional_sensor_never_reduces_the_distance_of_conditions() -> None:
     drive = _drive("prbs")
     fewer, more = condition_distances(P, drive, T, WITHOUT_PRESSURE), condition_distances(P, drive, T)
     assert np.all(more.nats >= fewer.nats * (1.0 - 1e-9) - 1e-6)
 
 
-def test_twice_the_experiment_brings_more_distance() -> None:
+def test_a_repeated_experiment_increases_the_distance_of_conditions() -> None:
     drive = _drive("prbs")
     assert condition_distances(P, np.tile(drive, 2), T).least > condition_distances(P, drive, T).least
 
 
-def test_a_channel_without_noise_or_unknown_is_refused() -> None:
+def test_a_channel_without_a_noise_model_is_refused() -> None:
     with pytest.raises(HydrostateError, match="a channel must be one of"):
         condition_distances(P, _drive("prbs"), T, ("pressure_a_pa",))
 
 
-def test_a_distance_is_that_of_two_normal_laws_with_the_spread_of_a_class_and_the_sensors_noise() -> None:
+def test_a_distance_is_that_of_normal_distributions_with_class_spread_and_sensor_noise() -> None:
     drive, channels = _drive("steps")[:200], ("velocity_m_s", "differential_pressure_pa")
     found = condition_distances(P, drive, T, channels)
     log = Record(T, {"motor_speed_rad_s": drive})

@@ -19,7 +19,7 @@ VOLTS = st.floats(0.0, 10.0)
 
 
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
-def test_table_1s_voltages_make_tables_3_and_4(condition: Condition) -> None:
+def test_throttle_voltages_of_table_1_give_the_parameters_of_tables_3_and_4(condition: Condition) -> None:
     volts = VOLTS_A[LEVELS.index(condition.leakage)], VOLTS_B[LEVELS.index(condition.friction)]
     made, wanted = asdict(throttled(PAPER, *volts)), asdict(parameters_for(condition, PAPER))
     for name, value in wanted.items():
@@ -27,14 +27,14 @@ def test_table_1s_voltages_make_tables_3_and_4(condition: Condition) -> None:
 
 
 @given(VOLTS, VOLTS)
-def test_opening_throttle_a_always_leaks_more(one: float, other: float) -> None:
+def test_opening_throttle_a_never_reduces_leakage(one: float, other: float) -> None:
     shut, opened = (throttled(PAPER, volts, 0.0) for volts in sorted((one, other), reverse=True))
     assert shut.leakage_coefficient <= opened.leakage_coefficient
     assert shut.flow_bias <= opened.flow_bias
 
 
 @given(VOLTS, VOLTS)
-def test_shutting_throttle_b_always_loads_more(one: float, other: float) -> None:
+def test_closing_throttle_b_never_reduces_friction(one: float, other: float) -> None:
     opened, shut = (throttled(PAPER, 10.0, volts) for volts in sorted((one, other)))
     assert opened.friction_quadratic <= shut.friction_quadratic
 

@@ -26,26 +26,26 @@ def runs(seed: int, count: int, apart: float, width: int = 3) -> tuple[Array, np
 
 @parametrize_with_checks([Classifier()])
 @pytest.mark.filterwarnings("ignore")
-def test_it_keeps_the_conventions_of_scikit_learn(estimator: Any, check: Any) -> None:
+def test_the_classifier_passes_the_checks_of_scikit_learn(estimator: Any, check: Any) -> None:
     # the checks divide by zero on purpose, and our tests otherwise raise floating-point errors
     with np.errstate(all="ignore"):
         check(estimator)
 
 
-def test_separate_classes_are_told_apart_from_other_blocks_alone() -> None:
+def test_well_separated_classes_are_recognized_in_held_out_blocks() -> None:
     verdicts = Classifier().judge(*runs(1, 200, 4.0))
     assert verdicts.balanced_accuracy > 0.98
     assert verdicts.classes == ("sound", "worn")
     np.testing.assert_allclose(verdicts.probabilities.sum(axis=1), 1.0)
 
 
-def test_classes_that_are_noise_are_not_told_apart_and_nothing_is_claimed() -> None:
+def test_classes_of_pure_noise_get_chance_accuracy_and_low_probabilities() -> None:
     verdicts = Classifier().judge(*runs(2, 400, 0.0))
     assert 0.4 < verdicts.balanced_accuracy < 0.6
     assert verdicts.probabilities.max() < 0.7
 
 
-def test_probabilities_are_those_of_the_two_normal_distributions_that_made_the_runs() -> None:
+def test_probabilities_match_the_normal_distributions_that_made_the_runs() -> None:
     x, labels = runs(3, 2000, 0.8)
     learnt = Classifier().fit(x, labels)
     other, _ = runs(4, 400, 0.8)
@@ -54,7 +54,7 @@ def test_probabilities_are_those_of_the_two_normal_distributions_that_made_the_r
     assert np.abs(learnt.predict_proba(other)[:, 1] - truth).max() < 0.08
 
 
-def test_neighbours_that_are_copies_do_not_make_probabilities_sure() -> None:
+def test_duplicated_runs_in_a_group_do_not_make_probabilities_overconfident() -> None:
     # every run occurs ten times, each ten form a group, and the labels are noise
     x, labels = runs(5, 60, 0.0)
     order = np.random.default_rng(6).permutation(60)
@@ -73,7 +73,7 @@ def signs(seed: int) -> tuple[Array, np.ndarray[Any, Any], list[str]]:
     return x, states, [f"{state}@{place}" for state, place in zip(states, load, strict=True)]
 
 
-def test_a_state_that_looks_different_under_each_load_is_found_by_learning_both_and_reporting_one() -> None:
+def test_a_state_that_differs_by_load_is_recognized_if_classes_are_learnt_per_load_and_merged() -> None:
     x, states, under_load = signs(7)
     assert Classifier().judge(x, states).balanced_accuracy < 0.7
     merged = Classifier(merge="@").judge(x, under_load)
@@ -89,7 +89,7 @@ def test_a_state_that_looks_different_under_each_load_is_found_by_learning_both_
         lambda name: name.split("@")[0],
     ],
 )
-def test_merging_is_said_by_a_text_a_mapping_or_a_function(merge: Any) -> None:
+def test_classes_are_merged_by_a_separator_a_mapping_or_a_function(merge: Any) -> None:
     x, states, under_load = signs(8)
     learnt = Classifier(merge=merge).fit(x, under_load)
     assert learnt.classes_.tolist() == ["sound", "worn"]
@@ -97,7 +97,7 @@ def test_merging_is_said_by_a_text_a_mapping_or_a_function(merge: Any) -> None:
     assert learnt.score(x, states) == learnt.score(x, under_load) > 0.98
 
 
-def test_what_was_not_learnt_is_unknown_and_what_was_is_not() -> None:
+def test_runs_unlike_all_learnt_classes_are_unknown_and_others_are_not() -> None:
     x, labels = runs(9, 400, 5.0)
     learnt = Classifier(unknown=0.01).fit(x, labels)
     fresh, _ = runs(10, 2000, 5.0)
@@ -107,7 +107,7 @@ def test_what_was_not_learnt_is_unknown_and_what_was_is_not() -> None:
     assert [*along, *across] == ["unknown", "unknown"]
 
 
-def test_a_new_class_along_the_others_is_not_hidden_by_what_varies_in_all() -> None:
+def test_a_new_class_is_unknown_despite_variation_common_to_all_classes() -> None:
     x, labels = runs(11, 400, 6.0, width=1)
     drift = 100.0 * np.random.default_rng(12).standard_normal((400, 1))
     blocks = np.repeat(np.random.default_rng(13).standard_normal((4, 30)) * 20.0, 100, axis=0)
@@ -118,7 +118,7 @@ def test_a_new_class_along_the_others_is_not_hidden_by_what_varies_in_all() -> N
     assert np.mean(learnt.predict(x) == "unknown") < 0.02
 
 
-def test_it_is_cloned_kept_and_scored_as_any_other() -> None:
+def test_a_classifier_can_be_cloned_pickled_and_cross_validated() -> None:
     x, labels = runs(15, 100, 3.0)
     learnt = clone(Classifier(merge="@", unknown=0.02)).fit(x, labels)
     again = pickle.loads(pickle.dumps(learnt))  # noqa: S301 -- our own
@@ -134,12 +134,12 @@ def test_it_is_cloned_kept_and_scored_as_any_other() -> None:
         ({"merge": {"a": "c", "b": "c"}}, "ab", "two classes at least are needed, got one class: c"),
     ],
 )
-def test_what_cannot_be_learnt_is_refused(arguments: dict[str, Any], labels: str, message: str) -> None:
+def test_invalid_options_and_a_single_class_are_refused(arguments: dict[str, Any], labels: str, message: str) -> None:
     with pytest.raises(HydrostateError, match=message):
         Classifier(**arguments).fit(np.arange(20.0)[:, None], list(labels) * 10)
 
 
-def test_a_class_in_one_group_alone_cannot_be_judged() -> None:
+def test_a_class_that_occurs_in_only_one_group_cannot_be_judged() -> None:
     x, labels = runs(16, 100, 3.0)
     groups = np.where(labels == "worn", 9, np.arange(100) // 10)
     with pytest.raises(HydrostateError, match="class worn occurs in one block alone"):
@@ -147,12 +147,12 @@ def test_a_class_in_one_group_alone_cannot_be_judged() -> None:
 
 
 @pytest.mark.parametrize(("labels", "blocks"), [(9, 2), (10, 1), (10, 11)])
-def test_labels_and_blocks_that_do_not_fit_are_refused(labels: int, blocks: int) -> None:
+def test_inconsistent_numbers_of_labels_or_blocks_are_refused(labels: int, blocks: int) -> None:
     with pytest.raises(HydrostateError, match="as many labels, and blocks from 2 to that are needed"):
         Classifier().judge(np.zeros((10, 2)), np.arange(labels) % 2, blocks=blocks)
 
 
-def test_scikit_learn_is_asked_for_by_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_scikit_learn_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     import faults.own_classes.face as face
 
     monkeypatch.setitem(sys.modules, "sklearn.base", None)

@@ -23,7 +23,7 @@ def test_means_and_deviations_of_parts_ignore_the_order_within_a_part() -> None:
     assert one.shape == (4, 3 * 28)
 
 
-def test_power_stands_in_the_band_of_the_tone_and_follows_its_size() -> None:
+def test_power_is_in_the_band_of_the_tone_and_follows_its_amplitude() -> None:
     time = np.arange(1000) * 0.01
     rows = [table(size * np.sin(2.0 * np.pi * 12.0 * time)) for size in (1.0, 10.0)]
     found = hs.features(rows, parts=1, bands=[0.0, 5.0, 20.0, 50.0])
@@ -39,7 +39,7 @@ def test_a_long_log_is_cut_into_its_cycles() -> None:
     assert found["q mean 2/2"].tolist() == [3.0, 5.0, 11.0]
 
 
-def test_logs_that_are_read_and_gaps_in_them_are_taken() -> None:
+def test_features_accept_logs_records_and_gaps() -> None:
     log = hs.simulate("normal", duration=1.0, sample_time=1e-3, seed=1)
     found = hs.features([log, log.record], channels=["position_m"], parts=4)
     np.testing.assert_array_equal(found.iloc[0], found.iloc[1])
@@ -53,7 +53,7 @@ def test_a_constant_channel_has_finite_features() -> None:
     assert np.isfinite(found.to_numpy()).all()
 
 
-def test_columns_do_not_hang_on_the_other_runs() -> None:
+def test_columns_of_a_run_do_not_depend_on_other_runs() -> None:
     short, long = table(np.random.default_rng(1).standard_normal(200)), table(np.arange(200.0))
     pd.testing.assert_series_equal(hs.features([short, long]).iloc[0], hs.features(short).iloc[0])
 
@@ -74,12 +74,12 @@ def test_columns_do_not_hang_on_the_other_runs() -> None:
         ([table(np.arange(50.0))], {"bands": [5.0, 5.1]}, "the band 5 to 5.1 Hz holds no frequency"),
     ],
 )
-def test_runs_that_do_not_fit_are_refused(runs: Any, options: dict[str, Any], message: str) -> None:
+def test_invalid_runs_and_options_are_refused(runs: Any, options: dict[str, Any], message: str) -> None:
     with np.errstate(all="ignore"), pytest.raises(HydrostateError, match=message):
         hs.features(runs, **options)
 
 
-def test_features_need_a_run_and_a_clock() -> None:
+def test_features_without_a_run_or_a_sample_time_are_refused() -> None:
     with pytest.raises(HydrostateError, match="features of at least one run are needed, got none"):
         channel_features(["p"], [], 1.0, Recipe())
     for wrong in (0.0, np.nan):
@@ -94,14 +94,14 @@ def bands_of(samples: int, octaves: int, sample_time: float = 0.01) -> list[str]
     return [name.removeprefix("p power ") for name in found if "power" in name]
 
 
-def test_bands_are_octaves_below_half_the_rate_as_far_as_a_run_has_lines_in_them() -> None:
+def test_bands_are_octaves_below_the_nyquist_frequency_that_contain_spectral_lines() -> None:
     assert bands_of(200, 3) == ["6.25-12.5 Hz", "12.5-25 Hz", "25-50 Hz"]
     assert bands_of(200, 0) == []
     # 16 samples of 10 ms: spectral lines are 6.25 Hz apart, and no band edge is below half of that
     assert bands_of(16, 10) == ["3.125-6.25 Hz", "6.25-12.5 Hz", "12.5-25 Hz", "25-50 Hz"]
 
 
-def test_the_shape_of_a_run_is_that_of_its_moments_and_its_power_that_of_its_spectrum() -> None:
+def test_features_are_the_moments_of_a_run_and_the_power_of_its_spectrum() -> None:
     rng = np.random.default_rng(1)
     run = 5.0 + 2.0 * rng.exponential(size=400)
     row = channel_features(["p"], [run[None]], 0.01, Recipe(2, octaves=1)).loc[0]

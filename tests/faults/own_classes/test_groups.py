@@ -5,7 +5,7 @@ from faults.own_classes.groups import contiguous_blocks, folds
 from plant.errors import HydrostateError
 
 
-def test_runs_in_turn_are_cut_into_contiguous_blocks() -> None:
+def test_runs_with_alternating_classes_are_cut_into_contiguous_blocks() -> None:
     places = np.arange(60) // 3 % 2
     blocks = contiguous_blocks(places, 5)
     assert (np.diff(blocks) >= 0).all()
@@ -19,7 +19,7 @@ def test_runs_sorted_by_class_are_cut_class_by_class() -> None:
     assert [len(held) for held in folds(places, None, 5)] == [14] * 5
 
 
-def test_no_group_is_on_both_sides_and_every_run_is_held_back_once() -> None:
+def test_no_group_is_split_across_folds_and_every_run_is_held_out_once() -> None:
     rng = np.random.default_rng(0)
     places, groups = rng.integers(0, 3, 300), rng.integers(0, 23, 300)
     seen = np.zeros(300, dtype=int)
@@ -37,6 +37,6 @@ def test_groups_of_one_class_each_are_spread_over_folds() -> None:
 
 
 @pytest.mark.parametrize(("groups", "message"), [([1] * 10, "two groups at least"), ([1, 2], "a group for each of 10")])
-def test_groups_that_do_not_fit_are_refused(groups: list[int], message: str) -> None:
+def test_a_single_group_or_a_wrong_number_of_group_labels_is_refused(groups: list[int], message: str) -> None:
     with pytest.raises(HydrostateError, match=message):
         folds(np.arange(10) % 2, groups, 5)

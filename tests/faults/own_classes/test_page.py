@@ -9,7 +9,7 @@ import pytest
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "own-classes.md"
 
 
-def test_every_block_of_the_page_runs_and_what_it_claims_holds(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_code_block_of_the_page_runs_and_its_assertions_hold(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra learn)")
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
     assert len(blocks) > 4

@@ -5,7 +5,7 @@ from faults.own_classes.calibration import Calibration, calibrated
 from faults.own_classes.verdicts import Verdicts
 
 
-def test_balanced_accuracy_weighs_classes_alike() -> None:
+def test_balanced_accuracy_weights_classes_equally() -> None:
     probabilities = np.array([[1.0, 0.0]] * 8 + [[0.4, 0.6], [0.7, 0.3]])
     verdicts = Verdicts(("sound", "worn"), np.array([0] * 8 + [1, 1]), probabilities, np.ones(10))
     assert verdicts.balanced_accuracy == pytest.approx(0.75)
@@ -13,7 +13,7 @@ def test_balanced_accuracy_weighs_classes_alike() -> None:
     assert verdicts.confusion.loc["worn"].tolist() == [1, 1]
 
 
-def test_claims_that_hold_have_no_calibration_error_and_others_have() -> None:
+def test_the_calibration_error_is_zero_for_correct_probabilities_only() -> None:
     right = np.array([0] * 8 + [1] * 2)
     claimed = np.tile([0.8, 0.2], (10, 1))
     assert Verdicts(("a", "b"), right, claimed, np.ones(10)).calibration_error == pytest.approx(0.0)
@@ -22,7 +22,7 @@ def test_claims_that_hold_have_no_calibration_error_and_others_have() -> None:
     assert bold.reliability().iloc[0].tolist() == pytest.approx([1.0, 0.8, 10])
 
 
-def test_scores_that_are_too_sure_are_brought_back_to_what_is_right() -> None:
+def test_calibration_corrects_overconfident_scores() -> None:
     rng = np.random.default_rng(0)
     truth = rng.uniform(-4.0, 4.0, 4000)
     true = (rng.uniform(size=4000) < 1.0 / (1.0 + np.exp(-truth))).astype(np.int64)
@@ -32,7 +32,7 @@ def test_scores_that_are_too_sure_are_brought_back_to_what_is_right() -> None:
     assert found.spread < 0.02
 
 
-def test_learnt_classes_add_up_to_those_that_are_reported_and_missing_ones_to_nothing() -> None:
+def test_learnt_classes_are_summed_into_reported_ones_and_missing_ones_count_zero() -> None:
     scores = np.log(np.array([[0.2, 0.3, 0.5], [0.1, 0.9, 1.0]]))
     scores[1, 2] = -np.inf
     found = Calibration().probabilities(scores, np.array([0, 1, 0]))

@@ -30,7 +30,7 @@ def log_of(p: PiezoStackParameters, seed: int = 1) -> Record:
     return simulate_stack(p, DRIVE, SAMPLE_TIME, sensors=BENCH_SENSORS, rng=np.random.default_rng(seed))
 
 
-def test_a_condition_is_named() -> None:
+def test_a_condition_is_named_with_advice() -> None:
     name = "major_leakage_minor_friction"
     found = diagnose_stack(log_of(stack_in_condition(HEALTHY, name)), HEALTHY)
     assert (found.condition, found.faults, found.gate.reasons) == (name, (), ())
@@ -63,7 +63,7 @@ def test_every_other_fault_is_named_with_its_size(fault: str, said: str, code: S
 
 
 @pytest.mark.slow
-def test_another_actuator_is_warned_of_and_diagnosed_once_calibrated() -> None:
+def test_another_actuator_has_objections_and_is_diagnosed_after_calibration() -> None:
     assert diagnose_stack(log_of(OTHER), HEALTHY).gate.reasons
     calibrated = calibrated_stack(log_of(OTHER), HEALTHY)
     assert calibrated.delivery_length == pytest.approx(OTHER.delivery_length, rel=0.01)
@@ -72,7 +72,7 @@ def test_another_actuator_is_warned_of_and_diagnosed_once_calibrated() -> None:
         assert (found.condition, found.gate.reasons) == (name, ())
 
 
-def test_a_drive_that_is_logged_too_small_shows_as_a_stroke_that_no_stack_has() -> None:
+def test_a_drive_logged_too_small_is_named_as_a_stroke_beyond_the_rig_file() -> None:
     log = log_of(HEALTHY)
     found = diagnose_stack(log.replace(drive_voltage_v=0.93 * log["drive_voltage_v"]), HEALTHY)
     (fault,), (advice,) = found.faults, found.advice
@@ -81,7 +81,7 @@ def test_a_drive_that_is_logged_too_small_shows_as_a_stroke_that_no_stack_has() 
 
 
 @pytest.mark.slow
-def test_the_one_channel_that_disagrees_is_named_and_no_fault() -> None:
+def test_a_single_disagreeing_channel_is_named_without_a_fault() -> None:
     log = log_of(HEALTHY)
     for name in ("stack_displacement_m", "stack_force_n"):
         found = diagnose_stack(log.replace(**{name: 1.05 * log[name]}), HEALTHY)

@@ -25,6 +25,6 @@ def test_flow_falls_with_the_level_of_leakage_and_friction(axis: str) -> None:
     assert flows[2] < 0.75 * flows[0]
 
 
-def test_an_unknown_fault_is_refused_with_those_that_are_known() -> None:
+def test_an_unknown_fault_is_refused_with_a_list_of_known_ones() -> None:
     with pytest.raises(HydrostateError, match=r"must be one of normal, .*bias_lost, got 'rust'"):
         stack_with_fault(HEALTHY, "rust")

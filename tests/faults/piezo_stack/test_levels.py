@@ -33,7 +33,7 @@ def found(name: str, value: float, deviation: float) -> Any:
         ),
     ],
 )
-def test_a_fault_is_said_where_it_is_large_and_sure(
+def test_a_fault_is_reported_only_if_it_is_large_and_certain(
     name: str, healthy: float, faulty: float, code: StackFaultCode
 ) -> None:
     base = 1.0 if name == "polarisation" else getattr(HEALTHY, name)
@@ -45,14 +45,14 @@ def test_a_fault_is_said_where_it_is_large_and_sure(
     assert note.code == code
 
 
-def test_a_level_is_the_nearest_and_none_where_deviations_span_half_a_step() -> None:
+def test_the_nearest_level_is_given_unless_the_deviation_is_too_large() -> None:
     levels = {"none": 0.0, "minor": 2.0, "major": 6.0}
     for value, level in ((10.9, "none"), (11.1, "minor"), (13.9, "minor"), (14.1, "major")):
         assert _level(found("q", value, 0.49), "q", 10.0, levels) == level
     assert _level(found("q", 12.0, 0.51), "q", 10.0, levels) is None
 
 
-def test_a_gap_below_a_reed_is_a_fault_by_what_it_opened_since_the_actuator_was_healthy() -> None:
+def test_a_reed_gap_is_a_fault_by_its_increase_over_the_healthy_gap() -> None:
     healthy = replace(HEALTHY, inlet_reed_gap=3e-6)
     assert _fault("inlet_reed_gap", found("inlet_reed_gap", 7e-6, 1e-8), healthy) is None
     note = _fault("inlet_reed_gap", found("inlet_reed_gap", 9e-6, 1e-8), healthy)

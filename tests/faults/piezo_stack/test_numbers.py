@@ -106,5 +106,5 @@ def a_run_that_is_diagnosed() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)
-def test_numbers_stand(case: str) -> None:
+def test_kept_numbers_are_unchanged(case: str) -> None:
     NUMBERS.check(case)

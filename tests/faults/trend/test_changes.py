@@ -8,7 +8,7 @@ from faults.trend.kalman import settings
 
 
 @pytest.mark.parametrize("length", range(FEWEST, LATEST + 1))
-def test_large_jumps_are_those_that_a_plain_loop_finds(length: int) -> None:
+def test_jumps_agree_with_a_plain_loop(length: int) -> None:
     rng = np.random.default_rng(length)
     values, stds = rng.standard_normal(40) + 12.0 * (np.arange(40) > 20), np.full(40, 0.3)
     expected = np.zeros(40, dtype=bool)
@@ -26,13 +26,13 @@ def test_a_series_of_few_logs_has_no_jump() -> None:
     assert not jumps(np.array([0.0, 9.0, 0.0]), np.ones(3), FEWEST).any()
 
 
-def test_a_jump_is_known_a_few_logs_later_and_not_before() -> None:
+def test_a_jump_is_detected_a_few_logs_later_and_not_before() -> None:
     values = np.where(np.arange(20) < 10, 0.0, 1.0) + 0.01 * np.random.default_rng(1).standard_normal(20)
     begins = [begin for begin, _ in stretches(np.arange(20.0), values, np.full(20, 0.02), (), settings())]
     assert begins[11] == 0
     assert set(begins[10 + LATEST :]) == {10}
 
 
-def test_what_is_known_of_a_repair_begins_anew_at_once() -> None:
+def test_a_recorded_repair_starts_a_new_stretch_at_once() -> None:
     begins = [begin for begin, _ in stretches(np.arange(9.0), np.zeros(9), np.full(9, 0.02), (4,), settings())]
     assert begins == [0] * 4 + [4] * 5

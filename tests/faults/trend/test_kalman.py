@@ -40,7 +40,7 @@ def test_without_process_noise_the_filter_is_bayesian_regression_on_a_line() -> 
     assert last.evidence[0] == pytest.approx(said)
 
 
-def test_a_series_is_followed_as_log_by_log() -> None:
+def test_filtering_a_series_equals_filtering_log_by_log() -> None:
     grid, rng = settings(), np.random.default_rng(5)
     times, values = np.cumsum(rng.uniform(0.0, 3.0, 6)), np.array([0.0, 0.1, 0.0, 9.0, 0.1, 0.2])
     now, *rest = beliefs(times, values, np.full(6, 0.05), grid)
@@ -54,7 +54,7 @@ def test_a_series_is_followed_as_log_by_log() -> None:
     assert np.allclose(plainly[-1].mean, now.mean, rtol=1e-12, atol=0.0)
 
 
-def test_two_steps_are_one_step_of_twice_the_time() -> None:
+def test_two_prediction_steps_equal_one_of_their_total_time() -> None:
     grid = settings()
     now = next_belief(first_belief(grid), 0.0, 0.1, 0.05, grid)
     once, twice = predict(now, 3.0, grid), predict(predict(now, 1.2, grid), 1.8, grid)
@@ -64,7 +64,7 @@ def test_two_steps_are_one_step_of_twice_the_time() -> None:
 
 @pytest.mark.parametrize("pace", [0.0, 1e-6, *PACES, 0.7])
 @pytest.mark.parametrize("step", [0.5, 1.0, 8.0])
-def test_a_slope_that_feeds_on_itself_moves_as_its_equation_says(step: float, pace: float) -> None:
+def test_exponential_growth_follows_its_differential_equation(step: float, pace: float) -> None:
     rates = np.array([[0.0, 1.0], [0.0, pace]])
 
     def brought(after: float) -> Array:  # covariance from noise on the slope some time ago
@@ -77,7 +77,7 @@ def test_a_slope_that_feeds_on_itself_moves_as_its_equation_says(step: float, pa
     assert covariance == pytest.approx(quad_vec(brought, 0.0, step)[0], rel=1e-4 if pace * step < 1e-4 else 1e-6)
 
 
-def test_exponential_growth_is_followed_without_noise() -> None:
+def test_noise_free_exponential_growth_is_extrapolated() -> None:
     grid = one_setting(pace=0.1, slope=0.03)
     times = np.arange(40.0)
     level = 0.02 * np.expm1(0.1 * times)
@@ -87,7 +87,7 @@ def test_exponential_growth_is_followed_without_noise() -> None:
     assert later.mean[0, 1] == pytest.approx(0.002 * np.exp(0.1 * 54.0), rel=1e-3)
 
 
-def test_each_way_of_growing_has_the_same_share_of_the_prior() -> None:
+def test_each_kind_of_growth_has_the_same_prior_probability() -> None:
     grid = settings()
     weights = first_belief(grid).weights(grid)
     curved, bent = grid.curvature > 0.0, (grid.bend > 0.0) & (grid.pace == 0.0)
@@ -121,7 +121,7 @@ def test_a_log_with_a_larger_deviation_counts_less() -> None:
     assert moves[0] > 2.0 * moves[1] > 0.0
 
 
-def test_growth_is_more_probable_with_a_slope_and_rest_is_not() -> None:
+def test_evidence_of_growth_is_positive_for_a_slope_and_negative_at_rest() -> None:
     grid, times, stds = settings(), np.arange(40.0), np.full(40, 0.03)
     noise = 0.03 * np.random.default_rng(3).standard_normal(40)
     *_, growing = beliefs(times, 0.02 * times + noise, stds, grid)
@@ -131,7 +131,7 @@ def test_growth_is_more_probable_with_a_slope_and_rest_is_not() -> None:
 
 
 @pytest.mark.parametrize("shared", [-1e4, 0.0, 1e4])
-def test_what_all_settings_explain_alike_weighs_for_none(shared: float) -> None:
+def test_evidence_common_to_all_settings_does_not_change_their_weights(shared: float) -> None:
     grid = settings()
     told = 3.0 * np.sin(np.arange(len(grid.slope)))
     now = first_belief(grid)
@@ -140,13 +140,13 @@ def test_what_all_settings_explain_alike_weighs_for_none(shared: float) -> None:
     assert found == pytest.approx(exact / exact.sum(), rel=1e-9)
 
 
-def test_weights_sum_to_one_and_half_of_the_prior_is_rest() -> None:
+def test_weights_sum_to_one_and_half_of_the_prior_is_without_growth() -> None:
     grid = settings()
     weights = first_belief(grid).weights(grid)
     assert weights.sum() == pytest.approx(1.0)
     assert weights[grid.growing].sum() == pytest.approx(0.5)
 
 
-def test_before_any_log_there_is_one_belief() -> None:
+def test_a_series_without_logs_has_only_the_prior_belief() -> None:
     none = np.empty(0)
     assert len(beliefs(none, none, none, settings())) == 1

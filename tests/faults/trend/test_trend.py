@@ -23,7 +23,7 @@ def series_of(truth: Array, std: float = 0.04, seed: int = 0) -> Series:
 
 
 @pytest.mark.parametrize("rate", [0.33, 0.5, 1.0])
-def test_growth_that_takes_a_few_logs_to_the_limit_is_followed_and_is_no_jump(rate: float) -> None:
+def test_growth_to_the_limit_within_a_few_logs_is_followed_and_not_taken_for_a_jump(rate: float) -> None:
     truth = growth(8, rate)
     for seed in range(3):
         found = last_trend(series_of(truth, std=0.02, seed=seed))
@@ -42,14 +42,14 @@ def scaled_by(series: Series, size: float, healthy: float, stretch: float) -> Se
     )
 
 
-def test_level_and_growth_of_a_steady_actuator_come_back() -> None:
+def test_level_and_growth_rate_of_a_steadily_growing_fault_are_estimated() -> None:
     found = last_trend(series_of(growth()))
     (level, level_std), (rate, rate_std) = found.level, found.growth
     assert abs(level - 0.78) < 3.0 * level_std < 0.15
     assert abs(rate - 0.02) < 3.0 * rate_std < 0.03
 
 
-def test_the_forecast_holds_the_crossing_and_its_intervals_are_nested() -> None:
+def test_the_forecast_contains_the_crossing_and_its_intervals_are_nested() -> None:
     found = last_trend(series_of(growth()))
     assert found.crossing is not None
     least, low, middle, high, most = found.crossing.quantiles
@@ -59,7 +59,9 @@ def test_the_forecast_holds_the_crossing_and_its_intervals_are_nested() -> None:
 
 
 @pytest.mark.parametrize(("size", "healthy", "stretch"), [(-4.1e7, 2.07e8, 7.0), (2.5, 1.1, 0.1)])
-def test_units_and_falling_severities_change_nothing(size: float, healthy: float, stretch: float) -> None:
+def test_the_forecast_does_not_depend_on_units_or_on_the_sign_of_a_severity(
+    size: float, healthy: float, stretch: float
+) -> None:
     plain = series_of(growth())
     one, other = last_trend(plain), last_trend(scaled_by(plain, size, healthy, stretch))
     assert one.crossing is not None
@@ -78,18 +80,18 @@ def test_a_growing_actuator_raises_an_alarm_well_before_its_limit() -> None:
     assert all(place is not None and place <= 40 for place in places)
 
 
-def test_a_resting_actuator_raises_none_though_one_log_is_grossly_wrong() -> None:
+def test_a_steady_actuator_raises_no_alarm_even_with_one_grossly_wrong_log() -> None:
     for seed in range(5):
         series = series_of(np.zeros(60), seed=seed)
         series.values[30] += 1.5
         assert first_alarm(series) is None
 
 
-def test_an_actuator_that_began_past_its_limit_is_in_alarm_from_the_first_forecast() -> None:
+def test_an_actuator_beyond_its_limit_from_the_start_is_in_alarm_at_the_first_forecast() -> None:
     assert first_alarm(series_of(np.full(10, 1.5))) == 3
 
 
-def test_a_jump_begins_a_new_stretch_and_is_no_growth() -> None:
+def test_a_jump_starts_a_new_stretch_and_is_not_taken_for_growth() -> None:
     truth = np.where(np.arange(40) < 25, 0.1, 0.6)
     found = last_trend(series_of(truth, std=0.02))
     assert 24 <= found.begin <= 26
@@ -101,7 +103,7 @@ def test_steady_growth_is_one_stretch() -> None:
     assert [last_trend(series_of(growth(60), seed=seed)).begin for seed in range(5)] == [0] * 5
 
 
-def test_a_repair_resets_the_trend_even_where_it_makes_no_jump() -> None:
+def test_a_repair_resets_the_trend_even_without_a_jump() -> None:
     truth = np.concatenate([growth(30, 0.01), np.full(15, 0.29)])
     series = series_of(truth)
     found = last_trend(replace(series, maintained=(29.5, 99.0)))
@@ -109,12 +111,12 @@ def test_a_repair_resets_the_trend_even_where_it_makes_no_jump() -> None:
     assert not found.alarm
 
 
-def test_before_a_few_logs_nothing_is_forecast() -> None:
+def test_the_first_three_logs_have_no_forecast() -> None:
     found = [*trends(series_of(growth(6)))]
     assert [one.crossing is None for one in found] == [True] * 3 + [False] * 3
 
 
-def test_what_is_said_after_a_log_does_not_depend_on_later_logs() -> None:
+def test_the_trend_after_a_log_does_not_depend_on_later_logs() -> None:
     series = series_of(growth(30))
     early = Series(series.times[:20], series.values[:20], series.stds[:20], 0.0, 1.0)
 
@@ -137,20 +139,20 @@ def test_a_known_slope_without_noise_crosses_at_a_known_time() -> None:
     assert crossing(late, grid, np.random.default_rng(0)).within(HORIZON) == 0.0
 
 
-def test_a_constant_curvature_crosses_where_the_parabola_does() -> None:
+def test_constant_curvature_crosses_the_limit_with_its_parabola() -> None:
     grid = one_setting(slope=1e-9)
     belief = replace(first_belief(grid), mean=np.array([[0.0, 0.0, 0.02]]), covariance=np.zeros((1, 3, 3)))
     assert crossing(belief, grid, np.random.default_rng(0)).quantiles[2] == pytest.approx(10.0)
 
 
-def test_exponential_growth_crosses_where_its_exponential_does() -> None:
+def test_exponential_growth_crosses_the_limit_with_its_exponential() -> None:
     grid = one_setting(pace=0.05, slope=1e-9)
     belief = replace(first_belief(grid), mean=np.array([[0.1, 0.01, 0.0]]), covariance=np.zeros((1, 3, 3)))
     expected = np.log1p(0.9 * 0.05 / 0.01) / 0.05  # solves 0.1 + 0.01 expm1(0.05 t) / 0.05 = 1
     assert crossing(belief, grid, np.random.default_rng(0)).quantiles == pytest.approx([expected] * 5, abs=0.02)
 
 
-def test_futures_of_exponential_growth_scatter_as_its_noise_says() -> None:
+def test_forecasts_of_exponential_growth_scatter_according_to_its_process_noise() -> None:
     grid = one_setting(pace=0.1, slope=1e-9, bend=0.004)
     belief = replace(first_belief(grid), mean=np.array([[0.0, 0.02, 0.0]]), covariance=np.zeros((1, 3, 3)))
     rise, spread = exponential_growth(20.0, 0.1)
@@ -164,7 +166,7 @@ def test_futures_of_exponential_growth_scatter_as_its_noise_says() -> None:
     [{"times": np.array([1.0, 0.0])}, {"limit": 0.0}, {"values": np.empty(0)}],
     ids=["order", "limit", "empty"],
 )
-def test_a_series_that_cannot_be_followed_is_refused(changes: dict[str, object]) -> None:
+def test_an_unordered_or_empty_series_or_one_without_a_limit_is_refused(changes: dict[str, object]) -> None:
     good = Series(np.arange(2.0), np.zeros(2), np.ones(2), 0.0, 1.0)
     with pytest.raises(ValueError, match="a series needs logs in the order of time"):
         replace(good, **changes)  # pyright: ignore[reportArgumentType]

@@ -39,11 +39,11 @@ def learnt(balance: str) -> Array:
 
 
 @pytest.mark.parametrize("balance", ["flow", "force", "motion"])
-def test_a_balance_finds_the_law_that_made_its_series(balance: str) -> None:
+def test_a_balance_recovers_the_law_that_made_its_series(balance: str) -> None:
     assert learnt(balance) == pytest.approx(LAW, abs=1e-5)
 
 
-def test_what_was_learnt_fades_and_the_miss_is_that_of_the_coefficients_so_far() -> None:
+def test_old_samples_fade_and_the_residual_is_that_of_the_current_coefficients() -> None:
     rng, fade = np.random.default_rng(5), 0.9
     rows, targets = rng.standard_normal((6, FEATURES)), rng.standard_normal(6)
     information, moment = np.zeros((1, FEATURES, FEATURES)), np.zeros((1, FEATURES))
@@ -56,7 +56,7 @@ def test_what_was_learnt_fades_and_the_miss_is_that_of_the_coefficients_so_far()
     assert moment[0] == pytest.approx(rows.T @ (weights * targets))
 
 
-def test_the_normal_equations_are_solved_with_the_ridge_that_is_named() -> None:
+def test_the_normal_equations_are_solved_with_a_small_ridge() -> None:
     rng = np.random.default_rng(6)
     rows = rng.standard_normal((50, FEATURES))
     rows[:, 7] = rows[:, 6]  # two features that cannot be separated
@@ -67,14 +67,14 @@ def test_the_normal_equations_are_solved_with_the_ridge_that_is_named() -> None:
     assert found == pytest.approx(np.linalg.solve(information + ridge, moment), rel=1e-5)
 
 
-def test_what_was_never_excited_stays_at_zero() -> None:
+def test_the_coefficient_of_an_unexcited_feature_is_zero() -> None:
     information, moment = np.diag([2.0] * 7 + [0.0]), np.array([1.0] * 7 + [0.0])
     found = np.full(FEATURES, np.nan)
     solve(information, moment, found, np.zeros((FEATURES, FEATURES)))
     assert found == pytest.approx([0.5] * 7 + [0.0], rel=1e-7)
 
 
-def test_gains_weigh_lost_flow_with_pressure_and_pressure_with_velocity() -> None:
+def test_gains_correlate_lost_flow_with_pressure_and_pressure_with_velocity() -> None:
     gains = np.zeros((3, GAINS))
     rng = np.random.default_rng(7)
     velocity, pressure = rng.standard_normal((2, 20))

@@ -8,7 +8,7 @@ import pytest
 from faults.watch.cusum import PEAK, SUM, accumulate, threshold
 
 
-def test_the_sum_is_the_largest_that_any_beginning_gives() -> None:
+def test_the_cusum_is_the_largest_sum_over_all_starting_points() -> None:
     rises = np.random.default_rng(1).standard_normal(300)
     score, peaks, width = np.zeros(4), np.zeros(400), 0.02
     sums: list[float] = []
@@ -25,7 +25,7 @@ def test_the_sum_is_the_largest_that_any_beginning_gives() -> None:
     assert peaks.sum() == len(heights)
 
 
-def test_a_peak_above_all_levels_counts_in_the_last() -> None:
+def test_a_peak_above_all_levels_counts_in_the_highest_level() -> None:
     score, peaks = np.zeros(4), np.zeros(10)
     for u in (9.0, -20.0):
         accumulate(score, peaks, u, 0.5, 0.02)
@@ -54,7 +54,7 @@ def test_a_stream_without_peaks_has_no_threshold() -> None:
     assert threshold(np.zeros(50), 0.0, WIDTH, 0.1) == math.inf
 
 
-def test_where_more_may_pass_than_did_the_threshold_is_the_lowest_level_that_counts() -> None:
+def test_the_threshold_is_the_lowest_peak_if_more_alarms_are_allowed_than_there_are_peaks() -> None:
     peaks = np.zeros(50)
     peaks[[10, 30]] = 15.0
     assert threshold(peaks, 0.0, WIDTH, 100.0) == pytest.approx(10 * WIDTH)

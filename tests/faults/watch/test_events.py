@@ -12,7 +12,7 @@ def test_the_change_time_is_the_start_of_the_raised_scores() -> None:
     assert least <= 12 <= most
 
 
-def test_the_change_time_is_the_most_likely_one_and_its_interval_holds_what_is_nearly_as_likely() -> None:
+def test_the_change_time_maximizes_the_likelihood_and_its_interval_contains_similar_ones() -> None:
     scores = np.random.default_rng(3).standard_normal(60)
     scores[:9] += 1.5
     gains = []
@@ -26,5 +26,5 @@ def test_the_change_time_is_the_most_likely_one_and_its_interval_holds_what_is_n
     assert most > least
 
 
-def test_an_interval_of_95_percent_ends_where_chi_square_says() -> None:
+def test_the_limit_of_the_95_percent_interval_follows_from_chi_square() -> None:
     assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == LIKELY

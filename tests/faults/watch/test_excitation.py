@@ -14,7 +14,7 @@ from faults.watch.excitation import (
 )
 
 
-def test_steady_motion_is_the_first_octave_and_reversals_are_higher() -> None:
+def test_steady_motion_is_in_the_first_octave_and_reversals_are_in_higher_ones() -> None:
     assert excitation_octave(0.0) == 0
     assert excitation_octave(0.9 * STILL) == 0
     assert excitation_octave(4.0) == 11
@@ -31,7 +31,7 @@ def test_scores_of_a_class_have_mean_zero_and_deviation_one() -> None:
     assert usual[VARIANCE] == pytest.approx(0.09, rel=0.3)
 
 
-def test_a_class_is_learnt_before_it_is_judged_and_no_block_decides() -> None:
+def test_a_class_is_learnt_before_it_is_scored_and_the_score_of_a_block_is_limited() -> None:
     usual = np.zeros(3)
     values = [0.0, 0.1] * int(LEAST_BLOCKS)
     scores = [standardise(value, 300.0, True, usual) for value in values]
@@ -42,7 +42,7 @@ def test_a_class_is_learnt_before_it_is_judged_and_no_block_decides() -> None:
     assert usual[COUNT] == len(values) + 2
 
 
-def test_moments_are_those_of_all_so_far_and_then_fade() -> None:
+def test_moments_weight_all_values_equally_and_fade_beyond_the_memory() -> None:
     values, memory = 3.0 + 2.0 * np.random.default_rng(2).standard_normal(60), 20.0
     usual = np.zeros(3)
     for n, value in enumerate(values, 1):

@@ -7,7 +7,7 @@ ENDS = 10.0 * np.arange(1, 201)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_slope_is_dated_where_it_begins(seed: int) -> None:
+def test_growth_is_dated_to_the_start_of_its_slope(seed: int) -> None:
     noise = 0.002 * np.random.default_rng(seed).standard_normal(len(ENDS))
     since, (low, high) = growth_time(0.07 + 1e-4 * np.maximum(ENDS - 1000.0, 0.0) + noise, ENDS)
     assert since == pytest.approx(1000.0, abs=60.0)
@@ -22,7 +22,7 @@ def test_a_jump_is_dated_to_its_span() -> None:
     assert interval == pytest.approx((1930.0 - 5.0, 1970.0 + 5.0))
 
 
-def test_the_interval_is_wider_beside_oil_that_drifts() -> None:
+def test_drifting_oil_widens_the_interval_of_the_growth_time() -> None:
     rise = 0.07 + 1e-4 * np.maximum(ENDS - 1000.0, 0.0)
     white = 0.002 * np.random.default_rng(3).standard_normal(len(ENDS))
     drift = 0.002 * np.sin(ENDS / 60.0) * np.sqrt(2.0)
@@ -30,7 +30,7 @@ def test_the_interval_is_wider_beside_oil_that_drifts() -> None:
     assert widths[1] > 1.2 * widths[0]
 
 
-def test_however_slowly_oil_drifts_the_interval_has_an_end() -> None:
+def test_slowly_drifting_oil_leaves_a_bounded_interval_of_the_growth_time() -> None:
     rise = 0.07 + 3e-4 * np.maximum(ENDS - 1000.0, 0.0)
     since, (low, high) = growth_time(rise + 0.01 * np.sin(ENDS / 200.0), ENDS)
     assert low < 1000.0 < high
@@ -38,5 +38,5 @@ def test_however_slowly_oil_drifts_the_interval_has_an_end() -> None:
     assert high - since < 200.0
 
 
-def test_too_few_levels_are_dated_no_closer_than_they_reach() -> None:
+def test_the_growth_time_of_two_levels_has_the_interval_that_they_span() -> None:
     assert growth_time(np.array([0.1, 0.4]), np.array([10.0, 20.0])) == (10.0, (10.0, 20.0))

@@ -30,7 +30,7 @@ def watched(samples: np.ndarray, T: float, *, pressure: bool) -> list[Event]:
 
 
 @pytest.mark.parametrize(("pressure", "T"), [(True, 2e-2), (False, 1e-2)])
-def test_plain_python_and_the_compiled_kernel_say_the_same(
+def test_plain_python_and_the_compiled_kernel_give_the_same_events(
     monkeypatch: pytest.MonkeyPatch, pressure: bool, T: float
 ) -> None:
     samples = reversals(65.0, 62.0, T)

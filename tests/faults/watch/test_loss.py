@@ -61,7 +61,7 @@ def first_alarm(shares: np.ndarray, others: np.ndarray | None = None) -> int | N
 
 @pytest.mark.parametrize("size", [0.05, 1.0, 30.0])
 @pytest.mark.parametrize("place", [FAST, LIVELY])
-def test_a_drive_is_like_the_learnt_one_by_the_ratio_to_it(place: int, size: float) -> None:
+def test_a_drive_is_like_the_learnt_one_within_a_limiting_ratio(place: int, size: float) -> None:
     loss = np.zeros(SEEN + 1)
     loss[SPANS] = loss[WANTED] = SPANS_LEARNT
     loss[FAST] = loss[LIVELY] = size
@@ -77,25 +77,25 @@ def test_oil_that_thins_by_almost_half_raises_no_alarm_in_a_day() -> None:
     assert first_alarm(warming) is None
 
 
-def test_a_leak_that_grows_as_slowly_is_found_once_it_has_doubled_what_is_lost() -> None:
+def test_a_leak_that_grows_as_slowly_raises_an_alarm_once_it_has_doubled_the_loss() -> None:
     found = first_alarm(USUAL * (1.0 + np.arange(360) / 90.0))
     assert found is not None
     assert 90 < found < 112
 
 
-def test_one_span_and_two_decide_nothing() -> None:
+def test_one_or_two_spans_raise_no_alarm() -> None:
     assert first_alarm(np.array([1.0, 1.0, *[USUAL] * 300])) is None
     assert first_alarm(np.full(5, 1.0)) == np.ceil(loss_threshold(1e-4) / (LARGEST - 0.5)) - 1
 
 
-def test_what_is_lost_more_over_one_of_the_two_alone_is_no_leak() -> None:
+def test_a_higher_loss_in_only_one_of_two_measures_is_not_a_leak() -> None:
     high, usual = np.full(300, 4.0 * USUAL), np.full(300, USUAL)
     assert first_alarm(high, usual) is None
     assert first_alarm(usual, high) is None
     assert first_alarm(high, high) is not None
 
 
-def test_after_an_alarm_the_loss_of_then_is_usual() -> None:
+def test_after_an_alarm_the_new_loss_is_learnt_as_usual() -> None:
     loss, levels = learnt(np.random.default_rng(2))
     learn_loss_again(loss)
     assert not any(judge_loss(span(0.4), float(now), loss, levels) for now in range(200))
@@ -103,7 +103,7 @@ def test_after_an_alarm_the_loss_of_then_is_usual() -> None:
     assert loss[SPANS] == LEARNT
 
 
-def test_a_jump_does_not_widen_the_known_spread_for_good() -> None:
+def test_a_jump_of_the_loss_hardly_widens_the_learnt_spread() -> None:
     loss, levels = learnt(np.random.default_rng(3))
     loss[KNOWN] = 100.0
     before = loss.copy()
@@ -113,7 +113,7 @@ def test_a_jump_does_not_widen_the_known_spread_for_good() -> None:
     assert loss[9] < 1.1 * before[9]
 
 
-def test_the_threshold_is_passed_at_the_rate_asked_for() -> None:
+def test_white_noise_exceeds_the_loss_threshold_at_the_requested_rate() -> None:
     rng, expected = np.random.default_rng(4), 0.01
     limit, sums, passed, spans = loss_threshold(expected), np.zeros(2000), 0, 1500
     for _ in range(spans):
@@ -123,7 +123,7 @@ def test_the_threshold_is_passed_at_the_rate_asked_for() -> None:
     assert passed / (2000 * spans) == pytest.approx(expected, rel=0.1)
 
 
-def test_oil_that_is_squeezed_is_not_lost() -> None:
+def test_compression_of_oil_does_not_count_as_lost_flow() -> None:
     work, told = np.zeros(5), np.zeros(6)
     phase = 2.0 * np.pi * np.arange(2000) / 100.0
     for w, p, rate in zip(np.sin(phase), np.sin(phase + 0.6), np.cos(phase + 0.6), strict=True):
@@ -133,7 +133,7 @@ def test_oil_that_is_squeezed_is_not_lost() -> None:
     assert told[2] * told[1] == pytest.approx(told[0], rel=1e-9)
 
 
-def test_rest_tells_nothing() -> None:
+def test_a_span_at_rest_gives_no_valid_measurement() -> None:
     told = np.ones(6)
     measure_work(np.zeros(5), told)
     assert told[3] == 0.0
@@ -160,7 +160,7 @@ def lagging(speed: np.ndarray, lost: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.05, 0.3])
-def test_lost_speed_is_told_from_lag(lost: float) -> None:
+def test_random_reversals_distinguish_lost_speed_from_lag(lost: float) -> None:
     reversals = np.repeat(np.random.default_rng(5).choice((-1.0, 1.0), 200), 10)
     told = lagging(reversals, lost)
     assert told[3] == 1.0
@@ -168,11 +168,11 @@ def test_lost_speed_is_told_from_lag(lost: float) -> None:
     assert told[2] * told[1] == pytest.approx(lost, abs=1e-3)
 
 
-def test_a_sine_does_not_tell_lost_speed_from_lag() -> None:
+def test_a_sine_does_not_distinguish_lost_speed_from_lag() -> None:
     assert lagging(np.sin(2.0 * np.pi * np.arange(2000) / 200.0), 0.2)[3] == 0.0
 
 
-def test_another_drive_is_left_out_and_learnt_when_it_stays() -> None:
+def test_another_drive_is_left_out_and_learnt_if_it_persists() -> None:
     loss, _ = learnt(np.random.default_rng(6))
     other = span(0.5)
     other[5] = 1.1 * ALIKE
@@ -186,7 +186,7 @@ def test_another_drive_is_left_out_and_learnt_when_it_stays() -> None:
 
 
 @pytest.mark.parametrize("known", [LEAST_LEARNT - 1.0, LEAST_LEARNT])
-def test_a_span_is_scored_by_its_distance_from_what_warm_oil_explains_over_its_deviation(known: float) -> None:
+def test_the_score_of_a_span_is_its_excess_over_warm_oil_in_standard_deviations(known: float) -> None:
     loss, levels = np.zeros(SEEN + 1), np.zeros((4, 2))
     state = {SPANS: 12.0, WANTED: 12.0, SHARE: 0.08, RATIO: 1.0, SPREAD: 4e-4, KNOWN: known, SEEN: 20.0, LAST: 0.08}
     for place, value in {**state, RISEN: 0.5, LIMIT: 7.0}.items():
@@ -204,13 +204,13 @@ def test_a_span_is_scored_by_its_distance_from_what_warm_oil_explains_over_its_d
     assert (loss[LAST], loss[SEEN], loss[KNOWN]) == (0.2, 21.0, known + 1.0)
 
 
-def test_a_span_at_rest_leaves_what_the_last_one_told() -> None:
+def test_a_span_at_rest_keeps_the_values_of_the_last_one() -> None:
     told = np.array([0.1, 0.2, 0.3, 1.0, 0.4, 0.5])
     measure_lag(np.zeros((DELAYS + 2, DELAYS + 2)), np.zeros(DELAYS + 2), told)
     assert told.tolist() == [0.1, 0.2, 0.3, 0.0, 0.4, 0.5]
 
 
-def test_a_drive_of_hardly_any_power_tells_lost_speed_as_well() -> None:
+def test_lost_speed_is_measured_even_with_a_drive_of_small_amplitude() -> None:
     reversals = 0.01 * np.repeat(np.random.default_rng(5).choice((-1.0, 1.0), 200), 10)
     told = lagging(reversals, 0.05)
     assert told[3] == 1.0

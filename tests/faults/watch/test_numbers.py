@@ -310,5 +310,5 @@ def samples_of_any_channels() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)
-def test_numbers_stand(case: str) -> None:
+def test_kept_numbers_are_unchanged(case: str) -> None:
     NUMBERS.check(case)

@@ -5,7 +5,7 @@ from faults.watch.samples import watched_samples
 from plant.errors import LogError
 
 
-def test_velocity_stands_in_for_position_and_two_pressures_for_their_difference() -> None:
+def test_velocity_replaces_position_and_two_pressures_their_difference() -> None:
     channels = {
         "motor_speed_rad_s": np.ones(3),
         "velocity_m_s": np.array([1.0, np.nan, 2.0]),
@@ -23,7 +23,7 @@ def test_a_log_without_motion_is_refused() -> None:
         watched_samples({"motor_speed_rad_s": np.zeros(3)}, 1e-3)
 
 
-def test_without_pressures_there_is_none_and_position_is_taken_as_it_is() -> None:
+def test_without_both_pressures_there_is_no_difference_and_position_is_unchanged() -> None:
     channels = {"motor_speed_rad_s": np.ones(3), "position_m": np.arange(3.0), "pressure_a_pa": np.full(3, 5.0)}
     samples, pressure = watched_samples(channels, 0.5)
     assert not pressure

@@ -24,7 +24,7 @@ def samples(seconds: float, leak_from: float) -> np.ndarray:
 
 # within a block of the learning phase, and between an alarm and its change
 @pytest.mark.parametrize("cut", [3_333, 18_100])
-def test_a_watch_continues_over_a_restart_to_the_last_bit(cut: int, tmp_path: Path) -> None:
+def test_a_watch_that_is_saved_and_resumed_gives_bit_identical_results(cut: int, tmp_path: Path) -> None:
     rows = samples(100.0, leak_from=90.0)
     whole, first = Watch(P, T, learning=60.0), Watch(P, T, learning=60.0)
     wanted, before = whole.take(rows), first.take(rows[:cut])
@@ -39,7 +39,7 @@ def test_a_watch_continues_over_a_restart_to_the_last_bit(cut: int, tmp_path: Pa
         np.testing.assert_array_equal(one, second.remembered()[name])
 
 
-def test_a_watch_of_other_settings_and_a_file_that_is_none_are_refused(tmp_path: Path) -> None:
+def test_a_state_of_other_settings_and_an_invalid_state_file_are_refused(tmp_path: Path) -> None:
     kept = Watch(P, T, learning=60.0).remembered()
     with pytest.raises(HydrostateError, match="can only continue one of the same rig"):
         Watch(P, T, learning=90.0).resume(kept)

@@ -49,13 +49,13 @@ def test_an_abrupt_leak_is_found_within_half_a_second_and_dated(leaking: np.ndar
     assert change.lost[1] - change.lost[0] > 0.15
 
 
-def test_a_sudden_leak_is_told_once() -> None:
+def test_a_sudden_leak_raises_one_alarm() -> None:
     """Before, the leak exceeded the loss learnt earlier, and raised `loss` as well some spans later."""
     events = Watch(P, T, learning=60.0).take(_run(leak_from=90.0, seconds=240.0))
     assert [event.balance for event in events if isinstance(event, Alarm)] == ["flow"]
 
 
-def test_a_load_that_doubles_does_not_hide_a_leak_that_grows() -> None:
+def test_a_doubled_load_does_not_hide_a_growing_leak() -> None:
     """Twice the pressure doubles the lost flow; before, that was taken for a leak and learnt, and `loss` never came."""
     count = round(800.0 / 5e-3)
     rng, time = np.random.default_rng(7), 5e-3 * np.arange(count)
@@ -71,7 +71,7 @@ def test_a_load_that_doubles_does_not_hide_a_leak_that_grows() -> None:
 
 
 @pytest.mark.parametrize("most", thinned([1, 7, 25000], [7, 25000]))
-def test_events_do_not_depend_on_how_samples_are_cut(leaking: np.ndarray, most: int) -> None:
+def test_events_do_not_depend_on_the_lengths_of_pieces(leaking: np.ndarray, most: int) -> None:
     watch = Watch(P, T, learning=60.0)
     # single samples are cut off only near events
     near = [k for k in range(most, len(leaking), most) if most > 1 or abs(T * k - 60.0) < 2.0 or T * k > 85.0]
@@ -84,7 +84,7 @@ def test_healthy_running_raises_no_alarm_in_a_minute_and_a_half() -> None:
     assert isinstance(event, Ready)
 
 
-def test_without_pressure_motion_alone_finds_the_leak(leaking: np.ndarray) -> None:
+def test_without_pressure_the_motion_balance_finds_the_leak(leaking: np.ndarray) -> None:
     blind = leaking.copy()
     blind[:, 2] = 0.0
     events = Watch(P, T, pressure=False, learning=60.0).take(blind)
@@ -101,7 +101,7 @@ def test_missing_samples_and_rest_raise_no_alarm() -> None:
     assert not [event for event in Watch(P, T, learning=60.0).take(samples) if isinstance(event, Alarm)]
 
 
-def test_an_interrupted_stream_is_learnt_again(leaking: np.ndarray) -> None:
+def test_an_interrupted_stream_must_be_learnt_again(leaking: np.ndarray) -> None:
     watch = Watch(P, T, learning=60.0)
     watch.take(leaking[:42000])
     watch.interrupt()
@@ -110,13 +110,13 @@ def test_an_interrupted_stream_is_learnt_again(leaking: np.ndarray) -> None:
     assert watch.last == pytest.approx(500.0 + T * (len(leaking) - 45000))
 
 
-def test_a_log_is_watched_like_its_samples(leaking: np.ndarray) -> None:
+def test_watching_a_log_gives_the_events_of_its_samples(leaking: np.ndarray) -> None:
     names = ("motor_speed_rad_s", "position_m", "differential_pressure_pa")
     record = Record(T, dict(zip(names, leaking.T, strict=True)))
     assert watch_record(record, P, learning=60.0) == Watch(P, T, learning=60.0).take(leaking)
 
 
-def test_the_threshold_of_exponential_peaks_is_passed_at_the_rate_asked_for() -> None:
+def test_exponential_peaks_exceed_the_threshold_at_the_requested_rate() -> None:
     rng, kernel, width = np.random.default_rng(1), watch_kernel(), 0.02
     passed = []
     for _ in range(1500):
@@ -127,7 +127,7 @@ def test_the_threshold_of_exponential_peaks_is_passed_at_the_rate_asked_for() ->
     assert np.mean(passed) == pytest.approx(0.3, rel=0.1)
 
 
-def test_the_threshold_is_higher_the_less_has_been_learnt() -> None:
+def test_the_threshold_is_higher_after_less_learning() -> None:
     kernel, once_in = watch_kernel(), 1e4
     levels = {}
     for count in (400, 40000):
@@ -151,7 +151,7 @@ def _slowly(most: float, seed: int = 7) -> np.ndarray:
 
 
 @pytest.mark.parametrize("pressure", [True, False])
-def test_leakage_that_grows_over_minutes_is_found_and_dated_and_warming_oil_is_not(pressure: bool) -> None:
+def test_leakage_that_grows_over_minutes_is_found_and_dated_and_warming_oil_raises_no_alarm(pressure: bool) -> None:
     watch = Watch(P, 5e-3, pressure=pressure, learning=60.0)
     events = watch.take(_slowly(0.4))
     alarms = [event for event in events if isinstance(event, Alarm) and event.balance == "loss"]
@@ -179,13 +179,13 @@ def test_leakage_that_grows_over_minutes_is_found_and_dated_and_warming_oil_is_n
         ({"learning": 10.0}, "learning must"),
     ],
 )
-def test_what_cannot_be_watched_is_refused(changes: dict[str, float], said: str) -> None:
+def test_invalid_settings_of_a_watch_are_refused(changes: dict[str, float], said: str) -> None:
     given = {"sample_time": T, **changes}
     with pytest.raises(HydrostateError, match=said):
         Watch(P, **given)
 
 
-def test_what_is_still_to_be_learnt_is_known_and_standing_still_teaches_nothing() -> None:
+def test_the_remaining_learning_time_falls_with_motion_and_not_at_rest() -> None:
     watch, moving = Watch(P, T, learning=60.0), _run(seconds=20.0, seed=3)
     watch.take(moving[:10])
     assert watch.unlearnt == pytest.approx(60.0)

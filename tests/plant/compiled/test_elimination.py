@@ -25,33 +25,33 @@ def both(outputs: list[Expression], inputs: list[Expression]) -> tuple[dict[str,
 
 
 @pytest.mark.parametrize(("x", "y"), [(0.7, -1.2), (-0.3, 0.4), (2.0, 3.0)])
-def test_it_is_the_jacobian(x: float, y: float) -> None:
+def test_elimination_gives_the_jacobian_of_forward_differentiation(x: float, y: float) -> None:
     shared = maximum(X * Y, -0.5) / (1.0 + absolute(X))
     outputs = [shared * shared - Y, where(X > Y, sqrt(1.0 + shared * shared), -shared), X, X * 0.0 + 1.0]
     found, wanted = both([o + ZERO for o in outputs], [X, Y, U])
     assert computed(found, x=x, y=y) == pytest.approx(computed(wanted, x=x, y=y), rel=1e-13)
 
 
-def test_what_does_not_depend_vanishes() -> None:
+def test_the_slope_of_an_output_that_does_not_depend_on_an_input_is_the_zero_node() -> None:
     rows = eliminated_jacobian([X * X, 2.0 * Y], [X, Y, U])
     assert [[slope is ZERO for slope in row] for row in rows] == [[False, True, True], [True, False, True]]
 
 
-def test_what_was_not_chosen_is_never_multiplied_by_zero() -> None:
+def test_elimination_selects_the_slope_of_a_choice_instead_of_multiplying_by_zero() -> None:
     ((slope,),) = eliminated_jacobian([where(X > 1.0, 1.0 / X, 0.0) * Y], [X])
     assert slope.operation == "where"
     assert slope.arguments[2] is ZERO
     assert computed({"s": slope}, x=2.0, y=3.0)["s"] == -0.75
 
 
-def test_it_needs_fewer_products_on_the_circuit() -> None:
+def test_elimination_needs_fewer_products_than_forward_differentiation_on_the_circuit() -> None:
     state = x0, x1, x2, x3, x4, x5, x6 = [symbol(f"x{i}") for i in range(7)]
     rates = list(circuit_derivative((x0, x1, x2, x3, x4, x5, x6), U, parameter_symbols(CircuitParameters)))
     counts = [sum(item.operation == "*" for item in ordered(one.values())) for one in both(rates, [*state, U])]
     assert counts[0] < 0.7 * counts[1]
 
 
-def test_it_is_the_jacobian_of_the_reduced_plant() -> None:
+def test_elimination_gives_the_jacobian_of_the_reduced_plant() -> None:
     state = x, v, a = [symbol(f"x{i}") for i in range(3)]
     p = parameter_symbols(EhaParameters)
     found, wanted = both(list(reduced_derivative((x, v, a), U, p)), [*state, U])

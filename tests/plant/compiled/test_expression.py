@@ -101,13 +101,13 @@ def test_a_jacobian_equals_the_numerical_derivative(output: Expression, x: float
         assert abs(value - (above - below) / (2.0 * h)) <= 1e-5 * (1.0 + abs(value) + abs(here))
 
 
-def test_a_sign_is_held_constant() -> None:
+def test_a_sign_is_constant_in_derivatives() -> None:
     ((flat,), (slope,)) = jacobian([sign(X), sign(X) * X], [X])
     assert flat is ZERO
     assert slope is sign(X)
 
 
-def test_a_choice_passes_on_the_slope_of_what_it_chose() -> None:
+def test_the_slope_of_a_choice_is_that_of_the_chosen_side() -> None:
     ((slope,),) = jacobian([where(X > 0.0, X * X, -3.0 * X)], [X])
     assert evaluate(slope, 2.0, 0.0)[0] == 4.0
     assert evaluate(slope, -2.0, 0.0)[0] == -3.0
@@ -139,7 +139,7 @@ def test_structural_zeros_and_ones_vanish() -> None:
     assert by_y is ZERO
 
 
-def test_operands_come_before_results_and_nothing_twice() -> None:
+def test_ordered_lists_each_node_once_after_its_operands() -> None:
     items = ordered([tanh(X * Y) + X * Y, X])
     seen: set[int] = set()
     for item in items:
@@ -148,7 +148,7 @@ def test_operands_come_before_results_and_nothing_twice() -> None:
         seen.add(id(item))
 
 
-def test_a_model_that_uses_if_is_told_to_use_where() -> None:
+def test_an_if_on_an_expression_is_refused_with_the_advice_to_use_where() -> None:
     def model(x: Expression) -> Expression:
         return x if x > 0.0 else -x
 
@@ -157,7 +157,7 @@ def test_a_model_that_uses_if_is_told_to_use_where() -> None:
 
 
 @pytest.mark.parametrize("compare", [lambda x: x == 0.0, lambda x: x != 0.0], ids=["==", "!="])
-def test_a_model_that_tests_equality_is_told_so_rather_than_given_false(compare: Callable[[Expression], bool]) -> None:
+def test_an_equality_test_on_an_expression_is_refused(compare: Callable[[Expression], bool]) -> None:
     with pytest.raises(TypeError, match="must compare with <, <=, > or >="):
         compare(X)
 

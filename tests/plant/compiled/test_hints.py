@@ -16,14 +16,14 @@ BOTH_WAYS = pytest.mark.parametrize("differentiated", [jacobian, eliminated_jaco
 
 
 @BOTH_WAYS
-def test_what_is_frozen_is_constant_and_keeps_its_value(differentiated: Differentiated) -> None:
+def test_a_frozen_value_is_unchanged_and_constant_in_derivatives(differentiated: Differentiated) -> None:
     y = X * frozen(X)
     [[slope]] = differentiated([y], [X])
     assert computed({"y": y, "slope": slope}, x=3.0) == {"y": 9.0, "slope": 3.0}
 
 
 @BOTH_WAYS
-def test_what_follows_a_balance_has_the_derivative_of_its_formula(differentiated: Differentiated) -> None:
+def test_a_root_that_follows_its_balance_has_the_derivative_of_its_formula(differentiated: Differentiated) -> None:
     root = sqrt(A * A + B)
     known = following(root, (A * A + B - frozen(root) * frozen(root), 0.5 / root))
     for output, told in ((root * A, known * A), (where(B > 0.0, root, A), where(B > 0.0, known, A))):
@@ -31,12 +31,12 @@ def test_what_follows_a_balance_has_the_derivative_of_its_formula(differentiated
         assert computed(found, a=0.7, b=1.9) == pytest.approx(computed(wanted, a=0.7, b=1.9), rel=1e-14)
 
 
-def test_a_choice_that_follows_is_differentiated_by_what_it_follows_alone() -> None:
+def test_a_choice_with_given_slopes_is_differentiated_by_those_slopes_only() -> None:
     [[slope]] = jacobian([following(where(A > 0.0, X, B), (3.0 * X, 2.0))], [X])
     assert computed({"slope": slope}) == {"slope": 6.0}
 
 
-def test_a_waypoint_is_its_node_with_a_mark() -> None:
+def test_a_waypoint_is_recognised_and_keeps_its_value_and_derivative() -> None:
     point = waypoint(X * A)
     assert is_waypoint(point)
     assert not any(is_waypoint(one) for one in (X * A, frozen(X * A), following(X * A, (X * B, 1.0)), X))
@@ -44,13 +44,13 @@ def test_a_waypoint_is_its_node_with_a_mark() -> None:
     assert computed({"y": jacobian([point], [X])[0][0]}, x=2.0, a=5.0) == {"y": 5.0}
 
 
-def test_numbers_are_handed_through() -> None:
+def test_hints_return_plain_numbers_unchanged() -> None:
     assert (frozen(2.0), following(2.0, (1.0, 3.0)), waypoint(2.0), late_in(2.0, 1.0)) == (2.0,) * 4
     assert late_in(X, None) is X
 
 
 @pytest.mark.parametrize("x", [-2.0, 0.5])
-def test_what_is_affine_in_a_late_quantity_waits_for_one_product_and_one_sum(x: float) -> None:
+def test_an_affine_expression_uses_the_late_input_in_one_product_and_one_sum(x: float) -> None:
     y = where(absolute(X) > 1.0, (X - A) / B, A * (B - X * B)) + 3.0 * X
     collected = late_in(y, X)
     assert computed({"y": collected}, x=x, a=0.3, b=0.7) == pytest.approx(computed({"y": y}, x=x, a=0.3, b=0.7))
@@ -63,6 +63,6 @@ def test_what_is_affine_in_a_late_quantity_waits_for_one_product_and_one_sum(x: 
 
 
 @pytest.mark.parametrize("y", [X * X, A / X, sqrt(X)], ids=["square", "reciprocal", "root"])
-def test_what_is_not_affine_is_refused(y: Expression) -> None:
+def test_an_expression_that_is_not_affine_in_the_late_input_is_refused(y: Expression) -> None:
     with pytest.raises(ValueError, match="is not affine in what comes late"):
         late_in(y, X)

@@ -7,7 +7,7 @@ import pytest
 from plant.compiled.kernel_folder import cache_folder
 
 
-def test_the_environment_moves_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_environment_variable_sets_the_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HYDROSTATE_CACHE", str(tmp_path / "kernels"))
     assert cache_folder() == tmp_path / "kernels"
     monkeypatch.delenv("HYDROSTATE_CACHE")

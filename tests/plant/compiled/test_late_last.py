@@ -20,33 +20,33 @@ MIXED: dict[str, Expression] = {
 
 
 @pytest.mark.parametrize("late", [(), ("x",), ("w", "x"), ("z",)])
-def test_the_order_of_sums_and_products_changes_no_value(late: tuple[str, ...]) -> None:
+def test_reordered_sums_and_products_keep_their_values(late: tuple[str, ...]) -> None:
     made, _ = late_last(MIXED, {name: 10.0 * i for i, name in enumerate(late)})
     for values in np.random.default_rng(2).normal(size=(20, 4)).tolist():
         given = dict(zip("xyzw", values, strict=True))
         assert computed(made, **given) == pytest.approx(computed(MIXED, **given), rel=1e-12)
 
 
-def test_the_last_to_come_passes_one_product_and_one_sum() -> None:
+def test_the_latest_input_passes_at_most_one_product_and_one_sum() -> None:
     for mixed in (((X * Y) * Z + Y) + Z, X * Y + Z * W, (X + Y) * Z - W):
         _, times = late_last({"f": mixed}, {"x": 0.0})
         fused = LATENCY["*"]  # a sum is fused with its product
         assert times["f"] == (fused if mixed.operation == "+" else LATENCY["+"] + fused)
 
 
-def test_what_is_taken_away_again_is_not_added() -> None:
+def test_terms_that_cancel_are_not_computed() -> None:
     made, times = late_last({"f": (X + Y) - X}, {"x": 0.0})
     assert made["f"] is Y
     assert times["f"] == -np.inf
     assert computed(late_last({"f": (Y + X) - (X + Y)}, {"x": 0.0})[0], x=0.1, y=1.5) == {"f": 0.0}
 
 
-def test_conditions_wait_for_nothing_and_calls_take_long() -> None:
+def test_a_late_condition_adds_no_latency_and_a_call_adds_its_own() -> None:
     _, times = late_last({"chosen": where(X > Y, Y, Z), "called": tanh(X), "root": sqrt(X)}, {"x": 5.0})
     assert times == {"chosen": -np.inf, "called": 5.0 + CALL, "root": 5.0 + LATENCY["sqrt"]}
 
 
-def test_one_multiple_of_a_shared_product_stays_shared() -> None:
+def test_a_product_shared_by_two_outputs_stays_shared() -> None:
     product = X * Y
     made, _ = late_last({"a": product * Z, "b": product * W}, {"x": 0.0})
     assert made["a"].arguments[0] is node("*", Y, X) or made["a"].arguments[1] is node("*", Y, X)

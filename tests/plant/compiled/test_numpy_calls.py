@@ -36,24 +36,24 @@ CALLS: dict[str, Callable[[Any, Any], Any]] = {
 
 @pytest.mark.parametrize("name", CALLS)
 @pytest.mark.parametrize(("x", "y"), [(0.7, -1.2), (-0.3, 0.4), (2.0, 1.5)])
-def test_a_call_on_symbols_computes_what_it_does_on_numbers(name: str, x: float, y: float) -> None:
+def test_a_numpy_call_on_symbols_computes_the_same_as_on_numbers(name: str, x: float, y: float) -> None:
     made = CALLS[name](X, Y)
     assert isinstance(made, Expression)
     needed = {one: value for one, value in (("x", x), ("y", y)) if one in symbols_in([made])}
     assert computed({"z": made}, **needed)["z"] == pytest.approx(float(CALLS[name](x, y)), rel=1e-14)
 
 
-def test_every_name_that_is_offered_is_tried_here() -> None:
+def test_every_supported_numpy_function_is_tested() -> None:
     assert set(CALLS) == set(KNOWN.split(", "))
 
 
 @pytest.mark.parametrize("operation", [np.add, np.subtract, np.multiply, np.divide])
-def test_a_number_of_numpy_may_stand_on_the_left(operation: Any) -> None:
+def test_a_numpy_number_may_be_the_left_operand(operation: Any) -> None:
     made = operation(np.float64(3.0), X)
     assert computed({"z": made}, x=2.0)["z"] == operation(3.0, 2.0)
 
 
-def test_whole_powers_and_comparisons_are_known_too() -> None:
+def test_whole_powers_comparisons_and_unary_signs_are_traced() -> None:
     assert computed({"z": np.power(X, 3)}, x=2.0)["z"] == 8.0
     assert computed({"z": np.where(np.less_equal(X, 2.0), 1.0, -np.positive(X))}, x=2.0)["z"] == 1.0
     assert math.isclose(computed({"z": np.negative(X)}, x=2.0)["z"], -2.0)
@@ -61,7 +61,7 @@ def test_whole_powers_and_comparisons_are_known_too() -> None:
 
 @pytest.mark.parametrize("comparison", [np.less, np.less_equal, np.greater, np.greater_equal])
 @pytest.mark.parametrize("value", [1.9, 2.0, 2.1])
-def test_a_comparison_of_numpy_is_itself_below_at_and_above(comparison: Any, value: float) -> None:
+def test_a_numpy_comparison_is_right_below_at_and_above_the_limit(comparison: Any, value: float) -> None:
     made = np.where(comparison(X, 2.0), 1.0, 0.0)
     assert computed({"z": made}, x=value)["z"] == float(comparison(value, 2.0))
 
@@ -76,7 +76,7 @@ def test_a_comparison_of_numpy_is_itself_below_at_and_above(comparison: Any, val
         lambda: np.sum(X),
     ],
 )
-def test_what_is_not_known_is_refused_by_name(call: Callable[[], object]) -> None:
+def test_an_unsupported_numpy_function_is_refused_by_name(call: Callable[[], object]) -> None:
     with pytest.raises(TypeError, match=r"np\.\w+ cannot be traced; a model may call abs, sign"):
         call()
 

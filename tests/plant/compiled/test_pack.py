@@ -27,13 +27,13 @@ def of(write: Callable[..., str], width: int) -> dict[str, list[float]]:
 
 
 @pytest.mark.parametrize("width", [1, 8])
-def test_packed_lines_give_the_bits_of_plain_ones(width: int) -> None:
+def test_packed_lines_give_the_same_bits_as_unpacked_ones(width: int) -> None:
     found = of(packed_source, width)
     assert found == of(lines_source, 1)
     assert list(found) == list(OUTPUTS)
 
 
-def test_what_waits_for_another_quotient_is_not_packed_with_it() -> None:
+def test_a_quotient_that_depends_on_another_is_not_packed_with_it() -> None:
     text = packed_source("lines", OUTPUTS)
     assert text.count("ratios(") == 2
     assert text.count("roots(") == 1

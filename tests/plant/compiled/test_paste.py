@@ -26,7 +26,7 @@ def total(values: NDArray[np.float64]) -> float:
     return result
 
 
-def test_annotations_docstrings_and_comments_stay_behind() -> None:
+def test_pasted_text_has_no_annotations_docstrings_or_comments() -> None:
     assert bare_text(clipped) == "def clipped(value, least=0.0):\n    return max(least, min(value, LIMIT))"
 
 
@@ -37,6 +37,6 @@ def test_a_pasted_function_computes_what_the_function_does() -> None:
     assert kernel.total(values) == total(values)
 
 
-def test_only_what_def_defines_can_be_pasted() -> None:
+def test_only_functions_written_with_def_can_be_pasted() -> None:
     with pytest.raises(TypeError, match="written with def"):
         pasted(Path)

@@ -48,14 +48,16 @@ def rosenbrock(state: tuple[float, ...], parameters: EhaParameters) -> NDArray[n
 
 @pytest.mark.parametrize("state", [SLIDING, STUCK, RELIEVED], ids=["sliding", "stuck", "relieved"])
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
-def test_the_emitted_lumped_step_is_the_model_function(condition: Condition, state: tuple[float, float, float]) -> None:
+def test_the_emitted_lumped_step_computes_the_same_as_the_model_function(
+    condition: Condition, state: tuple[float, float, float]
+) -> None:
     parameters = parameters_for(condition)
     direct = np.array(lumped_step(state, SPEEDS, parameters, STEP), dtype=np.float64)
     np.testing.assert_allclose(emitted(lumped_step, state, "lumped", parameters), direct, rtol=1e-12, atol=0.0)
 
 
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
-def test_the_emitted_reduced_step_is_ros2_by_linear_algebra(condition: Condition) -> None:
+def test_the_emitted_reduced_step_agrees_with_ros2_by_linear_algebra(condition: Condition) -> None:
     parameters = parameters_for(condition)
     state = (0.01, 0.03, 0.5)
     got = emitted(ros2_step(reduced_derivative), state, "reduced_once", parameters)
@@ -63,7 +65,7 @@ def test_the_emitted_reduced_step_is_ros2_by_linear_algebra(condition: Condition
     np.testing.assert_allclose(got - state, wanted - state, rtol=1e-6, atol=0.0)
 
 
-def test_every_function_is_spelt() -> None:
+def test_every_supported_function_is_written_in_the_source() -> None:
     x, y = symbol("x"), symbol("y")
     outputs = {
         "a": sqrt(absolute(x)) + exp(y) - tanh(x * y) / 3.0,

@@ -10,7 +10,7 @@ OPENING = 7e3
 
 
 @given(st.floats(-1e7, 0.0))
-def test_nothing_flows_backward(drop: float) -> None:
+def test_a_check_valve_passes_no_backward_flow(drop: float) -> None:
     assert float(check_valve_flow(drop, 1e-9, OPENING)) == 0.0
 
 
@@ -20,7 +20,7 @@ def test_flow_rises_with_the_drop_and_stays_below_the_open_valve(drop: float, mo
     assert low <= high <= 1e-9 * (drop + more)
 
 
-def test_at_a_large_drop_it_is_wide_open() -> None:
+def test_a_check_valve_is_wide_open_at_a_large_drop() -> None:
     assert float(check_valve_flow(1e3 * OPENING, 1e-9, OPENING)) == pytest.approx(1e-9 * 1e3 * OPENING, rel=2e-3)
 
 

@@ -8,13 +8,13 @@ from plant.components.directional_valve import SHUT, fed_pressure, pressure_afte
 @pytest.mark.parametrize(
     ("spool", "fed", "openings"), [(1.0, 5.0, (SHUT, 1.0)), (0.0, 0.0, (SHUT, SHUT)), (-1.0, 2.0, (1.0, SHUT))]
 )
-def test_the_side_that_is_not_fed_goes_to_tank(spool: float, fed: float, openings: tuple[float, float]) -> None:
+def test_the_side_that_is_not_fed_is_connected_to_tank(spool: float, fed: float, openings: tuple[float, float]) -> None:
     assert float(fed_pressure(spool, 5.0, 2.0)) == fed
     assert tuple(float(x) for x in tank_openings(spool)) == openings
 
 
 @pytest.mark.parametrize("pressure", [3600.0, -900.0])
-def test_many_implicit_steps_come_to_rest_where_inflow_returns(pressure: float) -> None:
+def test_implicit_steps_settle_at_the_pressure_that_returns_the_inflow(pressure: float) -> None:
     inflow = return_flow(pressure, 3e-8)
     found = 0.0
     for _ in range(3000):
@@ -22,7 +22,7 @@ def test_many_implicit_steps_come_to_rest_where_inflow_returns(pressure: float) 
     assert found == pytest.approx(pressure, rel=1e-6)
 
 
-def test_a_side_without_inflow_empties_and_stays_at_the_tanks_pressure() -> None:
+def test_a_side_without_inflow_settles_at_tank_pressure() -> None:
     pressure = 5e4
     for _ in range(3000):
         pressure = float(pressure_after_return(pressure, 0.0, 4e-13, 3e-8, 1e-5))

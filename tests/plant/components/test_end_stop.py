@@ -19,7 +19,7 @@ def test_the_two_ends_mirror_each_other(depth: float, velocity: float) -> None:
 
 
 @given(st.floats(-0.126, 0.126), st.floats(-1.0, 1.0))
-def test_the_damping_part_never_gives_energy(position: float, velocity: float) -> None:
+def test_end_stop_damping_never_adds_energy(position: float, velocity: float) -> None:
     damped = float(end_stop_force(position, velocity, 0.125, 1e8, 20.0))
     spring = float(end_stop_force(position, 0.0, 0.125, 1e8, 20.0))
     assert (damped - spring) * velocity <= 0.0

@@ -13,7 +13,7 @@ def test_a_valve_opens_between_its_leak_and_its_lift(drop: float, wanted: float)
     assert float(opening_target(drop, 0.1, 0.9, 200.0, 600.0)) == pytest.approx(wanted)
 
 
-def test_half_an_opening_drags_four_times() -> None:
+def test_halving_the_opening_quadruples_the_drag() -> None:
     assert orifice_drag(0.5, 2e-6, 0.65, 998.0) == pytest.approx(4.0 * orifice_drag(1.0, 2e-6, 0.65, 998.0))
 
 
@@ -25,7 +25,7 @@ def test_long_steps_reach_the_flow_at_which_drop_and_losses_balance() -> None:
     assert RESISTANCE * flow + drag * flow**2 == pytest.approx(5e3, rel=1e-6)
 
 
-def test_the_step_is_of_second_order() -> None:
+def test_the_port_flow_step_is_of_second_order() -> None:
     drag = orifice_drag(0.5, 1.894e-6, 0.65, 998.0)
 
     def after(steps: int) -> float:
@@ -39,17 +39,17 @@ def test_the_step_is_of_second_order() -> None:
 
 
 @pytest.mark.parametrize("flow", [-4e-6, 4e-6])
-def test_a_port_that_shuts_stops_its_flow_and_does_not_turn_it(flow: float) -> None:
+def test_a_shut_port_stops_its_flow_within_one_step(flow: float) -> None:
     drag = orifice_drag(1e-6, 1.894e-6, 0.65, 998.0)
     assert abs(float(port_flow_after(flow, 0.0, drag, RESISTANCE, INERTANCE, 1e-5))) < 1e-3 * abs(flow)
 
 
-def test_backward_is_the_mirror_of_forward() -> None:
+def test_backward_port_flow_mirrors_forward_flow() -> None:
     forth, back = (float(port_flow_after(s * 1e-6, s * 3e3, 3e14, RESISTANCE, INERTANCE, 1e-5)) for s in (1.0, -1.0))
     assert back == -forth
 
 
-def test_the_late_share_keeps_every_decay_stable() -> None:
+def test_late_share_makes_the_step_stable_at_every_rate_of_decay() -> None:
     decay = np.logspace(-6, 9, 200)
     late = late_share(decay)
     left = (1.0 - (1.0 - late) * decay) / (1.0 + late * decay)

@@ -36,7 +36,9 @@ def test_the_velocity_balances_the_forces_to_rounding_or_is_zero_below_the_coulo
 
 
 @given(PUSHES, RESISTANCES, QUADRATICS, COULOMBS)
-def test_the_answer_is_odd_in_the_push(push: float, resistance: float, quadratic: float, coulomb: float) -> None:
+def test_the_velocity_is_odd_in_the_driving_force(
+    push: float, resistance: float, quadratic: float, coulomb: float
+) -> None:
     forth, back = (float(velocity_under_friction(p, resistance, quadratic, coulomb)) for p in (push, -push))
     assert forth == -back
 
@@ -49,7 +51,7 @@ def test_a_larger_push_never_gives_a_smaller_velocity(
     assert low <= high + np.finfo(float).eps * max(abs(low), abs(high))
 
 
-def test_a_hair_above_the_coulomb_force_keeps_its_digits() -> None:
+def test_the_velocity_is_accurate_at_a_force_barely_above_the_coulomb_force() -> None:
     excess = 1e-9
     v = float(velocity_under_friction(436.0 + excess, 1e6, 6.589e4, 436.0))
     assert v == pytest.approx(((436.0 + excess) - 436.0) / 1e6, rel=1e-12)
@@ -79,7 +81,7 @@ def test_minor_friction_dips_to_488_newton_at_3_millimetres_a_second() -> None:
 
 
 @given(PUSHES, RESISTANCES, QUADRATICS, COULOMBS)
-def test_half_the_force_of_a_change_of_velocity_is_that_of_the_law(
+def test_sliding_returns_half_the_derivative_of_the_force_by_the_velocity(
     push: float, resistance: float, quadratic: float, coulomb: float
 ) -> None:
     v, half = (float(one) for one in sliding(push, resistance, quadratic, coulomb))

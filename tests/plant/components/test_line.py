@@ -16,7 +16,7 @@ def rate(drop: float, flow: float, minor: float) -> float:
 
 @pytest.mark.parametrize("minor", [0.0, 2.3, 40.0])
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_a_steady_flow_needs_hagen_and_poiseuilles_pressure_and_xi_times_the_dynamic_one(
+def test_a_steady_flow_needs_the_hagen_poiseuille_drop_plus_xi_times_the_dynamic_pressure(
     minor: float, direction: float
 ) -> None:
     radius = np.sqrt(AREA / np.pi)
@@ -25,7 +25,7 @@ def test_a_steady_flow_needs_hagen_and_poiseuilles_pressure_and_xi_times_the_dyn
     assert rate(drop, direction * FLOW, minor) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_oil_at_rest_gains_speed_as_newton_says() -> None:
+def test_oil_at_rest_accelerates_by_newtons_second_law() -> None:
     mass, force = DENSITY * LENGTH * AREA, 1e5 * AREA
     assert rate(1e5, 0.0, 2.3) == pytest.approx(AREA * force / mass)
 

@@ -21,7 +21,7 @@ def test_pressure_is_the_inverse_of_specific_volume(pressure: float, bulk_modulu
 
 
 @given(st.floats(1e-6, 1.2), STIFF, AIR)
-def test_pressure_is_finite_and_above_the_vapours_however_little_oil_there_is(
+def test_pressure_is_finite_and_not_below_vapour_pressure_for_any_amount_of_oil(
     amount: float, bulk_modulus: float, air: float
 ) -> None:
     pressure = float(oil_pressure(amount, 1.0, bulk_modulus, air, VAPOUR))
@@ -50,12 +50,12 @@ def test_without_air_the_oil_has_its_own_bulk_modulus() -> None:
 
 
 @pytest.mark.parametrize("pressure", [5e5, 1e6, 5e6])
-def test_a_little_air_softens_as_equation_5_of_the_piezo_stack_paper_says(pressure: float) -> None:
+def test_the_bulk_modulus_with_a_little_air_follows_equation_5_of_the_piezo_stack_paper(pressure: float) -> None:
     air, stiff = 1e-3, 1.4e9
     ratio = air * ATMOSPHERE / pressure
     published = 1.0 / (ratio / pressure + (1.0 - ratio) / stiff)
     assert effective_bulk_modulus(pressure, stiff, air, 0.0) == pytest.approx(published, rel=5e-3)
 
 
-def test_too_little_oil_leaves_vapour() -> None:
+def test_too_little_oil_is_at_vapour_pressure() -> None:
     assert float(oil_pressure(0.99, 1.0, 2.07e8, 0.0, VAPOUR)) == pytest.approx(VAPOUR, rel=1e-4)

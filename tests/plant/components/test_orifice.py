@@ -12,7 +12,7 @@ DROPS = st.floats(-4e6, 4e6)
 
 
 @given(DROPS, st.just(0.0) | st.floats(1e-30, 1e-6))
-def test_the_two_drops_add_up(drop: float, conductance: float) -> None:
+def test_laminar_and_orifice_drops_add_up_to_the_total_drop(drop: float, conductance: float) -> None:
     flow = float(laminar_orifice_flow(drop, conductance, ORIFICE))
     assert flow == -float(laminar_orifice_flow(-drop, conductance, ORIFICE))
     if conductance > 0.0:
@@ -30,18 +30,18 @@ def test_a_narrow_path_is_linear_in_pressure() -> None:
     assert ratio == pytest.approx(3.0, rel=1e-3)
 
 
-def test_a_wide_path_is_an_orifice() -> None:
+def test_flow_through_a_wide_path_rises_with_the_square_root_of_pressure() -> None:
     ratio = float(laminar_orifice_flow(3e6, 1e-2, ORIFICE)) / float(laminar_orifice_flow(1e6, 1e-2, ORIFICE))
     assert ratio == pytest.approx(3.0**0.5, rel=1e-3)
 
 
 @given(st.floats(1e2, 1e11))
-def test_area_and_load_are_inverse(friction: float) -> None:
+def test_effective_area_is_the_inverse_of_orifice_friction(friction: float) -> None:
     area = float(effective_area(860.0, 1.52e-3, friction))
     assert orifice_friction(860.0, 1.52e-3, area) == pytest.approx(friction, rel=1e-12)
 
 
-def test_the_load_is_the_pressure_of_the_piston_flow_on_the_piston() -> None:
+def test_orifice_friction_is_the_force_of_the_orifices_pressure_drop_on_the_piston() -> None:
     area, velocity = 1e-6, 0.03
     pressure = 0.5 * 860.0 * (1.52e-3 * velocity / area) ** 2
     assert orifice_friction(860.0, 1.52e-3, area) * velocity**2 == pytest.approx(1.52e-3 * pressure, rel=1e-12)

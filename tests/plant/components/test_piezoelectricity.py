@@ -28,20 +28,20 @@ def turned(angle: float) -> tuple[np.ndarray, np.ndarray]:
     return vector, stress
 
 
-def test_the_compliance_is_symmetric_and_costs_energy_whatever_the_stress() -> None:
+def test_the_compliance_is_symmetric_and_positive_definite() -> None:
     s = compliance_matrix(PZT)
     np.testing.assert_array_equal(s, s.T)
     assert np.linalg.eigvalsh(s).min() > 0.0
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.1, 2.0])
-def test_no_direction_across_the_poling_is_another(angle: float) -> None:
+def test_the_matrices_are_unchanged_by_rotation_about_the_poling_axis(angle: float) -> None:
     vector, stress = turned(angle)
     np.testing.assert_allclose(stress.T @ compliance_matrix(PZT) @ stress, compliance_matrix(PZT), atol=1e-25)
     np.testing.assert_allclose(vector.T @ charge_matrix(PZT) @ stress, charge_matrix(PZT), atol=1e-23)
 
 
-def test_both_effects_share_one_matrix() -> None:
+def test_the_direct_and_the_converse_effect_share_one_matrix() -> None:
     rng = np.random.default_rng(3)
     stress, field = 1e6 * rng.standard_normal(6), 1e5 * rng.standard_normal(3)
     by_field = strain(np.zeros(6), field, PZT) @ stress
@@ -49,14 +49,14 @@ def test_both_effects_share_one_matrix() -> None:
     assert by_field == pytest.approx(by_stress, rel=1e-12)
 
 
-def test_a_clamped_ceramic_holds_less_charge_but_not_none() -> None:
+def test_a_clamped_ceramic_has_a_smaller_but_positive_permittivity() -> None:
     d, s = charge_matrix(PZT), compliance_matrix(PZT)
     clamped = np.diag([PZT.eps_11, PZT.eps_11, PZT.eps_33]) - d @ np.linalg.solve(s, d.T)
     assert 0.0 < clamped[2, 2] < PZT.eps_33
     assert np.linalg.eigvalsh(clamped).min() > 0.0
 
 
-def test_charging_a_free_ceramic_costs_energy_whatever_the_field() -> None:
+def test_charging_a_free_ceramic_takes_energy_and_follows_its_permittivities() -> None:
     for field in 1e5 * np.random.default_rng(4).standard_normal((5, 3)):
         charge = electric_displacement(np.zeros(6), field, PZT)
         assert charge @ field > 0.0

@@ -56,14 +56,14 @@ def test_without_coulomb_friction_only_the_sliding_part_is_left() -> None:
 
 @pytest.mark.parametrize("a3", [1.5, 0.5])
 @pytest.mark.parametrize("a2", [0.5, 0.0, -0.5])
-def test_friction_of_order_one_is_the_same_law(a2: float, a3: float) -> None:
+def test_coefficients_of_order_one_also_give_the_steady_state_law(a2: float, a3: float) -> None:
     a1, velocity = 2.0, 0.7
     settled = 1.0 / (1.0 + max(-a2, 0.0) * velocity / a3)
     wanted = a3 + a2 * velocity + a1 * velocity**2
     assert force(velocity, settled, (a1, a2, a3)) == pytest.approx(wanted, rel=1e-12)
 
 
-def test_the_mass_rings_on_its_bristle_with_the_damping_ratio_that_is_asked_for() -> None:
+def test_the_mass_on_its_bristle_has_the_given_damping_ratio() -> None:
     a3 = ROWS["none"][2]
     stiffness, speed = a3 / DISPLACEMENT, 1e-9
     rate = bristle_rate(speed, 0.0, 0.0, a3, DISPLACEMENT)

@@ -13,18 +13,18 @@ def test_a_shut_reed_passes_nothing_and_an_open_one_passes_either_way() -> None:
     assert forward == -back == pytest.approx(0.62 * 0.0124 * 1e-4 * np.sqrt(2e6 / 850.0), rel=1e-4)
 
 
-def test_a_contact_does_not_jump_whatever_the_speed() -> None:
+def test_the_contact_force_is_continuous_at_first_touch() -> None:
     near, touching = (float(contact_force(depth, 1.0, 2e7, 300.0, 1e-6)) for depth in (-1e-12, 1e-12))
     assert near == 0.0
     assert touching == pytest.approx(0.0, abs=1e-3)
 
 
-def test_a_lines_losses_slow_it_in_both_directions() -> None:
+def test_losses_in_a_line_decelerate_flow_in_both_directions() -> None:
     forward, back = (line_flow_rate(0.0, flow, 0.4, 4e-5, 850.0, 0.02, 2.3) for flow in (2e-5, -2e-5))
     assert forward == -back < 0.0
 
 
-def test_a_rigid_port_is_a_chamber_and_a_gas_takes_up_what_comes() -> None:
+def test_a_rigid_port_acts_as_a_chamber_and_a_compliant_one_takes_up_added_oil() -> None:
     oil = (1.4e9, 0.0137, 2e3)
     assert compliant_oil_pressure(1.01, 1.0, 0.0, 1e6, oil) == pytest.approx(oil_pressure(1.01, 1.0, *oil))
     compliance, volume = 2e-11, 2e-6

@@ -18,7 +18,7 @@ def test_pumped_flow_never_runs_against_the_speed(speed: float) -> None:
 
 
 @given(SPEEDS)
-def test_the_pump_loses_its_bias_or_all_it_has(speed: float) -> None:
+def test_the_pump_loses_its_flow_bias_but_at_most_its_ideal_flow(speed: float) -> None:
     ideal = abs(DISPLACEMENT * speed)
     assert abs(float(pumped_flow(speed, DISPLACEMENT, BIAS))) == pytest.approx(max(ideal - BIAS, 0.0), abs=1e-20)
 

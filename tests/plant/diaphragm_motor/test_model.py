@@ -77,7 +77,7 @@ def test_a_free_response_only_loses_energy() -> None:
     assert energy[-1] < 0.05 * energy[0]
 
 
-def test_what_enters_the_pump_leaves_it() -> None:
+def test_the_inlet_flow_of_the_pump_equals_its_outlet_flow() -> None:
     point = operate(PUMP, PEAK, SWING)
     assert point.inlet_flow == pytest.approx(point.outlet_flow, rel=2e-3)
 
@@ -103,7 +103,7 @@ def test_the_flow_has_its_published_peak_and_the_middle_electrodes_peak_with_it(
     assert frequencies[middle.argmax(axis=0)] == pytest.approx(480.0, abs=10.0)
 
 
-def test_flow_and_sensing_rise_straight_with_voltage() -> None:
+def test_flow_rises_with_voltage_and_the_sensed_tone_rises_linearly() -> None:
     swings = np.array([100.0, 150.0, 200.0, 250.0, 300.0])
     points = [operate(PUMP, PEAK, swing) for swing in swings]
     assert np.all(np.diff([point.outlet_flow for point in points]) > 0.0)
@@ -113,7 +113,7 @@ def test_flow_and_sensing_rise_straight_with_voltage() -> None:
         assert np.corrcoef(swings, sensed)[0, 1] ** 2 > 0.99
 
 
-def test_velocity_falls_straight_with_load() -> None:
+def test_velocity_falls_linearly_with_load() -> None:
     loads = np.linspace(0.0, 25.0, 6)
     speeds = [operate(replace(HEALTHY, load_force=load), PEAK, SWING).velocity for load in loads]
     assert np.corrcoef(loads, speeds)[0, 1] ** 2 > 0.999
@@ -135,7 +135,7 @@ def test_a_cycle_of_the_valve_brings_the_rod_back() -> None:
     assert abs(position[-1]) < 0.2 * position.max()
 
 
-def test_a_stuck_valve_a_dead_diaphragm_and_a_leak_cost_velocity() -> None:
+def test_each_fault_costs_at_least_three_percent_of_the_velocity() -> None:
     healthy = operate(HEALTHY, PEAK, SWING).velocity
     faults = (
         replace(HEALTHY, valve_leak=changed(HEALTHY.valve_leak, 4, 1.0)),
@@ -162,7 +162,7 @@ def test_electrodes_hold_no_steady_charge() -> None:
     assert np.all(np.abs(held[-1]) < 1e-6)
 
 
-def test_a_tone_is_told_from_its_harmonics() -> None:
+def test_a_tone_is_separated_from_a_harmonic_and_an_offset() -> None:
     time = 1e-4 * np.arange(1000)
     mixed = 2.0 * np.sin(2.0 * np.pi * 50.0 * time + 0.3) + np.cos(2.0 * np.pi * 100.0 * time) + 5.0
     assert tone(mixed, 1e-4, 50.0) == pytest.approx(2.0 * np.exp(0.3j), abs=1e-9)
@@ -185,14 +185,14 @@ def test_a_sine_of_too_few_samples_is_refused() -> None:
         motor_drive(PEAK, SWING, 0.1, 1e-3)
 
 
-def test_a_load_that_runs_ahead_pulls_no_liquid_below_the_least_pressure() -> None:
+def test_an_overrunning_load_pulls_no_liquid_below_the_least_pressure() -> None:
     states = run_motor(replace(HEALTHY, load_force=-500.0), motor_drive(PEAK, SWING, 0.1, SAMPLE_TIME), SAMPLE_TIME)
     lowest = HEALTHY.least_pressure - HEALTHY.supply_pressure
     assert states[:, SIDE_A].min() >= lowest
     assert np.all(np.isfinite(states))
 
 
-def test_sensor_noise_is_that_of_the_sensors_and_a_seed_decides_it() -> None:
+def test_sensor_noise_has_its_stated_deviation_and_follows_the_seed() -> None:
     drive = motor_drive(PEAK, SWING, 0.05, SAMPLE_TIME)
 
     def noisy(seed: int) -> np.ndarray:
@@ -217,12 +217,12 @@ def test_impossible_parameters_are_refused(name: str, value: float | tuple[float
         DiaphragmMotorParameters(**{name: value})  # pyright: ignore[reportArgumentType] - one of each kind of field
 
 
-def test_a_place_that_is_not_there_is_refused() -> None:
+def test_a_place_out_of_range_is_refused() -> None:
     with pytest.raises(RigError, match="a place from 1 to 8 is needed, got 9"):
         changed(HEALTHY.valve_leak, 9, 1.0)
 
 
-def test_a_schedule_must_rise_from_zero() -> None:
+def test_a_schedule_that_does_not_start_at_zero_is_refused() -> None:
     drive = motor_drive(PEAK, SWING, 0.01, SAMPLE_TIME)
     with pytest.raises(DriveError, match="must rise from 0"):
         simulate_motor([(0.005, HEALTHY)], drive, SAMPLE_TIME)

@@ -68,7 +68,7 @@ def floating(p: CircuitParameters, size: float) -> CircuitParameters:
     ("condition", "share"), [("normal", 0.45), ("major_friction", 0.45), ("major_leakage_minor_friction", 0.7)]
 )
 @pytest.mark.parametrize("name", ["steps", "sine"])
-def test_the_circuit_becomes_the_lumped_plant(condition: str, share: float, name: str) -> None:
+def test_the_circuit_converges_to_the_lumped_plant(condition: str, share: float, name: str) -> None:
     base = parameters_for(CONDITIONS[condition], PAPER)
     assert isinstance(base, CircuitParameters)
     speed = drive(name, 1.0)
@@ -105,7 +105,7 @@ DRAINED = replace(PAPER, cylinder_drain_leakage=1e-12, pump_case_leakage=1e-12, 
 
 
 @pytest.mark.parametrize(("a", "b"), [(4e5, 1e5), (1e5, 4e5)])
-def test_a_drain_that_floats_passes_on_all_that_it_takes(a: float, b: float) -> None:
+def test_a_floating_case_drain_passes_no_oil_to_the_accumulator(a: float, b: float) -> None:
     flows = circuit_flows(0.0, (1.02, 0.98), Pressures(a, b, 5e5), DRAINED)
     assert flows.supply == 0.0
     assert flows.a * (a - b) < 0.0
@@ -125,7 +125,7 @@ def test_a_chamber_above_the_case_drains_oil_of_its_own_density(*, a_is_higher: 
     assert found.a + found.b + found.supply == pytest.approx(0.0, abs=1e-12 * found.supply)
 
 
-def test_a_drain_takes_oil_from_both_chambers_once_they_stand_above_the_accumulator() -> None:
+def test_a_drain_takes_oil_from_both_chambers_if_both_exceed_accumulator_pressure() -> None:
     level = circuit_flows(0.0, (1.02, 1.02), Pressures(9e5, 9e5, 5e5), DRAINED)
     drain = DRAINED.cylinder_drain_leakage + DRAINED.pump_case_leakage
     assert level.supply == pytest.approx(2.0 * drain * 4e5 * 1.02)
@@ -137,7 +137,7 @@ def test_a_drain_takes_oil_from_both_chambers_once_they_stand_above_the_accumula
 
 
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
-def test_the_circuit_settles_where_the_equations_say(condition: Condition) -> None:
+def test_the_circuit_settles_at_the_analytic_steady_state(condition: Condition) -> None:
     p = parameters_for(condition, replace(PAPER, stroke=1.2))
     assert isinstance(p, CircuitParameters)
     record = simulate(CIRCUIT, np.full(10_000, p.rated_speed), 1e-3, p)
@@ -161,7 +161,7 @@ def test_the_bypass_valve_unloads_the_pump() -> None:
     assert np.max(np.abs(record["position_m"])) < PAPER.presliding_displacement
 
 
-def test_make_up_keeps_the_low_side_near_the_accumulator() -> None:
+def test_make_up_valves_keep_the_low_side_near_accumulator_pressure() -> None:
     speed = drive("prbs", 2.0)
     with_valves, without = (
         simulate(CIRCUIT, speed, 1e-4, replace(PAPER, makeup_conductance=conductance)) for conductance in (1e-8, 0.0)
@@ -178,13 +178,13 @@ def test_the_piston_stops_at_the_end_of_its_stroke() -> None:
     assert record["differential_pressure_pa"][-1] == pytest.approx(PAPER.relief_pressure, rel=0.01)
 
 
-def test_relief_holds_the_pressure_at_its_setting() -> None:
+def test_the_relief_valve_holds_the_pressure_at_its_setting() -> None:
     p = replace(throttled(PAPER, 10.0, 3.0), relief_pressure=2e6)
     record = simulate(CIRCUIT, np.full(10_000, 251.0), 1e-4, p)
     assert record["differential_pressure_pa"][-1] == pytest.approx(2e6, rel=0.02)
 
 
-def test_the_piston_creeps_on_its_seals_and_comes_back() -> None:
+def test_a_small_pressure_moves_the_piston_only_within_its_presliding() -> None:
     start = np.array(at_rest(PAPER), dtype=np.float64)
     start[4] *= 1.0 + 2.5e-4
     start[5] *= 1.0 - 2.5e-4
@@ -209,7 +209,7 @@ DRIVES = st.lists(st.floats(-10.0, 10.0), min_size=4, max_size=10)
 
 @settings(max_examples=40)
 @given(VOLTS, VOLTS, st.floats(0.0, 0.2), DRIVES, st.sampled_from([0.0, 2e-3]))
-def test_pressures_stay_above_the_vapours_and_finite_under_any_throttles_air_and_drive(
+def test_pressures_stay_finite_and_above_vapour_pressure_with_any_throttles_air_and_drive(
     a_volts: float, b_volts: float, air: float, levels: list[float], lag: float
 ) -> None:
     p = throttled(replace(PAPER, air_fraction=air, motor_lag=lag), a_volts, b_volts)
@@ -224,7 +224,7 @@ def test_pressures_stay_above_the_vapours_and_finite_under_any_throttles_air_and
 
 
 @pytest.mark.parametrize("pressure", [-8e5, 0.0, 3e5, 2e6])
-def test_a_circuit_under_pressure_shows_it_with_the_lower_chamber_at_the_accumulators(pressure: float) -> None:
+def test_under_pressure_sets_the_difference_with_the_lower_chamber_at_accumulator_pressure(pressure: float) -> None:
     p = PAPER
     shown = observe_circuit(under_pressure(pressure, 0.01, p), p)
     assert shown["differential_pressure_pa"] == pytest.approx(pressure, abs=1.0)

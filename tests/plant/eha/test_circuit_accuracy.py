@@ -88,13 +88,13 @@ def test_cavitation_costs_little_accuracy() -> None:
     assert error(run(p, speed), truth, p) < 1e-3
 
 
-def test_a_throttle_all_but_shut_is_followed() -> None:
+def test_an_almost_shut_throttle_costs_no_accuracy() -> None:
     p = throttled(PAPER, 10.0, 5.0)
     speed = make_drive("prbs", 0.2, 1e-4, p, np.random.default_rng(5))
     assert error(run(p, speed), run(p, speed, tolerance=1e-9), p) < 1e-4
 
 
-def test_the_tolerance_rules_the_error() -> None:
+def test_the_error_falls_with_the_tolerance() -> None:
     p, speed = case("normal", "prbs", 0.5)
     truth = run(p, speed, tolerance=1e-10)
     errors = [error(run(p, speed, tolerance=tolerance), truth, p) for tolerance in (1e-3, 1e-5, 1e-7)]
@@ -133,7 +133,7 @@ def test_the_step_is_of_third_order_while_nothing_switches() -> None:
 
 
 @pytest.mark.parametrize("name", ["sine", "prbs"])
-def test_with_all_that_switches_the_step_is_of_second_order_at_least(name: str) -> None:
+def test_the_step_is_at_least_of_second_order_with_switching_valves_and_friction(name: str) -> None:
     p, speed = case("normal", name, 0.5)
     fixed = {"tolerance": 1e9, "drive_tolerance": 0.0}
     truth = run(p, speed, longest=1e-4 / 128, **fixed)
@@ -150,7 +150,7 @@ def test_the_independent_second_order_step_agrees() -> None:
     assert error(run(p, speed), other, p) < 5e-5
 
 
-def test_side_by_side_runs_are_those_of_each_alone() -> None:
+def test_runs_side_by_side_agree_with_runs_alone() -> None:
     circuits = [circuit_of(parameters_for(condition, PAPER)) for condition in CONDITIONS.values()]
     speed = make_drive("steps", 0.5, 1e-4, PAPER, np.random.default_rng(5))
     together = run_plant(CIRCUIT, speed, 1e-4, np.array([parameter_row(p) for p in circuits])[None])
@@ -159,7 +159,7 @@ def test_side_by_side_runs_are_those_of_each_alone() -> None:
         assert error(states, run(p, speed), p) < 1e-4
 
 
-def test_a_coarse_log_samples_the_fine_run() -> None:
+def test_a_coarse_log_agrees_with_every_tenth_sample_of_a_fine_run() -> None:
     p, knots = case("normal", "sine", 0.5)
     knots = knots[::10]
     fine = np.interp(np.arange(len(knots) * 10 - 9) / 10.0, np.arange(len(knots)), knots)

@@ -71,7 +71,7 @@ PRESSURES = st.floats(3e3, 5e6)
     st.floats(0.0, 0.2),
     st.sampled_from([(10.0, 0.0), (2.0, 2.3), (0.0, 0.0), (1.75, 2.5)]),
 )
-def test_no_energy_comes_from_nowhere_with_the_pump_stopped(
+def test_stored_energy_never_rises_with_the_pump_stopped(
     a: float, b: float, x: float, v: float, air: float, volts: tuple[float, float]
 ) -> None:
     p = throttled(CircuitParameters(air_fraction=air), *volts)

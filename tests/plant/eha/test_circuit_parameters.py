@@ -21,7 +21,7 @@ from plant.units import notes
 PAPER = CircuitParameters()
 
 
-def test_the_circuit_keeps_the_actuator_it_is_made_around() -> None:
+def test_circuit_of_keeps_the_parameters_of_its_actuator() -> None:
     actuator = EhaParameters(bulk_modulus=1.5e8, piston_area=1.2e-3, leakage_coefficient=1e-12)
     circuit = circuit_of(actuator)
     judged = {"stroke": JUDGED_STROKE, "accumulator_gas": pytest.approx(1.38e-3)}
@@ -30,17 +30,17 @@ def test_the_circuit_keeps_the_actuator_it_is_made_around() -> None:
     assert (stated.stroke, stated.accumulator_gas) == (0.3, 2e-4)
 
 
-def test_a_stroke_that_is_not_known_has_room_in_small_chambers() -> None:
+def test_an_unknown_stroke_is_limited_by_the_chamber_volume() -> None:
     small = replace(EhaParameters(), chamber_volume=1e-4, piston_area=2e-3)
     assert circuit_of(small).stroke == longest_stroke(small) < circuit_of(EhaParameters()).stroke
 
 
-def test_a_circuit_stays_as_it_is() -> None:
+def test_circuit_of_returns_a_circuit_unchanged() -> None:
     assert circuit_of(PAPER) is PAPER
 
 
 @pytest.mark.parametrize("name", CONDITIONS)
-def test_every_condition_is_a_circuit_and_stays_one(name: str) -> None:
+def test_a_condition_of_a_circuit_equals_the_circuit_of_an_actuator_in_that_condition(name: str) -> None:
     changed = parameters_for(CONDITIONS[name], PAPER)
     assert isinstance(changed, CircuitParameters)
     assert circuit_of(parameters_for(CONDITIONS[name])) == changed
@@ -55,7 +55,9 @@ def test_the_parts_of_the_leakage_sum_to_the_lumped_one() -> None:
 @pytest.mark.parametrize("leakage", [0.0, 1e-13, 4.784e-12, 1e-9])
 @pytest.mark.parametrize("bulk_modulus", [2e7, 2.07e8, 1.6e9])
 @pytest.mark.parametrize("volume", [3e-4, 1e-2])
-def test_other_actuators_get_a_circuit_that_fits(leakage: float, bulk_modulus: float, volume: float) -> None:
+def test_other_actuators_get_a_circuit_with_enough_oil_and_no_negative_leakage(
+    leakage: float, bulk_modulus: float, volume: float
+) -> None:
     actuator = EhaParameters(leakage_coefficient=leakage, bulk_modulus=bulk_modulus, chamber_volume=volume)
     circuit = circuit_of(actuator)
     assert circuit.cylinder_leakage >= 0.0
@@ -67,7 +69,7 @@ def test_the_first_fields_are_the_actuators_in_order() -> None:
     assert [field.name for field in fields(CircuitParameters)][: len(names)] == names
 
 
-def test_every_field_says_what_it_is() -> None:
+def test_every_field_of_the_circuit_is_documented() -> None:
     assert list(notes(CircuitParameters)) == [field.name for field in fields(CircuitParameters)]
 
 
@@ -88,22 +90,22 @@ def test_every_field_says_what_it_is() -> None:
         ({"bulk_modulus": -1.0}, "bulk_modulus must be positive"),
     ],
 )
-def test_what_makes_no_circuit_is_refused(change: dict[str, float], message: str) -> None:
+def test_impossible_circuit_parameters_are_refused(change: dict[str, float], message: str) -> None:
     with pytest.raises(RigError, match=message):
         replace(PAPER, **change)
 
 
 @pytest.mark.parametrize("name", ["pump_case_leakage", "air_fraction", "motor_lag", "presliding_damping"])
-def test_what_an_ideal_circuit_lacks_may_be_zero(name: str) -> None:
+def test_case_leakage_air_motor_lag_and_damping_may_be_zero(name: str) -> None:
     assert getattr(replace(PAPER, **{name: 0.0}), name) == 0.0
 
 
-def test_air_asks_more_of_the_accumulator() -> None:
+def test_air_increases_the_oil_demand_on_the_accumulator() -> None:
     demands = [oil_demand(replace(PAPER, air_fraction=air)) for air in (0.0, 0.05, 0.2)]
     assert np.all(np.diff(demands) > 0.0)
 
 
-def test_rows_of_circuits_have_each_parameter_by_its_name_and_no_other() -> None:
+def test_circuit_values_gives_each_parameter_by_name_and_refuses_unknown_names() -> None:
     circuit = CircuitParameters()
     rows = np.stack([parameter_row(circuit), parameter_row(replace(circuit, flow_bias=1e-6))])
     values = circuit_values(rows)

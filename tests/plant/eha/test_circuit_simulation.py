@@ -28,7 +28,7 @@ def test_the_circuit_is_among_the_plants() -> None:
     assert PLANTS["circuit"] is CIRCUIT
 
 
-def test_it_logs_chamber_pressures_and_the_command_beside_what_every_plant_logs() -> None:
+def test_the_circuit_also_logs_chamber_pressures_and_motor_voltage() -> None:
     record = simulate(CIRCUIT, DRIVE, 1e-3, RIG)
     assert set(record) == {*simulate(LUMPED, DRIVE, 1e-3, RIG), "pressure_a_pa", "pressure_b_pa", "motor_voltage_v"}
     difference = record["pressure_a_pa"] - record["pressure_b_pa"]
@@ -43,13 +43,13 @@ def test_the_motor_lags_its_command() -> None:
     assert reached[-1] == pytest.approx(1.0, rel=1e-9)
 
 
-def test_an_actuator_without_its_circuit_gets_the_papers() -> None:
+def test_an_actuator_without_a_circuit_runs_with_the_papers_circuit() -> None:
     plain, whole = (simulate(CIRCUIT, DRIVE, 1e-3, p) for p in (EhaParameters(stroke=0.4), RIG))
     for name in whole:
         np.testing.assert_array_equal(plain[name], whole[name])
 
 
-def test_sensors_measure_the_chambers_and_leave_the_other_noise_alone() -> None:
+def test_chamber_pressure_sensors_add_noise_without_changing_that_of_other_channels() -> None:
     clean = simulate(CIRCUIT, DRIVE, 1e-3, RIG)
     noisy = simulate(CIRCUIT, DRIVE, 1e-3, RIG, sensors=BENCH, rng=np.random.default_rng(4), keep_truth=True)
     for name in ("pressure_a_pa", "pressure_b_pa"):
@@ -65,7 +65,7 @@ def test_sensors_measure_the_chambers_and_leave_the_other_noise_alone() -> None:
     np.testing.assert_allclose(noisy["velocity_m_s"] - clean["velocity_m_s"], velocity_noise, atol=1e-12)
 
 
-def test_sensors_without_pressure_log_none() -> None:
+def test_sensors_without_pressure_log_no_pressure_channel() -> None:
     record = simulate(CIRCUIT, DRIVE, 1e-3, RIG, sensors=PAPER, rng=np.random.default_rng(1))
     assert not [name for name in record if "pressure" in name]
 
@@ -78,19 +78,19 @@ def test_an_abrupt_leak_slows_the_piston() -> None:
     assert velocity[-1] < 0.6 * healthy[-1]
 
 
-def test_leakage_that_grows_slows_the_piston_ever_more() -> None:
+def test_growing_leakage_slows_the_piston_continuously() -> None:
     leaking = parameters_for(CONDITIONS["major_leakage"], RIG)
     velocity = simulate(CIRCUIT, CONSTANT, 1e-3, growing(RIG, leaking, 1.0, 3.0))["velocity_m_s"]
     assert np.all(np.diff(velocity[1_200:2_900:100]) < 0.0)
 
 
-def test_a_stiffer_fault_gets_the_steps_it_needs() -> None:
+def test_an_almost_shut_throttle_is_simulated_without_instability() -> None:
     p = throttled(RIG, 10.0, 6.0)
     record = simulate(CIRCUIT, np.full(300, p.rated_speed), 1e-3, p)
     assert np.max(np.abs(record["velocity_m_s"])) < 2e-3
 
 
-def test_a_run_that_leaves_the_model_says_when_and_why() -> None:
+def test_a_run_that_leaves_the_models_range_reports_time_and_reason() -> None:
     def late(states: NDArray[np.float64]) -> Mapping[str, NDArray[np.bool_]]:
         return {name: np.arange(len(states)) >= 20 for name in circuit_breaches(states)}
 
@@ -98,7 +98,7 @@ def test_a_run_that_leaves_the_model_says_when_and_why() -> None:
         simulate(replace(CIRCUIT, breaches=late), DRIVE, 1e-3, RIG)
 
 
-def test_oil_that_runs_out_is_a_breach() -> None:
+def test_a_chamber_or_accumulator_without_oil_is_a_breach() -> None:
     states = np.tile(np.array(at_rest(RIG), dtype=np.float64), (3, 1))
     states[1, 5], states[2, 6] = 0.0, -1e-9
     chamber, accumulator = circuit_breaches(states).values()

@@ -21,7 +21,7 @@ def test_a_sized_cylinder_does_its_duty_with_standard_diameters() -> None:
     assert found.extend_pressure <= PRESS.supply_pressure * (1.0 - PRESS.valve_drop)
 
 
-def test_the_next_smaller_bore_would_not_do() -> None:
+def test_the_next_smaller_bore_does_not_reach_the_forces() -> None:
     found = size_cylinder(PRESS)
     smaller = BORES_MM[BORES_MM.index(round(1e3 * found.bore)) - 1] / 1e3
     weaker = cylinder_circuit(PRESS, smaller, found.rod)
@@ -39,7 +39,7 @@ def test_port_flows_differ_by_the_rods_area() -> None:
     assert found.pump_flow == pytest.approx(pi / 4.0 * (0.05**2 - 0.028**2) * 0.2)
 
 
-def test_pump_power_is_that_of_the_relief_valve() -> None:
+def test_pump_power_is_the_pump_flow_at_the_relief_setting() -> None:
     found = cylinder_circuit(PRESS, 0.05, 0.028)
     assert found.power == pytest.approx(1.1 * PRESS.supply_pressure * found.pump_flow)
 
@@ -56,7 +56,7 @@ def test_a_rod_twice_as_long_is_thicker_by_the_root_of_two() -> None:
     assert buckling_rod(1e3, 1.0) / buckling_rod(1e3, 0.5) == pytest.approx(2.0**0.5)
 
 
-def test_a_circuit_is_the_same_duty_in_other_units() -> None:
+def test_twice_the_diameters_give_four_times_the_force_and_flow() -> None:
     twice = replace(PRESS, extend_force=4.0 * PRESS.extend_force, retract_force=4.0 * PRESS.retract_force)
     ours, theirs = cylinder_circuit(PRESS, 0.04, 0.02), cylinder_circuit(twice, 0.08, 0.04)
     assert theirs.extend_force == pytest.approx(4.0 * ours.extend_force)
@@ -106,7 +106,7 @@ def test_a_free_rod_buckles_at_eulers_load_of_twice_its_length() -> None:
     assert cylinder_circuit(replace(PRESS, stroke=0.8), 0.05, rod).buckling_force == pytest.approx(wanted)
 
 
-def test_the_pressures_that_a_duty_needs_balance_its_forces() -> None:
+def test_force_reserve_and_needed_pressure_give_the_same_supply_in_both_directions() -> None:
     found = cylinder_circuit(PRESS, 0.05, 0.028)
     cap, ring = pi / 4.0 * 0.05**2, pi / 4.0 * (0.05**2 - 0.028**2)
     pressed = (found.extend_force - PRESS.extend_force) / (PRESS.efficiency * cap) + found.extend_pressure
@@ -115,7 +115,7 @@ def test_the_pressures_that_a_duty_needs_balance_its_forces() -> None:
     assert pressed <= PRESS.supply_pressure
 
 
-def test_a_cycle_is_the_stroke_at_either_speed_and_the_pipe_keeps_to_its_speed() -> None:
+def test_cycle_time_relief_setting_and_pipe_bore_follow_from_the_duty() -> None:
     found = cylinder_circuit(PRESS, 0.05, 0.028)
     assert found.cycle_time == pytest.approx(0.5 / 0.1 + 0.5 / 0.2)
     assert found.relief_setting == pytest.approx(1.1e7)

@@ -11,7 +11,7 @@ from plant.runs import require_frequency, require_positive, sample_count
 RIG = EhaParameters()
 
 
-def test_a_signal_has_one_sample_a_sample_time_and_leaves_out_its_end() -> None:
+def test_sample_count_excludes_the_end_point() -> None:
     assert sample_count(10.0, 1e-4) == 100_000
     assert sample_count(0.3, 0.1) == 3
 
@@ -30,7 +30,7 @@ def test_a_signal_of_one_sample_or_of_a_trillion_is_refused(duration: float) -> 
         sample_count(duration, 1e-3)
 
 
-def test_speed_beyond_the_motor_is_refused_with_both_numbers() -> None:
+def test_speed_beyond_the_motors_limit_is_refused_with_limit_and_speed() -> None:
     fast = np.array([0.0, 260.0, -260.0])
     with pytest.raises(DriveError, match=r"within 251\.4 rad/s, got 260 rad/s"):
         check_drive(fast, 1e-3, RIG)
@@ -40,7 +40,7 @@ def test_speed_at_the_limit_is_allowed() -> None:
     check_drive(np.array([RIG.motor_speed_limit, -RIG.motor_speed_limit]), 1e-3, RIG)
 
 
-def test_stroke_is_the_range_of_displacement_and_not_its_end() -> None:
+def test_the_needed_stroke_is_the_range_of_the_displacement() -> None:
     there_and_back = np.repeat([RIG.rated_speed, -RIG.rated_speed], 6000)
     with pytest.raises(DriveError, match=r"needs 0\.2762 m of stroke, the actuator has 0\.25 m"):
         check_drive(there_and_back, 1e-3, RIG)

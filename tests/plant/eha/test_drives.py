@@ -52,7 +52,7 @@ def test_prbs_has_flat_power_up_to_25_hz_when_held_10_ms_and_a_hole_there_when_h
 
 
 @pytest.mark.parametrize("hold_time", [1e-4, 0.0, np.inf])
-def test_a_hold_that_no_sample_can_follow_is_refused(hold_time: float) -> None:
+def test_a_hold_time_below_the_sample_time_or_infinite_is_refused(hold_time: float) -> None:
     with pytest.raises(DriveError, match="hold_time"):
         prbs(1.0, 1e-3, 1.0, hold_time, np.random.default_rng(0))
 

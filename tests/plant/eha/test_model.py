@@ -59,7 +59,7 @@ def test_below_the_coulomb_force_the_piston_sticks_exactly_and_stays(condition: 
 
 @EVERY_CONDITION
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_above_the_coulomb_force_it_breaks_loose_in_the_direction_of_the_pressure(
+def test_above_the_coulomb_force_the_piston_breaks_loose_in_the_direction_of_the_pressure(
     condition: Condition, direction: float
 ) -> None:
     p = parameters_for(condition)
@@ -76,7 +76,7 @@ def test_a_moving_piston_comes_to_rest_at_exactly_zero(condition: Condition) -> 
 
 
 @EVERY_CONDITION
-def test_energy_never_appears_with_the_pump_stopped(condition: Condition) -> None:
+def test_stored_energy_never_rises_with_the_pump_stopped(condition: Condition) -> None:
     p = parameters_for(condition)
     rng = np.random.default_rng(4)
     for substeps in (1, 4):
@@ -106,7 +106,7 @@ def test_leakage_makes_the_dead_zone_of_erratum_8(level: str, loose: float) -> N
 
 
 @EVERY_CONDITION
-def test_the_leakage_coefficient_comes_back_from_steady_state(condition: Condition) -> None:
+def test_the_leakage_coefficient_follows_from_the_steady_state(condition: Condition) -> None:
     p = parameters_for(condition)
     speed, v, dp = settled_at(2.5, p)
     assert abs(dp) < p.relief_pressure
@@ -271,7 +271,7 @@ def test_the_lumped_step_agrees_with_an_event_driven_solution(condition: str, dr
     ],
     ids=["slides", "slides back", "creeps", "sticks", "relieves", "relieves, held fast"],
 )
-def test_the_steps_derivatives_are_those_of_its_values(state: tuple[float, float, float]) -> None:
+def test_the_steps_derivatives_equal_numerical_derivatives(state: tuple[float, float, float]) -> None:
     names = parameter_names(EhaParameters)
     p = replace(RIG, load_stiffness=2e4, friction_coulomb=1e4 if state[1] == 0.0 else 436.0)
     values = dict(zip((*"xvd", *names), (*state, *parameter_row(p).tolist()), strict=True))
@@ -292,7 +292,7 @@ def test_the_steps_derivatives_are_those_of_its_values(state: tuple[float, float
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 @pytest.mark.parametrize("velocity", [-0.3, 0.3])
 @pytest.mark.parametrize("beyond", [-5e4, -2e4, 2e4, 5e4])
-def test_a_long_stage_opens_the_relief_valve_where_the_pressure_after_it_says_so(
+def test_an_implicit_stage_opens_the_relief_valve_by_the_pressure_at_its_end(
     side: float, velocity: float, beyond: float
 ) -> None:
     p, h = EhaParameters(), 2e-3  # the piston's motion changes the pressure by more than its distance from the setting
@@ -304,5 +304,5 @@ def test_a_long_stage_opens_the_relief_valve_where_the_pressure_after_it_says_so
     assert pressure - base[2] == pytest.approx(gained, rel=1e-9, abs=1e-3)
 
 
-def test_a_single_rod_has_unlike_areas_on_whichever_side_the_rod_is() -> None:
+def test_an_actuator_with_an_area_difference_of_either_sign_is_single_rod() -> None:
     assert [EhaParameters(area_difference=one).single_rod for one in (-0.2, 0.0, 0.2)] == [True, False, True]

@@ -24,7 +24,7 @@ def lowest(record: Record) -> tuple[float, float]:
     return float(np.min(record["pressure_a_pa"])), float(np.min(record["pressure_b_pa"]))
 
 
-def test_with_nothing_wrong_it_is_the_circuit() -> None:
+def test_a_one_sided_circuit_without_faults_equals_the_circuit() -> None:
     plain = simulate(CIRCUIT, DRIVE, 2e-3, PAPER)
     same = run()
     for name in plain:
@@ -43,7 +43,7 @@ def test_a_chamber_whose_valve_is_stuck_shut_draws_no_oil_and_its_pressure_falls
 
 
 @pytest.mark.parametrize(("side", "sign"), [("a", 1.0), ("b", -1.0)])
-def test_a_seat_that_leaks_slows_the_piston_where_its_chamber_pushes(side: str, sign: float) -> None:
+def test_a_leaking_seat_slows_the_piston_while_its_chamber_pushes(side: str, sign: float) -> None:
     sound, leaking = run(), run(**{f"seat_leakage_{side}": 1e-10})
     pushing = np.sign(DRIVE) == sign
     lost = [
@@ -54,7 +54,7 @@ def test_a_seat_that_leaks_slows_the_piston_where_its_chamber_pushes(side: str, 
     assert lost[0] > 2.0 * abs(lost[1])
 
 
-def test_a_row_tells_by_its_length_which_circuit_it_is_and_what_is_added_is_nothing_wrong() -> None:
+def test_the_length_of_a_row_selects_the_circuit_and_a_widened_row_has_no_faults() -> None:
     short, long = parameter_row(PAPER), parameter_row(one_sided(PAPER))
     assert circuit_plant(len(short)) is CIRCUIT
     assert circuit_plant(len(long)) is ONE_SIDED
@@ -62,7 +62,7 @@ def test_a_row_tells_by_its_length_which_circuit_it_is_and_what_is_added_is_noth
     assert as_wide(short, len(short)).tolist() == short.tolist()
 
 
-def test_no_more_of_a_valve_can_be_shut_than_there_is() -> None:
+def test_the_shut_share_of_a_valve_is_at_most_one() -> None:
     assert one_sided(PAPER, makeup_shut_a=1.0).makeup_shut_a == 1.0
     with pytest.raises(RigError, match="makeup_shut_b must be at most 1"):
         replace(OneSidedParameters(), makeup_shut_b=1.2)

@@ -26,7 +26,7 @@ def test_a_path_between_equal_parameters_is_constant() -> None:
     assert ParameterPath((0.0, 1.0), (HEALTHY, EhaParameters()), "linear").is_constant
 
 
-def test_a_step_holds_until_the_very_time_of_the_next() -> None:
+def test_a_stepped_path_holds_each_value_until_the_next_time() -> None:
     path = ParameterPath((0.0, 2.0), (HEALTHY, AERATED), "step")
     times = [-1.0, 0.0, np.nextafter(2.0, 0.0), 2.0, 9.0]
     assert path.sample(times)[:, BULK_MODULUS].tolist() == [2.07e8, 2.07e8, 2.07e8, 1.07e8, 1.07e8]

@@ -51,7 +51,7 @@ def test_the_commented_examples_of_the_template_are_valid(tmp_path: Path) -> Non
     assert len(rig.columns) == 8
 
 
-def test_a_rig_of_ones_own_keeps_what_it_says_and_the_papers_rest(tmp_path: Path) -> None:
+def test_a_rig_file_overrides_only_the_parameters_that_it_gives(tmp_path: Path) -> None:
     rig = rig_of(
         tmp_path,
         'name = "bench 2"\n[parameters]\npiston_area = 3.04e-3\nflow_bias = 0\n'
@@ -63,7 +63,7 @@ def test_a_rig_of_ones_own_keeps_what_it_says_and_the_papers_rest(tmp_path: Path
     assert dict(rig.columns) == {"position_m": "POS_MM:mm"}
 
 
-def test_the_template_says_what_is_doubted_of_each_entry_and_why() -> None:
+def test_the_template_states_the_uncertainty_of_each_entry_and_its_reason() -> None:
     text = rig_template()
     for name, doubt in DOUBTS.items():
         assert f"# {name}: " in text
@@ -71,7 +71,7 @@ def test_the_template_says_what_is_doubted_of_each_entry_and_why() -> None:
     assert "# moving_mass: 0.1 down, 0.4 up, 0.05 if measured;" in text
 
 
-def test_what_a_rig_does_not_say_is_doubted_and_less_so_what_was_measured(tmp_path: Path) -> None:
+def test_uncertainties_are_the_usual_ones_unless_stated_or_measured(tmp_path: Path) -> None:
     assert rig_of(tmp_path, "").spreads == Rig().spreads == {name: one.usual for name, one in DOUBTS.items()}
     rig = rig_of(tmp_path, 'measured = ["chamber_volume"]\n[uncertainty]\npressure_gain = 0.0\nrelief_pressure = 0.1\n')
     assert rig.measured == ("chamber_volume",)
@@ -81,7 +81,7 @@ def test_what_a_rig_does_not_say_is_doubted_and_less_so_what_was_measured(tmp_pa
     assert rig.spreads["moving_mass"] == DOUBTS["moving_mass"].usual
 
 
-def test_what_was_measured_is_surer_and_a_mass_is_sooner_too_small_than_too_large() -> None:
+def test_measured_entries_are_less_uncertain_and_no_entry_is_more_uncertain_downward() -> None:
     for doubt in DOUBTS.values():
         assert max(doubt.measured) < max(doubt.usual) <= 0.4
         assert doubt.usual.down <= doubt.usual.up
@@ -147,14 +147,14 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
         ),
     ],
 )
-def test_what_a_rig_cannot_hold_is_refused_with_file_and_field(tmp_path: Path, text: str, message: str) -> None:
+def test_an_invalid_rig_file_is_refused_with_file_and_field(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(RigError, match=message) as caught:
         rig_of(tmp_path, text)
     assert str(caught.value).startswith(str(tmp_path / "rig.toml"))
     assert "\n" not in str(caught.value)
 
 
-def test_a_rig_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
+def test_a_missing_or_binary_rig_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RigError, match="cannot be read as a rig file: No such file"):
         read_rig(tmp_path / "rig.toml")
     with pytest.raises(RigError, match="cannot be read as a rig file: a regular file is needed"):
@@ -212,12 +212,12 @@ def test_a_template_takes_two_areas_and_volumes_in_place_of_one(tmp_path: Path) 
         ("moving_mass = [1.0, 2.0]", "moving_mass must be"),
     ],
 )
-def test_what_is_no_pair_is_refused(tmp_path: Path, entry: str, said: str) -> None:
+def test_an_invalid_pair_of_sides_is_refused(tmp_path: Path, entry: str, said: str) -> None:
     with pytest.raises(RigError, match=said):
         rig_of(tmp_path, f"[parameters]\n{entry}\n")
 
 
-def test_valves_that_a_file_does_not_give_go_with_its_pump_and_those_that_it_gives_stay(tmp_path: Path) -> None:
+def test_valves_missing_from_the_file_scale_with_the_pump_and_given_ones_stay(tmp_path: Path) -> None:
     text = "[parameters]\npump_displacement = 1.114e-6\nrelief_conductance = 3e-8\n"
     p = rig_of(tmp_path, text).parameters
     assert p.makeup_conductance == pytest.approx(2e-9)

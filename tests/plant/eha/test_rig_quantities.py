@@ -55,7 +55,7 @@ def test_two_sides_may_differ_in_their_units(tmp_path: Path) -> None:
         ('pump_displacement = "8 mm^3/rad/bar"', "does not convert"),
     ],
 )
-def test_what_is_no_quantity_of_the_parameter_is_refused(tmp_path: Path, entry: str, words: str) -> None:
+def test_an_invalid_quantity_is_refused_with_the_reason(tmp_path: Path, entry: str, words: str) -> None:
     with pytest.raises(RigError) as said:
         read(tmp_path, entry)
     assert words in str(said.value)

@@ -45,14 +45,14 @@ def test_a_number_in_another_unit_is_refused_with_how_to_write_it(tmp_path: Path
 
 
 @pytest.mark.parametrize("name", list(LIMITS))
-def test_what_a_refusal_offers_is_read(tmp_path: Path, name: str) -> None:
+def test_the_example_given_in_a_refusal_is_accepted(tmp_path: Path, name: str) -> None:
     (tmp_path / "rig.toml").write_text(f'[parameters]\n{name} = "{LIMITS[name].example}"\n')
     value = getattr(read_rig(tmp_path / "rig.toml").parameters, name)
     assert LIMITS[name].least < value < LIMITS[name].most
 
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 10.0])
-def test_actuators_from_fingers_to_presses_are_read(tmp_path: Path, scale: float) -> None:
+def test_actuators_from_a_tenth_to_ten_times_the_papers_size_are_accepted(tmp_path: Path, scale: float) -> None:
     p = EhaParameters()
     sizes = {"piston_area": p.piston_area * scale**2, "chamber_volume": p.chamber_volume * scale**3}
     sizes |= {"pump_displacement": p.pump_displacement * scale**3, "relief_pressure": 35e6, "stroke": 0.2 * scale}

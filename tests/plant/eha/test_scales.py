@@ -8,7 +8,7 @@ from plant.eha.scales import PAPER_RIG, friction_scales, leakage_scales, with_va
 from plant.eha.steady_state import steady_state
 
 
-def test_the_paper_rig_is_its_own_measure() -> None:
+def test_the_paper_rig_has_scales_of_one() -> None:
     assert set({**leakage_scales(PAPER_RIG), **friction_scales(PAPER_RIG)}.values()) == {1.0}
 
 
@@ -31,7 +31,7 @@ def test_a_scaled_actuator_loses_the_same_share_of_velocity_and_adds_the_same_sh
     assert own == pytest.approx(paper, rel=1e-6)
 
 
-def test_valves_of_which_nothing_is_said_let_the_pumps_own_flow_through() -> None:
+def test_valves_not_given_are_sized_for_the_pumps_flow() -> None:
     """A pump with 15 times the flow used to lose 5 bar in the paper's valves."""
     p = replace(PAPER_RIG, pump_displacement=15.0 * PAPER_RIG.pump_displacement)
     sized = with_valves_sized(p, ())

@@ -19,7 +19,7 @@ DRIVE = sine(1.0, 1e-3, RIG.rated_speed, 2.0)
 CONSTANT = np.full(3_001, RIG.rated_speed)
 
 
-def test_one_seed_gives_one_record_and_another_seed_another() -> None:
+def test_the_seed_determines_the_record() -> None:
     first, again, other = (
         simulate(LUMPED, DRIVE, 1e-3, RIG, sensors=BENCH, rng=np.random.default_rng(seed)) for seed in (7, 7, 8)
     )
@@ -43,7 +43,7 @@ def test_truth_is_kept_when_asked_for_and_only_then() -> None:
     np.testing.assert_array_equal(ideal["true_position_m"], ideal["position_m"])
 
 
-def test_the_record_says_what_made_it() -> None:
+def test_the_record_states_its_plant_parameters_and_sensors() -> None:
     record = simulate(REDUCED, DRIVE, 1e-3, LEAKING, sensors=BENCH, rng=np.random.default_rng(1))
     assert record.metadata["plant"] == "reduced"
     assert record.metadata["parameters"] == asdict(LEAKING)
@@ -51,7 +51,7 @@ def test_the_record_says_what_made_it() -> None:
     assert (record.sample_time, len(record)) == (1e-3, len(DRIVE))
 
 
-def test_an_abrupt_leak_shows_when_it_comes() -> None:
+def test_an_abrupt_leak_changes_the_record_only_from_its_start() -> None:
     record = simulate(LUMPED, CONSTANT, 1e-3, abrupt(RIG, LEAKING, at=1.5))
     healthy, leaking = (simulate(LUMPED, CONSTANT, 1e-3, p)["velocity_m_s"][-1] for p in (RIG, LEAKING))
     velocity = record["velocity_m_s"]
@@ -76,7 +76,7 @@ def test_the_reduced_plant_reports_the_pressure_of_its_force_balance() -> None:
         assert settled[name][-1] == pytest.approx(wanted[name][-1], rel=1e-4)
 
 
-def test_the_samples_do_not_decide_the_motion() -> None:
+def test_the_motion_does_not_depend_on_the_sample_time() -> None:
     coarse = simulate(LUMPED, DRIVE, 1e-3, RIG)
     dense = np.interp(0.1 * np.arange(9_991), np.arange(1_000), DRIVE)
     fine = simulate(LUMPED, dense, 1e-4, RIG)
@@ -85,7 +85,7 @@ def test_the_samples_do_not_decide_the_motion() -> None:
         np.testing.assert_allclose(fine[name][::10], coarse[name], atol=1e-5 * peak)
 
 
-def test_the_drive_is_left_as_it_was() -> None:
+def test_simulate_does_not_modify_the_drive() -> None:
     drive = DRIVE.copy()
     simulate(LUMPED, drive, 1e-3, RIG, sensors=BENCH, rng=np.random.default_rng(1))
     np.testing.assert_array_equal(drive, DRIVE)

@@ -15,7 +15,7 @@ COULOMB = np.array([436.0, 436.0, 436.0, 6e3, 6e3])
 """Actuators with and without leakage; the last two have so much friction that the relief valve opens."""
 
 
-def test_many_circuits_settle_as_each_does_alone() -> None:
+def test_many_actuators_have_the_same_steady_states_as_each_alone() -> None:
     names = vars(SimpleNamespace(**{name: getattr(RIG, name) for name in RIG.__dataclass_fields__}))
     many = SimpleNamespace(**{**names, "leakage_coefficient": LEAKAGES, "friction_coulomb": COULOMB})
     alone = [
@@ -37,5 +37,5 @@ def test_flows_and_forces_balance_with_and_without_relief() -> None:
         assert pressure * p.piston_area == pytest.approx(rubbing, rel=1e-9) or velocity == 0.0
 
 
-def test_a_tight_pump_that_stands_still_settles_at_rest() -> None:
+def test_a_stopped_pump_without_leakage_settles_at_rest() -> None:
     assert steady_state(0.0, replace(RIG, leakage_coefficient=0.0))[0] == 0.0

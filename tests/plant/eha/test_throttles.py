@@ -22,14 +22,14 @@ def test_throttle_b_passes_through_its_points(volts: float, area: float) -> None
 
 
 @given(st.floats(0.0, 10.0), st.floats(0.0, 10.0))
-def test_a_lower_voltage_never_closes(one: float, other: float) -> None:
+def test_a_lower_voltage_never_closes_a_throttle(one: float, other: float) -> None:
     low, high = sorted((one, other))
     assert A.at(low)[0] >= A.at(high)[0]
     assert A.at(low)[1] >= A.at(high)[1]
     assert B.at(low) >= B.at(high)
 
 
-def test_points_that_turn_back_are_refused() -> None:
+def test_calibration_points_that_are_not_monotonic_or_too_few_are_refused() -> None:
     with pytest.raises(RigError, match="throttle B must open as its voltage falls"):
         ThrottleB((10.0, 0.0), (2e-6, 1e-6))
     with pytest.raises(RigError, match="throttle A must open as its voltage falls"):
@@ -39,7 +39,7 @@ def test_points_that_turn_back_are_refused() -> None:
 
 
 @pytest.mark.parametrize("volts", [-0.1, 10.1, float("nan")])
-def test_a_voltage_that_a_throttle_does_not_take_is_refused(volts: float) -> None:
+def test_a_throttle_voltage_out_of_range_is_refused(volts: float) -> None:
     with pytest.raises(RigError, match=r"throttle [AB] takes 0 to 10 V, got"):
         A.at(volts)
     with pytest.raises(RigError, match=rf"throttle B takes 0 to 10 V, got {volts!r} V"):

@@ -34,13 +34,13 @@ def native(plant: Plant) -> np.ndarray:
 
 @EVERY_PLANT
 @pytest.mark.parametrize("using", ["gcc", "clang"])
-def test_its_steps_in_c_are_those_of_python(plant: Plant, using: str, tmp_path: Path) -> None:
+def test_the_steps_of_a_plant_in_c_agree_with_python(plant: Plant, using: str, tmp_path: Path) -> None:
     wanted = native(plant)
     found = outputs(tmp_path, plant, using=using)
     assert np.max(np.abs(found - wanted) / np.max(np.abs(wanted), axis=0)) < 1e-12
 
 
-def test_a_plant_of_fixed_steps_is_what_simulate_runs(tmp_path: Path) -> None:
+def test_the_lumped_plant_in_c_agrees_with_simulate(tmp_path: Path) -> None:
     record = simulate(LUMPED, DRIVE, 1e-4, RIG)
     wanted = np.column_stack([record[name] for name in ("position_m", "velocity_m_s", "differential_pressure_pa")])
     assert np.max(np.abs(outputs(tmp_path, LUMPED) - wanted) / np.max(np.abs(wanted), axis=0)) < 1e-12
@@ -48,17 +48,17 @@ def test_a_plant_of_fixed_steps_is_what_simulate_runs(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @EVERY_PLANT
-def test_it_runs_clean_under_sanitizers(plant: Plant, tmp_path: Path) -> None:
+def test_a_plant_in_c_runs_clean_under_sanitizers(plant: Plant, tmp_path: Path) -> None:
     assert np.all(np.isfinite(outputs(tmp_path, plant, *SANITIZED)))
 
 
-def test_in_float_it_follows_within_a_few_parts_in_ten_thousand(tmp_path: Path) -> None:
+def test_a_plant_in_c_in_single_precision_errs_by_less_than_one_in_a_thousand(tmp_path: Path) -> None:
     wanted = native(LUMPED)
     error = np.max(np.abs(outputs(tmp_path, LUMPED, precision="float") - wanted) / np.max(np.abs(wanted), axis=0))
     assert 1e-8 < error < 1e-3
 
 
-def test_names_units_and_operations_stand_in_the_header() -> None:
+def test_the_header_gives_names_units_and_operation_counts() -> None:
     header = plant_in_c(LUMPED, RIG, 1e-3, name="bench")["bench.h"]
     assert "BENCH_ROW_PISTON_AREA = 1, /* m^2, effective piston area A */" in header
     assert "#define BENCH_SUBSTEPS 40" in header
@@ -66,7 +66,7 @@ def test_names_units_and_operations_stand_in_the_header() -> None:
     assert re.search(rf"#define BENCH_OPERATIONS {sum(counts)} ", header)
 
 
-def test_what_cannot_be_exported_is_refused() -> None:
+def test_an_invalid_name_or_sample_time_is_refused() -> None:
     with pytest.raises(HydrostateError, match="name in C"):
         plant_in_c(LUMPED, RIG, 1e-4, name="my plant")
     with pytest.raises(DriveError, match="sample_time must be positive"):

@@ -63,7 +63,7 @@ def apart(found: Any, wanted: dict[str, np.ndarray]) -> float:
     ("plant", "fmi"),
     thinned(itertools.product(PLANTS.values(), ("2.0", "3.0")), [(CIRCUIT, "2.0"), (LUMPED, "3.0"), (REDUCED, "2.0")]),
 )
-def test_it_passes_validation_and_follows_the_native_trajectory(
+def test_an_fmu_passes_validation_and_follows_the_native_trajectory(
     fmpy: Any, plant: Plant, fmi: str, tmp_path: Path
 ) -> None:
     from fmpy.validation import validate_fmu
@@ -74,7 +74,7 @@ def test_it_passes_validation_and_follows_the_native_trajectory(
 
 
 @pytest.mark.parametrize("plant", [REDUCED, LUMPED], ids=["reduced", "lumped"])
-def test_with_slopes_of_its_input_it_is_what_simulate_runs(fmpy: Any, plant: Plant, tmp_path: Path) -> None:
+def test_an_fmu_given_the_derivative_of_its_input_agrees_with_simulate(fmpy: Any, plant: Plant, tmp_path: Path) -> None:
     from fmpy.fmi2 import FMU2Slave
 
     path = written(tmp_path, plant, "2.0")
@@ -122,7 +122,7 @@ def test_every_variable_has_a_description_and_its_unit(fmpy: Any, tmp_path: Path
 
 
 @EVERY_VERSION
-def test_sources_are_inside_so_that_other_platforms_can_build(fmi: str) -> None:
+def test_an_fmu_contains_its_sources_and_is_reproducible(fmi: str) -> None:
     compiler("gcc")
     archive = plant_fmu(LUMPED, RIG, STEP, fmi, name="bench")
     with zipfile.ZipFile(io.BytesIO(archive)) as packed:
@@ -132,12 +132,12 @@ def test_sources_are_inside_so_that_other_platforms_can_build(fmi: str) -> None:
     assert archive == plant_fmu(LUMPED, RIG, STEP, fmi, name="bench")
 
 
-def test_a_version_that_is_none_is_refused() -> None:
+def test_an_unknown_version_of_fmi_is_refused() -> None:
     with pytest.raises(HydrostateError, match=r"version of FMI must be one of 2\.0, 3\.0, got '1\.0'"):
         plant_fmu(LUMPED, RIG, STEP, "1.0", name="bench")
 
 
-def test_a_state_begins_in_the_unit_of_its_channel_its_own_or_of_oil() -> None:
+def test_every_state_of_every_plant_has_its_unit() -> None:
     units = {state: _unit(state) for plant in PLANTS.values() for state in plant.states}
     assert units == {
         "position_m": "m",

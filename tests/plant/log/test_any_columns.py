@@ -17,7 +17,7 @@ def written(path: Path, header: str, *columns: object) -> Path:
 RAMP = np.arange(20.0)
 
 
-def test_columns_are_read_in_their_own_units_beside_time_in_any(tmp_path: Path) -> None:
+def test_columns_are_read_in_their_own_units_and_time_is_converted_to_seconds(tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", "Time [ms],Valve (%),bar", 2.0 * RAMP, RAMP, RAMP**2)
     record = read_any(path, ["Valve (%)", "bar"])
     assert record.sample_time == pytest.approx(2e-3)
@@ -25,13 +25,13 @@ def test_columns_are_read_in_their_own_units_beside_time_in_any(tmp_path: Path) 
     assert record["bar"][-1] == 361.0
 
 
-def test_every_column_of_numbers_is_read_where_none_is_named(tmp_path: Path) -> None:
+def test_every_column_of_numbers_is_read_if_none_is_requested(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t,u,note,y\n" + "".join(f"{k},{k * k},text,{-k}\n" for k in range(15)))
     assert list(read_any(path)) == ["u", "y"]
 
 
-def test_a_log_without_time_takes_the_sample_time_or_says_that_it_is_assumed(tmp_path: Path) -> None:
+def test_a_log_without_time_takes_the_given_sample_time_or_assumes_one_second_with_a_warning(tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", "u,y", RAMP, RAMP)
     assert read_any(path, sample_time=4.0).sample_time == 4.0
     with pytest.warns(LogWarning, match="no time column"):
@@ -52,13 +52,13 @@ def test_a_known_channel_in_another_unit_is_found_by_its_name(tmp_path: Path) ->
     ("name", "said"),
     [("valv", "column 'valv' is needed; the log has 't', 'valve', 'x', 'x'; did you mean 'valve'"), ("x", "2 times")],
 )
-def test_a_column_that_is_not_there_once_is_refused(name: str, said: str, tmp_path: Path) -> None:
+def test_a_requested_column_that_is_absent_or_ambiguous_is_refused(name: str, said: str, tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", "t,valve,x,x", RAMP, RAMP, RAMP, RAMP)
     with pytest.raises(LogError, match=said):
         read_any(path, [name])
 
 
-def test_a_part_of_a_name_is_told_the_whole(tmp_path: Path) -> None:
+def test_the_refusal_of_a_partial_column_name_suggests_the_full_name(tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", "t,Valve Cmd [V],Pos. [mm]", RAMP, RAMP, RAMP)
     with pytest.raises(LogError, match=r"did you mean 'Valve Cmd \[V\]'"):
         read_any(path, ["valve"])
@@ -71,7 +71,7 @@ def test_a_log_without_a_column_of_numbers_is_refused(tmp_path: Path) -> None:
         read_any(path)
 
 
-def test_dates_are_a_clock_and_no_column_of_numbers(tmp_path: Path) -> None:
+def test_dates_are_read_as_the_clock_and_refused_as_a_column_of_numbers(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     rows = [f"2026-03-01 12:00:{k:02d},2026-03-01 13:00:{k:02d},{k}\n" for k in range(15)]
     path.write_text("time,other,y\n" + "".join(rows))
@@ -81,20 +81,20 @@ def test_dates_are_a_clock_and_no_column_of_numbers(tmp_path: Path) -> None:
         read_any(path, ["other"])
 
 
-def test_what_was_mended_is_told(tmp_path: Path) -> None:
+def test_a_corrected_time_stamp_gives_a_warning(tmp_path: Path) -> None:
     time = RAMP.copy()
     time[7] += 0.02
     with pytest.warns(LogWarning, match="time"):
         read_any(written(tmp_path / "a.csv", "t,u", time, RAMP), ["u"])
 
 
-def test_a_known_channel_that_is_not_there_in_any_unit_is_named(tmp_path: Path) -> None:
+def test_the_refusal_of_an_absent_known_channel_names_it(tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", "t,motor_speed_rpm", RAMP, RAMP)
     with pytest.raises(LogError, match="column 'position_m' is needed; the log has 't', 'motor_speed_rpm'"):
         read_any(path, ["position_m"])
 
 
-def test_as_many_samples_may_be_missing_as_are_allowed(tmp_path: Path) -> None:
+def test_missing_samples_are_accepted_up_to_the_given_share(tmp_path: Path) -> None:
     keep = np.r_[0:8, 12:20]
     path = written(tmp_path / "a.csv", "t,u", RAMP[keep], RAMP[keep])
     with pytest.raises(LogError, match="time_s leaves out 4 of 20 samples, wanted at most 5 %"):
@@ -122,7 +122,7 @@ GARBAGE = {
 @pytest.mark.parametrize("names", [None, ("u", "y")])
 @pytest.mark.parametrize("kind", GARBAGE)
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_a_row_of_garbage_is_left_out_of_every_column_alike(
+def test_a_row_of_garbage_is_one_missing_sample_and_shifts_no_column(
     kind: str, names: tuple[str, ...] | None, tmp_path: Path
 ) -> None:
     stamped = kind.startswith("a stamp")
@@ -139,6 +139,6 @@ def test_a_row_of_garbage_is_left_out_of_every_column_alike(
     np.testing.assert_allclose(record["y"][there], 2.0 * record.time[there], atol=1e-6)
 
 
-def test_rows_without_a_time_are_as_far_apart_as_is_assumed(tmp_path: Path) -> None:
+def test_rows_without_a_time_are_spaced_by_the_assumed_sample_time(tmp_path: Path) -> None:
     with pytest.warns(LogWarning, match="sample time of 4 s"):
         assert read_any(written(tmp_path / "a.csv", "u,y", RAMP, RAMP), assumed=4.0).sample_time == 4.0

@@ -44,7 +44,7 @@ def refused(path: Path, said: str) -> None:
             read_log(path, {}, {})
 
 
-def test_a_pipe_and_a_socket_called_csv_are_not_waited_for(tmp_path: Path) -> None:
+def test_a_pipe_and_a_socket_named_csv_are_refused_without_waiting(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "x.csv")
     refused(tmp_path / "x.csv", "a file is needed, got a pipe")
     place = Path(os.path.relpath(tmp_path / "s.csv")) if len(str(tmp_path)) < 90 else tmp_path / "s.csv"
@@ -83,7 +83,7 @@ except LogError as error:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak of memory is read from /proc")
 @pytest.mark.parametrize("kind", ["gz", "zst", "mat", "xlsx", "parquet"])
-def test_a_bomb_unpacks_to_a_limit_and_no_further(tmp_path: Path, kind: str) -> None:
+def test_a_decompression_bomb_is_refused_at_the_unpacking_limit(tmp_path: Path, kind: str) -> None:
     path, zeros = tmp_path / f"bomb.{kind}", bytes(60 << 20)
     if kind == "gz":
         path.write_bytes(gzip.compress(f"{HEADER}\n".encode() + b"0,0,0\n" * (8 << 20)))
@@ -122,12 +122,12 @@ STAMPS = {
 
 
 @pytest.mark.parametrize("kind", STAMPS)
-def test_stamps_that_no_clock_gives_are_refused(tmp_path: Path, kind: str) -> None:
+def test_impossible_time_stamps_are_refused(tmp_path: Path, kind: str) -> None:
     refused(log(tmp_path / "a.csv", STAMPS[kind]), "time_s")
 
 
 @pytest.mark.parametrize("speed", [1e200, 1e-200, 1e17])
-def test_values_that_no_sensor_gives_are_refused(tmp_path: Path, speed: float) -> None:
+def test_values_beyond_any_sensor_are_refused(tmp_path: Path, speed: float) -> None:
     refused(log(tmp_path / "a.csv", speed=speed), "motor_speed_rad_s reaches .*, no sensor gives")
 
 
@@ -157,7 +157,7 @@ def test_lines_that_end_in_carriage_returns_are_read(tmp_path: Path) -> None:
         assert len(read_record(path)) == N
 
 
-def test_complex_numbers_do_not_lose_their_imaginary_part(tmp_path: Path) -> None:
+def test_complex_numbers_are_refused(tmp_path: Path) -> None:
     columns = {"time_s": TIME, "motor_speed_rad_s": np.arange(N) + 0j, "position_m": TIME + 1j}
     scipy.io.savemat(tmp_path / "a.mat", columns)
     refused(tmp_path / "a.mat", r"column 'position_m' must hold numbers, got '.*1j\)?' in row 1")
@@ -170,7 +170,7 @@ def test_complex_numbers_do_not_lose_their_imaginary_part(tmp_path: Path) -> Non
         (b"##CG", 96, 40, 0xFF000000, "it unpacks to more than"),
     ],
 )
-def test_an_mdf_whose_records_are_not_what_they_say_is_refused_before_it_is_copied(
+def test_an_mdf_file_with_damaged_record_sizes_is_refused(
     block: bytes, at: int, was: int, written: int, said: str, tmp_path: Path
 ) -> None:
     pytest.importorskip("asammdf")
@@ -184,7 +184,7 @@ def test_an_mdf_whose_records_are_not_what_they_say_is_refused_before_it_is_copi
     refused(path, said)
 
 
-def test_many_vectors_that_unpack_to_little_each_are_refused_for_their_sum(
+def test_many_small_packed_vectors_are_refused_for_their_total_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     h5py = pytest.importorskip("h5py")
@@ -196,9 +196,7 @@ def test_many_vectors_that_unpack_to_little_each_are_refused_for_their_sum(
         read_record(tmp_path / "bomb.h5")
 
 
-def test_a_row_of_a_sheet_that_is_longer_than_any_is_refused_before_it_is_held(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_overlong_row_of_a_sheet_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("plant.log.formats.xlsx.LONGEST_ROW", 1 << 16)
     with ZipFile(tmp_path / "bomb.xlsx", "w", ZIP_DEFLATED) as file:
         file.writestr("xl/workbook.xml", "<workbook/>")
@@ -207,7 +205,7 @@ def test_a_row_of_a_sheet_that_is_longer_than_any_is_refused_before_it_is_held(
         read_record(tmp_path / "bomb.xlsx")
 
 
-def test_the_empty_end_of_arrays_that_were_made_before_the_test_is_left_out() -> None:
+def test_the_unused_end_of_preallocated_arrays_is_left_out_with_a_note() -> None:
     ended = np.concatenate((np.ones(N), np.full(300, np.nan)))
     channels = {name: scale * ended for name, scale in (("motor_speed_rad_s", 9.0), ("velocity_m_s", 0.1))}
     checked = trusted({"time_s": 1e-3 * np.arange(N + 300) * ended, **channels}, source="a.csv")

@@ -14,7 +14,7 @@ def test_both_chambers_give_their_difference_as_the_last_channel() -> None:
     np.testing.assert_array_equal(found[PRESSURE], [2.0, 4.0, np.nan])
 
 
-def test_a_logged_difference_is_kept_and_one_chamber_alone_gives_none() -> None:
+def test_a_logged_differential_pressure_is_kept_and_one_chamber_pressure_adds_none() -> None:
     logged = {**BOTH, PRESSURE: np.zeros(3)}
     alone = {CHAMBERS[0]: A}
     assert with_difference(logged) is logged

@@ -59,7 +59,7 @@ def test_jitter_within_one_percent_is_resampled_with_a_note() -> None:
     np.testing.assert_allclose(checked.channels["velocity_m_s"], 0.03 * np.sin(phase * even), atol=2e-8)
 
 
-def test_a_single_stamp_that_is_off_is_mended_with_a_note() -> None:
+def test_a_single_shifted_time_stamp_is_resampled_with_a_note() -> None:
     time = TIME.copy()
     time[700] += 0.01 * 1e-3
     (note,) = check(time).notes
@@ -71,7 +71,7 @@ def test_a_single_stamp_that_is_off_is_mended_with_a_note() -> None:
 
 
 @pytest.mark.parametrize("share", [0.2, 0.35])
-def test_what_was_sampled_at_jittering_instants_is_put_on_a_uniform_clock(share: float) -> None:
+def test_a_signal_sampled_with_jitter_is_resampled_accurately_to_a_uniform_clock(share: float) -> None:
     time = TIME + 1e-3 * np.random.default_rng(1).uniform(-share, share, N)
     checked = check(time, velocity_m_s=0.03 * np.sin(40.0 * np.pi * time))
     assert [note.code for note in checked.notes] == [LogCode.TIME_JITTERS]
@@ -82,7 +82,7 @@ def test_what_was_sampled_at_jittering_instants_is_put_on_a_uniform_clock(share:
     assert np.max(np.abs(off)) < 2e-4
 
 
-def test_resampling_keeps_noise_white_and_as_large_as_it_was() -> None:
+def test_resampling_keeps_noise_white_and_its_standard_deviation() -> None:
     rng = np.random.default_rng(1)
     time = TIME + 1e-3 * rng.uniform(-0.2, 0.2, N)
     noise = check(time, velocity_m_s=rng.normal(0.0, 1e-3, N)).channels["velocity_m_s"]
@@ -90,7 +90,7 @@ def test_resampling_keeps_noise_white_and_as_large_as_it_was() -> None:
     assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 0.1
 
 
-def test_resampled_values_stay_on_the_quanta_of_the_sensor() -> None:
+def test_resampled_values_remain_multiples_of_the_sensor_resolution() -> None:
     time = TIME + 1e-3 * np.random.default_rng(1).uniform(-0.2, 0.2, N)
     counts = check(time, position_m=1e-6 * np.rint(1e4 * np.sin(6.0 * time))).channels["position_m"] / 1e-6
     np.testing.assert_allclose(counts, np.rint(counts), atol=1e-6)
@@ -104,14 +104,14 @@ def test_gaps_between_jittering_stamps_stay_gaps() -> None:
     assert np.flatnonzero(np.isnan(checked.channels["velocity_m_s"])).tolist() == [300, 301, 302, 700, 701]
 
 
-def test_steps_that_scatter_like_events_are_no_clock() -> None:
+def test_time_steps_that_scatter_like_random_events_are_refused() -> None:
     time = np.cumsum(np.random.default_rng(1).uniform(0.2e-3, 1.8e-3, N))
     with pytest.raises(LogError, match=r"scatter by at most 35 % of the sample time|leaves out"):
         check(time)
 
 
 @pytest.mark.parametrize(("sample_time", "quantum"), [(1e-3 / 3.0, 1e-5), (7e-4, 1e-3), (5e-4, 1e-3), (1e-3, 0.015625)])
-def test_rounded_stamps_are_put_back_and_no_sample_changes(sample_time: float, quantum: float) -> None:
+def test_rounded_time_stamps_are_made_uniform_and_samples_do_not_change(sample_time: float, quantum: float) -> None:
     checked = check(np.round(sample_time * np.arange(N) / quantum) * quantum)
     assert [note.code for note in checked.notes] == [LogCode.TIME_ROUNDED]
     assert checked.notes[0].data["quantum_s"] == pytest.approx(quantum, rel=1e-3)
@@ -140,7 +140,7 @@ def test_time_that_does_not_increase_is_refused(time: Values) -> None:
         check(time)
 
 
-def test_a_repeated_stamp_is_left_out_and_leaves_a_gap() -> None:
+def test_a_row_with_a_repeated_time_stamp_becomes_a_missing_sample() -> None:
     time = TIME.copy()
     time[41] = time[40]
     checked = check(time)
@@ -149,7 +149,7 @@ def test_a_repeated_stamp_is_left_out_and_leaves_a_gap() -> None:
 
 
 @pytest.mark.parametrize("rows", [np.arange(N), np.array([40]), np.arange(300, 700, 7)])
-def test_copied_rows_are_left_out_and_nothing_is_missing(rows: NDArray[np.int64]) -> None:
+def test_duplicate_rows_are_removed_and_no_sample_is_missing(rows: NDArray[np.int64]) -> None:
     twice = np.sort(np.concatenate([np.arange(N), rows]))
     copied = {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
     checked = trusted({name: values[twice] for name, values in copied.items()}, source="a.csv")
@@ -157,7 +157,7 @@ def test_copied_rows_are_left_out_and_nothing_is_missing(rows: NDArray[np.int64]
     np.testing.assert_array_equal(checked.channels["velocity_m_s"], VELOCITY)
 
 
-def test_whole_samples_left_out_become_missing_samples_in_place() -> None:
+def test_rows_absent_from_a_log_become_missing_samples_at_their_times() -> None:
     keep = np.ones(N, dtype=bool)
     keep[[100, 101, 600]] = False
     checked = trusted(
@@ -199,7 +199,7 @@ def test_a_channel_that_is_logged_every_tenth_row_is_kept_with_a_note() -> None:
     assert np.count_nonzero(np.isfinite(checked.channels["differential_pressure_pa"])) == N // 10
 
 
-def test_a_channel_of_which_nine_tenths_are_lost_at_random_is_left_out() -> None:
+def test_a_channel_with_nine_tenths_missing_at_random_is_left_out() -> None:
     lost = np.where(np.random.default_rng(1).random(N) < 0.9, np.nan, 1e5)
     checked = check(differential_pressure_pa=lost)
     assert "differential_pressure_pa" not in checked.channels
@@ -209,7 +209,7 @@ def test_a_channel_of_which_nine_tenths_are_lost_at_random_is_left_out() -> None
 
 
 @pytest.mark.parametrize(("first", "behind"), [(300, N), (0, 700), (200, 800)])
-def test_a_log_is_used_where_its_pressure_is_logged(first: int, behind: int) -> None:
+def test_a_log_is_cut_to_the_time_span_with_pressure(first: int, behind: int) -> None:
     pressure = np.full(N, np.nan)
     pressure[first:behind] = 1e5 * TIME[first:behind]
     checked = check(differential_pressure_pa=pressure)
@@ -222,7 +222,7 @@ def test_a_log_is_used_where_its_pressure_is_logged(first: int, behind: int) -> 
     assert note.data["end_s"] == pytest.approx(TIME[behind - 1])
 
 
-def test_a_slow_pressure_that_begins_late_is_used_too() -> None:
+def test_a_log_is_cut_to_the_time_span_of_a_slowly_sampled_pressure_that_begins_late() -> None:
     pressure = np.full(N, np.nan)
     pressure[300::10] = 1e5
     checked = check(differential_pressure_pa=pressure)
@@ -231,14 +231,14 @@ def test_a_slow_pressure_that_begins_late_is_used_too() -> None:
 
 
 @pytest.mark.parametrize("channel", ["differential_pressure_pa", "motor_voltage_v"])
-def test_a_channel_of_less_than_half_of_a_log_or_outside_the_balance_is_left_out(channel: str) -> None:
+def test_a_pressure_logged_under_half_of_the_time_or_another_channel_logged_in_part_is_left_out(channel: str) -> None:
     lost = np.full(N, 1.0)
     lost[: 600 if channel.endswith("pa") else 300] = np.nan
     checked = check(**{channel: lost})
     assert (channel in checked.channels, len(checked.channels["velocity_m_s"])) == (False, N)
 
 
-def test_channels_with_times_of_their_own_are_put_on_the_clock_of_the_fastest() -> None:
+def test_channels_with_different_time_stamps_are_resampled_to_those_of_the_fastest() -> None:
     when = TIME[5::10] + 3.7e-4
     rows = np.argsort(np.concatenate([TIME, when]), kind="stable")
     none, nothing = np.full(len(when), np.nan), np.full(N, np.nan)
@@ -259,7 +259,7 @@ def test_channels_with_times_of_their_own_are_put_on_the_clock_of_the_fastest() 
     assert checked.notes[0].data["sample_time_s"] == pytest.approx(1e-3, rel=1e-9)
 
 
-def test_a_clock_that_slips_by_part_of_a_sample_is_mended_though_a_sample_is_missing() -> None:
+def test_a_clock_shift_of_less_than_a_sample_is_corrected_in_a_log_with_missing_samples() -> None:
     time = TIME.copy()
     time[500:] += 4e-4
     checked = check(time, motor_speed_rad_s=with_gaps(SPEED, 3), velocity_m_s=with_gaps(VELOCITY, 7))
@@ -282,7 +282,7 @@ def test_a_missing_required_column_is_named(lost: str) -> None:
         trusted(log, source="a.csv")
 
 
-def test_position_or_velocity_is_wanted() -> None:
+def test_a_log_with_neither_position_nor_velocity_is_refused() -> None:
     with pytest.raises(LogError, match="position_m or velocity_m_s is missing"):
         trusted({"time_s": TIME, "motor_speed_rad_s": SPEED}, source="a.csv")
 
@@ -299,7 +299,7 @@ def test_differential_pressure_is_derived_from_both_port_pressures() -> None:
     assert LogCode.CHAMBER_ALONE.note(channel="pressure_a_pa", other="pressure_b_pa") in alone.notes
 
 
-def test_the_clock_of_the_writer_is_used_only_where_the_times_agree_with_it() -> None:
+def test_the_clock_in_the_metadata_is_used_only_if_the_time_stamps_agree() -> None:
     log = {"time_s": 0.1 + TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
     same = trusted(log, source="a.csv", clock=Clock(1e-3, 0.1))
     assert (same.sample_time, same.start_time) == (1e-3, 0.1)
@@ -307,7 +307,7 @@ def test_the_clock_of_the_writer_is_used_only_where_the_times_agree_with_it() ->
     assert other.sample_time == pytest.approx(1e-3, rel=1e-9)
 
 
-def test_rows_without_a_time_are_left_out_if_they_are_few() -> None:
+def test_rows_without_a_time_are_left_out_up_to_five_percent() -> None:
     few = check(with_gaps(TIME, 3, 400, 401))
     assert few.notes[0] == LogCode.TIME_MISSING.note(channel="time_s", count=3, total=N, percent=0.3)
     assert few.sample_time == pytest.approx(1e-3)
@@ -318,7 +318,7 @@ def test_rows_without_a_time_are_left_out_if_they_are_few() -> None:
         trusted(short, source="a.csv")
 
 
-def test_a_clock_alone_and_a_channel_that_is_hardly_there_are_no_log() -> None:
+def test_a_log_without_a_sufficiently_sampled_channel_beside_time_is_refused() -> None:
     with pytest.raises(NoChannelError, match="at least one channel is needed beside time_s"):
         trusted({"time_s": TIME}, source="a.csv", required=())
     hardly = np.where(np.random.default_rng(1).random(N) < 0.5, SPEED, np.nan)
@@ -331,7 +331,7 @@ def test_a_clock_alone_and_a_channel_that_is_hardly_there_are_no_log() -> None:
     assert list(kept.channels) == ["motor_speed_rad_s", "velocity_m_s"]
 
 
-def test_a_channel_that_is_logged_every_second_row_is_slower_too() -> None:
+def test_a_channel_that_is_logged_every_second_row_is_kept_with_a_note() -> None:
     half = np.where(np.arange(N) % 2 == 0, 1e6 * VELOCITY, np.nan)
     checked = check(differential_pressure_pa=half)
     assert [(note.code, dict(note.data)) for note in checked.notes] == [
@@ -340,7 +340,7 @@ def test_a_channel_that_is_logged_every_second_row_is_slower_too() -> None:
 
 
 @pytest.mark.parametrize(("lost", "kept"), [(4, True), (5, False)])
-def test_a_slow_channel_needs_nineteen_of_twenty_of_its_own_samples_between_its_ends(lost: int, kept: bool) -> None:
+def test_a_slowly_sampled_channel_needs_95_percent_of_its_samples_between_first_and_last(lost: int, kept: bool) -> None:
     rows = np.arange(9, N - 10, 10)  # 99 samples: the log begins before the first, and ends after the last
     slow = np.full(N, np.nan)
     slow[np.delete(rows, np.arange(10, 10 + 2 * lost, 2))] = 1e5

@@ -53,11 +53,11 @@ def test_unknown_columns_are_ignored_and_simulated_truth_is_kept() -> None:
     ]
 
 
-def test_a_part_of_a_structure_or_matrix_is_no_unit_of_its_channel() -> None:
+def test_a_field_name_or_matrix_index_after_a_channel_is_not_read_as_a_unit() -> None:
     assert channels("position_m.Data", "velocity_m_s 1", "time_s.Time") == {}
 
 
-def test_an_unknown_unit_names_file_column_wanted_and_got() -> None:
+def test_an_unknown_unit_is_refused_with_file_column_channel_and_unit() -> None:
     with pytest.raises(LogError, match=r"a\.csv: column 'position_xyz' cannot become position_m: unit 'xyz'"):
         channels("time_s", "position_xyz")
 
@@ -67,7 +67,7 @@ def test_a_unit_of_something_else_is_refused() -> None:
         channels("position_bar")
 
 
-def test_a_setpoint_beside_its_channel_is_no_second_channel() -> None:
+def test_a_setpoint_column_is_not_read_as_the_measured_channel() -> None:
     assert channels("position_setpoint_mm", "position_m")["position_m"] == "position_m"
 
 
@@ -79,7 +79,7 @@ def test_two_columns_for_one_channel_are_refused_and_a_mapping_settles_it() -> N
     assert channels("position_m", "position_mm", position_m="position_mm:mm") == {"position_m": "position_mm"}
 
 
-def test_foreign_names_take_their_unit_from_the_mapping_or_are_si() -> None:
+def test_a_mapped_column_has_the_unit_of_the_mapping_or_si() -> None:
     columns = resolve_columns(["POS_MM", "V"], {"position_m": "POS_MM:mm", "velocity_m_s": "V"}, "a.csv")
     assert [(c.channel, c.position) for c in columns] == [("position_m", 0), ("velocity_m_s", 1)]
     assert [c.factor for c in columns] == [pytest.approx(1e-3), 1.0]
@@ -128,19 +128,21 @@ def test_command_line_columns_are_parsed() -> None:
         (["motor_speed_rad_s=N:Hz"], "leaves the angle out"),
     ],
 )
-def test_a_command_line_column_of_another_shape_is_refused(texts: list[str], message: str) -> None:
+def test_a_malformed_command_line_column_is_refused(texts: list[str], message: str) -> None:
     with pytest.raises(RigError, match=message):
         parse_columns(texts)
 
 
 @pytest.mark.parametrize("units", [{"travel_mm": "m"}, {"position_m": "mm"}, {"travel": "m"}])
-def test_a_channel_is_known_in_one_unit_which_its_name_ends_in(units: dict[str, str]) -> None:
+def test_a_channel_whose_name_does_not_end_in_its_unit_is_refused(units: dict[str, str]) -> None:
     with pytest.raises(HydrostateError, match=r"must end in .* and be known in no other unit"):
         know_channels(units)
 
 
 @pytest.mark.parametrize("mapping", [None, {"position_m": "Position [mm]"}])
-def test_two_units_of_one_column_are_refused_and_a_mapping_settles_it(mapping: dict[str, str] | None) -> None:
+def test_a_column_with_two_different_units_is_refused_unless_a_mapping_gives_one(
+    mapping: dict[str, str] | None,
+) -> None:
     headings = [Heading("time_s"), Heading("Position [mm]", "um")]
     with pytest.raises(LogError, match="says mm by its name and um beside it, wanted one"):
         resolve_columns(headings, mapping, "a.csv")
@@ -149,7 +151,7 @@ def test_two_units_of_one_column_are_refused_and_a_mapping_settles_it(mapping: d
     assert resolve_columns([Heading("Position [mm]", "mm")], None, "a.csv")[0].factor == pytest.approx(1e-3)
 
 
-def test_a_unit_at_the_end_of_a_name_and_another_beside_it_are_two() -> None:
+def test_a_unit_suffix_that_contradicts_the_heading_unit_is_refused() -> None:
     with pytest.raises(LogError, match="says mm by its name and um beside it, wanted one"):
         resolve_columns([Heading("time_s"), Heading("position_mm", "um")], None, "a.csv")
     for said in ("mm", "counts", None):

@@ -101,7 +101,7 @@ def test_any_finite_record_comes_back_from_every_format(
         assert_same(read_record(path, required=()), record)
 
 
-def test_metadata_stand_where_other_programs_find_them(tmp_path: Path) -> None:
+def test_metadata_are_the_same_json_beside_a_csv_and_within_parquet_and_mat(tmp_path: Path) -> None:
     for name in ("run.csv", "run.parquet", "run.mat"):
         write_record(example(), tmp_path / name)
     beside = json.loads((tmp_path / "run.csv.json").read_text())
@@ -202,7 +202,7 @@ def test_the_csv_of_an_unruly_logger_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(record["motor_speed_rad_s"], SPEED, atol=1e-6)
 
 
-def test_truth_that_is_no_number_is_left_out(tmp_path: Path) -> None:
+def test_columns_of_simulated_truth_that_hold_text_are_left_out(tmp_path: Path) -> None:
     frame = pd.DataFrame({"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY})
     frame["true_class"], frame["true_x"] = "none", 1.0
     frame.to_csv(tmp_path / "run.csv", index=False)
@@ -283,7 +283,7 @@ def test_a_log_with_foreign_names_is_read_through_a_mapping(shared: Path) -> Non
     assert np.ptp(record["position_m"]) == pytest.approx(0.2464, abs=1e-4)
 
 
-def test_stamps_of_whole_seconds_are_read_with_the_sample_time_that_the_refusal_asks_for(tmp_path: Path) -> None:
+def test_stamps_of_whole_seconds_are_read_with_the_sample_time_option_of_the_refusal(tmp_path: Path) -> None:
     """The refusal named --sample-time, but the same refusal used to come again with it."""
     rows = (f"2026-11-29 10:00:0{k // 20},{k}.5,0.{k:03d}" for k in range(60))
     (tmp_path / "log.csv").write_text("\n".join(["time,motor_speed_rad_s,position_m", *rows]))
@@ -299,7 +299,7 @@ def test_stamps_of_whole_seconds_are_read_with_the_sample_time_that_the_refusal_
 
 
 @pytest.mark.parametrize("sample_time", [0.0, -1e-3, np.inf, np.nan])
-def test_a_sample_time_that_is_none_is_refused(sample_time: float, tmp_path: Path) -> None:
+def test_a_sample_time_that_is_not_positive_and_finite_is_refused(sample_time: float, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("motor_speed_rad_s,position_m\n" + "1.0,0.0\n" * 20)
     with pytest.raises(LogError, match="sample_time must be positive and finite"):
         read_record(tmp_path / "log.csv", sample_time=sample_time)
@@ -314,7 +314,9 @@ def test_a_sample_time_that_is_none_is_refused(sample_time: float, tmp_path: Pat
     ],
     ids=["empty", "old Excel", "HDF5 behind a block"],
 )
-def test_what_a_file_is_its_first_bytes_tell(name: str, content: bytes, said: str, tmp_path: Path) -> None:
+def test_a_file_named_csv_with_other_content_is_refused_without_a_decoding_error(
+    name: str, content: bytes, said: str, tmp_path: Path
+) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(LogError, match=said) as raised:
         read_record(tmp_path / name)
@@ -332,7 +334,7 @@ def test_blanks_between_columns_are_read_and_a_short_row_is_refused(tmp_path: Pa
         read_record(path)
 
 
-def test_where_an_object_lies_in_memory_is_not_told_of_a_damaged_file(tmp_path: Path) -> None:
+def test_the_refusal_of_a_damaged_file_contains_no_memory_address(tmp_path: Path) -> None:
     np.save(tmp_path / "run.npy", np.zeros(20, [(one, float) for one in ("time_s", "motor_speed_rad_s", "position_m")]))
     content = (tmp_path / "run.npy").read_bytes().replace(b"'fortran_order': False", b"'fortran_order': Falke")
     (tmp_path / "run.npy").write_bytes(content)

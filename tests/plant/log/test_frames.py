@@ -55,7 +55,7 @@ def table(index: Any = None) -> pd.DataFrame:
         "index of text",
     ],
 )
-def test_a_table_is_read_as_its_file_would_be(given: pd.DataFrame) -> None:
+def test_every_kind_of_table_in_memory_is_read(given: pd.DataFrame) -> None:
     record = read_record(frame_table(given))
     assert record.sample_time == pytest.approx(0.01, rel=1e-12)
     np.testing.assert_allclose(record.time, TIME, atol=1e-12)
@@ -65,7 +65,7 @@ def test_a_table_is_read_as_its_file_would_be(given: pd.DataFrame) -> None:
 
 @pytest.mark.parametrize("zone", [None, "Europe/Paris"])
 @pytest.mark.parametrize("in_a_column", [False, True])
-def test_dates_are_time_and_say_when_the_log_began(zone: str | None, in_a_column: bool) -> None:
+def test_a_column_or_index_of_dates_gives_time_and_the_start_date(zone: str | None, in_a_column: bool) -> None:
     stamps = pd.Timestamp("2026-11-25T10:00", tz=zone) + pd.to_timedelta(TIME, unit="s")
     given = table(index=stamps)
     if in_a_column:
@@ -75,7 +75,7 @@ def test_dates_are_time_and_say_when_the_log_began(zone: str | None, in_a_column
     np.testing.assert_allclose(record.time - record.time[0], TIME, atol=1e-9)
 
 
-def test_an_index_that_counts_rows_is_no_time() -> None:
+def test_an_index_of_row_numbers_is_not_taken_for_time() -> None:
     chosen = pd.concat([table(), table()], ignore_index=True).iloc[::2]
     with pytest.raises(LogError, match=r"^the table: column time_s is missing.*without time, give --sample-time"):
         read_record(frame_table(chosen))
@@ -96,7 +96,7 @@ def test_an_index_that_counts_rows_is_no_time() -> None:
         (pd.concat([table(), table()], axis=1), "columns of different names are needed, got motor_speed_rad_s,"),
     ],
 )
-def test_what_is_no_table_of_columns_is_refused(given: pd.DataFrame, said: str) -> None:
+def test_an_invalid_table_is_refused(given: pd.DataFrame, said: str) -> None:
     with pytest.raises(LogError, match=f"^the table: .*{said}"):
         frame_table(given)
 
@@ -120,7 +120,7 @@ def test_one_text_in_a_hundred_rows_is_a_missing_sample() -> None:
 
 
 @pytest.mark.parametrize("how", ["datetime64", "text", "datetime", "zone"])
-def test_a_column_of_dates_is_the_time_however_it_is_kept(how: str) -> None:
+def test_a_column_of_dates_is_read_as_time_from_every_data_type(how: str) -> None:
     ramp = np.arange(100.0)
     dates = pd.Series(pd.Timestamp("2026-03-01 12:00:00") + pd.to_timedelta(0.25 * ramp, unit="s"))
     kept = {
@@ -135,12 +135,12 @@ def test_a_column_of_dates_is_the_time_however_it_is_kept(how: str) -> None:
     assert (record.sample_time, len(record)) == (pytest.approx(0.25), 100)
 
 
-def test_only_pandas_has_frames() -> None:
+def test_only_pandas_objects_are_recognised_as_data_frames() -> None:
     assert is_frame(table())
     assert not any(is_frame(one) for one in (CHANNELS, np.zeros((3, 2)), "run.csv", None))
 
 
-def test_a_query_that_has_not_run_and_bare_numbers_are_no_tables() -> None:
+def test_a_lazy_query_and_an_unnamed_array_are_not_read_as_tables() -> None:
     class Query:
         columns: ClassVar = ["time_s"]
 
@@ -153,7 +153,7 @@ def test_a_query_that_has_not_run_and_bare_numbers_are_no_tables() -> None:
     assert by_name({"time_s": TIME}) == {"time_s": TIME}
 
 
-def test_masked_values_are_missing_ones() -> None:
+def test_masked_values_become_missing_samples() -> None:
     position = np.ma.masked_array(CHANNELS["position_m"].copy(), mask=np.arange(400) % 50 == 7)
     position.data[7::50] = 1e9
     with pytest.warns(LogWarning, match=r"position_m is missing in 8 of 400 samples"):

@@ -31,7 +31,7 @@ ROWS = "\n".join(f"{0.001 * k:.3f},{k % 7},{k % 5}" for k in range(20))
         ("Chamber B pressure [psi]", "pressure_b_pa"),
     ],
 )
-def test_names_of_benches_are_known(name: str, channel: str) -> None:
+def test_common_column_names_of_test_benches_are_guessed(name: str, channel: str) -> None:
     best = guess_by_name([Heading(name)])[0]
     assert (best.channel, best.place) == (channel, 0)
     assert best.sure > 0.5
@@ -42,7 +42,7 @@ def test_a_set_point_is_not_taken_for_what_was_measured() -> None:
     assert [one.name for one in found] == ["Position_Ist [mm]"]
 
 
-def test_a_unit_of_something_else_excludes_a_column() -> None:
+def test_a_column_with_a_unit_of_another_dimension_is_not_guessed() -> None:
     assert guess_by_name([Heading("Position [bar]")], ["position_m"]) == ()
 
 
@@ -57,7 +57,7 @@ def test_a_missing_column_is_refused_with_headers_guess_and_the_command(tmp_path
     assert "`hydrostate inspect FILE --write rig.toml`" in said
 
 
-def test_a_column_that_was_asked_for_and_is_not_there_is_refused_likewise(tmp_path: Path) -> None:
+def test_a_mapping_to_an_absent_column_is_refused_with_a_guess_and_the_inspect_command(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text("time_s,motor_speed_rpm,Weg [mm]\n" + ROWS)
     with pytest.raises(MissingColumnError, match=r"perhaps --columns 'position_m=Weg \[mm\]:mm'.*inspect FILE"):
@@ -82,20 +82,20 @@ def notes_of(tmp_path: Path, header: str) -> list[Note]:
         ("piston velocity [mm/s]", "velocity_m_s=piston velocity [mm/s]:mm/s"),
     ],
 )
-def test_a_column_that_was_left_unread_and_may_be_needed_is_named(tmp_path: Path, name: str, option: str) -> None:
+def test_a_note_names_an_unread_column_that_may_be_a_channel(tmp_path: Path, name: str, option: str) -> None:
     (told,) = notes_of(tmp_path, f"time_s,motor_speed_rad_s,position_m,{name}")
     channel = option.partition("=")[0]
     assert told == LogCode.COLUMN_OVERLOOKED.note(column=name, channel=channel, option=option)
 
 
 @pytest.mark.parametrize("name", ["differential_pressure_pa", "dp_set", "temperature [degC]", "y"])
-def test_other_columns_are_left_unread_without_a_word(tmp_path: Path, name: str) -> None:
+def test_columns_that_cannot_be_a_missing_channel_are_ignored_without_a_note(tmp_path: Path, name: str) -> None:
     assert LogCode.COLUMN_OVERLOOKED not in [
         one.code for one in notes_of(tmp_path, f"time_s,motor_speed_rad_s,position_m,{name}")
     ]
 
 
-def test_the_option_that_is_offered_reads_pressure_too_and_asks_for_units_that_no_name_says(tmp_path: Path) -> None:
+def test_the_suggested_columns_option_includes_pressure_and_a_placeholder_for_unknown_units(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     rows = "\n".join(f"{0.001 * k:.3f},{k % 7},{k % 5},{k % 3}" for k in range(20))
     path.write_text(f"Zeit,Drehzahl,Weg,Druck\n{rows}")
@@ -107,14 +107,14 @@ def test_the_option_that_is_offered_reads_pressure_too_and_asks_for_units_that_n
     assert "--sample-time" not in said  # the log has a time column
 
 
-def test_a_log_of_one_logger_says_how_the_other_is_merged(tmp_path: Path) -> None:
+def test_a_log_without_required_channels_suggests_merging_a_second_loggers_file(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text("time_s,motor_speed_rpm,pressure_bar\n" + ROWS)
     with pytest.raises(LogError, match="if a second logger's file has it, add --with FILE"):
         read_record(path)
 
 
-def test_a_log_of_a_valve_without_motor_speed_says_what_can_be_done_with_it(tmp_path: Path) -> None:
+def test_a_refused_log_of_a_valve_actuator_suggests_identification(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text("time_s,spool_command,position_m\n" + ROWS)
     with pytest.raises(LogError, match=r"an actuator that a valve controls cannot be diagnosed, but .*identify FILE"):
@@ -128,7 +128,7 @@ def test_a_letter_is_no_log(tmp_path: Path) -> None:
         read_record(path)
 
 
-def test_columns_in_volts_say_that_the_scale_of_the_sensor_is_needed() -> None:
+def test_the_hint_for_a_column_in_volts_asks_for_the_sensor_scale() -> None:
     volts, bars = (
         hint_of(["position_m"], [Heading("Time", "s"), Heading("CH1", unit), Heading("CH2", "V")])
         for unit in ("V", "bar")
@@ -137,7 +137,7 @@ def test_columns_in_volts_say_that_the_scale_of_the_sensor_is_needed() -> None:
     assert "in V needs" not in bars
 
 
-def test_one_chamber_alone_is_not_offered_by_its_unit(tmp_path: Path) -> None:
+def test_a_column_recognised_as_pressure_only_by_its_unit_is_not_suggested(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("Zeit [s],Drehzahl [rpm],Weg [mm],Äp bar\n1,2,3,4\n")
     with pytest.raises(NoChannelError) as told:

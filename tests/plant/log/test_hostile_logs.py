@@ -205,7 +205,7 @@ def test_a_binary_file_is_refused_under_any_name(tmp_path: Path, name: str) -> N
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet", "run.mat", "run.csv.gz"])
-def test_a_file_cut_short_is_refused_or_loses_its_last_row_with_a_word(tmp_path: Path, name: str) -> None:
+def test_a_file_cut_short_is_refused_or_loses_its_last_row_with_a_warning(tmp_path: Path, name: str) -> None:
     from plant.log.files import write_record
 
     write_record(read_record(log(tmp_path)), tmp_path / name)

@@ -33,7 +33,7 @@ def test_a_column_without_a_number_has_no_span() -> None:
     assert ColumnFacts(Heading("way"), np.full(3, np.nan)).span is None
 
 
-def test_dates_are_a_clock_in_seconds() -> None:
+def test_the_time_step_and_duration_of_dates_are_in_seconds() -> None:
     facts = clock_facts(np.insert(STAMPS, 3, np.datetime64("NaT")))
     assert facts is not None
     assert (facts.step, facts.duration) == (pytest.approx(0.01), pytest.approx(0.05))
@@ -55,11 +55,11 @@ def test_repeats_and_steps_back_are_counted() -> None:
     ],
     ids=["two", "backward", "no finite step", "no date"],
 )
-def test_what_is_no_clock_has_no_facts(stamps: np.ndarray) -> None:
+def test_an_invalid_clock_has_no_facts(stamps: np.ndarray) -> None:
     assert clock_facts(stamps) is None
 
 
-def test_days_as_excel_counts_them_are_told_by_their_size_and_their_steps() -> None:
+def test_excel_day_numbers_are_recognised_by_their_size_and_even_steps() -> None:
     days = 46082.5 + 1e-3 * np.arange(50) / 86400.0
     speeds = 46082.5 + np.sin(np.arange(50.0))
     facts = inspect_table(table_of("log.csv", {"Time": days, "speed": speeds}))

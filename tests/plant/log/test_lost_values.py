@@ -21,7 +21,7 @@ def with_marks(value: float, count: int = 5) -> "np.ndarray[tuple[int], np.dtype
 
 
 @pytest.mark.parametrize("value", [-9999.0, -999.0, 32767.0, 1e30, float(np.float32(1e30)), 9.91e37])
-def test_a_number_for_a_lost_sample_is_a_missing_one_and_is_named(value: float) -> None:
+def test_a_number_that_marks_lost_samples_becomes_missing_with_a_note(value: float) -> None:
     kept, said = without_lost(with_marks(value), "position_m")
     assert np.flatnonzero(np.isnan(kept)).tolist() == list(range(100, 105))
     assert said == [LogCode.LOST_VALUE.note(channel="position_m", value=value, count=5, total=N)]
@@ -40,13 +40,13 @@ def test_a_number_for_a_lost_sample_is_a_missing_one_and_is_named(value: float) 
     ],
     ids=["no such number", "once", "too often", "in range", "clipped", "nothing else", "nothing"],
 )
-def test_what_may_be_a_value_is_kept(values: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> None:
+def test_values_that_may_be_measured_are_kept(values: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> None:
     kept, said = without_lost(values, "position_m")
     np.testing.assert_array_equal(kept, values)
     assert said == []
 
 
-def test_it_is_looked_for_in_the_unit_of_the_log() -> None:
+def test_markers_of_lost_samples_are_recognised_in_the_unit_of_the_log() -> None:
     table = {
         "time_s": 0.01 * np.arange(N),
         "Motor speed [rpm]": 900.0 * COURSE,

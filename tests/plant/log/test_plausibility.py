@@ -39,7 +39,7 @@ def test_a_channel_wrong_by_a_thousand_is_noticed(name: str, factor: float) -> N
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
 @pytest.mark.parametrize("name", ["position_m", "velocity_m_s"])
-def test_a_slip_is_noticed_without_the_other_of_position_and_velocity(name: str, factor: float) -> None:
+def test_a_unit_error_of_position_or_velocity_is_noticed_without_the_other_channel(name: str, factor: float) -> None:
     slipped = {"motor_speed_rad_s": SPEED, name: factor * LOG[name]}
     (note,) = implausible(T, slipped)
     assert note.code in OUT_OF_RANGE | {LogCode.TRAVEL_UNITS}
@@ -60,7 +60,7 @@ def test_a_sample_time_within_bounds_that_contradicts_the_motion_is_noticed(fact
     assert note.data["ratio"] == pytest.approx(1.0 / factor, rel=0.02)
 
 
-def test_a_note_says_what_was_seen_and_which_slip_explains_it() -> None:
+def test_a_note_gives_the_value_the_usual_limit_and_the_likely_unit_error() -> None:
     (note,) = implausible(T, {**LOG, "position_m": 1e3 * LOG["position_m"]})
     assert note.code == LogCode.CHANNEL_LARGE
     assert (note.data["channel"], note.data["limit"]) == ("position_m", 5.0)
@@ -69,7 +69,7 @@ def test_a_note_says_what_was_seen_and_which_slip_explains_it() -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_sensor_noise_on_a_stuck_piston_is_no_slip_of_units(seed: int) -> None:
+def test_sensor_noise_on_a_stuck_piston_is_not_taken_for_a_unit_error(seed: int) -> None:
     rng = np.random.default_rng(seed)
     position = np.round(2e-7 * rng.standard_normal(len(TIME)) + 3e-7, 6)
     noisy = 1e-3 * rng.standard_normal(len(TIME)) + 2e-4
@@ -78,7 +78,7 @@ def test_sensor_noise_on_a_stuck_piston_is_no_slip_of_units(seed: int) -> None:
         assert implausible(T, stuck) == []
 
 
-def test_a_finely_resolved_stuck_piston_is_no_slip_of_units() -> None:
+def test_a_stuck_piston_measured_with_fine_resolution_is_not_taken_for_a_unit_error() -> None:
     position = 1e-8 * np.random.default_rng(2).standard_normal(len(TIME))
     assert implausible(T, {"motor_speed_rad_s": SPEED, "position_m": position}) == []
 
@@ -94,7 +94,7 @@ def test_a_log_in_which_nothing_moves_says_so() -> None:
     assert note.code == LogCode.NOTHING_MEASURED
 
 
-def test_missing_samples_do_not_hide_a_slip() -> None:
+def test_missing_samples_do_not_hide_a_unit_error() -> None:
     position = 1e3 * LOG["position_m"] / 4.0
     position[100:150] = np.nan
     (note,) = implausible(T, {**LOG, "position_m": position})
@@ -102,11 +102,11 @@ def test_missing_samples_do_not_hide_a_slip() -> None:
     assert note.data["ratio"] == pytest.approx(250.0, rel=0.02)
 
 
-def test_a_pump_alone_says_nothing_of_units() -> None:
+def test_motor_speed_alone_gives_no_note_on_units() -> None:
     assert implausible(T, {"motor_speed_rad_s": SPEED}) == []
 
 
-def test_what_a_sensor_cannot_give_is_refused_and_what_is_missing_or_true_is_not() -> None:
+def test_values_beyond_any_sensor_are_refused_but_not_missing_or_simulated_true_values() -> None:
     require_measurable({"position_m": np.full(3, np.nan), f"{TRUTH}x": np.array([1e300]), "force_n": np.zeros(2)}, "a")
     for size, said in (
         (1e16, r"reaches 1e\+16, no sensor gives more than"),

@@ -84,19 +84,19 @@ def test_replace_sets_and_drops_channels_and_leaves_the_original() -> None:
     assert record["position_m"][1] == 1.0
 
 
-def test_slice_moves_and_slows_the_clock() -> None:
+def test_slice_moves_the_start_time_and_multiplies_the_sample_time() -> None:
     part = Record(1e-3, {"position_m": RAMP}, start_time=1.0).slice(4, 15, 5)
     assert part["position_m"].tolist() == [4.0, 9.0, 14.0]
     np.testing.assert_allclose(part.time, [1.004, 1.009, 1.014])
 
 
 @pytest.mark.parametrize(("start", "step"), [(-3, 1), (0, 0), (0, -1)])
-def test_a_slice_backward_is_refused(start: int, step: int) -> None:
+def test_a_slice_from_a_negative_start_or_without_a_positive_step_is_refused(start: int, step: int) -> None:
     with pytest.raises(LogError, match="slice"):
         Record(1e-3, {"position_m": RAMP}).slice(start, None, step)
 
 
-def test_annotations_add_up() -> None:
+def test_annotate_adds_to_the_metadata() -> None:
     record = Record(1e-3, {"position_m": RAMP}, {"plant": "lumped"}).annotate(seed=3)
     assert dict(record.metadata) == {"plant": "lumped", "seed": 3}
 
@@ -133,7 +133,7 @@ def test_writing_a_frame_and_reading_it_with_pandas_keeps_the_columns(tmp_path: 
     assert list(Record.from_frame(pd.read_csv(tmp_path / "log.csv"))) == ["motor_speed_rad_s", "velocity_m_s"]
 
 
-def test_a_record_has_a_clock_and_channels_of_one_length() -> None:
+def test_a_record_without_a_valid_sample_time_or_equally_long_channels_is_refused() -> None:
     for wrong in (0.0, np.inf, np.nan):
         with pytest.raises(LogError, match="sample_time must be positive and finite"):
             Record(wrong, {"position_m": np.zeros(3)})
@@ -158,7 +158,7 @@ def test_a_record_has_a_clock_and_channels_of_one_length() -> None:
         ((1e-3, {"a": RAMP}, {}, float("nan")), "start_time must be a finite number of seconds, got nan"),
     ],
 )
-def test_what_is_no_record_is_refused_in_a_sentence(arguments: tuple[Any, ...], said: str) -> None:
+def test_invalid_arguments_of_a_record_are_refused(arguments: tuple[Any, ...], said: str) -> None:
     with pytest.raises(LogError, match=re.escape(said)):
         Record(*arguments)
 

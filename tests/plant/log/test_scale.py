@@ -33,7 +33,7 @@ PRESSURE = "differential_pressure_pa"
         ("1/min", "rad/s", None, np.pi / 30.0, 0.0),
     ],
 )
-def test_a_scale_is_the_worth_of_one_unit_of_the_column(
+def test_a_sensor_scale_gives_the_factor_and_offset_to_si(
     unit: str, wanted: str, logged: str | None, factor: float, offset: float
 ) -> None:
     assert conversion_of(unit, wanted, logged) == pytest.approx((factor, offset), rel=1e-12)
@@ -51,7 +51,7 @@ def test_a_scale_is_the_worth_of_one_unit_of_the_column(
         ("50 bar*9**9**9", "unknown"),
     ],
 )
-def test_what_is_no_scale_is_refused_with_a_reason(unit: str, said: str) -> None:
+def test_an_invalid_sensor_scale_is_refused_with_a_reason(unit: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         conversion_of(unit, "Pa")
     with pytest.raises(RigError, match=PRESSURE):

@@ -10,7 +10,7 @@ from plant.log.formats.detect import open_tables
 from plant.log.table import table_of
 
 
-def test_a_column_that_memory_does_not_hold_is_not_taken_for_a_column_of_text(
+def test_running_out_of_memory_is_refused_and_not_taken_for_a_text_column(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "run.csv"
@@ -26,7 +26,7 @@ def test_a_column_that_memory_does_not_hold_is_not_taken_for_a_column_of_text(
         table.numbers()
 
 
-def test_more_values_than_are_held_at_once_are_refused_before_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_table_with_too_many_values_is_refused_after_its_first_column(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tables, "MOST_VALUES", 1000)
     monkeypatch.setattr(tables, "FEW", 3)
     read: list[int] = []

@@ -35,7 +35,7 @@ def test_the_error_falls_with_the_step() -> None:
     assert off[1] / off[2] == pytest.approx(2.0, rel=0.02)
 
 
-def test_half_a_derivative_twice_is_one() -> None:
+def test_two_half_derivatives_make_one_derivative() -> None:
     wave = np.sin(7.0 * TIME) ** 2
     twice = grunwald_letnikov(grunwald_letnikov(wave, 0.5, STEP), 0.5, STEP)
     assert twice == pytest.approx(grunwald_letnikov(wave, 1.0, STEP), rel=1e-9, abs=1e-9)
@@ -85,7 +85,7 @@ def test_oustaloup_states_settle() -> None:
         (lambda: oustaloup_states(0.5, 10.0, 1.0), "got 10 to 1 Hz"),
     ],
 )
-def test_what_has_no_derivative_is_refused(call: object, said: str) -> None:
+def test_invalid_orders_memories_and_bands_are_refused(call: object, said: str) -> None:
     assert callable(call)
     with pytest.raises(HydrostateError, match=said):
         call()

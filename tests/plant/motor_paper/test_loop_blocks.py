@@ -37,11 +37,11 @@ def test_a_proportional_loop_keeps_the_error_of_its_gain() -> None:
     assert _pid_run(Pid(4.0), np.ones(3000)).output[-1] == pytest.approx(0.8, rel=1e-6)
 
 
-def test_an_integral_leaves_no_error() -> None:
+def test_an_integral_loop_leaves_no_error() -> None:
     assert _pid_run(Pid(1.0, 20.0), np.ones(3000)).output[-1] == pytest.approx(1.0, rel=1e-6)
 
 
-def test_a_pid_is_its_own_equation() -> None:
+def test_a_pid_step_follows_its_equation() -> None:
     pid, memory, error = Pid(2.0, 3.0, 0.5), PidMemory(integral=0.25, error=0.1), 0.4
     command, after = pid_step(pid, memory, error, 0.1)
     assert command == pytest.approx(2.0 * 0.4 + 0.25 + 3.0 * 0.4 * 0.1 + 0.5 * 3.0)
@@ -55,19 +55,19 @@ def test_the_integral_waits_while_a_limit_holds_the_command() -> None:
     assert waiting.output[2150] < 0.6  # with integrator windup it would stay at 1 for seconds
 
 
-def test_a_delayed_command_acts_so_many_samples_later() -> None:
+def test_a_delayed_command_acts_later_by_its_delay() -> None:
     prompt, late = _pid_run(Pid(0.0, 1.0), np.ones(100)), _pid_run(Pid(0.0, 1.0), np.ones(100), delay=7)
     assert np.flatnonzero(late.output)[0] == np.flatnonzero(prompt.output)[0] + 7
 
 
-def test_noise_is_measured_and_not_put_out() -> None:
+def test_noise_is_added_to_the_measurement_and_not_to_the_output() -> None:
     noise = np.random.default_rng(2).normal(0.0, 1.0, 50)
     run = run_loop(LAG, lambda memory, _: (0.0, memory), None, np.zeros(50), STEP, noise=noise)
     assert not run.output.any()
     assert run.measured == pytest.approx(noise)
 
 
-def test_a_relay_swings_where_model_and_delay_turn_by_half_a_turn() -> None:
+def test_a_relay_loop_oscillates_at_180_degrees_phase_lag_of_model_and_delay() -> None:
     matrices, delay, step = massless_matrices(VibrationParameters()), 20, 1e-5
 
     def controller(high: bool, error: float) -> tuple[float, bool]:
@@ -82,7 +82,7 @@ def test_a_relay_swings_where_model_and_delay_turn_by_half_a_turn() -> None:
     assert gain * abs(response) == pytest.approx(1.0, rel=0.03)
 
 
-def test_a_run_that_does_not_swing_has_no_ultimate_point() -> None:
+def test_a_run_without_oscillation_has_no_ultimate_point() -> None:
     with pytest.raises(RigError, match="two periods in its second half, got 0"):
         ultimate_point(_pid_run(Pid(1.0), np.ones(100)), 1.0)
 

@@ -44,7 +44,7 @@ def test_mended_stiffness_is_symmetric_and_positive_definite() -> None:
     assert np.all(np.linalg.eigvalsh(stiffness) > 0.0)
 
 
-def test_leaving_out_the_diaphragms_mass_is_its_limit() -> None:
+def test_the_model_without_diaphragm_mass_is_the_limit_of_a_small_mass() -> None:
     light = replace(MODEL, diaphragm_mass=1e-9)
     assert abs(first_mode(np.linalg.eigvals(mechanical_matrices(light)[0]))) == pytest.approx(
         abs(first_mode(np.linalg.eigvals(massless_matrices(MODEL)[0]))), rel=1e-6
@@ -57,7 +57,7 @@ def test_the_natural_frequency_rises_with_the_loads_stiffness() -> None:
 
 
 @pytest.mark.parametrize("order", [0.5, 1.0, 1.5])
-def test_oustaloup_imitates_fractional_damping(order: float) -> None:
+def test_oustaloup_states_approximate_fractional_damping(order: float) -> None:
     size = MODEL.damping * (2.0 * pi * 480.0) ** (1.0 - order)
     model = replace(MODEL, damping=0.0, fractional_damping=size, fractional_order=order)
     frequency = np.geomspace(50.0, 2e3, 30)
@@ -71,7 +71,7 @@ def test_fractional_damping_of_order_one_is_viscous() -> None:
     assert fractional[0] == pytest.approx(massless_matrices(MODEL)[0], rel=1e-15)
 
 
-def test_less_than_a_damper_stiffens_and_more_weighs() -> None:
+def test_damping_of_order_below_one_raises_the_resonance_and_above_one_lowers_it() -> None:
     frequency = np.linspace(400.0, 560.0, 1601)
     peaks: list[float] = []
     for order in (0.5, 1.0, 1.5):
@@ -94,12 +94,12 @@ def test_impossible_parameters_are_refused(change: dict[str, float], said: str) 
         VibrationParameters(**change)
 
 
-def test_what_does_not_swing_has_no_mode() -> None:
+def test_a_system_with_real_poles_only_has_no_first_mode() -> None:
     with pytest.raises(RigError, match="real poles only"):
         first_mode(np.array([-1.0 + 0.0j, -2.0 + 0.0j]))
 
 
-def test_its_stiffnesses_are_those_of_compliant_volumes_felt_by_the_piston() -> None:
+def test_the_stiffnesses_follow_from_the_compliances_and_the_piston_area() -> None:
     p, area = VibrationParameters(), 3.7934e-4  # F = A p and x = C p / A
     assert p.diaphragm_stiffness == pytest.approx(area**2 / 1.174e-13, rel=1e-3)
     assert p.fluid_stiffness == pytest.approx(area**2 / (4e-13 + 1e-5 / 1e9), rel=1e-3)
@@ -116,7 +116,7 @@ def test_without_fractional_damping_the_model_keeps_its_states() -> None:
 
 
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e6])
-def test_what_rounding_leaves_of_a_real_pole_does_not_swing_however_fast_or_slow_it_is(size: float) -> None:
+def test_a_tiny_imaginary_part_from_rounding_is_no_oscillation_at_any_pole_magnitude(size: float) -> None:
     swinging = size * (-0.1 + 1.0j)
     assert first_mode(np.array([swinging, swinging.conjugate(), 0.5 * size * (-1.0 + 1e-9j)])) == swinging
     with pytest.raises(RigError, match="must oscillate"):

@@ -25,7 +25,7 @@ def _force(cycles: int) -> np.ndarray:
     return np.sin(2.0 * pi * np.arange(cycles * CYCLE + 1) / CYCLE)
 
 
-def test_order_one_is_the_viscous_damper() -> None:
+def test_fractional_damping_of_order_one_gives_the_motion_of_a_viscous_damper() -> None:
     viscous, _ = vibration_run(MODEL, _force(10), STEP)
     fractional, _ = vibration_run(_fractional(1.0), _force(10), STEP)
     assert fractional == pytest.approx(viscous, rel=1e-12, abs=1e-18)
@@ -42,7 +42,7 @@ def test_a_sine_settles_to_the_exact_response(order: float) -> None:
 
 
 @pytest.mark.parametrize("memory", [None, 150])
-def test_every_step_balances_with_the_sampled_derivative(memory: int | None) -> None:
+def test_every_step_balances_its_forces_with_the_sampled_derivative(memory: int | None) -> None:
     model, force = _fractional(0.5), _force(2)
     x, v = vibration_run(model, force, STEP, memory=memory)
     resisted = model.fractional_damping * caputo_from_rest(x, 0.5, STEP, memory)[1:]
@@ -58,7 +58,7 @@ def test_a_memory_of_a_thousand_samples_is_enough_for_two_and_a_half_cycles() ->
     assert np.any(short != whole)
 
 
-def test_the_compiled_loop_is_the_plain_one() -> None:
+def test_the_compiled_loop_agrees_with_plain_python() -> None:
     model, force = _fractional(0.5), _force(1)
     constants = (model.cylinder_mass, reduced_stiffness(model), 0.0, 0.0, model.fractional_damping / STEP**0.5)
     share = model.fluid_stiffness / (model.diaphragm_stiffness + model.fluid_stiffness)

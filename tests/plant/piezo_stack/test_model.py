@@ -85,7 +85,7 @@ def test_a_port_too_small_for_the_step_is_refused() -> None:
     assert least_port(HEALTHY) < HEALTHY.port_volume
 
 
-def test_no_pressure_falls_below_the_vapours_at_low_bias() -> None:
+def test_no_pressure_falls_to_vapour_pressure_at_low_bias() -> None:
     starved = replace(HEALTHY, bias_pressure=1.2e5)
     states = run_stack(starved, DRIVE, FINE_TIME)
     assert min(float(p.min()) for p in stack_pressures(tuple(states.T), starved)) > starved.vapour_pressure
@@ -104,7 +104,7 @@ def test_less_bias_or_less_voltage_pumps_clearly_less_at_the_peak() -> None:
     assert litres(HEALTHY, voltage=100.0) < 0.85 * high
 
 
-def test_twenty_kilograms_leave_nearly_a_litre_and_fifty_are_still_lifted() -> None:
+def test_the_flow_is_one_litre_a_minute_at_20_kg_and_still_positive_at_50_kg() -> None:
     best = max(litres(replace(HEALTHY, load_mass=20.0), frequency) for frequency in (250.0, 275.0, 300.0))
     assert best == pytest.approx(1.0, abs=0.08)
     assert litres(replace(HEALTHY, load_mass=50.0)) > 0.0
@@ -137,7 +137,7 @@ def test_a_frequency_beyond_the_amplifier_is_refused(frequency: float) -> None:
         sine_drive(frequency, 140.0, 0.01, FINE_TIME)
 
 
-def test_sensor_noise_is_that_of_the_sensors() -> None:
+def test_sensor_noise_has_its_stated_deviation() -> None:
     sensors = StackSensors(stack_displacement_m=1e-7)
     record = simulate_stack(HEALTHY, DRIVE, FINE_TIME, sensors=sensors, rng=np.random.default_rng(1), keep_truth=True)
     noise = record["stack_displacement_m"] - record["true_stack_displacement_m"]

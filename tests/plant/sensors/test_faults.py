@@ -41,7 +41,7 @@ def test_nothing_changes_before_the_fault_nor_in_other_channels(kind: Kind) -> N
     assert found.metadata["sensor_fault_position_m"]["kind"] == kind
 
 
-def test_each_kind_does_what_it_says() -> None:
+def test_each_kind_of_fault_changes_the_readings_as_defined() -> None:
     healthy, after = LOG["position_m"], TIME >= START
     np.testing.assert_allclose(seen("bias")[after], healthy[after] + 0.2)
     np.testing.assert_allclose(seen("gain")[after], 0.7 * healthy[after])
@@ -75,12 +75,12 @@ def test_a_growing_fault_grows_linearly_and_then_stays(growth: float, kind: Kind
         ({"kind": "dropout", "size": 1.5}, "between 0 and 1, got 1.5"),
     ],
 )
-def test_what_is_no_fault_is_refused(arguments: dict[str, float], message: str) -> None:
+def test_an_invalid_fault_is_refused(arguments: dict[str, float], message: str) -> None:
     with pytest.raises(RigError, match=message):
         SensorFault(channel="position_m", **arguments)  # type: ignore[arg-type]
 
 
-def test_a_channel_that_is_not_there_and_a_missing_generator_are_named() -> None:
+def test_a_missing_channel_and_a_missing_generator_are_named_in_the_error() -> None:
     with pytest.raises(LogError, match="pressure_a_pa"):
         with_fault(LOG, SensorFault(channel="pressure_a_pa", kind="bias", size=1.0))
     with pytest.raises(RigError, match="needs rng"):

@@ -45,7 +45,7 @@ def test_ideal_sensors_change_nothing() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name, sensors in SENSORS.items() if not sensors.velocity_from_position])
-def test_errors_have_the_variance_that_the_filters_are_told(name: str) -> None:
+def test_sensor_errors_have_the_variances_given_to_the_filters(name: str) -> None:
     sensors = SENSORS[name]
     measured, told = measure(TRUTH, sensors, rng(), keep_truth=True), noise_variances(sensors)
     assert set(told) == set(measure(TRUTH, sensors, rng()))
@@ -55,7 +55,7 @@ def test_errors_have_the_variance_that_the_filters_are_told(name: str) -> None:
         assert abs(np.mean(error)) <= 4.0 * np.sqrt(variance / len(TRUTH))
 
 
-def test_the_papers_sensors_are_r_of_equation_7_7() -> None:
+def test_the_papers_sensors_have_the_variances_of_r_in_equation_7_7() -> None:
     told = noise_variances(PAPER)
     assert told["position_m"] == pytest.approx(1e-12, rel=1e-12)
     assert told["velocity_m_s"] == pytest.approx(1e-4, rel=1e-12)
@@ -170,12 +170,12 @@ def test_a_fraction_outside_zero_to_one_is_refused(fraction: float) -> None:
 
 
 @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
-def test_a_noise_that_is_no_deviation_is_refused_by_name(value: float) -> None:
+def test_an_invalid_noise_or_velocity_window_is_refused_by_name(value: float) -> None:
     with pytest.raises(RigError, match="velocity_noise must be finite and not negative"):
         Sensors(velocity_noise=value)
     with pytest.raises(RigError, match="velocity_window must be positive"):
         Sensors(velocity_window=0.0)
 
 
-def test_every_sensor_field_says_its_unit() -> None:
+def test_sensor_fields_state_their_unit() -> None:
     assert notes(Sensors)["pressure_quantum"].unit == "Pa"

@@ -28,7 +28,7 @@ def as_written(states: np.ndarray, rows: np.ndarray, block: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("each", [False, True], ids=["one_row", "a_row_a_sample"])
-def test_any_number_of_runs_is_averaged_as_the_channel_is_written(each: bool) -> None:
+def test_block_means_equal_the_means_of_the_observed_channel(each: bool) -> None:
     states = runs(LANES + 1, 23)
     drift = np.random.default_rng(2).uniform(0.9, 1.1, (23 if each else 1, LANES + 1, 1))
     rows = ROW * np.where(np.arange(len(ROW)) == CIRCUIT_COLUMN, drift, 1.0)
@@ -39,7 +39,7 @@ def test_any_number_of_runs_is_averaged_as_the_channel_is_written(each: bool) ->
 CIRCUIT_COLUMN = list(CircuitParameters.__dataclass_fields__).index("bulk_modulus")
 
 
-def test_a_run_that_escaped_has_no_mean_and_leaves_its_neighbours_alone() -> None:
+def test_a_nan_in_one_run_makes_only_the_mean_of_that_run_nan() -> None:
     states = runs(3, 20)
     sound = block_means(CIRCUIT.observe, PRESSURE, states, np.tile(ROW, (1, 3, 1)), 10, CircuitParameters)
     states[12, :, 1] = np.nan
@@ -49,7 +49,7 @@ def test_a_run_that_escaped_has_no_mean_and_leaves_its_neighbours_alone() -> Non
     np.testing.assert_array_equal(found, sound)
 
 
-def test_the_loop_run_as_python_gives_what_its_kernel_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_averaging_loop_gives_the_same_in_python_and_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     states, rows = runs(LANES, 6), np.tile(ROW, (1, LANES, 1))
     made_of = CIRCUIT.observe, PRESSURE, len(START), CircuitParameters
     file = functions_of(text_of(monkeypatch, module, lambda: module._compile.__wrapped__(*made_of)))

@@ -22,7 +22,7 @@ def runs(lanes: int, some: slice) -> np.ndarray:
     return states[:, 0]
 
 
-def test_runs_side_by_side_are_those_of_the_step_and_the_bits_of_one_alone() -> None:
+def test_runs_side_by_side_agree_with_the_plants_step_and_have_the_bits_of_a_run_alone() -> None:
     together = runs(8, slice(0, 8))
     one = compile_trajectory("slow_stack", slow_stack_step, 1, PiezoStackParameters)
     for lane in (0, 5):

@@ -112,7 +112,7 @@ def test_steps_of_controlled_error_are_the_same_compiled_and_in_python(
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)
 
 
-def test_samples_before_a_change_of_parameters_know_nothing_of_it() -> None:
+def test_samples_before_a_change_of_parameters_do_not_depend_on_it() -> None:
     run = compile_adaptive("damper", rates, 2, Damper, 8)
     drive = np.zeros(60)
     control = T, np.array([3e2, 3e1]), 1e-3, STRAIGHT, 20.0, 1e-3
@@ -125,7 +125,7 @@ def test_samples_before_a_change_of_parameters_know_nothing_of_it() -> None:
 
 
 @pytest.mark.parametrize("steps", [8, 41, 240, 480])
-def test_a_run_in_its_shortest_steps_ends_where_these_fill_a_sample_but_for_rounding(steps: int) -> None:
+def test_a_run_at_its_shortest_step_ends_if_the_steps_fill_a_sample_up_to_rounding(steps: int) -> None:
     asked = 0
 
     def stages(address: int, _: float) -> None:
@@ -142,7 +142,7 @@ def test_a_run_in_its_shortest_steps_ends_where_these_fill_a_sample_but_for_roun
 
 
 @pytest.mark.parametrize("lost", [(0,), (3,), (7,), (2, 5), tuple(range(8))])
-def test_a_run_without_numbers_ends_and_leaves_those_beside_it_as_they_are(lost: tuple[int, ...]) -> None:
+def test_a_run_that_turns_nan_ends_and_does_not_affect_runs_beside_it(lost: tuple[int, ...]) -> None:
     run = compile_adaptive("damper", rates, 2, Damper, 8)
     # the shortest step is so short that a run that stays at it never ends
     control = T, np.array([1e3, 1e2]), 1e-3, STRAIGHT, 20.0, 1e-9
@@ -157,7 +157,7 @@ def test_a_run_without_numbers_ends_and_leaves_those_beside_it_as_they_are(lost:
     assert np.all(np.isnan(found[1:][..., list(lost)]))
 
 
-def test_a_drive_is_smooth_as_far_as_one_parabola_follows_it() -> None:
+def test_a_piece_of_the_drive_extends_as_far_as_one_parabola_fits() -> None:
     line = np.concatenate([np.arange(10.0), np.full(5, 9.0)])
     rows = np.zeros((1, 1, 1))
     assert smooth(line, rows, 0, 1e-3, STRAIGHT) == (9, 0.0, 1.0, 0.0)
@@ -180,7 +180,7 @@ def volumes(drive: np.ndarray, bend: float, bulge: float) -> tuple[np.ndarray, n
 
 @pytest.mark.parametrize("bend", [1e-3, 0.3])
 @pytest.mark.parametrize("bulge", [SAMPLES, MEANS])
-def test_pieces_of_a_curve_hold_as_much_as_it(bulge: float, bend: float) -> None:
+def test_pieces_of_a_curved_drive_keep_its_integral(bulge: float, bend: float) -> None:
     """The speed settles exponentially; long pieces with straight lines used to lose 16 times as much volume."""
     time = np.arange(60.0)
     half = 0.5 if bulge == MEANS else 0.0
@@ -202,7 +202,7 @@ def test_a_piece_of_a_curve_ends_one_sample_before_a_corner() -> None:
     assert sums[-1] == pytest.approx(np.sum(0.5 * (step[1:] + step[:-1])))
 
 
-def test_a_step_ends_with_its_piece_or_leaves_enough_of_it() -> None:
+def test_a_step_ends_with_its_piece_or_leaves_enough_for_another_step() -> None:
     assert within(3.0, 3.0, 20.0, 0.1) == 3.0
     assert within(2.0, 3.0, 20.0, 0.1) == 1.5
     assert within(1.0, 3.0, 20.0, 0.1) == 1.0

@@ -134,7 +134,7 @@ def _fed(state: Any, flow: Any, p: Any) -> Any:
     return (p.rated_drop * (flow + fed) / p.filled_in,)
 
 
-def test_an_implicit_step_follows_a_valve_that_fills_a_chamber_within_it() -> None:
+def test_an_implicit_step_follows_a_valve_that_fills_a_chamber_within_one_step() -> None:
     """ROS2 treats the valve as shut in the step in which it opens, and so adds oil that stays in the chamber."""
     drive, row = np.sin(2.0 * np.pi * 5.0 * MILLISECOND * np.arange(401)), parameter_row(_Fed())[None]
 
@@ -147,7 +147,9 @@ def test_an_implicit_step_follows_a_valve_that_fills_a_chamber_within_it() -> No
     assert implicit < 0.01 * explicit
 
 
-def test_l_stability_damps_what_explicit_steps_blow_up(reduced: Trajectory, explicit: Trajectory) -> None:
+def test_an_l_stable_step_settles_at_a_step_size_at_which_rk4_diverges(
+    reduced: Trajectory, explicit: Trajectory
+) -> None:
     p = parameters_for(CONDITIONS["major_friction"])
     row, drive = parameter_row(p)[None], np.full(1001, p.rated_speed)
     start = np.array([0.0, 0.03, 0.0])
@@ -159,7 +161,7 @@ def test_l_stability_damps_what_explicit_steps_blow_up(reduced: Trajectory, expl
 
 
 @EVERY_CONDITION
-def test_the_analytic_slopes_are_the_numerical_ones(condition: Condition) -> None:
+def test_analytic_derivatives_equal_numerical_ones(condition: Condition) -> None:
     p = parameters_for(condition)
     _, slopes = rates_and_slopes(reduced_derivative, 3, EhaParameters)
     for state in ((0.1, 0.03, 1.0), (-0.1, -0.01, 3.0)):
@@ -201,7 +203,7 @@ def test_each_row_of_parameters_holds_until_the_next_sample(lumped: Trajectory) 
     np.testing.assert_array_equal(both[100:], after)
 
 
-def test_parameters_stand_in_the_row_as_in_the_dataclass() -> None:
+def test_a_parameter_row_has_the_order_of_the_dataclass() -> None:
     p = EhaParameters(stroke=0.25, accumulator_gas=1e-3)
     assert dict(zip(PARAMETER_NAMES, parameter_row(p).tolist(), strict=True)) == asdict(p)
     assert {name: found.value for name, found in vars(parameter_symbols(EhaParameters)).items()} == {
@@ -215,7 +217,7 @@ def test_a_step_of_ros2_needs_symbols_because_it_differentiates() -> None:
 
 
 @pytest.mark.parametrize("name", ["h", "x1", "theta12", "u_rise"])
-def test_a_parameter_may_not_be_called_as_kernels_call_their_own_numbers(name: str) -> None:
+def test_a_parameter_name_that_kernels_use_themselves_is_refused(name: str) -> None:
     made = make_dataclass("Own", [("mass", float), (name, float)], frozen=True)
     with pytest.raises(HydrostateError, match=f"Own must not call a parameter '{name}': use a longer name"):
         parameter_names(made)

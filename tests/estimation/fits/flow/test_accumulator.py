@@ -36,7 +36,7 @@ def compact(seed: int) -> Record:
     return simulate(CIRCUIT, make_drive("multisine", 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
 
-def test_gas_that_is_stated_is_believed_as_far_as_its_uncertainty_goes() -> None:
+def test_a_stated_gas_volume_sets_the_presumed_stiffness_with_its_uncertainty() -> None:
     rig = replace(PAPER, accumulator_gas=SMALL)
     known, doubted = (presumed_stiffness(rig, {"accumulator_gas": doubt})[STIFFNESS] for doubt in (0.0, 0.3))
     assert rig.accumulator_pressure / SMALL < known[0] < 1.4 * rig.accumulator_pressure / SMALL
@@ -45,18 +45,18 @@ def test_gas_that_is_stated_is_believed_as_far_as_its_uncertainty_goes() -> None
     assert doubted[1] == pytest.approx(math.hypot(known[1], 0.3))
 
 
-def test_gas_that_is_not_stated_is_some_times_the_oil_that_comes_and_goes() -> None:
+def test_an_unstated_gas_volume_is_presumed_from_the_oil_that_the_accumulator_exchanges() -> None:
     value, spread = presumed_stiffness(PAPER, {})[STIFFNESS]
     gas = np.array([LEAST_GAS, MOST_GAS]) * oil_taken(PAPER)
     assert np.abs(np.log(value * gas / PAPER.accumulator_pressure)).max() < 2.0 * spread
 
 
-def test_a_single_rod_gives_and_takes_what_its_rod_displaces() -> None:
+def test_the_accumulator_of_a_single_rod_also_exchanges_the_volume_of_its_rod() -> None:
     single = replace(PAPER, area_difference=0.2, stroke=0.3)
     assert oil_taken(single) - oil_taken(PAPER) == pytest.approx(4.0 * 0.1 * single.piston_area * 0.3)
 
 
-def test_an_accumulator_far_stiffer_than_presumed_has_taken_up_something_else() -> None:
+def test_an_accumulator_is_far_stiffer_than_presumed_beyond_a_limit_in_deviations() -> None:
     """In 45 plain logs it is at most 0.6 deviations stiffer; in two with an encoder homed at a stop it was 2.4."""
     plain = seen(log(0.2))
     usual, std = plain.presumed[STIFFNESS]
@@ -70,7 +70,7 @@ def test_an_accumulator_far_stiffer_than_presumed_has_taken_up_something_else() 
     ("less", "left", "limit"),
     [(2.5, 0.1, "least"), (1.0, 0.1, None), (-2.5, 0.1, "most")],
 )
-def test_gas_that_a_log_contradicts_is_named(less: float, left: float, limit: str | None) -> None:
+def test_a_stated_gas_volume_that_the_log_contradicts_is_reported(less: float, left: float, limit: str | None) -> None:
     rig = replace(PAPER, accumulator_gas=SMALL)
     usual, spread = presumed_stiffness(rig, {"accumulator_gas": 0.35})[STIFFNESS]
     told = replace(seen(log(0.2)), presumed={STIFFNESS: (usual, spread)})
@@ -83,7 +83,9 @@ def test_gas_that_a_log_contradicts_is_named(less: float, left: float, limit: st
 
 
 @pytest.mark.parametrize("stated", [None, SMALL, 2.0 * SMALL])
-def test_a_compact_actuator_has_its_bulk_modulus_and_its_gas_whatever_its_file_says_of_it(stated: float | None) -> None:
+def test_bulk_modulus_and_gas_of_a_compact_actuator_are_right_whatever_its_rig_file_states(
+    stated: float | None,
+) -> None:
     """With the gas held to the paper's size, bulk modulus was 1.1 % low, by six deviations."""
     rig = replace(EhaParameters(), accumulator_gas=stated)
     fit = fit_flow(compact(3), rig, rig.bulk_modulus, {"accumulator_gas": 0.3})

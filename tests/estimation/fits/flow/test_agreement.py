@@ -20,7 +20,7 @@ def said(name: str, gain: float = 0.0, *, explained: bool = False) -> Answered:
     return Answered(plain, (), (), strange if name else None)
 
 
-def test_what_both_ways_show_has_the_numbers_of_straight_lines() -> None:
+def test_if_both_fits_agree_the_one_with_straight_lines_is_reported() -> None:
     straight = said("delivery", 51.0)
     assert agreed(straight, said("delivery", 69.0)) is straight
     plain = said("", explained=True)
@@ -31,7 +31,7 @@ def test_what_both_ways_show_has_the_numbers_of_straight_lines() -> None:
 
 
 @pytest.mark.parametrize("explained", [True, False])
-def test_what_straight_lines_alone_show_is_not_strange(explained: bool) -> None:
+def test_a_hypothesis_accepted_with_straight_lines_alone_is_dropped(explained: bool) -> None:
     """Oil compressed by the pump gained 76 with straight lines, and leakage was 66 % low."""
     straight, read = said("pump_compresses", 76.0, explained=explained), said("", explained=True)
     told = agreed(straight, read)
@@ -41,7 +41,7 @@ def test_what_straight_lines_alone_show_is_not_strange(explained: bool) -> None:
 
 @pytest.mark.parametrize("name", ["delivery", ""])
 @pytest.mark.parametrize("left", [0.05, 0.0])
-def test_a_worn_pump_that_turns_exclude_is_not_left_open_by_straight_lines(name: str, left: float) -> None:
+def test_pump_wear_that_is_excluded_with_turns_read_is_not_reported_as_possible(name: str, left: float) -> None:
     """In a plain log at 200 Hz a sound pump was 99 % likely to deliver 73 %: ten deviations, 0.6 with turns read."""
     told = RigCode.WEAR_NOT_EXCLUDED.note(percent=37.0, half_width=6.2)
     by_turns = (RigCode.WEAR_NOT_EXCLUDED.note(percent=100.0 * left, half_width=3.6),) if left else ()
@@ -50,19 +50,21 @@ def test_a_worn_pump_that_turns_exclude_is_not_left_open_by_straight_lines(name:
     assert agreed(straight, read._replace(open_ends=by_turns)).open_ends == ()
 
 
-def test_where_the_search_with_turns_read_was_ended_nothing_is_strange_and_straight_lines_have_the_numbers() -> None:
+def test_if_the_search_with_turns_read_is_cut_short_the_plain_fit_with_straight_lines_is_reported() -> None:
     straight = said("delivery", 51.0)
     told = agreed(straight, said("")._replace(ended=True))
     assert (told.plain, told.strange, told.ended) == (straight.plain, None, True)
 
 
 @pytest.mark.parametrize("gain", [0.9, 1.1])
-def test_what_shows_with_turns_read_alone_must_gain_at_each_turn(gain: float) -> None:
+def test_a_hypothesis_accepted_with_turns_read_alone_must_gain_at_each_turn(gain: float) -> None:
     straight, read = said("air_midway", 173.0), said("single_rod", gain * TURNS * WORTH)
     assert agreed(straight, read).names == (("single_rod",) if gain > 1.0 else ())
 
 
 @pytest.mark.parametrize(("told", "read", "turns"), [(True, False, 1.0), (False, True, 1.0), (False, False, TURNS)])
-def test_a_hypothesis_that_is_asked_both_ways_need_not_gain_at_each_turn(told: bool, read: bool, turns: float) -> None:
+def test_a_hypothesis_tested_with_and_without_turns_read_need_not_gain_at_each_turn(
+    told: bool, read: bool, turns: float
+) -> None:
     plain: Any = SimpleNamespace(turns_told=told, start=SimpleNamespace(turns_read=read), log=said("").plain.log)
     assert wanted_of(plain) == turns * WORTH

@@ -47,7 +47,7 @@ from tests.estimation.fits.short_logs import PAPER, log, made_fit, seen
 from tests.estimation.fits.test_numbers_wide import all_promise
 
 
-def test_a_fit_that_leaves_more_than_the_noise_of_sensors_is_asked_for_all_that_may_be_strange() -> None:
+def test_residuals_above_sensor_noise_have_every_hypothesis_tested() -> None:
     """The gate would pass such a fit: bulk modulus of a single rod was 39 % too low in one."""
     plain, sound = seen(log(6.0)), made_fit(400.0, 2e8, 1e5)
     doubted = replace(sound, chi_square=(0.5 * (DOUBTED + LARGEST_CHI_SQUARE),))
@@ -58,7 +58,7 @@ def test_a_fit_that_leaves_more_than_the_noise_of_sensors_is_asked_for_all_that_
         assert hypotheses_asked(plain, PAPER, sound, sound, loaded=False, moving=False) == ((), remarks)
 
 
-def test_a_fit_that_leaves_far_less_than_the_noise_of_position_is_asked_for_nothing() -> None:
+def test_residuals_far_below_position_noise_have_no_hypothesis_tested() -> None:
     """Hypotheses reduce the residuals further: to test them all took 19 s, and the log was refused all the same."""
     plain, sound = seen(log(6.0)), made_fit(400.0, 2e8, 1e5)
     noisy = replace(plain, noise=tuple(replace(one, passed_on=1.0) for one in plain.noise))
@@ -68,7 +68,7 @@ def test_a_fit_that_leaves_far_less_than_the_noise_of_position_is_asked_for_noth
         assert hypotheses_asked(noisy, PAPER, fit, fit, loaded=False, moving=False)[0] == wanted
 
 
-def test_valves_as_wide_as_a_model_resolves_are_asked_what_they_took_up() -> None:
+def test_make_up_valves_at_their_widest_have_every_hypothesis_tested() -> None:
     """A log whose pressure lags by 2 ms was called plain, with bulk modulus six deviations too low."""
     plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
     widest = widest_makeup(PAPER.chamber_volume, PAPER.bulk_modulus, plain)
@@ -81,7 +81,7 @@ def test_valves_as_wide_as_a_model_resolves_are_asked_what_they_took_up() -> Non
 
 
 @pytest.mark.parametrize(("lead", "wanted"), [(-0.5, ()), (-1.0, (PRESSURE_LATE,)), (1.0, (SPEED_LATE,))])
-def test_a_lead_of_the_motor_at_its_bounds_is_asked_which_channel_is_late(
+def test_a_motor_lead_at_its_bound_has_the_channel_that_may_be_late_tested(
     lead: float, wanted: tuple[Hypothesis, ...]
 ) -> None:
     """At 500 Hz it absorbed a pressure 2.5 ms late: bulk modulus was 5.6 % too high, a worn pump was called sound."""
@@ -91,7 +91,7 @@ def test_a_lead_of_the_motor_at_its_bounds_is_asked_which_channel_is_late(
         assert hypotheses_asked(plain, PAPER, early, early, loaded=False, moving=False)[0] == wanted
 
 
-def test_a_minute_at_1_khz_is_asked_and_two_are_not() -> None:
+def test_hypotheses_are_tested_on_one_minute_at_1_khz_and_not_on_two() -> None:
     """A sound log of a minute was refused: its pump compressed the oil, and no hypothesis was tested."""
     short, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
     for samples, wanted in ((60_000, True), (120_000, False)):
@@ -100,7 +100,7 @@ def test_a_minute_at_1_khz_is_asked_and_two_are_not() -> None:
         assert bool(asked) == wanted
 
 
-def test_a_worn_pump_that_is_asked_for_stays_open_until_it_is_found() -> None:
+def test_a_worn_pump_that_is_to_be_tested_is_reported_as_not_excluded() -> None:
     """If the search ends before it finds the worn pump, the plain form is reported."""
     sound = made_fit(400.0, 2e8, 1e5)
     with all_promise(PredictedGain(12.0, -0.14, 0.03)):
@@ -109,7 +109,7 @@ def test_a_worn_pump_that_is_asked_for_stays_open_until_it_is_found() -> None:
     assert [note.data["percent"] for note in remarks] == [pytest.approx(20.0)]
 
 
-def test_an_encoder_s_zero_is_asked_for_where_no_held_volumes_fit_better_or_the_log_was_homed_at_a_stop() -> None:
+def test_held_volumes_that_fit_better_exclude_an_encoder_zero_unless_it_was_homed_at_a_stop() -> None:
     swinging, held = made_fit(400.0, 2e8, 1e5), made_fit(300.0, 2e8, 1e5)
     record = log(0.2)
     stop = seen(record.replace(position_m=record["position_m"] + 0.12))
@@ -120,7 +120,9 @@ def test_an_encoder_s_zero_is_asked_for_where_no_held_volumes_fit_better_or_the_
 
 
 @pytest.mark.parametrize(("deviations", "wanted"), [(0.5, False), (2.5, True)])
-def test_an_encoder_s_zero_is_asked_for_where_the_accumulator_took_it_up(deviations: float, *, wanted: bool) -> None:
+def test_an_encoder_zero_is_tested_if_the_accumulator_stiffness_has_absorbed_it(
+    deviations: float, *, wanted: bool
+) -> None:
     """Slopes beside an accumulator that follows the piston predicted no gain: bulk modulus was 1.8 and 2.1 % low."""
     plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
     usual, std = plain.presumed[STIFFNESS]
@@ -143,7 +145,7 @@ def test_an_encoder_s_zero_is_asked_for_where_the_accumulator_took_it_up(deviati
     assert STIFFNESS not in away
 
 
-def test_a_short_log_is_not_asked_for_all_where_noise_alone_leaves_as_much_by_chance() -> None:
+def test_a_short_log_with_residuals_within_chance_has_no_hypothesis_tested() -> None:
     """One in eleven plain logs of 2 s was tested for all, which took four times as long and never found anything."""
     short, sound = seen(log(2.0)), made_fit(400.0, 2e8, 1e5)
     with all_promise(PredictedGain(0.0, 0.0, 2.0 * OPEN_DELIVERY)):
@@ -152,7 +154,7 @@ def test_a_short_log_is_not_asked_for_all_where_noise_alone_leaves_as_much_by_ch
             assert hypotheses_asked(short, PAPER, fit, fit, loaded=False, moving=False)[0] == wanted
 
 
-def test_a_log_is_asked_nothing_where_slopes_promise_more_than_it_leaves() -> None:
+def test_no_hypothesis_is_tested_if_slopes_predict_a_gain_above_the_remaining_cost() -> None:
     """The lumped plant has no make-up valves: under friction its plain fit ends far below vapour pressure.
 
     A sound pump was then said to deliver 36 ± 3 % less, and to be worn with a probability of 100 %.
@@ -164,7 +166,7 @@ def test_a_log_is_asked_nothing_where_slopes_promise_more_than_it_leaves() -> No
         assert bool(asked) == bool(remarks) == wanted
 
 
-def test_valves_that_open_late_or_never_are_asked_for_where_a_plain_fit_has_late_ones() -> None:
+def test_late_or_unequal_cracking_pressures_of_the_plain_fit_have_valve_hypotheses_tested() -> None:
     """If a valve is almost shut already, the slopes predicted no gain.
 
     `checks_crack_late` 17006 passed with bulk modulus 3.0 % low: priors held the opening drops back.

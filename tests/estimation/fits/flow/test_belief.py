@@ -14,7 +14,7 @@ def explanation(name: str, cost: float) -> Explanation:
     return Explanation((name,), {}, {}, (made_fit(cost, 2e8, 1e5),), (), 1e6)
 
 
-def test_gauges_of_unlike_gains_are_told_where_nothing_else_is_as_likely() -> None:
+def test_unlike_gauge_gains_are_accepted_only_if_no_other_explanation_is_as_likely() -> None:
     """Tested together with all others, they absorbed 1.8 rad/s of a speed offset of 2 rad/s."""
     offset, gauges = explanation("pressure_offset", 2585.0), explanation("pressure_sides", 2731.0)
     assert likelier(offset, gauges) is offset
@@ -26,7 +26,7 @@ def test_gauges_of_unlike_gains_are_told_where_nothing_else_is_as_likely() -> No
 
 
 @pytest.mark.parametrize(("chi", "left"), [(1.1, 0.1), (9.0, 8.0), (12.0, None)])
-def test_what_takes_nearly_all_away_that_is_unexplained_is_hinted_at(chi: float, left: float | None) -> None:
+def test_a_hypothesis_that_removes_nearly_all_of_the_misfit_is_hinted_at(chi: float, left: float | None) -> None:
     """`makeup_check_stuck_shut`, validation 25300: a blocked valve left 1.14 of 1100, too much for an explanation."""
     plain: Any = SimpleNamespace(best=made_fit(5e4, 2e8, 1e5, chi=101.0), explains=lambda fit: fit.chi_square[0] < 1.05)
     blocked = Explanation(("makeup_blocked",), {}, {}, (made_fit(1e3, 2e8, 1e5, chi=chi),), (), 1e6)

@@ -39,7 +39,7 @@ def log(condition: str, seed: int, drive: str = "steps", duration: float = 10.0,
 
 
 @pytest.mark.parametrize("condition", thinned(CONDITIONS, ["major_leakage_major_friction"]))
-def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condition: str) -> None:
+def test_bulk_modulus_and_leakage_are_found_without_knowing_the_condition(condition: str) -> None:
     p = parameters_for(CONDITIONS[condition])
     fit = fit_flow(log(condition, 11, duration=6.0), HEALTHY, 4e8)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(p.bulk_modulus, rel=0.005)
@@ -63,7 +63,7 @@ def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condit
         (True, 1.6, True, False),
     ],
 )
-def test_what_a_log_begins_with_must_leave_noise_alone_and_an_offset_no_more_than_any_other_cause(
+def test_a_hypothesis_about_the_start_of_a_log_must_leave_only_noise_unless_it_is_an_offset(
     begun: bool, chi: float, offset: bool, explained: bool
 ) -> None:
     fit = made_fit(50.0, 2e8, 1e5, chi=chi)
@@ -85,7 +85,7 @@ def test_a_wandering_pressure_sensor_is_objected_to(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("offset", [0.0, 2e5], ids=["at rest", "under load"])
-def test_a_log_whose_search_was_ended_is_refused_and_handed_to_no_filter(
+def test_a_log_whose_search_exceeds_its_work_limit_is_refused_without_trying_a_filter(
     offset: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     record = log("normal", 12, duration=2.0)
@@ -98,7 +98,7 @@ def test_a_log_whose_search_was_ended_is_refused_and_handed_to_no_filter(
     assert EstimateCode.SEARCH_ENDED in [note.code for note in found.gate.reasons]
 
 
-def test_slips_that_are_asked_last_may_do_no_more_than_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_search_for_channel_slips_stays_within_the_remaining_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pairs of slips were searched without a limit on the work."""
 
     def searched(_: object, plain: PlainFits, *__: object, paired: bool = True) -> None:
@@ -147,13 +147,13 @@ def test_an_offset_of_pressure_does_not_pass_for_one_of_speed(monkeypatch: pytes
     assert unseen in fit.remarks  # also reported if a hypothesis explains the log
 
 
-def test_a_log_without_pressure_is_refused_with_what_it_lacks() -> None:
+def test_a_log_without_pressure_is_refused_and_the_missing_channel_named() -> None:
     with pytest.raises(LogError, match="lacks differential_pressure_pa"):
         fit_flow(log("normal", 13).replace(differential_pressure_pa=None), HEALTHY, 2e8)
 
 
 @pytest.mark.slow
-def test_logs_of_a_foreign_bench_give_their_bulk_modulus_without_the_condition(shared: Path) -> None:
+def test_bulk_modulus_of_foreign_bench_logs_is_found_without_knowing_the_condition(shared: Path) -> None:
     truth = pd.read_csv(shared / "bench" / "truth.csv")
     errors: list[float] = []
     covered = 0
@@ -168,7 +168,7 @@ def test_logs_of_a_foreign_bench_give_their_bulk_modulus_without_the_condition(s
 
 
 @pytest.mark.parametrize("condition", thinned(["normal", "minor_friction", "major_friction"], ["normal"]))
-def test_a_draining_pump_and_oil_that_gives_way_do_not_bias_bulk_modulus(condition: str) -> None:
+def test_a_case_drain_and_an_accumulator_do_not_bias_bulk_modulus(condition: str) -> None:
     rng = np.random.default_rng(3)
     p = circuit_of(parameters_for(CONDITIONS[condition]))
     record = simulate(CIRCUIT, make_drive("steps", 4.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
@@ -178,14 +178,14 @@ def test_a_draining_pump_and_oil_that_gives_way_do_not_bias_bulk_modulus(conditi
     assert fit.reasons == ()
 
 
-def test_an_uncertain_chamber_volume_makes_bulk_modulus_as_uncertain() -> None:
+def test_bulk_modulus_is_proportional_to_the_stated_chamber_volume() -> None:
     fit = fit_flow(log("normal", 14, duration=2.0), HEALTHY, 2e8, {"chamber_volume": 0.04, "moving_mass": 0.5})
     value, _ = fit.parameters["bulk_modulus"]
     assert fit.rig_slopes["chamber_volume"]["bulk_modulus"] / value == pytest.approx(1.0, rel=0.05)
 
 
 @pytest.mark.slow
-def test_noise_of_speed_and_position_widens_the_interval() -> None:
+def test_speed_noise_widens_the_interval() -> None:
     record = log("minor_friction", 15)
     calm = fit_flow(record, HEALTHY, 2e8)
     noise = 0.5 * np.random.default_rng(1).standard_normal(len(record))
@@ -226,7 +226,7 @@ def test_speeds_missing_at_reversals_do_not_bias_bulk_modulus() -> None:
 
 
 @pytest.mark.parametrize("channel", thinned(["motor_speed_rad_s", "position_m"], ["motor_speed_rad_s"]))
-def test_a_long_gap_of_one_channel_does_not_shut_the_check(channel: str) -> None:
+def test_a_long_gap_in_one_channel_does_not_shut_the_gate(channel: str) -> None:
     record = log("normal", 19, "multisine", 3.0)
     values = record[channel].copy()
     values[900:1200] = np.nan
@@ -262,7 +262,7 @@ def test_gross_outliers_in_every_channel_do_not_bias_bulk_modulus() -> None:
 
 
 @pytest.mark.parametrize("seed", thinned([1, 3], [1]))
-def test_a_relief_valve_with_a_sharp_corner_does_not_feign_certainty(seed: int) -> None:
+def test_a_relief_valve_with_a_sharp_corner_does_not_make_the_interval_too_narrow(seed: int) -> None:
     rng, rig = np.random.default_rng(seed), EhaParameters(relief_pressure=1.7e6)
     p = replace(parameters_for(CONDITIONS["major_friction"], rig), relief_conductance=1e-7)
     record = simulate(CIRCUIT, make_drive("prbs", 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)

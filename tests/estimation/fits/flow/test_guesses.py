@@ -8,7 +8,7 @@ from estimation.models.flow import MASS_FLOW_FORM, STIFFNESS
 from plant.eha.model import EhaParameters
 
 
-def test_guesses_about_a_start_go_as_far_above_it_as_the_paper_rig_is_from_healthy_to_worst() -> None:
+def test_guesses_cover_the_range_of_the_paper_rigs_faults_above_a_start() -> None:
     p = EhaParameters()
     start = {"leakage_coefficient": 2e-13, "flow_bias": 3e-6, "bulk_modulus": 1e9, "makeup_conductance": 1e-9}
     around = {STIFFNESS: 4e8, **flow_starts(p, 1e9)[0], **start}

@@ -44,7 +44,7 @@ def deviations(record: Record, true: float) -> float:
 
 
 @pytest.mark.parametrize("condition", thinned(["normal", "major_leakage"], ["normal"]))
-def test_noise_of_position_does_not_pass_for_soft_oil(condition: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_position_noise_is_not_mistaken_for_soft_oil(condition: str, monkeypatch: pytest.MonkeyPatch) -> None:
     record, true = log(condition, 5, duration=4.0)
     assert abs(deviations(record, true)) < 3.0
     monkeypatch.setattr("estimation.fits.flow.log.FELT_NOISE", np.inf)  # as if all noise came from the pressure sensor
@@ -53,7 +53,7 @@ def test_noise_of_position_does_not_pass_for_soft_oil(condition: str, monkeypatc
 
 
 @pytest.mark.slow
-def test_noise_of_position_does_not_pass_for_soft_oil_where_speeds_are_missing() -> None:
+def test_position_noise_is_not_mistaken_for_soft_oil_if_speeds_are_missing() -> None:
     record, true = log("minor_leakage", 6)
     speed = record["motor_speed_rad_s"].copy()
     for reversal in np.flatnonzero(np.abs(np.diff(speed)) > 30.0)[::5]:
@@ -62,7 +62,7 @@ def test_noise_of_position_does_not_pass_for_soft_oil_where_speeds_are_missing()
     assert abs(deviations(record.replace(motor_speed_rad_s=speed), true)) < 3.0
 
 
-def test_noise_of_position_counts_where_it_is_felt_beside_the_pressure_sensor() -> None:
+def test_position_noise_is_included_if_it_is_significant_beside_pressure_noise() -> None:
     record, _ = log("normal", 7, duration=4.0)
     noisy = flow_log(*_sound(record))
     assert noisy.passes_on
@@ -83,7 +83,7 @@ def lagging(values: np.ndarray, lag: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("condition", ["normal", pytest.param("minor_friction", marks=pytest.mark.slow)])
-def test_a_position_sensor_that_lags_is_named_and_its_number_is_right(condition: str) -> None:
+def test_a_lagging_position_sensor_is_identified_and_bulk_modulus_is_right(condition: str) -> None:
     rng = np.random.default_rng(9)
     p = circuit_of(parameters_for(CONDITIONS[condition]))
     drive = make_drive("prbs", 1.2, 1e-3, p, rng)
@@ -99,7 +99,7 @@ def test_a_position_sensor_that_lags_is_named_and_its_number_is_right(condition:
 
 
 @pytest.mark.parametrize("kind", [Problem, FreedProblem.of])
-def test_the_slope_of_the_cost_holds_what_the_variance_changes_by(kind: type[Problem]) -> None:
+def test_the_gradient_of_the_cost_includes_the_change_of_the_variance(kind: type[Problem]) -> None:
     record, true = log("normal", 7, duration=4.0)
     problem = kind(FLOW_FORM, flow_log(*_sound(record)))
     start = {
@@ -123,7 +123,7 @@ def test_the_slope_of_the_cost_holds_what_the_variance_changes_by(kind: type[Pro
         assert abs(held - gradient) > least * abs(gradient)  # the difference is large enough for this test
 
 
-def test_noise_of_position_leaks_off_and_goes_with_stiffness_over_volume() -> None:
+def test_passed_on_position_noise_scales_with_modulus_over_volume_and_decays_with_leakage() -> None:
     """Otherwise oil as stiff as steel, or twice the volume with twice the modulus, would explain any leaky actuator."""
     noise = flow_log(*_sound(log("normal", 7, duration=4.0)[0])).noise[0]
 
@@ -144,7 +144,7 @@ def _sound(record: Record) -> tuple[Record, EhaParameters, dict[str, float], dic
 
 
 @pytest.mark.parametrize("difference", [0.0, 0.2])
-def test_what_position_squeezes_is_the_slope_of_the_chambers_logarithms(difference: float) -> None:
+def test_the_swept_share_is_the_rms_slope_of_the_logarithms_of_chamber_volumes(difference: float) -> None:
     p = replace(HEALTHY, area_difference=difference)
     area_1, area_2 = piston_areas(p)
     position, step = 0.01 * np.sin(0.1 * np.arange(200)), 1e-7
@@ -157,7 +157,7 @@ def test_what_position_squeezes_is_the_slope_of_the_chambers_logarithms(differen
     assert _swept_share(position, p) == pytest.approx(np.sqrt(np.mean(slope**2)), rel=1e-5)
 
 
-def test_in_a_gap_the_pump_delivers_what_the_piston_swept_and_the_oil_yielded() -> None:
+def test_pump_flow_across_a_gap_is_that_of_piston_travel_and_oil_compression() -> None:
     p = circuit_of(HEALTHY)
     rng = np.random.default_rng(31)
     record = simulate(CIRCUIT, make_drive("prbs", 3.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
@@ -176,7 +176,7 @@ def test_in_a_gap_the_pump_delivers_what_the_piston_swept_and_the_oil_yielded() 
     assert abs(delivered - turned) < 0.1 * abs(line - turned)
 
 
-def test_noise_of_speed_stays_where_oil_is_stiff_and_hardly_leaks() -> None:
+def test_speed_noise_accumulates_in_stiff_oil_that_hardly_leaks() -> None:
     record, true = log("normal", 7)
     seen = flow_log(*_sound(record))
     found = {"bulk_modulus": 50.0 * true, "leakage_coefficient": HEALTHY.leakage_coefficient}
@@ -192,7 +192,7 @@ def test_noise_of_speed_stays_where_oil_is_stiff_and_hardly_leaks() -> None:
     assert carried(seen, HEALTHY, {**found, "leakage_coefficient": 1e4 * HEALTHY.leakage_coefficient}) is seen
 
 
-def test_speeds_missing_at_an_end_of_a_log_are_open_by_the_half_slope_of_the_end_that_is_known() -> None:
+def test_speeds_missing_at_an_end_of_a_log_are_uncertain_by_half_the_adjacent_slope() -> None:
     n, at = 30, 1e-3
     speed = 10.0 * np.arange(n, dtype=float)
     speed[:3] = speed[-3:] = np.nan

@@ -37,7 +37,7 @@ def weights(*each: float) -> Array:
     return np.array(each)
 
 
-def test_two_leaks_are_known_together_where_neither_is_known() -> None:
+def test_lumped_leakage_is_known_even_if_neither_of_its_two_leaks_is() -> None:
     told, _ = with_lumped(found(fit()), [fit()], weights(1.0), PAPER)
     value, std = told[LEAKAGE]
     assert value == pytest.approx(ACROSS + 0.5 * DRAINED)
@@ -45,7 +45,7 @@ def test_two_leaks_are_known_together_where_neither_is_known() -> None:
     assert told[BIAS] == found(fit())[BIAS]
 
 
-def test_no_leakage_is_known_better_than_the_forms_steps_balance_the_pumped_flow() -> None:
+def test_leakage_is_known_no_better_than_the_discretisation_error_of_the_flow_balance() -> None:
     """Leakage of a circuit at 10 kHz was reported to within 0.005 %, and was 0.02 % off."""
     sure = replace(fit(), covariance=1e-12 * fit().covariance)
     told, correlation = with_lumped(found(sure), [sure], weights(1.0), PAPER)
@@ -63,7 +63,7 @@ def test_losses_of_a_single_rod_are_known_no_better_than_its_balance_and_its_dra
     assert told[BIAS][1] == pytest.approx(np.hypot(found(sure)[BIAS][1], left_out), rel=1e-3)
 
 
-def test_what_fits_disagree_on_is_not_known() -> None:
+def test_disagreement_between_fits_widens_the_deviation_of_leakage() -> None:
     apart = [fit(), fit(1.1 * ACROSS)]
     value, covariance = losses(apart, weights(0.5, 0.5))
     assert value[0] == pytest.approx(1.05 * ACROSS + 0.5 * DRAINED)
@@ -71,19 +71,19 @@ def test_what_fits_disagree_on_is_not_known() -> None:
     assert losses(apart, weights(1.0, 1e-30))[0][0] == pytest.approx(ACROSS + 0.5 * DRAINED)
 
 
-def test_a_leak_that_is_not_felt_leaves_the_sum_open() -> None:
+def test_an_undetermined_leak_makes_the_lumped_leakage_undetermined() -> None:
     unfelt = replace(fit(), std={**fit().std, LEAKAGE: np.inf})
     told, correlation = with_lumped(found(unfelt), [unfelt], weights(1.0), PAPER)
     assert told[LEAKAGE] == (ACROSS + 0.5 * DRAINED, np.inf)
     assert correlation == 0.0
 
 
-def test_a_leakage_that_changed_is_told_as_it_is_at_the_end() -> None:
+def test_a_leakage_that_changed_is_reported_at_its_final_value() -> None:
     ended = {**found(fit()), LEAKAGE: (3.0 * ACROSS, 3.0 * fit().std[LEAKAGE])}
     (told, _), (once, _) = (with_lumped(one, [fit()], weights(1.0), PAPER) for one in (ended, found(fit())))
     assert told[LEAKAGE] == pytest.approx(tuple(3.0 * each for each in once[LEAKAGE]))
 
 
-def test_both_leaks_answer_the_rig() -> None:
+def test_the_rig_slope_of_lumped_leakage_combines_those_of_both_leaks() -> None:
     told = with_lumped_slopes({"piston_area": {LEAKAGE: 2.0, DRAIN: 4.0, BIAS: 1.0}})
     assert told == {"piston_area": {LEAKAGE: 4.0, DRAIN: 4.0, BIAS: 1.0}}

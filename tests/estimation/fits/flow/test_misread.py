@@ -57,7 +57,7 @@ def test_a_short_log_names_a_unit_or_sign_that_correlations_do_not(
 @pytest.mark.parametrize(
     ("rests", "missing", "lengths"), [(0, 0, [2001, 5000]), (1500, 2000, [4001, 5000]), (1500, 3500, [5000])]
 )
-def test_slips_are_tried_once_and_first_where_the_pump_has_turned_for_two_seconds(
+def test_slips_are_tested_once_and_first_on_the_log_up_to_two_seconds_of_pump_motion(
     rests: int, missing: int, lengths: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A speed that was missing throughout the first 2 s caused an error."""
@@ -82,7 +82,7 @@ def test_slips_are_tried_once_and_first_where_the_pump_has_turned_for_two_second
     assert dead.misread(plain, fit) is None
 
 
-def test_a_log_that_is_fitted_anew_is_asked_for_slips_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_that_is_fitted_again_is_tested_for_slips_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first minimum may fit the rig, and a lower one may not."""
     plains = [SimpleNamespace(best=best, explains=lambda _: True) for best in ("kin", "foreign")]
     nothing: Any = None
@@ -106,7 +106,7 @@ def test_a_log_that_is_fitted_anew_is_asked_for_slips_anew(monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("named", ["pressure_offset", "delivery"])
-def test_slips_are_tried_of_what_nothing_explains_unless_an_offset_of_pressure_does(
+def test_slips_are_tested_before_every_hypothesis_except_a_pressure_offset(
     monkeypatch: pytest.MonkeyPatch, named: str
 ) -> None:
     """A pump that delivers a tenth of its flow looks like a speed in rpm; no slip looks like an offset."""
@@ -131,7 +131,7 @@ def test_slips_are_tried_of_what_nothing_explains_unless_an_offset_of_pressure_d
 
 
 @pytest.mark.parametrize("noise", [0.0, 2e3])
-def test_a_dead_sensor_of_pressure_accuses_no_speed(noise: float) -> None:
+def test_a_dead_pressure_sensor_is_not_reported_as_a_misread_channel(noise: float) -> None:
     """Nothing moved, so a pump a tenth as fast explained the log best."""
     sound = log()
     still = {name: np.zeros(len(sound)) for name in ("position_m", "velocity_m_s")}
@@ -141,7 +141,7 @@ def test_a_dead_sensor_of_pressure_accuses_no_speed(noise: float) -> None:
 
 
 @pytest.mark.parametrize("softer", [1.0, 5.0])
-def test_a_short_log_of_oil_that_is_soft_accuses_no_channel(softer: float) -> None:
+def test_soft_oil_in_a_short_log_is_not_reported_as_a_misread_channel(softer: float) -> None:
     told = estimate_bulk_modulus(log(softer), RIG)
     assert not any(isinstance(note.code, ChannelCode) for note in told.gate.reasons)
 
@@ -158,7 +158,7 @@ def test_a_short_log_of_oil_that_is_soft_accuses_no_channel(softer: float) -> No
         (1.0, 0.01, 9.0, True, False),
     ],
 )
-def test_a_fit_is_none_of_the_rigs_where_its_oil_or_what_its_pump_loses_is_surely_beyond_it(
+def test_a_fit_is_foreign_to_the_rig_if_its_oil_or_pump_losses_are_surely_out_of_range(
     times: float, std: float, lost: float, explained: bool, kin: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(CorrectedLogs, "_beyond", 0.0)
@@ -172,7 +172,9 @@ def test_a_fit_is_none_of_the_rigs_where_its_oil_or_what_its_pump_loses_is_surel
     assert CorrectedLogs(nothing, RIG).is_kin(plain, fit) is kin
 
 
-def test_oil_seven_times_as_stiff_as_the_rigs_is_no_pressure_in_another_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_oil_seven_times_stiffer_than_the_rigs_is_not_mistaken_for_a_pressure_unit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Pressure that reads ten times too high looks like such stiff oil; friction distinguishes the two."""
     monkeypatch.setattr(misread_module, "SLIPS", [one for one in SLIPS if one.channel == PRESSURE])
     stiff = log(1 / (1.05 * FOREIGN))
@@ -200,7 +202,7 @@ def _strange_rigs_are_searched_for(request: pytest.FixtureRequest, monkeypatch: 
         ({SPEED: DEGREES}, SPEED, "deg/s read as rad/s"),
     ],
 )
-def test_a_unit_of_a_factor_that_oils_differ_by_and_two_slips_together_are_named(
+def test_two_slips_together_and_unit_factors_within_the_range_of_oils_are_identified(
     wrong: dict[str, float], channel: str, said: str
 ) -> None:
     """A pressure in psi, read as kPa, passed with bulk modulus 85 % too low."""
@@ -225,7 +227,7 @@ def test_slips_that_a_rough_search_refutes_are_not_fitted(monkeypatch: pytest.Mo
 
 @pytest.mark.usefixtures("_strange_rigs_are_searched_for")
 @pytest.mark.parametrize(("times", "passed"), [(1.0, True), (-1.0, False)])
-def test_a_rig_file_without_friction_at_rest_is_fitted_and_names_slips(times: float, passed: bool) -> None:
+def test_fits_and_slip_detection_work_for_a_rig_file_without_coulomb_friction(times: float, passed: bool) -> None:
     """Both failed on every log, with a division by zero."""
     sound = log()
     read = sound.replace(**{PRESSURE: times * sound[PRESSURE]})
@@ -234,7 +236,7 @@ def test_a_rig_file_without_friction_at_rest_is_fitted_and_names_slips(times: fl
     assert [note.code for note in found.gate.reasons] == ([] if passed else [ChannelCode.CHANNEL_MISREAD])
 
 
-def test_of_units_that_explain_a_log_alike_those_are_fitted_first_whose_pressure_the_rigs_friction_takes(
+def test_among_equally_good_units_the_one_whose_pressure_suits_the_rigs_friction_is_fitted_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A pressure in psi, read as bar, was called kPa or MPa: five units explained it, and only four were fitted."""

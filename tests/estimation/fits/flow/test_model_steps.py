@@ -50,7 +50,7 @@ SPEED = 175.0
 """Amplitude of its motor's speed [rad/s]."""
 
 
-def test_steps_that_chatter_are_taken_implicitly_and_the_log_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_implicit_steps_explain_a_log_whose_usual_steps_chatter(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the usual steps such logs were refused: the residuals were the model's own error."""
     speed = chirp(1.5, 5e-4, SPEED, 0.5, 4.0)
     sensors, rng = replace(BENCH, pressure_noise=1500.0), np.random.default_rng(1)

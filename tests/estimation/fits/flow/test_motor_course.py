@@ -34,7 +34,7 @@ def logged(*, held: bool) -> Logged:
 
 
 @pytest.mark.parametrize("held", [False, True])
-def test_a_log_says_whether_its_motors_command_was_held(held: bool) -> None:
+def test_a_held_motor_command_is_detected_from_the_log(held: bool) -> None:
     log = logged(held=held)
     plain = plain_fits(log, FitStart(STIFF, STIFF.bulk_modulus))
     found = by_course(log, plain)
@@ -43,7 +43,7 @@ def test_a_log_says_whether_its_motors_command_was_held(held: bool) -> None:
     assert abs(error) < 2e-3
 
 
-def test_a_held_command_is_fitted_from_the_end_of_the_smooth_ones_fit_where_bends_may_gain_little(
+def test_the_fit_with_a_held_command_begins_at_the_smooth_fit_if_bends_can_gain_little(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Both fits of a log were searched from the start, which took a third of the time of an estimate."""
@@ -71,7 +71,7 @@ def test_a_held_command_is_fitted_from_the_end_of_the_smooth_ones_fit_where_bend
         (NEARLY + 0.1, True, 1.0, False),
     ],
 )
-def test_turns_are_left_open_in_a_log_that_nothing_else_explains(
+def test_turns_are_freed_only_in_a_log_that_nothing_else_explains(
     monkeypatch: pytest.MonkeyPatch, left: float, felt: bool, then: float, opened: bool
 ) -> None:
     """Tried before the gains of two gauges, free turns absorbed the effect of these gains."""
@@ -89,7 +89,9 @@ def test_turns_are_left_open_in_a_log_that_nothing_else_explains(
     assert (found is plain) is not opened
 
 
-def test_a_log_in_which_bends_move_pressure_by_less_than_noise_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_held_command_is_not_tested_if_bends_move_pressure_by_less_than_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The test took two runs of the model for each log, and chance had some logs fitted twice."""
 
     def asked(*_: object) -> float:
@@ -104,7 +106,7 @@ def test_a_log_in_which_bends_move_pressure_by_less_than_noise_is_not_asked(monk
         by_course(stiff, plain_fits(stiff, FitStart(STIFF, STIFF.bulk_modulus)))
 
 
-def test_a_fast_log_that_is_averaged_otherwise_under_a_held_command_has_no_course() -> None:
+def test_a_fast_log_that_is_averaged_differently_under_a_held_command_keeps_its_fit() -> None:
     """Corners of motor speed decide how many samples are averaged: such a log caused an internal error."""
     plain = plain_fits(Logged(*without_strays(log(0.3))), FitStart(PAPER, PAPER.bulk_modulus))
     halved = Logged(*without_strays(log(0.3).slice(0, 150)))

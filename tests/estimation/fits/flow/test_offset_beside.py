@@ -45,7 +45,7 @@ def explanation(cost: float, shown: float = 0.0, gain: float = 0.0) -> Explanati
         (0.2, MOST_SHARE * PAPER.rated_speed, 80.0, 0.2),
     ],
 )
-def test_a_log_is_explained_at_the_offset_that_the_explanation_leaves(
+def test_the_log_is_explained_again_with_the_speed_offset_that_remains(
     taken: float, shown: float, gain: float, left: float
 ) -> None:
     """Beside a false offset in the log of a worn pump, bulk modulus was 4.2 % low, by seven deviations."""
@@ -63,14 +63,14 @@ def test_a_log_is_explained_at_the_offset_that_the_explanation_leaves(
     assert [note.code for note in found.teeth] == [RigCode.SPEED_OFFSET] * (left != 0.0)
 
 
-def test_an_offset_that_does_not_keep_its_promise_stays_as_it_was() -> None:
+def test_the_speed_offset_is_kept_if_a_new_one_gains_less_than_predicted() -> None:
     plain, first = told(0.2), explanation(500.0, -0.2, 80.0)
     for again in (None, explanation(501.0 - KEPT * 80.0), replace(explanation(100.0), names=("volume",))):
         assert offset_settled(plain, first, HYPOTHESES, lambda *_, again=again: again) == (plain, first)
     assert offset_settled(plain, None, (), lambda *_: None) == (plain, None)
 
 
-def test_a_pair_is_the_same_in_either_order_and_is_asked_as_it_was() -> None:
+def test_the_same_pair_of_hypotheses_is_tested_again_and_accepted_in_either_order() -> None:
     """The hypothesis for a log that begins in motion has the same name as the one for other logs."""
     plain = told(0.2)
     first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, BEGUN.name))
@@ -85,7 +85,7 @@ def test_a_pair_is_the_same_in_either_order_and_is_asked_as_it_was() -> None:
     assert (found.turning.offset, strange and strange.fit.cost) == (0.0, 420.0)
 
 
-def test_beside_another_offset_fewer_hypotheses_may_be_enough_or_a_worn_pump_but_no_others() -> None:
+def test_with_another_offset_only_fewer_of_the_hypotheses_or_a_worn_pump_are_accepted() -> None:
     """A worn pump passed for a low relief valve, a pressure offset and a pump that delivers 150 %."""
     plain = told(0.2)
     first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, ENCODER_ZERO.name))

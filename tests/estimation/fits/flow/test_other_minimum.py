@@ -56,7 +56,9 @@ def found(shift: float = 1.0) -> dict[str, tuple[float, float]]:
 
 
 @pytest.mark.parametrize(("wanted", "lower"), [(1.0, True), (-1.0, False)])
-def test_the_plain_form_is_led_where_a_hypothesis_ended(wanted: float, *, lower: bool) -> None:
+def test_a_start_from_a_hypothesis_is_returned_only_if_it_reaches_the_wanted_cost(
+    wanted: float, *, lower: bool
+) -> None:
     near = found(1.001)
     valley = lower_minimum(seen(), PAPER, best(), near, best().cost + wanted)
     absent = dict.fromkeys((*CRACKS, BEND), 0.0)
@@ -64,7 +66,7 @@ def test_the_plain_form_is_led_where_a_hypothesis_ended(wanted: float, *, lower:
     assert (valley is not None) == lower
 
 
-def test_what_a_hypothesis_held_is_as_the_plain_form_has_it() -> None:
+def test_unknowns_absent_from_the_hypothesis_keep_their_plain_values() -> None:
     lacking = {name: pair for name, pair in found().items() if name != "speed_lead"}
     valley = lower_minimum(seen(), PAPER, best(), lacking, np.inf)
     assert valley is not None
@@ -72,7 +74,7 @@ def test_what_a_hypothesis_held_is_as_the_plain_form_has_it() -> None:
 
 
 @pytest.mark.parametrize(("behind", "bend", "led"), [(WRONG, None, True), (-WRONG, None, False), (WRONG, 3e-5, False)])
-def test_a_form_whose_search_came_nowhere_near_is_led_on_if_it_is_nearer_there(
+def test_an_incomplete_form_restarts_only_at_a_lower_cost_without_orifice_valves(
     behind: float, bend: float | None, *, led: bool
 ) -> None:
     """Otherwise make-up valves that act as orifices would be absorbed without being named."""
@@ -83,12 +85,12 @@ def test_a_form_whose_search_came_nowhere_near_is_led_on_if_it_is_nearer_there(
     assert (lower_minimum(seen(), PAPER, far, told, np.inf) is not None) == led
 
 
-def test_a_log_with_gaps_is_led_nowhere() -> None:
+def test_no_lower_minimum_is_sought_in_a_log_with_gaps() -> None:
     gapped = replace(seen(), gaps=np.zeros((1, 2)))
     assert lower_minimum(gapped, PAPER, best(), found(), np.inf) is None
 
 
-def test_a_search_that_is_told_of_a_lower_valley_ends_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_that_is_given_a_lower_minimum_ends_there(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = best()  # fitted before the search is patched, as other tests use it too
     monkeypatch.setattr("estimation.fits.flow.search._finished", unmoved)
     lost = balanced(seen(), PAPER, STARTS)
@@ -105,7 +107,7 @@ def unmoved(one: Any, log: GreyBoxLog, wanted: float = np.inf, **_: Any) -> Any:
 
 
 @pytest.mark.parametrize("lost", [True, False])
-def test_a_form_that_fails_is_led_by_one_that_has_lost_its_leakage(*, lost: bool) -> None:
+def test_a_failed_search_restarts_from_one_that_lost_its_leakage_with_leakage_restored(*, lost: bool) -> None:
     """A search with the mass balance ended at 24 times the noise and no leakage, from where no search returns."""
     problem = FreedProblem.of(MASS_FLOW_FORM, seen())
     known = {STIFFNESS: first_stiffness(seen()), **best().values}
@@ -125,7 +127,7 @@ def test_a_form_that_fails_is_led_by_one_that_has_lost_its_leakage(*, lost: bool
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1319, 1392])
-def test_a_rig_with_a_small_accumulator_or_a_search_without_leakage_has_its_bulk_modulus(seed: int) -> None:
+def test_bulk_modulus_is_right_with_a_small_accumulator_or_a_search_that_lost_leakage(seed: int) -> None:
     bench = draw_bench(seed)
     answer = estimate_bulk_modulus(bench.record, bench.healthy)
     assert answer.gate.passed
@@ -134,7 +136,7 @@ def test_a_rig_with_a_small_accumulator_or_a_search_without_leakage_has_its_bulk
 
 
 @pytest.mark.parametrize(("cost", "believed"), [(0.0, "plain"), (-50.0, "hypothesis")])
-def test_a_hypothesis_is_believed_where_it_gains_over_its_own_valley_alone(
+def test_a_hypothesis_is_accepted_only_if_it_gains_over_the_plain_form_in_its_minimum(
     cost: float, believed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A plain log was called unknown because of a drain of port A that had turned into that of port B."""
@@ -167,7 +169,7 @@ def test_a_hypothesis_is_believed_where_it_gains_over_its_own_valley_alone(
 
 
 @pytest.mark.slow
-def test_a_plain_log_whose_plain_form_has_two_valleys_is_explained_by_the_lower_one() -> None:
+def test_a_plain_log_with_two_minima_of_the_plain_form_is_explained_by_the_lower_one() -> None:
     made = make("plain", "training", 667)
     answer = flow_fit.fit_flow(Record.from_frame(made.log), PAPER, PAPER.bulk_modulus)
     assert answer.explanation is None
@@ -176,7 +178,7 @@ def test_a_plain_log_whose_plain_form_has_two_valleys_is_explained_by_the_lower_
     assert answer.parameters["case_leakage"][0] == pytest.approx(made.setup.machine.drain, rel=0.3)
 
 
-def test_the_drain_of_a_side_that_a_load_shuts_in_is_sought_from_below_too() -> None:
+def test_the_drain_of_a_chamber_that_a_load_shuts_in_is_also_searched_from_below() -> None:
     """In the minimum with fourteen times the drain, leakage was twelve deviations off."""
     made = make("constant_load", "validation", 17804)
     answer = flow_fit.fit_flow(Record.from_frame(made.log), PAPER, PAPER.bulk_modulus)
@@ -186,7 +188,7 @@ def test_the_drain_of_a_side_that_a_load_shuts_in_is_sought_from_below_too() -> 
 
 
 @pytest.mark.slow
-def test_a_plain_log_whose_search_ended_far_off_is_told_no_air() -> None:
+def test_no_air_is_reported_in_a_plain_log_whose_search_ended_far_off() -> None:
     """Air was found that enters after the end of the log, `0 ± inf %`, and bleeding was advised."""
     made = hydrostate.simulate("minor_leakage", drive="steps", duration=5.0, sample_time=1e-4, seed=2)
     answer = flow_fit.fit_flow(made.record, PAPER, PAPER.bulk_modulus)

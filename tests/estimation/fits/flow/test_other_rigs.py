@@ -93,7 +93,7 @@ def seen(record: Record, p: EhaParameters) -> int:
     return round(flow_log(cleaned, p, {}, variances).sample_time / record.sample_time)
 
 
-def test_searches_begin_at_what_a_fault_is_on_this_rig() -> None:
+def test_searches_begin_at_fault_sizes_scaled_to_the_rig() -> None:
     major = severity(2.0, 0.0, STIFF)
     assert major.leakage_coefficient > 20.0 * STIFF.leakage_coefficient
     worst = max(flow_starts(STIFF, 9e8), key=lambda start: start["leakage_coefficient"])
@@ -101,13 +101,13 @@ def test_searches_begin_at_what_a_fault_is_on_this_rig() -> None:
     assert worst["flow_bias"] == pytest.approx(major.flow_bias, rel=0.02)
 
 
-def test_means_are_shorter_where_stiff_chambers_show_the_corners_of_the_flow() -> None:
+def test_fewer_samples_are_averaged_if_stiff_chambers_show_the_corners_of_the_flow() -> None:
     assert seen(log(PAPER, 1.0, 2e-4), PAPER) == 3
     assert seen(log(STIFF, 1.0, 2e-4), STIFF) == 1
 
 
 @pytest.mark.slow
-def test_a_leaky_stiff_actuator_is_followed_to_the_true_bulk_modulus() -> None:
+def test_bulk_modulus_of_a_leaky_stiff_actuator_is_right() -> None:
     fit = fit_flow(log(STIFF, 2.0, 2e-4), STIFF, 1.2 * STIFF.bulk_modulus)
     value, std = fit.parameters["bulk_modulus"]
     assert fit.reasons == ()
@@ -115,7 +115,7 @@ def test_a_leaky_stiff_actuator_is_followed_to_the_true_bulk_modulus() -> None:
     assert value == pytest.approx(STIFF.bulk_modulus, rel=0.01)
 
 
-def test_noise_that_was_taken_for_too_large_speaks_against_no_fit() -> None:
+def test_overestimated_noise_is_no_objection_to_a_fit() -> None:
     record, variances = without_strays(log(PAPER, 1.0, 1e-3))
     fit: GreyBoxFit = plain_fits(Logged(record, variances), FitStart(PAPER, PAPER.bulk_modulus)).best
     assert objections(fit, noisy=False) == ()
@@ -125,9 +125,7 @@ def test_noise_that_was_taken_for_too_large_speaks_against_no_fit() -> None:
 
 
 @pytest.mark.parametrize(("left", "small"), [(0.0, False), (0.21, True), (0.6, False), (1.0, False)])
-def test_oil_in_which_the_encoders_noise_would_be_felt_more_than_it_is_explains_no_log(
-    left: float, *, small: bool
-) -> None:
+def test_residuals_far_below_the_predicted_encoder_noise_are_an_objection_to_a_fit(left: float, *, small: bool) -> None:
     """Oil five times too stiff was accepted at a fifth of the noise, together with a pressure that seemed late."""
     record, variances = without_strays(log(PAPER, 1.0, 1e-3))
     fit = replace(plain_fits(Logged(record, variances), FitStart(PAPER, 2e8)).best, chi_square=(left,))
@@ -136,7 +134,7 @@ def test_oil_in_which_the_encoders_noise_would_be_felt_more_than_it_is_explains_
     assert objections(fit, noisy=False) == ()
 
 
-def test_a_single_rod_that_pumps_up_its_mean_pressure_is_balanced_by_mass() -> None:
+def test_a_single_rod_with_rising_mean_pressure_is_fitted_by_the_mass_balance() -> None:
     rng = np.random.default_rng(26)
     drive = prbs(5.0, 5e-4, 250.0, 0.05, rng)
     record = simulate(CIRCUIT, drive, 5e-4, PUMPED_UP, sensors=BENCH, rng=rng)

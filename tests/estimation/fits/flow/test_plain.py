@@ -22,9 +22,7 @@ def test_valves_of_usual_size_fill_the_chambers_of_small_rigs_within_a_step(shru
     ("heard", "walk", "again"),
     [(1e11, 1e12, True), (4e8, 1e12, True), (2.5e8, 1e12, False), (1e8, 1e12, False), (1e11, 1e9, False)],
 )
-def test_a_log_that_was_judged_by_the_noise_of_far_stiffer_oil_is_judged_anew(
-    heard: float, walk: float, again: bool
-) -> None:
+def test_a_log_is_fitted_again_if_its_noise_was_that_of_far_stiffer_oil(heard: float, walk: float, again: bool) -> None:
     plain: Any = SimpleNamespace(
         start=START,
         swinging=SimpleNamespace(values={"bulk_modulus": heard}),

@@ -42,7 +42,7 @@ def pumped(speed: Array, sample_time: float, bias: float) -> Array:
 
 
 @pytest.mark.parametrize(("bias", "left"), [(1.0, 0.15), (6.0, 0.3)])
-def test_straight_lines_between_means_pump_and_sweep_what_the_motor_does(bias: float, left: float) -> None:
+def test_straight_lines_between_means_pump_the_same_volume_as_the_motor(bias: float, left: float) -> None:
     """The rig file only states the flow bias of a sound pump."""
     means = drives(SAMPLE)
     course = pumped(turning(SAMPLE / FINE * np.arange(3000 * FINE, dtype=np.float64)), SAMPLE / FINE, bias)[::FINE]
@@ -53,14 +53,14 @@ def test_straight_lines_between_means_pump_and_sweep_what_the_motor_does(bias: f
     assert np.std(led) < left * np.std(straight)
 
 
-def test_a_flow_bias_that_a_fit_has_found_takes_the_place_of_the_rig_files() -> None:
+def test_a_fitted_flow_bias_replaces_that_of_the_rig_file() -> None:
     found = {"flow_bias": 6.0 * P.flow_bias}
     wanted = seen(SAMPLE, replace(P, **found)).drives
     np.testing.assert_allclose(pumped_evenly_at(seen(SAMPLE), P, found).drives, wanted, atol=1e-12)
     assert np.std(wanted - seen(SAMPLE).drives) > 1e-8
 
 
-def test_teeth_that_means_hold_are_not_taken_back_by_positions() -> None:
+def test_ripple_added_to_mean_speeds_is_not_cancelled_by_corrected_positions() -> None:
     """`logged_at_5_kHz`, validation 25301: ripple of 2.7 % gained 3 of a predicted 36, and the log was refused."""
     found, means = {"flow_bias": 6.0 * P.flow_bias}, seen(SAMPLE)
     rippled = with_ripple(means, [Ripple(12, 0.1, 0.0)])
@@ -73,6 +73,6 @@ def test_teeth_that_means_hold_are_not_taken_back_by_positions() -> None:
     assert np.std(more) < 0.02 * np.std(teeth)
 
 
-def test_a_log_that_is_not_averaged_is_what_it_was() -> None:
+def test_a_log_that_is_not_averaged_is_unchanged() -> None:
     assert np.all(drives(1e-3)[:, 1] == 0.0)
     assert np.all(pumped_evenly_at(seen(1e-3), P, {"flow_bias": 6.0 * P.flow_bias}).drives[:, 1] == 0.0)

@@ -4,7 +4,7 @@ from benchmarks.diagnosis.coverage import Case, logged
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 
 
-def test_a_balance_that_another_leads_out_of_a_wrong_valley_counts() -> None:
+def test_a_balance_that_ended_in_a_wrong_minimum_is_searched_again_from_another() -> None:
     """Only the mass balance came down: bulk modulus was 0.31 % low, by 7 deviations, and leakage 1.1 % high."""
     record, true, rig = logged(Case("lumped", "flow", 10000, "prbs", "minor_leakage_major_friction", 24011))
     found = estimate_bulk_modulus(record, rig)

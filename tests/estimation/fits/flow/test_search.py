@@ -63,7 +63,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 @pytest.mark.parametrize("condition", ["normal", "major_leakage", "minor_leakage_major_friction"])
-def test_a_log_that_the_likeliest_guess_explains_is_fitted_as_by_a_search_from_every_start(
+def test_a_search_from_the_likeliest_guess_alone_finds_the_fit_of_one_from_every_start(
     condition: str, tried: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = seen(recorded(condition))
@@ -80,7 +80,9 @@ def test_a_log_that_the_likeliest_guess_explains_is_fitted_as_by_a_search_from_e
         assert one.std["bulk_modulus"] == pytest.approx(std, rel=0.01)
 
 
-def test_valves_of_the_balance_by_mass_spare_that_by_volume_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_valve_values_of_the_mass_balance_save_model_runs_of_the_volume_balance(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     log, runs = seen(recorded("normal")), list[Array]()
 
     def counted(problem: Problem, theta: Array) -> Point:
@@ -100,7 +102,7 @@ def test_valves_of_the_balance_by_mass_spare_that_by_volume_runs(monkeypatch: py
         assert one.values["bulk_modulus"] == pytest.approx(other.values["bulk_modulus"], abs=0.05 * std)
 
 
-def test_valves_that_crack_are_fitted_beside_missing_speeds() -> None:
+def test_cracking_pressures_are_fitted_in_a_log_with_missing_speeds() -> None:
     """Otherwise their effect is attributed to a false cause: a drift of leakage, a blocked valve."""
     record = recorded("normal")
     speed = record["motor_speed_rad_s"].copy()
@@ -159,7 +161,7 @@ def test_a_balance_far_behind_one_that_leaves_noise_alone_is_given_up(
     assert len(fits) == forms
 
 
-def test_what_is_told_has_short_steps_throughout_though_less_drain_was_found_with_long_ones(
+def test_reported_fits_use_short_steps_even_if_less_drain_was_found_with_long_ones(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     log, told = seen(recorded("normal")), list[int]()
@@ -184,7 +186,7 @@ def test_what_is_told_has_short_steps_throughout_though_less_drain_was_found_wit
 
 
 @pytest.mark.parametrize(("deviation", "asked"), [(0.4, True), (0.6, False)])
-def test_less_drain_is_looked_for_where_the_log_tells_the_drain_alone(
+def test_less_drain_is_searched_for_only_if_the_log_determines_the_drain(
     monkeypatch: pytest.MonkeyPatch, deviation: float, asked: bool
 ) -> None:
     """A lumped plant has no make-up valve that a drain could open, yet half of its search was spent on less drain."""
@@ -208,14 +210,14 @@ def by_mass(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
     return one
 
 
-def test_what_a_hypothesis_promises_is_asked_where_the_plain_fit_stands() -> None:
+def test_the_predicted_gain_of_a_worn_pump_depends_on_the_balance_of_the_plain_fit() -> None:
     log = seen(recorded("minor_friction", 10.0, 2e-3))
     plain = by_mass(balanced(log, HEALTHY, STARTS)).values
     assert predicted_gain(log, HEALTHY, plain, DELIVERY, by_mass=True)[0] < 10.0
     assert predicted_gain(log, HEALTHY, plain, DELIVERY, by_mass=False)[0] > 100.0
 
 
-def test_what_is_promised_together_is_promised_alone() -> None:
+def test_gains_predicted_together_equal_those_predicted_one_by_one() -> None:
     log = seen(recorded("minor_friction", 10.0, 2e-3))
     plain = balanced(log, HEALTHY, STARTS)[0].values
     together = predicted_gains(log, HEALTHY, plain, (DELIVERY, ENCODER_ZERO))
@@ -223,7 +225,7 @@ def test_what_is_promised_together_is_promised_alone() -> None:
         assert tuple(told) == pytest.approx(tuple(predicted_gain(log, HEALTHY, plain, one)), rel=1e-4)
 
 
-def test_slopes_that_the_fit_has_found_promise_what_slopes_taken_anew_do() -> None:
+def test_slopes_of_the_fit_predict_the_same_gains_as_slopes_computed_anew() -> None:
     log = seen(recorded("minor_friction"))
     fit = by_mass(balanced(log, HEALTHY, STARTS))
     slopes = dict(zip(fit.model.unknowns, fit.slopes.T, strict=True))
@@ -236,7 +238,7 @@ def test_slopes_that_the_fit_has_found_promise_what_slopes_taken_anew_do() -> No
         assert one.deviation == pytest.approx(other.deviation, rel=1e-3)
 
 
-def test_make_up_valves_that_crack_apart_are_fitted_and_do_not_bias_bulk_modulus() -> None:
+def test_make_up_valves_with_different_cracking_pressures_do_not_bias_bulk_modulus() -> None:
     machine = Machine(crack_a=3e3, crack_b=0.0, ripple=0.0)
     rng = np.random.default_rng(3)
     course = np.zeros((6000, 5))
@@ -262,7 +264,7 @@ def pulled(load: float) -> Record:
     return Record(1e-3, {name: logged[name].to_numpy() for name in PLAIN})
 
 
-def test_make_up_valves_are_orifices_where_a_load_pulls_the_piston_faster_than_the_pump_does(
+def test_make_up_valves_act_as_orifices_if_a_load_pulls_the_piston_ahead_of_the_pump(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     free, loaded = seen(pulled(0.0)), seen(pulled(1.5e3))
@@ -276,7 +278,7 @@ def test_make_up_valves_are_orifices_where_a_load_pulls_the_piston_faster_than_t
     assert min(fit.cost for fit in balanced(loaded, HEALTHY, STARTS)) > bent.cost + 30.0
 
 
-def test_what_the_orifices_of_make_up_valves_leave_is_put_on_no_sensor() -> None:
+def test_make_up_valves_that_act_as_orifices_are_not_mistaken_for_a_sensor_fault() -> None:
     """A log of 3 s was refused, and some of 10 s passed with a speed 4 ms late and bulk modulus 2 % low."""
     fit = fit_flow(pulled(2.2e3), HEALTHY, HEALTHY.bulk_modulus)
     assert not fit.reasons

@@ -38,7 +38,7 @@ def fits(makeup: float = 1e-29, std: float = np.inf, held: float = np.inf) -> An
         (fits(), LogTraits(moving=True), 1.1 * WORTH, []),
     ],
 )
-def test_a_log_without_any_make_up_has_a_stuck_valve_if_sound_ones_contradict_it_and_may_have_one_else(
+def test_missing_make_up_flow_is_a_stuck_valve_only_if_the_log_contradicts_sound_valves(
     plain: Any, traits: LogTraits, sound: float, said: list[RigCode], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(of_valves, "cost_of_sound_ones", lambda *_: sound)

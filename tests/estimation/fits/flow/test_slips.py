@@ -19,7 +19,7 @@ LOGGED = Logged(
 )
 
 
-def test_two_slips_are_set_right_with_their_noise() -> None:
+def test_two_slips_are_corrected_together_with_their_noise_variances() -> None:
     right = set_right([slip(SPEED, "wrong sign"), slip(PRESSURE, "psi read as kPa")], LOGGED)
     assert right is not None
     assert list(right.record[SPEED]) == [0.0, -1.0, -2.0, -3.0]
@@ -27,7 +27,7 @@ def test_two_slips_are_set_right_with_their_noise() -> None:
     assert (right.variances[SPEED], right.variances[PRESSURE]) == pytest.approx((1.0, 2.0 * 6.894757**2))
 
 
-def test_a_channel_in_anothers_place_takes_its_noise_along_and_needs_to_be_there() -> None:
+def test_a_channel_in_the_place_of_another_brings_its_noise_variance_and_must_be_logged() -> None:
     misplaced = [slip(POSITION, VELOCITY)]
     right = set_right(misplaced, LOGGED)
     assert right is not None
@@ -36,7 +36,7 @@ def test_a_channel_in_anothers_place_takes_its_noise_along_and_needs_to_be_there
     assert set_right(misplaced, Logged(LOGGED.record.replace(**{VELOCITY: None}), LOGGED.variances)) is None
 
 
-def test_pairs_are_of_two_channels_and_two_wrong_signs_are_one_of_the_third() -> None:
+def test_pairs_of_slips_are_in_two_channels_and_not_two_wrong_signs() -> None:
     assert all(one.channel != two.channel for one, two in PAIRS)
     assert not any(one.factor < 0.0 and two.factor < 0.0 for one, two in PAIRS)
     assert (slip(SPEED, "wrong sign"), slip(PRESSURE, "psi read as bar")) in PAIRS

@@ -34,7 +34,7 @@ def emptied(position: Array) -> Array:
     return out
 
 
-def test_straight_lines_between_samples_leak_what_the_pistons_own_course_does() -> None:
+def test_straight_lines_between_corrected_positions_leak_as_much_as_the_pistons_true_course() -> None:
     rate = 2.0 * np.pi * 25.0
     answer = 1e-3 * 1j * rate / (1j * rate + 1.0 / EMPTIES)  # response to exp(j w t)
     wanted = (answer * np.exp(1j * TURNED)).imag
@@ -43,6 +43,6 @@ def test_straight_lines_between_samples_leak_what_the_pistons_own_course_does() 
 
 
 @pytest.mark.parametrize("share", [0.05, 20.0])
-def test_a_log_that_feels_little_and_one_that_is_too_slow_are_what_they_were(share: float) -> None:
+def test_positions_are_unchanged_if_leakage_is_small_or_the_log_too_slow(share: float) -> None:
     leaking = {**VALUES, "leakage_coefficient": share * VALUES["leakage_coefficient"]}
     np.testing.assert_array_equal(seen(leaking), seen({**leaking, "leakage_coefficient": 0.0}))

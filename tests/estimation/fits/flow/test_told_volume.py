@@ -18,14 +18,14 @@ def explained(*names: str, deviation: float = 1e-3, std: float = 1e7, slopes: An
     return SimpleNamespace(names=names, fit=fit, delivery_open=SimpleNamespace(deviation=deviation))
 
 
-def test_a_log_that_tells_more_is_no_less_observable_for_it() -> None:
+def test_the_bound_of_a_log_that_shows_chamber_volume_is_that_with_a_known_volume() -> None:
     known: Any = SimpleNamespace(values={"bulk_modulus": 2e8}, std={"bulk_modulus": 1e5})
     assert bound_told(explained(VOLUME.name), known) == pytest.approx(5e-4)
     assert bound_told(explained("encoder_zero"), known) == pytest.approx(0.05)
     assert not is_told(None)
 
 
-def test_what_a_log_leaves_of_displacement_over_area_is_in_the_interval() -> None:
+def test_the_remaining_doubt_of_displacement_over_area_is_in_the_interval() -> None:
     usual = {name: DOUBTS[name].usual.up for name in RATIO}
     assert ratio_doubt(explained(VOLUME.name), usual) == pytest.approx(20.0 * 1e-3)
     for file in (usual, {"pump_displacement": 0.1}, {"piston_area": 0.02}):
@@ -34,7 +34,7 @@ def test_what_a_log_leaves_of_displacement_over_area_is_in_the_interval() -> Non
     assert ratio_doubt(explained("encoder_zero"), usual) == ratio_doubt(explained(VOLUME.name, slopes={}), usual) == 0.0
 
 
-def test_the_area_answers_for_the_ratio_where_displacement_was_measured() -> None:
+def test_the_area_carries_the_doubt_of_the_ratio_if_displacement_is_measured() -> None:
     slopes = {"piston_area": {"bulk_modulus": -4e9}}
     doubt = ratio_doubt(explained(VOLUME.name, deviation=1.0, slopes=slopes), {"piston_area": 0.02})
     assert doubt == pytest.approx(20.0 * 0.02)
@@ -43,6 +43,6 @@ def test_the_area_answers_for_the_ratio_where_displacement_was_measured() -> Non
 @pytest.mark.parametrize(
     ("name", "entries"), [(VOLUME.name, {PRESSURE_GAIN}), ("encoder_zero", {PRESSURE_GAIN, *SLOPES})]
 )
-def test_where_the_volume_is_told_the_rest_of_the_rig_scales_without_bulk_modulus(name: str, entries: set[str]) -> None:
+def test_bulk_modulus_responds_to_pressure_gain_alone_if_the_log_shows_the_volume(name: str, entries: set[str]) -> None:
     fit: Any = SimpleNamespace(parameters={"bulk_modulus": (2e8, 1e6)}, rig_slopes=SLOPES, explanation=explained(name))
     assert set(fitted_responses(fit)["bulk_modulus"]) == entries

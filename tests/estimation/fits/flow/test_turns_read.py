@@ -45,7 +45,7 @@ def off(sample_time: float, lag: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(("sample_time", "lag"), [(0.01, 3e-3), (0.01, 6e-3), (0.005, 2e-3), (0.005, 6e-3)])
-def test_the_samples_after_a_turn_tell_what_it_pumped(sample_time: float, lag: float) -> None:
+def test_the_volume_pumped_at_a_turn_is_read_from_the_samples_after_it(sample_time: float, lag: float) -> None:
     straight, read = off(sample_time, lag)
     assert read < 0.05 * straight
 
@@ -73,7 +73,7 @@ def slow(sample_time: float = 0.01) -> Record:
     return Record(sample_time, {SPEED: speed + 0.01 * noise[0], POSITION: position, PRESSURE: 3e3 * noise[1]})
 
 
-def test_what_a_turn_pumps_is_swept_less_and_a_fast_log_stays_what_it_was() -> None:
+def test_the_volume_pumped_at_turns_is_subtracted_from_positions_of_slow_logs_alone() -> None:
     log = seen(slow())
     read, fast = with_turns_read(log, PAPER), seen(slow(1e-3))
     assert with_turns_read(fast, PAPER) is fast
@@ -84,7 +84,7 @@ def test_what_a_turn_pumps_is_swept_less_and_a_fast_log_stays_what_it_was() -> N
     assert pumped == pytest.approx(turned(np.array([4.49]), 4e-3)[1][0], abs=0.02)
 
 
-def test_a_hypothesis_must_gain_at_each_turn_of_a_slow_log_by_the_noise_that_it_leaves() -> None:
+def test_the_gain_required_in_a_slow_log_grows_with_its_turns_and_its_residuals() -> None:
     """A gain of 76 at nine turns wrongly showed a pump that compresses its oil, with leakage 66 % low."""
     log = seen(slow())
     turning = replace(log, course=IntersampleDoubt(np.where(np.arange(len(log.drives)) % 30 < 2, 1e6, 0.0)))
@@ -96,7 +96,7 @@ def test_a_hypothesis_must_gain_at_each_turn_of_a_slow_log_by_the_noise_that_it_
 
 
 @pytest.mark.parametrize("gains", [True, False])
-def test_what_looks_strange_is_believed_where_it_gains_with_turns_read_too(
+def test_a_hypothesis_is_accepted_only_if_it_also_gains_with_turns_read(
     gains: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read: list[bool] = []
@@ -125,6 +125,6 @@ def test_what_looks_strange_is_believed_where_it_gains_with_turns_read_too(
         assert answer.parameters["bulk_modulus"][0] == pytest.approx(2e8)
 
 
-def test_a_turn_whose_next_samples_take_it_back_is_not_read() -> None:
+def test_a_turn_that_the_next_samples_reverse_is_not_read() -> None:
     rises = [0.0, 0.0, 100.0, 50.0, 25.0, 12.5, *4 * [0.0], 100.0, -50.0, -25.0, -12.0, *4 * [0.0]]
     assert not turned_beside(np.cumsum(rises), 0.01, 0.01)[9:].any()

@@ -30,7 +30,7 @@ def fast(samples: int = 100) -> GreyBoxLog:
     )
 
 
-def test_straight_lines_stay_where_they_are_and_noise_shrinks() -> None:
+def test_averages_keep_straight_lines_and_reduce_noise() -> None:
     log = averaged(fast(), 2.5e-4)
     time = log.sample_time * np.arange(len(log.drives))
     assert log.sample_time == pytest.approx(5.0 * SAMPLE)
@@ -55,7 +55,7 @@ def test_a_block_with_a_sample_missing_is_missing() -> None:
 
 
 @pytest.mark.parametrize("case", ["slow", "gaps", "every second sample missing", "every tenth sample alone there"])
-def test_a_log_that_would_lose_by_it_stays_as_it_is(case: str) -> None:
+def test_a_log_that_would_lose_information_is_not_averaged(case: str) -> None:
     log = fast()
     match case:
         case "slow":

@@ -17,7 +17,7 @@ from tests.estimation.fits.short_logs import PRESSURE, log, made_fit, problem, s
 ROWS = 400
 
 
-def test_of_many_short_logs_of_noise_few_leave_more_than_the_gate_lets_by() -> None:
+def test_few_short_logs_of_pure_noise_exceed_the_limits_of_the_gate() -> None:
     """Before, one in fifteen left more than 1.2, and one in twenty had correlated residuals."""
     rng = np.random.default_rng(0)
     left, alike = [], []
@@ -32,7 +32,9 @@ def test_of_many_short_logs_of_noise_few_leave_more_than_the_gate_lets_by() -> N
 
 
 @pytest.mark.parametrize(("chi", "correlated"), [(1.3, 0.0), (1.0, 0.14), (1.0, -0.14)])
-def test_a_fit_of_a_short_log_may_leave_what_one_of_a_long_log_may_not(chi: float, correlated: float) -> None:
+def test_the_fit_of_a_short_log_may_have_larger_residuals_than_that_of_a_long_one(
+    chi: float, correlated: float
+) -> None:
     fit = made_fit(100.0, 2e8, 1e5, chi=chi, correlated=correlated)
     for rows, explains in ((ROWS, True), (20_000, False)):
         assert fit_explains(replace(fit, seen=float(rows)), noisy=False) == explains
@@ -45,7 +47,7 @@ def test_a_fit_of_a_short_log_that_leaves_more_than_chance_is_refused(chi: float
     assert not fit_explains(fit, noisy=False)
 
 
-def test_a_search_in_a_short_log_ends_where_noise_alone_may_leave_as_much() -> None:
+def test_a_search_in_a_short_log_ends_once_its_residuals_are_within_chance() -> None:
     one = problem()
     point = one.at(usual(one))
     for share, ends in ((0.99, True), (1.01, False)):
@@ -54,7 +56,7 @@ def test_a_search_in_a_short_log_ends_where_noise_alone_may_leave_as_much() -> N
     assert largest_chi_square(one.blocks) > 1.3
 
 
-def test_a_fit_counts_the_residuals_that_are_seen() -> None:
+def test_a_fit_counts_only_the_residuals_of_logged_samples() -> None:
     record = log(0.5)
     pressure = record[PRESSURE].copy()
     pressure[::4] = np.nan

@@ -31,7 +31,7 @@ def spread_of_estimates(colour: float, runs: int = 300) -> tuple[float, float, f
     return float(np.std(found)), float(np.sqrt(np.mean(white))), float(np.sqrt(np.mean(coloured)))
 
 
-def test_white_noise_is_judged_alike_by_both() -> None:
+def test_both_formulas_give_the_true_deviation_in_white_noise() -> None:
     true, white, coloured = spread_of_estimates(0.0)
     assert white == pytest.approx(true, rel=0.12)
     assert coloured == pytest.approx(true, rel=0.15)
@@ -51,14 +51,14 @@ def test_the_bread_is_the_inverse_of_the_normal_equations_however_columns_are_sc
     np.testing.assert_allclose(spread, bread * (residual @ residual) / (len(residual) - 2), rtol=1e-9)
 
 
-def test_parameters_that_cannot_be_told_apart_are_warned_of() -> None:
+def test_collinear_parameters_raise_a_warning() -> None:
     column = np.random.default_rng(2).standard_normal(40)
     with pytest.warns(LogWarning) as caught:
         least_squares_covariance(np.column_stack([column, column]), column, 40, 0, NOTHING)
     assert [one.message.note.code for one in caught] == [EstimateCode.NOT_DETERMINED]
 
 
-def test_the_warning_names_the_line_that_asked_for_the_fit() -> None:
+def test_the_warning_points_to_the_caller_of_the_fit() -> None:
     column = np.random.default_rng(2).standard_normal(40)
 
     def fitted() -> object:
@@ -69,7 +69,7 @@ def test_the_warning_names_the_line_that_asked_for_the_fit() -> None:
     assert [one.filename for one in caught] == [__file__]
 
 
-def test_what_is_known_beforehand_tells_parameters_apart() -> None:
+def test_prior_information_determines_collinear_parameters() -> None:
     rng = np.random.default_rng(3)
     column, noise = rng.standard_normal(4000), rng.standard_normal(4000)
     _, spread = least_squares_covariance(np.column_stack([column, column]), noise, 4000, 0, np.array([0.0, 25.0]))
@@ -87,11 +87,11 @@ def test_an_autocovariance_is_the_windowed_sum_of_products_however_many_lags(lag
     assert _autocovariance(residual, 2981, lags) == pytest.approx(window * np.array(summed), rel=1e-9, abs=1e-9)
 
 
-def test_a_residual_of_nothing_has_no_colour() -> None:
+def test_zero_residuals_need_no_lags() -> None:
     assert automatic_lags(np.zeros(50)) == 0
 
 
-def test_the_span_grows_with_the_correlation_as_andrews_has_it() -> None:
+def test_the_number_of_lags_follows_the_rule_of_andrews() -> None:
     count = 40_000
     noise = np.random.default_rng(2).standard_normal(count)
     coloured = lfilter([1.0], [1.0, -0.6], noise)
@@ -99,14 +99,14 @@ def test_the_span_grows_with_the_correlation_as_andrews_has_it() -> None:
     assert automatic_lags(coloured) == pytest.approx(wanted, rel=0.05)
 
 
-def test_what_is_not_determined_is_not_known_where_nobody_is_warned() -> None:
+def test_collinear_parameters_have_infinite_variance_without_a_warning() -> None:
     column = np.random.default_rng(1).standard_normal(40)
     _, spread = least_squares_covariance(np.column_stack([column, column]), column, 40, 0, np.zeros(2), warned=False)
     assert np.all(np.isinf(spread))
 
 
 @pytest.mark.parametrize("lags", [1, 7, FEW_LAGS - 1, FEW_LAGS])
-def test_products_with_an_autocovariance_are_those_of_its_whole_matrix(lags: int) -> None:
+def test_products_with_an_autocovariance_equal_those_with_its_full_matrix(lags: int) -> None:
     rng = np.random.default_rng(8)
     columns, known = rng.normal(size=(200, 3)), rng.normal(size=lags + 1)
     apart = np.abs(np.subtract.outer(np.arange(200), np.arange(200)))

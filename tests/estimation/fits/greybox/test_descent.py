@@ -12,12 +12,12 @@ def bowl(x: np.ndarray) -> Point:
     return Point(x, 0.5 * float(errors @ errors), slopes.T @ errors, slopes.T @ slopes)
 
 
-def test_the_least_cost_is_found_and_what_is_not_felt_stays() -> None:
+def test_the_minimum_is_found_and_a_coordinate_without_effect_keeps_its_value() -> None:
     found = descend(bowl, np.array([-5.0, 4.0, 1.5]), 60, (-FAR, FAR), 1e-12)
     np.testing.assert_allclose(found.theta, [2.0, 3.0, 1.5], atol=1e-3)
 
 
-def test_the_least_cost_within_bounds_is_found_at_a_bound() -> None:
+def test_the_minimum_within_bounds_is_found_at_a_bound() -> None:
     lower = np.array([-10.0, 4.0, -10.0])
     found = descend(bowl, np.array([-5.0, 6.0, 0.0]), 60, (lower, FAR), 1e-12)
     np.testing.assert_allclose(found.theta[:2], [1.0, 4.0], atol=2e-3)
@@ -49,7 +49,7 @@ def test_searches_together_end_where_each_ends_alone() -> None:
     assert evaluated[-1] < len(starts)
 
 
-def test_a_second_search_from_the_same_start_works_out_only_what_is_new() -> None:
+def test_a_second_search_from_the_same_start_evaluates_only_new_points() -> None:
     tried: list[np.ndarray] = []
 
     def counted(x: np.ndarray) -> Point:
@@ -65,7 +65,7 @@ def test_a_second_search_from_the_same_start_works_out_only_what_is_new() -> Non
     np.testing.assert_array_equal(long.theta, descend(bowl, start, 5, (-FAR, FAR), 1e-12, radius=1.0).theta)
 
 
-def test_a_search_whose_end_is_of_no_use_is_given_up_and_any_other_is_not() -> None:
+def test_a_search_ends_early_only_if_it_cannot_reach_what_is_wanted_or_is_good_enough() -> None:
     tried: list[np.ndarray] = []
 
     def bent(x: np.ndarray) -> Point:
@@ -92,7 +92,7 @@ def test_a_search_whose_end_is_of_no_use_is_given_up_and_any_other_is_not() -> N
     assert len(tried) == 1
 
 
-def test_a_step_that_promises_less_than_its_share_is_not_taken() -> None:
+def test_a_step_that_predicts_less_than_the_least_share_is_not_taken() -> None:
     def slow(x: np.ndarray) -> Point:
         """Return a point of a quartic: each step removes the same share of the cost above a floor of 1."""
         error, slope = x[0] ** 2, 2.0 * x[0]

@@ -9,7 +9,7 @@ from estimation.models.flow import MASS_FLOW_FORM
 from tests.estimation.fits.short_logs import problem, usual
 
 
-def test_draws_for_a_long_log_are_those_for_a_short_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_draws_made_one_by_one_give_the_covariance_of_stored_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     one = problem()
     theta = usual(one)
     slopes = one.slopes(theta)
@@ -35,7 +35,7 @@ def test_a_run_without_noise_takes_no_kernel_of_its_own(monkeypatch: pytest.Monk
     np.testing.assert_allclose(found, given, rtol=1e-6, atol=1e-6 * float(np.max(given)))
 
 
-def test_what_the_drives_noise_does_to_one_balance_it_does_to_another() -> None:
+def test_the_effect_of_drive_noise_on_one_balance_serves_for_another() -> None:
     one, other = problem(), problem(MASS_FLOW_FORM)
     theta = usual(other)
     slopes = other.slopes(theta)

@@ -6,13 +6,13 @@ from estimation.fits.greybox.driven import driven_samples
 SINE = np.sin(np.linspace(0.0, 60.0, 6000))
 
 
-def test_a_log_that_is_driven_from_the_first_sample_is_compared_on_what_was_asked_for() -> None:
+def test_a_log_that_is_driven_from_its_first_sample_keeps_the_requested_length() -> None:
     assert driven_samples(SINE, 1000) == 1000
     assert driven_samples(np.zeros(50), 1000) == 1000
 
 
 @pytest.mark.parametrize("rest", [2000, 9000])
-def test_a_beginning_reaches_beyond_rest_until_it_is_driven_half_as_much_as_an_average_part(rest: int) -> None:
+def test_the_beginning_extends_past_rest_until_it_has_half_of_the_average_drive(rest: int) -> None:
     drive = np.concatenate([np.zeros(rest), SINE])
     length = driven_samples(drive, 1000)
     average = 1000.0 * np.mean(drive**2)

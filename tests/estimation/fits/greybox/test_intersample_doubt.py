@@ -40,20 +40,18 @@ def still(samples: int, noise: float) -> GreyBoxLog:
     return GreyBoxLog(drives, measured, row, 5e-3, steps, (OutputNoise(noise**2),), (0.05, 0.0))
 
 
-def test_a_speed_turns_where_its_second_difference_exceeds_what_noise_makes_of_it() -> None:
+def test_a_speed_turns_if_its_second_difference_exceeds_noise() -> None:
     log = still(7, 1.0)
     log.drives[:, 0] = [0.0, 0.1, 0.0, 0.0, 10.0, 20.0, 30.0]
     assert turns(log) == pytest.approx([0.0, 0.0, 0.0, 9.8, 9.8, 0.0, 9.8])  # nothing follows the last rise
 
 
 @pytest.mark.parametrize(("turned", "passes"), [([0.0, 5.0, 5.0, 0.01, 0.01, 3.0, 3.0], 2.0), ([0.0, 0.1], 1.0)])
-def test_a_turn_is_felt_on_either_side_and_counts_once_where_noise_does_not_hide_it(
-    turned: list[float], passes: float
-) -> None:
+def test_a_turn_between_two_samples_counts_once_if_it_exceeds_noise(turned: list[float], passes: float) -> None:
     assert IntersampleDoubt(np.array(turned)).passes(0.2) == pytest.approx(passes, rel=0.15)
 
 
-def test_blocks_of_several_samples_hold_what_each_gains() -> None:
+def test_the_variance_of_a_block_sums_those_of_its_samples() -> None:
     course = IntersampleDoubt(np.array([0.0, 0.0, 3.0, 4.0, 1.0]))
     assert course.walk(5, 2).tolist() == [25.0, 1.0]
     assert course.beside(5, 2).tolist() == [9.0 / 4.0, 32.0 / 4.0, 1.0]
@@ -88,13 +86,13 @@ def test_bulk_modulus_of_a_log_of_200_hz_is_within_its_interval(seed: int) -> No
     assert std < 0.005 * value
 
 
-def test_balances_of_a_slow_log_are_weighed_by_what_they_gain_at_one_turn() -> None:
+def test_cost_differences_between_balances_count_less_in_a_slow_log() -> None:
     slow, fast = (fitted(rate, 0)[1] for rate in (200, 1000))
     assert fast == fit.SURER
     assert slow > 5.0 * fit.SURER
 
 
-def test_a_steady_bend_leaves_nothing_open() -> None:
+def test_a_steady_curvature_of_speed_is_not_a_turn() -> None:
     log = still(200, 1.0)
     log.drives[:, 0] = 500.0 * np.sin(0.05 * np.arange(200))
     bent = turns(log)[2:-2]

@@ -25,7 +25,7 @@ def still(samples: int, noise: float) -> GreyBoxLog:
 
 
 @pytest.mark.parametrize(("staying", "passing"), [(0.1, 0.0), (0.0, 0.1)])
-def test_what_stays_is_told_from_what_comes_back(staying: float, passing: float) -> None:
+def test_lasting_and_passing_effects_of_turns_are_distinguished(staying: float, passing: float) -> None:
     rng, samples = np.random.default_rng(1), 4000
     log, course = (
         still(samples, 5e3),
@@ -38,7 +38,7 @@ def test_what_stays_is_told_from_what_comes_back(staying: float, passing: float)
     assert likeliest(problem, np.empty(0), course) == pytest.approx((staying, passing, 1.0), rel=0.6, abs=0.01)
 
 
-def test_what_unknowns_take_up_of_few_turns_is_counted_all_the_same() -> None:
+def test_the_share_of_few_turns_that_unknowns_absorb_is_included() -> None:
     rng, samples, times = np.random.default_rng(5), 1000, np.linspace(-1.0, 1.0, 1000)
     walk = np.where(np.arange(samples) % 62 == 31, (4e5) ** 2, 0.0)
     columns, _ = np.linalg.qr(np.vander(times, 9))
@@ -52,7 +52,7 @@ def test_what_unknowns_take_up_of_few_turns_is_counted_all_the_same() -> None:
     assert np.sqrt(np.mean(np.square(without))) < 0.75 * np.sqrt(np.mean(np.square(found)))
 
 
-def test_what_leaks_off_is_told_from_what_stays() -> None:
+def test_effects_of_turns_that_leak_off_are_distinguished_from_lasting_ones() -> None:
     rng, samples, kept = np.random.default_rng(3), 2000, 0.99
     gained = np.where(np.arange(samples) % 50 == 25, (4e5) ** 2, 0.0)
     leaking = np.zeros(samples)

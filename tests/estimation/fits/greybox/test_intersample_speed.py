@@ -18,7 +18,7 @@ def motor(asked: float, time: Array) -> tuple[Array, Array]:
     return speed[::100], angle[::100]
 
 
-def test_a_motor_that_starts_at_its_largest_acceleration_has_turned_as_far_as_straight_lines_say() -> None:
+def test_straightened_speeds_give_the_angle_of_a_motor_that_starts_at_full_acceleration() -> None:
     speed, angle = motor(300.0, SAMPLE * np.arange(41.0))
     turned = [np.concatenate([[0.0], np.cumsum(0.5 * (s[1:] + s[:-1])) * SAMPLE]) for s in (speed, straightened(speed))]
     plainly, bent = (np.max(np.abs(one - angle)) for one in turned)
@@ -34,6 +34,6 @@ def test_a_corner_at_a_sample_is_left_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("samples", [0, 1, 2, 3])
-def test_what_is_too_short_to_bend_is_left_as_it_is(samples: int) -> None:
+def test_a_log_that_is_too_short_to_bend_is_unchanged(samples: int) -> None:
     speed = np.arange(float(samples)) ** 2
     np.testing.assert_array_equal(straightened(speed), speed)

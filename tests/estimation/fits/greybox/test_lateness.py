@@ -12,7 +12,7 @@ from estimation.notes import RigCode
 from tests.estimation.fits.strange_logs import HEALTHY, SPEED, explained, log
 
 
-def test_the_channel_whose_timing_explains_most_is_told_within_what_is_believed() -> None:
+def test_the_latest_channel_is_the_one_that_gains_most_if_its_delay_is_plausible() -> None:
     late = {"motor_speed_rad_s": (-3e-3, 12.0), "position_m": (1e-3, 9.0)}
     assert most_late(late) == ("motor_speed_rad_s", -3e-3, 12.0)
     assert most_late({}) == ("", 0.0, 0.0)
@@ -20,7 +20,7 @@ def test_the_channel_whose_timing_explains_most_is_told_within_what_is_believed(
         assert most_late({"position_m": (behind, 30.0)}) == ("position_m", behind, gain)
 
 
-def test_a_speed_ahead_of_position_and_pressure_is_named_with_its_time_and_put_back() -> None:
+def test_a_speed_ahead_of_position_and_pressure_is_identified_and_shifted_back() -> None:
     record = log()
     ahead = np.concatenate([record[SPEED][3:], np.full(3, record[SPEED][-1])])
     given = record.replace(**{SPEED: ahead})
@@ -33,7 +33,7 @@ def test_a_speed_ahead_of_position_and_pressure_is_named_with_its_time_and_put_b
     assert np.std((back - record[SPEED])[:-3]) < 0.1 * np.std(ahead - record[SPEED])
 
 
-def test_half_a_millisecond_of_a_position_is_taken_up_where_it_shows() -> None:
+def test_a_position_late_by_half_a_millisecond_is_identified() -> None:
     record = log(duration=3.0)
     rows = np.arange(len(record))
     given = record.replace(position_m=np.interp(rows - 0.5, rows, record["position_m"]))

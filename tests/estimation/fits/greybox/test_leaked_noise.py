@@ -23,14 +23,14 @@ def spread(errors: Array, lost: float, samples: int, every: int = 1) -> float:
 
 @pytest.mark.parametrize("samples", [1, 5])
 @pytest.mark.parametrize("lost", [0.03, 0.3, 1.0, 4.0])
-def test_means_of_white_noise_that_is_lost_again_have_the_variance_that_is_told(lost: float, samples: int) -> None:
+def test_the_predicted_deviation_of_means_of_leaking_white_noise_is_right(lost: float, samples: int) -> None:
     told, _ = white_noise(samples).kept(lost)
     assert spread(RNG.standard_normal(200_000), lost, samples) == pytest.approx(told, rel=0.03)
 
 
 @pytest.mark.parametrize("every", [2, 3, 6])
 @pytest.mark.parametrize("lost", [0.03, 0.13, 1.0])
-def test_losses_even_out_less_of_the_noise_where_an_output_has_one_row_in_several(lost: float, every: int) -> None:
+def test_leakage_removes_less_noise_from_the_means_of_a_thinned_output(lost: float, every: int) -> None:
     """For a thinned pressure of a small chamber 55 % of the encoder's noise was predicted, and 90 % remain."""
     told, _ = white_noise(24, every).kept(lost)
     assert spread(RNG.standard_normal(400_000), lost, 24, every) == pytest.approx(told, rel=0.04)
@@ -47,7 +47,7 @@ def read(per_sample: float, blur: float) -> tuple[Array, Array, LeakedNoise]:
 
 
 @pytest.mark.parametrize("lost", [0.1, 0.3, 1.0])
-def test_errors_of_an_encoder_are_alike_at_a_steady_speed(lost: float) -> None:
+def test_encoder_errors_are_correlated_at_a_steady_speed(lost: float) -> None:
     """At 8.99 steps per sample each error is nearly the one before; white noise would be half as large or less."""
     errors, _, told = read(8.99, 0.0)
     found = spread(errors, lost, SAMPLES)
@@ -55,13 +55,13 @@ def test_errors_of_an_encoder_are_alike_at_a_steady_speed(lost: float) -> None:
     assert white_noise(SAMPLES).kept(lost)[0] < 0.85 * found
 
 
-def test_errors_of_an_encoder_whose_reading_flickers_are_white() -> None:
+def test_errors_of_an_encoder_with_a_flickering_reading_are_white() -> None:
     errors, _, told = read(8.99, 0.6)
     assert told.kept(0.3)[0] == pytest.approx(spread(errors, 0.3, SAMPLES), rel=0.08)
     assert told.kept(0.3)[0] == pytest.approx(white_noise(SAMPLES).kept(0.3)[0], rel=0.05)
 
 
-def test_means_of_samples_are_judged_as_their_samples_are() -> None:
+def test_uncorrelated_errors_count_as_white_noise_in_means_of_samples() -> None:
     """If errors are not correlated between samples, a mean of five is lost like one sample of white noise."""
     _, course, _ = read(8.99, 0.6)
     position = course + STEP * RNG.standard_normal(len(course))
@@ -71,22 +71,22 @@ def test_means_of_samples_are_judged_as_their_samples_are() -> None:
 
 @pytest.mark.parametrize("told", [white_noise(5), read(8.99, 0.0)[2]], ids=["white", "alike"])
 @pytest.mark.parametrize("lost", [1e-5, 0.2, 3.0, 600.0, 1e6])
-def test_its_slope_is_that_of_its_logarithm(lost: float, told: LeakedNoise) -> None:
+def test_the_slope_of_leaked_noise_is_that_of_its_logarithm(lost: float, told: LeakedNoise) -> None:
     above, below = (math.log(told.kept(lost * factor)[0]) for factor in (1.001, 1.0 / 1.001))
     assert told.kept(lost)[1] == pytest.approx((above - below) / (2.0 * math.log(1.001)), abs=1e-4)
 
 
-def test_nothing_is_lost_where_nothing_leaks() -> None:
+def test_all_noise_is_kept_without_leakage() -> None:
     assert white_noise(5).kept(0.0) == pytest.approx((1.0, 0.0), abs=1e-5)
 
 
-def test_a_short_log_or_one_that_stands_still_is_taken_for_white() -> None:
+def test_encoder_noise_in_a_short_or_resting_log_is_taken_as_white() -> None:
     for position in (np.zeros(5000), STEP * np.arange(20.0)):
         told = encoder_noise(position, position, STEP**2, 1, SAMPLES)
         assert told.kept(0.3) == white_noise(SAMPLES).kept(0.3)
 
 
-def test_an_encoders_step_shows_beside_samples_that_are_missing() -> None:
+def test_missing_samples_do_not_hide_the_correlation_of_encoder_errors() -> None:
     """A straight line across a gap has steps that are not the encoder's, so its noise was taken for white."""
     errors, course, told = read(8.99, 0.0)
     position = course + errors

@@ -33,7 +33,9 @@ def _numbers(address: int, count: int) -> "ctypes.Array[ctypes.c_double]":
         pytest.param(MASS_FLOW_FORM, id="mass flow", marks=pytest.mark.slow),
     ],
 )
-def test_the_same_bits_as_python(model: GreyBoxModel, asked: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_compiled_kernel_gives_the_same_bits_as_python(
+    model: GreyBoxModel, asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     text = text_of(monkeypatch, greybox_kernel, lambda: compile_kernel.__wrapped__(model))
     rng, samples, block = np.random.default_rng(3), 60, 4
     drives = np.stack([120.0 * np.sign(np.sin(0.3 * np.arange(samples))), 0.01 * np.sin(0.1 * np.arange(samples))], 1)
@@ -68,7 +70,7 @@ def test_the_same_bits_as_python(model: GreyBoxModel, asked: bool, monkeypatch: 
 KERNEL: Any = SimpleNamespace(JUMPS=2, UNKNOWNS=3)
 
 
-def test_an_open_covariance_goes_through_a_step_by_its_jacobian() -> None:
+def test_the_covariance_in_a_gap_is_carried_through_a_step_by_its_jacobian() -> None:
     rng = np.random.default_rng(1)
     point = rng.standard_normal((4, 6))
     root = rng.standard_normal((2, 2))
@@ -78,7 +80,7 @@ def test_an_open_covariance_goes_through_a_step_by_its_jacobian() -> None:
     assert covariance == pytest.approx(wanted)
 
 
-def test_a_sample_closes_a_gap_as_kalmans_update_does() -> None:
+def test_the_first_sample_after_a_gap_applies_the_kalman_update() -> None:
     rng = np.random.default_rng(2)
     point, shown = rng.standard_normal((4, 6)), rng.standard_normal(6)
     root = rng.standard_normal((2, 2))
@@ -96,7 +98,7 @@ def test_a_sample_closes_a_gap_as_kalmans_update_does() -> None:
 
 
 @pytest.mark.parametrize("size", [2.0, -2.0, 9.0, -9.0])
-def test_a_block_counts_by_its_square_and_beyond_the_limit_by_its_size(size: float) -> None:
+def test_a_block_counts_quadratically_up_to_the_outlier_limit_and_linearly_beyond(size: float) -> None:
     row, level = np.array([size, 0.5, -1.0]), np.array([0.4, 0.1, 0.2])
     gain, scale, outlier = 0.25, 0.8, 3.0
     error, *slopes = scale * (row - level)
@@ -109,7 +111,7 @@ def test_a_block_counts_by_its_square_and_beyond_the_limit_by_its_size(size: flo
     assert level == pytest.approx(moved)
 
 
-def test_what_ran_away_counts_as_much_and_no_more() -> None:
+def test_a_runaway_residual_counts_as_a_fixed_large_value() -> None:
     for value in (np.nan, 1e300):
         row, level, gradient, gram = np.array([value, 1.0]), np.zeros(2), np.zeros(1), np.zeros((1, 1))
         with np.errstate(all="ignore"):

@@ -29,7 +29,7 @@ def known(one: FreedProblem, theta: Array) -> Information:
     return information(one, theta, errors, slopes, felt, warned=False)
 
 
-def test_it_is_what_draws_of_the_noise_move_the_solution_by(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_noise_shift_equals_the_shift_of_the_solution_by_drawn_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("estimation.fits.greybox.noise_shift.struck_variance", lambda _: SPREAD**2)
     one = loud()
     theta = usual(one)
@@ -48,7 +48,7 @@ def test_it_is_what_draws_of_the_noise_move_the_solution_by(monkeypatch: pytest.
     assert variance["bulk_modulus"] == pytest.approx((0.2 * shift["bulk_modulus"]) ** 2)
 
 
-def test_noise_that_is_not_felt_moves_nothing() -> None:
+def test_noise_without_effect_causes_no_shift() -> None:
     one = loud(walk=0.0)
     theta = usual(one)
     assert noise_shift(one, theta, known(one, theta)) == ({}, {})

@@ -12,7 +12,7 @@ SLOPES = RNG.normal(size=(2, 40, 3))
 
 
 @pytest.mark.parametrize("fill", [fill_differences, fill_differences.__wrapped__])
-def test_differences_are_taken_from_the_first_lane_and_lanes_that_are_left_count_for_nothing(fill: object) -> None:
+def test_differences_are_taken_from_the_first_lane_and_spare_lanes_are_ignored(fill: object) -> None:
     found = np.concatenate([ERRORS[..., None], ERRORS[..., None] + 1e-3 * SLOPES, np.full((2, 40, 4), 7.0)], axis=-1)
     here, slopes = np.empty((2, 40)), np.empty((2, 40, 3))
     fill(found, 1e-3, here, slopes)  # type: ignore[operator]  # a compiled loop, or its Python function

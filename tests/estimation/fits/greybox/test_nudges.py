@@ -22,7 +22,7 @@ def seen(p: EhaParameters) -> GreyBoxLog:
     return flow_log(record, p, {}, {name: size**2 for name, (_, size) in channels.items()})
 
 
-def test_a_single_rod_has_the_longer_step_whether_the_file_says_so_or_the_fit_asks() -> None:
+def test_a_single_rod_has_the_longer_step_whether_it_is_stated_or_fitted() -> None:
     through, single = seen(PAPER), seen(replace(PAPER, area_difference=0.2))
     assert nudge_for(through, FLOW_FORM, ()) == NUDGE
     assert nudge_for(single, FLOW_FORM, ()) == UNEVEN_NUDGE

@@ -18,7 +18,7 @@ def bent(x: np.ndarray) -> Point:
 
 @pytest.mark.parametrize("share", [1.05, 1.5, np.inf])
 @pytest.mark.parametrize("logs", [1, 2])
-def test_searches_abreast_end_where_each_ends_that_waits_for_those_before_it(share: float, logs: int) -> None:
+def test_parallel_searches_end_at_the_points_of_sequential_searches(share: float, logs: int) -> None:
     rng = np.random.default_rng(3)
     starts = rng.uniform(-3.0, 3.0, (12, 3))
     alone, wanted = list[Point](), np.inf

@@ -64,14 +64,14 @@ def test_play_is_crossed_between_the_last_movement_one_way_and_the_first_one_bac
     assert np.all(np.diff(side[490:560]) <= 0.0)
 
 
-def test_noise_of_a_piston_that_stands_or_moves_turns_nothing() -> None:
+def test_encoder_noise_is_not_taken_for_a_reversal() -> None:
     noise = QUANTUM * np.random.default_rng(1).standard_normal(5000)
     assert not np.any(side_of_play(read(noise)))
     moved = side_of_play(read(noise + np.linspace(0.0, 1e-2, 5000)))
     assert moved[100:] == pytest.approx(1.0)
 
 
-def test_a_dead_encoder_is_at_no_side() -> None:
+def test_a_dead_encoder_is_at_neither_side_of_its_play() -> None:
     assert not np.any(side_of_play(np.full(100, 0.3)))
 
 
@@ -81,7 +81,7 @@ def turned() -> Array:
     return read(np.concatenate([up, np.full(50, 1e-2), up[::-1]]))
 
 
-def test_a_piston_that_pressure_moves_crosses_while_pressure_turns() -> None:
+def test_a_piston_that_pressure_moves_crosses_the_play_as_pressure_reverses() -> None:
     position = turned()
     pressure = np.where(np.arange(len(position)) < 510, 1e6, -1e6)  # reverses when the encoder has rested for 10 ms
     late, by_pressure, at_once, sprung = crossings(position, pressure, 1e-3).T
@@ -92,7 +92,7 @@ def test_a_piston_that_pressure_moves_crosses_while_pressure_turns() -> None:
     assert not np.any(sprung)
 
 
-def test_a_piston_that_stops_and_goes_on_springs_back_by_the_share_of_the_pressure_that_is_lost() -> None:
+def test_a_stopped_piston_springs_back_in_proportion_to_the_lost_pressure() -> None:
     up = np.linspace(0.0, 1e-2, 500)
     position = read(np.concatenate([up, np.full(200, 1e-2), 1e-2 + up]))
     pressure = np.where(np.abs(np.arange(len(position)) - 600) < 50, 2.5e5, 1e6)
@@ -107,7 +107,7 @@ def test_a_piston_that_stops_and_goes_on_springs_back_by_the_share_of_the_pressu
     assert back == pytest.approx(-sprung)
 
 
-def test_without_a_movement_there_is_no_course() -> None:
+def test_the_play_is_not_crossed_without_a_movement() -> None:
     assert not np.any(crossings(np.full(100, 0.3), np.linspace(0.0, 1e6, 100), 1e-3))
 
 
@@ -129,7 +129,7 @@ def shown(record: Record) -> ShownPlay:
 
 
 @pytest.mark.parametrize("condition", ["normal", "minor_leakage_major_friction"])
-def test_residuals_show_a_play_where_there_is_one_and_none_where_there_is_none(condition: str) -> None:
+def test_residuals_show_a_play_only_of_an_encoder_that_has_one(condition: str) -> None:
     assert shown(logged(condition, "prbs", 0.0)).gain < PLAY_SHOWN
     played = shown(logged(condition, "prbs", 5e-5))
     assert played.gain > PLAY_SHOWN
@@ -137,7 +137,7 @@ def test_residuals_show_a_play_where_there_is_one_and_none_where_there_is_none(c
 
 
 @pytest.mark.parametrize("condition", thinned(["normal", "minor_leakage_major_friction", "major_leakage"], ["normal"]))
-def test_a_play_is_taken_up_within_the_interval_or_shuts_the_gate(condition: str) -> None:
+def test_bulk_modulus_with_a_play_is_within_its_interval_or_the_gate_is_shut(condition: str) -> None:
     fit = fit_flow(logged(condition, "prbs", 5e-5), PAPER, PAPER.bulk_modulus)
     value, std = fit.parameters["bulk_modulus"]
     named = fit.explanation is not None and "position_play" in fit.explanation.names
@@ -161,9 +161,7 @@ def test_a_velocity_sensor_shows_the_play_that_the_encoder_hides(drive: str) -> 
 
 
 @pytest.mark.parametrize(("noise", "shows"), [(1e-3, False), (2e-5, True)])
-def test_an_encoder_that_sees_half_of_what_the_piston_yields_within_chance_has_no_play(
-    noise: float, shows: bool
-) -> None:
+def test_an_encoder_has_a_play_only_if_it_surely_misses_half_of_the_pistons_motion(noise: float, shows: bool) -> None:
     rng, time = np.random.default_rng(4), 1e-3 * np.arange(2000)
     pressure = 1e6 * np.sin(2.0 * np.pi * time)
     yields = 5e-12
@@ -187,14 +185,14 @@ def standing_still(noise: float, seed: int, samples: int = 4000) -> Record:
     return Record(1e-3, channels)
 
 
-def test_noise_of_velocity_shows_a_play_as_seldom_as_the_limit_says() -> None:
+def test_velocity_noise_shows_a_play_no_more_often_than_the_limit_predicts() -> None:
     """It is averaged over two sample times and so correlated: it counts for more than its scatter."""
     gains = [sensed_play(standing_still(1e-3, seed)).gain for seed in range(300)]
     assert sum(gain > PLAY_SENSED for gain in gains) <= 6  # 3 are expected by chance
     assert sum(gain > 1.0 for gain in gains) >= 8  # otherwise a test that detects nothing would pass
 
 
-def test_few_samples_that_stand_are_few_looks_at_the_noise() -> None:
+def test_few_samples_at_rest_show_a_play_less_clearly() -> None:
     seed = max(range(60), key=lambda one: sensed_play(standing_still(1e-3, one)).gain)
     long, short = standing_still(1e-4, seed), standing_still(1e-4, seed, 120)
     yielding = 3e-11
@@ -209,7 +207,7 @@ def test_few_samples_that_stand_are_few_looks_at_the_noise() -> None:
     assert gains[1] < 0.2 * gains[0]
 
 
-def test_what_the_piston_creeps_between_an_encoders_steps_is_no_play() -> None:
+def test_creep_between_the_steps_of_an_encoder_is_not_mistaken_for_play() -> None:
     """All rests together hide 40 um, each of them 5 um at most."""
     time = 1e-3 * np.arange(4000)
     position = 2e-5 * time / time[-1]
@@ -223,12 +221,12 @@ def test_what_the_piston_creeps_between_an_encoders_steps_is_no_play() -> None:
     assert sensed_play(Record(1e-3, channels)) == NO_PLAY
 
 
-def test_a_coarse_encoder_has_no_play() -> None:
+def test_the_quantum_of_a_coarse_encoder_is_not_mistaken_for_play() -> None:
     sound = logged("normal", "multisine", 0.0)
     assert sensed_play(sound.replace(position_m=2e-5 * np.round(sound["position_m"] / 2e-5))) == NO_PLAY
 
 
-def test_an_encoder_that_never_stands_shows_none_to_a_velocity_sensor() -> None:
+def test_a_velocity_sensor_shows_no_play_without_rests_or_without_pressure() -> None:
     moving = np.linspace(0.0, 0.1, 1000)
     channels = {"position_m": moving, "velocity_m_s": np.full(1000, 0.1), "differential_pressure_pa": 1e6 * moving}
     assert sensed_play(Record(1e-3, channels)) == NO_PLAY
@@ -260,7 +258,7 @@ def concluded(
     return fit_flow(record or logged("normal", "prbs", 0.0), PAPER, PAPER.bulk_modulus)
 
 
-def test_a_play_that_is_shown_is_asked_for_and_believed_where_no_more_than_noise_is_left(
+def test_a_play_that_residuals_show_is_tested_and_accepted_if_only_noise_remains(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     unseen, asked = concluded(monkeypatch, PLAY_SHOWN, 0.0), concluded(monkeypatch, PLAY_SHOWN + 0.1, 0.0)
@@ -282,7 +280,7 @@ def test_a_play_that_is_shown_and_not_found_shuts_the_gate(monkeypatch: pytest.M
     assert [(note.code, note.data["play_um"]) for note in another.reasons] == [(EstimateCode.PLAY_LEFT, 10.0)]
 
 
-def test_a_play_that_residuals_may_show_by_chance_is_in_the_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_play_that_residuals_may_show_by_chance_widens_the_interval(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = concluded(monkeypatch, PLAY_SHOWN - 0.1, 0.0, chi=DOUBTED + 0.01)
     doubtful = concluded(monkeypatch, PLAY_BELIEVED - 0.1, 0.0, chi=DOUBTED + 0.01)
     assert not doubtful.reasons
@@ -295,7 +293,7 @@ def test_a_play_that_residuals_may_show_by_chance_is_in_the_interval(monkeypatch
     assert RigCode.PLAY_NOT_EXCLUDED not in [note.code for note in sound.remarks]
 
 
-def test_a_play_that_a_velocity_sensor_shows_is_asked_for_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_play_that_a_velocity_sensor_shows_is_tested_too(monkeypatch: pytest.MonkeyPatch) -> None:
     record = logged("normal", "prbs", 5e-5)
     assert concluded(monkeypatch, 0.0, 0.0, record=record).explanation is not None
     (note,) = concluded(monkeypatch, 0.0, 0.0, chi=DOUBTED + 0.01, record=record).reasons
@@ -303,7 +301,7 @@ def test_a_play_that_a_velocity_sensor_shows_is_asked_for_too(monkeypatch: pytes
     assert note.data["play_um"] == pytest.approx(1e6 * sensed_play(record).size)
 
 
-def test_a_play_too_small_to_be_one_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fitted_play_below_the_smallest_size_is_not_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = logged("normal", "prbs", 0.0)
     monkeypatch.setattr(flow_fit, "sensed_play", lambda _: ShownPlay(3e-5, PLAY_SHOWN + 0.1))
     fit = fit_flow(sound, PAPER, PAPER.bulk_modulus)
@@ -321,19 +319,19 @@ def test_a_play_too_small_to_be_one_is_not_believed(monkeypatch: pytest.MonkeyPa
         (NO_PLAY, ShownPlay(6e-6, PLAY_SENSED + 0.1), False),
     ],
 )
-def test_the_gate_is_shut_by_a_play_that_chance_seldom_shows_and_that_is_not_too_small(
+def test_only_a_significant_play_of_sufficient_size_shuts_the_gate(
     shown: ShownPlay, sensed: ShownPlay, shut: bool
 ) -> None:
     assert bool(play_left(shown, sensed)) is shut
 
 
-def test_a_piston_that_begins_to_move_within_what_a_sound_encoder_resolves_shows_no_play() -> None:
+def test_motion_within_the_resolution_of_a_sound_encoder_shows_no_play() -> None:
     p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(21)  # a play gained 7.4 at 500 Hz
     record = simulate(LUMPED, make_drive("prbs", 10.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
     assert sensed_play(record).gain <= PLAY_SHOWN
 
 
-def test_a_play_is_shown_by_chance_as_seldom_as_its_limit_says() -> None:
+def test_the_limits_for_a_play_have_their_stated_rates_of_false_alarms() -> None:
     """If a course asks for more play, its score statistic is the square of a positive normal deviate."""
     assert 1.0 / (3.0 * float(ndtr(-((2.0 * PLAY_BELIEVED) ** 0.5)))) == pytest.approx(3600.0, rel=0.02)
     by_chance = float(ndtr(-((2.0 * PLAY_SHOWN) ** 0.5)))
@@ -342,5 +340,5 @@ def test_a_play_is_shown_by_chance_as_seldom_as_its_limit_says() -> None:
     assert 1.0 / float(ndtr(-((2.0 * PLAY_SENSED) ** 0.5))) == pytest.approx(100.0, rel=0.02)
 
 
-def test_what_a_fit_says_of_a_play_comes_back_from_another_process() -> None:
+def test_a_shown_play_survives_a_copy_to_another_process() -> None:
     assert deepcopy(NO_PLAY) == NO_PLAY  # copied in the same way as by pickle

@@ -7,7 +7,7 @@ from estimation.fits.greybox.play import shown_play
 from plant.arrays import Array
 
 
-def test_what_a_play_would_move_is_what_the_unknowns_take_up_of_it() -> None:
+def test_a_play_shifts_the_unknowns_by_the_share_that_they_absorb() -> None:
     errors, change = np.array([-3.0, 1.0, 2.0, 0.5]), np.array([1e-6, 0.0, -1e-6, 0.0])
     slope = np.array([1.0, 2.0, 0.0, 1.0])
 

@@ -37,7 +37,7 @@ def turned(speed: Array) -> Array:
 
 
 @pytest.mark.parametrize(("cosine", "sine"), [(0.1, 0.0), (0.0, 0.1), (-0.05, 0.08)])
-def test_a_log_with_teeth_delivers_what_they_do_between_any_two_samples(cosine: float, sine: float) -> None:
+def test_a_log_with_ripple_delivers_its_volume_between_any_two_samples(cosine: float, sine: float) -> None:
     speed = 60.0 * np.sin(np.pi * SAMPLE * np.arange(2000))  # both ways, up to 0.7 rad of tooth phase per sample
     log = with_ripple(bare(speed), [Ripple(12, cosine, sine)])
     added = turned(log.drives[:, 0]) - turned(speed)
@@ -48,7 +48,7 @@ def test_a_log_with_teeth_delivers_what_they_do_between_any_two_samples(cosine: 
     assert log.teeth == (Ripple(12, cosine, sine),)
 
 
-def test_teeth_of_which_too_few_samples_are_taken_deliver_none() -> None:
+def test_ripple_that_is_too_fast_for_the_sample_time_is_not_added() -> None:
     fast = np.full(100, 2.1 / (12 * SAMPLE))
     assert with_ripple(bare(fast), [Ripple(12, 0.1, 0.0)]).drives[:, 0] == pytest.approx(fast)
     slower = np.full(100, 1.9 / (12 * SAMPLE))
@@ -62,7 +62,7 @@ def test_an_offset_is_subtracted_before_the_angle_is_taken() -> None:
     assert with_ripple(bare(speed), (), 0.4).speed_offset == 0.4
 
 
-def test_two_counts_of_teeth_add_up() -> None:
+def test_ripples_of_two_tooth_counts_add_up() -> None:
     speed = np.linspace(-30.0, 30.0, 500)
     one, other = Ripple(10, 0.1, 0.02), Ripple(20, -0.03, 0.05)
     together = with_ripple(bare(speed), [one, other])
@@ -109,7 +109,7 @@ def most(fit: GreyBoxFit) -> ShownRipple:
     return max(fit.teeth.values(), key=lambda one: one.gain)
 
 
-def test_residuals_show_count_and_size_of_teeth_and_none_where_there_are_none() -> None:
+def test_residuals_show_count_and_amplitude_of_ripple_and_none_of_a_smooth_pump() -> None:
     shown = most(likeliest(0.1))
     assert shown.gain > TEETH_WORTH
     assert shown.teeth.count == 11
@@ -118,12 +118,12 @@ def test_residuals_show_count_and_size_of_teeth_and_none_where_there_are_none() 
     assert most(likeliest(0.0)).gain < TEETH_WORTH
 
 
-def test_of_many_counts_the_model_is_asked_of_a_few_and_of_none_where_a_fit_is_not() -> None:
+def test_the_model_is_run_only_for_the_likeliest_of_the_requested_tooth_counts() -> None:
     assert len(likeliest(0.0).teeth) == LIKELIEST
     assert not fits_of(seen(logged(0.0)))[0].teeth
 
 
-def test_what_a_count_gains_beside_the_likeliest_is_what_it_gains_once_that_is_taken_up() -> None:
+def test_the_gain_beside_the_likeliest_tooth_count_is_that_after_fitting_this_count() -> None:
     fit = likeliest(0.1)
     held = with_ripple(replace(seen(logged(0.1)), counts=(11, 19)), [most(fit).teeth])
     after = min(fits_of(held), key=lambda one: one.cost)
@@ -132,7 +132,7 @@ def test_what_a_count_gains_beside_the_likeliest_is_what_it_gains_once_that_is_t
     assert fit.teeth[19].beside < 0.95 * fit.teeth[19].gain
 
 
-def test_teeth_that_a_log_holds_leave_more_open() -> None:
+def test_a_ripple_that_the_log_includes_adds_to_the_deviation() -> None:
     held = with_ripple(replace(seen(logged(0.1)), counts=(11,)), [Ripple(11, 0.1, 0.0)])
     free, known = (min(fits_of(log), key=lambda fit: fit.cost) for log in (held, replace(held, counts=(), teeth=())))
     assert free.std["leakage_coefficient"] > known.std["leakage_coefficient"]
@@ -146,7 +146,7 @@ def fitted(ripple: float) -> FormFit:
     return fit_flow(logged(ripple), PAPER, PAPER.bulk_modulus)
 
 
-def test_bulk_modulus_with_teeth_is_what_it_would_be_without_and_is_off_where_they_are_not_taken_up(
+def test_bulk_modulus_is_right_with_a_fitted_ripple_and_off_with_an_ignored_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     sound, taken_up = fitted(0.0), fitted(0.2)
@@ -162,7 +162,7 @@ def test_bulk_modulus_with_teeth_is_what_it_would_be_without_and_is_off_where_th
     assert abs(note.data["percent"] - 20.0) < note.data["half_width"] < 5.0
 
 
-def test_overtones_go_with_the_teeth() -> None:
+def test_an_overtone_is_fitted_with_its_tooth_count_and_not_reported_by_itself() -> None:
     found = with_pump_ripple(seen(logged(0.1, overtone=0.15)), fits_of, lambda _: True)
     assert [one.count for one in found.log.teeth] == [11, 22]
     assert [note.data["teeth"] for note in found.remarks] == [11]
@@ -177,7 +177,7 @@ def shifted(ripple: float) -> Record:
     return record.replace(motor_speed_rad_s=record["motor_speed_rad_s"] + OFFSET)
 
 
-def test_teeth_whose_phase_an_offset_of_speed_turns_are_found_with_it_and_without_it_are_not() -> None:
+def test_a_ripple_whose_phase_a_speed_offset_shifts_is_found_only_together_with_it() -> None:
     held = with_ripple(replace(seen(shifted(0.1)), counts=COUNTS), (), 0.7 * OFFSET)  # a part of the offset is left
     best = most(min(fits_of(held), key=lambda fit: fit.cost))
     assert best.teeth.count == 11
@@ -187,7 +187,7 @@ def test_teeth_whose_phase_an_offset_of_speed_turns_are_found_with_it_and_withou
     assert alone.gain < 0.5 * best.gain
 
 
-def test_an_offset_is_read_off_the_residuals_and_leaves_more_open() -> None:
+def test_a_speed_offset_is_estimated_from_the_residuals_and_adds_to_the_deviation() -> None:
     plain = replace(seen(shifted(0.0)), counts=COUNTS)
     first = min(fits_of(plain), key=lambda fit: fit.cost)
     assert first.speed_offset.gain > 100.0

@@ -8,13 +8,13 @@ from estimation.fits.greybox.ridge import STEEPEST, PlacedRidge, Ridge
 RIDGE = Ridge("delivery", "bias", 100.0)
 
 
-def test_a_ridge_is_where_both_parameters_are_free() -> None:
+def test_a_ridge_needs_both_of_its_parameters_to_be_free() -> None:
     assert RIDGE.placed(("modulus", "bias", "delivery")) == PlacedRidge(2, 1, 100.0)
     assert RIDGE.placed(("modulus", "delivery")) is None
     assert RIDGE.placed(("modulus", "bias")) is None
 
 
-def test_a_neighbour_on_the_ridge_gains_of_the_second_what_it_gains_of_the_first_times_the_ratio() -> None:
+def test_a_step_along_the_ridge_changes_the_second_parameter_by_the_ratio_times_the_first() -> None:
     placed, theta, nudge = PlacedRidge(0, 1, 100.0), np.log([2e-6, 4e-5]), 1e-3
     points = theta + nudge * np.eye(3, 2, -1)
     placed.turn(points, theta, nudge)
@@ -38,5 +38,5 @@ def test_a_slope_turned_back_is_that_of_the_first_parameter_alone() -> None:
     assert slopes[0] == pytest.approx([2e-4, -4e-5], rel=1e-5)
 
 
-def test_a_parameter_that_has_vanished_leaves_no_steep_ridge() -> None:
+def test_the_steepness_of_a_ridge_is_limited_if_a_parameter_vanishes() -> None:
     assert PlacedRidge(0, 1, 100.0).steepness(np.log([2e-6, 1e-30])) == STEEPEST

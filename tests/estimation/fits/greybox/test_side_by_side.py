@@ -89,7 +89,7 @@ def test_the_normal_equations_are_those_of_residuals_one_by_one(problem: FreedPr
         assert point.gradient[i] == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 
-def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_alone(problem: FreedProblem) -> None:
+def test_a_run_that_diverges_keeps_finite_residuals_and_does_not_affect_its_neighbours(problem: FreedProblem) -> None:
     mad = problem.log.parameters.copy()
     mad[parameter_names(WideFlowParameters).index("chamber_volume")] = np.nan
     run = compile_side_by_side(replace(WIDE_FLOW_FORM, jump=()), LANES)
@@ -150,9 +150,7 @@ def test_any_number_of_points_is_run(problem: FreedProblem, count: int) -> None:
         assert together[place] == pytest.approx(problem.at(thetas[place]).cost, rel=1e-9)
 
 
-def test_what_was_run_at_one_of_the_last_two_points_is_not_run_again(
-    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_last_two_points_are_not_run_again(problem: FreedProblem, monkeypatch: pytest.MonkeyPatch) -> None:
     own, (first, second, third) = problem.on(problem.log), points(problem, 3)
     fresh = [problem.on(problem.log).linearised(theta) for theta in (first, second)]
     for theta in (third, first, second):
@@ -166,7 +164,7 @@ def test_what_was_run_at_one_of_the_last_two_points_is_not_run_again(
         own.at(third)
 
 
-def test_a_point_near_a_known_one_lies_along_its_slopes_where_that_is_asked_for(
+def test_a_point_near_a_known_one_is_extrapolated_by_its_slopes_on_request(
     problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own, (theta,) = problem.on(problem.log), points(problem, 1)
@@ -235,7 +233,7 @@ def gapped(problem: FreedProblem) -> FreedProblem:
     return FreedProblem.of(FLOW_FORM, replace(log, gaps=np.array([[18.0, 24.0, 1e9], [300.0, 340.0, 1e12]])))
 
 
-def test_across_gaps_what_is_run_side_by_side_is_what_is_run_one_by_one(gapped: FreedProblem) -> None:
+def test_runs_side_by_side_across_gaps_equal_single_runs(gapped: FreedProblem) -> None:
     values = {**vars(flow_parameters(HEALTHY)), "case_leakage": 1e-13, "speed_lead": 1e-5, "makeup_opening": 1e3}
     theta, rng = gapped.model.theta(values), np.random.default_rng(4)
     rows = [gapped.log.parameters * rng.uniform(0.95, 1.05, len(gapped.log.parameters)) for _ in range(LANES + 2)]
@@ -284,9 +282,7 @@ def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return asked
 
 
-def test_drives_that_are_drawn_take_no_kernel_beside_that_of_the_slopes(
-    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_disturbed_drives_use_the_kernel_of_the_slopes(problem: FreedProblem, monkeypatch: pytest.MonkeyPatch) -> None:
     log = replace(problem.log, drives=problem.log.drives[:, :2], parameters=parameter_row(flow_parameters(HEALTHY)))
     held = FreedProblem.of(HELD_FLOW_FORM, log)
     values = {**vars(flow_parameters(HEALTHY)), "case_leakage": 1e-13, "speed_lead": 1e-5, "makeup_opening": 1e3}
@@ -302,7 +298,7 @@ def test_drives_that_are_drawn_take_no_kernel_beside_that_of_the_slopes(
         np.testing.assert_allclose(found[..., place], one, rtol=1e-7, atol=1e-7)
 
 
-def test_slopes_beside_known_ones_take_the_kernel_that_all_slopes_take(
+def test_slopes_beside_known_ones_use_the_kernel_of_all_slopes(
     problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (theta,) = points(problem, 1)
@@ -318,7 +314,7 @@ def test_slopes_beside_known_ones_take_the_kernel_that_all_slopes_take(
     assert beside.gradient == pytest.approx(whole.gradient, rel=1e-9, abs=1e-9 * np.max(np.abs(whole.gradient)))
 
 
-def test_costs_of_a_search_may_be_taken_by_its_own_kernel(
+def test_costs_can_be_computed_by_the_kernel_of_a_search(
     problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     thetas, own = [*points(problem, LANES + 3)], problem.on(problem.log)
@@ -328,7 +324,7 @@ def test_costs_of_a_search_may_be_taken_by_its_own_kernel(
     np.testing.assert_array_equal(found, problem.costs(thetas))
 
 
-def test_costs_of_many_points_are_summed_a_kernel_at_a_time(
+def test_costs_of_many_points_are_summed_in_batches_of_one_kernel(
     problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     widths, summed = [], freed_problem._misfits
@@ -337,7 +333,7 @@ def test_costs_of_many_points_are_summed_a_kernel_at_a_time(
     assert widths == 3 * [LANES]
 
 
-def test_lines_of_a_model_are_written_once_for_all_widths(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_is_traced_once_for_kernels_of_all_widths(monkeypatch: pytest.MonkeyPatch) -> None:
     traced: list[GreyBoxModel] = []
     step = side_by_side.model_step
     monkeypatch.setattr(side_by_side, "model_step", lambda model, *given: traced.append(model) or step(model, *given))

@@ -13,22 +13,22 @@ SPREAD = np.array([[4.0, 1.2], [1.2, 1.0]])
 
 
 @pytest.mark.parametrize(("low", "point"), [(-1.0, 0.0), (1.0, 1.0), (-0.5, 0.7)])
-def test_mean_square_about_a_point_is_that_of_what_is_drawn_above_another_one(low: float, point: float) -> None:
+def test_the_mean_square_of_a_truncated_normal_is_that_of_draws(low: float, point: float) -> None:
     drawn = np.random.default_rng(1).standard_normal(400_000)
     assert square_about(low, point) == pytest.approx(np.mean((drawn[drawn > low] - point) ** 2), rel=0.02)
 
 
-def test_far_beyond_a_bound_nothing_is_open_on_either_side() -> None:
+def test_the_mean_square_far_beyond_a_bound_follows_its_asymptote() -> None:
     assert square_about(7.99, 7.99) == pytest.approx(square_about(8.01, 8.01), rel=0.1)
     assert square_about(60.0, 60.0) == pytest.approx(2.0 / 60.0**2)
 
 
-def test_far_from_nothing_a_covariance_stays() -> None:
+def test_a_covariance_far_from_the_bound_is_unchanged() -> None:
     assert not_negative(SPREAD, {}) == pytest.approx(SPREAD)
     assert not_negative(SPREAD, {1: (9.0, 9.0)}) == pytest.approx(SPREAD)
 
 
-def test_covariance_at_a_bound_is_that_of_what_is_drawn_above_it() -> None:
+def test_the_covariance_at_a_bound_is_that_of_draws_above_it() -> None:
     wanted = np.array([0.3, -0.7])
     drawn = np.random.default_rng(2).multivariate_normal(wanted, SPREAD, 400_000)
     kept = drawn[drawn[:, 1] > 0.0]
@@ -40,18 +40,18 @@ def test_covariance_at_a_bound_is_that_of_what_is_drawn_above_it() -> None:
 
 
 @pytest.mark.parametrize("beyond", [1e-12, 0.05])
-def test_unknowns_that_rounding_correlates_beyond_one_keep_a_variance(beyond: float) -> None:
+def test_a_correlation_that_rounding_puts_beyond_one_leaves_variances_positive(beyond: float) -> None:
     alike = np.array([[4.0, 2.0 + 2.0 * beyond], [2.0 + 2.0 * beyond, 1.0]])
     told = not_negative(alike, {1: (0.0, -1e7)})
     assert np.all(np.diag(told) > 0.0)
     assert told[0, 0] == pytest.approx(4.0 * told[1, 1], abs=1e-12)
 
 
-def test_an_unknown_that_is_open_beyond_measure_is_left_alone() -> None:
+def test_an_undetermined_unknown_keeps_its_infinite_variance() -> None:
     assert np.isinf(not_negative(np.diag([1.0, inf]), {1: (0.0, 0.0)})[1, 1])
 
 
-def test_a_motor_that_seems_to_lag_widens_no_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_apparent_lag_of_the_motor_does_not_widen_the_interval(monkeypatch: pytest.MonkeyPatch) -> None:
     record = log(1.0, p=PAPER)
     speed = record[SPEED]
     early = record.replace(**{SPEED: 0.94 * speed + 0.06 * np.append(speed[1:], speed[-1:])})

@@ -26,7 +26,7 @@ def shown(cosine: float, std: float, offset: float = 0.0) -> dict[int, ShownRipp
     return {11: ShownRipple(Ripple(11, cosine, 0.0), gain, std, np.zeros(2), offset, 0.0, power, ANSWERS)}
 
 
-def test_teeth_that_a_log_tells_move_the_unknowns_as_if_they_were_fitted() -> None:
+def test_a_ripple_that_the_log_determines_shifts_the_unknowns_as_if_it_were_fitted() -> None:
     moved, variance = small_pump_ripple(shown(0.02, 1e-3), NAMES)
     assert moved["bulk_modulus"] == pytest.approx(-2.0 * 0.02, rel=0.01)
     assert moved["leakage_coefficient"] == pytest.approx(0.0, abs=1e-12)
@@ -34,32 +34,32 @@ def test_teeth_that_a_log_tells_move_the_unknowns_as_if_they_were_fitted() -> No
     assert variance["leakage_coefficient"] == pytest.approx(1e-6, rel=0.02)
 
 
-def test_teeth_that_a_log_does_not_show_move_next_to_nothing() -> None:
+def test_an_insignificant_ripple_hardly_shifts_the_unknowns() -> None:
     moved, variance = small_pump_ripple(shown(1e-3, 1e-3), NAMES)
     assert abs(moved["bulk_modulus"]) < 1e-5
     assert variance["bulk_modulus"] < (2.0 * 1e-4) ** 2
 
 
-def test_teeth_that_a_log_cannot_tell_add_what_they_may_be() -> None:
+def test_a_ripple_that_the_log_does_not_determine_adds_less_than_its_prior_variance() -> None:
     moved, variance = small_pump_ripple(shown(0.5, 1.0), NAMES)
     assert abs(moved["bulk_modulus"]) < 1e-3
     assert 0.0 < variance["bulk_modulus"] < (2.0 * SMALL_STD) ** 2
 
 
-def test_teeth_that_need_an_offset_of_speed_move_nothing() -> None:
+def test_a_ripple_that_needs_a_speed_offset_causes_no_shift() -> None:
     moved, variance = small_pump_ripple(shown(0.02, 1e-3, offset=0.3), NAMES)
     assert moved == dict.fromkeys(NAMES, 0.0)
     assert variance == dict.fromkeys(NAMES, 0.0)
 
 
-def test_what_is_told_is_moved_and_wider_and_the_rest_stays() -> None:
+def test_bulk_modulus_is_shifted_and_widened_and_the_motor_lead_is_not() -> None:
     found = {"bulk_modulus": (2e8, 3e5), "speed_lead": (1e-5, 1e-6)}
     told = with_shifts(found, ({"bulk_modulus": 0.01, "speed_lead": 1.0}, {"bulk_modulus": 4e-6, "speed_lead": 1}))
     assert told["bulk_modulus"] == pytest.approx((2e8 * np.exp(0.01), 5e5))
     assert told["speed_lead"] == found["speed_lead"]
 
 
-def test_a_move_beyond_what_is_linear_makes_a_number_uncertain_and_no_other_one() -> None:
+def test_a_shift_beyond_the_linear_range_widens_the_deviation_and_keeps_the_value() -> None:
     found = with_shifts({"bulk_modulus": (2e8, 0.0)}, ({"bulk_modulus": 800.0}, {"bulk_modulus": 4.0}))
     assert found == {"bulk_modulus": (2e8, 4e8)}
 
@@ -76,7 +76,7 @@ def logged(ripple: float) -> Record:
     return Record(5e-4, {name: log[name].to_numpy() for name in PLAIN})
 
 
-def test_bulk_modulus_with_small_teeth_is_what_it_is_without(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_small_ripple_does_not_bias_bulk_modulus(monkeypatch: pytest.MonkeyPatch) -> None:
     ripple = 0.8 * LEAST_TEETH
     (value, std), (found, _) = (fit_flow(logged(one), PAPER, 2e8).parameters["bulk_modulus"] for one in (0.0, ripple))
     monkeypatch.setattr("estimation.fits.flow.fit.with_shifts", lambda given, *_: given)
@@ -85,7 +85,7 @@ def test_bulk_modulus_with_small_teeth_is_what_it_is_without(monkeypatch: pytest
     assert abs(found - value) < 0.5 * std < abs(left - value)
 
 
-def test_a_log_that_holds_teeth_or_has_gaps_is_asked_for_none() -> None:
+def test_ripple_is_not_tested_in_a_log_with_gaps_in_speed() -> None:
     sound, variances = without_strays(logged(0.0))
     log = flow_log(sound, PAPER, {}, variances)
     assert asked_for_ripple(log).counts

@@ -34,7 +34,7 @@ def steps_taken(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return taken
 
 
-def test_few_samples_need_short_steps_and_the_misfit_stays(log: GreyBoxLog) -> None:
+def test_short_steps_at_few_samples_suffice_for_the_misfit(log: GreyBoxLog) -> None:
     best = min(balanced(log, HEALTHY, STARTS), key=lambda fit: fit.cost)
     problem = FreedProblem.of(best.model, log)
     steps = sparing_steps(problem, best.theta)
@@ -50,7 +50,7 @@ def test_few_samples_need_short_steps_and_the_misfit_stays(log: GreyBoxLog) -> N
     assert moved(spared.gradient) < LEAST_GAIN < moved(long.gradient)
 
 
-def test_a_fit_that_is_told_ends_with_all_short_steps(
+def test_a_search_with_fewer_steps_reaches_the_fit_of_one_with_all_short_steps(
     log: GreyBoxLog, steps_taken: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     quick = balanced(log, HEALTHY, STARTS)
@@ -66,7 +66,7 @@ def test_a_fit_that_is_told_ends_with_all_short_steps(
     assert told.std["bulk_modulus"] == pytest.approx(std, rel=0.01)
 
 
-def test_nothing_is_spared_across_gaps_and_with_one_step_a_sample(log: GreyBoxLog) -> None:
+def test_no_steps_are_spared_across_gaps_or_with_one_step_per_sample(log: GreyBoxLog) -> None:
     fit = balanced(log, HEALTHY, STARTS)[0]
     for other in (log.coarsened(), replace(log, gaps=np.array([[10.0, 12.0, 1e6]]))):
         problem = FreedProblem.of(fit.model, other)

@@ -17,7 +17,7 @@ def test_runs_are_counted_in_steps_of_the_model() -> None:
     assert work.done == 17 * 40
 
 
-def test_what_would_be_more_than_all_that_is_allowed_is_not_begun() -> None:
+def test_a_run_that_would_exceed_the_work_limit_is_not_begun() -> None:
     work = Work(most=100)
     with work.counted():
         spend(LOG, 2)
@@ -26,7 +26,7 @@ def test_what_would_be_more_than_all_that_is_allowed_is_not_begun() -> None:
     assert work.done == 80
 
 
-def test_one_that_counts_again_goes_on_from_what_was_done() -> None:
+def test_a_second_count_continues_from_the_work_that_was_done() -> None:
     work = Work(most=100)
     with work.counted():
         spend(LOG, 2)

@@ -42,14 +42,14 @@ def seen(record: Record) -> GreyBoxLog:
     return widened(flow_log(sound, PAPER, {}, variances), PAPER)
 
 
-def test_lost_flow_tells_when_air_gets_in() -> None:
+def test_lost_flow_shows_when_air_enters() -> None:
     entry = likeliest_entry(seen(logged(0.03)))
     assert entry.share > AIRED
     assert entry.at == pytest.approx(0.45, abs=0.06)  # the middle of an entry that lasts half a second
 
 
 @pytest.mark.parametrize("course", ["none", "throughout"])
-def test_oil_that_stays_as_it_is_shows_none(course: str) -> None:
+def test_oil_with_constant_air_content_shows_no_air_entry(course: str) -> None:
     log = logged(0.0) if course == "none" else logged(0.02, at=-1.0)
     assert likeliest_entry(seen(log)).share < AIRED
 
@@ -60,7 +60,7 @@ def test_a_dead_pressure_sensor_shows_no_change() -> None:
     assert likeliest_entry(dead) == likeliest_step(dead) == NO_CHANGE
 
 
-def test_air_that_lost_flow_shows_is_tried_first() -> None:
+def test_air_entry_is_tested_first_if_lost_flow_shows_it() -> None:
     log = seen(logged(0.03))
     likely, others, _ = by_predicted_gain(log, (), {**usual_values(log), "case_leakage": 1e-13}, HYPOTHESES)
     assert likely[0] is AIR_MIDWAY
@@ -68,7 +68,7 @@ def test_air_that_lost_flow_shows_is_tried_first() -> None:
 
 
 @pytest.mark.parametrize(("at", "lasting"), thinned([(2.0, 0.5), (3.0, 0.1)], [(2.0, 0.5)]))
-def test_air_that_gets_in_is_named_with_its_time_and_bulk_modulus_is_right(at: float, lasting: float) -> None:
+def test_air_entry_is_identified_with_its_time_and_bulk_modulus_is_right(at: float, lasting: float) -> None:
     clean = clean_log(logged(0.03, at=at, lasting=lasting), PAPER)
     fit = fit_flow(clean.record, PAPER, PAPER.bulk_modulus, {}, clean.variances)
     assert fit.explanation is not None

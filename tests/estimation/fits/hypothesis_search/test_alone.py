@@ -39,7 +39,7 @@ def reached(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("left", [1.5, 5.0])
-def test_a_start_that_leads_nowhere_is_not_used_again_where_little_is_left(
+def test_poor_and_duplicate_starts_are_dropped_if_the_misfit_is_small(
     left: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[list[Any]] = []
@@ -64,7 +64,7 @@ def test_a_start_that_leads_nowhere_is_not_used_again_where_little_is_left(
 @pytest.mark.parametrize(
     ("plain", "left", "asked"), [(1000.0, 1.1, ["far"]), (1000.0, 1.04, []), (805.0, 1.04, ["far", "some"])]
 )
-def test_where_a_cause_explains_a_log_but_leaves_more_than_noise_what_slopes_do_not_see_is_tried_too(
+def test_more_hypotheses_are_tested_if_an_explanation_leaves_more_than_noise_or_gains_little(
     plain: float, left: float, asked: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All are tried if it gains too little to be accepted: a worn pump that gained 3 hid a speed that gains 34."""
@@ -109,7 +109,7 @@ def pairing(monkeypatch: pytest.MonkeyPatch) -> Pairing:
     return paired
 
 
-def test_a_pair_beside_a_rival_counts_only_below_what_is_known(pairing: Pairing) -> None:
+def test_a_pair_beside_a_rival_must_gain_over_the_best_known_pair(pairing: Pairing) -> None:
     useful: list[float] = []
 
     def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Trial]:
@@ -124,7 +124,7 @@ def test_a_pair_beside_a_rival_counts_only_below_what_is_known(pairing: Pairing)
     assert useful == [1461.0 - WORTH, 1459.0 - WORTH]
 
 
-def test_a_speed_that_is_late_and_one_that_is_early_are_one_where_they_came_to_one_place() -> None:
+def test_a_late_and_an_early_speed_with_the_same_optimum_count_as_one() -> None:
     late, early = (Hypothesis(name, ("speed_lag",)) for name in ("speed_late", "speed_early"))
     one = tried(800.0, together=(late,))
     again = replace(tried(800.0, 0.1, together=(early,)), delays={"motor_speed_rad_s": 0.0})
@@ -136,7 +136,7 @@ def test_a_speed_that_is_late_and_one_that_is_early_are_one_where_they_came_to_o
 @pytest.mark.parametrize(
     ("one", "gain", "alone"), [(DELIVERY, 49.0, True), (DELIVERY, 51.0, False), (OFFSET, 51.0, True)]
 )
-def test_a_pump_that_delivers_less_beside_another_volume_may_be_a_wrong_area(
+def test_a_worn_pump_does_not_suffice_by_itself_if_another_volume_would_gain_much(
     one: Any, gain: float, alone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(explain, "is_explained", lambda *_: True)

@@ -15,9 +15,7 @@ from tests.estimation.fits.short_logs import wide
 
 
 @pytest.mark.parametrize(("passed_on", "left", "void"), [(1.0, 0.9, True), (1.0, 1.1, False), (0.0, 0.9, False)])
-def test_what_leaves_far_less_than_noise_of_position_is_no_explanation(
-    passed_on: float, left: float, *, void: bool
-) -> None:
+def test_residuals_far_below_position_noise_are_no_explanation(passed_on: float, left: float, *, void: bool) -> None:
     """In a drone's log, a late speed and air left 2 % of the noise; the encoder's zero left all of it."""
     log = wide()
     log = replace(log, noise=tuple(replace(one, passed_on=passed_on) for one in log.noise))

@@ -47,13 +47,13 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         (tried(90.0, DELIVERY), False),  # delivery was already sought
     ],
 )
-def test_another_delivery_is_followed_where_nothing_explains_a_log(
+def test_another_delivery_is_searched_further_only_if_nothing_explains_the_log(
     first: Trial, sought: bool, asked: list[Any]
 ) -> None:
     assert bool(delivery_followed(LOG, [first], SPARED, explains)) == bool(asked) == sought
 
 
-def test_a_zero_is_sought_together_with_what_is_likeliest_alone_unless_that_explains_the_log(asked: list[Any]) -> None:
+def test_an_encoder_zero_is_tested_with_the_likeliest_hypothesis_unless_that_explains_the_log(asked: list[Any]) -> None:
     (both,) = with_zero(LOG, tried(90.0, OFFSET, delays={"position_m": 1e-3}), SPARED, explains)
     assert both.together == (OFFSET, ENCODER_ZERO)
     assert both.delays == {"position_m": 1e-3}
@@ -63,7 +63,7 @@ def test_a_zero_is_sought_together_with_what_is_likeliest_alone_unless_that_expl
     assert len(asked) == 2
 
 
-def test_a_load_a_pump_and_chambers_are_sought_together_only_where_nothing_explains_a_log_and_told_only_if_they_do(
+def test_delivery_volume_and_load_are_tested_together_only_if_nothing_explains_the_log(
     asked: list[Any],
 ) -> None:
     assert rig_and_load(LOG, BEGUN, tried(40.0, OFFSET), SPARED, explains) == asked == []
@@ -82,7 +82,7 @@ def test_a_load_a_pump_and_chambers_are_sought_together_only_where_nothing_expla
         (tried(45.0, OFFSET, DELIVERY), 27.0, -0.08, False),
     ],
 )
-def test_another_delivery_is_sought_beside_an_explanation_where_slopes_promise_it_much(
+def test_another_delivery_is_tested_beside_an_explanation_if_its_predicted_gain_is_large(
     first: Trial, gain: float, size: float, sought: bool, asked: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(commonly_hidden, "delivery_beside", lambda *_: PredictedGain(gain, size, 0.01))

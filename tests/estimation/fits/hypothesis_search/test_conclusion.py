@@ -34,7 +34,7 @@ def told(monkeypatch: pytest.MonkeyPatch, volume: float, behind: float) -> Expla
     return conclude(LOG, EhaParameters(), sets, lambda _: True)
 
 
-def test_a_volume_that_the_rig_file_hardly_allows_yields_to_what_explains_the_log_alike(
+def test_a_volume_that_the_rig_file_hardly_allows_yields_to_an_equally_good_explanation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """`position_zero_at_stop`, validation 23751: chambers of 181 % were likelier than the zero by 1.5."""
@@ -56,7 +56,7 @@ def test_a_set_is_no_rival_of_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     assert conclude(LOG, EhaParameters(), alike, lambda _: True).rivals == ()
 
 
-def test_the_file_s_own_uncertainty_says_how_likely_a_volume_is() -> None:
+def test_the_prior_of_a_volume_follows_the_uncertainty_in_the_rig_file() -> None:
     off = tried(VOLUME, 100.0, 2e8, float(np.exp(0.3)))
     assert prior_weight(LOG, off) == pytest.approx(np.exp(-2.0))
     assert prior_weight(CERTAIN, off) == 1.0

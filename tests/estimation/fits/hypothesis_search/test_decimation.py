@@ -26,7 +26,7 @@ def seen() -> GreyBoxLog:
 
 
 @pytest.mark.parametrize("every", [2, 4])
-def test_what_is_pumped_and_swept_stays(every: int) -> None:
+def test_decimation_keeps_the_pumped_and_swept_volumes(every: int) -> None:
     whole = seen()
     few = decimated(whole, every)
     assert few.sample_time == pytest.approx(every * whole.sample_time)
@@ -42,7 +42,7 @@ def test_what_is_pumped_and_swept_stays(every: int) -> None:
 
 
 @pytest.mark.parametrize(("apart", "first", "every"), [(5, 3, 5), (6, 1, 6), (10, 0, 5), (3, 2, 3)])
-def test_a_pressure_that_came_slower_counts_as_often_as_it_was_read(apart: int, first: int, every: int) -> None:
+def test_each_sample_of_a_slower_pressure_channel_counts_once(apart: int, first: int, every: int) -> None:
     """Of a pressure that was read in every sixth sample, no sample was left, or each counted four times."""
     whole = seen()
     held = np.full_like(whole.measured, np.nan)
@@ -55,7 +55,7 @@ def test_a_pressure_that_came_slower_counts_as_often_as_it_was_read(apart: int, 
     assert few.drives[0, 1] == whole.drives[first % every, 1]
 
 
-def test_a_pressure_at_no_even_distance_leaves_a_log_as_it_is() -> None:
+def test_a_log_with_unevenly_spaced_pressure_is_not_decimated() -> None:
     whole = seen()
     uneven = np.full_like(whole.measured, np.nan)
     rows = np.cumsum(np.random.default_rng(2).integers(3, 8, 400))
@@ -64,7 +64,7 @@ def test_a_pressure_at_no_even_distance_leaves_a_log_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("every", [2, 4])
-def test_what_a_gap_in_the_speed_leaves_open_stays(every: int) -> None:
+def test_decimation_keeps_the_variance_of_gaps_in_speed(every: int) -> None:
     whole = replace(seen(), gaps=np.array([[9.0, 20.0, 1e9], [401.0, 401.0, 2e9]]))
     first, last, variance = decimated(whole, every).gaps.T
     assert first.tolist() == [9 // every, 401 // every]
@@ -72,7 +72,7 @@ def test_what_a_gap_in_the_speed_leaves_open_stays(every: int) -> None:
     assert variance * (last - first + 1.0) == pytest.approx([12e9, 2e9])
 
 
-def test_a_cost_stays_what_it_was_where_far_more_than_noise_is_left() -> None:
+def test_decimation_keeps_the_cost_if_residuals_far_exceed_noise() -> None:
     whole = seen()
     costs = []
     for every in (1, 2, 4):
@@ -84,7 +84,7 @@ def test_a_cost_stays_what_it_was_where_far_more_than_noise_is_left() -> None:
     assert cost_over_noise(whole, costs[0]) > 10.0
 
 
-def test_samples_are_spared_where_much_is_left_of_a_long_log() -> None:
+def test_a_long_log_is_decimated_more_the_larger_its_residuals() -> None:
     long: Any = replace(seen(), drives=np.zeros((FEW, 1)))
     assert [decimation_for(long, left) for left in (1.5, 5.0, 50.0)] == [1, 2, 4]
     assert decimation_for(replace(long, sample_time=2e-4), 50.0) == 20
@@ -92,7 +92,7 @@ def test_samples_are_spared_where_much_is_left_of_a_long_log() -> None:
     assert decimation_for(replace(long, drives=long.drives[1:]), 50.0) == 1
 
 
-def test_the_best_of_few_samples_is_sought_anew_with_all(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_best_set_on_a_decimated_log_is_searched_again_with_all_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     place = Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1))
     tried = Trial((), place, flow_starts(PAPER, 2e8)[0], {}, {})
     begun = replace(tried, point=replace(place, cost=80.0))
@@ -116,7 +116,7 @@ def test_the_best_of_few_samples_is_sought_anew_with_all(monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize(("ended", "anew"), [(1.12, False), (1.3, True)])
-def test_a_set_that_leaves_more_than_on_few_samples_is_sought_anew(
+def test_a_set_with_larger_residuals_on_all_samples_is_searched_again(
     monkeypatch: pytest.MonkeyPatch, ended: float, anew: bool
 ) -> None:
     tried = Trial((), Point(np.zeros(1), 1.1, np.zeros(1), np.eye(1)), flow_starts(PAPER, 2e8)[0], {}, {})
@@ -132,7 +132,7 @@ def test_a_set_that_leaves_more_than_on_few_samples_is_sought_anew(
     assert (found.cost, bool(asked)) == (ended, anew)  # no start leads elsewhere
 
 
-def test_what_leaves_far_too_much_is_not_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_set_with_far_too_large_residuals_is_not_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     finished: list[float] = []
     monkeypatch.setattr(ranking, "search_coarsely", lambda _, one, *__: one)
     monkeypatch.setattr(final_fits, "FEW", 0)

@@ -22,7 +22,7 @@ def kept(record: Record, p: EhaParameters, every: int) -> int:
     return decimation_limit(widened(flow_log(cleaned, p, {}, variances), p), flow_starts(p, p.bulk_modulus)[0], every)
 
 
-def test_steps_of_4_ms_stay_on_the_papers_rig_and_not_where_small_chambers_hold_stiff_oil() -> None:
+def test_steps_of_4_ms_are_allowed_on_the_papers_rig_and_not_in_small_stiff_chambers() -> None:
     assert kept(log(PAPER, 1.0, 1e-3, duration=1.0), PAPER, 4) == 4
     assert kept(log(STIFF, 1.0, 1e-3, duration=1.0), STIFF, 4) < 4
 
@@ -31,7 +31,7 @@ class AskedError(Exception):
     """Raised by a search that should not run."""
 
 
-def test_hypotheses_are_compared_by_steps_that_the_rig_allows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hypotheses_are_compared_on_a_log_decimated_as_far_as_the_rig_allows(monkeypatch: pytest.MonkeyPatch) -> None:
     record, variances = without_strays(log(STIFF, 1.0, 5e-4, duration=4.1))
     told = replace(STIFF, pump_displacement=1.05 * STIFF.pump_displacement)
     seen_by_form = flow_log(record, told, {}, variances)

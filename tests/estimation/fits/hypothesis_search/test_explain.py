@@ -47,17 +47,17 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
     return final_fits._led_on(problem, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
 
 
-def test_a_search_goes_on_while_it_gains_what_tells_hypotheses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_continues_while_it_gains_enough_to_distinguish_hypotheses(monkeypatch: pytest.MonkeyPatch) -> None:
     costs = [9.0 * CLOSE, 6.0 * CLOSE, 4.5 * CLOSE, 4.0 * CLOSE, 0.0]
     assert ended(costs, monkeypatch) == (4.0 * CLOSE, 4)
 
 
-def test_a_search_that_gains_nothing_keeps_what_it_had_and_is_not_endless(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_without_a_gain_keeps_its_result_and_its_rounds_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     assert ended([3.0 * CLOSE, 3.5 * CLOSE], monkeypatch) == (3.0 * CLOSE, 2)
     assert ended([-2.0 * CLOSE * i for i in range(ROUNDS + 3)], monkeypatch)[1] == ROUNDS
 
 
-def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_says(
+def test_the_most_promising_set_is_searched_even_if_all_of_its_starts_are_void(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def tried(cost: float) -> Any:
@@ -90,7 +90,7 @@ def test_a_relief_valve_set_above_the_rig_files_is_not_set_low() -> None:
     ("setting", "std", "left", "void"),
     [(2e6, 1e3, 1.0, False), (2e6, np.inf, 1.0, True), (4e6, 1e3, 1.0, True), (2e6, 1e3, 0.1, True)],
 )
-def test_what_is_set_above_the_rig_files_or_has_no_interval_or_leaves_too_little_is_void(
+def test_a_low_relief_setting_is_void_if_too_high_undetermined_or_with_too_small_residuals(
     setting: float, std: float, left: float, void: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
@@ -111,7 +111,7 @@ def test_what_is_set_above_the_rig_files_or_has_no_interval_or_leaves_too_little
     assert found.void is void
 
 
-def test_starts_are_dropped_from_which_no_hypothesis_that_came_near_ended_near_its_best() -> None:
+def test_starts_from_which_no_promising_hypothesis_ended_near_its_best_are_dropped() -> None:
     def each(*costs: float) -> Any:
         return [SimpleNamespace(cost=cost) for cost in costs]
 
@@ -123,7 +123,7 @@ def test_starts_are_dropped_from_which_no_hypothesis_that_came_near_ended_near_i
 
 
 @pytest.mark.parametrize(("explains", "asked"), [(True, "likely far"), (False, "likely far hidden")])
-def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_not_explain_a_log(
+def test_all_other_pairs_are_tested_if_the_likely_ones_do_not_explain_the_log(
     explains: bool, asked: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def hypothesis(name: str, **more: Any) -> Any:
@@ -179,7 +179,7 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
         (105.0, 60.0, 2.0, 100.0, "", ("relief",), 0),  # the best alone explains next to nothing
     ],
 )
-def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
+def test_pairs_are_also_tested_with_a_nearly_equally_good_hypothesis(
     second: float,
     least: float,
     chi: float,
@@ -229,7 +229,7 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     ("share", "said"),
     [(0.5, True), (0.59, True), (0.61, False), (0.8, False), (1.0, False), (1.24, False), (1.26, True), (2.0, True)],
 )
-def test_a_flow_that_no_worn_pump_and_no_rounded_rig_file_gives_is_objected_to(share: float, said: bool) -> None:
+def test_a_delivery_beyond_wear_and_rounding_of_the_rig_file_is_objected_to(share: float, said: bool) -> None:
     displacement = share * HEALTHY.pump_displacement
     found: Any = SimpleNamespace(values={"pump_displacement": (displacement, 0.01 * displacement)})
     objections = contradicted(found, HEALTHY)
@@ -238,7 +238,7 @@ def test_a_flow_that_no_worn_pump_and_no_rounded_rig_file_gives_is_objected_to(s
     assert contradicted(other, HEALTHY) == ()
 
 
-def test_a_set_of_fewer_hypotheses_stands_in_place_of_all_that_hold_it_and_more() -> None:
+def test_a_smaller_set_of_hypotheses_replaces_all_larger_sets_that_contain_it() -> None:
     """Another pair that contained it cost less, by less than a hypothesis must gain, and was reported instead."""
 
     def ended(cost: float, *together: Hypothesis) -> Trial:

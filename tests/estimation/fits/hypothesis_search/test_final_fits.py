@@ -17,7 +17,7 @@ from tests.estimation.fits.short_logs import made_fit
 
 
 @pytest.mark.parametrize(("by_mass", "order"), [(True, [1.0, 0.0]), (False, [0.0, 1.0])])
-def test_the_balance_in_which_a_set_was_sought_comes_first_and_the_other_must_come_as_low(
+def test_a_set_is_fitted_first_by_the_balance_of_its_search_and_the_other_must_be_as_good(
     by_mass: bool, order: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     led: list[tuple[float, float]] = []
@@ -43,7 +43,7 @@ def test_the_balance_in_which_a_set_was_sought_comes_first_and_the_other_must_co
 
 
 @pytest.mark.parametrize(("cost", "searches"), [(0.9, 2), (1.1, 1)])
-def test_what_stays_far_behind_is_given_up(cost: float, searches: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_set_far_behind_the_best_is_given_up(cost: float, searches: int, monkeypatch: pytest.MonkeyPatch) -> None:
     useful = 100.0 * CLOSE
     costs = [cost * FAR_BEHIND * useful] * 2
 
@@ -105,7 +105,7 @@ def test_valves_that_a_set_frees_itself_are_not_freed_again(monkeypatch: pytest.
         (80.0, 95.0, False),  # the valve is stuck
     ],
 )
-def test_a_hypothesis_that_ended_at_its_absence_is_not_told_beside_another(
+def test_a_hypothesis_whose_effect_vanished_is_dropped_from_a_pair(
     share: float, cost: float, alone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In oil with air, a sound make-up valve was said to be stuck shut."""

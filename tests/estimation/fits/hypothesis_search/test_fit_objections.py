@@ -14,7 +14,7 @@ from estimation.notes import EstimateCode
     ("correlation", "chi_square", "noisy", "objected"),
     [(-0.47, 1.15, True, False), (-0.47, 1.15, False, True), (-0.2, 0.9, False, False), (0.47, 1.15, True, True)],
 )
-def test_an_encoders_noise_that_leaks_off_alternates_and_objects_to_nothing(
+def test_negative_correlation_due_to_leaking_encoder_noise_is_no_objection(
     correlation: float, chi_square: float, noisy: bool, objected: bool
 ) -> None:
     """A leaky single rod was refused for -0.47, which remains in its log with the true values too."""
@@ -26,7 +26,7 @@ def test_an_encoders_noise_that_leaks_off_alternates_and_objects_to_nothing(
 
 
 @pytest.mark.parametrize(("chi_square", "gain", "named"), [(28.0, 660.0, False), (1.7, 2270.0, True), (1.0, 9.0, True)])
-def test_a_play_is_named_beside_a_misfit_only_where_it_is_much_of_it(
+def test_a_play_is_reported_beside_a_misfit_only_if_it_explains_much_of_it(
     chi_square: float, gain: float, named: bool
 ) -> None:
     """A pressure drop in a hose left 28 times the noise; a play of 30 um that is not there explained little of it."""

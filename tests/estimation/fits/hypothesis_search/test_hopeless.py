@@ -10,7 +10,7 @@ from estimation.fits.hypothesis_search import explain
 from tests.estimation.fits.short_logs import PAPER, PRESSURE, log, made_fit
 
 
-def test_noise_that_varies_is_asked_for_no_pair(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_pairs_are_tested_on_a_log_with_varying_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: object) -> None:
         raise AssertionError("no two explain what none alone takes any of")
 
@@ -22,7 +22,9 @@ def test_noise_that_varies_is_asked_for_no_pair(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize(("chi", "cost"), [(2.0, 9_950.0), (1.01, 9_990.0), (0.9, 9_990.0)])
-def test_pairs_are_tried_where_the_best_of_all_takes_a_hundredth_of_what_is_left(chi: float, cost: float) -> None:
+def test_pairs_are_tested_only_if_the_best_hypothesis_removes_a_hundredth_of_the_misfit(
+    chi: float, cost: float
+) -> None:
     plain = made_fit(1e4, 2e8, 1e5, chi=chi)
     assert hopeless_cost(plain, HYPOTHESES) == pytest.approx(cost)
     assert hopeless_cost(plain, HYPOTHESES[:3]) == np.inf  # the other hypotheses are only tried in pairs

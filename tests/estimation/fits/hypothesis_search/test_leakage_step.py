@@ -46,7 +46,7 @@ def seen(record: Record) -> GreyBoxLog:
     return widened(flow_log(sound, HEALTHY, {}, variances), HEALTHY)
 
 
-def test_lost_flow_tells_when_leakage_steps_and_by_how_much() -> None:
+def test_lost_flow_shows_the_time_and_size_of_a_leakage_step() -> None:
     step = likeliest_step(seen(stepping(6.0)))
     assert step.share > STEPPED
     assert step.at == pytest.approx(0.4, abs=0.01)
@@ -54,7 +54,7 @@ def test_lost_flow_tells_when_leakage_steps_and_by_how_much() -> None:
     assert step.after == pytest.approx(6.0 * HEALTHY.leakage_coefficient, rel=0.1)
 
 
-def test_a_seal_that_was_tight_is_found_where_lost_flow_says_that_it_leaked_less_than_nothing() -> None:
+def test_apparently_negative_leakage_before_a_step_counts_as_a_tight_seal() -> None:
     """Small rigs leak so little that noise makes leakage negative, and only times with positive leakage were tried."""
     log = seen(stepping(6.0, before=1e-3))
     parameters = log.parameters.copy()
@@ -65,7 +65,7 @@ def test_a_seal_that_was_tight_is_found_where_lost_flow_says_that_it_leaked_less
     assert step.before == 0.0
 
 
-def test_a_step_behind_a_hole_is_told_at_its_time_in_the_log() -> None:
+def test_a_gap_in_pressure_does_not_shift_the_time_of_a_leakage_step() -> None:
     """With three of ten pieces missing, it was reported at 0.2 instead of 0.4."""
     log = seen(stepping(6.0))
     measured = log.measured.copy()
@@ -73,11 +73,11 @@ def test_a_step_behind_a_hole_is_told_at_its_time_in_the_log() -> None:
     assert likeliest_step(replace(log, measured=measured)).at == pytest.approx(0.4, abs=0.02)
 
 
-def test_a_leakage_that_stays_is_no_step() -> None:
+def test_constant_leakage_shows_no_step() -> None:
     assert likeliest_step(seen(stepping(1.0))).share < STEPPED
 
 
-def test_a_seal_that_gives_way_is_named_and_bulk_modulus_is_right() -> None:
+def test_a_failing_seal_is_identified_and_bulk_modulus_is_right() -> None:
     clean = clean_log(stepping(6.0), HEALTHY)
     fit = fit_flow(clean.record, HEALTHY, HEALTHY.bulk_modulus, {}, clean.variances)
     assert fit.explanation is not None
@@ -91,7 +91,7 @@ def test_a_seal_that_gives_way_is_named_and_bulk_modulus_is_right() -> None:
     assert abs(value - HEALTHY.bulk_modulus) < 3.0 * std
 
 
-def test_drops_at_which_make_up_valves_open_leave_bulk_modulus_open_beside_a_step() -> None:
+def test_cracking_pressures_widen_the_interval_of_bulk_modulus_beside_a_leakage_step() -> None:
     """Held at their values in the plain form, they made intervals too narrow."""
     log = seen(stepping(6.0))
     values = {"leakage_before": 1.0 / 6.0 - 1.0, "step_at": 0.4, "step_width": 1e-3, **dict.fromkeys(CRACKS, 0.0)}
@@ -106,6 +106,6 @@ def test_drops_at_which_make_up_valves_open_leave_bulk_modulus_open_beside_a_ste
     assert stds[0] > 1.2 * stds[1]
 
 
-def test_a_step_leaves_what_comes_after_it_and_runs_evenly() -> None:
+def test_leakage_rises_linearly_over_the_step_to_its_final_value() -> None:
     elapsed = np.array([0.0, 0.3, 0.375, 0.4, 0.425, 0.5, 1.0])
     assert stepped_leakage(elapsed, -0.8, 0.4, 0.1) == pytest.approx([0.2, 0.2, 0.4, 0.6, 0.8, 1.0, 1.0])

@@ -44,11 +44,11 @@ LEAKED = SEEN.leakage * SEEN.pressure
     ],
     ids=lambda one: one.kind if isinstance(one, LossRegressor) else "",
 )
-def test_a_unit_of_each_loss_is_what_its_name_says(course: LossRegressor, expected: np.ndarray) -> None:
+def test_the_regressor_of_each_loss_has_the_course_of_its_cause(course: LossRegressor, expected: np.ndarray) -> None:
     assert SEEN.of(course) == pytest.approx(np.asarray(expected), rel=1e-9, abs=1e-18)
 
 
-def test_every_kind_is_tried_within_what_the_log_shows() -> None:
+def test_every_kind_of_loss_is_tried_within_the_range_of_the_log() -> None:
     tried = SEEN.tried()
     assert {one.kind for one in tried} == {BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR}
     assert all(0.0 <= one.at <= 0.03 for one in tried if one.kind == BORE)
@@ -56,17 +56,17 @@ def test_every_kind_is_tried_within_what_the_log_shows() -> None:
     assert all(np.any(SEEN.of(one) != 0.0) for one in tried)
 
 
-def test_a_piston_that_hardly_moves_shows_no_score() -> None:
+def test_no_scored_bore_is_tried_if_the_piston_hardly_moves() -> None:
     still = SEEN._replace(position=1e-4 * SEEN.position)
     assert all(one.kind != BORE for one in still.tried())
 
 
-def test_a_dead_pressure_and_a_motor_at_rest_tell_nothing_that_begins_at_a_share_of_them() -> None:
+def test_losses_with_a_threshold_are_not_tried_with_dead_pressure_and_a_motor_at_rest() -> None:
     still = SEEN._replace(speed=np.zeros(4), pressure=np.zeros(4), steady=np.zeros(4))
     assert not {FILLING, LIFTING} & {course.kind for course in still.tried()}
 
 
-def test_what_is_sought_of_a_course_is_moved_and_nothing_else() -> None:
+def test_each_kind_of_loss_varies_only_its_own_parameters() -> None:
     assert {
         kind: tuple(SEEN.moves(LossRegressor(kind, 1.0, 0.1)))
         for kind in (BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR)

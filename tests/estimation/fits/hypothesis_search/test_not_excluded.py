@@ -25,7 +25,9 @@ FELT, UNFELT = 900.0, np.inf
         ({}, []),
     ],
 )
-def test_one_valve_that_is_not_felt_beside_one_that_is(stds: dict[str, float], sides: list[str]) -> None:
+def test_a_make_up_valve_without_effect_is_reported_only_if_the_other_has_one(
+    stds: dict[str, float], sides: list[str]
+) -> None:
     fit = made_fit(100.0, 2e8, 1e5)
     said = unseen_valve_note(replace(fit, std={**fit.std, **stds}))
     assert [note.data["side"] for note in said] == sides
@@ -45,7 +47,7 @@ def test_one_valve_that_is_not_felt_beside_one_that_is(stds: dict[str, float], s
         (-0.029, 0.001, None),
     ],
 )
-def test_wear_is_open_where_two_deviations_below_what_is_likeliest_come_to_the_limit(
+def test_wear_is_possible_if_two_deviations_below_the_estimate_reach_the_limit(
     size: float, deviation: float, percent: float | None
 ) -> None:
     said = open_wear_note(PredictedGain(1.0, size, deviation))
@@ -53,7 +55,7 @@ def test_wear_is_open_where_two_deviations_below_what_is_likeliest_come_to_the_l
     assert open_wear_note(NO_GAIN) == ()
 
 
-def test_a_pump_delivers_no_less_than_what_leaks_would_take() -> None:
+def test_wear_explains_no_more_flow_than_the_losses_of_the_fit() -> None:
     """By slopes the pump of three sound logs was worn with 53 to 97 %: it would have had to leak backwards."""
     plain = seen(log(0.2))
     plain = replace(plain, drives=np.full_like(plain.drives, 100.0), measured=np.full_like(plain.measured, -5e5))

@@ -21,35 +21,35 @@ FOUND = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 3e7, "case_leak
 """Possible result of a plain fit [SI]."""
 
 
-def test_what_slopes_say_nothing_of_is_not_tried_first() -> None:
+def test_a_hypothesis_that_slopes_do_not_show_is_not_tried_first() -> None:
     likely, others, gains = by_predicted_gain(wide(), (), FOUND, [MAKEUP_BLOCKED, OFFSET])
     assert (likely, others) == ([OFFSET], [MAKEUP_BLOCKED])
     assert gains[OFFSET.name] == pytest.approx(predicted_gain_beside(wide().coarsened(), (), FOUND, OFFSET).gain)
 
 
-def test_a_hypothesis_that_slopes_say_nothing_of_is_tried_where_nothing_else_is_asked() -> None:
+def test_a_hypothesis_that_slopes_do_not_show_is_tried_first_if_there_is_no_other() -> None:
     """A stuck make-up valve beside an offset of speed: with no other to try first, the search ended in an error."""
     likely, others, _ = by_predicted_gain(wide(), (), FOUND, [MAKEUP_BLOCKED])
     assert (likely, others) == ([MAKEUP_BLOCKED], [])
 
 
-def test_behind_a_plain_form_that_explains_a_log_all_that_may_hide_is_tried_by_its_slopes() -> None:
+def test_slopes_show_every_hypothesis_that_may_hide_behind_a_plain_fit() -> None:
     assert not any(one.far for one in MAY_HIDE)
     assert MAKEUP_BLOCKED.name in [one.name for one in MAY_HIDE]
 
 
-def test_beside_nothing_a_hypothesis_promises_what_it_does_alone() -> None:
+def test_the_gain_beside_no_other_hypothesis_is_that_alone() -> None:
     alone = predicted_gain(seen(log(0.5), chamber_volume=0.1), PAPER, FOUND, OFFSET)
     assert predicted_gain_beside(wide(), (), FOUND, OFFSET) == pytest.approx(alone, rel=1e-6)
 
 
-def test_what_is_taken_already_leaves_less_to_tell() -> None:
+def test_delivery_is_less_certain_beside_a_pressure_offset() -> None:
     known = {**FOUND, "pressure_offset": 1e3}
     alone, beside = (predicted_gain_beside(wide(), taken, known, DELIVERY) for taken in ((), (OFFSET,)))
     assert beside.deviation > alone.deviation
 
 
-def test_what_is_promised_beside_air_is_promised_with_bubbles_as_they_were_found(
+def test_gains_beside_air_are_predicted_with_the_bubbles_of_the_fit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With isothermal bubbles beside a fit with others, a sound pump was worn at 99 %, by a gain that did not exist."""
@@ -66,7 +66,7 @@ def test_what_is_promised_beside_air_is_promised_with_bubbles_as_they_were_found
 
 
 @pytest.mark.parametrize(("by_mass", "freed_last"), [(True, (STIFFNESS,)), (False, ()), (False, (STIFFNESS, *CRACKS))])
-def test_what_another_delivery_promises_is_asked_where_the_fit_ended(
+def test_the_gain_of_another_delivery_is_predicted_with_the_form_of_the_fit(
     by_mass: bool, freed_last: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In the other balance a sound pump was predicted to gain 30,000, and without valve drops that were freed, 208."""
@@ -84,7 +84,7 @@ def test_what_another_delivery_promises_is_asked_where_the_fit_ended(
     assert asked == [(by_mass, freed_last)]
 
 
-def test_what_a_worn_pump_at_one_speed_promises_does_not_hang_on_the_step_of_its_slopes(
+def test_the_predicted_gain_of_a_worn_pump_at_one_speed_does_not_depend_on_the_slope_step(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Curvature in forward slopes by delivery and flow bias does not cancel, and it looked like information."""
@@ -94,7 +94,7 @@ def test_what_a_worn_pump_at_one_speed_promises_does_not_hang_on_the_step_of_its
     assert predicted_gain(worn, PAPER, lost_in_bias(), DELIVERY) == pytest.approx(fine, rel=0.02)
 
 
-def test_less_of_what_is_freed_is_promised_as_less() -> None:
+def test_the_predicted_size_has_the_sign_of_the_pressure_offset() -> None:
     pressure = log(0.5)["differential_pressure_pa"]
     low, high = (
         predicted_gain(seen(log(0.5).replace(differential_pressure_pa=pressure + off)), PAPER, FOUND, OFFSET)

@@ -73,7 +73,7 @@ def well(_: GreyBoxFit) -> bool:
     return True
 
 
-def test_teeth_are_not_taken_up_where_the_log_stays_unexplained() -> None:
+def test_ripple_is_included_only_if_it_explains_the_log() -> None:
     for explained, size in ((True, 0.1), (False, 0.1), (True, 0.01)):  # small ripple too, if it is needed
         fitted, _ = told(fit(500.0, shown(12, 200.0, size)), fit(300.0, shown(12, 0.0)))
         found = with_pump_ripple(PLAIN, fitted, lambda one, said=explained: said and one.cost == 300.0)
@@ -81,7 +81,7 @@ def test_teeth_are_not_taken_up_where_the_log_stays_unexplained() -> None:
         assert bool(found.left) is not explained
 
 
-def test_teeth_are_taken_up_and_corrected_until_nothing_is_left() -> None:
+def test_ripple_is_corrected_until_none_remains() -> None:
     rounds = [fit(500.0, shown(12, 200.0, 0.10)), fit(300.0, shown(12, 5.0, 0.02)), fit(290.0, shown(12, 0.1, 0.001))]
     fitted, asked = told(*rounds)
     found = with_pump_ripple(PLAIN, fitted, well)
@@ -101,7 +101,7 @@ def test_teeth_are_taken_up_and_corrected_until_nothing_is_left() -> None:
 
 @pytest.mark.parametrize(("chi", "hopeless"), [(2.0, False), (1.2, False), (3.0, True)])
 @pytest.mark.parametrize("by_offset", [True, False])
-def test_a_log_that_neither_teeth_nor_an_offset_can_explain_is_fitted_once(
+def test_a_log_that_neither_ripple_nor_an_offset_can_explain_is_fitted_once(
     chi: float, hopeless: bool, by_offset: bool
 ) -> None:
     # its cost of 1000 must fall by 500 at a residual of 2, and by 667 at 3; a predicted 60 may gain ten times that
@@ -115,7 +115,7 @@ def test_a_log_that_neither_teeth_nor_an_offset_can_explain_is_fitted_once(
     assert bool(found.left) is (hopeless and not by_offset)
 
 
-def test_corrections_end_after_so_many_rounds() -> None:
+def test_ripple_corrections_end_after_a_fixed_number_of_rounds() -> None:
     fitted, asked = told(fit(500.0, shown(12, 200.0)), *(fit(300.0, shown(12, SETTLED + 0.1, 0.01)) for _ in range(9)))
     with_pump_ripple(PLAIN, fitted, well)
     assert len(asked) == 1 + ROUNDS
@@ -137,7 +137,7 @@ def test_corrections_end_after_so_many_rounds() -> None:
         ([], False),
     ],
 )
-def test_teeth_are_asked_for_by_gain_and_size_where_no_other_count_does_as_well(
+def test_ripple_is_tested_by_gain_and_amplitude_if_no_other_tooth_count_does_as_well(
     teeth: list[ShownRipple], wanted: bool
 ) -> None:
     settled = [fit(100.0, *(shown(one.teeth.count, 0.0) for one in teeth)) for _ in range(2)]
@@ -147,7 +147,7 @@ def test_teeth_are_asked_for_by_gain_and_size_where_no_other_count_does_as_well(
     assert len(asked) == 1 + wanted
 
 
-def test_an_overtone_is_taken_up_with_its_teeth_where_it_gains_enough() -> None:
+def test_an_overtone_is_included_only_if_it_gains_enough() -> None:
     for gain, held in ((OVERTONE_WORTH + 0.1, (12, 24)), (OVERTONE_WORTH - 0.1, (12,))):
         rounds = fit(300.0, shown(12, 0.0), shown(24, gain, 0.05)), fit(290.0, shown(12, 0.0), shown(24, 0.0))
         found = with_pump_ripple(PLAIN, told(fit(500.0, shown(12, 200.0)), *rounds)[0], well)
@@ -158,7 +158,7 @@ def left(notes: Sequence[Note]) -> list[tuple[object, object, object]]:
     return [(note.code, note.data["teeth"], note.data["percent"]) for note in notes]
 
 
-def test_teeth_that_do_not_explain_the_log_or_do_not_stand_out_are_left() -> None:
+def test_ripple_that_gains_too_little_or_does_not_stand_out_is_reported_as_left() -> None:
     useless, _ = told(fit(500.0, shown(12, 200.0)), fit(500.0 - TEETH_WORTH + 0.1, shown(12, 0.0)))
     useful, _ = told(fit(500.0, shown(12, 200.0)), fit(500.0 - TEETH_WORTH - 0.1, shown(12, 0.0)))
     several, _ = told(fit(500.0, shown(12, 50.0), shown(13, 40.0)))
@@ -172,7 +172,7 @@ def test_teeth_that_do_not_explain_the_log_or_do_not_stand_out_are_left() -> Non
     assert not with_pump_ripple(PLAIN, told(fit(500.0, shown(12, 9.0), shown(13, 8.0)))[0], well).left
 
 
-def test_teeth_that_may_be_as_small_as_any_pumps_are_left_only_where_they_move_bulk_modulus() -> None:
+def test_ripple_that_may_be_small_is_reported_as_left_only_if_it_shifts_bulk_modulus() -> None:
     def doubted(size: float, moved: float, offset: float = 0.0, gain: float = 50.0) -> bool:
         rivals = fit(500.0, shown(12, gain, size, offset), shown(13, gain - 5.0), off=(offset, 0.0))
         felt = rivals.std["bulk_modulus"] / rivals.values["bulk_modulus"] * moved
@@ -187,7 +187,7 @@ def test_teeth_that_may_be_as_small_as_any_pumps_are_left_only_where_they_move_b
     assert not doubted(LEAST_TEETH - 1e-4, MOST_LINEAR + 0.01)
 
 
-def test_teeth_larger_than_any_are_not_believed_but_left() -> None:
+def test_ripple_larger_than_that_of_any_pump_is_reported_as_left() -> None:
     for at_first, more, left_over in ((MOST_TEETH + 0.01, 0.0, True), (0.3, 0.12, True), (0.3, 0.08, False)):
         first = fit(500.0, shown(12, 200.0, at_first))
         fitted, asked = told(first, fit(300.0, shown(12, 5.0, more)), fit(290.0, shown(12, 0.0, 0.0)))
@@ -197,7 +197,7 @@ def test_teeth_larger_than_any_are_not_believed_but_left() -> None:
         assert len(asked) == (1 if at_first > MOST_TEETH else 2 if left_over else 3)
 
 
-def test_a_log_with_gaps_in_its_speed_is_not_asked() -> None:
+def test_ripple_is_not_tested_in_a_log_with_gaps_in_speed() -> None:
     fitted, asked = told(fit(500.0, shown(12, 200.0)))
     holey = replace(PLAIN, gaps=np.array([[3.0, 9.0, 1.0]]))
     assert with_pump_ripple(holey, fitted, well).log is holey
@@ -205,7 +205,7 @@ def test_a_log_with_gaps_in_its_speed_is_not_asked() -> None:
 
 
 @pytest.mark.parametrize(("chi", "code"), [(1.0, "TEETH_LEFT"), (2.0, "PRESSURE_RESIDUALS_LARGE")])
-def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
+def test_remaining_ripple_shuts_the_gate_if_nothing_else_does(
     monkeypatch: pytest.MonkeyPatch, chi: float, code: str
 ) -> None:
     shows = replace(fit(500.0, shown(12, 50.0), shown(13, 40.0)), chi_square=(chi,))
@@ -218,7 +218,7 @@ def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
     assert [note.code for note in found.remarks] == [RigCode.WEAR_NOT_EXCLUDED]
 
 
-def test_nothing_is_left_of_a_sound_log(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sound_log_has_no_remaining_ripple(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [fit(500.0, shown(12, 3.0))])
     gains = len(ALWAYS_ASKED) * [PredictedGain(0.0, 0.0, 0.01)]
     monkeypatch.setattr(asked_hypotheses, "predicted_gains", lambda *_, **__: gains)
@@ -227,7 +227,7 @@ def test_nothing_is_left_of_a_sound_log(monkeypatch: pytest.MonkeyPatch) -> None
     assert not found.remarks
 
 
-def test_teeth_are_asked_for_by_chance_as_seldom_as_their_limits_say() -> None:
+def test_the_limits_for_ripple_have_their_stated_rates_of_false_alarms() -> None:
     """Twice the gain of a cosine and a sine is chi-square distributed with two degrees of freedom."""
     assert np.exp(TEETH_WORTH) / len(COUNTS) == pytest.approx(1500.0, rel=0.03)
     assert np.exp(OVERTONE_WORTH) == pytest.approx(150.0, rel=0.02)
@@ -237,7 +237,7 @@ def subtracted(found: RippleFits) -> Array:
     return PLAIN.drives[:, 0] - found.log.drives[:, 0]
 
 
-def test_an_offset_of_speed_is_subtracted_corrected_and_told_where_the_log_is_explained_without_it() -> None:
+def test_a_speed_offset_is_subtracted_corrected_and_reported_if_this_explains_the_log() -> None:
     rounds = [
         fit(900.0, off=(0.2, 500.0)),
         fit(420.0, off=(0.04, 2.0 * OFFSET_SETTLED)),
@@ -268,7 +268,7 @@ def test_an_offset_of_speed_is_subtracted_corrected_and_told_where_the_log_is_ex
         ([fit(900.0, off=(0.2, 500.0)), fit(900.0 - KEPT * 500.0 - 0.1)], False),
     ],
 )
-def test_an_offset_that_gains_little_or_breaks_its_promise_or_leaves_the_log_unexplained_is_none(
+def test_an_offset_that_gains_too_little_or_leaves_the_log_unexplained_is_not_subtracted(
     rounds: list[GreyBoxFit], *, explained: bool
 ) -> None:
     found = with_pump_ripple(PLAIN, told(*rounds)[0], lambda _: explained)
@@ -277,7 +277,7 @@ def test_an_offset_that_gains_little_or_breaks_its_promise_or_leaves_the_log_une
     assert not found.remarks
 
 
-def test_an_offset_that_leaves_more_than_the_noise_of_sensors_is_none() -> None:
+def test_an_offset_that_leaves_residuals_above_sensor_noise_is_not_subtracted() -> None:
     """A single rod looks like an offset, and its log passed with bulk modulus 39 % too low."""
     most = SURE * 0.2 + CHANCE * np.sqrt(2.0 / len(PLAIN.drives))
     for left, taken in ((0.95 * most, True), (1.05 * most, False)):
@@ -286,7 +286,7 @@ def test_an_offset_that_leaves_more_than_the_noise_of_sensors_is_none() -> None:
         assert bool(found.remarks) is taken
 
 
-def test_the_offset_is_that_of_the_balance_which_is_likeliest_with_an_offset_of_its_own() -> None:
+def test_the_offset_is_that_of_the_balance_that_is_likeliest_with_its_own_offset() -> None:
     fits = [[fit(900.0, off=(0.2, 500.0))], [fit(400.0), fit(405.0, off=(0.05, 50.0))], [fit(410.0), fit(355.0)]]
     found = with_pump_ripple(PLAIN, lambda _: fits.pop(0), well)
     assert subtracted(found) == pytest.approx(0.25)
@@ -294,7 +294,7 @@ def test_the_offset_is_that_of_the_balance_which_is_likeliest_with_an_offset_of_
 
 
 @pytest.mark.parametrize("left", [0.9 * OFFSET_SETTLED, 1.1 * OFFSET_SETTLED])
-def test_a_first_guess_of_the_offset_is_corrected_and_told_however_large(left: float) -> None:
+def test_a_first_guess_of_the_offset_is_corrected_and_reported_whatever_its_size(left: float) -> None:
     settled = left < OFFSET_SETTLED
     fitted, asked = told(fit(420.0, off=(0.04, left)), fit(419.0))
     found = with_pump_ripple(PLAIN, fitted, well, offset=3.0 * MOST_OFFSET)
@@ -305,14 +305,14 @@ def test_a_first_guess_of_the_offset_is_corrected_and_told_however_large(left: f
     assert note.data["offset_rad_s"] == found.log.speed_offset == pytest.approx(offset)
 
 
-def test_a_small_offset_is_subtracted_and_not_told() -> None:
+def test_a_small_offset_is_subtracted_and_not_reported() -> None:
     for size, said in ((0.9 * LEAST_OFFSET, False), (1.1 * LEAST_OFFSET, True)):
         found = with_pump_ripple(PLAIN, told(fit(900.0, off=(size, 500.0)), fit(400.0))[0], well)
         assert subtracted(found) == pytest.approx(size)
         assert bool(found.remarks) is said
 
 
-def test_teeth_are_looked_for_without_the_offset_and_tell_what_is_left_of_it() -> None:
+def test_ripple_is_tested_after_the_offset_is_subtracted_and_corrects_the_offset() -> None:
     rounds = [
         fit(9000.0, off=(0.2, 8000.0)),
         fit(600.0, shown(12, 90.0, 0.1, 0.03)),
@@ -330,14 +330,14 @@ def test_teeth_are_looked_for_without_the_offset_and_tell_what_is_left_of_it() -
     }
 
 
-def test_teeth_however_small_that_tell_an_offset_are_taken_up() -> None:
+def test_small_ripple_is_included_if_it_shows_a_speed_offset() -> None:
     for offset, wanted in ((0.1, True), (0.0, False)):
         one = shown(12, 60.0, 0.5 * LEAST_TEETH, offset)
         fits = fit(900.0, one, off=(offset, 0.0)), fit(800.0, shown(12, 0.0))
         assert bool(with_pump_ripple(PLAIN, told(*fits)[0], well).remarks) is wanted
 
 
-def test_overtones_are_asked_once_the_teeth_have_settled_and_dropped_where_they_help_none() -> None:
+def test_overtones_are_tested_once_the_ripple_has_settled_and_dropped_if_they_gain_nothing() -> None:
     rounds = [
         fit(900.0, shown(12, 200.0)),
         fit(700.0, shown(12, OVERTONE_WORTH + 0.1), shown(24, 50.0)),

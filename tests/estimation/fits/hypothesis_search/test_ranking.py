@@ -15,7 +15,7 @@ def tried(cost: float, place: float, **delays: float) -> Trial:
     return Trial((), Point(np.full(1, place), cost, np.zeros(1), np.eye(1)), {}, delays, {})
 
 
-def test_two_starts_that_came_to_one_place_are_led_on_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_starts_that_reached_the_same_point_are_searched_further_once(monkeypatch: pytest.MonkeyPatch) -> None:
     led: list[tuple[float, float]] = []
 
     def settled(_: Any, start: Trial, wanted: float, *__: Any) -> Trial:

@@ -31,7 +31,7 @@ LARGEST_SMALL = LEAST_TEETH + ONE_SIDED_95 * STD
         (LARGEST_SMALL + 1e-4, 0.0, 1e-3, True),  # not small, so not chance
     ],
 )
-def test_small_teeth_that_need_an_offset_of_speed_which_the_flow_contradicts_shut_no_gate(
+def test_small_ripple_with_a_speed_offset_that_the_flow_contradicts_does_not_shut_the_gate(
     size: float, flow: float, std: float, left: bool
 ) -> None:
     wandering = ShownRipple(Ripple(14, size, 0.0), 12.0, STD, np.zeros(2), offset=-1.0, offset_std=1e-3)
@@ -52,7 +52,7 @@ def test_small_teeth_that_need_an_offset_of_speed_which_the_flow_contradicts_shu
         (10.0 * TEETH_WORTH, TEETH_WORTH - 1.0, True),
     ],
 )
-def test_teeth_that_a_fit_tried_and_that_gain_what_chance_does_shut_no_gate(
+def test_fitted_ripple_that_gains_no_more_than_chance_does_not_shut_the_gate(
     promised: float, gained: float, left: bool
 ) -> None:
     large = ShownRipple(Ripple(19, LARGEST_SMALL + 0.02, 0.0), promised, STD, np.zeros(2))

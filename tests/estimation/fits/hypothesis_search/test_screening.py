@@ -14,7 +14,7 @@ from estimation.models.flow import STIFFNESS
 from tests.estimation.fits.short_logs import PAPER, at_one_speed, lost_in_bias, seen
 
 
-def test_a_worn_pump_at_one_speed_is_found_sooner_from_where_the_flow_bias_is_healthy(
+def test_a_worn_pump_at_one_speed_is_found_sooner_from_a_start_with_healthy_flow_bias(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     log, plain = widened(seen(at_one_speed()), PAPER, {STIFFNESS: 1.0}), lost_in_bias()  # practically no accumulator
@@ -24,7 +24,9 @@ def test_a_worn_pump_at_one_speed_is_found_sooner_from_where_the_flow_bias_is_he
     assert from_worn.cost < from_sound.cost - 1.0
 
 
-def test_a_screening_ends_where_a_step_promises_less_than_long_steps_err(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_screening_ends_once_a_step_predicts_less_than_the_error_of_long_steps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     log, descend_in_turn = widened(seen(at_one_speed()), PAPER), screening.descend_in_turn
     counted: list[int] = []
 
@@ -47,7 +49,7 @@ def test_a_screening_ends_where_a_step_promises_less_than_long_steps_err(monkeyp
 
 
 @pytest.mark.parametrize(("lowest", "begun"), [(90.0, ["b"]), (110.0, ["a", "c"])])
-def test_where_what_slopes_do_not_see_comes_lower_than_all_else_others_begin_from_where_it_did_so(
+def test_other_hypotheses_begin_at_the_start_from_which_a_far_one_reached_the_lowest_cost(
     lowest: float, begun: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[Any] = []

@@ -15,7 +15,7 @@ LEAKAGE, DISPLACEMENT = 5e-11, PAPER.pump_displacement
 
 
 @pytest.mark.parametrize(("offset", "cost", "told"), [(-2.0, 99.0, True), (2.0, 99.0, True), (-2.0, 101.0, False)])
-def test_the_speed_pumps_what_the_pressure_would_leak_if_that_explains_the_log_better(
+def test_a_speed_offset_replaces_a_pressure_offset_if_it_explains_the_log_better(
     offset: float, cost: float, *, told: bool
 ) -> None:
     plain = seen(log(0.2))
@@ -33,7 +33,7 @@ def test_the_speed_pumps_what_the_pressure_would_leak_if_that_explains_the_log_b
 
 
 @pytest.mark.parametrize("share", [0.9, None])
-def test_nothing_is_tried_where_no_pressure_offset_was_found_or_the_speed_would_not_be_told(
+def test_no_speed_offset_is_tried_without_a_pressure_offset_or_if_it_would_be_too_small(
     share: float | None,
 ) -> None:
     def fitted(_: GreyBoxLog) -> Sequence[GreyBoxFit]:
@@ -51,16 +51,16 @@ def turned_by(offset: float) -> float:
 
 
 @pytest.mark.parametrize("offset", [-2.5, 2.5])
-def test_what_is_lost_between_pump_and_piston_tells_an_offset_of_speed(offset: float) -> None:
+def test_lost_flow_shows_a_speed_offset(offset: float) -> None:
     assert turned_by(offset) == pytest.approx(offset, rel=0.1)
 
 
-def test_a_right_speed_and_one_that_no_converter_has_tell_none() -> None:
+def test_lost_flow_shows_no_speed_offset_that_is_zero_or_implausibly_large() -> None:
     assert turned_by(0.0) == 0.0
     assert turned_by(2.0 * MOST_SHARE * PAPER.rated_speed) == 0.0
 
 
-def test_a_dead_pressure_tells_no_offset() -> None:
+def test_a_dead_pressure_sensor_shows_no_speed_offset() -> None:
     record = log(0.5)
     still = record.replace(differential_pressure_pa=np.zeros_like(record[SPEED]))
     assert offset_by_lost_flow(seen(still), PAPER) == 0.0

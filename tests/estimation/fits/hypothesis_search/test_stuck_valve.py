@@ -44,7 +44,7 @@ def stuck(
     return [one.together for one in stuck_valve.stuck_instead(NOTHING, best, NO_DECIMATION)]
 
 
-def test_a_stuck_valve_is_told_where_a_late_one_is_hardly_likelier(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stuck_valve_replaces_a_late_one_that_is_hardly_likelier(monkeypatch: pytest.MonkeyPatch) -> None:
     """`makeup_check_stuck_shut`, training 17011: 47 kPa late was likelier by 2, "major leakage, major friction"."""
     late = -2.0 * UNLIKE_CRACKS
     assert stuck(monkeypatch, 1002.0, late) == [(MAKEUP_BLOCKED,)]
@@ -53,18 +53,18 @@ def test_a_stuck_valve_is_told_where_a_late_one_is_hardly_likelier(monkeypatch: 
     assert stuck(monkeypatch, 1011.0, late) == []
 
 
-def test_a_valve_that_is_stuck_already_is_not_stuck_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_set_with_a_stuck_valve_is_not_given_a_second_one(monkeypatch: pytest.MonkeyPatch) -> None:
     assert stuck(monkeypatch, 900.0, 2.0 * UNLIKE_CRACKS, MAKEUP_BLOCKED) == []
 
 
-def test_valves_that_open_alike_are_both_sound(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_valves_with_similar_cracking_pressures_are_not_tested_as_stuck(monkeypatch: pytest.MonkeyPatch) -> None:
     assert stuck(monkeypatch, 900.0, 0.5 * UNLIKE_CRACKS) == []
     assert stuck_valve.stuck_instead(NOTHING, trial([DELIVERY], 1000.0), NO_DECIMATION) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [16301, 17011])
-def test_a_valve_that_stays_shut_as_far_as_a_log_reaches_is_stuck(index: int) -> None:
+def test_a_valve_that_stays_shut_throughout_a_log_is_identified_as_stuck(index: int) -> None:
     """Both logs got a class: one as plain, with a drop of 11 kPa (67 %), one with valves that open late (99.9 %)."""
     log = make("makeup_check_stuck_shut", "training", index).log
     fit = fit_flow(Record.from_frame(log), EhaParameters(), EhaParameters().bulk_modulus)

@@ -64,7 +64,7 @@ def found_of(course: LossRegressor) -> VaryingLoss:
 
 
 @pytest.mark.parametrize("course", COURSES, ids=lambda one: one.kind)
-def test_a_loss_is_found_where_it_is_and_leaves_bulk_modulus_right(course: LossRegressor) -> None:
+def test_a_varying_loss_is_located_and_bulk_modulus_is_right(course: LossRegressor) -> None:
     loss = found_of(course)
     assert loss.course.kind == course.kind
     assert loss.course.at == pytest.approx(course.at, rel=0.1)
@@ -73,7 +73,7 @@ def test_a_loss_is_found_where_it_is_and_leaves_bulk_modulus_right(course: LossR
     assert loss.fit.values["bulk_modulus"] == pytest.approx(HEALTHY.bulk_modulus, rel=0.01)
 
 
-def test_where_a_loss_lies_adds_to_what_is_not_known_of_bulk_modulus() -> None:
+def test_an_uncertain_location_of_a_loss_adds_to_the_variance_of_bulk_modulus() -> None:
     tooth, one_way = (found_of(course) for course in (COURSES[1], COURSES[3]))
     assert tooth.opened > 0.0
     assert one_way.opened == 0.0
@@ -94,13 +94,13 @@ def test_each_loss_has_a_note_of_its_own() -> None:
     assert notes[ONE_WAY].data["side"] == "A"
 
 
-def test_a_loss_that_may_be_none_is_not_told() -> None:
+def test_an_insignificant_loss_is_not_reported() -> None:
     """It leads a search out of a wrong minimum: `single_rod` 17002 was said to leak 1.004 times as much one way."""
     loss = found_of(COURSES[3])
     assert [len(loss_notes(loss._replace(std=share * loss.size))) for share in (0.4, 1.5)] == [1, 0]
 
 
-def test_a_pump_that_fills_badly_from_a_low_speed_on_is_told_as_a_worn_one() -> None:
+def test_a_pump_that_fills_badly_from_a_low_speed_on_is_reported_as_worn() -> None:
     loss = found_of(LossRegressor(WEAR, 0.0))
     assert loss.course.kind == WEAR
     (note,) = loss_notes(loss)

@@ -49,7 +49,7 @@ VARIANCES = {"differential_pressure_pa": 1e6}
 
 
 @pytest.mark.parametrize("one", HYPOTHESES, ids=[one.name for one in HYPOTHESES])
-def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_a_number(one: Hypothesis) -> None:
+def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_finite_values(one: Hypothesis) -> None:
     still = dict.fromkeys((*FLOW_FORM.drives, *FLOW_FORM.outputs), np.zeros(20))
     seen_log = greybox_log(FLOW_FORM, Record(1e-3, still), flow_parameters(RIG), longest_step=1e-3, variances=VARIANCES)
     log = widened(replace(seen_log, presumed=presumed_stiffness(RIG, {})), RIG)
@@ -72,7 +72,7 @@ def test_leakage_that_grows_with_time_squared_is_within_bounds(factor: float) ->
 
 
 @pytest.mark.parametrize("share", [0.98, 1.1])
-def test_a_relief_valve_is_sought_where_the_log_shows_one_open(share: float) -> None:
+def test_the_bounds_of_the_relief_setting_follow_the_peak_pressure_of_the_log(share: float) -> None:
     """A search stepped to a setting that pressure never reached, from where no slope leads back."""
     peak, form = share * RIG.relief_pressure, relieving(FLOW_FORM)
     reached = replace(seen(log(0.2)), measured=np.full((200, 1), -peak))
@@ -82,7 +82,7 @@ def test_a_relief_valve_is_sought_where_the_log_shows_one_open(share: float) -> 
     assert most == pytest.approx(max(peak, RIG.relief_pressure))
 
 
-def test_an_encoder_is_first_taken_to_read_zero_in_mid_travel() -> None:
+def test_the_last_start_of_an_encoder_zero_is_at_mid_travel() -> None:
     moved = wide()
     drives = moved.drives.copy()
     drives[:, 1] = np.linspace(0.1, 0.16, len(drives))
@@ -90,14 +90,14 @@ def test_an_encoder_is_first_taken_to_read_zero_in_mid_travel() -> None:
     assert last[POSITION_ZERO] == pytest.approx(0.13)
 
 
-def test_an_offset_at_rest_is_first_taken_to_be_what_the_sensor_reads_there() -> None:
+def test_the_start_of_an_offset_at_rest_is_the_pressure_that_is_read_there() -> None:
     log = wide()
     measured = np.full_like(log.measured, 1e5)
     measured[0] = np.nan
     assert list(own_starts(replace(log, measured=measured), OFFSET_AT_REST)) == [{"pressure_offset": 1e5}]
 
 
-def test_what_the_flow_bias_holds_beyond_a_healthy_one_is_first_taken_for_wear() -> None:
+def test_the_start_of_a_worn_pump_attributes_excess_flow_bias_to_wear() -> None:
     log = widened(seen(at_one_speed()), PAPER)
     assert flow_speed(log) == pytest.approx(100.0, rel=3e-2)  # computed from means about each sample
     (start,) = worn_start(log, lost_in_bias())
@@ -114,7 +114,7 @@ def test_what_the_flow_bias_holds_beyond_a_healthy_one_is_first_taken_for_wear()
 @pytest.mark.parametrize("implicit", [False, True])
 @pytest.mark.parametrize("opening", [1e2, 1e4])
 @pytest.mark.parametrize("modulus", [5e7, 2e8, 1.5e9])
-def test_slopes_of_the_widest_make_up_valve_are_those_of_the_model_and_no_chatter(
+def test_slopes_of_the_widest_make_up_valve_do_not_chatter(
     modulus: float, opening: float, implicit: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = replace(wide(), stiff=implicit)
@@ -133,13 +133,13 @@ def test_slopes_of_the_widest_make_up_valve_are_those_of_the_model_and_no_chatte
     assert effects(1e-6) == pytest.approx(effects(1e-5), rel=0.1, abs=1.0)
 
 
-def test_an_offset_at_rest_is_first_taken_to_be_none_where_no_pressure_was_read() -> None:
+def test_the_start_of_an_offset_at_rest_is_zero_without_pressure() -> None:
     log = wide()
     blind = replace(log, measured=np.full_like(log.measured, np.nan))
     assert list(own_starts(blind, OFFSET_AT_REST)) == [{"pressure_offset": 0.0}]
 
 
-def test_the_level_at_which_chambers_begin_is_presumed_anywhere_up_to_half_of_what_loads_them() -> None:
+def test_the_prior_of_the_initial_pressure_level_reaches_up_to_half_of_the_peak_pressure() -> None:
     log = wide()
     problem, most = freed(log, (BEGUN,)), 0.5 * float(np.max(np.abs(log.measured)))
     place = problem.model.unknowns.index(START_LEVEL)
@@ -149,7 +149,7 @@ def test_the_level_at_which_chambers_begin_is_presumed_anywhere_up_to_half_of_wh
     assert unit * believed(problem)[place] ** -0.5 == pytest.approx(np.sqrt(np.mean(levels**2)), rel=1e-3)
 
 
-def test_a_log_that_begins_with_both_chambers_shut_in_is_searched_from_there() -> None:
+def test_bulk_modulus_is_right_in_a_log_that_begins_with_both_chambers_shut_in() -> None:
     """Their pressures had met in a pause after a hard move. Too low a start cost 0.05 % and five times the search."""
     rng, p = np.random.default_rng(0), parameters_for(CONDITIONS["major_friction"])
     speed = np.repeat([120.0, 0.0, 0.0, 0.0, -110.0, 90.0, 0.0, -90.0, 80.0, -120.0, 0.0], 800)
@@ -160,7 +160,7 @@ def test_a_log_that_begins_with_both_chambers_shut_in_is_searched_from_there() -
 
 
 @pytest.mark.slow
-def test_a_level_that_a_loaded_log_hardly_tells_is_in_the_deviation_of_bulk_modulus() -> None:
+def test_an_uncertain_initial_pressure_level_is_in_the_deviation_of_bulk_modulus() -> None:
     bench = draw_bench(1004)  # the level absorbed half of the load's pressure: 0.45 % high, by 4.9 deviations
     found = estimate_bulk_modulus(bench.record, bench.healthy)
     assert found.gate.passed
@@ -176,7 +176,7 @@ def test_a_search_for_an_encoders_zero_begins_within_the_chambers(length: float,
     assert [one[POSITION_ZERO] for one in begun[:2]] == pytest.approx(starts)
 
 
-def test_a_drift_of_pressure_begins_where_it_explains_most_beside_what_is_guessed() -> None:
+def test_the_start_of_a_pressure_drift_explains_most_beside_the_first_guess() -> None:
     """A stepwise search reached a twentieth of 1.8 bar, and the log was refused at 17 times the noise."""
     record = log()
     drifts = record.replace(**{PRESSURE: record[PRESSURE] + np.linspace(0.0, 1.8e5, len(record))})

@@ -30,20 +30,20 @@ def at(problem: FreedProblem, stiffness: float) -> np.ndarray:
     return problem.model.theta({**values, "bristle_stiffness": stiffness})
 
 
-def test_the_mass_on_a_bristle_that_is_followed_is_no_quicker_than_the_steps(search: MotionSearch) -> None:
+def test_the_largest_followed_bristle_stiffness_and_damping_match_the_model_steps(search: MotionSearch) -> None:
     limits = followed(search.whole.log, parameter_names(MOTION_FORMS[0].parameters))
     assert np.sqrt(limits["bristle_stiffness"][1] / MASS) == pytest.approx(STIFFEST)
     assert limits["bristle_damping"][1] / MASS == pytest.approx(QUICKEST)
 
 
-def test_starts_are_brought_near_with_a_bristle_that_is_followed_and_fitted_with_any(search: MotionSearch) -> None:
+def test_the_bristle_is_limited_for_the_first_descents_and_less_for_fits(search: MotionSearch) -> None:
     place = search.whole.model.unknowns.index("bristle_stiffness")
     assert np.exp(search.near[1][place]) == pytest.approx(MASS * STIFFEST**2)
     assert search.bounds[1][place] > search.near[1][place]
 
 
 @pytest.mark.parametrize(("quicker", "times"), [(0.99, 1), (1.01, 2), (2.9, 3), (9.0, MOST_SHORTENED)])
-def test_steps_where_the_piston_turns_are_as_much_shorter_as_a_bristle_is_quicker(
+def test_steps_at_piston_reversals_are_shortened_in_proportion_to_the_bristle_frequency(
     search: MotionSearch, quicker: float, times: int
 ) -> None:
     log = replace(search.whole.log, steps=np.where(np.arange(len(search.whole.log.steps)) % 3 == 0, 16, 4))
@@ -55,7 +55,7 @@ def test_steps_where_the_piston_turns_are_as_much_shorter_as_a_bristle_is_quicke
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
-def test_no_log_is_refused_for_the_last_digit_of_its_noise(seed: int) -> None:
+def test_rounding_of_the_noise_variance_does_not_get_a_log_refused(seed: int) -> None:
     record = short_log(2.0, seed)
     noise = measurement_variances(record, ("motor_speed_rad_s",))["motor_speed_rad_s"]
     for place in range(4):

@@ -70,13 +70,13 @@ def test_two_seconds_without_pressure_give_the_bulk_modulus(healthy: FormFit) ->
     assert healthy.chi_square < motion_fit.EXPLAINED
 
 
-def test_the_deviation_holds_noise_and_what_the_friction_law_may_be_wrong_by(healthy: FormFit) -> None:
+def test_the_deviation_includes_noise_and_the_error_of_the_friction_law(healthy: FormFit) -> None:
     value, std = healthy.parameters["bulk_modulus"]
     least = np.hypot(healthy.bound, motion_fit.STRUCTURE)
     assert least <= std / value <= np.hypot(least, motion_fit.MOST_MOVED)
 
 
-def test_what_a_doubtful_piston_area_does_to_bulk_modulus_is_told(healthy: FormFit) -> None:
+def test_the_slope_of_bulk_modulus_by_an_uncertain_piston_area_is_returned(healthy: FormFit) -> None:
     assert set(healthy.rig_slopes) == {"piston_area"}
     assert abs(healthy.rig_slopes["piston_area"]["bulk_modulus"]) > 1e-3 * HEALTHY.bulk_modulus
 
@@ -91,7 +91,7 @@ def test_a_shaken_position_is_not_explained() -> None:
     assert large.data["motion_percent"] > 10.0
 
 
-def test_residuals_are_compared_with_how_far_the_piston_goes_while_noise_of_speed_is_remembered() -> None:
+def test_residuals_are_compared_with_the_motion_over_the_memory_of_speed_noise() -> None:
     still = seen(Record(1e-3, {"motor_speed_rad_s": np.ones(1000), "position_m": np.zeros(1000)}))
     moving = replace(still, measured=4e-5 * np.arange(1000.0)[:, None], noise=(OutputNoise(2.56e-12, 1e-11),))
     moving.measured[500] = np.nan
@@ -105,7 +105,7 @@ def test_residuals_are_compared_with_how_far_the_piston_goes_while_noise_of_spee
     assert motion_fit.share_of_motion(100.0, gone) == np.inf
 
 
-def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(
+def test_a_long_log_is_searched_on_its_beginning_and_fitted_as_a_whole(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     log = heard(short_log(2.0))
@@ -123,7 +123,7 @@ def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(
 
 
 @pytest.mark.parametrize(("wanted", "alike", "brought"), [(np.inf, 0.0, 3), (np.inf, np.inf, 2), (0.0, 0.0, 1)])
-def test_starts_that_larger_noise_does_not_explain_or_that_end_alike_are_left_out(
+def test_starts_that_fail_under_larger_noise_or_reach_the_same_point_are_left_out(
     wanted: float, alike: float, brought: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(motion_search, "explained", lambda _: wanted)
@@ -143,7 +143,7 @@ def test_starts_that_larger_noise_does_not_explain_or_that_end_alike_are_left_ou
 
 @pytest.mark.slow
 @pytest.mark.parametrize("condition", ["major_leakage_minor_friction", "minor_leakage_major_friction"])
-def test_a_log_that_does_not_hold_the_scale_of_forces_says_so(condition: str) -> None:
+def test_a_log_that_does_not_determine_the_force_scale_is_refused_or_its_value_right(condition: str) -> None:
     parameters = parameters_for(CONDITIONS[condition])
     speed = make_drive("steps", 10.0, 1e-3, parameters, np.random.default_rng(1))
     run = simulate(PLANTS["lumped"], speed, 1e-3, parameters, sensors=BENCH, rng=np.random.default_rng(2))
@@ -152,13 +152,13 @@ def test_a_log_that_does_not_hold_the_scale_of_forces_says_so(condition: str) ->
     assert fit.reasons or abs(value - HEALTHY.bulk_modulus) < 3.0 * std
 
 
-def test_a_log_without_position_is_refused_with_what_it_lacks() -> None:
+def test_a_log_without_position_is_refused_and_the_missing_channel_named() -> None:
     record = Record(1e-3, {"motor_speed_rad_s": np.zeros(50), "velocity_m_s": np.zeros(50)})
     with pytest.raises(LogError, match="needs position_m"):
         fit_motion(record, HEALTHY, 2e8)
 
 
-def test_without_a_variance_the_noise_of_motor_speed_is_read_off_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_speed_noise_is_estimated_from_the_log_if_no_variance_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
     record, walks, guesses = short_log(0.3), list[float](), list[float]()
 
     def ended(searches: list[MotionSearch]) -> list[Ended]:
@@ -192,7 +192,7 @@ def test_the_end_of_a_very_long_log_is_left_out(monkeypatch: pytest.MonkeyPatch)
     assert seen(short_log(0.3)).drives.shape == (100, 2)
 
 
-def test_steps_are_short_where_the_piston_turns_and_where_the_pump_is_set_off() -> None:
+def test_steps_are_short_at_piston_reversals_and_pump_starts() -> None:
     t = 1e-3 * np.arange(400)
     speed = np.where(t > 0.2, 50.0, 0.0)  # starts at sample 201
     position = 1e-2 * np.abs(t - 0.1)  # reverses at sample 100
@@ -230,7 +230,7 @@ def found(bulk_modulus: float, cost: float = 50.0, chi_square: float = 1.0) -> G
     return GreyBoxFit(MOTION_FORMS[0], np.zeros(1), values, {"bulk_modulus": 1e6}, cost, (chi_square,), (0.0,))
 
 
-def test_friction_laws_that_explain_a_log_alike_and_disagree_are_objected_to() -> None:
+def test_equally_good_friction_laws_that_disagree_are_objected_to() -> None:
     fits = [found(2.0e8), found(2.3e8, 50.0 + 0.9 * motion_fit.ALIKE)]
     (note,) = motion_fit._objections(fits, fits[0], [], 0.01)
     assert note.code == EstimateCode.FRICTION_LAWS_DISAGREE
@@ -248,7 +248,7 @@ def test_another_optimum_far_from_the_best_is_objected_to() -> None:
 
 
 @pytest.mark.parametrize("near", [True, False])
-def test_the_other_law_goes_on_on_the_whole_log_from_where_it_stands_better(
+def test_the_other_friction_law_is_fitted_to_the_whole_log_from_the_better_point(
     near: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = fine_searches(monkeypatch, 1.0)
@@ -277,7 +277,7 @@ def test_the_other_law_goes_on_on_the_whole_log_from_where_it_stands_better(
 
 
 @pytest.mark.parametrize("late", [True, False])
-def test_what_the_searches_leave_unexplained_is_fitted_on_and_tried_on_other_scales_if_that_explains_it(
+def test_an_unexplained_log_is_fitted_further_and_tried_on_other_scales_if_that_explains_it(
     late: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = fine_searches(monkeypatch)
@@ -296,7 +296,7 @@ def test_what_the_searches_leave_unexplained_is_fitted_on_and_tried_on_other_sca
     assert fits[0].cost == second.whole.at(fits[0].theta).cost
 
 
-def test_what_only_the_whole_log_explains_is_tried_on_other_scales_too(
+def test_a_fit_that_explains_only_the_whole_log_is_tried_on_other_scales_too(
     healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = fine_searches(monkeypatch)
@@ -317,7 +317,7 @@ def test_what_only_the_whole_log_explains_is_tried_on_other_scales_too(
 
 
 @pytest.mark.parametrize("disagreeing", [True, False])
-def test_the_other_law_is_not_fitted_where_no_number_is_told(
+def test_the_other_friction_law_is_not_fitted_if_force_scales_disagree(
     disagreeing: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = fine_searches(monkeypatch)
@@ -330,7 +330,7 @@ def test_the_other_law_is_not_fitted_where_no_number_is_told(
     assert bool(motion_fit._objections(fits, fits[0], others, 0.01)) == disagreeing
 
 
-def test_what_nothing_explains_is_fitted_by_one_law_and_not_to_the_last_digit(
+def test_an_unexplained_log_is_fitted_by_one_friction_law_and_only_roughly(
     healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = fine_searches(monkeypatch)

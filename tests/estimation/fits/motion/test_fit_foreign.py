@@ -30,7 +30,7 @@ def test_a_foreign_log_without_pressure_gives_its_bulk_modulus(shared: Path) -> 
 
 
 @pytest.mark.slow
-def test_a_wrong_law_of_friction_is_objected_to(shared: Path) -> None:
+def test_a_shaken_position_in_a_foreign_log_is_objected_to(shared: Path) -> None:
     record, _ = bench(shared, "run001.csv")
     record = record.slice(0, 3000)
     shaken = record["position_m"] + 2e-5 * np.sin(200.0 * np.arange(3000) * 1e-3)

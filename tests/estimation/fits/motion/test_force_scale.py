@@ -59,33 +59,33 @@ def flat(cost: Callable[[np.ndarray], float]) -> Callable[[np.ndarray], Point]:
 
 
 @pytest.mark.parametrize("scale", [0.7, 1.4])
-def test_a_lower_optimum_on_another_scale_takes_the_place_of_the_best(scale: float) -> None:
+def test_a_lower_optimum_on_another_scale_replaces_the_best(scale: float) -> None:
     best, others, _ = searched(valleys(scale, lower=7.0))
     assert best.theta[0] - HERE[0] == pytest.approx(np.log(scale), abs=1e-3)
     assert any(other == pytest.approx(2e8, rel=1e-2) for other in others)
 
 
 @pytest.mark.parametrize("scale", [0.7, 1.4])
-def test_an_optimum_on_another_scale_that_is_as_good_is_told_of(scale: float) -> None:
+def test_an_equally_good_optimum_on_another_scale_is_reported(scale: float) -> None:
     best, others, _ = searched(valleys(scale, lower=1.0))
     found = [MODEL.values(best.theta)["bulk_modulus"], *others]
     for there in (2e8, 2e8 * scale):
         assert any(one == pytest.approx(there, rel=1e-2) for one in found)
 
 
-def test_an_optimum_that_does_not_explain_the_log_is_not_told_of() -> None:
+def test_an_optimum_that_does_not_explain_the_log_is_not_reported() -> None:
     worse = valleys(1.4, lower=1.0)
     _, others, _ = searched(lambda theta: replace(worse(theta), cost=worse(theta).cost + 100.0), explained=100.0)
     assert others == []
 
 
 @pytest.mark.parametrize("scale", [0.95, 1.05])
-def test_a_pit_a_few_percent_away_is_found(scale: float) -> None:
+def test_a_lower_minimum_a_few_percent_away_is_found(scale: float) -> None:
     best, _, _ = searched(valleys(scale, lower=7.0))
     assert best.theta[0] - HERE[0] == pytest.approx(np.log(scale), abs=1e-3)
 
 
-def test_all_forces_grow_together_and_what_yields_to_them_falls() -> None:
+def test_another_scale_raises_all_forces_and_lowers_all_conductances_in_proportion() -> None:
     _, _, seen = searched(flat(lambda theta: float(theta[0] != HERE[0])), explained=0.5)
     before, fixed = MODEL.values(HERE), ("flow_bias", "speed_lead")
     falls = ("leakage_coefficient", "makeup_conductance", "case_leakage")
@@ -97,13 +97,13 @@ def test_all_forces_grow_together_and_what_yields_to_them_falls() -> None:
         assert changed == pytest.approx({name: factor if name == "bulk_modulus" else 1.0 for name in UNKNOWNS})
 
 
-def test_another_stiffness_alone_is_not_asked_where_scales_of_force_disagree() -> None:
+def test_another_bulk_modulus_alone_is_not_tried_if_force_scales_disagree() -> None:
     _, _, seen = searched(flat(lambda _: 0.0))
     moduli = {round(MODEL.values(point.theta)["bulk_modulus"] / 2e8, 6) for point in seen}
     assert moduli == {0.8, 1.25}
 
 
-def test_a_valley_that_goes_on_for_ever_is_left_after_three_rounds() -> None:
+def test_the_search_along_an_endless_valley_ends_after_three_rounds() -> None:
     best, _, _ = searched(flat(lambda theta: 100.0 * theta[0]), explained=-np.inf)
     assert best.theta[0] - HERE[0] == pytest.approx(3.0 * np.log(0.8))
 
@@ -111,7 +111,7 @@ def test_a_valley_that_goes_on_for_ever_is_left_after_three_rounds() -> None:
 @pytest.mark.parametrize(
     ("moved", "duration", "rounds"), [(0.04, 20.0, 1), (0.07, 20.0, 3), (0.04, 4.1, 1), (0.04, 4.0, 3), (0.004, 4.0, 1)]
 )
-def test_an_optimum_is_left_in_its_turn_only_where_it_is_another_and_in_short_logs_where_it_is_near(
+def test_further_rounds_need_a_distinct_optimum_which_may_be_nearer_in_short_logs(
     moved: float, duration: float, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(force_scale, "SCALES", ())
@@ -126,7 +126,7 @@ def test_optima_that_disagree_end_the_search() -> None:
     assert disagree([2e8, *others])
 
 
-def test_moduli_disagree_from_a_twentieth_on() -> None:
+def test_moduli_disagree_if_they_differ_by_more_than_a_twentieth() -> None:
     assert not disagree([2.0e8, 2.099e8])
     assert disagree([2.0e8, 1.95e8, 2.101e8])
 
@@ -136,7 +136,7 @@ def test_an_optimum_that_is_hardly_better_ends_the_search_where_it_is() -> None:
     assert best.theta[0] - HERE[0] == pytest.approx(np.log(0.8))
 
 
-def test_a_search_that_ends_close_by_goes_on_before_it_is_said_to_disagree() -> None:
+def test_a_search_that_ends_close_by_is_continued_before_it_counts_as_disagreeing() -> None:
     """Steps are a quarter of what they should be, so the first descent ends seven to nine percent away."""
 
     def slow(theta: np.ndarray) -> Point:

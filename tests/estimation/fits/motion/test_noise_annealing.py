@@ -36,7 +36,7 @@ def problem(asked: list[str]) -> Any:
     return SimpleNamespace(at=at, log=SimpleNamespace(softened=softened), on=lambda _: soft)
 
 
-def test_a_pit_is_left_for_the_bottom_and_that_is_not_left_again() -> None:
+def test_a_local_minimum_is_left_for_the_global_one_which_is_not_left_again() -> None:
     asked: list[str] = []
     found = annealed(problem(asked), PIT, BOUNDS, 1e-3, 1.0)
     assert found.cost == pytest.approx(5.0, abs=1e-3)
@@ -44,12 +44,12 @@ def test_a_pit_is_left_for_the_bottom_and_that_is_not_left_again() -> None:
     assert len([one for one, last in zip(asked, ["own", *asked[:-1]], strict=True) if one != last == "own"]) == 2
 
 
-def test_an_end_is_kept_that_no_way_back_comes_below() -> None:
+def test_a_result_is_kept_if_annealing_finds_nothing_lower() -> None:
     low = Point(np.array([3.0]), 4.0, np.zeros(1), np.eye(1))
     assert annealed(problem([]), low, BOUNDS, 1e-3, 1.0) is low
 
 
-def test_a_share_is_asked_of_steps_on_the_way_back_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_least_share_applies_only_to_descents_under_the_original_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     shares: list[float] = []
     descended = noise_annealing.descend
 

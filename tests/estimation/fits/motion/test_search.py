@@ -72,7 +72,7 @@ def test_the_second_structure_is_tried_before_the_less_likely_starts_of_the_firs
     assert second.point.cost < 0.5 * 1.1 * PART
 
 
-def test_less_likely_starts_are_tried_where_the_misfit_is_not_hopeless() -> None:
+def test_less_likely_starts_are_tried_if_the_misfit_is_not_hopeless() -> None:
     found, asked = ended(lambda _: 2.0, lambda at: 1.0 if at == 7.0 else 2.0)
     assert asked == ["a0", "b0", "a1", "b1", "a2", "b2"]
     assert [one.explains for one in found] == [False, True]
@@ -92,7 +92,7 @@ def test_every_start_is_tried_before_a_log_that_is_nearly_explained_is_given_up(
     assert not any(one.explains for one in found)
 
 
-def test_no_other_start_is_tried_once_the_work_is_done() -> None:
+def test_no_other_start_is_tried_once_the_work_limit_is_reached() -> None:
     for steps, ranks in ((1, FINALISTS), (MOST_WORK, 1)):
         found, asked = ended(lambda _: 1.2, lambda _: 1.3, steps=steps)
         assert len(asked) == 2 * ranks
@@ -126,7 +126,7 @@ def test_a_structure_that_explains_the_beginning_goes_on_while_any_work_is_left(
     assert set(tried) == {0.0, 1.0}
 
 
-def test_where_the_work_is_done_the_end_is_searched_on_while_that_gains_a_share(
+def test_at_the_work_limit_the_best_search_continues_only_while_its_steps_gain_a_share(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     shares: list[float] = []
@@ -143,7 +143,9 @@ def test_where_the_work_is_done_the_end_is_searched_on_while_that_gains_a_share(
         assert shares.count(share) == (len(shares) if share == 0.0 else 1)
 
 
-def test_an_end_that_explains_the_beginning_is_carried_on_as_a_start_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_annealed_point_that_explains_the_beginning_is_searched_on_the_longer_part(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(motion_search, "annealed", lambda problem, *_: problem.at(np.array([7.5])))
     (first, second), _ = ended(lambda at: 1.0 if at == 7.5 else 2.0, lambda _: 2.5)
     assert (first.explains, second.explains) == (True, False)
@@ -152,7 +154,7 @@ def test_an_end_that_explains_the_beginning_is_carried_on_as_a_start_is(monkeypa
 
 
 @pytest.mark.parametrize(("factor", "left"), [(0.9, True), (1.1, False)])
-def test_an_end_is_not_left_for_a_deeper_one_where_more_of_the_log_is_foreign(
+def test_a_result_is_not_annealed_if_the_misfit_of_the_longer_part_is_too_large(
     monkeypatch: pytest.MonkeyPatch, factor: float, left: bool
 ) -> None:
     def of_part(problem: SimpleNamespace) -> float:
@@ -166,7 +168,7 @@ def test_an_end_is_not_left_for_a_deeper_one_where_more_of_the_log_is_foreign(
     assert bool(ends) is left
 
 
-def test_what_explains_the_first_seconds_alone_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_result_that_explains_only_the_first_seconds_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     def longer(problem: SimpleNamespace) -> float:
         return explained(cast("motion_search.FreedProblem", problem)) * (
             0.5 if len(problem.log.measured) == PART else 1.0
@@ -177,12 +179,12 @@ def test_what_explains_the_first_seconds_alone_is_not_taken(monkeypatch: pytest.
     assert not any(one.explains for one in found)
 
 
-def test_the_less_a_log_holds_the_farther_an_unseen_misfit_may_move_it() -> None:
+def test_the_allowance_for_an_undetected_misfit_grows_with_the_residuals() -> None:
     assert unseen(0.9, 20_000) == pytest.approx((1.0 + 200.0) ** 0.5)
     assert unseen(1.05, 20_000) == pytest.approx((1.0 + 200.0 + 1000.0) ** 0.5)
 
 
-def test_where_the_work_is_done_the_likeliest_start_alone_is_brought_near() -> None:
+def test_only_the_likeliest_start_is_tried_once_the_work_limit_is_reached() -> None:
     search, begun = searches_of(seen(short_log(0.2)))[0], Begun()
     assert len(list(search.brought_near(0, begun, lambda: False))) == 1
     assert set(begun.screened) == {0}

@@ -32,7 +32,7 @@ def problem_of(chi_square: float, samples: int) -> Any:
         (0.99, 0.99, LONG - 1, False),  # short logs take little time
     ],
 )
-def test_a_search_need_not_go_on_that_cannot_come_to_explain_a_log_whose_class_stands(
+def test_a_search_of_a_long_log_may_end_early_if_its_residuals_rule_out_no_class(
     large: float, far: float, samples: int, ends: bool, counts: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = problem_of(large * counts * SPARED_NIS, samples)
@@ -42,13 +42,13 @@ def test_a_search_need_not_go_on_that_cannot_come_to_explain_a_log_whose_class_s
 
 
 @pytest.mark.parametrize(("chi_square", "spared"), [(9.9, (True, True)), (10.1, (False, True)), (50.1, (False, False))])
-def test_the_beginning_of_a_log_is_searched_on_further_than_the_whole(
+def test_the_beginning_of_a_log_is_searched_further_than_the_whole(
     chi_square: float, spared: tuple[bool, bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert tuple(searched(problem_of(chi_square, 10_000), problem_of(chi_square, 20_000), monkeypatch)) == spared
 
 
-def test_a_log_that_is_no_longer_than_its_beginning_is_searched_on_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_that_is_no_longer_than_its_beginning_is_searched_further_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(searched(problem_of(50.1, 10_000), problem_of(50.1, 10_000), monkeypatch)) == 1
 
 

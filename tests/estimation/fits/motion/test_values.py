@@ -28,21 +28,21 @@ def share(**others: float) -> float:
     return share_at(log().replace(differential_pressure_pa=None), PAPER, VALUES | others, 1e-4)
 
 
-def test_the_actuators_own_values_leave_little_of_the_motion() -> None:
+def test_the_actuators_own_values_leave_little_of_the_motion_unexplained() -> None:
     assert share() < 0.03
 
 
 @pytest.mark.parametrize("name", ["leakage_coefficient", "friction_coulomb"])
-def test_values_of_another_actuator_leave_several_times_as_much(name: str) -> None:
+def test_values_of_another_actuator_leave_several_times_as_much_unexplained(name: str) -> None:
     assert share(**{name: 4.0 * VALUES[name]}) > 3.0 * share()
 
 
-def test_a_model_that_runs_away_leaves_infinitely_much(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_that_diverges_leaves_an_infinite_share_unexplained(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FreedProblem, "residuals_of", lambda *_: [np.array([[1.0, np.nan, np.inf]])])
     assert share() == np.inf
 
 
-def test_what_is_fitted_of_the_actuator_does_not_count() -> None:
+def test_rig_values_of_fitted_parameters_are_ignored() -> None:
     record = log().replace(differential_pressure_pa=None)
     other = replace(PAPER, leakage_coefficient=1e-10, friction_coulomb=1e4)
     assert share_at(record, other, VALUES, 1e-4) == pytest.approx(share())

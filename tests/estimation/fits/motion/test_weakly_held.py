@@ -31,7 +31,7 @@ def at(cost: float) -> Point:
 
 @pytest.mark.parametrize("samples", [WHOLE // 4, WHOLE])
 @pytest.mark.parametrize("size", [0.99, 1.01])
-def test_a_beginning_counts_as_what_the_whole_log_will_hold(
+def test_the_deviation_from_a_beginning_is_scaled_to_the_whole_log(
     samples: int, size: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     needed = FAR_TOO_WEAK * MOST_MOVED / unseen(1.0, WHOLE) * np.sqrt(WHOLE / samples)
@@ -39,13 +39,13 @@ def test_a_beginning_counts_as_what_the_whole_log_will_hold(
     assert far_too_weak(problem_of(samples), at(0.5 * samples), problem_of(WHOLE)) == (size > 1.0)
 
 
-def test_a_misfit_that_shows_holds_a_log_more_weakly() -> None:
+def test_a_visible_misfit_makes_bulk_modulus_less_certain() -> None:
     assert unseen(1.1, WHOLE) > 3.0 * unseen(1.0, WHOLE)
     assert unseen(0.5, WHOLE) == unseen(1.0, WHOLE)
 
 
 @pytest.mark.parametrize(("std", "asked"), [(1e6, [True]), (1e5, [True, False])])
-def test_a_log_that_holds_bulk_modulus_after_all_is_asked_on_other_scales(
+def test_a_log_that_does_determine_bulk_modulus_is_fitted_again_on_other_scales(
     std: float, asked: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sparing: list[bool] = []
@@ -69,7 +69,7 @@ def test_a_log_that_holds_bulk_modulus_after_all_is_asked_on_other_scales(
 
 
 @pytest.mark.parametrize("sparing", [True, False])
-def test_what_bulk_modulus_was_on_the_way_stands_for_the_scales_that_are_spared(
+def test_the_bulk_modulus_of_the_search_replaces_those_of_skipped_scales(
     sparing: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ends: list[list[float]] = []

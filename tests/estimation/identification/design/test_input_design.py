@@ -20,7 +20,7 @@ def held(seconds: float, n: int = 20_000) -> np.ndarray:
     return 125.66 * np.repeat(levels, round(seconds * 1e3))[:n]
 
 
-def test_a_literal_five_hertz_clock_leaves_25_hz_several_times_less_certain(table6: dict[str, LinearModel]) -> None:
+def test_a_five_hertz_clock_leaves_the_gain_at_25_hz_several_times_less_certain(table6: dict[str, LinearModel]) -> None:
     inputs = {"200 ms": held(0.2), "20 ms": held(0.02), "10 ms": held(0.01)}
     table = rank_inputs(table6["major_leakage"], inputs, 1e-3, np.array([25.0]), LIMITS)
     assert table.index[-1] == "200 ms"
@@ -28,7 +28,7 @@ def test_a_literal_five_hertz_clock_leaves_25_hz_several_times_less_certain(tabl
     assert table.loc["200 ms", "steady_state"] < table.loc["10 ms", "steady_state"]
 
 
-def test_a_prbs_made_for_a_bandwidth_is_as_good_there_as_the_best_clock(table6: dict[str, LinearModel]) -> None:
+def test_a_prbs_designed_for_a_bandwidth_is_as_accurate_there_as_the_best_clock(table6: dict[str, LinearModel]) -> None:
     inputs = {
         "made": prbs_for(25.0, 1e-3, LIMITS, slowest=0.1, duration=20.0),
         "10 ms": held(0.01),
@@ -38,7 +38,7 @@ def test_a_prbs_made_for_a_bandwidth_is_as_good_there_as_the_best_clock(table6: 
     assert table.loc["made", "at_25_hz"] < 1.1 * table["at_25_hz"].min()
 
 
-def test_predicted_covariance_falls_with_the_square_root_of_time(table6: dict[str, LinearModel]) -> None:
+def test_predicted_deviations_fall_with_the_square_root_of_time(table6: dict[str, LinearModel]) -> None:
     short, long = (predicted_covariance(table6["major_leakage"], held(0.05, n), 1e-3) for n in (5_000, 20_000))
     np.testing.assert_allclose(np.sqrt(np.diag(short) / np.diag(long)), 2.0, rtol=0.3)
 
@@ -50,7 +50,7 @@ def test_a_multisine_has_power_at_its_lines_only() -> None:
     assert np.abs(u).max() == pytest.approx(125.66)
 
 
-def test_limits_that_a_test_breaks_are_named(table6: dict[str, LinearModel]) -> None:
+def test_limits_violated_by_an_input_are_named(table6: dict[str, LinearModel]) -> None:
     model, u = table6["major_leakage"], np.full(3_000, 130.0)
     found = violations(model, u, Limits(125.66, stroke=0.05, output=0.01))
     assert [sentence.split()[1] for sentence in found] == ["input", "output", "stroke"]
@@ -59,7 +59,7 @@ def test_limits_that_a_test_breaks_are_named(table6: dict[str, LinearModel]) -> 
     assert "dead zone for 100 %" in idle
 
 
-def test_what_cannot_be_designed_is_refused() -> None:
+def test_an_infeasible_input_design_is_refused() -> None:
     with pytest.raises(HydrostateError, match="needs samples of"):
         prbs_for(1_000.0, 1e-3, LIMITS, slowest=0.1, duration=1.0)
     with pytest.raises(HydrostateError, match="frequencies must lie"):

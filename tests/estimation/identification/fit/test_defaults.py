@@ -64,22 +64,22 @@ def plain(found: Any) -> Any:
         ),
     ],
 )
-def test_what_is_not_named_is_the_default(fit: Callable[..., Any], named: dict[str, Any]) -> None:
+def test_omitted_arguments_have_the_expected_defaults(fit: Callable[..., Any], named: dict[str, Any]) -> None:
     np.testing.assert_equal(plain(fit()), plain(fit(**named)))
 
 
-def test_an_order_is_read_off_fifteen_rows_unless_told() -> None:
+def test_the_order_test_uses_fifteen_rows_by_default() -> None:
     u, y = np.tile(U, 2), np.tile(Y, 2)
     found = [order_test(u, y, n_lags=30, rng=np.random.default_rng(0), **one) for one in ({}, {"n_rows": 15})]
     assert len(found[0].projected_singular_values) == len(found[1].projected_singular_values) == 15
     assert found[0].projected_noise_floor == found[1].projected_noise_floor
 
 
-def test_a_test_is_passed_at_five_percent() -> None:
+def test_a_residual_test_is_passed_above_five_percent_by_default() -> None:
     assert [ResidualTest(1.0, 1, p).passed() for p in (0.049, 0.051)] == [False, True]
 
 
-def test_a_dead_time_of_less_than_a_sample_is_found() -> None:
+def test_a_dead_time_shorter_than_a_sample_is_found() -> None:
     late = LinearModel([2.0], [1.0, 2.0], 0.1, "u", "y", continuous=True, dead_time=0.04)
     u = np.repeat(RNG.choice([-1.0, 1.0], 100), 4)
     y = late.simulate(u) + 0.01 * RNG.standard_normal(400)

@@ -27,13 +27,13 @@ def closed_loop(rng: np.random.Generator, n: int, gain: float) -> tuple[np.ndarr
     return u, y
 
 
-def test_inputs_that_follow_the_noise_are_found() -> None:
+def test_feedback_from_the_noise_to_the_input_is_found() -> None:
     u, y = closed_loop(np.random.default_rng(1), 4_000, 0.8)
     model = fit_output_error(u, y, 1e-3, n_numerator=1, n_denominator=1, delay=1)
     assert feedback_test(y - model.simulate(u), u).p_value < 1e-9
 
 
-def test_the_size_in_open_loop_is_right_for_coloured_noise_too() -> None:
+def test_the_feedback_test_keeps_its_false_alarm_rate_for_coloured_noise() -> None:
     rejected = []
     for seed in range(100):
         rng = np.random.default_rng([3, seed])
@@ -54,7 +54,7 @@ def test_a_log_from_a_closed_loop_warns() -> None:
     assert {one.filename for one in caught} == {__file__}  # a warning points at the caller
 
 
-def test_a_closed_loop_is_noticed_between_any_columns_and_an_open_one_is_not() -> None:
+def test_a_closed_loop_is_noted_for_columns_of_any_name_and_an_open_one_is_not() -> None:
     u, y = closed_loop(np.random.default_rng(2), 1_000, 0.8)
     with pytest.warns(LogWarning, match="closed loop"):
         found = identify_channels(channels_from([u], [y], 1e-3, ["u"], "y"), order=1, delay=1)
@@ -69,7 +69,7 @@ def test_a_short_residual_is_refused(plant_30hz: LinearModel) -> None:
         feedback_test(plant_30hz.simulate(np.ones(50)), np.ones(50))
 
 
-def test_a_log_too_short_for_the_test_says_nothing() -> None:
+def test_a_log_too_short_for_the_feedback_test_gets_no_note() -> None:
     u, y = closed_loop(np.random.default_rng(1), 4_000, 0.8)
     model = fit_output_error(u, y, 1e-3, n_numerator=1, n_denominator=1, delay=1)
     residual, short = y - model.simulate(u), 8 * DEFAULT_LAGS - 1
@@ -77,20 +77,20 @@ def test_a_log_too_short_for_the_test_says_nothing() -> None:
     assert feedback_note(residual[:short], u[:short], ("u", "y")) is None
 
 
-def test_an_unstable_model_is_not_simulated_to_look_for_feedback(recwarn: pytest.WarningsRecorder) -> None:
+def test_the_feedback_test_does_not_simulate_an_unstable_model(recwarn: pytest.WarningsRecorder) -> None:
     unstable: Any = SimpleNamespace(is_stable=False)
     from_record._warn_of_feedback(unstable, np.zeros(10), np.zeros(10))
     assert len(recwarn) == 0
 
 
-def test_an_adopted_model_that_is_unstable_does_not_run_free() -> None:
+def test_an_unstable_model_is_refused_for_free_runs() -> None:
     unstable: Any = SimpleNamespace(is_stable=False, structure="arx")
     data: Any = SimpleNamespace(output="speed")
     with pytest.raises(HydrostateError, match="the arx model of 'speed' is unstable and does not run free: use"):
         other_structures._dynamics(unstable, data, data)
 
 
-def test_columns_that_are_swapped_are_told_and_not_ok() -> None:
+def test_swapped_input_and_output_are_noted_and_the_model_is_not_sound() -> None:
     rng = np.random.default_rng(4)
     u = np.repeat(rng.uniform(-1.0, 1.0, 80), 10)
     y = filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u) + 0.01 * rng.normal(size=u.size)
@@ -101,7 +101,7 @@ def test_columns_that_are_swapped_are_told_and_not_ok() -> None:
     assert note.data["back"] < 0.05 < 0.2 < note.data["left"]
 
 
-def test_a_loop_that_is_driven_by_its_set_point_is_not_swapped() -> None:
+def test_a_closed_loop_driven_by_its_set_point_is_not_taken_for_swapped_columns() -> None:
     u, y = closed_loop(np.random.default_rng(5), 2_000, 0.8)
     with pytest.warns(LogWarning, match="closed loop"):
         found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"), order=1, delay=1)

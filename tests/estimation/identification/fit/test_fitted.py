@@ -9,7 +9,7 @@ import pytest
 from estimation.identification.fit.fitted import quality
 
 
-def test_the_deviation_of_a_residual_has_no_bias_however_many_parameters_are_fitted() -> None:
+def test_the_residual_variance_is_unbiased_with_many_parameters() -> None:
     rng = np.random.default_rng(1)
     n, p, sigma, found = 12, 6, 0.3, []
     data: Any = SimpleNamespace(n_used=n, y_scale=1.0, used=np.ones(n, dtype=bool), y=None)

@@ -12,7 +12,7 @@ PUBLISHED = np.array([95.1089, 203.5034, 20.3935])
 PUBLISHED_STD = np.array([0.11, 1.15, 0.10])
 
 
-def test_a_simulated_body_comes_back() -> None:
+def test_mass_and_friction_of_a_simulated_body_are_found() -> None:
     time = 1e-3 * np.arange(20_000)
     position = 0.1 * np.sin(3.0 * time) + 0.05 * np.sin(7.0 * time)
     velocity = 0.3 * np.cos(3.0 * time) + 0.35 * np.cos(7.0 * time)
@@ -40,7 +40,7 @@ def test_the_positioning_system_has_the_published_mass_and_friction(emps: Path) 
     assert force_error(found, *columns[1], 1e-3) <= 0.050
 
 
-def test_a_body_that_does_not_move_both_ways_is_refused() -> None:
+def test_a_log_without_motion_in_both_directions_is_refused() -> None:
     with pytest.raises(HydrostateError, match="move both ways"):
         fit_rigid_body(np.arange(1_000.0), np.ones(1_000), 1e-3)
     with pytest.raises(HydrostateError, match="of one length"):

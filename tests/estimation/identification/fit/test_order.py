@@ -11,7 +11,7 @@ Binary = Callable[..., np.ndarray]
 
 
 @pytest.mark.parametrize("condition", ["normal", "minor_leakage", "major_leakage", "major_leakage_major_friction"])
-def test_a_second_order_system_is_found_to_be_one(
+def test_a_second_order_system_has_suggested_order_two(
     condition: str, table6: dict[str, LinearModel], binary: Binary
 ) -> None:
     rng = np.random.default_rng(7)
@@ -23,7 +23,7 @@ def test_a_second_order_system_is_found_to_be_one(
     assert found.projected_singular_values[2] < found.projected_noise_floor
 
 
-def test_hankel_values_show_the_order_where_the_input_is_rich(plant_30hz: LinearModel) -> None:
+def test_hankel_singular_values_show_the_order_with_a_white_input(plant_30hz: LinearModel) -> None:
     rng = np.random.default_rng(8)
     u = rng.standard_normal(10_000)
     y = plant_30hz.simulate(u)
@@ -32,7 +32,7 @@ def test_hankel_values_show_the_order_where_the_input_is_rich(plant_30hz: Linear
     assert found.suggested_order == 2
 
 
-def test_the_floor_holds_for_coloured_noise(plant_30hz: LinearModel, binary: Binary) -> None:
+def test_the_noise_floor_is_valid_for_coloured_noise(plant_30hz: LinearModel, binary: Binary) -> None:
     rng = np.random.default_rng(9)
     u = binary(rng, 10_000, 20)
     y = plant_30hz.simulate(u)
@@ -48,7 +48,7 @@ def test_noise_alone_has_no_order() -> None:
     assert (found.hankel_singular_values > found.hankel_noise_floor).sum() == 0
 
 
-def test_the_impulse_response_comes_back(plant_30hz: LinearModel) -> None:
+def test_markov_parameters_equal_the_impulse_response_without_noise(plant_30hz: LinearModel) -> None:
     u = np.random.default_rng(11).standard_normal(3_000)
     pulse = np.zeros(200)
     pulse[0] = 1.0

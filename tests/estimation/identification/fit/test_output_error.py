@@ -45,7 +45,7 @@ def mahalanobis(fitted: LinearModel, truth: LinearModel) -> float:
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
-def test_table_6_coefficients_come_back_within_their_intervals(
+def test_intervals_contain_the_coefficients_of_table_6(
     condition: str, table6: dict[str, LinearModel], binary: Binary
 ) -> None:
     truth, rng = table6[condition], np.random.default_rng(6)
@@ -131,7 +131,7 @@ def test_inputs_are_not_changed(plant_30hz: LinearModel, binary: Binary) -> None
     assert first.to_dict() == again.to_dict()
 
 
-def test_a_long_record_is_fitted_whole(plant_30hz: LinearModel, binary: Binary) -> None:
+def test_all_samples_of_a_long_record_are_fitted(plant_30hz: LinearModel, binary: Binary) -> None:
     rng = np.random.default_rng(8)
     u = np.concatenate([np.zeros(60_000), binary(rng, 60_000, 20)])
     y = plant_30hz.simulate(u) + 0.5 * rng.standard_normal(u.size)
@@ -195,7 +195,7 @@ def test_filtering_the_output_only_moves_the_poles_and_filtering_both_does_not(
     assert abs(both.numerator[0] / both.dc_gain) < 0.02
 
 
-def test_a_coloured_covariance_allows_for_the_filter(plant_30hz: LinearModel, binary: Binary) -> None:
+def test_a_coloured_covariance_accounts_for_filtered_noise(plant_30hz: LinearModel, binary: Binary) -> None:
     form = {"n_numerator": 2, "n_denominator": 2, "delay": 1}
     white, coloured = [], []
     for seed in range(8):
@@ -232,7 +232,7 @@ def hair_dryer() -> np.ndarray:
 
 @pytest.mark.filterwarnings("ignore:the pole .* nearly cancel")  # correct for the third order
 @pytest.mark.parametrize(("form", "wanted"), [((2, 2, 3), 88.77), ((3, 3, 3), 89.35)])
-def test_the_hair_dryer_is_fitted_as_well_as_by_the_peers(
+def test_the_fit_to_the_hair_dryer_is_at_least_as_good_as_that_of_other_tools(
     form: tuple[int, int, int], wanted: float, hair_dryer: np.ndarray
 ) -> None:
     u, y = detrend(hair_dryer[:, 0]), detrend(hair_dryer[:, 1])

@@ -44,14 +44,14 @@ def deviations(fitted: LinearModel, truth: LinearModel) -> np.ndarray:
     return np.abs(error) / fitted.coefficient_std
 
 
-def test_arx_comes_back_where_noise_enters_inside_the_loop(plant_30hz: LinearModel) -> None:
+def test_arx_finds_the_plant_if_noise_enters_through_the_denominator(plant_30hz: LinearModel) -> None:
     u, y = record(plant_30hz, [1.0], plant_30hz.denominator.tolist(), 0.1, 1)
     fitted = fit_arx(u, y, 1e-3, **FORM)
     assert (deviations(fitted, plant_30hz) < 3.0).all()
     np.testing.assert_array_equal(fitted.noise_denominator, fitted.denominator)
 
 
-def test_arx_leaves_out_rows_that_miss_an_output(plant_30hz: LinearModel) -> None:
+def test_arx_leaves_out_rows_with_a_missing_output(plant_30hz: LinearModel) -> None:
     u, y = record(plant_30hz, [1.0], plant_30hz.denominator.tolist(), 0.1, 2)
     y[100:140:4] = np.nan
     fitted = fit_arx(u, y, 1e-3, **FORM)
@@ -84,7 +84,7 @@ def test_armax_finds_the_noise_numerator(plant_30hz: LinearModel) -> None:
     assert fitted.noise_numerator[1] == pytest.approx(-0.6, abs=0.05)
 
 
-def test_box_jenkins_finds_system_and_noise_apart_and_bears_gaps(plant_30hz: LinearModel) -> None:
+def test_box_jenkins_separates_plant_and_noise_despite_gaps(plant_30hz: LinearModel) -> None:
     u, y = record(plant_30hz, [1.0, 0.5], [1.0, -0.9], 0.1, 4)
     y[::50] = np.nan
     fitted = fit_box_jenkins(u, y, 1e-3, **FORM, n_c=1, n_d=1)
@@ -93,7 +93,7 @@ def test_box_jenkins_finds_system_and_noise_apart_and_bears_gaps(plant_30hz: Lin
     assert fitted.noise_denominator[1] == pytest.approx(-0.9, abs=0.04)
 
 
-def test_box_jenkins_is_more_accurate_than_it_is_without_a_noise_model(plant_30hz: LinearModel) -> None:
+def test_box_jenkins_is_more_accurate_with_a_noise_model(plant_30hz: LinearModel) -> None:
     u, y = record(plant_30hz, [1.0], [1.0, -0.97], 0.2, 5)
     coloured = fit_box_jenkins(u, y, 1e-3, **FORM, n_c=0, n_d=1)
     plain = fit_box_jenkins(u, y, 1e-3, **FORM, n_c=0, n_d=0, covariance="coloured")
@@ -102,14 +102,14 @@ def test_box_jenkins_is_more_accurate_than_it_is_without_a_noise_model(plant_30h
     assert coloured.pole_std[0].real < plain.pole_std[0].real
 
 
-def test_refined_instruments_are_as_good_as_output_error(plant_30hz: LinearModel) -> None:
+def test_refined_instrumental_variables_find_the_plant_in_white_noise(plant_30hz: LinearModel) -> None:
     u, y = record(plant_30hz, [1.0], [1.0], 0.2, 6)
     fitted = fit_instrumental(u, y, 1e-3, **FORM)
     assert fitted.structure == "SRIV"
     assert (deviations(fitted, plant_30hz) < 3.0).all()
 
 
-def test_refined_instruments_take_a_noise_model(plant_30hz: LinearModel) -> None:
+def test_refined_instrumental_variables_find_the_plant_and_a_noise_model(plant_30hz: LinearModel) -> None:
     u, y = record(plant_30hz, [1.0], [1.0, -0.9], 0.2, 7)
     fitted = fit_instrumental(u, y, 1e-3, **FORM, n_d=1)
     assert fitted.structure == "RIV"
@@ -117,7 +117,7 @@ def test_refined_instruments_take_a_noise_model(plant_30hz: LinearModel) -> None
     assert fitted.noise_denominator[1] == pytest.approx(-0.9, abs=0.03)
 
 
-def test_a_subspace_fit_reads_its_order_off_the_noise_floor(table6: dict[str, LinearModel]) -> None:
+def test_a_subspace_fit_chooses_its_order_by_the_noise_floor(table6: dict[str, LinearModel]) -> None:
     truth = table6["major_leakage"]
     rng = np.random.default_rng(8)
     u = np.repeat(rng.choice([-1.0, 1.0], 400), 50)
@@ -129,7 +129,7 @@ def test_a_subspace_fit_reads_its_order_off_the_noise_floor(table6: dict[str, Li
 
 
 @pytest.mark.parametrize("late", [0.0, 0.0023])
-def test_a_continuous_model_comes_back_with_its_dead_time(late: float) -> None:
+def test_a_continuous_model_and_its_dead_time_are_found(late: float) -> None:
     w = 2.0 * np.pi * 30.0
     truth = LinearModel(
         np.array([w * w]), np.array([1.0, 1.2 * w, w * w]), 1e-3, "u", "y", continuous=True, dead_time=late
@@ -142,7 +142,7 @@ def test_a_continuous_model_comes_back_with_its_dead_time(late: float) -> None:
         assert abs(fitted.dead_time - late) < 3.0 * fitted.dead_time_std < 2e-4
 
 
-def test_a_long_dead_time_has_no_initial_values_to_search_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_dead_time_adds_no_initial_values_to_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
     searched: list[int] = []
 
     def descended(form: Structure, *given: Any) -> tuple[float, np.ndarray]:
@@ -163,7 +163,7 @@ def test_a_long_dead_time_has_no_initial_values_to_search_for(monkeypatch: pytes
     assert short.without_whole_samples() is short
 
 
-def test_a_held_input_makes_continuous_and_discrete_the_same() -> None:
+def test_a_continuous_model_with_a_held_input_is_discretised_exactly() -> None:
     late = LinearModel(np.array([2.0]), np.array([1.0, 2.0]), 0.1, "u", "y", continuous=True, dead_time=0.25)
     time = 0.1 * np.arange(30)
     wanted = np.where(time > 0.25, 1.0 - np.exp(-2.0 * np.maximum(time - 0.25, 0.0)), 0.0)
@@ -208,7 +208,7 @@ def test_an_unstable_model_warns() -> None:
         (lambda u, y: choose_model(u, y, 1.0, structures=("OE",)), "structures must be among"),  # pyright: ignore
     ],
 )
-def test_what_cannot_be_fitted_is_refused(fit: Callable[[np.ndarray, np.ndarray], object], message: str) -> None:
+def test_unsuitable_data_or_sizes_are_refused(fit: Callable[[np.ndarray, np.ndarray], object], message: str) -> None:
     u = np.random.default_rng(13).standard_normal(400)
     y = u.copy()
     y[7] = np.nan

@@ -18,14 +18,14 @@ from plant.errors import HydrostateError
 Binary = Callable[..., np.ndarray]
 
 
-def test_a_perfect_simulation_fits_by_100_percent_and_the_mean_by_0() -> None:
+def test_a_perfect_simulation_fits_100_percent_and_the_mean_0_percent() -> None:
     y = np.array([1.0, 2.0, np.nan, 6.0])
     assert fit_percent(y, np.array([1.0, 2.0, 0.0, 6.0])) == 100.0
     assert fit_percent(y, np.full(4, 3.0)) == 0.0
     assert rmse(y, np.array([1.0, 2.0, 0.0, 3.0])) == pytest.approx(np.sqrt(3.0))
 
 
-def test_the_ljung_box_statistic_is_its_textbook_formula() -> None:
+def test_the_ljung_box_statistic_equals_the_textbook_formula() -> None:
     e = np.random.default_rng(1).standard_normal(300)
     e -= e.mean()
     r = [e[k:] @ e[:-k] / (e @ e) for k in range(1, 11)]
@@ -40,7 +40,7 @@ def test_white_residuals_pass_and_coloured_ones_fail() -> None:
     assert not ljung_box(lfilter([1.0], [1.0, -0.3], np.random.default_rng(2).standard_normal(2_000))).passed()
 
 
-def test_the_whiteness_test_rejects_as_often_as_it_says() -> None:
+def test_the_whiteness_test_keeps_its_nominal_rejection_rate() -> None:
     rng = np.random.default_rng(3)
     rejected = [not ljung_box(rng.standard_normal(500)).passed() for _ in range(400)]
     assert 0.02 < np.mean(rejected) < 0.08
@@ -55,17 +55,19 @@ def right_model_s_verdict(plant: LinearModel, binary: Binary, seed: int) -> Resi
     return validate(fitted, u, y, fitted=True).cross_correlation
 
 
-def test_the_right_model_leaves_no_input_in_its_residual(plant_30hz: LinearModel, binary: Binary) -> None:
+def test_the_residual_of_the_right_model_is_uncorrelated_with_the_input(
+    plant_30hz: LinearModel, binary: Binary
+) -> None:
     assert right_model_s_verdict(plant_30hz, binary, 0).passed()
 
 
 @pytest.mark.slow
-def test_the_cross_correlation_test_rejects_as_often_as_it_says(plant_30hz: LinearModel, binary: Binary) -> None:
+def test_the_cross_correlation_test_keeps_its_nominal_rejection_rate(plant_30hz: LinearModel, binary: Binary) -> None:
     rejected = [not right_model_s_verdict(plant_30hz, binary, seed).passed() for seed in range(200)]
     assert 0.02 < np.mean(rejected) < 0.08
 
 
-def test_too_low_an_order_is_found_out(plant_30hz: LinearModel, binary: Binary) -> None:
+def test_the_cross_correlation_test_rejects_too_low_an_order(plant_30hz: LinearModel, binary: Binary) -> None:
     rng = np.random.default_rng(5)
     u = binary(rng, 3_000, 20)
     y = plant_30hz.simulate(u)
@@ -77,7 +79,7 @@ def test_too_low_an_order_is_found_out(plant_30hz: LinearModel, binary: Binary) 
     assert verdict.rmse == pytest.approx(first_order.rmse, rel=1e-9)
 
 
-def test_a_model_is_validated_from_the_state_that_the_log_begins_in(plant_30hz: LinearModel, binary: Binary) -> None:
+def test_the_initial_state_of_a_log_in_motion_is_estimated(plant_30hz: LinearModel, binary: Binary) -> None:
     rng = np.random.default_rng(6)
     u = binary(rng, 600, 20)
     y = plant_30hz.simulate(u)[300:]
@@ -88,7 +90,7 @@ def test_a_model_is_validated_from_the_state_that_the_log_begins_in(plant_30hz: 
     )
 
 
-def test_the_cross_correlation_test_counts_only_what_the_input_can_tell_apart() -> None:
+def test_the_degrees_of_freedom_of_the_cross_correlation_are_those_that_the_input_excites() -> None:
     rng = np.random.default_rng(7)
     u = np.sin(0.2 * np.arange(1_000))
     result = cross_correlation_test(rng.standard_normal(1_000), u)

@@ -39,7 +39,7 @@ def found() -> Identified:
         return identify_channels(channels(0), structure="auto", order=2, delay=1)
 
 
-def test_auto_finds_what_no_linear_model_follows(found: Identified) -> None:
+def test_auto_finds_an_absolute_value_at_the_output(found: Identified) -> None:
     assert (found.model.structure, found.sound) == ("wiener", True)
     assert found.model.nonlinearity is not None
     assert found.model.nonlinearity["kind"] == "absolute-value"
@@ -62,7 +62,7 @@ def test_the_default_follows_an_output_whose_sign_is_missing(shift: float, told:
         assert found.held_back_percent > 90.0
 
 
-def test_a_model_is_the_same_after_it_was_saved(found: Identified) -> None:
+def test_a_saved_model_simulates_the_same_output(found: Identified) -> None:
     again = FreeRunModel.from_dict(json.loads(json.dumps(found.model.to_dict())))
     u, y = logged(2)
     np.testing.assert_array_equal(again.simulate(u, y), found.model.simulate(u, y))
@@ -70,7 +70,7 @@ def test_a_model_is_the_same_after_it_was_saved(found: Identified) -> None:
     assert (again.simulate(u) - y)[50:].std() < 0.1 * y.std()
 
 
-def test_a_lag_behind_the_absolute_value_is_told() -> None:
+def test_a_lag_behind_the_absolute_value_is_found() -> None:
     model = identify_channels(channels(3, lag=0.5), structure="wiener", order=2, delay=1).model
     assert isinstance(model.dynamics, AbsoluteDynamics)
     assert model.dynamics.lag == pytest.approx(0.5, abs=0.03)
@@ -79,7 +79,7 @@ def test_a_lag_behind_the_absolute_value_is_told() -> None:
     np.testing.assert_allclose(model.dynamics.linear.f, F, atol=0.02)
 
 
-def test_derivatives_are_exact_where_no_sample_changes_its_sign() -> None:
+def test_derivatives_are_exact_if_no_sample_changes_its_sign() -> None:
     data, by = scaled(channels(4))
     problem = AbsoluteProblem(Form(2, (1,), (1,)), from_zero(data, by))
     theta = np.array([0.3, 0.5, *F[1:], 0.2, 0.4, -0.1])
@@ -92,7 +92,7 @@ def test_derivatives_are_exact_where_no_sample_changes_its_sign() -> None:
     assert (output > 0.0).all()
 
 
-def test_signs_are_told_from_squares() -> None:
+def test_signs_are_estimated_from_the_square_of_the_output() -> None:
     data, by = scaled(channels(5))
     truth = np.sign(filtered(np.array([0.0, 0.2]), F, logged(5)[0]))
     agree = [abs(float(np.mean(one * truth))) for one in signs_at_first(from_zero(data, by))[1:]]
@@ -100,7 +100,7 @@ def test_signs_are_told_from_squares() -> None:
 
 
 @pytest.mark.parametrize(("shift", "sign", "may"), [(0.0, 1.0, True), (1.0, 1.0, False), (0.0, -1.0, False)])
-def test_only_what_touches_zero_and_stays_above_may_lack_its_sign(shift: float, sign: float, may: bool) -> None:
+def test_only_an_output_that_touches_zero_from_above_may_lack_its_sign(shift: float, sign: float, may: bool) -> None:
     u, y = logged(6)
     data, by = scaled(channels_from([u[:, None]], [sign * y + shift], 0.02, ["u"], "y"))
     assert may_lack_sign(data, by) is may

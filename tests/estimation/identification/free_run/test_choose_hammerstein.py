@@ -24,7 +24,7 @@ def candidate(held_back: float, bic: float, doubt: str = "") -> HammersteinCandi
     return HammersteinCandidate(NONE, doubt, block_errors=(held_back,), bic=bic)
 
 
-def test_the_smallest_of_those_that_do_nearly_as_well_as_the_best_is_chosen() -> None:
+def test_the_lowest_bic_among_candidates_nearly_as_good_as_the_best_is_chosen() -> None:
     best = candidate(0.1, 50.0)
     near = candidate(0.1 * (1.0 + 0.99 * CLEARLY), 40.0)
     far = candidate(0.1 * (1.0 + 1.01 * CLEARLY), 30.0)
@@ -39,7 +39,7 @@ def linear(order: int, delay: int, held_back: float) -> Any:
     return SimpleNamespace(form=Form(order, (1,), (delay,)), held_back=held_back)
 
 
-def test_bent_models_begin_at_the_best_linear_one_of_each_order_with_and_without_a_dead_time() -> None:
+def test_hammerstein_fits_begin_at_the_best_linear_model_of_each_order_with_and_without_dead_time() -> None:
     late, later, at_once = linear(2, 1, 0.3), linear(2, 5, 0.2), linear(2, 0, 0.9)
     high, higher = linear(ORDERS, 1, 0.5), linear(ORDERS + 1, 1, 0.1)
     found = _bases([late, later, at_once, high, higher])
@@ -47,7 +47,7 @@ def test_bent_models_begin_at_the_best_linear_one_of_each_order_with_and_without
 
 
 @pytest.mark.parametrize("cost", [0.0, 3.0, 70.0])
-def test_the_criterion_is_that_of_a_gaussian_likelihood(cost: float) -> None:
+def test_bic_is_that_of_a_gaussian_likelihood(cost: float) -> None:
     fit: Any = SimpleNamespace(theta=np.zeros(5), cost=cost)
     data: Any = SimpleNamespace(n_samples=200)
     found = _bic(fit, data)
@@ -58,7 +58,7 @@ def test_the_criterion_is_that_of_a_gaussian_likelihood(cost: float) -> None:
         assert found == pytest.approx(5.0 * np.log(200.0) - 2.0 * likelihood)
 
 
-def test_what_is_told_of_a_candidate_is_in_percent_and_by_its_sizes() -> None:
+def test_a_row_of_the_candidate_table_has_percentages_and_model_sizes() -> None:
     form = Form(3, (2, 1), (1, 4))
     one: Any = SimpleNamespace(form=form, held_back=0.25, bic=-7.0, aic=-9.0, doubt="")
     assert linear_row(one) == {

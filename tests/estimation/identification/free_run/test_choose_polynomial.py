@@ -36,7 +36,7 @@ def rubs(
     return asked, _with_friction(models, DATA)
 
 
-def test_friction_is_tried_on_two_models_of_each_order_to_the_third_and_holds_a_position_from_the_second(
+def test_friction_is_tried_on_the_best_two_models_of_orders_1_to_3_and_position_friction_from_order_2(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     models = [linear(order, 0.1 * rank + order) for order in (1, 2, 3, 4) for rank in (3, 1, 2)]
@@ -50,7 +50,7 @@ def test_friction_is_tried_on_two_models_of_each_order_to_the_third_and_holds_a_
     assert found == []
 
 
-def test_a_model_that_rubs_goes_on_where_friction_explains_a_tenth_of_the_error_and_two_of_them_do(
+def test_the_best_two_models_with_friction_are_kept_if_it_explains_a_tenth_of_the_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     models = [linear(1, 1.0), linear(2, 2.0), linear(3, 3.0)]
@@ -74,7 +74,7 @@ class Growing:
         return self.errors[1]
 
 
-def test_growths_are_compared_after_three_products_and_the_best_are_taken_to_twenty() -> None:
+def test_growing_models_are_compared_at_three_products_and_the_best_grow_to_twenty() -> None:
     growths: Any = [Growing(0.4), Growing(0.1, runs=False), Growing(0.3), Growing(0.2)]
     assert _best_grown(growths, 2) == [0.2, 0.3]
     assert [one.most for one in growths] == [[3], [3], [3, 20], [3, 20]]
@@ -104,7 +104,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch, error: Callable[[int], float]) -> l
     return fitted
 
 
-def test_of_the_models_of_every_product_sixteen_and_six_larger_ones_are_fitted_but_for_wild_ones(
+def test_the_best_sixteen_dense_models_and_six_larger_ones_are_kept_except_wild_ones(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     made_up(monkeypatch, lambda rank: 1.0 + 1e-6 * rank)
@@ -114,7 +114,7 @@ def test_of_the_models_of_every_product_sixteen_and_six_larger_ones_are_fitted_b
     assert found[0].price == pytest.approx(np.hypot(1.0, 0.25), abs=1e-5)
 
 
-def test_a_model_that_cannot_be_the_best_one_any_more_is_not_fitted_to_all_data(
+def test_a_model_that_can_no_longer_be_the_best_is_not_fitted_to_all_data(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # the price of the first model is 1.031 with its spread of 0.25: the fifth has a larger held-back error
@@ -126,7 +126,7 @@ def test_a_model_that_cannot_be_the_best_one_any_more_is_not_fitted_to_all_data(
     assert fitted == [1]
 
 
-def test_a_recipe_goes_on_from_the_same_one_with_fewer_penalties() -> None:
+def test_the_fit_of_a_recipe_starts_from_that_with_one_penalty_fewer() -> None:
     steps: list[tuple[Any, Any, Any]] = []
 
     class Noted(Recipe):

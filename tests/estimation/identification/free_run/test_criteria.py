@@ -7,7 +7,7 @@ from scipy.stats import norm
 from estimation.identification.free_run.choose_linear import criteria
 
 
-def test_criteria_are_those_of_gaussian_errors_but_for_what_all_models_of_a_log_share() -> None:
+def test_criteria_equal_those_of_gaussian_errors_without_the_constant_common_to_all_models() -> None:
     errors = np.random.default_rng(1).normal(0.0, 0.2, 300)
     cost, samples = float(errors @ errors), len(errors)
     twice = -2.0 * float(np.sum(norm.logpdf(errors, scale=np.sqrt(cost / samples))))

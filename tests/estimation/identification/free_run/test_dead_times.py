@@ -34,12 +34,12 @@ def late_plant(delay: int, count: int = 700, seed: int = 0, held: int = 9) -> Ch
 
 
 @pytest.mark.parametrize("delay", [30, 80])
-def test_a_dead_time_beyond_those_tried_one_by_one_is_found(delay: int) -> None:
+def test_a_dead_time_longer_than_those_tried_individually_is_found(delay: int) -> None:
     (found,) = estimate_delays(scaled(late_plant(delay))[0])
     assert delay - 5 <= found <= delay + 1
 
 
-def test_a_dead_time_beyond_a_twentieth_of_a_short_log_is_found_and_left_out() -> None:
+def test_a_dead_time_of_more_than_a_twentieth_of_a_short_log_is_found_and_its_fit_leaves_the_noise() -> None:
     data = late_plant(18, 200, seed=1, held=5)
     (found,) = estimate_delays(scaled(data)[0])
     assert 16 <= found <= 19
@@ -47,7 +47,7 @@ def test_a_dead_time_beyond_a_twentieth_of_a_short_log_is_found_and_left_out() -
     assert fit.cost / 200 == pytest.approx(NOISE**2, rel=0.15)
 
 
-def test_a_dead_time_is_found_where_nearly_half_of_the_outputs_are_missing() -> None:
+def test_a_dead_time_is_found_with_nearly_half_of_the_outputs_missing() -> None:
     data = late_plant(80)
     y = data.y[0].copy()
     y[80:400] = np.nan
@@ -55,7 +55,7 @@ def test_a_dead_time_is_found_where_nearly_half_of_the_outputs_are_missing() -> 
     assert 75 <= found <= 81
 
 
-def test_each_of_two_inputs_has_its_dead_time() -> None:
+def test_each_of_two_inputs_has_its_own_dead_time() -> None:
     first, second = scaled(late_plant(60))[0], scaled(late_plant(3, seed=1, held=7))[0]
     both = replace(
         first,
@@ -68,14 +68,14 @@ def test_each_of_two_inputs_has_its_dead_time() -> None:
     assert early <= 4
 
 
-def test_inputs_that_come_back_have_the_shortest_dead_time() -> None:
+def test_with_periodic_inputs_the_shortest_dead_time_is_found() -> None:
     u = np.tile(np.repeat([1.0, -1.0], 40), 10)
     y = np.concatenate([np.full(3, -1.0), u[:-3]]) + 0.01 * np.random.default_rng(0).normal(size=u.size)
     (found,) = estimate_delays(scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))[0])
     assert 2 <= found <= 3
 
 
-def test_outputs_that_answer_inputs_from_before_the_log_are_left_out_of_a_fit() -> None:
+def test_outputs_that_respond_to_inputs_before_the_log_are_left_out_of_a_fit() -> None:
     data = scaled(late_plant(80))[0]
     fit = fit_linear(Form(2, (1,), (80,)), data)
     answered = (Problem(fit.form, data).jacobian(fit.theta)[0] - data.y[0])[80:]
@@ -85,7 +85,7 @@ def test_outputs_that_answer_inputs_from_before_the_log_are_left_out_of_a_fit() 
 
 
 @pytest.mark.parametrize("short", [60, 130])
-def test_a_short_log_beside_a_long_one_does_not_answer_inputs_from_before_it(short: int) -> None:
+def test_each_of_several_logs_leaves_out_the_outputs_within_its_dead_time(short: int) -> None:
     long, brief = late_plant(80), late_plant(80, short, seed=1)
     both = scaled(replace(long, u=(*brief.u, *long.u), y=(*brief.y, *long.y)))[0]
     fit = fit_linear(Form(2, (1,), (80,)), both)
@@ -96,7 +96,7 @@ def test_a_short_log_beside_a_long_one_does_not_answer_inputs_from_before_it(sho
     assert np.sqrt(np.mean(left**2)) == pytest.approx(NOISE, rel=0.1)
 
 
-def test_a_state_space_begins_where_outputs_answer_inputs_of_their_log() -> None:
+def test_subspace_starts_ignore_a_log_without_outputs() -> None:
     rng = np.random.default_rng(0)
     y = np.zeros((300, 1))
     u = rng.choice([-1.0, 1.0], (300, 1))
@@ -106,7 +106,7 @@ def test_a_state_space_begins_where_outputs_answer_inputs_of_their_log() -> None
     assert np.array_equal(subspace_starts(silent, 1)[0][0], subspace_starts(told, 1)[0][0])
 
 
-def test_the_default_finds_a_dead_time_of_eighty_samples_and_judges_what_is_answered() -> None:
+def test_the_default_finds_a_dead_time_of_eighty_samples_and_rates_the_fit_after_it() -> None:
     found = identify_channels(late_plant(80), order=2)
     (numerator, _) = found.model.transfer_functions()[0]
     assert found.sound
@@ -115,7 +115,7 @@ def test_the_default_finds_a_dead_time_of_eighty_samples_and_judges_what_is_answ
     assert found.held_back_percent == pytest.approx(98.0, abs=0.5)
 
 
-def test_a_run_stays_where_it_begins_before_its_first_answer() -> None:
+def test_a_run_is_constant_during_its_dead_time() -> None:
     # an integrator has no steady state under its first input
     form = Form(2, (1,), (13,))
     dynamics = LinearDynamics(form, np.array([0.3, -1.69999999, 0.699999993, 0.0]))
@@ -126,7 +126,7 @@ def test_a_run_stays_where_it_begins_before_its_first_answer() -> None:
     assert np.ptp(run[:14]) == 0.0
 
 
-def test_a_state_space_is_not_fitted_to_outputs_that_answer_inputs_from_before_the_log() -> None:
+def test_a_state_space_fit_leaves_out_outputs_that_respond_to_inputs_before_the_log() -> None:
     late = joined([scaled(late_plant(80))[0]]).delayed((79,))
     assert late.slices == [slice(79, 700)]
     fit = fit_state_space(Size(2, 1, 1, direct=False), late)
@@ -136,7 +136,7 @@ def test_a_state_space_is_not_fitted_to_outputs_that_answer_inputs_from_before_t
     assert np.isfinite(joined([scaled(late_plant(80))[0]]).delayed((20,)).y[0]).all()
 
 
-def test_a_dead_time_beyond_those_looked_for_is_named() -> None:
+def test_a_dead_time_beyond_the_searched_range_is_noted() -> None:
     data = scaled(late_plant(200, 600))[0]
     (note,) = late_answers(data, rmse=0.9)
     assert note.code == "answers_late"
@@ -145,13 +145,13 @@ def test_a_dead_time_beyond_those_looked_for_is_named() -> None:
     assert late_answers(data, rmse=0.4) == []  # a model that explains most of the output has found the response
 
 
-def test_a_dead_time_that_is_looked_for_is_not_named_and_neither_is_chance() -> None:
+def test_neither_a_dead_time_in_the_searched_range_nor_unrelated_noise_is_noted() -> None:
     assert late_answers(scaled(late_plant(80, 600))[0], rmse=0.9) == []
     noise = np.random.default_rng(0).standard_normal((2, 300))
     assert late_answers(channels_from([noise[0][:, None]], [noise[1]], 0.1, ["u"], "y"), rmse=0.99) == []
 
 
-def test_a_model_before_a_dead_time_that_is_too_long_to_be_judged_is_not_sound() -> None:
+def test_a_model_is_not_sound_if_the_dead_time_is_beyond_the_searched_range() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
         found = identify_channels(late_plant(200, 600), order=1)

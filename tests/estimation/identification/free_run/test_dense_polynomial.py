@@ -35,7 +35,7 @@ def log(n: int = 400, seed: int = 1, noise: float = 0.01) -> Channels:
 RECIPE = Recipe(Form(1, (1,), (1,)), 2, 1e-8)
 
 
-def test_a_plant_of_products_is_found_by_one_least_squares_where_there_is_no_noise() -> None:
+def test_without_noise_one_least_squares_finds_the_terms_of_a_bilinear_plant() -> None:
     u = np.random.default_rng(1).uniform(-1.0, 1.0, 200)
     y = np.zeros(200)
     for t in range(1, 200):
@@ -50,7 +50,7 @@ def test_a_plant_of_products_is_found_by_one_least_squares_where_there_is_no_noi
     assert told[0, 0] == pytest.approx(0.0, abs=1e-5)
 
 
-def test_a_block_that_is_held_back_changes_nothing_of_its_fit() -> None:
+def test_a_held_back_block_does_not_affect_the_fit() -> None:
     data = log()
     mask = blocks(data, BLOCKS)[1]
     spoilt = Channels(data.inputs, data.output, 1.0, data.u, (np.where(mask[0], 50.0, data.y[0]),))
@@ -61,7 +61,7 @@ def test_a_block_that_is_held_back_changes_nothing_of_its_fit() -> None:
         assert np.array_equal(one.theta, other.theta)
 
 
-def test_a_penalty_makes_products_smaller_and_leaves_more_error() -> None:
+def test_a_larger_penalty_gives_smaller_coefficients_and_a_larger_error() -> None:
     data = log(noise=0.2)
     sizes, costs = list[float](), list[float]()
     for penalty in (1e-6, 1e-1, 1e1):
@@ -80,7 +80,7 @@ def test_too_few_samples_give_no_model() -> None:
     assert judged_recipes(data, parts, [Form(3, (30,), (0,))]) == []
 
 
-def test_sizes_that_are_asked_for_are_kept() -> None:
+def test_requested_sizes_are_kept() -> None:
     assert {form.order for form in forms_tried((5,), Asked())} == {1, 2, 3}
     assert {form.delays for form in forms_tried((5,), Asked())} == {(0,), (1,), (5,)}
     assert forms_tried((5, 1), Asked(order=4, delay=2)) == [Form(4, (4, 4), (2, 2))]
@@ -97,7 +97,7 @@ def late_product(n: int = 500) -> Channels:
     return scaled(channels_from([u[:, None]], [y + 0.01 * rng.normal(size=n)], 1.0, ["u"], "y"))[0]
 
 
-def test_a_lag_beyond_the_sizes_that_are_tried_first_is_found_and_no_further_one() -> None:
+def test_a_lag_beyond_the_first_sizes_is_found_and_much_larger_sizes_are_not_tried() -> None:
     data = late_product()
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
     forms = [Form(1, (2,), (0,)), Form(1, (3,), (0,))]
@@ -108,7 +108,7 @@ def test_a_lag_beyond_the_sizes_that_are_tried_first_is_found_and_no_further_one
     assert max(one.recipe.form.sizes[0] for one in found) <= 5
 
 
-def test_a_log_that_begins_in_motion_is_fitted_as_if_its_inputs_were_known_before_it() -> None:
+def test_the_fit_of_a_log_that_begins_in_motion_leaves_only_the_noise() -> None:
     data, recipe = late_product(), Recipe(Form(1, (4,), (0,)), 2, 1e-8, (1e-6,))
     assert np.ptp(data.u[0][:4]) > 1.0
     fit = recipe.fit(data)
@@ -125,7 +125,7 @@ def test_a_log_that_begins_in_motion_is_fitted_as_if_its_inputs_were_known_befor
     assert runs.used[2:500].all()
 
 
-def test_a_run_forgets_what_inputs_before_its_log_did() -> None:
+def test_the_effect_of_inputs_before_the_log_on_a_run_decays() -> None:
     data = late_product()
     fit = Recipe(Form(1, (4,), (0,)), 2, 1e-8, (1e-6,)).fit(data)
     assert fit is not None
@@ -137,27 +137,27 @@ def test_a_run_forgets_what_inputs_before_its_log_did() -> None:
     assert np.isfinite(body.run(u, np.full(40, np.nan))).all()
 
 
-def test_lags_that_are_asked_for_do_not_grow() -> None:
+def test_requested_lags_do_not_grow() -> None:
     data = late_product()
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
     found = judged_recipes(data, parts, [Form(1, (3,), (0,))], Asked(order=1, n_numerator=3))
     assert {one.recipe.form for one in found} == {Form(1, (3,), (0,))}
 
 
-def test_every_product_stands_once() -> None:
+def test_every_product_occurs_once() -> None:
     terms = every_term(4, 3)
     assert len(terms) == 1 + 4 + 10 + 20
     assert len({tuple(term) for term in terms.tolist()}) == len(terms)
 
 
-def test_other_orders_hold_the_same_inputs() -> None:
+def test_reordered_inputs_have_the_same_values() -> None:
     data = log()
     others = list(reordered(data))
     assert all(sorted(one.u[0][:, 0]) == sorted(data.u[0][:, 0]) for one in others)
     assert not any(np.array_equal(one.u[0], data.u[0]) for one in others)
 
 
-def test_fits_agree_where_the_data_tell_them_and_not_where_they_do_not() -> None:
+def test_fits_agree_with_many_clean_samples_and_disagree_with_few_noisy_ones() -> None:
     found: list[float] = []
     for n, noise in ((800, 0.01), (150, 0.3)):
         data, recipe = log(n, noise=noise), Recipe(Form(2, (2,), (0,)), 3, 1e-5)
@@ -168,7 +168,7 @@ def test_fits_agree_where_the_data_tell_them_and_not_where_they_do_not() -> None
     assert found[0] < 0.05 < 0.1 < found[1]
 
 
-def test_doubt_counts_beside_the_error_on_what_was_held_back() -> None:
+def test_the_price_of_a_model_includes_the_disagreement_of_its_fits() -> None:
     data = log()
     every = polynomial_candidates(linear_candidates(data, [1], (1,)), data, Asked(order=1, delay=1, n_numerator=1))
     assert len(every) > 1
@@ -177,7 +177,7 @@ def test_doubt_counts_beside_the_error_on_what_was_held_back() -> None:
         assert one.price > one.held_back
 
 
-def test_a_plant_of_products_runs_well_on_another_log() -> None:
+def test_the_model_of_a_bilinear_plant_simulates_another_log_well() -> None:
     u, y = bilinear(400, 1, 0.02)
     asked = {"order": 1, "delay": 1, "n_numerator": 1}
     model = identify_channels(channels_from([u[:, None]], [y], 1.0, ["u"], "y"), structure="narx", **asked).model

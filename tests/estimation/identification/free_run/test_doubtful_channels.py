@@ -31,7 +31,7 @@ def model() -> FreeRunModel:
     return identify_channels(channels(), order=1, delay=DELAY).model
 
 
-def test_an_input_that_follows_others_exactly_is_told_and_one_with_noise_is_not() -> None:
+def test_an_input_that_is_an_exact_combination_of_others_is_noted() -> None:
     u = np.random.default_rng(0).normal(size=(300, 3))
     names = ("a", "b", "sum")
 
@@ -46,7 +46,7 @@ def test_an_input_that_follows_others_exactly_is_told_and_one_with_noise_is_not(
 
 
 @pytest.mark.parametrize("size", [30.0, 1e6])
-def test_outputs_that_stand_out_and_decide_the_fit_are_told(size: float) -> None:
+def test_outliers_of_the_output_are_noted(size: float) -> None:
     data = channels()
     y = data.y[0].copy()
     y[[50, 200, 310]] += size
@@ -56,7 +56,7 @@ def test_outputs_that_stand_out_and_decide_the_fit_are_told(size: float) -> None
     assert [note.data["count"] for note in found.notes if note.code == "outliers"] == [3]
 
 
-def test_peaks_that_the_input_drives_are_no_outliers(model: FreeRunModel) -> None:
+def test_output_peaks_caused_by_the_input_are_not_taken_for_outliers(model: FreeRunModel) -> None:
     data = channels()
     u = 0.01 * data.u[0]
     u[[50, 200, 310]] = 40.0
@@ -64,7 +64,7 @@ def test_peaks_that_the_input_drives_are_no_outliers(model: FreeRunModel) -> Non
     assert outputs_that_stand_out(model, replace(data, u=(u,), y=(y,))) == []
 
 
-def test_a_log_no_longer_than_the_dead_time_has_no_fit_and_says_why(model: FreeRunModel) -> None:
+def test_a_log_no_longer_than_the_dead_time_has_no_fit_and_a_note_with_the_reason(model: FreeRunModel) -> None:
     brief = channels(DELAY + 1)
     brief = replace(brief, u=(brief.u[0][:DELAY],), y=(brief.y[0][:DELAY],))
     assert np.isnan(model.quality(brief.u, brief.y).fit_percent)
@@ -73,7 +73,7 @@ def test_a_log_no_longer_than_the_dead_time_has_no_fit_and_says_why(model: FreeR
     assert doubts_about_inputs(model, channels()) == []
 
 
-def test_an_output_that_is_its_input_is_identified_as_that() -> None:
+def test_an_output_equal_to_its_input_gives_a_sound_linear_model() -> None:
     u = np.repeat([1.0, -1.0, 1.0, 1.0, -1.0], 60)
     data = channels_from([u[:, None]], [u], 1.0, ["u"], "y")
     found = identify_channels(data, structure="auto", order=1, delay=0)
@@ -83,7 +83,7 @@ def test_an_output_that_is_its_input_is_identified_as_that() -> None:
 
 
 @pytest.mark.parametrize(("dead", "told"), [(0.5, True), (0.0, False)])
-def test_a_linear_model_says_where_it_leaves_more_than_noise(dead: float, told: bool) -> None:
+def test_a_linear_model_of_a_plant_with_a_dead_zone_is_noted_to_leave_more_than_noise(dead: float, told: bool) -> None:
     rng = np.random.default_rng(3)
     u = filtered(np.array([0.1]), np.array([1.0, -0.9]), rng.normal(size=800))
     bent = np.sign(u) * np.maximum(np.abs(u) - dead * u.std(), 0.0)
@@ -106,13 +106,13 @@ def with_noise(kind: str, seed: int, n: int = 800) -> set[object]:
 
 
 @pytest.mark.parametrize("kind", ["held", "filtered"])
-def test_sensor_noise_that_is_filtered_or_held_is_no_nonlinear_plant(kind: str) -> None:
+def test_filtered_or_held_sensor_noise_is_not_taken_for_a_nonlinear_plant(kind: str) -> None:
     for seed in range(20, 24):
         assert IdentificationCode.MORE_THAN_NOISE not in with_noise(kind, seed)
 
 
 @pytest.mark.parametrize("every", [1, 3])
-def test_more_than_noise_is_asked_of_samples_that_are_there_and_answer_the_log(every: int) -> None:
+def test_the_check_for_more_than_noise_uses_present_samples_after_the_dead_time_only(every: int) -> None:
     rng = np.random.default_rng(3)
     u = filtered(np.array([0.1]), np.array([1.0, -0.97]), rng.normal(size=2000))
     y = np.concatenate([np.full(100, 5.0 * u.std()), u[:-100]]) + 0.05 * u.std() * rng.normal(size=2000)
@@ -124,7 +124,7 @@ def test_more_than_noise_is_asked_of_samples_that_are_there_and_answer_the_log(e
     assert more_than_noise(model, Channels(("u",), "y", 0.01, (u[:, None],), (bent,))) != []
 
 
-def test_an_output_without_sign_that_is_cut_off_is_no_match() -> None:
+def test_an_absolute_value_that_is_also_cut_off_is_noted_and_not_sound() -> None:
     rng = np.random.default_rng(1)
     u = np.repeat(rng.uniform(-1.0, 1.0, 100), 12)[:1000]
     y = np.minimum(np.abs(filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u)), 1.0)
@@ -146,7 +146,7 @@ def test_an_output_without_sign_that_is_cut_off_is_no_match() -> None:
         (4, 0.06, 0.9, "INPUT_LOGGED_LATE"),
     ],
 )
-def test_an_input_that_is_logged_late_is_not_told_as_swapped(
+def test_an_input_logged_late_is_distinguished_from_swapped_columns(
     late: int | None, noise: float, pole: float, told: str
 ) -> None:
     rng = np.random.default_rng(50)

@@ -38,7 +38,9 @@ def slow() -> tuple[Channels, Scaling, Candidate]:
     return data, by, replace(plain, block_errors=(0.1,) * 4)
 
 
-def test_a_band_ends_where_an_input_hardly_moves(slow: tuple[Channels, Scaling, Candidate]) -> None:
+def test_the_band_ends_at_the_highest_frequency_that_an_input_excites(
+    slow: tuple[Channels, Scaling, Candidate],
+) -> None:
     data, _, _ = slow
     assert band_end(data) == pytest.approx(0.3, abs=0.05)
     steps = np.repeat(np.random.default_rng(2).normal(size=N // 8), 8)
@@ -47,7 +49,7 @@ def test_a_band_ends_where_an_input_hardly_moves(slow: tuple[Channels, Scaling, 
     assert band_end(two) > 2.0
 
 
-def test_a_slow_pole_above_the_band_rings_beyond(slow: tuple[Channels, Scaling, Candidate]) -> None:
+def test_a_slowly_decaying_pole_above_the_band_rings_beyond_it(slow: tuple[Channels, Scaling, Candidate]) -> None:
     data, _, plain = slow
     end, wild = band_end(data), rings(plain, -0.999, (0.1,) * 4)
     assert not rings_beyond(plain, data, end)
@@ -71,7 +73,7 @@ def test_a_slow_pole_above_the_band_rings_beyond(slow: tuple[Channels, Scaling, 
         ((0.08, 0.08, 0.08, 0.08), "wild"),
     ],
 )
-def test_what_answers_beyond_has_to_pay_within(
+def test_a_model_that_rings_above_the_band_is_taken_only_if_it_is_clearly_better(
     slow: tuple[Channels, Scaling, Candidate], errors: tuple[float, ...], taken: str
 ) -> None:
     data, by, plain = slow
@@ -81,7 +83,7 @@ def test_what_answers_beyond_has_to_pay_within(
     assert believable([models["wild"]], data, by)[0] is models["wild"]
 
 
-def test_the_band_of_inputs_is_that_of_those_that_move() -> None:
+def test_a_constant_input_does_not_affect_the_band() -> None:
     t = np.arange(640.0)
     slow, still = np.sin(0.2 * t), np.ones(640)
     alone = band_end(Channels(("u",), "y", 1.0, (slow[:, None],), (t,)))

@@ -39,7 +39,7 @@ class Fails:
         return np.full(u.shape[0], np.nan)
 
 
-def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
+def test_the_jackknife_gives_the_standard_error_of_a_mean() -> None:
     x = np.random.default_rng(0).normal(size=(5, 4000))  # five groups of one value each, 4000 times
     whole = x.mean(axis=0)
     parts = [(x.sum(axis=0) - one) / 4.0 for one in x[1:]]
@@ -52,7 +52,9 @@ def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
     ("apart", "linear_apart", "taken"),
     [(0.04, 0.0, "own"), (0.06, 0.0, "linear"), (0.06, 0.05, "own"), (0.5, 0.05, "linear")],
 )
-def test_the_linear_run_is_taken_where_it_errs_less(apart: float, linear_apart: float, taken: str) -> None:
+def test_the_linear_run_is_taken_if_its_expected_error_is_smaller(
+    apart: float, linear_apart: float, taken: str
+) -> None:
     # runs of a unit input that are off by `apart` on both sides have a variance of four times its square
     parts = tuple(gain(2.0 + sign * apart) for sign in (1, -1, 1, -1))
     straight = tuple(gain(1.0 + sign * linear_apart) for sign in (1, -1, 1, -1))
@@ -62,7 +64,7 @@ def test_the_linear_run_is_taken_where_it_errs_less(apart: float, linear_apart: 
     assert np.array_equal(one.judged(u, y, own)[0], own if taken == "own" else np.ones(9))
 
 
-def test_what_is_fitted_to_more_samples_is_better_determined() -> None:
+def test_a_model_fitted_to_more_samples_has_a_smaller_uncertainty() -> None:
     parts = tuple(gain(2.0 + sign * 0.06) for sign in (1, -1, 1, -1))
     few = Fallback(gain(1.0), (gain(1.0),) * 4, parts, 0.1)
     u, y, own = np.ones((9, 1)), np.full(9, np.nan), np.full(9, 2.0)
@@ -74,7 +76,9 @@ def test_what_is_fitted_to_more_samples_is_better_determined() -> None:
 
 
 @pytest.mark.parametrize(("own_error", "apart", "taken"), [(0.05, 0.04, "own"), (0.05, 0.08, "linear")])
-def test_what_a_bend_leaves_of_held_back_blocks_is_counted_beside(own_error: float, apart: float, taken: str) -> None:
+def test_the_held_back_error_of_a_nonlinearity_adds_to_its_uncertainty(
+    own_error: float, apart: float, taken: str
+) -> None:
     parts = tuple(bend(2.0 + sign * apart / 2.0) for sign in (1, -1, 1, -1))
     fallback = Fallback(gain(1.0), (gain(1.0),) * 4, parts, 0.085, own_error=own_error)
     whole = replace(bend(2.0), fallback=fallback)
@@ -94,7 +98,7 @@ def test_what_a_bend_leaves_of_held_back_blocks_is_counted_beside(own_error: flo
     assert replace(whole, fallback=None).run(u, y) == pytest.approx(np.full(9, 2.0))
 
 
-def test_a_run_that_has_no_end_is_replaced() -> None:
+def test_a_diverging_run_is_replaced_by_the_linear_one() -> None:
     away: Any = Fails()
     u, y = np.ones((9, 1)), np.full(9, np.nan)
     one = Fallback(gain(1.0), (gain(1.0),) * 4, (gain(2.0),) * 3 + (away,), 0.1)
@@ -117,7 +121,7 @@ ENDS = np.array([-1.2, 1.2])
 
 
 @pytest.mark.parametrize(("decay", "level", "taken"), [(1e-9, 1.0, 0), (1e-9, 2.0, 1), (1e-9, 9.0, 1), (0.2, 9.0, 0)])
-def test_what_integrates_beyond_the_ends_of_a_nonlinear_run_is_an_error_of_that(
+def test_an_integrating_output_beyond_the_limits_of_a_nonlinear_run_adds_to_its_error(
     decay: float, level: float, taken: int
 ) -> None:
     """All fits are clipped at the same limit and agree there; only an output that settles may be clipped."""
@@ -156,7 +160,7 @@ def squared(coefficient: float, end: float) -> PolynomialDynamics:
         ([(0.5, 1.0), (0.5, 0.8), (0.5, 1.0), (0.5, 0.8)], 0.7, 0.5 * 0.7**2),
     ],
 )
-def test_products_go_on_beyond_what_was_seen_where_fits_agree_on_that(
+def test_products_are_extrapolated_beyond_the_fitted_range_if_all_fits_agree(
     parts: list[tuple[float, float]], u: float, wanted: float
 ) -> None:
     linear = gain(0.2)
@@ -199,7 +203,7 @@ def between() -> Channels:
     return log(u)
 
 
-def test_a_model_of_two_levels_is_not_run_between_them_where_its_fits_disagree(
+def test_the_linear_model_runs_between_two_fitted_levels_if_the_nonlinear_fits_disagree(
     switched: tuple[Channels, Identified], between: Channels
 ) -> None:
     data, found = switched
@@ -228,7 +232,7 @@ def _bent(one: Any, much: float) -> Any:
     return replace(one, coefficients=coefficients)
 
 
-def test_a_polynomial_model_that_is_asked_for_is_run_as_it_is(between: Channels) -> None:
+def test_a_requested_polynomial_model_has_no_linear_fallback(between: Channels) -> None:
     found = identify_channels(between, structure="narx", order=1, delay=1).model
     assert isinstance(found.dynamics, PolynomialDynamics)
     assert found.dynamics.fallback is None

@@ -23,7 +23,7 @@ def log(n: int = 600) -> Channels:
     return channels_from([u[:, None]], [y + 0.01 * rng.normal(size=n)], 1.0, ["u"], "y")
 
 
-def test_linear_models_are_judged_anew_and_keep_what_is_doubtful_of_them() -> None:
+def test_linear_models_are_judged_again_on_fewer_samples_and_keep_their_doubts() -> None:
     whole = scaled(log())[0]
     linear = linear_candidates(whole, [1, 2], (1,))
     linear[1] = replace(linear[1], doubt="time_constant")
@@ -38,7 +38,7 @@ def test_linear_models_are_judged_anew_and_keep_what_is_doubtful_of_them() -> No
     assert on_fewer(linear, best, whole, whole) == (whole, linear, best)
 
 
-def test_structures_are_compared_on_a_whole_period(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_structures_are_compared_on_at_least_one_period(monkeypatch: pytest.MonkeyPatch) -> None:
     one = log()
     cut = one.longest * 2 // 3
     twice = channels_from(
@@ -52,7 +52,7 @@ def test_structures_are_compared_on_a_whole_period(monkeypatch: pytest.MonkeyPat
     assert compared == [cut, cut // 2]
 
 
-def test_a_polynomial_model_that_was_compared_on_fewer_samples_is_fitted_to_all(
+def test_a_polynomial_model_compared_on_fewer_samples_is_refitted_to_all(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     seen, refitted = list[int](), identify._refitted

@@ -34,12 +34,12 @@ def log(u: Array, *lost: slice) -> Record:
     return Record(T, {"u": seen, "y": answered(u)})
 
 
-def test_a_gap_that_a_line_bridges_splits_nothing() -> None:
+def test_a_gap_bridged_by_a_line_does_not_split_the_log() -> None:
     record = log(slow(), slice(1000, 1005))
     assert pieces(record, ["u"]) == [record]
 
 
-def test_a_log_is_split_where_a_binary_input_is_missing_and_its_ends_are_left_out() -> None:
+def test_a_log_is_split_at_gaps_of_a_binary_input_and_gaps_at_its_ends_are_cut_off() -> None:
     record = log(binary(), slice(0, 40), slice(1000, 1010), slice(2000, 2010), slice(2990, 3000))
     with pytest.warns(LogWarning) as said:
         parts = pieces(record, ["u"])
@@ -49,21 +49,21 @@ def test_a_log_is_split_where_a_binary_input_is_missing_and_its_ends_are_left_ou
     np.testing.assert_array_equal(parts[1]["y"], record["y"][1010:2000])
 
 
-def test_a_slow_logger_leaves_no_gaps() -> None:
+def test_an_input_logged_at_a_third_of_the_rate_has_no_gaps() -> None:
     seen = binary()
     seen[np.arange(N) % 3 > 0] = np.nan
     record = Record(T, {"u": seen, "y": answered(binary())})
     assert [len(part) for part in pieces(record.slice(0, N - 2), ["u"])] == [N - 2]
 
 
-def test_a_log_falls_into_a_bounded_number_of_parts() -> None:
+def test_a_log_is_split_into_a_limited_number_of_parts() -> None:
     lost = [slice(start, start + 10) for start in range(20, N - 20, 30)]
     with pytest.warns(LogWarning):
         parts = pieces(log(binary(), *lost), ["u"])
     assert 1 < len(parts) <= MOST_GAPS + 1
 
 
-def test_outputs_next_to_a_gap_are_left_out_for_they_may_answer_what_is_not_known() -> None:
+def test_outputs_after_a_gap_of_the_input_are_left_out() -> None:
     with pytest.warns(LogWarning) as said:
         data = channels_of([log(binary(), slice(1000, 1010))], ["u"], "y", split=True)
     assert {one.filename for one in said} == {__file__}  # it points at the caller
@@ -71,7 +71,7 @@ def test_outputs_next_to_a_gap_are_left_out_for_they_may_answer_what_is_not_know
     assert np.isnan(data.y[1][:20]).all()
 
 
-def test_a_model_of_a_log_with_gaps_is_that_of_the_whole_log() -> None:
+def test_a_model_of_a_log_with_gaps_is_as_accurate_as_without_them() -> None:
     whole = identify_channels(channels_of([log(binary())], ["u"], "y"), order=2, delay=1).model
     with pytest.warns(LogWarning):
         data = channels_of([log(binary(), slice(1000, 1010), slice(2000, 2060))], ["u"], "y", split=True)
@@ -81,14 +81,14 @@ def test_a_model_of_a_log_with_gaps_is_that_of_the_whole_log() -> None:
     assert np.std(off[1]) == pytest.approx(np.std(off[0]), rel=0.02)
 
 
-def test_one_channel_is_not_both_input_and_output() -> None:
+def test_one_channel_as_input_and_output_is_refused() -> None:
     with pytest.raises(HydrostateError, match="input and output must be different channels, got 'u' for both"):
         channels_of([log(binary())], ["u"], "u")
     with pytest.raises(HydrostateError, match="each input must be named once, got u, u"):
         channels_of([log(binary())], ["u", "u"], "y")
 
 
-def test_an_input_of_which_nothing_or_nothing_but_a_level_is_known_is_not_split() -> None:
+def test_a_log_with_one_known_input_sample_is_not_split_and_one_with_a_constant_input_is() -> None:
     empty = Record(T, {"u": np.where(np.arange(N) == 5, 1.0, np.nan), "y": answered(binary())})
     assert pieces(empty, ["u"]) == [empty]
     level = Record(T, {"u": np.where(np.arange(N) // 10 == 100, np.nan, 3.0), "y": answered(binary())})
@@ -96,7 +96,7 @@ def test_an_input_of_which_nothing_or_nothing_but_a_level_is_known_is_not_split(
         assert [len(one) for one in pieces(level, ["u"])] == [1000, N - 1010]
 
 
-def test_parts_that_are_less_than_a_two_hundredth_of_a_log_are_left_out() -> None:
+def test_parts_shorter_than_a_two_hundredth_of_a_log_are_left_out() -> None:
     u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 600), 15)
     for length, kept in ((44, [8940]), (45, [45, 8940])):
         seen = u.copy()
@@ -106,7 +106,7 @@ def test_parts_that_are_less_than_a_two_hundredth_of_a_log_are_left_out() -> Non
         assert [len(part) for part in parts] == kept
 
 
-def test_bridged_samples_of_all_parts_are_told_once() -> None:
+def test_bridged_samples_of_all_parts_are_reported_in_one_warning() -> None:
     record = log(binary(), *(slice(start, start + 2) for start in range(52, N - 40, 60)))  # 49 gaps: 30 split the log
     with pytest.warns(LogWarning) as said:
         channels_of([record], ["u"], "y", split=True)
@@ -115,7 +115,7 @@ def test_bridged_samples_of_all_parts_are_told_once() -> None:
     assert "lacks 38 of 2940 samples" in told[0]
 
 
-def test_a_log_that_is_slower_than_a_model_says_that_it_is_interpolated() -> None:
+def test_a_log_sampled_more_slowly_than_the_model_is_interpolated_with_a_warning() -> None:
     record = log(binary())
     half = Record(2.0 * T, {name: record[name][::2] for name in ("u", "y")})
     with pytest.warns(LogWarning, match="interpolated from 0.02 s to 0.01 s per sample") as said:

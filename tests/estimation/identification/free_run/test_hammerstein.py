@@ -44,7 +44,7 @@ def found(planted: Planted) -> Identified:
     return identified(logged(planted, 1))
 
 
-def test_what_was_planted_is_found_within_its_interval(planted: Planted, found: Identified) -> None:
+def test_the_true_nonlinearity_is_found_within_its_interval(planted: Planted, found: Identified) -> None:
     assert found.sound
     assert found.model.structure == "hammerstein"
     assert isinstance(found.model.dynamics, HammersteinDynamics)
@@ -60,7 +60,7 @@ def test_what_was_planted_is_found_within_its_interval(planted: Planted, found: 
     assert planted.kind in kinds <= set(NONLINEARITIES)
 
 
-def test_a_model_is_the_same_after_it_was_saved(planted: Planted, found: Identified) -> None:
+def test_a_saved_model_simulates_the_same_output(planted: Planted, found: Identified) -> None:
     data, model = logged(planted, 2), found.model
     again = FreeRunModel.from_dict(json.loads(json.dumps(model.to_dict())))
     np.testing.assert_array_equal(again.simulate(data.u[0], data.y[0]), model.simulate(data.u[0], data.y[0]))
@@ -70,13 +70,13 @@ def test_a_model_is_the_same_after_it_was_saved(planted: Planted, found: Identif
         model.to_control()
 
 
-def test_a_run_without_outputs_follows_all_the_same(planted: Planted, found: Identified) -> None:
+def test_a_free_run_without_measured_outputs_follows_the_plant(planted: Planted, found: Identified) -> None:
     data, model = logged(planted, 3), found.model
     left = (model.simulate(data.u[0]) - data.y[0])[200:]
     assert left.std() < 0.1 * data.y[0].std()
 
 
-def test_derivatives_are_exact_where_no_sample_changes_sides(planted: Planted) -> None:
+def test_derivatives_are_exact_if_no_sample_changes_its_branch_of_the_nonlinearity(planted: Planted) -> None:
     data, by = scaled(logged(planted, 4))
     problem = HammersteinProblem(planted.kind, Form(2, (2,), (1,)), data)
     values = np.array(list(planted.values.values())) - (by.u_mean[0] if NONLINEARITIES[planted.kind].level else 0.0)
@@ -88,7 +88,7 @@ def test_derivatives_are_exact_where_no_sample_changes_sides(planted: Planted) -
         np.testing.assert_allclose(jacobian[:, j], rise, atol=1e-5 * max(np.abs(rise).max(), 1.0))
 
 
-def test_a_linear_plant_is_given_a_linear_model() -> None:
+def test_a_linear_plant_gets_a_linear_model() -> None:
     rng = np.random.default_rng(5)
     u, y = np.repeat(rng.normal(size=120), 10), np.zeros(1200)
     for k in range(2, 1200):
@@ -98,7 +98,7 @@ def test_a_linear_plant_is_given_a_linear_model() -> None:
     assert "no_nonlinearity" in {str(note.code) for note in found.notes}
 
 
-def test_gaps_and_several_logs_are_borne() -> None:
+def test_a_nonlinearity_is_found_in_several_logs_with_gaps() -> None:
     parts = [logged(PLANTED[2], seed) for seed in (6, 7)]
     outputs = [np.array(one.y[0]) for one in parts]
     outputs[0][300:350] = np.nan
@@ -116,13 +116,13 @@ def test_several_inputs_are_refused() -> None:
         identify_channels(data, structure="hammerstein", order=1, delay=1)
 
 
-def test_an_input_that_has_no_such_values_is_given_no_fit() -> None:
+def test_a_saturation_is_not_fitted_to_an_input_of_two_levels() -> None:
     data = channels_from([np.array([[0.0], [1.0]] * 30)], [np.sin(np.arange(60.0))], 1.0, ["u"], "y")
     narrow = fit_hammerstein("saturation", Form(1, (1,), (1,)), scaled(data)[0], [np.array([1.0, -0.5])])
     assert narrow is None or narrow.cost > 0.0
 
 
-def test_a_play_follows_at_half_its_width_and_stands_still_in_between() -> None:
+def test_backlash_follows_at_half_its_width_and_is_constant_in_between() -> None:
     out, slopes = np.empty(6), np.empty((6, 2))
     play(np.array([0.0, 2.0, 1.5, 0.5, -1.0, 0.0]), 0.5, 0.2, out, slopes)
     np.testing.assert_array_equal(out, [0.2, 1.5, 1.5, 1.0, -0.5, -0.5])
@@ -133,7 +133,7 @@ def test_a_play_follows_at_half_its_width_and_stands_still_in_between() -> None:
     "bent",
     [pytest.param(one, id=one.kind, marks=() if one.kind == "saturation" else pytest.mark.slow) for one in PLANTED],
 )  # a test above covers that each kind is found
-def test_auto_takes_a_bend_where_it_is_better_than_every_other_on_blocks_held_back(bent: Planted) -> None:
+def test_auto_takes_a_nonlinearity_that_is_best_on_held_back_blocks(bent: Planted) -> None:
     found = identify_channels(logged(bent, 5), structure="auto", order=2, delay=1)
     assert found.model.structure == "hammerstein"
     assert isinstance(found.model.dynamics, HammersteinDynamics)
@@ -159,13 +159,15 @@ def candidate(order: int, held_back: float, delay: int = 1, doubt: str = "", f: 
     )
 
 
-def test_bends_are_tried_behind_the_best_linear_model_of_each_order_and_dead_time() -> None:
+def test_nonlinear_fits_begin_at_the_best_linear_model_of_each_order_with_and_without_dead_time() -> None:
     best, late = candidate(1, 0.2), candidate(1, 0.3, delay=0)
     linear = [candidate(1, 0.25, delay=2), best, candidate(1, 0.4, delay=7), late, candidate(ORDERS + 1, 0.1)]
     assert _bases(linear) == [best, late]
 
 
-def test_a_denominator_with_an_unbelievable_time_constant_is_no_start(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_denominator_with_a_doubtful_time_constant_is_a_start_only_without_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     given: list[list[float]] = []
 
     def fit(kind: str, form: Any, data: Channels, denominators: list[np.ndarray]) -> None:  # noqa: ARG001
@@ -181,7 +183,7 @@ def test_a_denominator_with_an_unbelievable_time_constant_is_no_start(monkeypatc
     assert given == [[-1.0]] * len(NONLINEARITIES)  # this denominator alone is better than none
 
 
-def test_the_best_of_each_kind_and_order_is_judged_so_that_a_smaller_one_may_do_better(
+def test_the_best_nonlinear_fit_of_each_kind_and_order_is_judged_on_held_back_blocks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     data = scaled(logged(PLANTED[0], 3))[0]
@@ -200,7 +202,7 @@ def test_the_best_of_each_kind_and_order_is_judged_so_that_a_smaller_one_may_do_
 
 
 @pytest.mark.parametrize(("pole", "doubt"), [(0.999, "cancelling"), (0.99, "")])
-def test_a_pole_too_slow_for_a_block_that_a_zero_cancels_is_doubtful(pole: float, doubt: str) -> None:
+def test_a_pole_slower_than_a_block_and_cancelled_by_a_zero_is_doubtful(pole: float, doubt: str) -> None:
     data = scaled(logged(PLANTED[0], 3))[0]
     b, f = 0.3 * np.array([1.0, -pole]), np.convolve([1.0, -0.8], [1.0, -pole])
     fit = HammersteinFit(
@@ -212,7 +214,7 @@ def test_a_pole_too_slow_for_a_block_that_a_zero_cancels_is_doubtful(pole: float
     assert _doubt(fit, data) == doubt
 
 
-def test_a_doubtful_bend_is_taken_only_where_every_one_is() -> None:
+def test_a_doubtful_nonlinearity_is_taken_only_if_all_are_doubtful() -> None:
     fit: Any = None
     good, better = (
         HammersteinCandidate(fit, doubt, block_errors=(error,), bic=bic)
@@ -231,7 +233,7 @@ def straight(blocks: tuple[float, ...]) -> Any:
     return SimpleNamespace(held_back=pooled(blocks), block_errors=blocks)
 
 
-def test_a_bend_that_nobody_asked_for_gains_more_than_blocks_scatter() -> None:
+def test_a_nonlinearity_that_was_not_requested_must_gain_more_than_the_scatter_of_blocks() -> None:
     best = straight((0.3, 0.3, 0.3, 0.3))
     even, chance = bent((0.28, 0.29, 0.28, 0.29)), bent((0.31, 0.32, 0.31, 0.10))
     assert chance.held_back < even.held_back < 0.98 * best.held_back
@@ -246,7 +248,9 @@ def test_a_bend_that_nobody_asked_for_gains_more_than_blocks_scatter() -> None:
     assert worthwhile([halfway], [best], best, surely=True) is None
 
 
-def test_the_bend_that_was_judged_is_the_one_that_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_chosen_nonlinear_fit_is_repeated_only_if_it_was_judged_on_fewer_samples(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     data, again = logged(PLANTED[0], 1), list[int]()
 
     def refit(fit: HammersteinFit, part: Channels) -> HammersteinFit:
@@ -261,7 +265,7 @@ def test_the_bend_that_was_judged_is_the_one_that_is_given(monkeypatch: pytest.M
     assert again == [data.n_samples]  # it was judged on fewer samples
 
 
-def test_auto_takes_a_bend_only_where_it_is_surely_better(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_auto_requires_a_significant_advantage_of_a_nonlinearity(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[bool] = []
 
     def none(*_: Any, surely: bool) -> None:
@@ -275,7 +279,7 @@ def test_auto_takes_a_bend_only_where_it_is_surely_better(monkeypatch: pytest.Mo
     assert asked == [True, False]
 
 
-def test_where_no_bend_can_be_fitted_the_model_is_linear(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_fitted_nonlinearity_the_model_is_linear_with_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("estimation.identification.free_run.identify.hammerstein_candidates", lambda *_: [])
     found = identified(logged(PLANTED[0], 1))
     assert found.model.structure == "output-error"
@@ -290,7 +294,7 @@ def test_where_no_bend_can_be_fitted_the_model_is_linear(monkeypatch: pytest.Mon
         ("saturation", [[-0.5, 0.5], [-1.0, 1.0]], [[0.2, 0.2], [-1.1, 0.0], [0.0, 1.1]]),
     ],
 )
-def test_a_bend_is_sought_only_where_the_input_shows_it(
+def test_the_values_of_a_nonlinearity_must_lie_within_the_range_of_the_input(
     kind: str, allowed: list[list[float]], refused: list[list[float]]
 ) -> None:
     u, bend = np.linspace(-1.0, 1.0, 201), NONLINEARITIES[kind]

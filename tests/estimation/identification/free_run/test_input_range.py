@@ -23,12 +23,12 @@ def driven(factor: float) -> Channels:
     return channels_from([factor * u[:, None]], [y], 0.01, ["force"], "deflection")
 
 
-def test_inputs_within_the_range_are_no_matter(model: FreeRunModel) -> None:
+def test_inputs_within_the_fitted_range_are_not_noted(model: FreeRunModel) -> None:
     assert inputs_beyond(model, driven(1.0)) == []
     assert inputs_beyond(model, driven(0.5)) == []
 
 
-def test_an_input_that_leaves_the_range_is_named_with_how_far_and_how_often(model: FreeRunModel) -> None:
+def test_an_input_beyond_the_fitted_range_is_noted_with_its_extremes_and_share(model: FreeRunModel) -> None:
     u = driven(2.0).u[0][:, 0]
     (note,) = inputs_beyond(model, driven(2.0))
     assert note.code == "input_beyond_range"
@@ -40,7 +40,7 @@ def test_an_input_that_leaves_the_range_is_named_with_how_far_and_how_often(mode
     assert note.data["share"] == pytest.approx(np.mean((u < low - far) | (u > high + far)))
 
 
-def test_ranges_lie_about_the_mean_of_the_fitted_input(model: FreeRunModel) -> None:
+def test_the_fitted_range_shifts_with_the_mean_of_the_fitted_input(model: FreeRunModel) -> None:
     away = replace(model, scaling=replace(model.scaling, u_mean=model.scaling.u_mean + 3.0))
 
     def shifted(factor: float) -> Channels:
@@ -54,7 +54,7 @@ def test_ranges_lie_about_the_mean_of_the_fitted_input(model: FreeRunModel) -> N
         assert there.data[end] == pytest.approx(here.data[end] + 3.0)
 
 
-def test_a_model_whose_products_hold_no_input_and_a_linear_one_have_no_range(model: FreeRunModel) -> None:
+def test_a_linear_model_and_one_without_inputs_in_its_products_have_no_input_range(model: FreeRunModel) -> None:
     assert isinstance(model.dynamics, PolynomialDynamics)
     variables = replace(model.dynamics.variables, source=np.zeros_like(model.dynamics.variables.source))
     own = replace(model, dynamics=replace(model.dynamics, variables=variables))

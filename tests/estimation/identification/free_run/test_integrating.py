@@ -35,7 +35,7 @@ def data(request: pytest.FixtureRequest) -> Channels:
     return channels_from([one[:, None] for one in u], y, 1.0, ["u"], "y")
 
 
-def test_a_pole_at_one_runs_on_where_an_estimated_one_decays(data: Channels) -> None:
+def test_an_integrating_fit_keeps_the_initial_level_over_twenty_records(data: Channels) -> None:
     inside, by = scaled(data)
     fit = fit_integrating(Form(2, (2,), (1,)), inside, [F], search=True)
     assert fit.integrates
@@ -52,7 +52,7 @@ def test_a_pole_at_one_runs_on_where_an_estimated_one_decays(data: Channels) -> 
     assert np.std(ran - y) < 0.05 * np.std(y)
 
 
-def test_a_fit_to_other_data_keeps_its_kind(data: Channels) -> None:
+def test_an_integrating_fit_to_other_data_integrates_too(data: Channels) -> None:
     inside, _ = scaled(data)
     fit = fit_integrating(Form(1, (3,), (1,)), inside, [np.array([1.0, -0.99])])
     mask = [np.arange(N) // 80 == 2 for _ in data.y]
@@ -62,7 +62,7 @@ def test_a_fit_to_other_data_keeps_its_kind(data: Channels) -> None:
     assert other.f == pytest.approx(fit.f, abs=1e-12), "one pole alone, and it is given"
 
 
-def test_a_model_that_cannot_be_written_once_it_is_fitted_on_stays_as_it_was_judged(
+def test_a_model_whose_final_fit_diverges_is_kept_as_it_was_judged(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     u = levels(3)

@@ -7,7 +7,7 @@ from estimation.identification.free_run.least_squares import MOST_PIECES, Counte
 
 
 @pytest.mark.parametrize("scattered", [False, True])
-def test_samples_that_do_not_count_change_nothing(scattered: bool) -> None:
+def test_unused_samples_do_not_affect_least_squares(scattered: bool) -> None:
     rng = np.random.default_rng(1)
     columns, target = rng.normal(size=(300, 4)), rng.normal(size=300)
     used = rng.random(300) < 0.5 if scattered else (np.arange(300) // 50) % 3 > 0

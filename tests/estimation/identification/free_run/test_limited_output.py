@@ -44,7 +44,7 @@ def between_stops(seed: int, n: int = 600) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize(("after", "order"), [(0.0, 1), (0.01, None)])
-def test_the_gain_of_an_output_that_is_cut_off_is_that_of_the_plant(after: float, order: int | None) -> None:
+def test_the_gain_of_the_plant_is_found_from_an_output_that_is_cut_off(after: float, order: int | None) -> None:
     with pytest.warns(LogWarning, match="cut off at"):
         found = identify_channels(cut_off(0, 0.4, after=after), order=order, delay=1)
     assert found.sound
@@ -58,7 +58,7 @@ def test_the_gain_of_an_output_that_is_cut_off_is_that_of_the_plant(after: float
 
 @pytest.mark.parametrize(("every", "seed"), [(3, 0), (5, 1), (10, 0)])
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_limits_are_looked_for_where_outputs_are_missing_regularly(every: int, seed: int) -> None:
+def test_limits_are_found_with_outputs_missing_at_regular_intervals(every: int, seed: int) -> None:
     data = cut_off(seed, 0.5)
     rows = np.arange(data.y[0].size) % every
     missing = rows == 2 if every == 3 else rows > 0
@@ -68,13 +68,13 @@ def test_limits_are_looked_for_where_outputs_are_missing_regularly(every: int, s
     assert abs(found.model.linear.dc_gain - 2.0) < 3.0 * found.model.linear.dc_gain_std < 0.2
 
 
-def test_an_output_that_is_nowhere_cut_off_has_no_limits() -> None:
+def test_an_output_that_is_not_cut_off_has_no_limits() -> None:
     found = identify_channels(cut_off(0, np.inf), order=1, delay=1)
     assert not {IdentificationCode.OUTPUT_CUT_OFF, IdentificationCode.OUTPUT_STOPPED} & {n.code for n in found.notes}
     assert not isinstance(found.model.dynamics, LimitedDynamics)
 
 
-def test_an_end_that_one_block_alone_reaches_is_told() -> None:
+def test_an_extreme_reached_in_one_block_only_is_noted_and_gives_no_limits() -> None:
     rng = np.random.default_rng(2)
     u = np.repeat(rng.uniform(-1.0, 1.0, 600), rng.integers(5, 40, 600))[:600]
     u *= np.where(np.arange(600) // 120 == 2, 1.0, 0.2)
@@ -101,7 +101,7 @@ def test_an_output_that_settles_at_the_level_of_its_input_has_no_limits(seed: in
 
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_a_piston_driven_to_and_fro_between_its_stops_has_them() -> None:
+def test_the_stops_of_a_piston_driven_back_and_forth_are_found() -> None:
     """Its input has one value at each end, like the input of an output that has settled."""
     rng = np.random.default_rng(0)
     u, x, v = np.repeat(rng.choice([-1.0, 1.0], 1500), rng.integers(15, 90, 1500))[:1500], np.zeros(1500), 0.0
@@ -130,14 +130,14 @@ def rubbing(seed: int, n: int = 300) -> Channels:
 
 @pytest.mark.parametrize(("seed", "order"), [(3, 1), (104, 4)])
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_a_given_order_that_is_wrong_tells_no_stops(seed: int, order: int) -> None:
+def test_no_stops_are_reported_if_the_given_order_is_wrong(seed: int, order: int) -> None:
     """A linear model of another order explains more than stops do."""
     found = identify_channels(rubbing(seed), order=order, delay=1)
     assert IdentificationCode.OUTPUT_STOPPED not in {note.code for note in found.notes}
 
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_stops_that_win_on_blocks_alone_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stops_that_are_better_on_blocks_but_not_on_the_whole_log_are_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     """On blocks, stops leave 0.20 of the deviation and the linear model 0.41, but stops leave more of the whole log."""
     monkeypatch.setattr(Task, "free", None)
     found = identify_channels(rubbing(0), order=4, delay=1)
@@ -146,7 +146,7 @@ def test_stops_that_win_on_blocks_alone_are_none(monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("error::plant.errors.LogWarning")
-def test_the_ends_of_a_staircase_ask_no_one_to_check_them() -> None:
+def test_the_extreme_levels_of_a_staircase_are_not_noted_as_possible_limits() -> None:
     """The levels between determine the gain; every log of steps had the warning."""
     rng = np.random.default_rng(3)
     u = np.repeat(rng.integers(-2, 3, 1500).astype(float), 60)[:1500]
@@ -157,7 +157,7 @@ def test_the_ends_of_a_staircase_ask_no_one_to_check_them() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_an_output_between_stops_leaves_them_at_once() -> None:
+def test_a_model_with_stops_follows_an_integrating_output_that_leaves_them_at_once() -> None:
     u, y = between_stops(0)
     found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"), order=1, delay=1)
     codes = {note.code for note in found.notes}
@@ -173,7 +173,7 @@ def test_an_output_between_stops_leaves_them_at_once() -> None:
     assert found.model.nonlinearity["high"]["value"] == pytest.approx(0.5, abs=0.005)
 
 
-def test_what_moves_between_stops_moves_as_a_free_series_does() -> None:
+def test_an_output_between_stops_has_the_increments_of_the_free_series() -> None:
     free = np.array([0.0, 2.0, 3.0, 2.5, -4.0, -3.0])
     output, left = np.empty(6), np.empty(6, dtype=np.int64)
     stopped(free, -1.0, 1.0, output, left)
@@ -182,7 +182,7 @@ def test_what_moves_between_stops_moves_as_a_free_series_does() -> None:
 
 
 @pytest.mark.parametrize("stops", [False, True])
-def test_derivatives_are_exact_where_no_sample_reaches_a_limit(stops: bool) -> None:
+def test_derivatives_of_a_limited_output_equal_numerical_ones(stops: bool) -> None:
     u, y = between_stops(3)
     data, _ = scaled(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
     problem = LimitedProblem(Form(2, (2,), (0,)), data, Limits(-1.1, 0.9, 0.01, stops))
@@ -196,7 +196,7 @@ def test_derivatives_are_exact_where_no_sample_reaches_a_limit(stops: bool) -> N
         np.testing.assert_allclose((ahead - behind) / 2e-7, jacobian[:, k], atol=1e-4 * np.abs(jacobian).max())
 
 
-def test_limits_are_where_an_output_stands() -> None:
+def test_the_limit_is_the_level_at_which_the_output_stays() -> None:
     data, by = scaled(cut_off(1, 0.4))
     limits = limits_of(data)
     assert limits is not None

@@ -59,7 +59,9 @@ def test_a_long_dead_time_adds_no_states_to_the_search(monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize("order", [0, 1, 2, 5])
 @pytest.mark.parametrize(("rows", "n"), [(1, 40), (2, 40), (5, 40), (3, 4), (2, 1), (0, 9), (2, 0)])
-def test_rows_side_by_side_are_filtered_as_each_alone_from_its_level(order: int, rows: int, n: int) -> None:
+def test_rows_filtered_together_equal_each_filtered_alone_from_the_steady_state_of_its_level(
+    order: int, rows: int, n: int
+) -> None:
     f = np.atleast_1d(np.poly([0.9, 0.8, -0.3, 0.5, 0.2][:order])).astype(np.float64)
     rng = np.random.default_rng(order)
     series, levels = rng.normal(size=(rows, n)), rng.normal(size=rows)
@@ -70,7 +72,7 @@ def test_rows_side_by_side_are_filtered_as_each_alone_from_its_level(order: int,
     assert ran == pytest.approx(np.array(alone).reshape(ran.shape), rel=1e-9, abs=1e-9)
 
 
-def test_a_denominator_whose_sum_rounding_swallows_is_not_run() -> None:
+def test_a_denominator_with_a_sum_lost_to_rounding_is_not_run() -> None:
     data, _ = scaled(one_log(120))
     problem = Problem(Form(2, (2,), (3,)), data)
     swallowed = np.array([-1.9999999999999947, 0.9999999999999947])
@@ -94,7 +96,7 @@ def test_sensitivities_are_the_derivatives_of_the_output() -> None:
         assert moved == pytest.approx(jacobian[:, k], abs=1e-6)
 
 
-def test_delay_and_offset_come_back_beside_a_mean_that_is_not_zero() -> None:
+def test_delay_and_offset_are_found_with_a_mean_other_than_zero() -> None:
     """The order is given as 2, since two more poles act nearly like a dead time of three samples."""
     found = identify_channels(one_log(300), order=2)
     linear = found.model.linear
@@ -106,7 +108,7 @@ def test_delay_and_offset_come_back_beside_a_mean_that_is_not_zero() -> None:
     assert found.held_back_percent == pytest.approx(found.quality.fit_percent, abs=1.0)
 
 
-def test_the_transfer_function_simulates_what_the_model_does() -> None:
+def test_the_transfer_function_simulates_the_same_output_as_the_model() -> None:
     data = one_log()
     model = identify_channels(data, order=2, delay=3).model
     assert model.linear is not None
@@ -118,7 +120,7 @@ def test_the_transfer_function_simulates_what_the_model_does() -> None:
     assert b.sum() / f.sum() == pytest.approx(model.linear.dc_gain)
 
 
-def test_several_inputs_and_several_logs_are_one_model() -> None:
+def test_one_model_is_fitted_to_several_inputs_and_several_logs() -> None:
     u, y = [], []
     for seed in (1, 2):
         both = np.column_stack([steps(300, seed), 10.0 * steps(300, seed + 10)])
@@ -134,7 +136,7 @@ def test_several_inputs_and_several_logs_are_one_model() -> None:
     assert found.model.to_control().ninputs == 2
 
 
-def test_a_block_that_is_held_back_does_not_move_the_fit() -> None:
+def test_a_held_back_block_does_not_affect_the_fit() -> None:
     data, _ = scaled(one_log(300))
     masks = blocks(data, 4)[1]
     spoilt = data.without([np.zeros(300, dtype=bool)])
@@ -144,7 +146,7 @@ def test_a_block_that_is_held_back_does_not_move_the_fit() -> None:
     assert same.theta == pytest.approx(clean.theta)
 
 
-def test_a_drift_is_not_taken_for_a_time_constant_beyond_the_record() -> None:
+def test_a_drift_is_not_taken_for_a_time_constant_longer_than_the_record() -> None:
     rng = np.random.default_rng(3)
     u = steps(400, 3, hold=5)
     y = filtered([0.0, 0.4], [1.0, -0.6], u) + 1e-2 * np.cumsum(rng.normal(size=400))
@@ -155,7 +157,7 @@ def test_a_drift_is_not_taken_for_a_time_constant_beyond_the_record() -> None:
     assert (-1.0 / np.log(poles) <= 400).all()
 
 
-def test_a_time_constant_beyond_the_record_is_tried_again_within_it() -> None:
+def test_a_fit_with_a_time_constant_longer_than_the_record_is_repeated_with_a_bound() -> None:
     rng = np.random.default_rng(3)
     u = steps(400, 3, hold=5)
     y = filtered([0.0, 0.4], [1.0, -0.6], u) + 0.05 * np.cumsum(rng.normal(size=400))
@@ -171,7 +173,7 @@ def test_a_time_constant_beyond_the_record_is_tried_again_within_it() -> None:
     assert within[0].fit.cost < 1.05 * beyond[0].fit.cost
 
 
-def test_of_models_that_do_as_well_the_most_probable_is_taken_and_a_dead_time_counts() -> None:
+def test_of_equally_good_models_the_lowest_bic_is_taken_and_a_dead_time_counts_as_a_parameter() -> None:
     data = scaled(one_log(300))[0]
     one = candidate(fit_linear(Form(1, (1,), (1,)), data), data)
     tried = {
@@ -197,7 +199,7 @@ def test_a_model_no_better_than_the_mean_is_not_sound(form: dict[str, Any]) -> N
     assert places[IdentificationCode.NO_FIT] == __file__
 
 
-def test_an_integrating_plant_is_believed_and_said_to_be_one() -> None:
+def test_an_integrating_plant_gets_a_sound_model_and_a_warning() -> None:
     u = steps(200, 8, hold=10)
     y = np.cumsum(0.1 * u) + 0.02 * np.random.default_rng(8).normal(size=200)
     with pytest.warns(LogWarning, match="integrates its input"):
@@ -216,14 +218,14 @@ def test_an_integrating_plant_is_believed_and_said_to_be_one() -> None:
         (np.ones((50, 2)), np.arange(50.0), "shape"),
     ],
 )
-def test_what_cannot_be_fitted_is_refused_with_a_sentence(u: Array, y: Array, said: str) -> None:
+def test_unusable_channels_are_refused(u: Array, y: Array, said: str) -> None:
     with pytest.raises(HydrostateError, match=said):
         channels_from([u], [y], 1.0, ["u"], "y")
 
 
 @pytest.mark.parametrize("samples", [20, 25, 26])
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_a_log_of_hardly_more_samples_than_are_needed_has_a_model(samples: int) -> None:
+def test_a_log_with_hardly_more_samples_than_needed_gets_a_model(samples: int) -> None:
     """The whiteness of the residual is tested at as many lags as the log allows."""
     u = steps(samples, 8, hold=3)
     y = filtered([0.0, 0.5], [1.0, -0.5], u) + 0.01 * np.random.default_rng(8).normal(size=samples)
@@ -234,7 +236,7 @@ def test_a_log_of_hardly_more_samples_than_are_needed_has_a_model(samples: int) 
 
 
 @pytest.mark.parametrize("structure", ["arx", "box-jenkins", "instrumental", "subspace", "continuous"])
-def test_other_structures_run_free_with_an_offset(structure: str) -> None:
+def test_other_structures_have_free_runs_with_an_offset(structure: str) -> None:
     data = one_log()
     found = identify_channels(data, structure=structure, order=2, delay=3)
     u, y = 3.0 + steps(400, 9), plant(3.0 + steps(400, 9), 9)
@@ -246,7 +248,7 @@ def test_other_structures_run_free_with_an_offset(structure: str) -> None:
     assert found.model.linear.offset == pytest.approx(found.model.offset, abs=0.05)
 
 
-def test_a_further_value_costs_two_by_akaike_and_the_logarithm_of_the_samples_by_schwarz() -> None:
+def test_a_further_parameter_adds_two_to_aic_and_the_logarithm_of_the_sample_count_to_bic() -> None:
     data, _ = scaled(one_log(200))
     small, large = (candidate(fit_linear(Form(order, (1,), (1,)), data), data) for order in (1, 2))
     values = large.fit.theta.size - small.fit.theta.size
@@ -268,13 +270,13 @@ def test_a_further_value_costs_two_by_akaike_and_the_logarithm_of_the_samples_by
         ({"u": [np.ones((50, 1))]}, "valve"),
     ],
 )
-def test_what_is_no_log_of_input_and_output_is_refused(changes: dict[str, Any], said: str) -> None:
+def test_inconsistent_channels_are_refused(changes: dict[str, Any], said: str) -> None:
     good = {"u": [steps(50, 1)[:, None]], "y": [steps(50, 2)], "sample_time": 0.1, "inputs": ["valve"]}
     with pytest.raises(HydrostateError, match=said):
         channels_from(**{**good, **changes}, output="level")
 
 
-def test_a_model_is_run_with_its_own_inputs_and_as_many_outputs() -> None:
+def test_a_run_with_other_inputs_or_another_number_of_outputs_is_refused() -> None:
     model = identify_channels(one_log(200), structure="output-error", order=2, delay=3).model
     with pytest.raises(HydrostateError, match=r"inputs valve are needed, shape \(n, 1\), got \(9, 2\)"):
         model.simulate(np.zeros((9, 2)), None)
@@ -306,13 +308,13 @@ def with_a_gap(log: Channels) -> Channels:
         ),
     ],
 )
-def test_a_structure_that_cannot_have_a_log_says_so(structure: str, log: Channels, said: str) -> None:
+def test_a_log_unsuitable_for_a_structure_is_refused(structure: str, log: Channels, said: str) -> None:
     by = scaled(log)[1]
     with pytest.raises(HydrostateError, match=said):
         adopt(structure, Form(2, (2,), (1,)), log, by)
 
 
-def test_an_order_is_tried_behind_the_estimated_dead_times_and_behind_none_or_one_sample() -> None:
+def test_each_order_is_tried_with_the_estimated_dead_times_and_with_none_or_one_sample() -> None:
     assert _forms(2, (3, 0), 2, None) == [
         Form(2, (2, 3), (3, 0)),  # one value more if the output responds at once
         Form(2, (3, 3), (3, 0)),

@@ -37,7 +37,7 @@ def identified(data: Channels, structure: str = "output-error") -> Identified:
 
 
 @pytest.mark.parametrize("structure", thinned(["output-error", "auto"], ["output-error"]))
-def test_each_log_has_its_own_offset_where_they_differ(structure: str) -> None:
+def test_logs_with_different_offsets_each_get_their_own(structure: str) -> None:
     found = identified(logs((0.0, 1.0, 5.0)), structure)
     assert found.notes[-1].code == "offsets_differ"
     assert found.sound
@@ -49,24 +49,24 @@ def test_each_log_has_its_own_offset_where_they_differ(structure: str) -> None:
     assert found.quality.rmse == pytest.approx(0.1, rel=0.1)  # the noise
 
 
-def test_it_is_warned_of() -> None:
+def test_different_offsets_cause_a_warning() -> None:
     with pytest.warns(LogWarning, match=r"differs from log to log \(-0\.\d+, \+0\.\d+ from their mean\)"):
         identify_channels(logs((2.0, 3.0)), order=1, delay=1)
 
 
-def test_offsets_that_differ_by_chance_are_one() -> None:
+def test_logs_with_the_same_offset_get_one_offset() -> None:
     assert levelled(logs((2.0, 2.0, 2.0)), [1]) is None
     assert levelled(logs((2.0,)), [1]) is None
     assert identified(logs((2.0, 2.0))).notes == ()
 
 
-def test_a_log_without_outputs_or_changes_has_no_offset_of_its_own() -> None:
+def test_logs_without_outputs_or_without_changes_get_no_separate_offsets() -> None:
     data = logs((2.0, 3.0))
     assert levelled(replace(data, y=(data.y[0], np.full(N, np.nan))), [1]) is None
     assert levelled(replace(data, y=(np.zeros(N), np.ones(N))), [1]) is None
 
 
-def test_derivatives_by_offsets_are_those_of_differences() -> None:
+def test_derivatives_with_respect_to_offsets_equal_numerical_ones() -> None:
     data = replace(scaled(logs((0.0, 1.0, 5.0)))[0], own_offsets=True)
     problem, rng = Problem(Form(2, (2,), (1,)), data), np.random.default_rng(1)
     theta = np.concatenate([[0.1, 0.2, -1.2, 0.4], rng.standard_normal(1 + 2 * 3 + 2)])

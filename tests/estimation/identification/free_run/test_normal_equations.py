@@ -90,7 +90,7 @@ def followed_freely(runs: Runs, theta: Array) -> tuple[Array, Array]:
 
 @pytest.mark.usefixtures("way")
 @RUBS
-def test_runs_and_sums_of_factored_terms_are_those_of_the_terms_themselves(
+def test_runs_and_normal_equations_of_factored_terms_equal_those_of_the_full_terms(
     friction: str, rub: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     runs, theta = made(friction, rub)
@@ -113,7 +113,9 @@ def test_runs_and_sums_of_factored_terms_are_those_of_the_terms_themselves(
 
 @pytest.mark.usefixtures("way")
 @RUBS
-def test_slopes_by_first_outputs_are_those_of_all_values(friction: str, rub: tuple[float, ...]) -> None:
+def test_slopes_with_respect_to_first_outputs_equal_those_of_the_full_jacobian(
+    friction: str, rub: tuple[float, ...]
+) -> None:
     both, theta = made(friction, rub)
     k, data = len(TERMS), replace(both.data, u=both.data.u[:1], y=both.data.y[:1])
     for early in (False, True):
@@ -127,14 +129,14 @@ def test_slopes_by_first_outputs_are_those_of_all_values(friction: str, rub: tup
 
 
 @pytest.mark.usefixtures("way")
-def test_a_run_that_grows_beyond_bounds_has_no_outputs() -> None:
+def test_a_diverging_run_has_no_outputs() -> None:
     runs, theta = made("", ())
     theta[1] = 1e4
     away: Any = SimpleNamespace(**{**vars(runs), "begun": runs.begun})
     assert NormalEquations(away, np.array([-np.inf, np.inf])).outputs(theta) is None
 
 
-def test_terms_share_what_they_have_of_past_outputs_and_of_inputs() -> None:
+def test_terms_share_their_factors_of_past_outputs_and_of_inputs() -> None:
     found = factored([0, 0, 1, 1], every_term(4, 3))
     # 1, two outputs as they are, two clipped ones, three products of two and four of three
     assert found.parent.size == 1 + 2 + 2 + 3 + 4

@@ -281,5 +281,5 @@ def adopted() -> dict[str, Any]:
 
 @pytest.mark.parametrize("case", NUMBERS.cases)
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning", "ignore::plant.errors.CovarianceWarning")
-def test_numbers_stand(case: str) -> None:
+def test_kept_numbers_are_unchanged(case: str) -> None:
     NUMBERS.check(case)

@@ -22,7 +22,7 @@ def moves(gain: float, square: float = 0.0, level: float = 0.0) -> PolynomialFit
     return PolynomialFit(variables, terms, np.array([gain, square, level, 0.0]), 0.0)
 
 
-def test_pieces_of_the_inputs_come_in_other_orders_some_of_them_backwards() -> None:
+def test_pieces_of_the_inputs_are_permuted_and_some_are_reversed() -> None:
     u = np.arange(200.0)
     found = [one.u[0][:, 0] for one in reordered(channels(u))]
     assert len(found) == REORDERED
@@ -36,7 +36,7 @@ def test_pieces_of_the_inputs_come_in_other_orders_some_of_them_backwards() -> N
     assert 0.3 < np.mean(backwards) < 0.7
 
 
-def test_a_model_is_wild_where_it_is_held_in_more_than_three_samples_of_a_thousand() -> None:
+def test_a_model_is_wild_if_it_leaves_its_range_in_more_than_three_samples_of_a_thousand() -> None:
     low, high = moves(1.0).variables.around(FARTHEST)
     quiet = np.zeros(1000)
     for end in (low, high):
@@ -48,7 +48,7 @@ def test_a_model_is_wild_where_it_is_held_in_more_than_three_samples_of_a_thousa
     assert not is_wild(moves(1.0), channels(np.zeros(20)))  # nor for a short record
 
 
-def test_fits_disagree_by_the_root_mean_square_of_what_is_between_them() -> None:
+def test_the_disagreement_of_fits_is_the_root_mean_square_of_their_difference() -> None:
     u = np.random.default_rng(0).uniform(-1.0, 1.0, 100)
     whole = moves(0.5)
     same = disagreement([whole, whole], whole, channels(u))

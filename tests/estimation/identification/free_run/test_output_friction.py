@@ -55,7 +55,9 @@ def found(order: int | None = 1, delay: int | None = 1) -> Identified:
 
 @pytest.mark.parametrize("way", [lambda loop: loop, lambda loop: loop.__wrapped__], ids=["compiled", "Python"])
 @pytest.mark.parametrize("rub", [[0.1, 0.2], [0.1, 0.2, 0.05]], ids=["position", "velocity"])
-def test_friction_takes_a_level_off_and_holds_what_moves_less(way: Callable[[Any], Any], rub: list[float]) -> None:
+def test_friction_reduces_each_change_by_its_level_and_holds_smaller_changes(
+    way: Callable[[Any], Any], rub: list[float]
+) -> None:
     u = np.random.default_rng(3).uniform(-1.0, 1.0, 80)
     # factors of 1 and of the previous output: the input's contribution, and 0.6
     share, none = np.column_stack([0.5 * np.roll(u, 1), np.full(80, 0.6)]), np.zeros(2, dtype=np.int64)
@@ -99,7 +101,7 @@ def test_sensitivities_are_the_derivatives_of_a_run_that_sticks(friction: str) -
 @pytest.mark.parametrize(
     "form", [pytest.param((1, 1), id="told"), pytest.param((None, None), marks=pytest.mark.slow, id="searched")]
 )
-def test_friction_that_was_planted_is_found_and_runs_better_than_every_polynomial(
+def test_the_true_friction_is_found_and_its_free_run_leaves_little_more_than_noise(
     form: tuple[int | None, int | None],
 ) -> None:
     model = found(*form).model
@@ -116,14 +118,14 @@ def test_friction_that_was_planted_is_found_and_runs_better_than_every_polynomia
     assert {one.get("friction") for one in found(*form).candidates} >= {None, "velocity"}
 
 
-def test_a_body_that_does_not_rub_is_given_no_friction() -> None:
+def test_a_body_without_friction_gets_no_friction() -> None:
     plain = identify_channels(log(400, 1, 0.0), structure="auto", order=1, delay=1)
     assert plain.model.structure == "output-error"
     assert plain.model.nonlinearity is None
     assert not any("friction" in one for one in plain.candidates)
 
 
-def test_a_fit_goes_on_with_other_data_from_where_it_is() -> None:
+def test_a_friction_fit_continues_on_a_part_of_the_data() -> None:
     data, by = scaled(log())
     fit = fit_with_friction(fit_linear(Form(1, (1,), (1,)), data), "velocity", data)
     assert fit is not None
@@ -134,7 +136,7 @@ def test_a_fit_goes_on_with_other_data_from_where_it_is() -> None:
     assert part.friction[:2] * by.y_std / STEP == pytest.approx([FRICTION, FRICTION], rel=0.1)
 
 
-def test_a_saved_model_that_rubs_runs_and_predicts_as_before() -> None:
+def test_a_saved_model_with_friction_simulates_and_predicts_the_same_output() -> None:
     model = found().model
     u, y = body(300, 3)
     again = FreeRunModel.from_dict(model.to_dict())
@@ -148,7 +150,7 @@ def test_a_saved_model_that_rubs_runs_and_predicts_as_before() -> None:
 
 
 @pytest.mark.parametrize("friction", ["velocity", "position"])
-def test_the_prediction_of_one_step_sticks_as_the_run_does(friction: str) -> None:
+def test_one_step_predictions_along_a_run_with_friction_equal_the_run(friction: str) -> None:
     data, _ = scaled(log(200))
     fit = fit_with_friction(fit_linear(Form(2, (2,), (1,)), data), friction, data)
     assert fit is not None

@@ -31,7 +31,7 @@ def run_by_hand(first: float, square: float = 0.0) -> Array:
 
 
 @pytest.mark.parametrize("square", [0.0, 0.2])
-def test_a_run_begins_with_the_output_that_suits_what_was_measured_best(square: float) -> None:
+def test_a_run_begins_with_the_first_output_that_fits_the_measured_ones_best(square: float) -> None:
     truth = run_by_hand(0.7, square)
     seen = truth + np.where(np.arange(len(U)) == 0, 0.5, 0.0)  # the first sample is wrong, but the others determine it
     seen[10:20] = np.nan
@@ -45,7 +45,7 @@ def test_a_run_begins_with_the_output_that_suits_what_was_measured_best(square: 
     assert abs(off[-1]) < 1e-4
 
 
-def test_the_search_of_a_start_ends_where_it_gains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_search_of_a_start_ends_if_a_step_gains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
     real = NormalEquations.outputs
 
@@ -62,7 +62,7 @@ def test_the_search_of_a_start_ends_where_it_gains_nothing(monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize(("kind", "power"), [("velocity", 1), ("position", 2)])
-def test_friction_brakes_in_units_of_the_output(kind: str, power: int) -> None:
+def test_friction_levels_are_reported_in_units_of_the_output(kind: str, power: int) -> None:
     by = Scaling(np.zeros(1), np.ones(1), 3.0, 2.0)
     values = (0.1, 0.3, 0.5)[: 3 if kind == "velocity" else 2]
     told = body(*values, kind=kind).nonlinearity(by, 0.01)
@@ -78,7 +78,7 @@ def test_friction_brakes_in_units_of_the_output(kind: str, power: int) -> None:
 
 
 @pytest.mark.parametrize(("kind", "friction"), [("velocity", (0.1, 0.2, 0.05)), ("position", (0.1, 0.2)), ("", ())])
-def test_a_prediction_of_one_step_is_what_the_measured_past_gives(kind: str, friction: tuple[float, ...]) -> None:
+def test_a_one_step_prediction_is_computed_from_the_measured_past(kind: str, friction: tuple[float, ...]) -> None:
     y = np.random.default_rng(5).uniform(-0.8, 0.8, 60)
     found = body(*friction, kind=kind).one_step(U, y)
     assert np.isnan(found[0])
@@ -95,7 +95,7 @@ def test_a_prediction_of_one_step_is_what_the_measured_past_gives(kind: str, fri
     assert np.flatnonzero(np.isnan(body(*friction, kind=kind).one_step(U, lost))).tolist() == [0, 8]
 
 
-def test_a_body_comes_back_from_its_dictionary_and_counts_its_values() -> None:
+def test_dynamics_from_their_dictionary_give_the_same_run_and_number_of_parameters() -> None:
     for one in (body(square=0.2), body(0.1, 0.2, 0.05, kind="velocity"), body(0.1, 0.2, kind="position")):
         again = PolynomialDynamics.from_dict(one.to_dict())
         assert np.array_equal(again.terms, one.terms)
@@ -107,7 +107,7 @@ def test_a_body_comes_back_from_its_dictionary_and_counts_its_values() -> None:
         PolynomialDynamics.from_dict(values)
 
 
-def test_noise_of_the_first_outputs_does_not_throw_a_run_where_nothing_leads_back(
+def test_noise_in_the_first_outputs_does_not_make_the_run_of_a_softening_spring_diverge(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # two samples of 1 ms give a speed: a body in a pit at zero, with a cubic force that drives it away beyond 1.2

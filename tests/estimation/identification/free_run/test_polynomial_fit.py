@@ -56,7 +56,7 @@ def grown(of: Channels) -> tuple[Channels, PolynomialFit]:
     return data, start
 
 
-def test_the_free_run_begins_as_the_linear_model_that_it_grows_from() -> None:
+def test_a_polynomial_fit_begins_with_the_error_of_its_linear_model() -> None:
     data, _ = scaled(log())
     linear = fit_linear(Form(2, (1,), (1,)), data)
     start = begun(linear, data)
@@ -80,7 +80,7 @@ def test_sensitivities_are_the_derivatives_of_the_free_run() -> None:
     assert right == pytest.approx(jacobian.T @ left[runs.used], rel=1e-5, abs=1e-4)
 
 
-def test_the_product_that_the_plant_has_is_the_first_one_added() -> None:
+def test_the_product_in_the_plant_is_the_first_one_added() -> None:
     data, start = grown(log())
     fit = one_more(start, candidate_terms(start.variables), data)
     assert fit is not None
@@ -89,7 +89,7 @@ def test_the_product_that_the_plant_has_is_the_first_one_added() -> None:
     assert fit.cost < 0.2 * start.cost
 
 
-def test_auto_takes_the_polynomial_model_of_a_stiffening_spring_and_not_of_a_linear_one() -> None:
+def test_auto_takes_a_polynomial_model_for_a_stiffening_spring_and_a_linear_one_for_a_linear_plant() -> None:
     stiff = identify_channels(log(), structure="auto", order=2, delay=1)
     assert stiff.model.structure == "narx"
     u, y = duffing(400, 7)
@@ -103,7 +103,7 @@ def test_auto_takes_the_polynomial_model_of_a_stiffening_spring_and_not_of_a_lin
     assert identify_channels(linear, structure="auto", order=1, delay=1).model.structure == "output-error"
 
 
-def test_a_saved_model_simulates_as_before(tmp_path: object) -> None:
+def test_a_saved_model_simulates_the_same_output(tmp_path: object) -> None:
     path = tmp_path / "model.json"  # type: ignore[operator]
     u, y = duffing(300, 3)
     for structure in ("narx", "output-error"):
@@ -123,7 +123,7 @@ def test_a_saved_model_simulates_as_before(tmp_path: object) -> None:
         FreeRunModel.from_dict({**entries, "version": 2})
 
 
-def test_a_model_that_leaves_the_range_when_the_inputs_come_in_another_order_is_wild() -> None:
+def test_a_model_that_leaves_its_range_with_reordered_inputs_is_wild() -> None:
     data, start = grown(log())
     fit = one_more(start, candidate_terms(start.variables), data)
     assert fit is not None
@@ -133,12 +133,12 @@ def test_a_model_that_leaves_the_range_when_the_inputs_come_in_another_order_is_
     assert is_wild(replace(fit, theta=theta), data)
 
 
-def test_a_run_beyond_what_was_seen_does_not_run_away() -> None:
+def test_a_run_beyond_the_fitted_range_stays_finite() -> None:
     model = identify_channels(log(), structure="narx", order=2, delay=1).model
     assert np.isfinite(model.simulate(3.0 * duffing(400, 4)[0])).all()
 
 
-def test_products_are_held_at_the_ends_of_what_was_seen_and_single_terms_are_not() -> None:
+def test_factors_of_products_are_clipped_to_the_fitted_range_and_single_terms_are_not() -> None:
     _, start = grown(log())
     far = 100.0 * np.ones((5, 1))
     terms = np.array([[2, -1, -1], [2, 2, -1]])
@@ -147,7 +147,7 @@ def test_products_are_held_at_the_ends_of_what_was_seen_and_single_terms_are_not
     assert square == pytest.approx(start.variables.limits[2, 1] ** 2)
 
 
-def test_pruning_takes_out_a_product_that_explains_nothing_and_keeps_the_plants_own() -> None:
+def test_pruning_removes_a_product_without_effect_and_keeps_that_of_the_plant() -> None:
     data, start = grown(log())
     own = one_more(start, candidate_terms(start.variables), data)
     assert own is not None
@@ -163,7 +163,7 @@ TERMS = np.array([[-1, -1, -1], [0, -1, -1], [1, -1, -1], [2, -1, -1], [0, 1, -1
 
 
 @pytest.mark.parametrize("way", [lambda loop: loop, lambda loop: loop.__wrapped__], ids=["compiled", "Python"])
-def test_products_are_of_single_signals_as_they_are_and_of_several_as_they_are_held(way: Callable[[Any], Any]) -> None:
+def test_products_of_several_signals_use_clipped_values_and_single_signals_do_not(way: Callable[[Any], Any]) -> None:
     single = np.random.default_rng(4).normal(size=(9, 3))
     held, out = np.clip(single, -0.5, 0.5), np.full((9, TERMS.shape[0] + 2), 7.0)
     way(write_products)(single, held, TERMS, out)
@@ -174,7 +174,7 @@ def test_products_are_of_single_signals_as_they_are_and_of_several_as_they_are_h
     assert (out[:, TERMS.shape[0] :] == 7.0).all()
 
 
-def test_a_rejected_step_is_not_asked_for_its_slopes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_slopes_are_computed_only_for_accepted_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     data, start = grown(log(200))
     runs, costs, asked = Runs(start.variables, start.terms, data), list[float](), list[int]()
     outputs, sums = NormalEquations.outputs, NormalEquations.sums
@@ -197,7 +197,7 @@ def test_a_rejected_step_is_not_asked_for_its_slopes(monkeypatch: pytest.MonkeyP
     assert len(asked) < len(costs)
 
 
-def test_a_fit_that_runs_away_is_wild_takes_no_product_and_predicts_nothing() -> None:
+def test_a_diverging_fit_is_wild_gets_no_product_and_predicts_nan() -> None:
     data, start = grown(log())
     away = replace(start, theta=5.0 * start.theta)
     runs = Runs(away.variables, away.terms, data)
@@ -209,7 +209,9 @@ def test_a_fit_that_runs_away_is_wild_takes_no_product_and_predicts_nothing() ->
     assert np.isnan(body.run(data.u[0], data.y[0])).all()
 
 
-def test_no_product_is_added_where_none_explains_anything_or_none_runs_free(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_product_is_added_if_none_reduces_the_error_or_every_free_run_diverges(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     data, start = grown(log())
     pool = candidate_terms(start.variables)
     explained = replace(start, cost=1e9 * start.cost)
@@ -220,14 +222,14 @@ def test_no_product_is_added_where_none_explains_anything_or_none_runs_free(monk
     assert tried == [(start.theta.size + 1, STEPS)] * TRIED
 
 
-def test_a_plant_that_no_polynomial_model_follows_freely_is_refused_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_requested_polynomial_model_is_refused_if_none_runs_freely(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(identify, "polynomial_candidates", lambda *_: [])
     with pytest.raises(HydrostateError, match="no polynomial model of 'deflection' runs free without growing beyond"):
         identify_channels(log(), structure="narx", order=2, delay=1)
     assert identify_channels(log(), structure="auto", order=2, delay=1).model.structure != "narx"
 
 
-def test_of_long_logs_the_liveliest_part_of_each_is_taken() -> None:
+def test_the_section_of_a_long_log_is_its_most_excited_part() -> None:
     quiet, u = np.zeros((1000, 1)), np.zeros((3000, 1))
     u[1200:1500, 0] = np.sin(np.arange(300.0))
     data = channels_from([u, quiet], [np.arange(3000.0), np.arange(1000.0)], 1.0, ["u"], "y")
@@ -240,7 +242,7 @@ def test_of_long_logs_the_liveliest_part_of_each_is_taken() -> None:
     assert np.var(part.u[0]) > 0.5 * np.var(u[1200:1500])
 
 
-def test_a_model_is_found_in_what_the_command_wrote_around_it(tmp_path: Path) -> None:
+def test_a_model_is_read_from_the_output_file_of_the_command(tmp_path: Path) -> None:
     model = identify_channels(log(300), structure="output-error", order=2, delay=1).model
     entries = [{"rows": []}, {"model": "none"}, {"model": model.to_dict()}]
     (tmp_path / "found.json").write_text(json.dumps(entries))

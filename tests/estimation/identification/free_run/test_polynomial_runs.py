@@ -32,7 +32,7 @@ VARIABLES = Variables(np.array([0, 0, 1, 1]), np.array([1, 2, 3, 4]), np.zeros((
 LINEAR = np.array([[-1, -1, -1], *([k, -1, -1] for k in range(4))])
 
 
-def test_a_run_begins_where_no_input_before_the_log_counts_or_as_early_as_its_outputs_allow() -> None:
+def test_a_run_begins_after_the_longest_input_lag_or_on_request_after_the_output_lags() -> None:
     data = logs()
     late, early = Runs(VARIABLES, LINEAR, data), Runs(VARIABLES, LINEAR, data, early=True)
     assert late.begins == [4, 4]
@@ -45,14 +45,14 @@ def test_a_run_begins_where_no_input_before_the_log_counts_or_as_early_as_its_ou
     assert Runs(VARIABLES, LINEAR, short).begins == [3]
 
 
-def test_a_run_from_what_was_measured_is_what_was_measured_where_the_model_is_right() -> None:
+def test_the_run_of_the_true_model_equals_the_measured_output_without_noise() -> None:
     data = logs()
     runs = Runs(VARIABLES, LINEAR, data)
     ran = runs.outputs(np.array([0.2, 1.2, -0.5, 0.3, 0.1, *runs.start_values()]))
     assert ran == pytest.approx(np.concatenate(data.y), abs=1e-12)
 
 
-def test_a_linear_model_hands_over_its_coefficients_its_constant_and_its_first_outputs() -> None:
+def test_coefficients_constant_and_first_outputs_are_taken_from_the_linear_model() -> None:
     data = logs(1e-6)
     linear = fit_linear(Form(2, (2,), (3,)), data)
     variables, terms, values = variables_of(linear, data)
@@ -64,7 +64,7 @@ def test_a_linear_model_hands_over_its_coefficients_its_constant_and_its_first_o
     assert _first_outputs(linear, runs, data) == pytest.approx(runs.start_values(), abs=1e-4)
 
 
-def test_the_range_of_an_output_is_what_was_seen_and_a_share_around_it() -> None:
+def test_ranges_are_the_measured_ones_widened_by_a_share() -> None:
     data = logs()
     variables = variables_of(fit_linear(Form(2, (2,), (3,)), data), data)[0]
     seen = np.concatenate(data.y)
@@ -76,7 +76,7 @@ def test_the_range_of_an_output_is_what_was_seen_and_a_share_around_it() -> None
     assert variables.limits[2:] == pytest.approx(np.array([[u.min() - reach, u.max() + reach]] * 2))
 
 
-def test_gaps_at_the_beginning_are_filled_by_the_first_output_that_is_there() -> None:
+def test_gaps_in_the_first_outputs_are_filled_with_the_first_measured_one() -> None:
     y = np.array([np.nan, np.nan, 3.0, np.nan, 5.0])
     assert first_values(y, 4).tolist() == [3.0, 3.0, 3.0, 3.0]
     assert first_values(np.full(3, np.nan), 2).tolist() == [0.0, 0.0]

@@ -22,7 +22,7 @@ def gains(own: Array, every: Array, residual: Array) -> Array:
         return _gains(own.T @ own, own.T @ every, square, own.T @ residual, every.T @ residual)
 
 
-def test_a_product_explains_what_least_squares_gains_by_it() -> None:
+def test_the_gain_of_a_product_equals_the_reduction_of_the_least_squares_error() -> None:
     own, every, residual = RNG.normal(size=(80, 3)), RNG.normal(size=(80, 5)), RNG.normal(size=80)
     own[:, 2] *= 1e-6  # columns of any size
     every[:, 3] *= 1e4
@@ -30,7 +30,7 @@ def test_a_product_explains_what_least_squares_gains_by_it() -> None:
     assert gains(own, every, residual) == pytest.approx(exact, rel=1e-6)
 
 
-def test_what_others_sum_up_to_what_is_nothing_and_what_ran_away_explain_nothing() -> None:
+def test_a_linear_combination_of_other_terms_a_zero_and_an_infinite_column_have_no_gain() -> None:
     own, residual = RNG.normal(size=(80, 3)), RNG.normal(size=80)
     nearly = own[:, 0] + 1e-4 * RNG.normal(size=80)
     barely = own[:, 0] + 1e-2 * RNG.normal(size=80)
@@ -39,7 +39,7 @@ def test_what_others_sum_up_to_what_is_nothing_and_what_ran_away_explain_nothing
 
 
 @pytest.mark.parametrize(("lags", "inputs"), [(1, 1), (2, 2), (9, 0), (5, 5)])
-def test_products_are_those_of_two_and_three_signals_until_there_are_too_many(lags: int, inputs: int) -> None:
+def test_products_of_three_signals_are_limited_to_one_channel_if_there_are_too_many(lags: int, inputs: int) -> None:
     source = np.array([0] * lags + [1] * inputs)
     n = lags + inputs
     variables = Variables(source, np.ones(n, dtype=np.int64), np.zeros((n, 2)))

@@ -50,7 +50,7 @@ def identified(seed: int, step: float = 0.1, noise: float = 0.0, structure: str 
 
 
 @pytest.mark.parametrize(("seed", "noise"), [(16801, 0.0), (16802, 0.1)])
-def test_the_gain_of_an_output_that_wanders_is_within_its_interval(seed: int, noise: float) -> None:
+def test_the_interval_of_the_gain_contains_the_truth_for_an_output_with_a_random_walk(seed: int, noise: float) -> None:
     found = identified(seed, noise=noise)
     assert [note.code for note in found.notes] == ["random_walk"]
     assert found.sound
@@ -63,7 +63,7 @@ def test_the_gain_of_an_output_that_wanders_is_within_its_interval(seed: int, no
     assert -found.model.transfer_functions()[0][1][1] == pytest.approx(POLE, abs=0.03)
 
 
-def test_it_is_warned_of() -> None:
+def test_a_random_walk_of_the_output_causes_a_warning() -> None:
     with pytest.warns(LogWarning, match="'y' wanders by itself .random walk"):
         identify_channels(log(16801), order=1, delay=1)
 
@@ -73,14 +73,12 @@ def first(data: Channels, count: int) -> Channels:
 
 
 @pytest.mark.parametrize(("seed", "noise"), [(16802, 0.1), (16804, 0.1), (16807, 0.0)])
-def test_a_walk_of_few_samples_is_told_though_their_correlations_are_not_small_by_chance(
-    seed: int, noise: float
-) -> None:
+def test_a_random_walk_is_found_in_few_samples_with_large_chance_correlations(seed: int, noise: float) -> None:
     data = scaled(first(log(seed, noise=noise), 260))[0]
     assert wandering(data, data, [1], (1,), None) is not None
 
 
-def test_what_follows_a_walk_is_told_of_walks_alone() -> None:
+def test_a_followed_walk_is_noted_for_a_random_walk_and_not_for_white_noise() -> None:
     data, noisy = (scaled(first(one, 300))[0] for one in (log(16801), log(16801, 0.0, 0.3)))
     (note,) = followed_walk(data, data, [1], "narx")
     assert note.code == "walk_followed"
@@ -88,7 +86,7 @@ def test_what_follows_a_walk_is_told_of_walks_alone() -> None:
 
 
 @pytest.mark.parametrize("structure", ["hammerstein", "state-space"])
-def test_a_structure_that_follows_a_walk_says_so(structure: str) -> None:
+def test_a_structure_that_follows_a_random_walk_is_noted_and_not_sound(structure: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
         (found,) = identify_outputs([first(log(16801), 300)], structure=structure, order=1, delay=1)
@@ -96,11 +94,11 @@ def test_a_structure_that_follows_a_walk_says_so(structure: str) -> None:
     assert not found.sound
 
 
-def test_white_noise_is_no_walk() -> None:
+def test_white_noise_is_not_taken_for_a_random_walk() -> None:
     assert identified(16801, 0.0, 0.3).notes == ()
 
 
-def test_an_automatic_choice_takes_no_bends_where_the_output_wanders() -> None:
+def test_auto_takes_no_nonlinearity_if_the_output_has_a_random_walk() -> None:
     found = identified(16801, structure="auto")
     assert [note.code for note in found.notes] == ["random_walk"]
     assert found.model.structure == "output-error"
@@ -110,7 +108,7 @@ def test_an_automatic_choice_takes_no_bends_where_the_output_wanders() -> None:
     ("structure", "left", "taken"),
     [("narx", 0.84, "other"), ("narx", 0.86, "walk"), ("output-error", 0.1, "walk"), ("narx", None, "walk")],
 )
-def test_auto_leaves_changes_where_a_nonlinear_model_of_levels_leaves_clearly_less(
+def test_auto_prefers_a_nonlinear_model_of_levels_only_if_its_error_is_clearly_smaller(
     structure: str, left: float | None, taken: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The residual of a nonlinearity may look like a walk: a heat exchanger's polynomial leaves a tenth of it."""
@@ -123,7 +121,7 @@ def test_auto_leaves_changes_where_a_nonlinear_model_of_levels_leaves_clearly_le
 
 
 @pytest.mark.parametrize(("order", "told"), [(1, False), (None, True)])
-def test_a_walk_at_sizes_that_are_given_is_one_at_others_too(
+def test_a_random_walk_at_a_given_order_must_be_found_at_other_orders_too(
     order: int | None, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The residual of missing poles may look like a walk."""
@@ -137,7 +135,7 @@ def test_a_walk_at_sizes_that_are_given_is_one_at_others_too(
     assert told if free is None else free.orders == [1, 2, 3, 4, 5], "each order's starts come from one less"
 
 
-def test_logs_and_gaps_and_two_inputs() -> None:
+def test_a_random_walk_is_found_in_two_logs_with_gaps_and_two_inputs() -> None:
     one = log(16803)
     y = np.where(np.arange(N) % 400 == 399, np.nan, one.y[0])
     second = np.random.default_rng(16804).standard_normal((N, 1))
@@ -151,19 +149,19 @@ def test_logs_and_gaps_and_two_inputs() -> None:
     assert gains == pytest.approx([GAIN, 1.0], abs=0.15)
 
 
-def test_a_walk_that_is_small_beside_the_output_moves_nothing() -> None:
+def test_a_random_walk_that_is_small_beside_the_output_is_ignored() -> None:
     whole, _ = scaled(log(16801, 0.003))
     assert wandering(whole, whole, [1], (1,), None) is None
 
 
-def test_a_plant_that_integrates_does_not_wander() -> None:
+def test_an_integrating_plant_is_not_taken_for_a_random_walk() -> None:
     one = log(16805, 0.0, 0.05)
     summed = replace(one, y=(np.cumsum(0.1 * one.y[0]) + np.random.default_rng(1).standard_normal(N),))
     whole, _ = scaled(summed)
     assert wandering(whole, whole, [2], (1,), None) is None
 
 
-def test_sums_that_come_back_and_changes_that_are_smooth_are_no_walk() -> None:
+def test_random_walks_are_distinguished_from_returning_sums_and_smooth_changes() -> None:
     white = np.random.default_rng(16806).standard_normal((40, 600))
     walks = np.array([returns(one) > COMES_BACK for one in white])
     noise = np.array([returns(np.diff(one)) > COMES_BACK for one in white])
@@ -175,7 +173,7 @@ def test_sums_that_come_back_and_changes_that_are_smooth_are_no_walk() -> None:
     assert sum(map(remembers, white)) + sum(map(remembers, beside)) <= 1
 
 
-def test_a_fit_of_changes_runs_at_the_levels() -> None:
+def test_a_fit_to_changes_is_converted_to_one_of_levels() -> None:
     plain = log(16808, 0.0)
     whole, _ = scaled(plain)
     changed, by = scaled(changes_of(whole))
@@ -186,7 +184,7 @@ def test_a_fit_of_changes_runs_at_the_levels() -> None:
 
 
 @pytest.mark.parametrize("gaps", [False, True])
-def test_an_output_whose_changes_say_nothing_does_not_wander(gaps: bool) -> None:
+def test_an_output_with_constant_changes_or_without_any_has_no_random_walk(gaps: bool) -> None:
     ramp = 0.5 * np.arange(float(N))
     if gaps:
         ramp[::2] = np.nan
@@ -195,7 +193,7 @@ def test_an_output_whose_changes_say_nothing_does_not_wander(gaps: bool) -> None
 
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_a_controller_that_answers_the_noise_is_told_and_no_walk() -> None:
+def test_feedback_from_the_noise_is_noted_and_not_taken_for_a_random_walk() -> None:
     """A fit to changes gave a gain of 1.7 instead of 1, without a note."""
     loop = closed_loop(0)
     data = channels_from([loop["u"][:, None]], [loop["y"]], 0.01, ["u"], "y")
@@ -207,7 +205,7 @@ def test_a_controller_that_answers_the_noise_is_told_and_no_walk() -> None:
 
 
 @pytest.mark.parametrize(("seed", "step"), [(16808, 0.03), (16810, 0.0)])
-def test_auto_says_of_a_nonlinear_model_that_the_output_wanders_beside_it(seed: int, step: float) -> None:
+def test_auto_notes_a_random_walk_in_the_residual_of_a_nonlinear_model(seed: int, step: float) -> None:
     """A nonlinearity hides the walk from the linear models that are tested for it."""
     rng, y, n = np.random.default_rng(seed), np.zeros(N), 600
     for t in range(1, N):

@@ -43,7 +43,7 @@ def driven(n: int, seed: int, noise: float) -> tuple[Array, Array]:
     return u, y + noise * rng.normal(size=n)
 
 
-def test_the_terms_of_a_sparse_plant_come_first() -> None:
+def test_the_terms_of_a_sparse_plant_are_selected() -> None:
     data = sparse()
     fit = Selection(FORM, 4).fit(data)
     assert fit is not None
@@ -51,7 +51,7 @@ def test_the_terms_of_a_sparse_plant_come_first() -> None:
     assert told == pytest.approx({(0,): 0.6, (3,): 0.5, (1, 3): -0.3, (2, 2, 2): 0.2}, abs=1e-6)
 
 
-def test_each_regressor_is_measured_beside_those_before_it() -> None:
+def test_each_regressor_is_rated_by_its_contribution_beyond_those_already_selected() -> None:
     rng = np.random.default_rng(2)
     columns = rng.normal(size=(200, 4))
     columns = np.column_stack([columns, columns[:, 0] + columns[:, 1]])
@@ -65,7 +65,7 @@ def test_each_regressor_is_measured_beside_those_before_it() -> None:
     assert np.abs(residual).max() < 1e-9
 
 
-def test_a_block_that_is_held_back_chooses_no_term() -> None:
+def test_a_held_back_block_does_not_affect_the_selection_of_terms() -> None:
     data = sparse(noise=0.2)
     mask = blocks(data, BLOCKS)[1]
     spoilt = Channels(data.inputs, data.output, 1.0, data.u, (np.where(mask[0], 50.0, data.y[0]),))
@@ -77,7 +77,7 @@ def test_a_block_that_is_held_back_chooses_no_term() -> None:
         assert np.array_equal(one.theta, other.theta)
 
 
-def test_selections_are_descended_and_judged_by_the_free_run() -> None:
+def test_selections_are_refined_and_judged_by_their_free_run() -> None:
     data = sparse(noise=0.05)
     judged = judged_selections(data, [data.without(mask) for mask in blocks(data, BLOCKS)], [FORM])
     assert {one.recipe.count for one in judged} == set(COUNTS)
@@ -89,7 +89,7 @@ def test_selections_are_descended_and_judged_by_the_free_run() -> None:
     assert np.sqrt(whole.cost / data.n_samples) == pytest.approx(0.05, rel=0.15)
 
 
-def test_of_many_lags_not_all_products_are_chosen_from() -> None:
+def test_a_selection_from_thirty_input_lags_has_the_requested_number_of_terms() -> None:
     found = Selection(Form(4, (30,), (0,)), 6).fit(sparse())
     assert found is not None
     assert found.terms.shape == (6, 3)
@@ -101,13 +101,15 @@ def test_too_few_samples_give_no_model() -> None:
     assert judged_selections(data, [data.without(mask) for mask in blocks(data, BLOCKS)], [FORM]) == []
 
 
-def test_sizes_that_are_asked_for_are_kept() -> None:
+def test_requested_sizes_are_kept() -> None:
     assert {one.order for one in forms_selected((5,), Asked())} == {2, 3, 4}
     assert {one.delays for one in forms_selected((5,), Asked())} == {(0,), (1,), (5,)}
     assert forms_selected((5, 1), Asked(order=7, delay=2, n_numerator=3)) == [Form(7, (3, 3), (2, 2))]
 
 
-def test_a_short_log_of_a_sparse_plant_is_a_case_for_few_products(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_selected_terms_fit_a_short_log_of_a_sparse_plant_better_than_all_products(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     (u, y), (test_u, test_y) = driven(160, 3, 0.02), driven(400, 4, 0.0)
     raw = channels_from([u], [y], 1.0, ["u", "v"], "y")
     data, by = scaled(raw)

@@ -49,7 +49,7 @@ def with_pole(one: Candidate, pole: float, errors: tuple[float, ...], doubt: str
     return replace(one, fit=fit, block_errors=errors, doubt=doubt)
 
 
-def test_a_block_ends_before_a_slow_pole_has_decayed(plain: tuple[Channels, Candidate]) -> None:
+def test_a_pole_outlasts_a_held_back_block_above_a_limit_of_its_radius(plain: tuple[Channels, Candidate]) -> None:
     data, one = plain
     edge = np.exp(-(BLOCKS + 1) / N)
     assert not with_pole(one, edge - 1e-4, (0.1,)).outlasts_block(data)
@@ -67,7 +67,7 @@ def test_a_block_ends_before_a_slow_pole_has_decayed(plain: tuple[Channels, Cand
         ((0.1005, 0.1005, 0.1005, 0.1005), "quick"),
     ],
 )
-def test_a_slow_pole_wins_by_more_than_blocks_scatter(
+def test_a_slow_pole_is_taken_only_if_its_gain_exceeds_the_scatter_of_blocks(
     plain: tuple[Channels, Candidate], slow: tuple[float, ...], taken: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data, one = plain
@@ -90,7 +90,7 @@ def test_a_slow_pole_wins_by_more_than_blocks_scatter(
         ((float("nan"), 0.25), "slow"),  # a half that cannot be fitted decides nothing
     ],
 )
-def test_a_slow_pole_carries_on_where_nothing_pins_it(
+def test_a_slow_pole_is_taken_only_if_its_error_on_blocks_and_halves_is_no_larger(
     plain: tuple[Channels, Candidate], errors: tuple[float, float], taken: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data, one = plain
@@ -101,7 +101,7 @@ def test_a_slow_pole_carries_on_where_nothing_pins_it(
     assert believable(list(models.values()), data, scaled(data)[1])[0] is models[taken]
 
 
-def test_a_half_is_run_by_a_fit_to_the_other(plain: tuple[Channels, Candidate]) -> None:
+def test_each_half_is_simulated_by_a_fit_to_the_other_half(plain: tuple[Channels, Candidate]) -> None:
     data, one = plain
     first, second = halves(replace(data, u=(*data.u, data.u[0][:101]), y=(*data.y, data.y[0][:101])))
     assert [y.size for y in first.y] == [300, 50]
@@ -114,7 +114,7 @@ def test_a_half_is_run_by_a_fit_to_the_other(plain: tuple[Channels, Candidate]) 
     assert np.isnan(halves_error(one.fit, replace(data, u=(data.u[0][:10],), y=(data.y[0][:10],))))
 
 
-def test_what_lies_beyond_the_record_is_still_told(plain: tuple[Channels, Candidate]) -> None:
+def test_rejected_models_with_a_time_constant_beyond_the_record_are_noted(plain: tuple[Channels, Candidate]) -> None:
     data, one = plain
     beyond = with_pole(one, 0.9999, (0.09,) * 4, "time_constant")
     slow, quick = with_pole(one, 0.998, (0.07, 0.1, 0.1, 0.115)), with_pole(one, 0.7, (0.1,) * 4)
@@ -134,7 +134,7 @@ def test_the_drift_of_one_record_is_not_taken_for_a_slow_pole() -> None:
     assert believable(candidates, data, by)[0].fit.f == pytest.approx([1.0, -0.7], abs=0.03)
 
 
-def test_an_output_that_rounding_left_no_spread_has_no_fit() -> None:
+def test_a_fit_to_an_output_without_spread_is_doubtful() -> None:
     u, y = np.sin(np.arange(40.0)), np.cos(np.arange(40.0))
     data = channels_from([u[:, None]], [y], 0.1, ["u"], "y")
     fit = replace(fit_linear(Form(1, (1,), (1,)), data, [np.array([1.0, -0.5])]), cost=0.0)
@@ -149,7 +149,7 @@ def test_an_output_that_rounding_left_no_spread_has_no_fit() -> None:
         ((0.03, 0.09, 0.10, 0.115), "prompt"),  # as much better, but in one block
     ],
 )
-def test_a_dead_time_wins_by_more_than_blocks_scatter(
+def test_a_dead_time_is_taken_only_if_its_gain_exceeds_the_scatter_of_blocks(
     plain: tuple[Channels, Candidate], late: tuple[float, ...], taken: str
 ) -> None:
     data, one = plain
@@ -164,7 +164,7 @@ def test_a_dead_time_wins_by_more_than_blocks_scatter(
         assert believable([other, models["late"]], data, by)[0] is models["late"]
 
 
-def test_what_is_slower_than_its_inputs_repeat_themselves_does_not_integrate(
+def test_a_time_constant_between_input_period_and_record_length_is_not_noted_as_integrating(
     plain: tuple[Channels, Candidate],
 ) -> None:
     u = np.tile(steps(3)[: N // 4], 4)
@@ -179,7 +179,7 @@ def test_what_is_slower_than_its_inputs_repeat_themselves_does_not_integrate(
 
 
 @pytest.mark.parametrize(("gained", "taken"), [(10.0, "settled"), (-10.0, "integrates")])
-def test_a_pole_at_one_is_needless_where_a_settled_model_explains_the_record_better(
+def test_an_integrating_model_is_rejected_if_a_settling_one_has_a_lower_bic(
     plain: tuple[Channels, Candidate], gained: float, taken: str
 ) -> None:
     data, one = plain

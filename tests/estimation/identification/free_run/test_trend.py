@@ -32,7 +32,7 @@ def told(found: Identified) -> bool:
 
 
 @pytest.mark.parametrize("logs", [1, 2])
-def test_a_trend_is_told_and_leaves_the_gain(logs: int) -> None:
+def test_a_trend_is_noted_and_does_not_bias_the_gain(logs: int) -> None:
     found = identify_channels(channels(0, 0.9, SLOPE, logs), order=2, delay=1)
     (note,) = (one for one in found.notes if one.code == IdentificationCode.TREND)
     assert note.data["slope"] == pytest.approx(SLOPE, rel=0.02)
@@ -42,7 +42,7 @@ def test_a_trend_is_told_and_leaves_the_gain(logs: int) -> None:
     assert found.quality.rmse == pytest.approx(0.02, rel=0.15)
 
 
-def test_what_is_drawn_beside_the_model_has_no_trend() -> None:
+def test_the_output_plotted_with_the_model_has_its_trend_removed() -> None:
     data = channels(1, 0.9, SLOPE)
     found = identify_channels(data, order=2, delay=1)
     flat = found.at_one_offset(data)
@@ -51,12 +51,12 @@ def test_what_is_drawn_beside_the_model_has_no_trend() -> None:
 
 
 @pytest.mark.parametrize(("pole", "slope"), [(1.0, 0.0), (0.998, 0.0), (0.9, 0.0), (1.0, -0.1)])
-def test_a_plant_that_integrates_or_is_slow_is_none(pole: float, slope: float) -> None:
+def test_no_trend_is_noted_for_an_integrating_or_slow_plant_or_one_without_trend(pole: float, slope: float) -> None:
     assert not told(identify_channels(channels(2, pole, slope), order=2, delay=1))
 
 
 @pytest.mark.parametrize(("seed", "order"), [(0, None), (1, 2), (2, 2)])
-def test_a_trend_too_small_to_bring_a_slow_pole_is_told_too(seed: int, order: int | None) -> None:
+def test_a_trend_too_small_to_cause_a_slow_pole_is_noted(seed: int, order: int | None) -> None:
     found = identify_channels(channels(seed, 0.9, 0.02), order=order, delay=1)
     (note,) = (one for one in found.notes if one.code == IdentificationCode.TREND)
     assert note.data["slope"] == pytest.approx(0.02, rel=0.15)

@@ -38,7 +38,7 @@ COURSES = {
 
 
 @pytest.mark.parametrize("course", COURSES)
-def test_a_course_of_its_own_is_no_answer_to_an_input(course: str) -> None:
+def test_an_output_that_drifts_by_itself_is_noted_as_unrelated_and_not_sound(course: str) -> None:
     with pytest.warns(LogWarning, match="the output drifts by itself"):
         found = identify_channels(_data(COURSES[course]), order=2, delay=1)
     assert found.quality.fit_percent > 40.0
@@ -46,21 +46,21 @@ def test_a_course_of_its_own_is_no_answer_to_an_input(course: str) -> None:
     assert not found.sound
 
 
-def test_structures_that_begin_at_such_a_model_say_so_too() -> None:
+def test_an_arx_model_of_an_unrelated_output_is_noted_and_not_sound() -> None:
     with pytest.warns(LogWarning):
         found = identify_channels(_data(COURSES["ramp"]), structure="arx", order=2, delay=1)
     assert _said(found)
     assert not found.sound
 
 
-def test_no_nonlinear_model_makes_a_course_of_its_own_an_answer() -> None:
+def test_auto_gives_no_sound_model_of_an_unrelated_output() -> None:
     with pytest.warns(LogWarning):
         found = identify_channels(_data(COURSES["ramp"]), structure="auto", order=1, delay=1)
     assert not found.sound
 
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_what_sums_its_input_or_drifts_beside_its_answer_is_related() -> None:
+def test_an_integrating_output_and_a_response_with_drift_are_related_to_their_input() -> None:
     summed = 0.02 * np.cumsum(_input()) + 0.05 * _noise(5)
     beside = np.convolve(_input(), 0.2 * 0.8 ** np.arange(N))[:N] + 0.03 * np.cumsum(_noise(6))
     for y in (summed, beside):
@@ -69,7 +69,7 @@ def test_what_sums_its_input_or_drifts_beside_its_answer_is_related() -> None:
         assert not _said(found)
 
 
-def test_the_measured_order_has_to_be_better_than_every_other() -> None:
+def test_inputs_explain_an_output_only_if_every_reordering_of_them_fits_worse() -> None:
     for own, wanted in ((4.0, True), (9.0, False)):
         costs = iter([float("inf"), *[10.0] * 9, 8.0, *[12.0] * 9])
         assert explains(own, lambda _, costs=costs: next(costs), _data(_noise(7))) is wanted  # type: ignore[misc]

@@ -71,7 +71,7 @@ def test_the_gain_s_deviation_agrees_with_drawn_coefficients() -> None:
     assert identified.dc_gain_std == pytest.approx(gains.std(), rel=0.03)
 
 
-def test_the_bandwidth_is_where_the_gain_is_three_decibels_down() -> None:
+def test_the_bandwidth_is_the_frequency_at_three_decibels_below_the_steady_gain() -> None:
     identified = model()
     bandwidth = identified.bandwidth_hz
     assert bandwidth is not None
@@ -82,7 +82,7 @@ def test_the_bandwidth_is_where_the_gain_is_three_decibels_down() -> None:
 
 
 @pytest.mark.parametrize("place", [0.05, 0.17, 0.3, 0.37])
-def test_a_notch_as_wide_as_a_five_hundredth_of_half_the_sample_rate_ends_the_band(place: float) -> None:
+def test_a_notch_as_narrow_as_a_five_hundredth_of_the_nyquist_frequency_limits_the_bandwidth(place: float) -> None:
     turn, inner = np.pi * place, 0.997
     notch = np.poly(np.exp([1j * turn, -1j * turn])).real
     poles = np.poly(inner * np.exp([1j * turn, -1j * turn])).real
@@ -147,7 +147,7 @@ def test_an_impossible_model_is_refused(changes: dict[str, object], message: str
         model(**changes)
 
 
-def test_the_table_has_one_row_a_model() -> None:
+def test_the_table_has_one_row_for_each_model() -> None:
     table = model_table({"normal": model(), "published": LinearModel([1.0], [1.0, -0.5], 1e-3, "u", "y")})
     assert list(table.index) == ["normal", "published"]
     assert table.loc["normal", "dc_gain"] == pytest.approx(1.5)
@@ -156,13 +156,13 @@ def test_the_table_has_one_row_a_model() -> None:
     assert np.isnan(table.loc["published", "fit_percent"])
 
 
-def test_noise_models_begin_with_one() -> None:
+def test_a_noise_denominator_that_is_not_monic_is_refused() -> None:
     for wrong in ([0.9, 0.1], [], [[1.0]]):
         with pytest.raises(HydrostateError, match="noise_denominator must be monic"):
             model(noise_denominator=wrong)
 
 
-def test_only_a_continuous_model_is_made_discrete_and_it_goes_to_control_as_it_is() -> None:
+def test_only_a_continuous_model_is_discretised_and_its_exports_stay_continuous() -> None:
     with pytest.raises(HydrostateError, match=r"discretised\(\) is for a model in continuous time"):
         model().discretised()
     continuous = LinearModel([200.0], [1.0, 8.0, 100.0], 1e-3, "u", "y", continuous=True)
@@ -176,7 +176,7 @@ def test_only_a_continuous_model_is_made_discrete_and_it_goes_to_control_as_it_i
 
 
 @pytest.mark.parametrize("continuous", [False, True])
-def test_a_response_is_that_of_the_polynomials_and_its_gradient_is_its_derivative(continuous: bool) -> None:
+def test_the_frequency_response_and_its_gradient_equal_those_of_the_polynomials(continuous: bool) -> None:
     late = {"continuous": True, "dead_time": 0.03} if continuous else {"delay": 2}
     b, f = ([0.4, 2.0], [1.0, 0.3, 4.0]) if continuous else ([0.0, 0.0, 0.4, 0.2], [1.0, -1.2, 0.5])
     frequency, T = np.array([0.0, 0.1, 0.7]), 0.1

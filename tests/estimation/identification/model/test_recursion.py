@@ -8,7 +8,7 @@ from estimation.identification.model.recursion import filtered
 @pytest.mark.parametrize("n_b", [1, 2, 5])
 @pytest.mark.parametrize("n_f", [1, 2, 4])
 @pytest.mark.parametrize("from_rest", [True, False])
-def test_the_output_is_that_of_scipy(n_b: int, n_f: int, from_rest: bool) -> None:
+def test_the_output_equals_that_of_scipy_lfilter(n_b: int, n_f: int, from_rest: bool) -> None:
     rng = np.random.default_rng(10 * n_b + n_f)
     b, u = rng.standard_normal(n_b), rng.standard_normal(300)
     f = np.poly(rng.uniform(-0.95, 0.95, n_f - 1)) if n_f > 1 else np.ones(1)

@@ -11,7 +11,7 @@ from estimation.identification.model.step_response import step_response
 SPREAD = np.array([[4e-4, 1e-4, 0.0], [1e-4, 9e-4, 2e-4], [0.0, 2e-4, 1e-4]])
 
 
-def test_a_discrete_model_answers_after_its_dead_time_whatever_its_offset_and_start() -> None:
+def test_a_discrete_step_response_begins_after_the_dead_time_without_offset_and_initial_state() -> None:
     model = LinearModel([0.0, 0.0, 0.3, 0.1], [1.0, -0.6], 0.01, "u", "y", delay=2, offset=5.0, initial_state=[1, 2, 3])
     found = step_response(model, 40)
     assert found.response[:3].tolist() == [0.0, 0.0, pytest.approx(0.3)]
@@ -20,7 +20,7 @@ def test_a_discrete_model_answers_after_its_dead_time_whatever_its_offset_and_st
     assert found.time[-1] == pytest.approx(0.39)
 
 
-def test_the_deviation_is_that_of_models_drawn_from_the_covariance() -> None:
+def test_the_deviation_equals_the_spread_of_models_drawn_from_the_covariance() -> None:
     model = LinearModel([0.3, 0.1], [1.0, -0.6], 0.01, "u", "y", covariance=1e-3 * SPREAD)
     rng = np.random.default_rng(3)
     drawn = rng.multivariate_normal([0.3, 0.1, -0.6], 1e-3 * SPREAD, 4000)

@@ -34,13 +34,13 @@ def spread_over_draws(model: LinearModel, quantity: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("quantity", "std"), [("dc_gain", "dc_gain_std"), ("bandwidth_hz", "bandwidth_std_hz")])
-def test_deviations_are_those_of_coefficients_drawn_from_the_covariance(
+def test_deviations_equal_the_spread_over_coefficients_drawn_from_the_covariance(
     quantity: str, std: str, fitted: LinearModel
 ) -> None:
     assert getattr(fitted, std) == pytest.approx(spread_over_draws(fitted, quantity).real.std(), rel=0.08)
 
 
-def test_poles_and_zeros_have_deviations_of_both_parts(fitted: LinearModel) -> None:
+def test_poles_and_zeros_have_deviations_of_their_real_and_imaginary_parts(fitted: LinearModel) -> None:
     for quantity, std in (("poles", fitted.pole_std), ("zeros", fitted.zero_std)):
         drawn = spread_over_draws(fitted, quantity)
         assert std[0].real == pytest.approx(drawn.real.std(axis=0)[0], rel=0.08)
@@ -56,7 +56,7 @@ def test_a_band_of_the_response_contains_the_response(fitted: LinearModel) -> No
 
 
 @pytest.mark.slow
-def test_a_pole_that_a_zero_nearly_cancels_is_flagged_and_its_profile_interval_is_wider(
+def test_a_near_cancellation_is_noted_and_the_profile_interval_contains_the_true_gain(
     table6: dict[str, LinearModel],
 ) -> None:
     truth = table6["minor_leakage"]
@@ -75,7 +75,7 @@ def test_a_pole_that_a_zero_nearly_cancels_is_flagged_and_its_profile_interval_i
     assert low < model.dc_gain < high
 
 
-def test_where_nothing_cancels_the_profile_interval_is_that_of_the_covariance(
+def test_without_cancellations_the_profile_interval_equals_that_of_the_covariance(
     table6: dict[str, LinearModel],
 ) -> None:
     rng = np.random.default_rng(4)
@@ -92,7 +92,7 @@ def test_where_nothing_cancels_the_profile_interval_is_that_of_the_covariance(
     ("gain", "white", "stretched"),
     [(4.0, 1.0, 4.0), (1.0, 1.0, 1.0), (1.0, 0.0, 1.0), (np.nan, 1.0, 1.0), (1.0, np.nan, 1.0), (0.0, 0.0, 1.0)],
 )
-def test_an_interval_is_stretched_by_the_ratio_of_the_gain_s_variances(
+def test_a_profile_interval_is_widened_by_the_ratio_of_coloured_to_white_gain_variance(
     gain: float, white: float, stretched: float
 ) -> None:
     def spread(variance: float) -> Array:
@@ -102,7 +102,7 @@ def test_an_interval_is_stretched_by_the_ratio_of_the_gain_s_variances(
     assert _stretch(model) == pytest.approx(stretched)
 
 
-def test_a_profile_is_for_output_error_only(table6: dict[str, LinearModel]) -> None:
+def test_a_profile_interval_requires_an_output_error_fit(table6: dict[str, LinearModel]) -> None:
     with pytest.raises(HydrostateError, match="needs an output-error fit"):
         dc_gain_interval(table6["normal"], np.ones(3), np.ones(3))
 
@@ -158,14 +158,14 @@ def test_a_step_response_settles_at_the_gain(fitted: LinearModel) -> None:
     assert response[-1] == pytest.approx(fitted.dc_gain, rel=1e-6)
 
 
-def test_without_a_covariance_nothing_cancels_and_no_bandwidth_has_a_deviation() -> None:
+def test_without_a_covariance_there_are_no_cancellations_and_no_bandwidth_deviation() -> None:
     alike = LinearModel([0.1, -0.09], [1.0, -1.8001, 0.81009], 1e-3, "u", "y")
     assert alike.cancellations == ()
     assert alike.bandwidth_hz is not None
     assert alike.bandwidth_std_hz is None
 
 
-def test_a_zero_on_a_pole_is_no_deviation_away() -> None:
+def test_the_distance_of_a_zero_from_a_pole_is_measured_in_deviations_along_it() -> None:
     assert _deviations(np.zeros(2), np.eye(2)) == 0.0
     assert _deviations(np.array([3.0, 4.0]), np.diag([4.0, 9.0])) == pytest.approx(
         5.0 / np.sqrt(0.6**2 * 4.0 + 0.8**2 * 9.0)
@@ -175,7 +175,7 @@ def test_a_zero_on_a_pole_is_no_deviation_away() -> None:
 
 
 @pytest.mark.parametrize("share", [1e-4, 1e-6, 1e-10])
-def test_a_pole_that_takes_hours_has_its_own_bandwidth(share: float) -> None:
+def test_the_bandwidth_of_a_very_slow_pole_is_accurate(share: float) -> None:
     slow = LinearModel([share], [1.0, -(1.0 - share)], 1e-3, "u", "y")
     assert slow.bandwidth_hz == pytest.approx(share / (2.0 * np.pi * 1e-3), rel=1e-4)
 
@@ -185,7 +185,7 @@ def test_an_integrator_has_no_bandwidth() -> None:
         assert LinearModel([1.0], [1.0, -1.0], 1e-3, "u", "y").bandwidth_hz is None
 
 
-def test_a_band_is_the_spread_along_the_response_and_across_it() -> None:
+def test_gain_and_phase_deviations_are_the_spread_along_and_across_the_response() -> None:
     gradient = np.array([[1.0 + 2.0j, -1.0j], [3.0 + 0.0j, 4.0j]])
     covariance = np.array([[0.04, 0.01], [0.01, 0.09]])
     response = np.array([2.0j, 0.0])  # along the imaginary axis, and zero

@@ -48,7 +48,7 @@ def test_the_best_numerator_is_that_of_least_squares() -> None:
         assert power == pytest.approx(np.sum((design @ best) ** 2), rel=1e-6)
 
 
-def test_refined_starts_lie_where_the_criterion_is_least() -> None:
+def test_refined_starts_are_at_a_minimum_of_the_criterion() -> None:
     starts = np.array([[0.3, 0.0, 0.0, -1.0, 0.4], [*B, *F]])
     costs, refined = refine_banded(starts, 3, DELAY, OMEGA, POWER, cross(), 60)
     for theta, cost in zip(refined, costs, strict=True):
@@ -58,7 +58,7 @@ def test_refined_starts_lie_where_the_criterion_is_least() -> None:
     assert costs[0] == pytest.approx(costs[1], rel=1e-4)
 
 
-def test_a_search_without_steps_or_without_numbers_leaves_its_start() -> None:
+def test_a_search_without_steps_or_with_nan_data_returns_its_start() -> None:
     start = np.array([[0.3, 0.0, 0.0, -1.0, 0.4]])
     costs, refined = refine_banded(start, 3, DELAY, OMEGA, POWER, cross(), 0)
     np.testing.assert_array_equal(refined, start)

@@ -27,7 +27,7 @@ def test_a_model_at_rest_has_no_initial_state_columns() -> None:
     np.testing.assert_array_equal(jacobian, sensitivities(Structure(3, 2), np.append(THETA[:5], [0.0, 0.0]), u)[:, :5])
 
 
-def test_an_input_that_comes_later_than_the_log_is_long_moves_nothing() -> None:
+def test_with_a_delay_longer_than_the_log_the_numerator_has_no_effect() -> None:
     structure = Structure(2, 1, 8)
     theta = np.concatenate([[0.5, 0.2, -0.7, 0.3], np.zeros(structure.n_initial - 1)])
     jacobian = sensitivities(structure, theta, np.arange(6.0))
@@ -36,7 +36,7 @@ def test_an_input_that_comes_later_than_the_log_is_long_moves_nothing() -> None:
     assert not jacobian[:, 9:].any()
 
 
-def test_the_linear_part_is_solved_out_exactly() -> None:
+def test_linear_parameters_are_solved_exactly() -> None:
     structure = Structure(3, 2)
     u = np.random.default_rng(3).standard_normal(300)
     y = predict(structure, THETA, u)

@@ -24,7 +24,7 @@ def test_normal_equations_are_those_of_the_sensitivities() -> None:
     np.testing.assert_allclose(gradient, -(jacobian.T @ residual), rtol=1e-6)
 
 
-def test_stability_is_that_of_the_roots() -> None:
+def test_the_stability_test_agrees_with_the_roots() -> None:
     rng = np.random.default_rng(2)
     for _ in range(500):
         radius, angle = rng.uniform(0.9, 1.05, 2), rng.uniform(0.0, np.pi, 2)
@@ -40,7 +40,7 @@ def test_a_singular_system_is_solved_only_with_damping() -> None:
     np.testing.assert_allclose(step, [-0.5, -0.5], rtol=1e-5)
 
 
-def test_descent_ends_where_no_step_helps(plant_30hz: LinearModel) -> None:
+def test_a_descent_ends_at_a_point_without_gradient(plant_30hz: LinearModel) -> None:
     rng = np.random.default_rng(3)
     u = np.repeat(rng.choice([-1.0, 1.0], 300), 10)
     y = plant_30hz.simulate(u) + 0.1 * rng.standard_normal(u.size)
@@ -53,7 +53,7 @@ def test_descent_ends_where_no_step_helps(plant_30hz: LinearModel) -> None:
     assert np.abs(jacobian.T @ residual / np.sqrt(np.diag(gram))).max() < 1e-4 * np.sqrt(cost)
 
 
-def test_machine_code_computes_what_python_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compiled_normal_equations_equal_those_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(5)
     u, f = rng.normal(size=80), np.array([-1.2, 0.5])
     sizes, bounds = np.array([2, 2, 1, 2]), np.array([0, 50, 80])
@@ -94,7 +94,7 @@ def test_a_damped_step_solves_marquardts_equations(damping: float) -> None:
 
 
 @WAYS
-def test_a_value_that_changes_nothing_is_left_alone_and_a_negative_direction_refused() -> None:
+def test_a_parameter_without_effect_is_not_moved_and_an_indefinite_matrix_is_refused() -> None:
     step, factor = np.empty(2), np.empty((2, 2))
     assert solve_damped(np.diag([4.0, 0.0]), np.array([2.0, 0.0]), 0.0, step, factor)
     assert step.tolist() == [-0.5, 0.0]
@@ -112,7 +112,7 @@ def first_order(noise: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @WAYS
-def test_a_descent_ends_at_the_optimum_and_says_so() -> None:
+def test_a_descent_ends_at_the_optimum_and_reports_convergence() -> None:
     u, y = first_order(0.05)
     ones, bounds = np.ones(u.size), np.array([0, u.size])
     cost, theta, gram, converged = descend(np.array([0.1, 0.0, 0.0]), SIZES, u, y, ones, bounds, 60, 1e-10)
@@ -126,7 +126,7 @@ def test_a_descent_ends_at_the_optimum_and_says_so() -> None:
 
 
 @WAYS
-def test_a_descent_that_begins_at_the_truth_or_has_no_steps_or_no_numbers_stays_there() -> None:
+def test_a_descent_stays_at_its_start_at_the_truth_or_without_steps_or_with_nan_data() -> None:
     u, y = first_order(0.0)
     ones, bounds, truth = np.ones(u.size), np.array([0, u.size]), np.array([0.3, -0.8, 0.2])
     cost, theta, _, converged = descend(truth, SIZES, u, y, ones, bounds, 60, 1e-10)
@@ -142,7 +142,7 @@ def test_a_descent_that_begins_at_the_truth_or_has_no_steps_or_no_numbers_stays_
 
 @WAYS
 @pytest.mark.parametrize("n_s", [0, 1])
-def test_a_descent_without_initial_states_is_that_of_the_response_alone(n_s: int) -> None:
+def test_a_descent_finds_the_truth_with_and_without_an_initial_state(n_s: int) -> None:
     u = first_order(0.0)[0]
     truth = np.array([0.3, -0.8, 0.0])[: 2 + n_s]
     y = predict(Structure(1, 1, 1), np.array([0.3, -0.8, 0.0]), u)
@@ -153,7 +153,7 @@ def test_a_descent_without_initial_states_is_that_of_the_response_alone(n_s: int
 
 
 @WAYS
-def test_a_step_beyond_the_circle_is_not_taken() -> None:
+def test_a_descent_stays_within_the_unit_circle() -> None:
     u = first_order(0.0)[0]
     y = np.zeros(u.size)
     for t in range(1, u.size):

@@ -8,7 +8,7 @@ from plant.errors import HydrostateError
 WANTED = {"names": ("u", "y"), "n_excited": 2, "n_wanted": 10}
 
 
-def test_several_experiments_share_coefficients_and_begin_each_in_its_own_state(plant_30hz: LinearModel) -> None:
+def test_several_experiments_share_coefficients_and_have_separate_initial_states(plant_30hz: LinearModel) -> None:
     rng = np.random.default_rng(1)
     u = np.repeat(rng.choice([-1.0, 1.0], 200), 10)
     y = plant_30hz.simulate(u)
@@ -32,7 +32,7 @@ def test_gaps_are_bridged_for_starts_only() -> None:
     assert np.isfinite(data.bridged()[0][1]).all()
 
 
-def test_outputs_brought_forward_answer_the_inputs_beside_them_in_every_experiment() -> None:
+def test_outputs_are_advanced_by_the_dead_time_within_each_experiment() -> None:
     u, y = np.arange(1.0, 41.0) % 7, np.sin(np.arange(40.0))
     data = experiments_from([u, u[:20]], [y, y[:20]], **WANTED)
     late = data.advanced(3)
@@ -43,7 +43,7 @@ def test_outputs_brought_forward_answer_the_inputs_beside_them_in_every_experime
     assert not data.goes_on_behind(20)
 
 
-def test_one_output_for_each_input_is_wanted() -> None:
+def test_different_numbers_of_inputs_and_outputs_are_refused() -> None:
     u = np.arange(40.0) % 7
     with pytest.raises(HydrostateError, match="as many inputs as outputs are needed, got 2 and 1"):
         experiments_from([u, u], [u], **WANTED)
@@ -56,20 +56,20 @@ def test_an_experiment_without_any_output_is_refused() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_an_input_that_noise_drowns_is_refused(seed: int) -> None:
+def test_an_input_without_effect_above_the_noise_is_refused(seed: int) -> None:
     rng = np.random.default_rng(seed)
     u, y = rng.standard_normal((2, 2_000))
     with pytest.raises(HydrostateError, match="does not move 'output' above its noise"):
         fit_output_error(u, y, 1e-3, n_numerator=2, n_denominator=2)
 
 
-def test_a_weak_effect_that_is_there_is_not_refused() -> None:
+def test_an_input_with_a_weak_effect_is_not_refused() -> None:
     u, noise = np.random.default_rng(5).standard_normal((2, 2_000))
     fitted = fit_output_error(u, 0.25 * u + noise, 1e-3, n_numerator=1, n_denominator=1)
     assert fitted.dc_gain == pytest.approx(0.25, abs=4.0 * fitted.dc_gain_std)
 
 
-def test_a_log_shorter_than_what_it_should_excite_excites_nothing() -> None:
+def test_a_log_too_short_for_the_wanted_parameters_excites_none() -> None:
     u = np.random.default_rng(1).normal(size=9)
     assert [_excited(u, wanted) for wanted in (4, 5)] == [4, 0]
     assert _excited(np.sin(np.arange(50.0)), 4) == 2

@@ -22,7 +22,7 @@ class Valley:
 
 @pytest.mark.parametrize("floor", [0.0, 3.0])
 @pytest.mark.parametrize("start", [[-1.2, 1.0], [3.0, -2.0]])
-def test_it_comes_to_the_bottom_of_a_bent_valley(start: list[float], floor: float) -> None:
+def test_the_search_finds_the_minimum_of_a_curved_valley(start: list[float], floor: float) -> None:
     valley = Valley(floor)
     cost, found = levenberg(valley, np.array(start), lambda _: True, tolerance=1e-12, most_steps=200)
     assert cost == pytest.approx(floor**2, abs=1e-9)
@@ -30,13 +30,13 @@ def test_it_comes_to_the_bottom_of_a_bent_valley(start: list[float], floor: floa
     assert valley.asked < 60
 
 
-def test_at_its_bottom_it_asks_once_more_and_ends() -> None:
+def test_a_search_from_the_minimum_ends_after_one_further_evaluation() -> None:
     valley = Valley(floor=3.0)
     cost, found = levenberg(valley, np.ones(2), lambda _: True, tolerance=1e-9, most_steps=200)
     assert (cost, found.tolist(), valley.asked) == (9.0, [1.0, 1.0], 2)
 
 
-def test_between_walls_it_stays_where_it_began_and_gives_up() -> None:
+def test_the_search_gives_up_at_its_start_if_no_step_is_acceptable() -> None:
     valley, tried = Valley(), list[Array]()
 
     def walled(x: Array) -> bool:
@@ -52,7 +52,7 @@ def test_between_walls_it_stays_where_it_began_and_gives_up() -> None:
     assert len(sizes) < 20
 
 
-def test_it_never_asks_beyond_what_is_acceptable_nor_more_often_than_it_may() -> None:
+def test_the_search_evaluates_only_acceptable_points_and_respects_its_largest_number_of_steps() -> None:
     seen: list[Array] = []
     valley = Valley()
 
@@ -68,7 +68,7 @@ def test_it_never_asks_beyond_what_is_acceptable_nor_more_often_than_it_may() ->
     assert len(seen) <= 6
 
 
-def test_where_two_steps_in_a_row_gain_too_little_it_ends() -> None:
+def test_the_search_ends_after_two_consecutive_steps_with_too_little_gain() -> None:
     asked = list[int]()
     for least_gain in (0.0, 1e-3, 2.0):
         valley = Valley(floor=3.0)

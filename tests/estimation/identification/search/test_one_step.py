@@ -27,7 +27,7 @@ def errors(
 
 
 @pytest.mark.parametrize("tied", [False, True])
-def test_errors_are_what_is_left_by_plant_and_noise_model(tied: bool) -> None:
+def test_one_step_errors_equal_those_of_the_plant_and_noise_filters(tied: bool) -> None:
     d = [] if tied else D
     cost, error, _ = errors(np.array([*B, *F, *C, *d]), len(d), 0, WHOLE, [0, N])
     left = Y - lfilter([0.0] * DELAY + B, [1.0, *F], U)
@@ -49,7 +49,7 @@ def test_sensitivities_are_the_derivatives_of_the_errors(tied: bool, used: Array
         np.testing.assert_allclose(jacobian[:, k], (below - above) / 2e-6, atol=1e-7 * np.abs(jacobian).max())
 
 
-def test_a_missing_output_is_no_error_and_is_replaced_by_its_prediction() -> None:
+def test_a_missing_output_has_zero_error_and_is_not_read() -> None:
     theta = np.array([*B, *F, *C, *D, 0.0, 0.0, 0.0, 0.0])
     _, error, _ = errors(theta, 1, 2, GAPPED)
     assert np.all(error[~GAPPED] == 0.0)

@@ -39,7 +39,7 @@ def test_a_slow_pole_that_a_zero_nearly_cancels_gets_a_start(table6: dict[str, L
     assert any(0.97 < radius < 0.995 for radius in slowest)
 
 
-def test_two_records_say_more_than_one(plant_30hz: LinearModel) -> None:
+def test_the_spectra_of_two_records_are_added(plant_30hz: LinearModel) -> None:
     rng = np.random.default_rng(5)
     signals = [rng.standard_normal(n) for n in (700, 1_100)]
     spectra = banded_spectra([(u, plant_30hz.simulate(u)) for u in signals])
@@ -55,7 +55,7 @@ def test_unstable_roots_are_reflected_into_the_unit_circle() -> None:
     np.testing.assert_allclose(rows[1], np.poly([0.3, -0.2])[1:])
 
 
-def test_pairs_of_poles_are_real_or_conjugate_with_the_damping_ratios_that_are_named() -> None:
+def test_pairs_of_poles_are_real_or_conjugate_with_the_listed_damping_ratios() -> None:
     n = 2000
     real = -_real_poles(n)[:, 0]
     assert np.all((real > -1.0) & (real < 1.0))
@@ -74,7 +74,7 @@ def test_pairs_of_poles_are_real_or_conjugate_with_the_damping_ratios_that_are_n
     assert max(frequencies) == pytest.approx(0.97 * np.pi)
 
 
-def test_products_of_denominators_are_those_of_their_polynomials() -> None:
+def test_products_of_denominators_equal_polynomial_products() -> None:
     rng = np.random.default_rng(0)
     kept, additions = rng.normal(size=(3, 2)), rng.normal(size=(4, 1))
     wanted = [np.polymul([1.0, *a], [1.0, *b])[1:] for a in kept for b in additions]

@@ -12,7 +12,7 @@ POLES = ([0.9], [0.9999, 0.5], [0.99 + 0.1j, 0.99 - 0.1j, -0.4], [0.9999, 0.999,
 
 
 @pytest.mark.parametrize("poles", POLES)
-def test_a_denominator_comes_back_from_its_reflection_coefficients_with_its_slopes(poles: list[complex]) -> None:
+def test_reflection_coefficients_give_back_the_denominator_and_its_derivatives(poles: list[complex]) -> None:
     f = polynomial(np.array(poles, dtype=np.complex128))[1:]
     reflected = reflections(f)
     assert (np.abs(reflected) < 1.0).all()
@@ -23,7 +23,7 @@ def test_a_denominator_comes_back_from_its_reflection_coefficients_with_its_slop
         np.testing.assert_allclose((ahead - behind) / 2e-6, slopes[:, k], atol=1e-6)
 
 
-def test_a_step_towards_poles_outside_stays_inside_and_promises_less_cost() -> None:
+def test_a_step_towards_unstable_poles_stays_stable_and_predicts_a_lower_cost() -> None:
     f, wanted = np.array([-1.9, 0.905]), np.array([-2.3, 1.4])
     gram = np.diag([5.0, 1.0, 1.0])
     theta = np.concatenate([[3.0], f])
@@ -38,7 +38,7 @@ def test_a_step_towards_poles_outside_stays_inside_and_promises_less_cost() -> N
     assert stable_step(outside, gram, gradient, 1e-6, slice(1, 3), np.ones(2)) is None
 
 
-def test_a_descent_follows_the_bound_where_plain_steps_end_at_it() -> None:
+def test_a_descent_continues_along_a_bound_at_which_plain_steps_end() -> None:
     """The first value's optimum, of size 1.2, is beyond the bound 1; the second must still follow the curved valley."""
 
     def at(x: Array) -> tuple[float, Array, Array]:

@@ -5,7 +5,7 @@ from estimation.identification import LinearModel, automatic_response
 from plant.errors import HydrostateError
 
 
-def test_the_window_is_long_at_a_resonance_and_short_where_the_response_is_flat(table6: dict[str, LinearModel]) -> None:
+def test_the_resolution_is_finer_at_a_resonance_than_at_low_frequencies(table6: dict[str, LinearModel]) -> None:
     truth = table6["major_leakage_minor_friction"]
     rng = np.random.default_rng(1)
     u = np.repeat(rng.choice([-1.0, 1.0], 400), 50)
@@ -16,7 +16,7 @@ def test_the_window_is_long_at_a_resonance_and_short_where_the_response_is_flat(
 
 
 @pytest.mark.slow
-def test_bands_cover_at_the_resonance_and_below(table6: dict[str, LinearModel]) -> None:
+def test_bands_contain_the_true_gain_at_the_resonance_and_below(table6: dict[str, LinearModel]) -> None:
     truth, covered = table6["major_leakage_minor_friction"], []
     for seed in range(40):
         rng = np.random.default_rng([2, seed])

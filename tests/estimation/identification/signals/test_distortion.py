@@ -12,7 +12,7 @@ def drawn(count: int) -> np.ndarray:
     return RNG.normal(size=count) + 1j * RNG.normal(size=count)
 
 
-def test_a_response_that_bends_no_more_than_the_polynomial_leaves_nothing() -> None:
+def test_a_response_no_more_curved_than_the_polynomial_leaves_no_residual() -> None:
     inside = drawn(40)
     lines = np.arange(40) / 40.0
     output = (1.0 + 2.0j * lines + 0.5 * lines**2) * inside
@@ -20,7 +20,7 @@ def test_a_response_that_bends_no_more_than_the_polynomial_leaves_nothing() -> N
 
 
 @pytest.mark.parametrize("place", [0, 2, 11, 19])
-def test_each_line_is_what_least_squares_over_its_neighbours_misses_it_by_in_units_of_its_own_noise(place: int) -> None:
+def test_the_residual_of_a_line_is_its_prediction_error_from_its_neighbours_scaled_to_its_own_noise(place: int) -> None:
     inside, output = drawn(20), drawn(20)
     span = 2 * BESIDE + 1
     begin = min(max(place - BESIDE, 0), 20 - span)
@@ -35,7 +35,7 @@ def test_each_line_is_what_least_squares_over_its_neighbours_misses_it_by_in_uni
     assert _left(output, inside)[place] == pytest.approx(missed)
 
 
-def test_fewer_lines_than_a_polynomial_spans_leave_nothing_known() -> None:
+def test_with_fewer_lines_than_the_polynomial_spans_the_residual_is_nan() -> None:
     span = 2 * BESIDE + 1
     assert np.isnan(_left(drawn(span - 1), drawn(span - 1))).all()
     assert np.isfinite(_left(drawn(span), drawn(span))).all()

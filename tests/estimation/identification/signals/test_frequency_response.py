@@ -19,7 +19,7 @@ def _truth(frequency: np.ndarray, denominator: list[float]) -> np.ndarray:  # ty
     return np.polyval(NUMERATOR[::-1], z) / np.polyval(denominator[::-1], z)
 
 
-def test_circles_of_the_local_polynomial_method_cover() -> None:
+def test_confidence_circles_of_the_local_polynomial_method_contain_the_true_response() -> None:
     covered: list[float] = []
     for seed in range(4):
         rng = np.random.default_rng(seed)
@@ -48,7 +48,7 @@ def log() -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
     return u, bent(u, DAMPED) + 0.02 * rng.normal(size=len(u))
 
 
-def test_noise_odd_and_even_distortion_are_told_apart(log: tuple[np.ndarray, np.ndarray]) -> None:  # type: ignore[type-arg]
+def test_noise_and_odd_and_even_distortion_are_separated(log: tuple[np.ndarray, np.ndarray]) -> None:  # type: ignore[type-arg]
     u, y = log
     told = best_linear_approximation(u, y, 1.0)
     assert (told.period, told.periods) == (PERIOD, PERIODS - 1)
@@ -61,14 +61,16 @@ def test_noise_odd_and_even_distortion_are_told_apart(log: tuple[np.ndarray, np.
     assert squared.level(odd=True) == pytest.approx(told.level(odd=True), rel=0.2)
 
 
-def test_circles_of_the_best_linear_approximation_hold_its_distortion(log: tuple[np.ndarray, np.ndarray]) -> None:  # type: ignore[type-arg]
+def test_confidence_circles_of_the_best_linear_approximation_include_its_distortion(
+    log: tuple[np.ndarray, np.ndarray],  # type: ignore[type-arg]
+) -> None:
     found = best_linear_approximation(*log, 1.0).response
     linear = _truth(found.frequency, DAMPED)
     gain = np.vdot(linear, found.response) / np.vdot(linear, linear)
     assert 0.9 < np.mean(np.abs(found.response - gain * linear) <= found.radius()) < 0.99
 
 
-def test_a_multisine_without_silent_lines_tells_the_noise_alone() -> None:
+def test_a_multisine_without_silent_lines_gives_no_distortion_level() -> None:
     rng = np.random.default_rng(5)
     u = np.tile(multisine(np.arange(1, PERIOD // 2), rng), 3)
     told = best_linear_approximation(u, u + 0.01 * rng.normal(size=len(u)), 1.0)
@@ -77,7 +79,7 @@ def test_a_multisine_without_silent_lines_tells_the_noise_alone() -> None:
     assert np.median(np.abs(told.response.response - 1.0)) < 0.02
 
 
-def test_the_period_is_found_and_a_walk_has_none() -> None:
+def test_a_period_is_found_and_a_random_walk_or_a_constant_has_none() -> None:
     rng = np.random.default_rng(6)
     one = rng.normal(size=250)
     assert find_period(np.concatenate([np.tile(one, 4), one[:70]])) == 250
@@ -99,12 +101,12 @@ def test_the_period_is_found_and_a_walk_has_none() -> None:
         (lambda: best_linear_approximation(np.full(99, np.nan), np.ones(99), 1.0), "without gaps"),
     ],
 )
-def test_signals_that_tell_nothing_are_refused(call: object, said: str) -> None:
+def test_unusable_signals_are_refused(call: object, said: str) -> None:
     with pytest.raises(HydrostateError, match=said):
         call()  # type: ignore[operator]
 
 
-def test_the_method_is_what_the_input_allows(log: tuple[np.ndarray, np.ndarray]) -> None:  # type: ignore[type-arg]
+def test_the_method_depends_on_whether_the_input_is_periodic(log: tuple[np.ndarray, np.ndarray]) -> None:  # type: ignore[type-arg]
     u, y = log
     assert measured_response(u, y, 1.0).method == "multisine"
     rng = np.random.default_rng(8)
@@ -114,7 +116,7 @@ def test_the_method_is_what_the_input_allows(log: tuple[np.ndarray, np.ndarray])
         measured_response(v, np.where(np.arange(500) == 3, np.nan, v), 0.1)
 
 
-def test_a_level_comes_with_how_far_it_scatters_from_multisine_to_multisine(
+def test_the_interval_of_a_distortion_level_matches_its_scatter_between_multisines(
     log: tuple[np.ndarray, np.ndarray],  # type: ignore[type-arg]
 ) -> None:
     every: list[tuple[float, float, float]] = []
@@ -136,7 +138,7 @@ def test_a_level_comes_with_how_far_it_scatters_from_multisine_to_multisine(
     assert wanted > PERIOD
 
 
-def test_what_a_level_scatters_by_is_not_guessed_where_the_lines_do_not_tell_it() -> None:
+def test_a_distortion_level_has_no_interval_if_the_lines_do_not_determine_its_scatter() -> None:
     rng = np.random.default_rng(2)
     every = multisine(np.arange(1, 3200), rng)
     u = np.tile(every, 3)

@@ -304,5 +304,5 @@ def filtered_and_resampled() -> dict[str, Any]:
 
 @pytest.mark.parametrize("case", NUMBERS.cases)
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
-def test_numbers_stand(case: str) -> None:
+def test_kept_numbers_are_unchanged(case: str) -> None:
     NUMBERS.check(case)

@@ -9,7 +9,7 @@ RNG = np.random.default_rng(4)
 ONCE = np.repeat(RNG.normal(size=40), 5)
 
 
-def test_a_period_is_found_beside_noise_and_where_the_last_one_is_cut() -> None:
+def test_a_period_is_found_in_noise_and_with_an_incomplete_last_period() -> None:
     for count, rest in ((2, 0), (3, 70), (1, 60)):
         u = np.concatenate([np.tile(ONCE, count), ONCE[:rest]])
         assert common_period(u[:, None]) == ONCE.size
@@ -22,7 +22,7 @@ def test_a_period_is_found_beside_noise_and_where_the_last_one_is_cut() -> None:
     assert common_period(np.column_stack([both[:, 0], RNG.normal(size=len(both))])) is None
 
 
-def test_no_period_is_found_where_nothing_comes_again() -> None:
+def test_no_period_is_found_in_signals_that_do_not_repeat() -> None:
     step = (np.arange(500) > 100).astype(float)
     slow = np.cumsum(RNG.normal(size=500))
     sweep = np.sin(np.cumsum(np.geomspace(0.02, 1.0, 500)))

@@ -12,7 +12,7 @@ def tone(frequency_hz: float, time: np.ndarray = TIME) -> np.ndarray:
     return np.sin(2.0 * np.pi * frequency_hz * time + 0.3)
 
 
-def test_the_mean_is_removed_over_the_samples_that_are_there() -> None:
+def test_the_mean_of_the_present_samples_is_removed() -> None:
     np.testing.assert_array_equal(detrend([1.0, np.nan, 5.0]), [-2.0, np.nan, 2.0])
 
 

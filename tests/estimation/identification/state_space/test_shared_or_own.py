@@ -29,7 +29,7 @@ def found(name: str, left: float, n_values: int, *, sound: bool = True) -> Ident
         ((1.0 - 1.1 * CLEARLY) * LEFT, 20, True),
     ],
 )
-def test_more_values_must_do_better_by_a_hundredth_and_fewer_by_anything(
+def test_a_shared_model_without_fewer_parameters_must_be_better_by_one_percent(
     left: float, n_values: int, shared: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data: Any = ["y", "z"]
@@ -41,7 +41,7 @@ def test_more_values_must_do_better_by_a_hundredth_and_fewer_by_anything(
     assert [[row["structure"] for row in one.candidates] for one in chosen] == [["own", "shared"]] * 2
 
 
-def test_one_unsound_output_of_a_shared_model_keeps_all_on_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shared_model_with_one_unsound_output_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     data: Any = ["y", "z"]
     together = [found("shared", 0.5 * LEFT, 5, sound=sound) for sound in (True, False)]
     monkeypatch.setattr(identify, "identify_channels", lambda *_, **__: found("own", LEFT, 10))

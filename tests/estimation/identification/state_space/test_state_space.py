@@ -37,7 +37,7 @@ def test_sensitivities_are_the_derivatives_of_the_outputs() -> None:
         assert moved == pytest.approx(slopes[:, :, k], abs=1e-6)
 
 
-def test_another_basis_of_the_states_changes_no_output_and_is_no_direction_of_the_search() -> None:
+def test_a_change_of_the_state_basis_changes_no_output_and_is_excluded_from_the_search() -> None:
     size = Size(3, 2, 2, direct=False)
     problem = Problem(size, joined(in_scale(60)))
     theta = 0.3 * np.random.default_rng(3).normal(size=size.n_matrices + size.n)
@@ -49,14 +49,14 @@ def test_another_basis_of_the_states_changes_no_output_and_is_no_direction_of_th
     assert np.linalg.matrix_rank(slopes) == np.linalg.matrix_rank(slopes @ basis)
 
 
-def test_the_subspace_start_is_near_the_poles() -> None:
+def test_the_subspace_start_has_nearly_the_true_poles() -> None:
     starts = subspace_starts(joined(in_scale(600)), 3)
     wanted = np.sort_complex(np.linalg.eigvals(A))
     distance = [float(np.abs(np.sort_complex(np.linalg.eigvals(a)) - wanted).max()) for a, _ in starts]
     assert min(distance) < 0.05
 
 
-def test_deviations_of_a_log_are_those_of_the_bound_and_its_errors_are_within_them() -> None:
+def test_deviations_from_one_log_equal_the_cramer_rao_bound_and_errors_are_consistent_with_it() -> None:
     data = logged(0, 500)
     (values, deviations), limit = told(identified(data, 3)), told(bound(data))[1]
     free = limit > 1e-9
@@ -66,7 +66,7 @@ def test_deviations_of_a_log_are_those_of_the_bound_and_its_errors_are_within_th
 
 
 @pytest.mark.slow
-def test_errors_are_at_the_bound_and_deviations_say_so() -> None:
+def test_errors_over_eight_logs_equal_the_cramer_rao_bound_and_the_deviations() -> None:
     truth, errors, own = told(plant())[0], [], []
     for seed in range(8):
         data = logged(seed, 500)
@@ -88,7 +88,7 @@ def test_the_number_of_states_is_chosen_on_blocks_held_back() -> None:
     assert candidates[0].price > 2.0 * best.price
 
 
-def test_dead_times_are_looked_for_once_and_not_at_every_order(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dead_times_are_estimated_once_and_not_for_each_order(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = list[str]()
 
     def found(data: Channels) -> tuple[int, ...]:
@@ -101,7 +101,9 @@ def test_dead_times_are_looked_for_once_and_not_at_every_order(monkeypatch: pyte
     assert asked == [one.output for one in data]
 
 
-def test_outputs_share_one_model_that_is_saved_with_its_covariance(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_outputs_share_one_model_that_simulates_the_same_after_loading(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
     data = logged(3, 400)
     found = identify_state_space(data, order=3, delay=1)
     path = tmp_path_factory.mktemp("saved") / "model.json"
@@ -119,7 +121,7 @@ def test_outputs_share_one_model_that_is_saved_with_its_covariance(tmp_path_fact
     assert [one.model.offset for one in found] == pytest.approx([5.0, -2.0], abs=0.05)
 
 
-def test_dead_time_is_a_state_of_its_own_or_a_late_input() -> None:
+def test_dead_times_as_states_give_the_same_response_as_delayed_inputs() -> None:
     late = replace(plant(), delays=(2, 0))
     a, b, c, d = late.with_delays_as_states()
     z = complex(np.exp(0.3j))
@@ -128,7 +130,7 @@ def test_dead_time_is_a_state_of_its_own_or_a_late_input() -> None:
 
 
 @pytest.mark.slow  # kept numbers test this with smaller logs
-def test_missing_samples_and_several_logs_are_one_fit() -> None:
+def test_one_model_is_fitted_to_several_logs_with_missing_samples() -> None:
     first, second = logged(5, 300), logged(6, 300)
     both = [
         channels_from([*a.u, *b.u], [*a.y, np.where(np.arange(300) % 7 == k, np.nan, b.y[0])], 0.01, ["a", "b"], name)
@@ -139,7 +141,7 @@ def test_missing_samples_and_several_logs_are_one_fit() -> None:
 
 
 @pytest.mark.slow  # kept numbers test this with a smaller log
-def test_auto_takes_the_state_space_where_outputs_share_their_dynamics() -> None:
+def test_auto_takes_the_state_space_if_outputs_share_their_dynamics() -> None:
     shared = identify_outputs(logged(7, 300), structure="auto", order=3, delay=1)
     assert {one.model.structure for one in shared} == {"state-space"}
     compared = {row["structure"] for row in shared[0].candidates}
@@ -147,7 +149,7 @@ def test_auto_takes_the_state_space_where_outputs_share_their_dynamics() -> None
 
 
 @pytest.mark.slow
-def test_outputs_that_share_nothing_keep_models_of_their_own() -> None:
+def test_outputs_without_common_dynamics_keep_separate_models() -> None:
     rng = np.random.default_rng(8)
     u = np.repeat(rng.normal(size=(60, 2)), 4, axis=0)
     y = filtered([0.0, 0.4], [1.0, -0.8], u[:, 0]) + 0.05 * rng.normal(size=240)
@@ -157,7 +159,7 @@ def test_outputs_that_share_nothing_keep_models_of_their_own() -> None:
     assert "state-space" not in {one.model.structure for one in found}
 
 
-def test_what_cannot_be_fitted_is_said() -> None:
+def test_too_high_an_order_a_numerator_size_and_different_inputs_are_refused() -> None:
     data = logged(9, 40)
     with pytest.raises(HydrostateError, match="give a lower order"):
         identify_state_space(data, order=12)
@@ -180,7 +182,7 @@ def test_a_model_no_better_than_the_mean_is_not_sound() -> None:
 
 
 @pytest.mark.parametrize(("radius", "slowest"), [(0.9, -0.02 / np.log(0.9)), (1.0, np.inf), (1.2, np.inf)])
-def test_a_time_constant_that_a_log_is_too_short_for_is_told_in_seconds(
+def test_a_time_constant_too_long_for_the_log_is_noted_in_seconds(
     radius: float, slowest: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(identify, "doubtful_channels", lambda *_: [])

@@ -27,7 +27,7 @@ def gain(values: np.ndarray, z: complex) -> np.ndarray:
     return whole * z ** -np.array([0.0, 2.0])
 
 
-def test_a_response_has_the_derivatives_of_every_value() -> None:
+def test_the_response_has_exact_derivatives_with_respect_to_every_parameter() -> None:
     z = complex(np.exp(0.4j))
     values = np.concatenate([*(one.ravel() for one in MATRICES), np.zeros(P)])
     found, slopes = SYSTEM.response(z)
@@ -46,7 +46,7 @@ def test_a_direct_path_that_was_not_fitted_has_no_deviation() -> None:
     assert SYSTEM.n_values - without.n_values == P * M
 
 
-def test_a_frequency_response_has_the_spread_of_what_the_covariance_draws() -> None:
+def test_deviations_of_a_frequency_response_equal_its_spread_over_draws_from_the_covariance() -> None:
     found, spread = SYSTEM.frequency_response([1.0, 20.0])
     values = np.concatenate([*(one.ravel() for one in MATRICES), np.zeros(P)])
     draws = values + np.random.default_rng(5).normal(size=(4000, SIZE)) @ ROOT.T
@@ -71,7 +71,7 @@ def test_a_log_that_is_too_short_gives_no_start() -> None:
     assert subspace_starts(joined(in_scale(20)), 3) == []
 
 
-def test_an_output_at_rest_is_as_well_known_in_units_as_in_scale() -> None:
+def test_steady_outputs_and_their_deviations_are_converted_from_scaled_to_physical_units() -> None:
     u_mean, u_std = np.array([3.0, -40.0]), np.array([2.0, 5.0])
     y_mean, y_std = np.array([1.0, 7.0]), np.array([0.5, 20.0])
     in_units = SYSTEM.in_units(u_mean, u_std, y_mean, y_std)

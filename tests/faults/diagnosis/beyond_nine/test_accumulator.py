@@ -34,7 +34,7 @@ def of_rod() -> tuple[Blocks, Actuator, ClassFits]:
     return log, actuator, fit_classes(log, actuator)
 
 
-def test_a_rod_is_followed_with_the_gas_that_its_log_shows() -> None:
+def test_the_gas_volume_of_a_single_rods_accumulator_is_estimated_from_its_log() -> None:
     log, actuator, fits = of_rod()
     assert unexplained(log, fits, actuator)
     fed = fed_otherwise(log, fits, actuator)
@@ -44,11 +44,11 @@ def test_a_rod_is_followed_with_the_gas_that_its_log_shows() -> None:
     assert fed_otherwise(replace(log, pressure=None), fits, actuator) is None
 
 
-def test_no_other_gas_is_told_of_a_log_that_it_does_not_explain() -> None:
+def test_no_other_gas_volume_is_proposed_for_a_log_that_the_rig_file_explains() -> None:
     assert fed_otherwise(blocks(), classes(), ACTUATOR) is None
 
 
-def test_nothing_is_asked_where_circuits_follow_or_both_sides_are_alike() -> None:
+def test_the_gas_volume_is_refitted_only_for_an_unexplained_log_of_a_single_rod() -> None:
     log, actuator, fits = of_rod()
     left = tuple(unexplained(log, fits, actuator))
     board: Any = SimpleNamespace(blocks=log, fits=fits)

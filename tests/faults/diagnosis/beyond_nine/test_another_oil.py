@@ -61,7 +61,7 @@ def asked_of(
         ((BESIDE, BIASED), 2.5, [1.0]),
     ],
 )
-def test_a_circuit_is_fitted_again_around_stiff_oil_that_alone_may_speak_against_it(
+def test_a_log_is_refitted_around_stiffer_oil_only_if_nothing_else_is_an_objection(
     against: tuple[Note, ...], fitted: float, moduli: list[float]
 ) -> None:
     found, asked = asked_of(against, fitted)
@@ -74,14 +74,14 @@ def test_a_circuit_is_fitted_again_around_stiff_oil_that_alone_may_speak_against
     )
 
 
-def test_what_lies_beside_the_nine_around_stiffer_oil_too_has_another_cause() -> None:
+def test_the_rig_files_oil_is_kept_if_the_refit_around_stiffer_oil_has_objections() -> None:
     found, asked = asked_of((BESIDE,), 2.5, again=(BIASED,))
     assert len(asked) == 2
     assert found.diagnosis.against == (BESIDE,)
     assert (found.parameters, found.notes) == (HEALTHY, ())
 
 
-def test_a_log_of_stiff_oil_gets_its_class_without_pressure_and_says_so() -> None:
+def test_without_pressure_a_log_of_stiff_oil_gets_its_class_and_a_note() -> None:
     truth = replace(parameters_for(CONDITIONS["minor_leakage"]), bulk_modulus=4.0 * HEALTHY.bulk_modulus)
     rng = np.random.default_rng(8)
     log = simulate(CIRCUIT, make_drive("steps", 3.0, 2e-3, truth, rng), 2e-3, truth, sensors=BENCH, rng=rng)

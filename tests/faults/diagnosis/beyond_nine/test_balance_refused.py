@@ -44,7 +44,7 @@ def stands(
     return class_without_balance(doubts, Diagnosis({}, against, {}, {}, {}, (), board), estimate, ACTUATOR)
 
 
-def test_a_class_stands_where_a_circuit_follows_closely_and_nothing_else_does_better(
+def test_a_refused_balance_keeps_its_class_if_a_circuit_follows_closely_and_no_fault_is_better(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     said = stands(monkeypatch)
@@ -68,13 +68,15 @@ def test_a_class_stands_where_a_circuit_follows_closely_and_nothing_else_does_be
     ],
     ids=str,
 )
-def test_it_does_not_stand_where(monkeypatch: pytest.MonkeyPatch, change: dict[str, Any]) -> None:
+def test_a_refused_balance_loses_its_class_if_one_requirement_is_missing(
+    monkeypatch: pytest.MonkeyPatch, change: dict[str, Any]
+) -> None:
     assert stands(monkeypatch, **change) is None
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("fault", "name"), [(None, ""), ("valve A", STUCK), ("pump", WORN)])
-def test_with_pressure_circuits_tell_a_stuck_valve_and_a_worn_pump(fault: str | None, name: str) -> None:
+def test_with_pressure_gains_of_circuits_identify_a_stuck_valve_and_a_worn_pump(fault: str | None, name: str) -> None:
     one = log_of(FAULTS[fault][0], pressure=True) if fault else log_of(pressure=True)
     gains = gains_of_others(one, fit_classes(one, ACTUATOR), ACTUATOR)
     speaks = {other for other, gain in gains.items() if gain > MOST_GAINED.get(other, 0.0)}

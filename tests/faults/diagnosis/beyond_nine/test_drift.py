@@ -62,7 +62,7 @@ def weighed_over_drift(condition: str, first: float) -> Diagnosis:
 
 
 @pytest.mark.parametrize("condition", thinned(["minor_leakage", "major_leakage"], ["major_leakage"]))
-def test_a_condition_of_cold_oil_is_no_other_when_it_is_warm(condition: str) -> None:
+def test_averaging_over_the_drift_finds_a_condition_that_applies_to_the_cold_oil(condition: str) -> None:
     at_end = diagnosed(warming(condition, 1.0)).diagnosis
     assert at_end.condition != condition or at_end.unknown
     found = weighed_over_drift(condition, 1.0)
@@ -71,12 +71,12 @@ def test_a_condition_of_cold_oil_is_no_other_when_it_is_warm(condition: str) -> 
 
 
 @pytest.mark.parametrize("first", [TWICE**-0.5, 1.0 / TWICE])
-def test_nor_is_one_of_oil_that_is_warm_halfway_or_at_the_end(first: float) -> None:
+def test_averaging_over_the_drift_finds_a_condition_that_applies_halfway_or_at_the_end(first: float) -> None:
     found = weighed_over_drift("minor_leakage", first)
     assert (found.condition, found.unknown) == ("minor_leakage", False)
 
 
-def test_severities_are_those_at_the_end_and_the_total_holds_the_drift() -> None:
+def test_severities_of_a_drifting_log_apply_to_its_end_and_total_intervals_span_the_drift() -> None:
     found, at_end = weighed_over_drift("minor_leakage", 1.0), diagnosed(warming("minor_leakage", 1.0)).diagnosis
     flow = found.severity["leakage_flow"]
     assert (flow.value, flow.ci95) == (at_end.severity["leakage_flow"].value, at_end.severity["leakage_flow"].ci95)
@@ -102,7 +102,7 @@ def test_a_log_that_does_not_drift_is_diagnosed_once() -> None:
     assert asked == [log]
 
 
-def test_what_speaks_against_all_nine_in_any_oil_speaks_against_a_log() -> None:
+def test_a_drifting_log_keeps_an_objection_only_if_every_place_in_the_drift_has_one() -> None:
     first = weighed_over_drift("minor_leakage", 1.0)
     outside, bias = AgainstCode.OUTSIDE_CONDITIONS.note(), AgainstCode.PRESSURE_BIAS.note(bias_pa=1e5)
 
@@ -118,7 +118,7 @@ def test_what_speaks_against_all_nine_in_any_oil_speaks_against_a_log() -> None:
     assert against((outside,), (bias,), ()) == (bias,)
 
 
-def test_places_count_by_their_evidence_and_alike_where_they_compare_other_stretches() -> None:
+def test_places_are_weighted_by_evidence_and_equally_if_their_blocks_differ() -> None:
     one = weighed_over_drift("minor_leakage", 1.0)
     sure = {name: {"normal": 1.0}.get(name, 0.0) for name in CONDITIONS}
     other = {name: {"major_friction": 1.0}.get(name, 0.0) for name in CONDITIONS}
@@ -135,7 +135,7 @@ def test_places_count_by_their_evidence_and_alike_where_they_compare_other_stret
 
 
 @pytest.mark.parametrize("pressure", [True, False])
-def test_a_circuit_fitted_on_from_another_place_begins_at_its_leakage_and_has_the_widths_of_the_log(
+def test_a_refit_from_another_place_starts_at_its_scaled_leakage_with_widths_for_the_channels(
     pressure: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one = weighed_over_drift("minor_leakage", 1.0)

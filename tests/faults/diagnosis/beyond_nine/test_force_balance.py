@@ -53,7 +53,7 @@ def seen(blocks: Blocks, p: EhaParameters = PAPER) -> Loads:
     return found
 
 
-def test_force_spring_and_inertia_come_back_within_their_intervals_at_once() -> None:
+def test_force_spring_and_inertia_are_estimated_together_within_their_intervals() -> None:
     true = {"load_force": -700.0, "load_stiffness": 9e3, "moving_mass": 250.0}
     found = seen(blocks_under(PAPER, to_and_fro(), *true.values()))
     assert found.believed == tuple(true)
@@ -65,18 +65,18 @@ def test_force_spring_and_inertia_come_back_within_their_intervals_at_once() -> 
     assert LAGGING < found.of("moving_mass")[1] < 0.2 * true["moving_mass"]
 
 
-def test_a_rod_without_a_load_shows_none() -> None:
+def test_the_force_balance_shows_no_load_on_a_rod_without_one() -> None:
     found = seen(blocks_under(PAPER, to_and_fro()))
     assert found.sure == ()
     assert abs(found.of("load_force")[0]) < 5.0
 
 
-def test_a_load_too_small_to_matter_is_sure_and_not_believed() -> None:
+def test_a_significant_but_small_load_is_not_accepted() -> None:
     found = seen(blocks_under(PAPER, to_and_fro(), force=20.0))
     assert (found.sure, found.believed) == (("load_force",), ())
 
 
-def test_the_rigs_own_load_and_two_areas_are_no_finding() -> None:
+def test_the_rig_files_load_and_two_piston_areas_are_not_reported_as_a_load() -> None:
     rig = replace(PAPER, load_force=400.0, load_stiffness=5e3)
     assert seen(blocks_under(rig, to_and_fro()), rig).sure == ()
     rod = replace(PAPER, area_difference=0.2)
@@ -90,7 +90,7 @@ def test_the_rigs_own_load_and_two_areas_are_no_finding() -> None:
     assert abs(found.of("load_force")[0]) < 5.0
 
 
-def test_a_force_as_small_as_the_inner_circuits_on_two_unlike_areas_is_not_told() -> None:
+def test_a_force_equal_to_that_of_the_precharge_on_unequal_areas_is_not_significant() -> None:
     rod = replace(PAPER, area_difference=0.2)
     own = PAPER.piston_area * 0.2 * 2.0 * (PAPER.accumulator_pressure - ATMOSPHERE)
     one = blocks_under(PAPER, to_and_fro(), force=own)
@@ -101,7 +101,7 @@ def test_a_force_as_small_as_the_inner_circuits_on_two_unlike_areas_is_not_told(
 
 
 @pytest.mark.parametrize("condition", ["normal", "major_friction"])
-def test_of_a_piston_that_slides_one_way_friction_at_rest_is_left_open(condition: str) -> None:
+def test_one_way_motion_leaves_the_force_as_uncertain_as_coulomb_friction(condition: str) -> None:
     p = parameters_for(CONDITIONS[condition], PAPER)
     found = seen(blocks_under(p, to_and_fro(one_way=True), force=2000.0))
     force, std = found.of("load_force")
@@ -110,14 +110,14 @@ def test_of_a_piston_that_slides_one_way_friction_at_rest_is_left_open(condition
     assert found.believed == ("load_force",)
 
 
-def test_nothing_is_said_without_pressure_or_of_a_piston_that_stands() -> None:
+def test_there_is_no_force_balance_without_pressure_or_motion() -> None:
     moving = blocks_under(PAPER, to_and_fro(), force=500.0)
     assert force_balance(replace(moving, pressure=None), PAPER) is None
     standing = blocks_under(PAPER, 1e-6 * to_and_fro(), force=500.0)
     assert force_balance(standing, PAPER) is None
 
 
-def test_a_piston_slides_once_it_has_gone_on_after_a_turn() -> None:
+def test_a_piston_slides_only_after_its_seals_have_broken_loose_behind_a_reversal() -> None:
     velocity = np.concatenate([np.full(40, 0.002), np.full(40, -0.002), np.zeros(10)])
     velocity[60] = np.nan
     blocks = Blocks(np.zeros(901), 1e-3, 10, velocity, velocity, NOISE)

@@ -19,19 +19,19 @@ from faults.notes import ClassCode
     [(-9.0, -9.0, -4.0, 3.9, 3.9), (0.0, 0.0, 0.0, 3.9, 3.9), (3.0, 3.0, 1.0, 0.0, 0.0), (-9.0, 0.0, 1.2, 1.0, 1.0)],
     ids=str,
 )
-def test_a_pump_that_is_well_worn_need_only_be_likelier_than_a_sound_one(shares: tuple[float, ...]) -> None:
+def test_odds_of_wear_count_well_worn_pumps_against_the_sound_pump(shares: tuple[float, ...]) -> None:
     presumed = 0.5 * np.exp(-0.5 * (np.log(DELIVERIES) / 0.15) ** 2)
     less, well = np.exp(shares) * presumed, np.array([1.0, 1.0, 1.0, 0.0, 0.0])
     assert odds_of_wear([one - 5.0 for one in shares], -5.0) == pytest.approx(np.log(less @ well))
 
 
-def test_what_is_presumed_of_wear_does_not_hang_on_how_many_pumps_are_tried() -> None:
+def test_the_prior_of_wear_does_not_depend_on_the_number_of_pumps_tried() -> None:
     tenths = np.exp(-0.5 * (np.log([0.7, 0.8, 0.9]) / 0.15) ** 2)
     assert np.sum(np.exp(presumed_of_wear(DELIVERIES))) == pytest.approx(np.sum(tenths), rel=0.2)
     assert presumed_of_wear([1.0]) == 0.0
 
 
-def test_a_valve_that_never_opened_may_be_stuck_as_likely_as_each_of_the_nine() -> None:
+def test_a_valve_that_never_opened_is_as_likely_stuck_as_each_of_the_nine_conditions() -> None:
     sure = {"normal": 0.0, "major_friction": 1.0}
     unseen = (RigCode.MAKEUP_UNSEEN.note(side="B"),)
     left, said = beside_unseen_valve(sure, unseen)
@@ -45,7 +45,7 @@ def test_a_valve_that_never_opened_may_be_stuck_as_likely_as_each_of_the_nine() 
     assert beside_unseen_valve({}, unseen) == ({}, ())
 
 
-def test_a_fault_that_is_likelier_than_each_condition_speaks_against_all_nine() -> None:
+def test_a_fault_likelier_than_every_condition_is_an_objection_to_all_nine() -> None:
     """Before, the headline gave 94 % for none of the nine, while the rest of the page named a condition."""
     wear = ClassCode.WEAR_NOT_TOLD.note(percent=94.0, limit=90.0)
     unseen = ClassCode.STUCK_NOT_TOLD.note(percent=10.0)

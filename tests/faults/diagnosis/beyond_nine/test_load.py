@@ -46,7 +46,7 @@ def loads_of(found: Finding) -> dict[str, Note]:
     return {note.code.name: note for note in found.notes if note.code in NAMED}
 
 
-def test_a_log_without_a_load_is_told_of_none() -> None:
+def test_a_log_without_a_load_has_no_note_of_a_load() -> None:
     found = diagnose_log(log("minor_leakage"), Rig())
     assert found.condition == "minor_leakage"
     assert loads_of(found) == {}
@@ -67,7 +67,7 @@ def test_a_load_is_found_with_the_condition_under_it(force: float) -> None:
     assert note.data["pressure_pa"] * HEALTHY.piston_area == pytest.approx(note.data["force_n"])
 
 
-def test_a_spring_is_named_that_would_pass_for_friction() -> None:
+def test_a_spring_on_the_rod_is_named_and_not_taken_for_friction() -> None:
     found = diagnose_log(log("minor_friction", load_stiffness=2e4), Rig())
     assert (found.condition, found.unknown) == ("minor_friction", False)
     (note,) = loads_of(found).values()
@@ -110,7 +110,7 @@ def loads(guesses: Iterable[EhaParameters]) -> list[float]:
     return [guess.load_force for guess in guesses]
 
 
-def test_loads_that_the_balance_likes_and_that_hold_the_first_and_the_mean_pressure_are_tried() -> None:
+def test_first_guesses_are_the_loads_of_the_balance_the_start_pressure_and_the_mean_pressure() -> None:
     blocks = replace(BLOCKS, pressure=np.array([1e5, np.nan, 3e5]))
     area = HEALTHY.piston_area
     assert loads(first_guesses(blocks, HEALTHY, ESTIMATE, None)) == [pytest.approx(2e5 * area)]
@@ -147,7 +147,7 @@ def under(
     return under_load(circuits, rig, ESTIMATE)
 
 
-def test_what_the_balance_is_sure_of_is_taken_and_corrected_until_nothing_asks(
+def test_a_significant_load_is_accepted_and_corrected_until_no_objection_remains(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     circuits = Circuits(800.0)
@@ -159,7 +159,7 @@ def test_what_the_balance_is_sure_of_is_taken_and_corrected_until_nothing_asks(
     assert (note.data["low"], note.data["high"]) == pytest.approx((800.0 - 9.8, 800.0 + 9.8))
 
 
-def test_a_load_is_named_where_nothing_asks_for_one_if_a_circuit_follows_better_under_it(
+def test_without_an_objection_a_load_is_named_only_if_a_circuit_follows_better_under_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     for true, named in ((800.0, True), (0.0, False)):
@@ -168,13 +168,13 @@ def test_a_load_is_named_where_nothing_asks_for_one_if_a_circuit_follows_better_
         assert found.parameters.load_force == (800.0 if named else 0.0)
 
 
-def test_what_is_too_small_to_matter_is_taken_where_a_circuit_asks_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_small_load_is_accepted_only_if_a_circuit_objects_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
     for asks in (True, False):
         found = under(Circuits(30.0, asks=asks), shown(30.0, 2.0, share=0.02), monkeypatch)
         assert found.parameters.load_force == (30.0 if asks else 0.0)
 
 
-def test_where_no_load_is_enough_the_rigs_own_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_if_no_load_removes_the_objections_the_rig_files_load_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     circuits = Circuits(800.0, gain=0.5)
     found = under(circuits, shown(100.0, 300.0), monkeypatch)
     assert found.parameters is HEALTHY
@@ -186,7 +186,7 @@ def loads_tried(circuits: Circuits) -> list[float]:
     return [force for force, _ in circuits.tried]
 
 
-def test_no_load_is_tried_that_the_balance_rules_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_load_that_the_force_balance_excludes_is_not_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
     circuits = Circuits(800.0)
     assert under(circuits, shown(0.0, 1.0), monkeypatch).parameters is HEALTHY
     assert loads_tried(circuits) == [0.0]
@@ -195,14 +195,16 @@ def test_no_load_is_tried_that_the_balance_rules_out(monkeypatch: pytest.MonkeyP
     assert far.parameters is HEALTHY
 
 
-def test_of_a_piston_that_stands_a_load_is_known_as_far_as_friction_holds_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_force_balance_the_interval_of_a_load_includes_coulomb_friction(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     found = under(Circuits(800.0), None, monkeypatch)
     assert found.parameters.load_force == pytest.approx(800.0)
     (note,) = found.notes
     assert float(note.data["high"]) - 800.0 > 1.9 * HEALTHY.friction_coulomb
 
 
-def test_the_doubt_of_a_force_widens_what_is_said_of_friction_where_a_piston_slides_one_way() -> None:
+def test_if_a_piston_slides_one_way_an_uncertain_load_widens_the_interval_of_friction() -> None:
     p = replace(circuit_of(HEALTHY), load_force=1500.0)
     speed = 60.0 + 40.0 * np.sin(2.0 * np.pi * 1.3e-3 * np.arange(3000))
     record = simulate(CIRCUIT, speed, 1e-3, p, sensors=BENCH, rng=np.random.default_rng(2))
@@ -215,7 +217,7 @@ def test_the_doubt_of_a_force_widens_what_is_said_of_friction_where_a_piston_sli
 
 
 @pytest.mark.slow
-def test_a_single_rod_of_which_the_rig_file_gives_the_mean_area_is_named_with_its_condition() -> None:
+def test_a_single_rod_is_recognized_under_a_rig_file_with_its_mean_area() -> None:
     # with the seed of the other tests, residuals show encoder play by chance (gain 5.3), and the check fails
     found = diagnose_log(log("minor_leakage", seed=1000, **ROD), Rig())
     assert (found.condition, found.unknown) == ("minor_leakage", False)
@@ -227,7 +229,7 @@ def test_a_single_rod_of_which_the_rig_file_gives_the_mean_area_is_named_with_it
     assert modulus.ci95_total[0] < HEALTHY.bulk_modulus < modulus.ci95_total[1]
 
 
-def test_a_force_that_no_balance_shows_is_none_within_all_that_friction_may_hold() -> None:
+def test_without_a_force_balance_the_force_is_zero_within_the_limits_of_friction() -> None:
     rest, spread = (one[0] for one in load.friction_believed(HEALTHY))
     assert load._force(None, HEALTHY) == (0.0, rest + spread)
     assert rest > 0.0

@@ -16,7 +16,7 @@ LOG = blocks(pressure=False)
 FITS = fit_classes(LOG, ACTUATOR)
 
 
-def test_only_a_place_beside_the_nine_is_one() -> None:
+def test_only_beside_means_no_objection_other_than_outside_or_between_conditions() -> None:
     outside, soft = AgainstCode.OUTSIDE_CONDITIONS.note(), AgainstCode.OIL_SOFT.note(share=0.3)
     assert only_beside(())
     assert only_beside((outside, AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.0)))
@@ -24,7 +24,7 @@ def test_only_a_place_beside_the_nine_is_one() -> None:
 
 
 @pytest.mark.parametrize(("error", "beside"), [(0.0, True), (0.05, False)])
-def test_what_lies_beside_them_does_not_where_what_it_leaves_lasts(error: float, beside: bool) -> None:
+def test_a_circuit_with_lasting_residuals_is_not_beside_the_nine_conditions(error: float, beside: bool) -> None:
     far = FITS.best.coordinates + (np.array(COORDINATES) == "bulk_modulus")
     best = replace(FITS.best, coordinates=far)
     fits = replace(FITS, best=best, scores=np.full(len(CONDITIONS), -1e3), information=100.0 * np.eye(len(far)))

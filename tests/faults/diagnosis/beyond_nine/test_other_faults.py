@@ -62,7 +62,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_fault_that_no_condition_has_is_named(name: str) -> None:
+def test_a_fault_outside_the_nine_conditions_is_named(name: str) -> None:
     circuit, code = FAULTS[name]
     ((found, data),), _ = said(log_of(circuit))
     assert found == code
@@ -72,7 +72,7 @@ def test_a_fault_that_no_condition_has_is_named(name: str) -> None:
 
 
 @pytest.mark.parametrize("share", [0.75, 0.85])
-def test_a_pump_that_delivers_something_between_tenths_is_named(share: float) -> None:
+def test_a_worn_pump_is_named_with_a_delivery_between_whole_tenths(share: float) -> None:
     """With pumps of 80 and 90 % only, 10 s of steps of a pump of 85 % were diagnosed as minor leakage at 98 %."""
     circuit = replace(SOUND, pump_displacement=share * SOUND.pump_displacement)
     ((found, data),), _ = said(log_of(circuit, "normal"))
@@ -94,18 +94,18 @@ def test_no_fault_is_named_in_a_sound_circuit(condition: str) -> None:
     ],
     ids=["no drain", "wide valves", "another accumulator"],
 )
-def test_what_no_rig_file_knows_is_no_fault(circuit: CircuitParameters) -> None:
+def test_circuit_properties_that_no_rig_file_states_are_not_named_as_faults(circuit: CircuitParameters) -> None:
     assert not said(log_of(circuit))[0]
 
 
-def test_a_valve_that_never_had_to_open_is_not_excluded_and_a_worn_pump_is_where_speeds_tell_it() -> None:
+def test_a_stuck_valve_is_not_excluded_if_it_never_opened_and_a_worn_pump_is_excluded_by_its_speeds() -> None:
     against, open_ = said(log_of(condition="normal"))
     assert not against
     assert "stuck shut (10 %)" in open_  # as with pressure, if the valve never opened
     assert "worn pump" not in open_
 
 
-def test_what_a_worn_pump_gains_may_be_less_than_what_a_rare_fault_must(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worn_pump_is_named_below_the_gain_that_a_rare_fault_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     blocks = log_of(FAULTS["pump"][0])
     fits = fit_classes(blocks, ACTUATOR)
     monkeypatch.setattr(other_faults, "GAIN", 1e9)
@@ -124,7 +124,7 @@ def test_a_relief_valve_that_opens_above_the_largest_pressure_is_not_excluded() 
     assert f"a relief valve that opens early, above {1e-5 * pressure:.2g} bar" in said(blocks)[1]
 
 
-def test_with_pressure_and_where_the_piston_sticks_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_faulty_circuit_is_fitted_with_pressure_or_to_a_stuck_piston(monkeypatch: pytest.MonkeyPatch) -> None:
     seen, still = log_of(pressure=True), replace(log_of(), velocity=0.0 * log_of().velocity)
     fits = [fit_classes(blocks, ACTUATOR) for blocks in (seen, still)]
     monkeypatch.setattr(other_faults, "fit_classes", lambda *_, **__: pytest.fail("a circuit was fitted"))
@@ -133,7 +133,7 @@ def test_with_pressure_and_where_the_piston_sticks_nothing_is_asked(monkeypatch:
 
 
 @pytest.mark.parametrize("anew", [False, True], ids=["from where the faulty one ended", "anew"])
-def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(
+def test_a_fault_is_not_named_if_a_second_fit_of_the_sound_circuit_is_as_good(
     monkeypatch: pytest.MonkeyPatch, *, anew: bool
 ) -> None:
     blocks = log_of(FAULTS["pump"][0])
@@ -156,7 +156,7 @@ def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(
     assert not faults_outside(blocks, fits, ACTUATOR).against
 
 
-def test_a_diagnosis_without_pressure_says_what_a_valve_that_is_stuck_shut_does() -> None:
+def test_without_pressure_a_make_up_valve_stuck_shut_is_diagnosed() -> None:
     rng = np.random.default_rng(2)
     speed = np.repeat(LEVELS, 200)
     stuck = one_sided(circuit_of(parameters_for(CONDITIONS["minor_leakage"])), makeup_shut_b=1.0)
@@ -165,7 +165,7 @@ def test_a_diagnosis_without_pressure_says_what_a_valve_that_is_stuck_shut_does(
     assert [note.code for note in found.against] == [AgainstCode.MAKEUP_STUCK]
 
 
-def test_of_two_circuits_one_after_the_other_the_last_may_have_the_fault() -> None:
+def test_the_second_of_two_successive_circuits_may_have_the_fault() -> None:
     sound, stuck = log_of(), one_sided(SOUND, makeup_shut_b=1.0)
     place = [list(CONDITIONS).index("minor_friction")]
     before, after = (parameter_rows(ACTUATOR.conditions[place], circuit, ACTUATOR.rated) for circuit in (SOUND, stuck))

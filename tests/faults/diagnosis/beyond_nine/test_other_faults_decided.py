@@ -65,7 +65,7 @@ def worn(circuit: CircuitParameters) -> float:
 
 
 @pytest.mark.parametrize(("gain", "named"), [(3.9, False), (4.1, True)])
-def test_a_fault_is_named_from_a_gain_of_four_and_what_is_presumed_of_a_pump(
+def test_a_worn_pump_is_named_from_a_gain_of_four_above_its_prior(
     gain: float, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gain += 0.5 * (np.log(0.9) / 0.15) ** 2 + np.log(2.0)
@@ -102,7 +102,7 @@ def test_a_fault_is_excluded_below_a_gain_of_minus_three(
 
 
 @pytest.mark.parametrize(("best", "open_"), [(-2.9, True), (-3.1, False)])
-def test_what_worn_pumps_leave_of_the_conditions_is_told_where_they_are_not_excluded(
+def test_scores_with_worn_pumps_are_returned_only_if_wear_is_not_excluded(
     best: float, open_: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scores = {1.0: 0.0, 0.7: -8.0, 0.75: -7.0, 0.8: best, 0.85: -6.0, 0.9: -5.0}
@@ -137,7 +137,7 @@ def test_a_well_worn_pump_that_is_not_excluded_takes_its_probability_from_the_co
 
 
 @pytest.mark.parametrize("gain", [-2.9, 0.0, 3.9])
-def test_a_valve_that_is_not_excluded_is_as_likely_as_not_where_it_would_be_believed(
+def test_a_stuck_valve_that_is_not_excluded_has_even_odds_at_the_gain_that_names_it(
     gain: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A stuck valve that a log cannot distinguish from a sound one keeps its prior probability."""
@@ -154,7 +154,7 @@ def test_a_valve_that_is_not_excluded_is_as_likely_as_not_where_it_would_be_beli
 
 
 @pytest.mark.parametrize(("gain", "named", "said"), [(6.6, True, False), (6.4, False, True), (0.0, False, True)])
-def test_a_low_relief_valve_gains_over_all_settings_that_it_may_have(
+def test_the_gain_of_a_low_relief_valve_is_averaged_over_its_possible_settings(
     gain: float, named: bool, said: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def score(one: CircuitParameters) -> float:
@@ -166,7 +166,7 @@ def test_a_low_relief_valve_gains_over_all_settings_that_it_may_have(
 
 
 @pytest.mark.parametrize(("pressure", "off", "named"), [(1e6, 0.5, False), (3.5e6, 0.5, True), (3.5e6, 0.1, False)])
-def test_a_relief_valve_is_set_low_where_all_pressures_would_have_to_be_too_large_for_it_to_open_as_set(
+def test_a_low_relief_valve_is_named_if_its_stated_setting_needs_an_implausible_pressure_scale(
     pressure: float, off: float, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In a log whose valve opened at 22 instead of 34 bar, each circuit made all pressures half as large again."""
@@ -184,7 +184,7 @@ def test_a_relief_valve_is_set_low_where_all_pressures_would_have_to_be_too_larg
     assert [note.code for note in against] == ([AgainstCode.RELIEF_EARLY] if named else [])
 
 
-def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circuit(
+def test_the_search_for_a_fault_ends_if_it_cannot_come_within_twenty_of_the_sound_circuit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     wanted: list[float] = []
@@ -202,7 +202,7 @@ def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circ
     assert set(wanted) == {30.0 * (20.0 - 3.0)}
 
 
-def test_a_worn_pump_is_weighed_against_the_sound_one_as_it_is_found_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worn_pump_is_compared_with_the_refitted_sound_pump(monkeypatch: pytest.MonkeyPatch) -> None:
     scores, asked = {1.0: 0.0, 0.7: -9.0, 0.75: -9.0, 0.8: 5.0, 0.85: -9.0, 0.9: -9.0}, list[float]()
 
     def score(one: CircuitParameters) -> float:
@@ -219,7 +219,7 @@ def test_a_worn_pump_is_weighed_against_the_sound_one_as_it_is_found_anew(monkey
 
 
 @pytest.mark.parametrize(("rough", "thorough"), [(-7.9, True), (-8.1, False)])
-def test_a_worn_pump_is_sought_thoroughly_unless_a_rough_search_leaves_it_eight_behind(
+def test_a_worn_pump_gets_a_thorough_search_if_it_is_within_eight_after_a_rough_one(
     rough: float, thorough: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, _, asked = decided(monkeypatch, lambda one: rough if worn(one) < 1.0 else 0.0)
@@ -230,14 +230,14 @@ def test_a_worn_pump_is_sought_thoroughly_unless_a_rough_search_leaves_it_eight_
 @pytest.mark.parametrize(
     ("pressure", "settings"), [(1e6, {7.5e5, 9e5}), (0.0, set()), (np.nan, set()), (np.inf, set())]
 )
-def test_a_relief_valve_is_tried_below_the_largest_pressure_if_there_is_one(
+def test_low_relief_settings_are_tried_only_below_a_finite_largest_pressure(
     pressure: float, settings: set[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, asked = looked(monkeypatch, lambda _: 0.0, pressure)
     assert {round(one.relief_pressure, 3) for one, _ in asked} - {SOUND.relief_pressure} == settings
 
 
-def test_faults_are_tried_on_the_sound_circuit_that_explains_most(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_faults_are_tried_in_the_sound_circuit_with_the_highest_score(monkeypatch: pytest.MonkeyPatch) -> None:
     wide = 5.0 * SOUND.makeup_conductance
 
     def score(one: CircuitParameters) -> float:
@@ -274,7 +274,7 @@ def test_faults_are_tried_on_the_sound_circuit_that_explains_most(monkeypatch: p
         (AgainstCode.NONE_FITS, False, AgainstCode.RELIEF_EARLY, [AgainstCode.NONE_FITS]),
     ],
 )
-def test_what_lies_beside_the_nine_is_asked_for_faults_before_what_lasts_of_its_misfit_counts(
+def test_the_objection_outside_conditions_is_dropped_if_lasting_errors_explain_it_but_faults_are_kept(
     said: AgainstCode,
     lies: bool,
     found: AgainstCode | None,
@@ -291,7 +291,9 @@ def test_what_lies_beside_the_nine_is_asked_for_faults_before_what_lasts_of_its_
 
 
 @pytest.mark.parametrize("near", [-1.0, -1e3])
-def test_a_diagnosis_asks_every_circuit_whether_a_log_is_outside(near: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_diagnosis_flags_a_log_as_outside_if_every_circuit_is_far_from_the_conditions(
+    near: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(by_circuits, "how_near", lambda *_: near)
     monkeypatch.setattr(by_circuits, "whatever_fault", lambda found, *_: found)
     clean = clean_log(log().replace(**{PRESSURE: None}), PAPER)
@@ -300,7 +302,7 @@ def test_a_diagnosis_asks_every_circuit_whether_a_log_is_outside(near: float, mo
 
 
 @pytest.mark.parametrize(("pressure", "percent"), [(3.4e5, "2"), (8e5, "1"), (3e6, None), (5e6, None)])
-def test_a_low_relief_valve_that_opens_nowhere_in_a_log_keeps_what_was_presumed_of_it(
+def test_a_low_relief_valve_that_never_opened_in_a_log_keeps_its_prior_probability(
     pressure: float, percent: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Before, it kept a tenth of its prior: only the settings just below the largest pressure were counted."""
@@ -313,7 +315,7 @@ def test_a_low_relief_valve_that_opens_nowhere_in_a_log_keeps_what_was_presumed_
 
 
 @pytest.mark.parametrize("moves", [False, True])
-def test_what_the_condition_would_be_beside_a_fault_that_is_not_excluded_is_said(
+def test_the_note_on_an_open_fault_states_the_condition_with_that_fault(
     moves: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def ahead(*, first: bool) -> Any:

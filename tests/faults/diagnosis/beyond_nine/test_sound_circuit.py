@@ -21,13 +21,13 @@ from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes
 LOG, FITS = blocks(pressure=False), classes(pressure=False)
 
 
-def test_the_rig_files_circuit_is_the_best_of_its_own_log() -> None:
+def test_the_rig_files_circuit_has_the_best_score_for_its_own_log() -> None:
     found = sound_circuit(LOG, FITS, ACTUATOR, nominal_runs(LOG, ACTUATOR))
     assert found.score >= float(np.max(FITS.scores))
     assert found.score - float(np.max(FITS.scores)) < 1.0
 
 
-def test_another_is_taken_only_if_it_follows_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_sound_circuit_is_accepted_only_if_it_follows_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
     narrow = replace(ACTUATOR.circuit, makeup_conductance=0.02 * ACTUATOR.circuit.makeup_conductance)
     other = replace(ACTUATOR, circuit=narrow)
     asked = fit_classes(LOG, other)
@@ -41,7 +41,7 @@ def test_another_is_taken_only_if_it_follows_the_log(monkeypatch: pytest.MonkeyP
     assert another_sound_circuit(LOG, asked, other) is None
 
 
-def test_with_pressure_none_is_sought() -> None:
+def test_with_pressure_no_other_sound_circuit_is_sought() -> None:
     assert another_sound_circuit(blocks(), classes(), ACTUATOR) is None
 
 
@@ -65,7 +65,7 @@ def test_a_plain_log_that_wider_valves_explain_gets_its_class(monkeypatch: pytes
 
 
 @pytest.mark.parametrize(("pressure", "opened"), [(0.99, False), (1.01, True)])
-def test_a_circuit_is_followed_from_the_scale_at_which_it_ran_where_its_relief_valve_opened_there(
+def test_a_refit_starts_at_the_scale_of_the_run_if_the_relief_valve_opened_in_it(
     pressure: float, opened: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From the likeliest scale, where the valve stays shut, no search recovered: a stuck make-up valve lost 2.6."""

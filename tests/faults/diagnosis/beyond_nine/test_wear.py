@@ -60,7 +60,7 @@ def board() -> Scoreboard:
     return weigh(simulate(CIRCUIT, drive, 1e-3, worn, sensors=BENCH, rng=rng), ACTUATOR)
 
 
-def test_what_a_worn_pump_would_explain_is_not_all_leakage(board: Scoreboard) -> None:
+def test_averaging_over_wear_moves_probability_from_major_to_minor_leakage(board: Scoreboard) -> None:
     sound = board.probabilities(shipped_calibration())
     found = probabilities_over_wear(board, ACTUATOR, OPEN, shipped_calibration())
     assert found is not None
@@ -69,11 +69,11 @@ def test_what_a_worn_pump_would_explain_is_not_all_leakage(board: Scoreboard) ->
     assert found["major_leakage"] < sound["major_leakage"]
 
 
-def test_classes_stay_where_the_log_tells_what_the_pump_delivers(board: Scoreboard) -> None:
+def test_classes_are_not_averaged_over_wear_if_the_log_determines_the_delivery(board: Scoreboard) -> None:
     assert probabilities_over_wear(board, ACTUATOR, (), shipped_calibration()) is None
 
 
-def test_conditions_are_summed_over_pumps_by_what_is_presumed_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_conditions_are_summed_over_pumps_weighted_by_their_prior(monkeypatch: pytest.MonkeyPatch) -> None:
     one = blocks()
     told = {"models": np.linspace(0.0, -6.0, 9), "parameters": np.linspace(-3.0, 0.0, 9)}
     board = Scoreboard(told, one, made_classes(OFF, one), log(), None)
@@ -122,7 +122,7 @@ PUMP, SPEED = AgainstCode.PUMP_OFF, AgainstCode.SPEED_BIAS
         (said(gate=Gate(passed=False, reasons=())), [PUMP, SPEED]),
     ],
 )
-def test_a_balance_that_holds_knows_pump_and_speed_better_than_a_circuit(
+def test_a_valid_flow_balance_overrules_a_circuits_objections_to_pump_and_speed(
     board: Scoreboard, estimate: Any, kept: list[AgainstCode]
 ) -> None:
     others = AgainstCode.OUTSIDE_CONDITIONS
@@ -134,7 +134,7 @@ def test_a_balance_that_holds_knows_pump_and_speed_better_than_a_circuit(
     assert judged.probabilities == found
 
 
-def test_a_circuit_may_doubt_the_pump_where_the_balance_leaves_wear_open(board: Scoreboard) -> None:
+def test_a_circuits_objection_to_the_pump_is_kept_if_the_balance_does_not_exclude_wear(board: Scoreboard) -> None:
     found = board.probabilities(shipped_calibration())
     off = AgainstCode.PUMP_OFF.note(percent=-15.0)
     judged = whatever_the_pump_delivers(Diagnosis(found, (off,), {}, {}, {}, (), board), ACTUATOR, said(remarks=OPEN))
@@ -158,7 +158,7 @@ def test_a_pump_is_worn_with_the_probability_that_it_delivers_less_than_nine_ten
     assert chance_of_wear((note,)) == pytest.approx(chance, rel=1e-3)
 
 
-def test_the_nine_lose_the_probability_that_the_pump_is_worn(board: Scoreboard) -> None:
+def test_the_probability_of_a_worn_pump_is_taken_from_the_nine_conditions(board: Scoreboard) -> None:
     found = board.probabilities(shipped_calibration())
     diagnosis = Diagnosis(found, (), {}, {}, {}, (), board)
     near = (RigCode.AREA_TO_DISPLACEMENT.note(percent=91.0, half_width=2.0 * NORMAL_95),)
@@ -175,7 +175,7 @@ def test_the_nine_lose_the_probability_that_the_pump_is_worn(board: Scoreboard) 
     assert sum(open_.probabilities.values()) == pytest.approx(1.0 - chance)
 
 
-def test_a_worn_pump_is_the_likelier_the_less_any_condition_holds_the_log_with_a_sound_one(board: Scoreboard) -> None:
+def test_a_worn_pump_is_likelier_the_farther_a_sound_pumps_leakage_is_beyond_the_conditions(board: Scoreboard) -> None:
     """A stuck piston with a pump of 80 % was diagnosed as major leakage at 93 %, with more leakage than that has."""
     left = delivery_left_open(OPEN)
     assert left is not None
@@ -188,7 +188,7 @@ def test_a_worn_pump_is_the_likelier_the_less_any_condition_holds_the_log_with_a
     assert chances[1.25] < chances[1.0] < 0.4 < chances[0.8]
 
 
-def test_a_log_that_says_nothing_of_the_conditions_leaves_wear_as_the_balance_has_it(
+def test_a_log_without_evidence_on_conditions_keeps_the_balances_probability_of_wear(
     board: Scoreboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(wear, "region_scores", lambda *_: np.zeros(9))
@@ -200,7 +200,7 @@ def test_a_log_that_says_nothing_of_the_conditions_leaves_wear_as_the_balance_ha
         assert found == pytest.approx(chance_of_wear((note,)), abs=0.02)
 
 
-def test_no_pump_is_worn_where_oil_would_leak_backwards(board: Scoreboard) -> None:
+def test_a_pump_is_not_worn_if_its_delivery_would_imply_negative_leakage(board: Scoreboard) -> None:
     """The slopes promised a pump of one third, although no flow was lost: a sound actuator was called worn at 99 %."""
     for likeliest, width in ((-104.0, 5.8), (-104.0, 0.0), (0.0, 5.8)):
         note = RigCode.WEAR_NOT_EXCLUDED.note(percent=3.7, half_width=width, likeliest=likeliest, most=3.7)
@@ -209,7 +209,7 @@ def test_no_pump_is_worn_where_oil_would_leak_backwards(board: Scoreboard) -> No
         assert chance_by_conditions(board, ACTUATOR, left, shipped_calibration()) == chance_of_wear((note,)) == 0.0
 
 
-def test_the_nine_keep_their_order_where_slopes_call_a_pump_worn_for_sure(board: Scoreboard) -> None:
+def test_conditions_keep_their_order_if_the_balance_is_certain_of_wear(board: Scoreboard) -> None:
     """A probability of 100 % left nothing for the nine, and the first of them was reported: a healthy actuator."""
     found = board.probabilities(shipped_calibration())
     sure = (RigCode.WEAR_NOT_EXCLUDED.note(percent=42.0, half_width=6.0),)
@@ -238,7 +238,7 @@ def test_no_condition_is_scored_with_a_pump_that_the_balance_excludes(
 
 
 @pytest.mark.slow
-def test_a_plain_log_of_another_law_of_friction_is_not_laid_to_the_pump() -> None:
+def test_another_law_of_friction_is_not_taken_for_a_worn_pump() -> None:
     made = make("plain", "training", 100)
     channels = {name: made.log[name].to_numpy() for name in made.setup.logger.channels}
     finding = diagnose_log(Record(1e-3, channels), Rig())

@@ -41,7 +41,7 @@ def odds(gain: float, parts: Sequence[ClassFits], of: Blocks | None = None, devi
     return odds_of_change(gain, parts, all_of_it, of or blocks(), ACTUATOR)
 
 
-def test_all_that_was_chosen_is_priced() -> None:
+def test_the_odds_of_a_change_include_the_priors_of_its_time_condition_and_circuit() -> None:
     parts, log = fits((0, 300.0), (3, 300.0)), blocks()
     volume = 0.5 * float(np.linalg.slogdet(np.eye(7) + WITHIN / 0.02**2)[1])
     times = len(log.velocity) / LASTING
@@ -51,7 +51,7 @@ def test_all_that_was_chosen_is_priced() -> None:
     assert odds(60.0, parts, longer) == pytest.approx(odds(60.0, parts) - math.log(10.0))
 
 
-def test_what_a_part_tells_of_a_circuit_counts_as_its_integral_over_the_region() -> None:
+def test_the_evidence_of_a_part_is_the_integral_of_its_likelihood_over_the_region() -> None:
     """The reference is an integral by quadrature over one coordinate; the log says nothing about the others."""
     parts = fits((0, 300.0), (3, 300.0))
     width, told, off = float(WITHIN[0, 0]), 400.0, 0.2
@@ -65,20 +65,20 @@ def test_what_a_part_tells_of_a_circuit_counts_as_its_integral_over_the_region()
     assert odds(30.0, parts) - odds(30.0, [nothing, parts[1]]) == pytest.approx(math.log(integral), abs=1e-6)
 
 
-def test_two_circuits_in_one_condition_are_no_change_of_it() -> None:
+def test_odds_of_a_change_are_limited_by_the_lead_of_the_conditions_of_both_parts() -> None:
     near, far = fits((0, 2.0), (3, 300.0)), fits((0, 20.0), (3, 300.0))
     assert odds(200.0, near) == pytest.approx(2.0)
     assert odds(200.0, far) == pytest.approx(20.0)
 
 
-def test_a_change_is_believed_from_ten_to_one_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_change_is_believed_at_odds_above_ten_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
     parts = [part_of(blocks(), 0, 75), part_of(blocks(), 75, 150)]
     for least, told in ((math.log(LIKELIER) + 0.01, True), (math.log(LIKELIER) - 0.01, False)):
         monkeypatch.setattr(change_odds, "odds_of_change", lambda *_, least=least: least)
         assert believed(blocks(), parts, fits((0, 9.0), (3, 9.0)), whole(), ACTUATOR) is told
 
 
-def test_one_circuit_for_all_is_asked_again_where_its_search_ended_short_of_the_best(
+def test_the_single_circuit_is_refitted_if_its_search_ended_short_of_the_best(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     log = blocks(after="major_leakage")
@@ -98,7 +98,7 @@ def test_one_circuit_for_all_is_asked_again_where_its_search_ended_short_of_the_
     assert not believed(steady, halves, apart, lost, ACTUATOR)
 
 
-def test_a_part_that_is_followed_to_its_noise_is_priced_as_the_others_are() -> None:
+def test_a_part_followed_to_its_noise_gets_the_same_credible_information_as_the_others() -> None:
     """If the other part or the whole log leaves more than noise, all circuits have the same credible information."""
     rough, parts = 3.0 * blocks().noise, fits((0, 300.0), (3, 300.0))
     (whole,) = fits((0, 99.0))
@@ -110,7 +110,7 @@ def test_a_part_that_is_followed_to_its_noise_is_priced_as_the_others_are() -> N
 
 
 @pytest.mark.parametrize("seconds", [3.0, 3.5, 4.0, 5.0])
-def test_a_change_after_a_part_that_is_followed_to_its_noise_is_believed(seconds: float) -> None:
+def test_a_change_is_believed_after_a_part_that_a_circuit_follows_to_its_noise(seconds: float) -> None:
     log = blocks(after="major_leakage", seconds=seconds)
     two = parted(log, fit_classes(log, ACTUATOR), ACTUATOR)
     assert two is not None

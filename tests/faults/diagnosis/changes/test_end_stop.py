@@ -38,7 +38,7 @@ def log_of(stop: float | None, place: int = 0, circuit: CircuitParameters = ACTU
     return replace(blank, velocity=found[:, 0], pressure=found[:, 1], stop=None)
 
 
-def test_a_piston_that_runs_into_a_stop_is_followed_once_the_stop_is_known() -> None:
+def test_a_circuit_with_the_end_stop_follows_a_piston_that_runs_into_it() -> None:
     log = log_of(0.02)
     without = fit_classes(log, ACTUATOR)
     seen, fits = stopped(log, without, ACTUATOR)
@@ -47,7 +47,7 @@ def test_a_piston_that_runs_into_a_stop_is_followed_once_the_stop_is_known() -> 
     assert list(CONDITIONS)[int(np.argmax(fits.scores))] == "normal"
 
 
-def test_how_a_stop_yields_is_not_taken_for_friction_or_leakage() -> None:
+def test_a_compliant_end_stop_is_not_taken_for_friction_or_leakage() -> None:
     soft = replace(ACTUATOR.circuit, end_stop_stiffness=1e7, end_stop_damping=0.0)
     log = log_of(0.02, circuit=soft)
     seen, fits = stopped(log, fit_classes(log, ACTUATOR), ACTUATOR)
@@ -60,7 +60,7 @@ def test_how_a_stop_yields_is_not_taken_for_friction_or_leakage() -> None:
     assert np.all(np.abs(off[told]) < 0.06)  # otherwise flow bias would be 25 % off
 
 
-def test_a_piston_that_the_drive_left_standing_met_no_stop() -> None:
+def test_no_end_stop_is_found_if_the_drive_stopped_the_piston() -> None:
     log = log_of(None)
     gone = np.cumsum(log.velocity) * log.block * log.sample_time
     assert np.sum(gone > log.reach - NEAR) * log.block * log.sample_time > RESTS
@@ -69,7 +69,7 @@ def test_a_piston_that_the_drive_left_standing_met_no_stop() -> None:
 
 
 @pytest.mark.parametrize(("shares", "sought"), [((0.055, 0.055), False), ((0.065, 0.01), True), ((0.01, 0.065), True)])
-def test_a_stop_is_sought_where_a_circuit_leaves_6_percent_of_an_output(
+def test_an_end_stop_is_sought_if_a_circuit_leaves_6_percent_of_an_output_unexplained(
     shares: tuple[float, float], sought: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = log_of(0.02)
@@ -85,14 +85,14 @@ def test_a_stop_is_sought_where_a_circuit_leaves_6_percent_of_an_output(
     assert asked == ([log.reach] if sought else [])
 
 
-def test_where_a_poor_fit_has_another_cause_a_stop_does_not_excuse_it() -> None:
+def test_no_end_stop_is_found_in_a_poor_fit_with_another_cause() -> None:
     log = log_of(None)
     wrong = replace(log, velocity=log.velocity * np.where(np.arange(len(log.velocity)) % 20 < 10, 1.2, 0.8))
     fits = fit_classes(wrong, ACTUATOR)
     assert stopped(wrong, fits, ACTUATOR)[0].stop is None
 
 
-def test_a_finding_names_the_stop_and_the_class_stays_right() -> None:
+def test_a_finding_names_the_end_stop_and_the_right_class() -> None:
     truth = replace(RIG, stroke=0.04)
     record = simulate(CIRCUIT, OUT_AND_BACK, 1e-3, truth, sensors=BENCH, rng=np.random.default_rng(1))
     found = diagnose_log(record, Rig(RIG))
@@ -101,7 +101,7 @@ def test_a_finding_names_the_stop_and_the_class_stays_right() -> None:
     assert (found.condition, found.against) == ("normal", ())
 
 
-def test_presliding_of_the_seals_is_fitted_and_bends_nothing_else() -> None:
+def test_presliding_of_the_seals_is_fitted_without_bias_in_other_coordinates() -> None:
     circuit = replace(ACTUATOR.circuit, presliding_displacement=3.0 * ACTUATOR.circuit.presliding_displacement)
     speed = 60.0 * np.sign(np.sin(2.0 * np.pi * 1.7 * 1e-3 * np.arange(4001)))
     empty, noise = np.zeros(400), np.array([4e-5, 2e3])

@@ -26,18 +26,18 @@ def two() -> Any:
     return found
 
 
-def test_a_worn_pump_that_two_sound_circuits_explain_better_than_one_is_no_change() -> None:
+def test_a_worn_pump_is_not_a_change_even_if_two_sound_circuits_beat_one() -> None:
     log = make("worn_pump", "training", 1240).log
     record = Record(1e-3, {name: log[name].to_numpy() for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
     assert last_part(record, ACTUATOR).onset is None  # over one sound circuit, two gain 77, and a pump of 80 % gains 52
 
 
-def test_a_seal_that_gives_way_is_no_fault_from_end_to_end(two: Any) -> None:
+def test_a_seal_that_fails_within_a_log_is_not_a_fault_throughout(two: Any) -> None:
     assert not fault_throughout(CHANGED, two.parts, two.fits, two.whole, ACTUATOR)
 
 
 @pytest.mark.parametrize(("beyond", "throughout"), [(1.0, False), (-1.0, True)])
-def test_a_change_has_to_be_likelier_than_a_fault_by_as_much_as_than_none(
+def test_a_change_needs_the_same_odds_against_a_fault_throughout_as_against_no_change(
     two: Any, monkeypatch: pytest.MonkeyPatch, beyond: float, throughout: bool
 ) -> None:
     """The circuit with a fault explains no more than the sound one; the prior of the fault varies."""
@@ -54,6 +54,6 @@ def test_a_change_has_to_be_likelier_than_a_fault_by_as_much_as_than_none(
     assert asked == [pytest.approx(odds - subject.math.log(LIKELIER))]
 
 
-def test_with_pressure_the_balance_of_flows_looks_for_faults(two: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_pressure_no_circuit_with_a_fault_throughout_is_tried(two: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subject, "circuits_with_faults", lambda *_: pytest.fail("asked"))
     assert not fault_throughout(blocks(), two.parts, two.fits, classes(), ACTUATOR)

@@ -77,7 +77,7 @@ def short_log(condition: str | None, start: float = 0.0) -> Record:
         [("major_leakage", True), ("major_friction", False)],
     ),
 )
-def test_a_log_is_judged_from_where_its_condition_changed(condition: str, *, pressure: bool) -> None:
+def test_a_log_is_judged_from_the_onset_of_its_last_condition(condition: str, *, pressure: bool) -> None:
     record = short_log(condition, start=100.0)
     found = last_part(record if pressure else record.replace(differential_pressure_pa=None), ACTUATOR)
     assert found.onset is not None
@@ -93,7 +93,7 @@ def test_a_log_is_judged_from_where_its_condition_changed(condition: str, *, pre
     assert list(CONDITIONS)[int(np.argmax(found.fits.scores))] == condition
 
 
-def test_without_pressure_a_log_whose_leakage_drifts_is_not_asked_for_a_change_again() -> None:
+def test_without_pressure_no_onset_is_sought_in_a_log_with_drifting_leakage() -> None:
     record = short_log("major_leakage")
     course = np.exp(0.01 * np.linspace(-1.0, 0.0, len(record)))
     drifts = record.replace(**{LEAKAGE_COURSE: course})
@@ -101,7 +101,7 @@ def test_without_pressure_a_log_whose_leakage_drifts_is_not_asked_for_a_change_a
     assert last_part(drifts.replace(differential_pressure_pa=None), ACTUATOR).onset is None
 
 
-def test_without_pressure_oil_that_softens_within_a_log_is_in_no_condition() -> None:
+def test_oil_that_softens_between_two_parts_is_an_objection_only_without_pressure() -> None:
     blocks = blocks_of(foreign("air_midway", 703).replace(differential_pressure_pa=None))
     two = parted(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
     assert two is not None
@@ -117,13 +117,13 @@ def test_without_pressure_oil_that_softens_within_a_log_is_in_no_condition() -> 
     assert softened(two._replace(fits=[two.fits[0], elsewhere])), "no condition softens the oil"
 
 
-def test_oil_that_softens_is_no_change_to_another_condition() -> None:
+def test_a_log_with_softening_oil_has_an_objection_and_no_onset() -> None:
     found = last_part(foreign("air_midway", 9707).replace(differential_pressure_pa=None), ACTUATOR)
     assert found.onset is None
     assert [note.code for note in found.against] == [AgainstCode.OIL_SOFTENS]
 
 
-def test_a_log_in_one_condition_is_judged_whole() -> None:
+def test_a_log_in_one_condition_is_judged_as_a_whole() -> None:
     record = short_log(None)
     found = last_part(record, ACTUATOR)
     assert found.onset is None
@@ -138,16 +138,16 @@ def foreign(kind: str, index: int) -> Record:
 
 
 @pytest.mark.parametrize("index", thinned([7, 17], [7]))
-def test_a_piston_that_creeps_at_first_was_in_no_other_condition_then(index: int) -> None:
+def test_a_piston_that_creeps_at_first_has_no_onset(index: int) -> None:
     assert last_part(foreign("plain", index), ACTUATOR).onset is None
 
 
-def test_two_circuits_that_explain_a_log_better_by_chance_are_no_change() -> None:
+def test_a_chance_gain_of_two_circuits_is_not_an_onset() -> None:
     assert last_part(foreign("plain", 2489), ACTUATOR).onset is None  # two circuits gain 12.1
 
 
 @pytest.mark.slow
-def test_a_seal_that_gives_way_is_dated_on_another_actuator() -> None:
+def test_the_onset_of_leakage_is_dated_on_another_actuator() -> None:
     found = last_part(foreign("leakage_sets_in", 2), ACTUATOR)
     assert found.onset is not None
     assert found.onset.before == "normal"
@@ -164,7 +164,7 @@ def with_bursts(*begins: float) -> Record:
     return simulate(CIRCUIT, speed, 2e-3, path, sensors=RIG, rng=rng)
 
 
-def test_a_quiet_end_is_no_last_condition_where_no_circuit_follows_what_came_before() -> None:
+def test_no_onset_is_found_after_bursts_of_friction_that_no_circuit_follows() -> None:
     record = with_bursts(0.6, 1.2, 1.9)
     found = last_part(record, ACTUATOR)
     assert found.onset is None
@@ -176,7 +176,7 @@ def alarm(since: float) -> Alarm:
     return Alarm(since + 1.0, "flow", since, (since, since), 9.0, 5.0)
 
 
-def test_what_no_circuit_follows_after_a_change_began_at_no_time(
+def test_no_onset_is_reported_if_no_circuit_follows_the_part_after_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     record = short_log("major_friction")
@@ -195,7 +195,7 @@ def test_what_no_circuit_follows_after_a_change_began_at_no_time(
             assert find_onset(blocks, two, ACTUATOR) is None
 
 
-def test_of_a_long_log_the_stretches_about_the_last_alarms_are_looked_at_until_one_holds_a_change(
+def test_stretches_about_the_last_alarms_of_a_long_log_are_searched_until_one_has_an_onset(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     alarms: list[Event] = [Ready(60.0, (5.0, 5.0)), *map(alarm, (503.0, 520.0, 540.0, 570.0, 594.0))]
@@ -230,7 +230,9 @@ def test_of_a_long_log_the_stretches_about_the_last_alarms_are_looked_at_until_o
 @pytest.mark.slow
 @pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "without"])
 @pytest.mark.parametrize(("condition", "drive"), [("minor_leakage", "steps"), ("major_friction", "prbs")])
-def test_a_fault_that_comes_within_a_log_is_named_with_its_time(condition: str, drive: str, *, pressure: bool) -> None:
+def test_a_fault_that_starts_within_a_log_is_named_with_its_onset(
+    condition: str, drive: str, *, pressure: bool
+) -> None:
     found = changed(condition, drive, pressure=pressure)
     onset = found.scoreboard.onset
     assert found.condition == condition
@@ -241,7 +243,7 @@ def test_a_fault_that_comes_within_a_log_is_named_with_its_time(condition: str, 
 
 
 @pytest.mark.slow
-def test_the_time_is_that_of_the_logs_own_clock() -> None:
+def test_the_onset_time_is_on_the_clock_of_the_log() -> None:
     onset = changed("major_leakage", "prbs", pressure=True, start=100.0).scoreboard.onset
     assert onset is not None
     assert onset.since == pytest.approx(100.0 + AT, abs=0.1)
@@ -249,13 +251,13 @@ def test_the_time_is_that_of_the_logs_own_clock() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("like", [True, False], ids=["the circuit that is fitted", "another circuit"])
-def test_a_fault_that_was_there_before_the_log_began_has_no_time(*, like: bool) -> None:
+def test_a_fault_older_than_the_log_has_no_onset(*, like: bool) -> None:
     for log in draw_logs([TEST + 40], like=like):
         assert diagnosed(log.record).scoreboard.onset is None
 
 
 @pytest.mark.slow
-def test_a_fault_late_in_a_long_log_is_found_by_the_watch_and_told() -> None:
+def test_a_fault_late_in_a_long_log_is_diagnosed_with_its_onset() -> None:
     stream = CircuitStream(3)
     before = [stream.run(60.0), stream.run(30.0)]
     stream.condition = "major_leakage"
@@ -267,19 +269,19 @@ def test_a_fault_late_in_a_long_log_is_found_by_the_watch_and_told() -> None:
     assert found.scoreboard.onset.since == pytest.approx(90.0, abs=0.3)
 
 
-def test_a_part_keeps_the_drive_and_misses_the_rest() -> None:
+def test_a_part_keeps_the_whole_drive_and_drops_outputs_outside_it() -> None:
     blocks = Blocks(np.zeros(201), 1e-3, 10, np.arange(20.0), None, np.array([1.0]))
     part = part_of(blocks, 5, 12)
     assert np.flatnonzero(np.isfinite(part.velocity)).tolist() == list(range(5, 12))
     assert part.speed is blocks.speed
 
 
-def test_the_interval_of_the_time_is_that_of_95_percent() -> None:
+def test_the_interval_of_the_onset_covers_95_percent() -> None:
     assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == onset.LIKELY
 
 
 @pytest.mark.parametrize(("lasting", "wide"), [(0.3, 4), (1.0, 4), (3.0, 13)])
-def test_the_interval_of_the_time_is_wider_by_what_the_circuits_leave_unexplained(
+def test_lasting_misfit_widens_the_interval_of_the_onset(
     lasting: float, wide: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place, best = 120, 100

@@ -24,7 +24,7 @@ def flat(velocity: np.ndarray) -> tuple[Blocks, PointFit]:
     return blocks, PointFit(ACTUATOR.conditions[0], 0.0, np.eye(7), scale, fitted, slopes)
 
 
-def test_a_jump_splits_a_log_where_it_is_and_noise_does_not() -> None:
+def test_a_log_is_split_at_a_jump_and_not_by_noise() -> None:
     noise = np.random.default_rng(0).normal(size=800)
     assert likeliest_split(*flat(noise)) is None
     jump = np.where(np.arange(800) < 300, 0.0, 5.0)
@@ -38,14 +38,14 @@ def test_a_log_too_short_to_hold_a_change_is_not_split() -> None:
 
 
 @pytest.mark.parametrize("alike", [True, False])
-def test_a_log_whose_parts_are_surely_in_one_condition_needs_no_second_circuit(*, alike: bool) -> None:
+def test_two_parts_are_in_one_condition_only_if_both_are_surely_in_the_same(*, alike: bool) -> None:
     blocks, fit = flat(np.random.default_rng(1).normal(size=800))
     sure = replace(fit, scales=blocks.noise, information=1e4 * np.eye(7))
     normal, leaking = (replace(sure, coordinates=ACTUATOR.conditions[place]) for place in (0, 2))
     assert in_one_condition(Split(300, leaking, leaking if alike else normal), blocks, ACTUATOR) == alike
 
 
-def test_a_part_that_tells_little_may_be_in_any_condition() -> None:
+def test_an_uncertain_part_is_not_surely_in_the_condition_of_the_other() -> None:
     blocks, fit = flat(np.random.default_rng(1).normal(size=800))
     sure = replace(fit, scales=blocks.noise, information=1e4 * np.eye(7))
     between = replace(sure, coordinates=0.5 * (ACTUATOR.conditions[0] + ACTUATOR.conditions[1]))

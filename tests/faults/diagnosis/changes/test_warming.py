@@ -63,7 +63,7 @@ def diagnosed(one: CleanLog) -> Loaded:
 @pytest.mark.parametrize(
     ("condition", "factor"), [("minor_leakage", 2.0), ("major_leakage", 2.0), ("minor_leakage", 0.5)]
 )
-def test_how_far_leakage_drifts_comes_back(condition: str, factor: float) -> None:
+def test_the_drift_factor_of_leakage_is_estimated(condition: str, factor: float) -> None:
     blocks, fits = fitted(condition, factor)
     found = drift_of(blocks, fits, ACTUATOR)
     assert found is not None
@@ -72,11 +72,11 @@ def test_how_far_leakage_drifts_comes_back(condition: str, factor: float) -> Non
 
 
 @pytest.mark.parametrize("condition", ["normal", "minor_leakage", "major_leakage_major_friction"])
-def test_leakage_that_stays_does_not_drift(condition: str) -> None:
+def test_constant_leakage_shows_no_drift(condition: str) -> None:
     assert drift_of(*fitted(condition, 1.0), ACTUATOR) is None
 
 
-def test_slopes_of_a_circuit_that_is_far_off_are_not_all_that_is_asked() -> None:
+def test_a_drift_is_found_even_if_the_slopes_of_the_first_circuit_are_useless() -> None:
     blocks, fits = fitted("minor_leakage", 2.0)
     lost = replace(fits.best, slopes=np.zeros_like(fits.best.slopes), scales=0.2 * blocks.sizes)
     found = drift_of(replace(blocks, noise=0.0 * blocks.noise), replace(fits, best=lost), ACTUATOR)
@@ -84,7 +84,7 @@ def test_slopes_of_a_circuit_that_is_far_off_are_not_all_that_is_asked() -> None
     assert np.exp(found.logarithm) == pytest.approx(2.0, rel=0.1)
 
 
-def test_a_drift_with_which_no_circuit_follows_the_log_explains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drift_is_rejected_if_its_circuit_leaves_the_log_unexplained(monkeypatch: pytest.MonkeyPatch) -> None:
     blocks, fits = fitted("minor_leakage", 2.0)
     found = drift_of(blocks, fits, ACTUATOR)
     assert found is not None
@@ -94,7 +94,7 @@ def test_a_drift_with_which_no_circuit_follows_the_log_explains_nothing(monkeypa
         assert (drift_of(blocks, fits, ACTUATOR) is not None) == is_one
 
 
-def test_a_drift_is_not_followed_that_will_gain_less_than_is_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_search_for_a_drift_ends_if_it_cannot_reach_the_wanted_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     blocks, fits = fitted("minor_leakage", 2.0)
     whole, searched, fitted_on = drift_of(blocks, fits, ACTUATOR), list[float](), warming.fit_freely
     assert whole is not None
@@ -115,14 +115,14 @@ def test_a_drift_is_not_followed_that_will_gain_less_than_is_wanted(monkeypatch:
     assert len(searched) == 1 < needed
 
 
-def test_of_a_piston_that_hardly_moves_a_drift_explains_how_its_seals_yield(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_drift_is_found_if_the_piston_only_yields_on_its_seals(monkeypatch: pytest.MonkeyPatch) -> None:
     blocks, fits = fitted("minor_leakage", 2.0)
     assert drift_of(blocks, fits, ACTUATOR) is not None
     monkeypatch.setattr(yielding, "YIELDING", 1.0)
     assert drift_of(blocks, fits, ACTUATOR) is None
 
 
-def test_no_drift_is_asked_for_with_pressure_beside_one_that_was_found_or_in_part_of_a_log() -> None:
+def test_no_drift_is_sought_with_pressure_a_known_drift_no_motion_or_too_long_a_log() -> None:
     blocks, fits = fitted("minor_leakage", 2.0)
     long = round(LONGEST / blocks.sample_time) + 2
     for other in (
@@ -134,13 +134,13 @@ def test_no_drift_is_asked_for_with_pressure_beside_one_that_was_found_or_in_par
         assert drift_of(other, fits, ACTUATOR) is None
 
 
-def test_a_drift_is_shown_where_it_is_ten_times_likelier_and_large_enough_to_matter() -> None:
+def test_a_drift_is_shown_only_if_it_is_ten_times_likelier_and_large_enough() -> None:
     _, fits = fitted("minor_leakage", 2.0)
     for logarithm, gain, shown in ((0.7, 2.6, True), (-0.7, 2.6, True), (0.7, 2.5, False), (0.9 * LEAST, 99.0, False)):
         assert Drift(logarithm, fits.best, gain).shown == shown
 
 
-def test_a_log_that_warms_is_not_parted() -> None:
+def test_a_log_of_warming_oil_has_a_drift_and_no_onset() -> None:
     part = last_part(log("minor_leakage", 2.0).record, ACTUATOR)
     assert part.onset is None
     assert part.drift is not None
@@ -148,7 +148,7 @@ def test_a_log_that_warms_is_not_parted() -> None:
 
 
 @pytest.mark.parametrize("condition", thinned(["minor_leakage", "major_leakage"], ["minor_leakage"]))
-def test_a_condition_of_cold_oil_keeps_its_name_without_pressure(condition: str) -> None:
+def test_without_pressure_a_condition_that_applies_to_the_cold_oil_is_found(condition: str) -> None:
     found = over_drift(diagnosed, log(condition, 2.0), ())
     assert (found.diagnosis.condition, found.diagnosis.unknown) == (condition, False)
     assert [note.code for note in found.notes] == [RigCode.LEAKAGE_DRIFTS]
@@ -156,13 +156,13 @@ def test_a_condition_of_cold_oil_keeps_its_name_without_pressure(condition: str)
     assert found.diagnosis.scoreboard.blocks.course is not None
 
 
-def test_what_grows_by_more_than_warm_oil_does_speaks_against_all_nine() -> None:
+def test_leakage_growth_beyond_that_of_warm_oil_is_an_objection_to_all_nine() -> None:
     found = over_drift(diagnosed, log("minor_leakage", 6.0), ())
     assert [note.code for note in found.notes] == [RigCode.LEAKAGE_GROWS]
     assert found.diagnosis.against[0] == found.notes[0]
 
 
-def test_a_log_with_its_drift_has_a_course_that_ends_at_one() -> None:
+def test_the_course_of_leakage_of_a_drifting_log_ends_at_one() -> None:
     _, fits = fitted("minor_leakage", 2.0)
     one = CleanLog(Record(0.1, {"motor_speed_rad_s": np.zeros(5)}), {}, (), ())
     other, note = with_course(one, Drift(float(np.log(2.0)), fits.best, 9.0))

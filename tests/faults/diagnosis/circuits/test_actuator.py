@@ -16,7 +16,7 @@ LONGEST = float(longest_stroke(PAPER))
 
 
 @pytest.mark.parametrize(("stroke", "larger"), [(None, 1.0), (0.9 * LONGEST, 1.0), (1.3 * LONGEST, 1.3)])
-def test_chambers_have_room_for_the_stroke(stroke: float | None, larger: float) -> None:
+def test_a_chamber_volume_too_small_for_the_stroke_is_enlarged_and_noted(stroke: float | None, larger: float) -> None:
     """With a chamber volume 27 % too small in a single rod's rig file, no circuit fitted, and the class was unknown."""
     rig = replace(PAPER, stroke=stroke)
     assert with_room(rig).chamber_volume == pytest.approx(larger * PAPER.chamber_volume)
@@ -29,7 +29,7 @@ def test_chambers_have_room_for_the_stroke(stroke: float | None, larger: float) 
     assert circuit.chamber_volume == pytest.approx(larger * PAPER.chamber_volume)
 
 
-def test_a_stroke_of_another_unit_is_no_wrong_volume() -> None:
+def test_a_stroke_far_too_long_for_the_chambers_is_refused() -> None:
     rig = replace(PAPER, stroke=3.0 * LONGEST)
     assert with_room(rig) == rig
     with pytest.raises(RigError, match="room"):

@@ -22,7 +22,7 @@ def told_of(place: Array) -> Note:
     return beside_note(replace(fits, best=replace(fits.best, coordinates=place)), ACTUATOR)
 
 
-def test_leakage_that_grows_without_the_flow_bias_of_the_tables_is_told_by_its_size() -> None:
+def test_leakage_without_the_flow_bias_of_its_level_is_described_by_the_ratio_of_flow_bias() -> None:
     place, bias = at(1.25, 0.0), COORDINATES.index("bias")
     healthy = ACTUATOR.conditions[0][bias]
     ratio = float(np.exp(healthy - place[bias]))
@@ -32,13 +32,13 @@ def test_leakage_that_grows_without_the_flow_bias_of_the_tables_is_told_by_its_s
     assert str(note).endswith("but flow bias is 0.17 times what it should be at these levels")
 
 
-def test_what_lies_beyond_the_last_level_is_told_as_that_level_and_so_many_times_it() -> None:
+def test_leakage_beyond_the_last_level_is_described_as_a_multiple_of_that_level() -> None:
     place = at(2.0, 0.0) + np.log(3.0) * (np.array(COORDINATES) == "leakage")
     expected = {"leakage": 2.0, "friction": 0.0, "part": "leakage coefficient", "ratio": pytest.approx(3.0)}
     assert told_of(place).data == expected
 
 
-def test_friction_has_a_level_of_its_own() -> None:
+def test_friction_is_described_by_its_level_and_the_part_that_deviates() -> None:
     place = at(0.0, 1.5) + np.log(0.4) * (np.array(COORDINATES) == "friction_rest")
     assert told_of(place).data == {
         "leakage": 0.0,

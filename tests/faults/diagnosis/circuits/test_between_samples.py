@@ -51,7 +51,7 @@ def error(blocks: Blocks, name: str) -> float:
     return abs(float(fit.coordinates[place] - coordinates_of(TRUE, ACTUATOR.rated)[place]))
 
 
-def test_the_lead_of_a_motor_comes_back_where_commands_come_at_samples() -> None:
+def test_the_lead_of_the_motor_is_estimated_if_commands_come_at_samples() -> None:
     found = with_lead(blocks_of(binary()), ACTUATOR)
     assert found.lead == pytest.approx(AHEAD, rel=0.15)
     assert found.lead > 1e-3
@@ -61,13 +61,13 @@ def test_a_command_in_the_middle_of_samples_leaves_less_lead() -> None:
     assert with_lead(blocks_of(binary(0.5 * SLOW)), ACTUATOR).lead < 0.5 * AHEAD
 
 
-def test_friction_of_a_slow_log_is_nearer_with_the_lead() -> None:
+def test_the_lead_makes_the_friction_of_a_slow_log_more_accurate() -> None:
     blocks = blocks_of(binary())
     found = with_lead(blocks, ACTUATOR)
     assert error(found, "friction_rated") < 0.3 * error(blocks, "friction_rated")
 
 
-def test_speeds_half_way_pump_what_the_lead_says() -> None:
+def test_speeds_inserted_halfway_deliver_the_volume_that_the_lead_requires() -> None:
     blocks = blocks_of(binary())
     logged, found = blocks.speed, led(blocks, 1e-3)
     assert (found.block, found.rows) == (2 * blocks.block, blocks.block)
@@ -79,7 +79,7 @@ def test_speeds_half_way_pump_what_the_lead_says() -> None:
     np.testing.assert_array_equal(led(led(blocks, 3e-3), 1e-3).speed, found.speed)
 
 
-def test_speed_that_bends_steadily_keeps_the_mean_of_its_curve() -> None:
+def test_speeds_inserted_halfway_keep_the_mean_of_a_smooth_curve() -> None:
     blocks = blocks_of(binary())
     time = SLOW * np.arange(len(blocks.speed))
     found = led(replace(blocks, speed=50.0 * np.sin(8.0 * time)), 0.0).speed
@@ -90,7 +90,7 @@ def test_speed_that_bends_steadily_keeps_the_mean_of_its_curve() -> None:
     assert off < 0.2 * straight
 
 
-def test_a_course_of_leakage_goes_along() -> None:
+def test_a_course_of_leakage_is_interpolated_with_the_speed() -> None:
     blocks = replace(blocks_of(binary()), course=np.linspace(0.5, 1.0, len(blocks_of(binary()).speed)))
     found = led(blocks, 0.0)
     assert found.course is not None
@@ -102,7 +102,7 @@ def test_a_course_of_leakage_goes_along() -> None:
     assert np.all(np.sqrt(np.mean((fine - predicted(blocks, rows)[0]) ** 2, axis=0)) < 0.05 * blocks.sizes)
 
 
-def test_fast_logs_and_logs_without_pressure_are_left_as_they_are() -> None:
+def test_fast_logs_and_logs_without_pressure_get_no_lead() -> None:
     without = blocks_of(binary().replace(differential_pressure_pa=None))
     assert with_lead(without, ACTUATOR) is without
     run = simulate(CIRCUIT, np.full(1000, 50.0), 1e-3, TRUE, sensors=BENCH, rng=np.random.default_rng(0))
@@ -110,7 +110,7 @@ def test_fast_logs_and_logs_without_pressure_are_left_as_they_are() -> None:
     assert with_lead(fast, ACTUATOR) is fast
 
 
-def test_a_lead_is_open_beside_a_circuit_of_a_slow_log_alone() -> None:
+def test_only_a_log_with_a_lead_has_it_among_the_uncertain_parameters() -> None:
     blocks = blocks_of(binary())
     fit = fit_freely(blocks, ACTUATOR, CONDITION)
     assert len(open_beside(fit, blocks, ACTUATOR)[0]) == len(seldom_known_slopes(fit, blocks, ACTUATOR))

@@ -23,7 +23,7 @@ def is_offset(log: Blocks) -> bool:
     return any(note.code in (AgainstCode.SPEED_BIAS, AgainstCode.LOAD_OR_OFFSET) for note in against)
 
 
-def test_an_offset_counts_by_what_it_gains(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_offset_of_speed_is_an_objection_only_above_a_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     log = blocks(pressure=False, seconds=6.0)
     off = replace(log, speed=log.speed + 6.0)
     assert is_offset(off)
@@ -32,7 +32,7 @@ def test_an_offset_counts_by_what_it_gains(monkeypatch: pytest.MonkeyPatch) -> N
     assert not is_offset(off)
 
 
-def test_a_piston_that_creeps_shows_no_offset_that_is_not_there() -> None:
+def test_a_creeping_piston_shows_no_false_offset_of_speed() -> None:
     """In this log of the open benchmark, one linear step promises 3.7 rad/s in 29, and a circuit with it gains 2.7."""
     log = make("plain", "training", 9749).log
     record = Record(1e-3, {name: log[name].to_numpy() for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})

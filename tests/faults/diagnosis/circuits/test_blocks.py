@@ -37,7 +37,7 @@ def running(seconds: float, first: float) -> Record:
         (6.0, 60.0, True, SETTLING),
     ],
 )
-def test_a_beginning_in_motion_does_not_count_where_no_pressure_says_with_what(
+def test_without_pressure_a_log_that_begins_in_motion_has_a_longer_settling_time(
     seconds: float, first: float, pressure: bool, settling: float
 ) -> None:
     log = running(seconds, first)
@@ -47,7 +47,7 @@ def test_a_beginning_in_motion_does_not_count_where_no_pressure_says_with_what(
     assert len(blocks.seen) == len(blocks.velocity) - blocks.first
 
 
-def test_a_circuit_from_rest_follows_a_running_test_once_its_beginning_is_forgotten() -> None:
+def test_a_circuit_started_at_rest_follows_a_running_log_after_the_settling_time() -> None:
     actuator, blocks = actuator_of(HEALTHY), blocks_of(running(6.0, 60.0).replace(**{PRESSURE: None}))
     fits = fit_classes(blocks, actuator)
     assert list(CONDITIONS)[int(np.argmax(fits.scores))] == "major_friction"
@@ -56,7 +56,7 @@ def test_a_circuit_from_rest_follows_a_running_test_once_its_beginning_is_forgot
     assert np.sqrt(np.mean(begun[: blocks.first] ** 2)) > 3.0 * fits.best.scales[0]
 
 
-def test_blocks_in_a_long_gap_of_speed_and_shortly_behind_it_do_not_count() -> None:
+def test_blocks_in_a_long_gap_of_speed_and_during_settling_after_it_are_blank() -> None:
     record = running(8.0, 0.0)
     speed, position = record["motor_speed_rad_s"].copy(), record["position_m"].copy()
     speed[2000:2300], position[3000:3300] = np.nan, np.nan
@@ -79,7 +79,7 @@ def test_blocks_in_a_long_gap_of_speed_and_shortly_behind_it_do_not_count() -> N
         ("steps", 1e-3, (8e-4, 5e-4)),  # 6.3e-4 and 2.5e-4; with lines 6.5e-4 and 1.5e-3
     ],
 )
-def test_a_circuit_follows_a_log_of_itself_whose_speed_is_curved_between_samples(
+def test_a_circuit_follows_its_own_log_if_speed_is_curved_between_samples(
     drive: str, sample_time: float, most: tuple[float, float]
 ) -> None:
     actuator, true = actuator_of(HEALTHY), parameters_for(CONDITIONS["minor_leakage"])
@@ -93,7 +93,7 @@ def test_a_circuit_follows_a_log_of_itself_whose_speed_is_curved_between_samples
 @pytest.mark.parametrize(
     ("sample_time", "smooth", "rough"), [(1e-4, 10, 5), (2e-4, 5, 2), (5e-4, 2, 1), (1e-3, 1, 1), (2e-3, 1, 1)]
 )
-def test_fast_logs_alone_are_averaged_and_less_where_that_blurs_their_speed(
+def test_only_fast_logs_are_averaged_and_less_if_their_speed_is_rough(
     sample_time: float, smooth: int, rough: int
 ) -> None:
     rng, time = np.random.default_rng(0), sample_time * np.arange(8000)

@@ -32,7 +32,7 @@ SPEED = 100.0 * np.sign(np.sin(np.arange(3000) * 2e-3))
 
 
 @pytest.mark.parametrize("name", CONDITIONS)
-def test_every_condition_comes_back_from_its_coordinates(name: str) -> None:
+def test_every_condition_is_recovered_from_its_coordinates(name: str) -> None:
     true = circuit_of(parameters_for(CONDITIONS[name]))
     (row,) = parameter_rows(coordinates_of(true, ACTUATOR.rated)[None], ACTUATOR.circuit, ACTUATOR.rated)
     found = dict(zip(CircuitParameters.__dataclass_fields__, row.tolist(), strict=True))
@@ -51,7 +51,9 @@ def test_friction_opposes_motion_at_every_coordinate() -> None:
 
 
 @pytest.mark.parametrize(("beyond", "shown"), [(-0.025, False), (-0.015, True), (0.015, True), (0.025, False)])
-def test_a_piston_that_turned_within_two_percent_of_a_stop_met_it(beyond: float, shown: bool) -> None:
+def test_a_piston_that_reversed_within_two_percent_of_a_stop_is_assumed_to_have_met_it(
+    beyond: float, shown: bool
+) -> None:
     still = np.zeros(20)
     still[5] = 0.03 * (1.0 + beyond) / 0.01  # out to a place near the stop 30 mm away
     log = Blocks(np.zeros(201), 1e-3, 10, still, None, np.ones(1))
@@ -61,7 +63,9 @@ def test_a_piston_that_turned_within_two_percent_of_a_stop_met_it(beyond: float,
 
 
 @pytest.mark.parametrize(("stiffness", "read"), [(2e7, 2e7), (1e9, 1e8), (1e5, SOFTEST_END * 1e8)])
-def test_an_end_of_the_stroke_is_as_stiff_as_the_log_shows_it_pressed(stiffness: float, read: float) -> None:
+def test_the_stiffness_of_an_end_stop_is_read_from_pressure_and_travel_within_limits(
+    stiffness: float, read: float
+) -> None:
     """Ends that yielded 0.6 instead of 0.1 mm left 10 % of a small strut's pressure, and its log was unexplained."""
     healthy, moved, pressure = replace(ACTUATOR.circuit, stroke=0.06), np.zeros(20), np.zeros(20)
     moved[5], pressure[5:] = 0.0302 / 0.01, 0.0002 * stiffness / healthy.piston_area  # 0.2 mm past the stop
@@ -83,7 +87,7 @@ def test_blocks_are_the_same_whatever_the_sample_rate(sample_time: float) -> Non
     assert blocks.travel == pytest.approx(1e-2 * np.ptp(np.sin(centres)), rel=0.02)
 
 
-def test_position_is_preferred_and_its_absence_borne() -> None:
+def test_velocity_replaces_a_missing_position_and_one_of_them_is_required() -> None:
     velocity = 0.01 * np.sin(np.arange(3000) * 1e-3)
     log = Record(1e-3, {"motor_speed_rad_s": SPEED, "velocity_m_s": velocity})
     assert blocks_of(log).velocity == pytest.approx(velocity[:2990].reshape(-1, 10).mean(axis=1))
@@ -93,7 +97,7 @@ def test_position_is_preferred_and_its_absence_borne() -> None:
 
 @pytest.mark.parametrize("sample_time", [1e-4, 1e-3])
 @pytest.mark.parametrize("rows", [3, 6, 10])
-def test_a_pressure_that_comes_in_some_rows_alone_has_the_means_of_lines_between_them(
+def test_a_pressure_in_every_few_rows_is_interpolated_linearly_and_averaged_over_blocks(
     rows: int, sample_time: float
 ) -> None:
     time = sample_time * np.arange(round(3.0 / sample_time))
@@ -119,7 +123,7 @@ def test_a_log_of_a_few_samples_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("stroke", "given"), [(1.0, None), (1.0, 0.1), (1.0, 0.25), (0.1, 0.1)])
-def test_a_circuit_has_the_stops_that_the_log_shows_and_no_others(stroke: float, given: float | None) -> None:
+def test_a_circuit_has_an_end_stop_only_if_the_log_reached_it(stroke: float, given: float | None) -> None:
     speed = np.repeat([100.0, -60.0], 4000)
     log = simulate(CIRCUIT, speed, 1e-3, EhaParameters(stroke=stroke))
     actuator = actuator_of(EhaParameters(stroke=given))
@@ -129,7 +133,7 @@ def test_a_circuit_has_the_stops_that_the_log_shows_and_no_others(stroke: float,
     assert np.all(np.sqrt(np.mean(off**2, axis=0)) < 0.05 * np.sqrt(np.mean(blocks.outputs**2, axis=0)))
 
 
-def test_a_circuit_begins_as_its_log_does_where_that_begins_under_pressure() -> None:
+def test_a_circuit_starts_under_pressure_if_its_log_does() -> None:
     p = parameters_for(CONDITIONS["major_friction"])
     run = simulate(CIRCUIT, np.repeat([100.0, -20.0, 0.0, 15.0], 400), 1e-3, p)
     blocks = blocks_of(run.slice(500, len(run)))
@@ -145,7 +149,7 @@ def test_a_circuit_begins_as_its_log_does_where_that_begins_under_pressure() -> 
     assert at_rest > 0.3
 
 
-def test_a_circuit_under_a_load_begins_where_its_log_does_and_strains_its_spring_there() -> None:
+def test_a_circuit_under_a_load_starts_at_the_position_and_spring_force_of_its_log() -> None:
     still, area = np.zeros(81 * 10), ACTUATOR.circuit.piston_area
     blocks = Blocks(still, 1e-3, 10, np.zeros(80), np.zeros(80), np.ones(2))
     loaded = replace(ACTUATOR.circuit, load_force=300.0)
@@ -168,7 +172,7 @@ def test_a_circuit_under_a_load_begins_where_its_log_does_and_strains_its_spring
     assert first(earlier, ACTUATOR.circuit)[1] == pytest.approx(held, rel=0.1)
 
 
-def test_a_log_that_begins_at_rest_begins_at_rest() -> None:
+def test_a_log_that_begins_at_rest_has_no_initial_pressure() -> None:
     log = simulate(CIRCUIT, SPEED, 1e-3, EhaParameters(), sensors=BENCH, rng=np.random.default_rng(1))
     assert blocks_of(log).begun is None
 
@@ -196,7 +200,7 @@ def test_an_earlier_circuit_runs_up_to_its_sample() -> None:
     assert np.abs(both[-10:] - before[-10:]).min() > 1e-3
 
 
-def test_an_earlier_circuit_is_run_once_for_all_that_are_tried_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_earlier_circuit_is_run_once_for_all_later_circuits(monkeypatch: pytest.MonkeyPatch) -> None:
     plain, rows = healthy_blocks()
     place, asked = list(CONDITIONS).index("major_leakage"), list[int]()
     (leaking,) = parameter_rows(ACTUATOR.conditions[[place]], ACTUATOR.circuit, ACTUATOR.rated)
@@ -220,7 +224,7 @@ def test_an_earlier_circuit_is_run_once_for_all_that_are_tried_after_it(monkeypa
     assert np.all(np.abs(between - first)[:49] < (2e-4, 1e-3) * size)
 
 
-def test_each_circuit_may_have_another_before_it_up_to_a_sample_of_its_own() -> None:
+def test_each_circuit_can_have_its_own_sample_of_change() -> None:
     plain, rows = healthy_blocks()
     place = list(CONDITIONS).index("major_leakage")
     (leaking,) = parameter_rows(ACTUATOR.conditions[[place]], ACTUATOR.circuit, ACTUATOR.rated)
@@ -232,7 +236,7 @@ def test_each_circuit_may_have_another_before_it_up_to_a_sample_of_its_own() -> 
     assert np.abs(both[0, 30:45, 0] - both[1, 30:45, 0]).min() > 1e-3
 
 
-def test_a_course_of_leakage_is_that_of_warm_oil_all_leakages_up_and_viscous_friction_down() -> None:
+def test_a_course_of_leakage_raises_all_leakages_and_lowers_viscous_friction() -> None:
     plain, rows = healthy_blocks()
     names = list(CircuitParameters.__dataclass_fields__)
     warm = rows.copy()
@@ -245,14 +249,14 @@ def test_a_course_of_leakage_is_that_of_warm_oil_all_leakages_up_and_viscous_fri
     assert course[30] < velocity_of(plain, rows)[30]
 
 
-def test_a_stop_that_the_log_has_shown_holds_the_piston() -> None:
+def test_a_known_end_stop_holds_the_piston() -> None:
     plain, rows = healthy_blocks(stop=0.01)
     gone = np.cumsum(velocity_of(plain, rows)) * 0.01
     assert gone.max() == pytest.approx(0.01, abs=2e-4)
     assert gone[-1] == pytest.approx(0.01, abs=2e-4)
 
 
-def test_pressure_is_that_of_the_steady_state() -> None:
+def test_a_run_settles_at_the_velocity_and_pressure_of_the_steady_state() -> None:
     plain, rows = healthy_blocks()
     (found,) = predicted(plain, rows)
     velocity, pressure = steady_state(100.0, circuit_of(EhaParameters()))
@@ -260,7 +264,7 @@ def test_pressure_is_that_of_the_steady_state() -> None:
     assert found[39, 1] == pytest.approx(pressure, rel=0.02)
 
 
-def test_a_block_is_the_mean_of_what_is_there_and_missing_where_most_is() -> None:
+def test_a_block_is_the_mean_of_its_samples_and_missing_if_most_of_them_are() -> None:
     speed, velocity = SPEED.copy(), np.arange(3000.0)
     velocity[[1, 2, 3, 4, 5]] = np.nan
     velocity[[11, 12, 13, 14, 15, 16]] = np.nan
@@ -271,7 +275,7 @@ def test_a_block_is_the_mean_of_what_is_there_and_missing_where_most_is() -> Non
 
 
 @pytest.mark.parametrize("position", [True, False])
-def test_the_noise_of_blocks_is_that_of_the_sensors_over_them(position: bool) -> None:
+def test_the_noise_of_blocks_follows_from_that_of_the_sensors(position: bool) -> None:
     rng, time = np.random.default_rng(2), 1e-3 * np.arange(6001)
     travelled, moving = 1e-2 * np.sin(3.0 * time), 3e-2 * np.cos(3.0 * time)
     log = Record(
@@ -290,7 +294,7 @@ def test_the_noise_of_blocks_is_that_of_the_sensors_over_them(position: bool) ->
     assert np.std(blocks.velocity - true) == pytest.approx(wanted, rel=0.1)
 
 
-def test_a_sensor_that_was_out_for_the_whole_stretch_is_none() -> None:
+def test_a_sensor_without_values_in_the_stretch_counts_as_absent() -> None:
     velocity = 0.01 * np.sin(np.arange(3000) * 1e-3)
     out = np.where(np.arange(3000) < 80, 1e5, np.nan)  # it worked only during the first samples, which do not count
     log = Record(1e-3, {"motor_speed_rad_s": SPEED, "velocity_m_s": velocity})
@@ -313,7 +317,7 @@ def test_a_rig_without_leakage_or_flow_bias_has_coordinates() -> None:
 @pytest.mark.parametrize(
     "absent", [("quadratic",), ("coulomb",), ("quadratic", "linear"), ("quadratic", "coulomb", "linear")], ids=str
 )
-def test_a_rig_without_a_part_of_friction_has_coordinates_within_a_thousandth_of_the_relief_force(
+def test_a_missing_part_of_friction_becomes_a_thousandth_of_the_relief_force(
     absent: tuple[str, ...],
 ) -> None:
     p = replace(EhaParameters(), **{f"friction_{part}": 0.0 for part in absent})

@@ -36,7 +36,7 @@ def cost(point: Array) -> float:
     return class_fit._at(log(), ACTUATOR, CENTRE, point, PULL).cost
 
 
-def test_a_step_is_down_the_slope_of_the_log_posterior() -> None:
+def test_a_step_follows_the_gradient_of_the_log_posterior() -> None:
     start = CENTRE + 0.4 * APART
     here = class_fit._at(log(), ACTUATOR, CENTRE, start, PULL)
     step = class_fit._step(log(), here, CENTRE, PULL)
@@ -45,7 +45,7 @@ def test_a_step_is_down_the_slope_of_the_log_posterior() -> None:
     assert (here.information + PULL) @ step == pytest.approx(downward, rel=0.0, abs=0.015 * np.abs(downward).max())
 
 
-def test_no_step_is_longer_than_the_longest_and_short_ones_are_whole() -> None:
+def test_only_a_step_longer_than_the_limit_is_shortened() -> None:
     here = class_fit._at(log(), ACTUATOR, CENTRE, CENTRE, PULL)
     left = (log().outputs - here.fitted)[log().first :] / here.scales**2
     whole = np.linalg.solve(here.information + PULL, np.einsum("ink,nk->i", here.slopes[:, log().first :], left))
@@ -56,7 +56,7 @@ def test_no_step_is_longer_than_the_longest_and_short_ones_are_whole() -> None:
 
 @pytest.mark.parametrize("bend", [0.5, 3.0, 40.0])
 @pytest.mark.parametrize("reach", [1.0, 0.3, 0.09])
-def test_what_a_shorter_step_gains_is_read_off_the_parabola_through_the_one_that_was_tried(
+def test_the_best_gain_along_a_step_is_the_vertex_of_the_parabola_through_the_tried_step(
     bend: float, reach: float
 ) -> None:
     promised = 1.5
@@ -69,7 +69,7 @@ def test_what_a_shorter_step_gains_is_read_off_the_parabola_through_the_one_that
 
 
 @pytest.mark.parametrize("pulled", [1.0, 1e3])
-def test_a_whole_step_promises_half_of_what_its_slope_would_give(pulled: float) -> None:
+def test_a_whole_step_promises_half_the_gain_of_its_slope(pulled: float) -> None:
     pull = pulled * PULL
     here = class_fit._at(log(), ACTUATOR, CENTRE, CENTRE + 0.4 * APART, pull)
     information = here.information + pull
@@ -81,7 +81,7 @@ def test_a_whole_step_promises_half_of_what_its_slope_would_give(pulled: float) 
         assert other == pytest.approx((2.0 * share - share**2) * promised)
 
 
-def test_the_circuit_that_left_a_log_is_found() -> None:
+def test_the_circuit_that_made_a_log_is_recovered() -> None:
     found = fit_freely(log(), ACTUATOR, next(iter(CONDITIONS)), gained=1e-3)
     off = found.coordinates - CENTRE - APART
     # the weak prior shifts leakage and bias against each other
@@ -90,7 +90,7 @@ def test_the_circuit_that_left_a_log_is_found() -> None:
     assert off[2:5] == pytest.approx(0.0, abs=0.02)
 
 
-def test_a_model_that_ran_away_is_infinitely_far_off_and_another_as_far_as_its_residuals_are_large() -> None:
+def test_misfit_is_the_log_of_residuals_and_infinite_for_a_diverged_model() -> None:
     off = log().outputs + np.array([1e-3, 1e5])
     assert misfit(log(), np.where(np.arange(len(off))[:, None] == 70, np.inf, off)) == np.inf
     count = len(off) - log().first
@@ -98,7 +98,7 @@ def test_a_model_that_ran_away_is_infinitely_far_off_and_another_as_far_as_its_r
     assert twice == pytest.approx(count * (np.log(2.0) + np.log(3.0)))
 
 
-def test_a_log_that_gives_no_slope_ends_the_search_where_it_began() -> None:
+def test_the_search_stays_at_its_start_if_the_log_has_no_gradient() -> None:
     nothing = replace(log(), pressure=np.full(len(log().velocity), np.nan))
     with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
         found = fit_freely(nothing, ACTUATOR, next(iter(CONDITIONS)))
@@ -106,7 +106,7 @@ def test_a_log_that_gives_no_slope_ends_the_search_where_it_began() -> None:
 
 
 @pytest.mark.parametrize(("below", "ends"), [(1e6, True), (-20.0 * LASTING, False)])
-def test_a_search_that_cannot_come_to_what_is_wanted_ends_after_a_step_or_two(below: float, ends: bool) -> None:
+def test_a_search_ends_after_two_runs_if_it_cannot_reach_the_wanted_cost(below: float, ends: bool) -> None:
     at = list(CONDITIONS).index("minor_leakage")
     start = ACTUATOR.conditions[at] + 0.2
     whole = fit_freely(log(), ACTUATOR, "minor_leakage", start)
@@ -119,7 +119,7 @@ def test_a_search_that_cannot_come_to_what_is_wanted_ends_after_a_step_or_two(be
     assert (there.cost == whole.cost) == (not ends)
 
 
-def test_a_thorough_search_runs_no_circuit_again_that_a_rough_one_from_the_same_start_ran() -> None:
+def test_a_search_from_the_same_start_reuses_the_runs_of_an_earlier_one() -> None:
     blocks, name, runs = replace(log()), "minor_leakage", list[int]()
     with pytest.MonkeyPatch.context() as patch:
         real = class_fit.predicted
@@ -131,7 +131,7 @@ def test_a_thorough_search_runs_no_circuit_again_that_a_rough_one_from_the_same_
     np.testing.assert_array_equal(thorough.coordinates, roughly.coordinates)
 
 
-def test_nominal_circuits_of_a_log_run_once_and_nobody_changes_them() -> None:
+def test_runs_of_nominal_circuits_are_cached_and_read_only() -> None:
     first = class_fit.nominal_runs(log(), ACTUATOR)
     assert class_fit.nominal_runs(log(), ACTUATOR) is first
     assert not first.flags.writeable
@@ -139,7 +139,7 @@ def test_nominal_circuits_of_a_log_run_once_and_nobody_changes_them() -> None:
     assert not np.array_equal(class_fit.nominal_runs(log(), others), first)
 
 
-def test_a_search_tries_no_step_that_promises_too_little() -> None:
+def test_a_search_ends_if_a_step_promises_too_little() -> None:
     start = ACTUATOR.conditions[list(CONDITIONS).index("minor_leakage")] + 0.2
     first = class_fit._at(log(), ACTUATOR, ACTUATOR.conditions[list(CONDITIONS).index("minor_leakage")], start, PULL)
     assert fit_freely(log(), ACTUATOR, "minor_leakage", start, promising=1e9).cost == pytest.approx(first.cost)

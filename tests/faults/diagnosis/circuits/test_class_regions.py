@@ -40,13 +40,13 @@ def fit(place: int, scale: float = 1e-3, outputs: int = 2) -> PointFit:
 
 
 @pytest.mark.parametrize("place", range(len(CONDITIONS)))
-def test_a_nominal_circuit_lies_in_its_own_region_alone(place: int) -> None:
+def test_a_nominal_circuit_is_in_its_own_region_only(place: int) -> None:
     scores = region_scores(fit(place), INFORMATION, ACTUATOR)
     assert scores[place] == 0.0
     assert np.all(np.delete(scores, place) < -10.0)
 
 
-def test_what_a_log_says_nothing_of_counts_for_no_condition() -> None:
+def test_coordinates_without_information_do_not_affect_the_scores() -> None:
     only_leakage = np.diag([1e4, *6 * [0.0]])
     scores = region_scores(fit(0), only_leakage, ACTUATOR)
     alike = [i for i, condition in enumerate(CONDITIONS.values()) if condition.leakage == "none"]
@@ -54,13 +54,13 @@ def test_what_a_log_says_nothing_of_counts_for_no_condition() -> None:
     assert np.all(np.delete(scores, alike) < -10.0)
 
 
-def test_without_pressure_the_scale_of_pressure_is_not_believed() -> None:
+def test_without_pressure_there_is_no_credible_information_on_the_pressure_scale() -> None:
     believed = believed_information(fit(0, outputs=1), blocks(pressure=False))
     assert float(PRESSURE_SCALE @ believed @ PRESSURE_SCALE) == pytest.approx(0.0, abs=1e-6)
     assert believed_information(fit(0), blocks(pressure=True)) == pytest.approx(INFORMATION)
 
 
-def test_circuits_for_a_spread_are_run_where_it_is_asked_for_and_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_spread_is_computed_once_and_only_on_request(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
     monkeypatch.setattr(class_regions, "spread_with_pressure", lambda *given: asked.append(given) or np.eye(7))
     found = fit_classes(blocks(pressure=True), ACTUATOR, start=ACTUATOR.conditions[0])
@@ -70,12 +70,12 @@ def test_circuits_for_a_spread_are_run_where_it_is_asked_for_and_once(monkeypatc
     assert len(asked) == 1
 
 
-def test_a_model_error_widens_what_is_believed() -> None:
+def test_a_model_error_reduces_the_credible_information() -> None:
     near, far = (believed_information(fit(0, scale), blocks(pressure=True)) for scale in (1e-3, 1e-2))
     assert np.all(np.diag(far) < 0.02 * np.diag(near))
 
 
-def test_a_stuck_piston_says_nothing_of_friction() -> None:
+def test_a_stuck_piston_gives_no_information_on_friction() -> None:
     stuck = blocks(pressure=True, travel=5e-5)
     assert is_stuck(stuck, ACTUATOR)
     assert not is_stuck(blocks(pressure=True), ACTUATOR)
@@ -97,7 +97,7 @@ def residual(left: np.ndarray, *, pressure: bool = True) -> tuple[PointFit, Bloc
     return replace(found, fitted=outputs - 1e-3 * left[:, None]), log
 
 
-def test_what_lasts_widens_intervals_and_white_noise_does_not() -> None:
+def test_lasting_residuals_widen_intervals_and_white_noise_does_not() -> None:
     white = np.random.default_rng(1).normal(size=100)
     lasting = np.repeat(white[:10] / np.std(white[:10]), 10)
     spreads = [
@@ -113,7 +113,7 @@ def _with(left: np.ndarray, *, pressure: bool = True) -> tuple[PointFit, np.ndar
     return found, INFORMATION, log
 
 
-def test_without_pressure_an_actuator_unlike_its_kind_is_known_less_well() -> None:
+def test_without_pressure_an_atypical_actuator_has_a_wider_spread_of_the_pressure_scale() -> None:
     found, log = residual(np.zeros(100), pressure=False)
     believed = believed_information(found, log)
     along = PRESSURE_SCALE / np.linalg.norm(PRESSURE_SCALE)
@@ -125,7 +125,7 @@ def test_without_pressure_an_actuator_unlike_its_kind_is_known_less_well() -> No
     assert 1.5 * near < far < 1.0
 
 
-def test_of_two_circuits_that_were_fitted_the_one_that_follows_the_log_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fitted_circuit_that_follows_the_log_best_decides_the_scores(monkeypatch: pytest.MonkeyPatch) -> None:
     log = blocks(pressure=True)
     followed = {next(iter(CONDITIONS)): 1.0158, list(CONDITIONS)[4]: 1.0}
     runs = np.array([log.outputs * followed.get(name, 2.0) for name in CONDITIONS])
@@ -144,7 +144,9 @@ def test_of_two_circuits_that_were_fitted_the_one_that_follows_the_log_decides(m
     assert int(np.argmin(found.nominal)) == 4
 
 
-def test_a_creeping_piston_is_tried_with_each_friction_and_named_by_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_creeping_piston_is_fitted_at_each_friction_level_without_a_clear_winner(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     log = blocks(pressure=True)
     names, tried = list(CONDITIONS), list[tuple[str, bool]]()
     runs = np.array([log.outputs * (1.0 if place == 0 else 50.0) for place in range(len(names))])
@@ -169,7 +171,7 @@ def test_a_creeping_piston_is_tried_with_each_friction_and_named_by_none(monkeyp
     assert tried == [("normal", True)]
 
 
-def test_what_lasts_over_a_tenth_of_a_second_counts_as_often_as_white_noise_would_shrink() -> None:
+def test_the_lasting_misfit_compares_residuals_averaged_over_0_1_s_with_white_noise() -> None:
     log = blocks(pressure=True)
     least = np.maximum(log.noise, 1e-3 * np.abs(log.outputs[0]))
     lasting = np.ones((100, 2)) * least
@@ -181,7 +183,7 @@ def test_what_lasts_over_a_tenth_of_a_second_counts_as_often_as_white_noise_woul
     assert lasting_misfit(gaps, log) == pytest.approx(np.sqrt(10.0), rel=1e-6)
 
 
-def test_without_pressure_the_scale_is_known_as_far_as_actuators_of_one_kind_are_alike() -> None:
+def test_without_pressure_similarity_of_actuators_limits_the_spread_of_the_pressure_scale() -> None:
     found, log = residual(np.zeros(100), pressure=False)
     spread = spread_of(found, np.zeros((7, 7)), log, ACTUATOR.conditions[0])
     known = spread_of(found, INFORMATION, log, ACTUATOR.conditions[0])
@@ -192,7 +194,7 @@ def test_without_pressure_the_scale_is_known_as_far_as_actuators_of_one_kind_are
 
 
 @pytest.mark.parametrize("name", [name for name in COORDINATES if name != "presliding"])
-def test_an_actuator_of_its_kind_is_in_its_region_and_one_twice_off_in_anything_is_not(name: str) -> None:
+def test_a_typical_actuator_is_in_its_region_and_one_off_by_a_factor_of_two_is_not(name: str) -> None:
     at = COORDINATES.index(name)
     near, far = (
         region_scores(
@@ -204,7 +206,7 @@ def test_an_actuator_of_its_kind_is_in_its_region_and_one_twice_off_in_anything_
     assert far[0] < -7.0
 
 
-def test_seals_that_yield_over_twice_the_travel_put_no_actuator_out_of_its_region() -> None:
+def test_an_actuator_with_twice_the_presliding_travel_stays_in_its_region() -> None:
     at = COORDINATES.index("presliding")
     for factor in (0.5, 2.0):
         moved = replace(fit(0), coordinates=ACTUATOR.conditions[0] + np.log(factor) * np.eye(7)[at])
@@ -213,7 +215,7 @@ def test_seals_that_yield_over_twice_the_travel_put_no_actuator_out_of_its_regio
     assert region_scores(beyond, 1e6 * INFORMATION, ACTUATOR)[0] < -7.0
 
 
-def test_along_the_scale_of_pressure_motion_stays_and_pressure_grows_alike() -> None:
+def test_the_pressure_scale_multiplies_pressure_and_leaves_motion_unchanged() -> None:
     speed = np.repeat([60.0, 120.0, -120.0, -70.0], 150)
     log = Blocks(np.append(speed, speed[-1]), 1e-3, 10, np.zeros(60), np.zeros(60), np.ones(2))
     places = np.eye(7)[:6]
@@ -231,7 +233,7 @@ def test_along_the_scale_of_pressure_motion_stays_and_pressure_grows_alike() -> 
     assert np.sqrt(np.mean(runs[1, :, 1] ** 2)) / size[1] == pytest.approx(np.exp(0.2), rel=0.01)
 
 
-def test_a_log_that_says_nothing_leaves_the_weak_belief_and_one_that_says_all_leaves_none() -> None:
+def test_the_covariance_is_the_weak_prior_without_information_and_vanishes_with_much() -> None:
     nine = np.zeros(len(CONDITIONS))
     said = (
         class_regions.ClassFits(
@@ -245,7 +247,7 @@ def test_a_log_that_says_nothing_leaves_the_weak_belief_and_one_that_says_all_le
 
 
 @pytest.mark.parametrize("off", [0.4, -0.4])
-def test_without_pressure_a_fit_is_moved_along_the_scale_to_its_condition(
+def test_without_pressure_a_fit_is_moved_along_the_pressure_scale_to_its_condition(
     off: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = blocks(pressure=False)
@@ -260,7 +262,7 @@ def test_without_pressure_a_fit_is_moved_along_the_scale_to_its_condition(
     np.testing.assert_array_equal(found.as_run.coordinates, away)
 
 
-def test_from_a_circuit_that_explains_the_log_no_search_begins_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_after_a_circuit_that_explains_the_log_no_search_starts_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     drive = 100.0 * np.sign(np.sin(2.0 * np.pi * np.arange(3001) / 600.0))
     still = Blocks(drive, 1e-3, 10, np.zeros(300), np.zeros(300), np.array([2e-4, 2e4]))
     truth = 0.5 * ACTUATOR.conditions[0] + 0.5 * ACTUATOR.conditions[3]
@@ -286,7 +288,7 @@ def test_from_a_circuit_that_explains_the_log_no_search_begins_elsewhere(monkeyp
     assert np.argmax(quick.scores) == np.argmax(whole.scores)
 
 
-def test_conditions_are_told_apart_by_what_the_log_tells_of_that_in_which_they_differ() -> None:
+def test_the_distance_of_conditions_shrinks_with_uncertainty_of_the_coordinates_that_differ() -> None:
     sure, rubs = np.zeros((7, 7)), np.zeros((7, 7))
     for name in ("friction_rest", "friction_quadratic", "friction_rated"):
         rubs[COORDINATES.index(name), COORDINATES.index(name)] = 4.0
@@ -301,7 +303,7 @@ def test_conditions_are_told_apart_by_what_the_log_tells_of_that_in_which_they_d
 
 
 @pytest.mark.parametrize("pressure", [True, False])
-def test_a_log_is_outside_all_conditions_only_where_every_circuit_that_follows_it_as_well_is(
+def test_without_pressure_a_log_is_outside_only_if_every_circuit_that_follows_it_is(
     pressure: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log, far = blocks(pressure=False), np.eye(7)[COORDINATES.index("leakage")]

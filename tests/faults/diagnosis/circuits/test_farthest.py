@@ -13,7 +13,7 @@ from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes
 PLACED = {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}
 
 
-def test_two_severities_and_five_other_coordinates_reach_their_limits_as_seldom() -> None:
+def test_the_limits_of_severities_and_other_coordinates_are_equally_improbable() -> None:
     others = len(COORDINATES) - 2
     assert chdtrc(2, 2.0 * FARTHEST_OUT) == pytest.approx(1.0 / 1100.0, rel=0.01)
     assert chdtrc(others, 2.0 * FARTHEST_BESIDE) == pytest.approx(1.0 / 1100.0, rel=0.05)
@@ -29,7 +29,7 @@ def test_two_severities_and_five_other_coordinates_reach_their_limits_as_seldom(
         (-FARTHEST_OUT - 0.1, False, AgainstCode.OUTSIDE_CONDITIONS),
     ],
 )
-def test_a_circuit_beside_all_severities_is_outside_where_chance_seldom_takes_one(
+def test_the_limit_for_a_circuit_off_all_severities_is_wider_with_pressure(
     monkeypatch: pytest.MonkeyPatch, between: float, said: AgainstCode | None, *, pressure: bool
 ) -> None:
     monkeypatch.setattr(out_of_model, "_nearest_severity", lambda *_: (0.5, 0.0, between))

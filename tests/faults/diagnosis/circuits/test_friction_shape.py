@@ -25,7 +25,7 @@ def moved(fastest: float) -> np.ndarray:
     )
 
 
-def test_bends_move_the_parts_of_friction_as_they_move_a_parabola_through_the_velocities_reached() -> None:
+def test_bends_shift_friction_like_a_parabola_fitted_to_the_velocities_reached() -> None:
     found = moved(0.3)
     speed = np.abs(0.3 * np.sin(np.linspace(0.0, 40.0, 400)))[9:]
     speed = np.append(speed[speed > 0.005], 0.0)
@@ -37,20 +37,20 @@ def test_bends_move_the_parts_of_friction_as_they_move_a_parabola_through_the_ve
     assert not np.any(np.delete(found, FRICTION, axis=0))
 
 
-def test_the_slower_a_piston_the_less_is_known_of_friction_at_rated_velocity() -> None:
+def test_a_slower_piston_leaves_friction_at_rated_velocity_more_uncertain() -> None:
     deviation = [float(np.linalg.norm(moved(fastest)[RATED])) for fastest in (1.0, 0.5, 0.3, 0.1)]
     assert np.all(np.diff(deviation) > 0.0)
     assert deviation[0] < 0.05 < 0.3 < deviation[2]
 
 
-def test_a_log_tells_what_its_covariance_and_that_of_the_bends_leave_together() -> None:
+def test_information_with_bends_is_the_inverse_of_the_sum_of_both_covariances() -> None:
     information, by = np.diag([400.0, 300.0, 200.0, 90.0, 500.0, 60.0, 2.0]) + 8.0, moved(0.2)
     together = np.linalg.inv(np.linalg.inv(information) + by @ by.T)
     np.testing.assert_allclose(told_of_bent(information, by), together, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("fastest", [0.05, 0.3])
-def test_bends_add_doubt_of_friction_and_no_more_than_is_believed_without_a_log(fastest: float) -> None:
+def test_bends_increase_only_the_variance_of_friction_and_by_less_than_the_prior(fastest: float) -> None:
     information = 1e4 * np.eye(7)
     added = doubt_of_bends(information, moved(fastest))
     assert np.min(np.linalg.eigvalsh(added)) > -1e-9

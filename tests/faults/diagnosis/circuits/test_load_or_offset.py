@@ -38,7 +38,9 @@ def said_of(blocks: Blocks) -> list[Note]:
     return [note for note in against if note.code in CODES]
 
 
-def test_a_load_is_named_with_its_entry_and_an_offset_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_load_is_named_with_its_rig_file_entry_and_an_offset_of_speed_as_an_offset(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     (load,) = said_of(log(force=700.0))
     assert (load.code, load.data["entry"]) == (AgainstCode.LOAD_UNTOLD, "load_force")
     assert float(load.data["value"]) == pytest.approx(700.0, rel=0.3)
@@ -50,7 +52,7 @@ def test_a_load_is_named_with_its_entry_and_an_offset_as_one(monkeypatch: pytest
     assert float(either.data["bias_rad_s"]) == float(offset.data["bias_rad_s"])
 
 
-def test_a_spring_is_told_from_a_constant_load() -> None:
+def test_a_spring_is_distinguished_from_a_constant_load() -> None:
     sprung = log(stiffness=2e4)
     without = fit_freely(sprung, ACTUATOR, "normal")
     spring = load_for_offset(sprung, ACTUATOR, "normal", without, -3.0, 14.0)
@@ -59,7 +61,7 @@ def test_a_spring_is_told_from_a_constant_load() -> None:
     assert float(spring.data["value"]) == pytest.approx(2e4, rel=0.5)
 
 
-def test_what_no_circuit_follows_is_neither(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_neither_load_nor_offset_is_named_if_no_circuit_follows_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (load_or_offset, out_of_model):
         monkeypatch.setattr(module, "follows", lambda *_: False)
     assert not said_of(log(force=700.0))

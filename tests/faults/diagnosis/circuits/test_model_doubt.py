@@ -67,12 +67,12 @@ def variances(blocks: int, share: float = 0.0) -> np.ndarray:
     return np.diag(doubt_of(fit, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS))
 
 
-def test_noise_alone_averages_away_and_the_error_of_a_wrong_model_does_not() -> None:
+def test_noise_averages_out_in_a_longer_log_and_a_model_error_does_not() -> None:
     assert variances(14_010)[0] == pytest.approx(2.0 * variances(28_010)[0], rel=0.02)
     assert variances(14_010, 0.5)[0] == pytest.approx(variances(28_010, 0.5)[0], rel=0.02)
 
 
-def test_a_wrong_model_is_counted_once() -> None:
+def test_a_model_error_averages_over_ten_looks_and_noise_over_all_blocks() -> None:
     blocks, share = 14_010, 0.5
     seen = blocks - log(blocks).first
     beyond = 1.0 - NOISE_ALONE**2 * (1.0 - share)
@@ -80,14 +80,14 @@ def test_a_wrong_model_is_counted_once() -> None:
     assert variances(blocks, share)[0] == pytest.approx(1.0 / (1.0 / variance + np.linalg.inv(WEAK)[0, 0]), rel=0.01)
 
 
-def test_what_the_noise_is_not_known_to_is_no_wrong_model() -> None:
+def test_residuals_within_the_uncertainty_of_the_noise_are_not_a_model_error() -> None:
     as_known = variances(14_010, 1.0 - 1.0 / NOISE_ALONE**2)[0]
     assert as_known == pytest.approx(NOISE_ALONE**2 * variances(14_010)[0], rel=1e-3)
     assert variances(14_010, 1.0 - 0.9 / NOISE_ALONE**2)[0] > 20.0 * as_known
 
 
 @pytest.mark.parametrize("slope", [1.0, -1.0], ids=["the same in all blocks", "to and fro"])
-def test_what_a_position_adds_to_one_block_it_takes_from_the_next(slope: float) -> None:
+def test_noise_of_a_differenced_position_is_anticorrelated_between_blocks(slope: float) -> None:
     """Many draws of an encoder's noise give the reference for the error of the fit."""
     fit, one = told(430)
     slopes = np.zeros_like(fit.slopes)
@@ -104,7 +104,7 @@ def test_what_a_position_adds_to_one_block_it_takes_from_the_next(slope: float) 
     assert differenced < 0.01 * white if slope > 0.0 else differenced > 1.9 * white
 
 
-def test_what_an_encoder_takes_back_is_no_wrong_model() -> None:
+def test_differenced_encoder_noise_is_not_a_model_error() -> None:
     """The steps of an encoder do not average out if the piston is slow, so the residuals exceed the noise."""
     fit, one = told(2_010)
     rng, encoder = np.random.default_rng(0), replace(one, differenced=True)
@@ -118,7 +118,7 @@ def test_what_an_encoder_takes_back_is_no_wrong_model() -> None:
     assert wrong(as_steps, one)[0] == pytest.approx(wrong(as_white, one)[0], rel=0.1)
 
 
-def test_a_fast_log_that_is_followed_to_its_noise_shows_no_wrong_model() -> None:
+def test_a_fast_log_followed_to_its_noise_shows_no_model_error() -> None:
     """A search counts no residual as less than a thousandth of the signal, but the noise averages to less than that."""
     fit, one = told(14_010)
     quiet = replace(one, noise=0.3 * NOISE)
@@ -132,7 +132,7 @@ def test_a_fast_log_that_is_followed_to_its_noise_shows_no_wrong_model() -> None
     assert sure == pytest.approx(0.3**2 * as_loud, rel=0.01)
 
 
-def test_beside_a_wrong_model_the_noise_of_a_position_is_white() -> None:
+def test_with_a_model_error_the_noise_of_a_position_counts_as_white() -> None:
     fit, one = told(410, 0.5)
     # neighbouring residuals agree in sign as often as they differ
     up = np.where(np.arange(410) // 2 % 2, 1.0, -1.0)[:, None]
@@ -144,7 +144,7 @@ def test_beside_a_wrong_model_the_noise_of_a_position_is_white() -> None:
     np.testing.assert_array_equal(white, differenced)
 
 
-def test_an_error_that_lasts_is_seen_where_noise_hides_it_in_a_block() -> None:
+def test_a_lasting_error_below_the_noise_of_a_block_is_detected() -> None:
     fit, one = told(14_010)
     noise = NOISE * np.random.default_rng(0).normal(size=fit.fitted.shape)
     noise -= np.mean(noise[one.first :], axis=0)
@@ -158,7 +158,7 @@ def test_an_error_that_lasts_is_seen_where_noise_hides_it_in_a_block() -> None:
     assert wide[0, 0] > 20.0 * narrow[0, 0]
 
 
-def test_a_wrong_model_errs_where_it_errs() -> None:
+def test_a_local_model_error_widens_only_coordinates_that_act_there() -> None:
     left = np.zeros((1_000, 1))
     left[100:200] = 2.0
     seen = np.ones((1_000, 1), dtype=bool)
@@ -177,7 +177,7 @@ def test_a_wrong_model_errs_where_it_errs() -> None:
     assert found[0] > 50.0 * found[1]
 
 
-def test_each_output_answers_for_its_own_error() -> None:
+def test_an_error_in_one_output_leaves_the_information_of_the_other() -> None:
     fit, one = told(1_410)
     velocity_off = leaving(fit, one, NOISE * [10.0, 1.0])
     both_off = leaving(fit, one, NOISE * 10.0)
@@ -189,7 +189,7 @@ def test_each_output_answers_for_its_own_error() -> None:
     assert least > 10.0 * less
 
 
-def test_what_is_seldom_known_widens_what_answers_like_it_as_far_as_the_log_leaves_it_open() -> None:
+def test_a_rarely_known_parameter_widens_a_coordinate_with_the_same_effect() -> None:
     blocks = 1_410
     fit, one = told(blocks)
     alike, apart = nothing_seldom(blocks), nothing_seldom(blocks)
@@ -205,7 +205,7 @@ def test_what_is_seldom_known_widens_what_answers_like_it_as_far_as_the_log_leav
     assert sure < seen < 2.0 * sure
 
 
-def test_what_the_log_says_of_what_is_seldom_known_counts_as_far_as_the_fit_went_without_it() -> None:
+def test_residuals_like_the_effect_of_a_rarely_known_parameter_widen_a_coordinate() -> None:
     blocks, by = 14_010, 0.2
     fit, one = told(blocks)
     seldom = nothing_seldom(blocks)
@@ -219,7 +219,7 @@ def test_what_the_log_says_of_what_is_seldom_known_counts_as_far_as_the_fit_went
     assert np.sqrt(strayed - without) == pytest.approx(by, rel=0.05)
 
 
-def test_a_force_that_the_log_had_to_tell_is_open_whether_the_rig_file_is_right_or_not() -> None:
+def test_the_uncertainty_of_a_force_from_the_log_is_added_in_full() -> None:
     blocks = 1_410
     fit, one = told(blocks)
     force = np.concatenate([nothing_seldom(blocks), fit.slopes[:1]])
@@ -228,7 +228,7 @@ def test_a_force_that_the_log_had_to_tell_is_open_whether_the_rig_file_is_right_
     assert open_ - sure == pytest.approx(0.1**2 * WEAK[0, 0] / (0.1**2 + WEAK[0, 0]), rel=0.05)
 
 
-def test_friction_of_a_piston_that_sticks_is_open_to_each_condition_that_is_as_likely() -> None:
+def test_the_friction_of_a_stuck_piston_has_the_spread_of_all_likely_conditions() -> None:
     blocks = 1_410
     fit, one = told(blocks)
     rated = COORDINATES.index("friction_rated")
@@ -267,7 +267,7 @@ def same(slope: np.ndarray, expected: np.ndarray) -> bool:
     return bool(np.all(np.std(slope - expected, axis=0) < 0.05 * np.std(expected, axis=0)))
 
 
-def test_slopes_are_those_of_the_circuit_that_was_fitted() -> None:
+def test_slopes_of_rarely_known_parameters_match_finite_differences_of_the_circuit() -> None:
     fit, one, row = fitted(0)
     slopes = dict(zip(SELDOM_KNOWN, seldom_known_slopes(fit, one, ACTUATOR), strict=True))
     for name in ("moving_mass", "makeup_opening"):
@@ -277,7 +277,7 @@ def test_slopes_are_those_of_the_circuit_that_was_fitted() -> None:
     assert same(slopes[name], nudged(fit, one, row, name, by) / -0.05)
 
 
-def test_what_leaks_to_the_case_acts_otherwise_where_it_grows_than_where_it_falls() -> None:
+def test_the_slope_of_case_leakage_is_the_mean_of_a_rise_and_a_fall() -> None:
     fit, one, row = fitted(list(CONDITIONS).index("major_leakage"))
     name = "pump_case_leakage"
     slope = seldom_known_slopes(fit, one, ACTUATOR)[list(SELDOM_KNOWN).index(name)]

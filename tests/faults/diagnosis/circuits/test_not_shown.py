@@ -16,7 +16,7 @@ from plant.sensors.sensors import BENCH
 from tests.faults.diagnosis.test_severity import fits
 
 
-def test_a_coordinate_that_is_hardly_narrowed_is_not_shown() -> None:
+def test_coordinates_that_a_log_hardly_narrows_are_not_shown() -> None:
     narrowed = np.array([20.0 if name.startswith("friction") else 0.2 for name in COORDINATES])
     found = not_shown(fits(np.diag(narrowed**2 * np.diag(WEAK))))
     assert found >= FRICTION_LAW
@@ -24,7 +24,7 @@ def test_a_coordinate_that_is_hardly_narrowed_is_not_shown() -> None:
     assert not_shown(fits(BLIND**2 * 0.1 * WEAK)) == frozenset()
 
 
-def test_a_stuck_piston_without_pressure_has_no_soft_oil_whatever_holds_it() -> None:
+def test_without_pressure_a_stuck_piston_leaves_bulk_modulus_and_friction_undetermined() -> None:
     truth = parameters_for(CONDITIONS["minor_leakage_major_friction"])
     drive = make_drive("sine", 3.0, 1e-3, EhaParameters(), np.random.default_rng(0))
     log = simulate(CIRCUIT, drive, 1e-3, truth, sensors=BENCH, rng=np.random.default_rng(1))

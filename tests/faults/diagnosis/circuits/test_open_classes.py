@@ -21,14 +21,14 @@ def likely(**shares: float) -> dict[str, float]:
     return {name: shares.get(name, 0.0) for name in CONDITIONS}
 
 
-def test_the_best_circuit_is_alone_where_the_log_tells_the_class() -> None:
+def test_only_the_best_circuit_is_kept_if_the_class_is_certain() -> None:
     (only,) = circuits_left_open(
         blocks(), classes(), ACTUATOR, likely(**{NEAREST: 1.0 - 0.9 * OPEN, OTHER: 0.9 * OPEN})
     )
     assert only.coordinates is classes().best.coordinates
 
 
-def test_a_class_that_is_left_open_has_the_circuit_that_follows_best_about_it() -> None:
+def test_a_second_likely_class_gets_its_best_fitting_circuit() -> None:
     first, second = circuits_left_open(blocks(), classes(), ACTUATOR, likely(**{NEAREST: 0.4, OTHER: 0.6}))
     assert (first.probability, second.probability) == (0.4, 0.6)
     assert first.coordinates is classes().best.coordinates
@@ -38,12 +38,12 @@ def test_a_class_that_is_left_open_has_the_circuit_that_follows_best_about_it() 
     assert second.coordinates[told] == pytest.approx(first.coordinates[told], abs=0.2)
 
 
-def test_the_best_circuit_counts_whatever_the_other_evidences_say_of_its_class() -> None:
+def test_the_best_circuit_is_kept_even_if_other_evidence_excludes_its_class() -> None:
     first, second = circuits_left_open(blocks(), classes(), ACTUATOR, likely(**{OTHER: 1.0}))
     assert (first.probability, second.probability) == (OPEN, 1.0)
 
 
-def test_a_log_without_pressure_and_a_piston_that_sticks_leave_it_to_their_own_rules() -> None:
+def test_no_second_circuit_is_kept_without_pressure_or_for_a_stuck_piston() -> None:
     shares = likely(**{NEAREST: 0.4, OTHER: 0.6})
     blind = replace(blocks(), pressure=None)
     assert len(circuits_left_open(blind, classes(), ACTUATOR, shares)) == 1
@@ -51,7 +51,7 @@ def test_a_log_without_pressure_and_a_piston_that_sticks_leave_it_to_their_own_r
     assert len(circuits_left_open(sticking, classes(), ACTUATOR, shares)) == 1
 
 
-def test_the_interval_spans_the_circuits_and_the_value_is_the_likeliers() -> None:
+def test_the_interval_spans_all_circuits_and_the_value_is_that_of_the_likeliest() -> None:
     sound, rubbing = (ACTUATOR.conditions[NAMES.index(name)] for name in ("normal", "minor_friction"))
     known = replace(classes(), best=replace(classes().best, coordinates=sound), spreading=lambda: 1e-8 * np.eye(7))
     exact = {name: severities_at(point, ACTUATOR)["added_friction"] for name, point in (("s", sound), ("r", rubbing))}
@@ -65,7 +65,7 @@ def test_the_interval_spans_the_circuits_and_the_value_is_the_likeliers() -> Non
 
 
 @pytest.mark.slow
-def test_friction_at_rated_velocity_is_open_where_the_piston_moves_at_a_fifth_of_it() -> None:
+def test_friction_at_rated_velocity_is_uncertain_in_a_log_at_a_fifth_of_it() -> None:
     log = make("plain", "training", 14).log  # major leakage, whose friction may be minor
     found = read(log).diagnose()
     assert 0.97 > found.probabilities["major_leakage"] > 0.5
@@ -77,7 +77,7 @@ def test_friction_at_rated_velocity_is_open_where_the_piston_moves_at_a_fifth_of
 
 
 @pytest.mark.slow
-def test_a_search_whose_slopes_nearly_cancel_comes_to_the_class_that_is_there() -> None:
+def test_a_search_with_nearly_cancelling_slopes_finds_the_true_class() -> None:
     found = read(make("plain", "training", 3194).log).diagnose()  # the verdict was minor leakage alone, at 89 %
     assert found.condition == "minor_leakage_minor_friction"
     assert found.probabilities[found.condition] > 0.6  # not all, since the friction law above these speeds is unknown

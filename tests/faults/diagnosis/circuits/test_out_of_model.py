@@ -92,12 +92,12 @@ def healthy() -> Blocks:
 
 
 @pytest.mark.parametrize("place", range(len(CONDITIONS)), ids=list(CONDITIONS))
-def test_nothing_speaks_against_the_log_of_a_nominal_circuit(place: int) -> None:
+def test_the_log_of_a_nominal_circuit_has_no_objection(place: int) -> None:
     point = ACTUATOR.conditions[place]
     assert not reasons(run_of(tuple(point.tolist())), point)
 
 
-def test_of_a_pressure_that_is_0_throughout_all_is_unexplained_without_a_warning_of_numpy() -> None:
+def test_a_pressure_of_0_throughout_is_wholly_unexplained_without_a_numpy_warning() -> None:
     log = healthy()
     dead = replace(log, pressure=np.zeros(len(log.velocity)))
     with warnings.catch_warnings(action="error"):
@@ -123,14 +123,14 @@ def test_a_log_is_unexplained_once_its_circuit_leaves_more_than_the_stated_share
     assert 0.02 < limit < 0.25
 
 
-def test_what_the_sensors_own_noise_leaves_speaks_against_nothing() -> None:
+def test_residuals_within_sensor_noise_are_not_an_objection() -> None:
     log = replace(healthy(), noise=np.array([1.0, 1e9]))
     noisy = replace(log, velocity=log.velocity * np.where(np.arange(len(log.velocity)) % 2, 1.3, 0.7))
     assert AgainstCode.UNEXPLAINED not in reasons(noisy, ACTUATOR.conditions[0])
 
 
 @pytest.mark.parametrize(("share", "code"), [(0.4, AgainstCode.OIL_SOFT), (2.5, AgainstCode.OIL_STIFF)])
-def test_an_oil_less_than_half_or_more_than_twice_as_stiff_is_another_oil(share: float, code: AgainstCode) -> None:
+def test_an_oil_less_than_half_or_more_than_twice_as_stiff_is_an_objection(share: float, code: AgainstCode) -> None:
     point = shifted(bulk_modulus=float(np.log(share)))
     said = reasons(run_of(tuple(point.tolist())), point)
     assert list(said) == [code]
@@ -141,7 +141,7 @@ def test_an_oil_less_than_half_or_more_than_twice_as_stiff_is_another_oil(share:
 
 
 @pytest.mark.parametrize(("known", "said"), [(0.01, True), (0.3, False)])
-def test_an_oil_is_another_only_where_the_log_knows_how_stiff_it_is(known: float, *, said: bool) -> None:
+def test_an_oil_is_named_soft_only_if_the_log_determines_its_bulk_modulus(known: float, *, said: bool) -> None:
     point = shifted(bulk_modulus=float(np.log(0.45)))
     log = run_of(tuple(point.tolist()))
     fits = replace(fitted(log, point), information=np.diag([1e4, 1e4, 1e4, 1e4, 1e4, known**-2, 1e4]))
@@ -165,7 +165,7 @@ def slipping(late: int, far: float = 1.0, *, pressure: bool = True) -> bool:
     return any(note.code is AgainstCode.UNEXPLAINED and note.data["channel"] == "velocity" for note in found)
 
 
-def test_a_piston_may_break_loose_some_blocks_sooner_if_it_goes_as_far_and_pressure_is_followed() -> None:
+def test_a_slip_some_blocks_early_is_explained_if_its_travel_and_pressure_are_followed() -> None:
     assert not slipping(2)
     assert slipping(2, pressure=False)
     assert slipping(2, far=1.5)
@@ -187,7 +187,7 @@ def jumping(jump: float, *, pressure_left: float = 0.0, drift: float = 0.0, pres
     return any(note.code is AgainstCode.UNEXPLAINED and note.data["channel"] == "velocity" for note in found)
 
 
-def test_a_piston_may_stick_and_slip_at_other_times_if_it_goes_as_far_and_pressure_is_followed() -> None:
+def test_stick_slip_at_other_times_is_explained_if_its_travel_and_pressure_are_followed() -> None:
     yielded = STICKS * ACTUATOR.circuit.presliding_displacement
     assert yielded == pytest.approx(54e-6, rel=0.01)
     assert not jumping(1e-4)
@@ -197,7 +197,7 @@ def test_a_piston_may_stick_and_slip_at_other_times_if_it_goes_as_far_and_pressu
     assert jumping(1e-4, pressure=False)
 
 
-def test_without_pressure_a_circuit_that_explains_nothing_is_accused_and_a_misfit_that_lasts_counts() -> None:
+def test_without_pressure_a_log_whose_motion_no_circuit_follows_is_unexplained() -> None:
     place = ACTUATOR.conditions[0]
     log, pump = healthy(), ACTUATOR.circuit.pump_displacement / ACTUATOR.circuit.piston_area
     left = 0.5 * YIELDING * pump * float(np.sqrt(np.mean(log.speed**2)))
@@ -212,27 +212,27 @@ def test_without_pressure_a_circuit_that_explains_nothing_is_accused_and_a_misfi
     assert fit_classes(replace(log, velocity=log.velocity + velocity), ACTUATOR).lasting > 2.0
 
 
-def test_halfway_between_two_levels_of_leakage_lies_in_no_region_and_the_severity_is_told() -> None:
+def test_a_circuit_halfway_between_two_leakage_levels_is_between_conditions() -> None:
     point = at(0.5, 0.0)
     said = reasons(run_of(tuple(point.tolist())), point)
     assert list(said) == [AgainstCode.BETWEEN_CONDITIONS]
     assert said[AgainstCode.BETWEEN_CONDITIONS].data == {"leakage": 0.5, "friction": 0.0}
 
 
-def test_far_beyond_every_condition_lies_outside_of_all() -> None:
+def test_a_circuit_far_beyond_every_condition_is_outside_conditions() -> None:
     point = shifted(leakage=5.0, friction_rated=2.0)
     found = reasons(run_of(tuple(point.tolist())), point)
     assert AgainstCode.OUTSIDE_CONDITIONS in found
     assert AgainstCode.BETWEEN_CONDITIONS not in found
 
 
-def test_an_actuator_that_differs_as_its_kind_does_stays_in_its_condition() -> None:
+def test_an_actuator_with_typical_deviations_stays_in_its_condition() -> None:
     point = shifted(leakage=0.15, friction_rest=-0.1, bulk_modulus=0.1)
     assert not reasons(run_of(tuple(point.tolist())), point)
 
 
 @pytest.mark.parametrize("share", [1.5, 3.0, -3.0])
-def test_a_pressure_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bias(share: float) -> None:
+def test_a_pressure_sensor_biased_beyond_its_limit_is_named_with_its_bias(share: float) -> None:
     log = healthy()
     assert log.pressure is not None
     limit = LEAST_BIAS["differential_pressure_pa"] * float(np.sqrt(np.mean(log.pressure**2)))
@@ -241,7 +241,7 @@ def test_a_pressure_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bia
     assert not reasons(replace(log, pressure=log.pressure + np.sign(share) * 0.5 * limit))
 
 
-def test_a_bias_is_not_believed_within_two_of_its_standard_errors() -> None:
+def test_a_bias_within_two_standard_errors_is_not_an_objection() -> None:
     short, long = (run_of(tuple(ACTUATOR.conditions[0].tolist()), dwell) for dwell in (100, 1000))
     for log, said in ((short, False), (long, True)):
         assert log.pressure is not None
@@ -251,7 +251,7 @@ def test_a_bias_is_not_believed_within_two_of_its_standard_errors() -> None:
 
 
 @pytest.mark.parametrize("share", [1.5, 2.5, -2.5])
-def test_a_speed_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bias(share: float) -> None:
+def test_a_speed_sensor_biased_beyond_its_limit_is_named_with_its_bias(share: float) -> None:
     log = healthy()
     limit = LEAST_BIAS["motor_speed_rad_s"] * float(np.sqrt(np.mean(log.speed**2)))
     found = reasons(replace(log, speed=log.speed + share * limit))
@@ -259,7 +259,7 @@ def test_a_speed_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bias(s
     assert not reasons(replace(log, speed=log.speed + np.sign(share) * 0.5 * limit))
 
 
-def test_a_pump_that_moves_more_than_the_rig_file_says_is_named() -> None:
+def test_a_pump_that_delivers_more_than_the_rig_file_states_is_named() -> None:
     """In a circuit, a pump that moves less looks like leakage: the flow balance judges it (decisions 220 and 238)."""
     place = tuple(ACTUATOR.conditions[0].tolist())
     found = reasons(run_of(place, pump=1.2))
@@ -268,13 +268,13 @@ def test_a_pump_that_moves_more_than_the_rig_file_says_is_named() -> None:
         assert AgainstCode.PUMP_OFF not in reasons(run_of(place, pump=near))
 
 
-def test_without_pressure_a_pump_that_moves_less_is_left_to_the_search_for_faults_outside() -> None:
+def test_without_pressure_a_pump_that_delivers_less_is_not_an_objection_of_the_circuit() -> None:
     place = tuple(ACTUATOR.conditions[0].tolist())
     for gain, said in ((1.2, True), (0.8, False)):
         log = replace(run_of(place, pump=gain), pressure=None, noise=NOISE[:1])
         assert (AgainstCode.PUMP_OFF in reasons(log)) == said
 
 
-def test_a_motor_that_never_turned_biases_nothing() -> None:
+def test_a_motor_that_never_turned_shows_no_bias_of_speed_or_pump() -> None:
     log = replace(healthy(), speed=np.zeros_like(healthy().speed))
     assert not {AgainstCode.SPEED_BIAS, AgainstCode.PUMP_OFF} & set(reasons(log, ACTUATOR.conditions[0]))

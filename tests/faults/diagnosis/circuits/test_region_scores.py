@@ -23,7 +23,7 @@ def at(place: np.ndarray) -> PointFit:
 
 
 @pytest.mark.parametrize("place", range(len(CONDITIONS)))
-def test_a_nominal_circuit_lies_in_its_own_region_alone(place: int) -> None:
+def test_a_nominal_circuit_is_in_its_own_region_only(place: int) -> None:
     fit = at(ACTUATOR.conditions[place])
     scores = scores_in_forces(fit, KNOWN, ACTUATOR)
     assert scores[place] == pytest.approx(0.0, abs=1e-9)
@@ -34,7 +34,7 @@ def test_a_nominal_circuit_lies_in_its_own_region_alone(place: int) -> None:
     )
 
 
-def test_a_wide_log_leaves_two_regions_open_that_lie_as_far_off_in_newtons() -> None:
+def test_scores_in_forces_favor_stronger_friction_less_than_logarithmic_scores() -> None:
     quadratic, rated = np.exp(
         0.5 * np.log(np.exp(2.0 * ACTUATOR.conditions[[NORMAL, RUBS]][:, [QUADRATIC, RATED]]).mean(0))
     )
@@ -48,7 +48,7 @@ def test_a_wide_log_leaves_two_regions_open_that_lie_as_far_off_in_newtons() -> 
     assert abs(forces[NORMAL] - forces[RUBS]) < abs(straight[NORMAL] - straight[RUBS])
 
 
-def test_regions_are_as_far_apart_in_forces_as_in_logarithms_but_where_a_log_tells_few_newtons() -> None:
+def test_distances_in_forces_equal_those_in_logarithms_unless_friction_is_uncertain() -> None:
     fit = at(ACTUATOR.conditions[RUBS])
     wide = np.zeros((7, 7))
     wide[QUADRATIC, QUADRATIC] = wide[RATED, RATED] = 4.0

@@ -35,7 +35,7 @@ def leaving(velocity: float, pressure: float, one: Blocks, off: float = 0.0) -> 
     return PointFit(point, 0.0, np.eye(7), np.maximum(left, one.noise), fitted, np.zeros((7, *fitted.shape)))
 
 
-def test_where_the_piston_is_followed_the_worse_circuit_is_as_far_behind_as_its_misfit_says() -> None:
+def test_if_the_piston_is_followed_closely_a_circuit_is_behind_by_its_misfit() -> None:
     one = log()
     for better, worse in (((1.0, 1.0), (3.0, 1.0)), ((5.0, 1.5), (5.5, 2.0)), ((1.0, 4.0), (30.0, 8.0))):
         best, other = leaving(*better, one), leaving(*worse, one)
@@ -43,7 +43,7 @@ def test_where_the_piston_is_followed_the_worse_circuit_is_as_far_behind_as_its_
         assert behind([other], best, one)[0] == pytest.approx(expected, rel=1e-12)
 
 
-def test_where_it_is_followed_roughly_a_circuit_leads_by_a_few_looks_however_long_the_log() -> None:
+def test_if_the_piston_is_followed_roughly_the_lead_of_a_circuit_does_not_grow_with_the_log() -> None:
     lead = np.log(1.3)
     for blocks in (2_010, 20_010, 200_010):
         one = log(blocks)
@@ -52,14 +52,14 @@ def test_where_it_is_followed_roughly_a_circuit_leads_by_a_few_looks_however_lon
         assert misfit(one, other.fitted) - misfit(one, best.fitted) > 10.0 * LOOKS * lead
 
 
-def test_an_output_that_a_rough_circuit_follows_to_the_noise_is_not_in_doubt() -> None:
+def test_an_output_followed_to_its_noise_counts_in_full_even_in_a_rough_circuit() -> None:
     one = log()
     best, other = leaving(30.0, 1.0, one), leaving(30.0, 3.0, one)
     assert behind([other], best, one)[0] == pytest.approx(one.counts[1] * np.log(3.0) / LASTING, rel=1e-12)
     assert behind([best], other, one)[0] == pytest.approx(-behind([other], best, one)[0], rel=1e-12)
 
 
-def test_roughness_counts_evenly_from_what_is_followed_on() -> None:
+def test_the_lead_of_a_circuit_decreases_gradually_with_roughness() -> None:
     one, lead = log(200_010), np.log(1.2)
     share = [ROUGHLY * SIZES[0] / NOISE[0] * times for times in (1.0, 1.5, 2.0, 4.0)]
     found = [behind([leaving(1.2 * left, 1.0, one)], leaving(left, 1.0, one), one)[0] / lead for left in share]
@@ -68,7 +68,7 @@ def test_roughness_counts_evenly_from_what_is_followed_on() -> None:
     assert found[2:] == pytest.approx([LOOKS, LOOKS], rel=0.05)
 
 
-def test_without_pressure_and_of_a_circuit_that_ran_away_the_misfit_decides() -> None:
+def test_without_pressure_the_misfit_decides_and_a_diverged_circuit_is_infinitely_behind() -> None:
     one = log(pressure=False)
     best, other = leaving(30.0, 1.0, one), leaving(39.0, 1.0, one)
     assert behind([other], best, one)[0] == pytest.approx(one.counts[0] * np.log(1.3) / LASTING, rel=1e-12)
@@ -76,7 +76,7 @@ def test_without_pressure_and_of_a_circuit_that_ran_away_the_misfit_decides() ->
     assert behind([best, away], best, one).tolist() == [0.0, np.inf]
 
 
-def test_ends_of_a_search_that_explain_alike_widen_and_worse_ones_do_not() -> None:
+def test_equally_good_ends_of_a_search_widen_the_spread_and_worse_ones_do_not() -> None:
     one, off = log(), np.full(7, 0.3)
     fit, alike = leaving(1.0, 1.0, one), leaving(1.0, 1.0, one, 0.3)
 
@@ -88,14 +88,14 @@ def test_ends_of_a_search_that_explain_alike_widen_and_worse_ones_do_not() -> No
     assert np.all(added([fit]) == 0.0)
 
 
-def test_friction_of_a_creeping_piston_is_as_open_as_the_circuits_that_follow_it_roughly_differ() -> None:
+def test_circuits_that_follow_a_creeping_piston_roughly_widen_the_spread() -> None:
     one, off = log(), np.full(7, 0.3)
     fit, other = leaving(30.0, 1.0, one), leaving(33.0, 1.0, one, 0.3)
     assert misfit(one, other.fitted) - misfit(one, fit.fitted) > 5.0 * LASTING
     assert np.all(between_fits([fit, other], fit, behind([fit, other], fit, one)) > 0.3 * np.outer(off, off))
 
 
-def test_a_piston_creeps_where_more_than_noise_and_a_share_of_its_velocity_is_left() -> None:
+def test_a_piston_creeps_if_residuals_exceed_noise_and_a_share_of_its_velocity() -> None:
     one = log()
     limit = ROUGHLY * SIZES[0] / NOISE[0]
     assert not creeps(one, leaving(0.99 * limit, 1.0, one))
@@ -104,7 +104,7 @@ def test_a_piston_creeps_where_more_than_noise_and_a_share_of_its_velocity_is_le
     assert not creeps(noisy, leaving(1.0 * limit, 1.0, one))
 
 
-def test_each_other_level_of_friction_is_tried_at_the_leakage_and_the_force_at_rest_that_were_found(
+def test_other_friction_levels_are_tried_at_the_leakage_and_friction_at_rest_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     begun: dict[str, np.ndarray] = {}
@@ -126,7 +126,7 @@ def test_each_other_level_of_friction_is_tried_at_the_leakage_and_the_force_at_r
         np.testing.assert_array_equal(np.delete(start, sliding), np.delete(best.coordinates, sliding))
 
 
-def test_a_fit_of_motion_is_no_doubt_of_a_followed_log_that_begins_in_motion_or_drifts_or_shows_a_stop() -> None:
+def test_a_failed_motion_fit_is_not_an_objection_to_a_followed_log_that_its_form_cannot_describe() -> None:
     resting, size = log(pressure=False), SIZES[0] / NOISE[0]
     running, warming = replace(resting, settling=1.0), replace(resting, course=np.ones(len(resting.speed)))
     stopped = replace(resting, stop=0.1)

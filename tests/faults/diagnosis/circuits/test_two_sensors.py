@@ -29,7 +29,7 @@ def test_velocity_and_the_encoders_slope_may_differ_by_five_percent(gain: float,
 
 
 @pytest.mark.parametrize(("gain", "noise", "differs"), [(1.0, 0.05, False), (1.2, 1e-3, True)])
-def test_noise_of_a_velocity_sensor_excuses_what_it_can_make_and_no_more(
+def test_noise_of_a_velocity_sensor_excuses_only_differences_of_its_size(
     gain: float, noise: float, differs: bool
 ) -> None:
     record = with_two_sensors(gain, noise)
@@ -37,7 +37,7 @@ def test_noise_of_a_velocity_sensor_excuses_what_it_can_make_and_no_more(
 
 
 @pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (0.7, True)])
-def test_noise_that_a_filter_made_alike_accuses_no_sensor(gain: float, differs: bool) -> None:
+def test_filtered_noise_alone_does_not_make_the_sensors_disagree(gain: float, differs: bool) -> None:
     """The steps of such noise between samples are small: they show a tenth of its size in the mean over a block."""
     noise = 0.02 * np.random.default_rng(8).standard_normal(3020)
     for _ in range(4):
@@ -47,26 +47,26 @@ def test_noise_that_a_filter_made_alike_accuses_no_sensor(gain: float, differs: 
     assert bool(sensors_disagree(wandering, blocks_of(wandering))) == differs
 
 
-def test_one_sensor_alone_contradicts_none() -> None:
+def test_a_single_sensor_cannot_disagree() -> None:
     record = with_two_sensors(2.0, 1e-6).replace(position_m=None)
     assert not sensors_disagree(record, blocks_of(record))
 
 
-def test_sensors_that_never_spoke_at_once_do_not_disagree() -> None:
+def test_sensors_without_common_samples_do_not_disagree() -> None:
     record = with_two_sensors(2.0, 1e-6)
     early = np.where(np.arange(len(record)) < 60, record["velocity_m_s"], np.nan)
     apart = record.replace(velocity_m_s=early)
     assert not sensors_disagree(apart, blocks_of(apart))
 
 
-def test_a_velocity_that_is_slower_than_the_rows_is_excused_by_its_noise_too() -> None:
+def test_the_noise_of_a_velocity_in_every_other_row_excuses_a_difference() -> None:
     record = with_two_sensors(1.0, 0.05)
     slow = record.replace(velocity_m_s=np.where(np.arange(len(record)) % 2, np.nan, record["velocity_m_s"]))
     assert not sensors_disagree(slow, blocks_of(slow))
 
 
 @pytest.mark.parametrize("rows", [1, 20])
-def test_a_coarse_log_of_fast_motion_accuses_no_sensor(rows: int) -> None:
+def test_a_coarse_log_of_fast_motion_does_not_make_sound_sensors_disagree(rows: int) -> None:
     """A coarse log does not show how velocity changes between two samples, although that moves the piston."""
     rng, time = np.random.default_rng(2), 1e-3 * np.arange(12_001)
     steps = 0.04 * np.repeat(rng.choice([-1.0, 1.0], 1 + len(time) // 150), 150)[: len(time)]
@@ -79,7 +79,7 @@ def test_a_coarse_log_of_fast_motion_accuses_no_sensor(rows: int) -> None:
     assert sensors_disagree(wrong, blocks_of(wrong))
 
 
-def test_a_velocity_that_doubles_within_a_block_accuses_no_sensor() -> None:
+def test_fast_changes_within_a_block_do_not_make_sound_sensors_disagree() -> None:
     """Means of samples are half a sample early: at 20 Hz, a sound sensor differed from the encoder by 6 %."""
     time = 1e-3 * np.arange(3001)
     turned = 2.0 * np.pi * 20.0 * time

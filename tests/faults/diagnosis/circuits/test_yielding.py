@@ -33,12 +33,12 @@ def creeping_is_unexplained(share: float, followed: float, *, pressure: bool) ->
 
 
 @pytest.mark.parametrize("pressure", [True, False])
-def test_a_piston_that_only_yields_on_its_seals_need_not_be_followed_to_the_last_digit(*, pressure: bool) -> None:
+def test_a_piston_that_only_yields_on_its_seals_is_explained_by_a_rough_fit(*, pressure: bool) -> None:
     assert not creeping_is_unexplained(0.7 * YIELDING, 2.0, pressure=pressure)
     assert creeping_is_unexplained(1.5 * YIELDING, 2.0, pressure=pressure)
 
 
-def test_without_pressure_a_circuit_that_explains_less_than_half_of_a_creeping_motion_says_nothing_of_it() -> None:
+def test_without_pressure_a_circuit_must_explain_half_of_a_creeping_motion() -> None:
     assert creeping_is_unexplained(0.7 * YIELDING, 0.8, pressure=False)
     assert not creeping_is_unexplained(0.7 * YIELDING, 0.8, pressure=True)
     assert not creeping_is_unexplained(0.7 * YIELDING, 1.2, pressure=False)

@@ -36,7 +36,7 @@ def found(outputs: dict[str, Expression]) -> int:
 
 
 @pytest.mark.parametrize("using", ["gcc", "clang"])
-def test_either_side_gives_what_python_gives(tmp_path: Path, using: str) -> None:
+def test_both_sides_of_a_choice_compute_the_same_in_c_as_in_python(tmp_path: Path, using: str) -> None:
     places = {name: f"out[{i}]" for i, name in enumerate(CHOSEN)}
     lines = c_lines(CHOSEN, {"x": "in[0]", "y": "in[1]"}, places, DOUBLE)
     assert sum(line.startswith("if (") for line in lines) == 1
@@ -55,14 +55,14 @@ def test_either_side_gives_what_python_gives(tmp_path: Path, using: str) -> None
         assert dict(zip(CHOSEN, map(float, line.split()), strict=True)) == pytest.approx(wanted, rel=1e-15)
 
 
-def test_what_both_sides_or_others_need_is_computed_before_the_block() -> None:
+def test_operations_used_on_both_sides_or_elsewhere_are_computed_before_the_block() -> None:
     text = "\n".join(c_lines(CHOSEN, {"x": "x", "y": "y"}, {name: name for name in CHOSEN}, DOUBLE))
     before = text[: text.index("if (")]
     assert "y * 0.25" in before
     assert "sqrt" not in before
 
 
-def test_little_work_stays_a_conditional_expression() -> None:
+def test_a_choice_with_few_operations_stays_a_conditional_expression() -> None:
     little = {"a": where(POSITIVE, X * Y + 1.0, Y)}
     assert found(little) == 0
     assert not any(re.search(r"\bif\b", line) for line in c_lines(little, {"x": "x", "y": "y"}, {"a": "a"}, DOUBLE))
@@ -72,12 +72,12 @@ def test_little_work_stays_a_conditional_expression() -> None:
     assert found({"a": where(POSITIVE, grown, Y)}) == 1
 
 
-def test_what_is_wanted_in_any_case_is_in_no_block() -> None:
+def test_operations_needed_in_every_case_are_in_no_block() -> None:
     work = much(X)
     assert found({"a": where(POSITIVE, work, Y), "b": work}) == 0
 
 
-def test_a_choice_that_hangs_on_another_by_the_same_condition_is_written_after_it() -> None:
+def test_a_choice_that_depends_on_another_of_the_same_condition_follows_its_block() -> None:
     first = where(POSITIVE, much(X), Y)
     second = select(POSITIVE, much(first * Y), X)
     lines = c_lines({"a": second}, {"x": "x", "y": "y"}, {"a": "a"}, DOUBLE)

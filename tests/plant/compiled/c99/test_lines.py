@@ -62,7 +62,7 @@ def test_each_line_is_one_operation_so_that_no_compiler_fuses_two() -> None:
     assert lines == ["const double t0 = x * y;", "const double t1 = x / y;", "const double t2 = t0 + t1;", "z = t2;"]
 
 
-def test_an_output_may_have_the_place_of_an_input_for_all_is_read_before_anything_is_written() -> None:
+def test_all_inputs_are_read_before_any_output_is_written() -> None:
     lines = c_lines({"a": Y + 0.0, "b": X + 1.0}, {"x": "s[0]", "y": "s[1]"}, {"a": "s[0]", "b": "s[1]"}, DOUBLE)
     assert max(i for i, line in enumerate(lines) if "= s[" in line) < min(
         i for i, line in enumerate(lines) if line.startswith("s[")
@@ -78,7 +78,7 @@ def test_operations_are_counted_by_kind() -> None:
 
 
 @pytest.mark.parametrize("value", [0.1, 1.0, -2.5e-300, 1e22, 5e-324, 123456789.0, float("inf"), -float("inf")])
-def test_a_number_in_c_is_the_same_number(value: float) -> None:
+def test_a_literal_in_c_has_exactly_the_value_of_its_number(value: float) -> None:
     spelt = DOUBLE.literal(value)
     assert float(spelt.replace("INFINITY", "inf")) == value
     assert re.search(r"[.eI]", spelt)
@@ -87,12 +87,12 @@ def test_a_number_in_c_is_the_same_number(value: float) -> None:
     assert np.float32(short[:-1]) == np.float32(np.clip(value, -1e30, 1e30))
 
 
-def test_a_name_that_c_does_not_take_is_refused() -> None:
+def test_an_invalid_name_in_c_is_refused() -> None:
     for name in ("2fast", "while", "Upper", "a-b", "", "a" * 32):
         with pytest.raises(HydrostateError, match="name in C"):
             checked_name(name)
 
 
-def test_a_precision_that_is_none_is_refused() -> None:
+def test_an_unknown_precision_is_refused() -> None:
     with pytest.raises(HydrostateError, match="precision must be one of double, float, got 'half'"):
         precision_of("half")

@@ -77,7 +77,7 @@ int main(void)
 
 
 @pytest.mark.parametrize("using", ["gcc", "clang"])
-def test_a_loop_gives_in_c_what_it_gives_in_python(tmp_path: Path, using: str) -> None:
+def test_a_loop_gives_the_same_numbers_in_c_as_in_python(tmp_path: Path, using: str) -> None:
     written = translation()
     written.entered("work", GIVEN)
     text = f"#include <math.h>\n#include <stdio.h>\n{written.text}\n{MAIN}"
@@ -89,20 +89,20 @@ def test_a_loop_gives_in_c_what_it_gives_in_python(tmp_path: Path, using: str) -
     np.testing.assert_array_equal([float(one) for one in out.split()], wanted)
 
 
-def test_what_is_not_written_is_const() -> None:
+def test_an_array_that_is_only_read_is_const() -> None:
     found = translation().entered("spread", [Block("values", (4,), "values")])
     assert "const double *values" in found.text
     assert found.written == (False,)
     assert found.results == (False, False)
 
 
-def test_the_most_that_a_call_can_take_is_counted_through_every_loop_and_call() -> None:
+def test_the_largest_operation_count_includes_all_loops_and_called_functions() -> None:
     counted = translation().entered("spread", [Block("values", (4,), "values")]).operations
     assert counted == Counter({"additions": 4 + 8, "divisions": 1, "choices and comparisons": 8})
     assert translation().entered("work", GIVEN).operations["square roots"] == 1
 
 
-def test_a_function_that_stands_in_c_already_is_called_by_its_name() -> None:
+def test_a_function_already_written_in_c_is_called_by_its_c_name() -> None:
     outside = {"doubled": Outside("theirs", (True, False), Counter({"products": 5}))}
     written = Translation({"spread": spread, "work": work}, {"SHIFT": 2}, outside, DOUBLE, "mine")
     assert written.entered("work", GIVEN).operations["products"] >= 15
@@ -124,7 +124,7 @@ def swapped(a: float, b: float) -> float:
     return c - d
 
 
-def test_a_loop_without_bound_and_a_swap_are_refused() -> None:
+def test_a_while_loop_and_a_swap_of_two_numbers_are_refused() -> None:
     functions = {one.__name__: one for one in (endless, swapped)}
     written = Translation(functions, {}, {}, DOUBLE, "mine")
     with pytest.raises(NotImplementedError, match="while"):
@@ -219,7 +219,7 @@ UNTRANSLATED = (
 
 
 @pytest.mark.parametrize("function", UNTRANSLATED, ids=lambda one: one.__name__)
-def test_what_c_would_take_for_something_else_is_refused_by_its_line(function: Callable[..., object]) -> None:
+def test_code_outside_the_translated_subset_is_refused(function: Callable[..., object]) -> None:
     written = Translation({"f": function}, {}, {}, DOUBLE, "mine")
     known: dict[str, Thing] = {
         "values": Block("values", (4,), "values"),
@@ -237,7 +237,7 @@ def scaled(values: Array, scale: float) -> float:
     return float(values.shape[0])
 
 
-def test_half_a_turn_a_count_and_what_is_no_number_are_written() -> None:
+def test_pi_an_array_length_and_a_test_for_nan_are_translated() -> None:
     written = Translation({"scaled": scaled}, {}, {}, DOUBLE, "mine")
     text = written.entered("scaled", [Block("values", (4,), "values"), Scalar("scale")]).text
     assert "!isnan(scale)" in text

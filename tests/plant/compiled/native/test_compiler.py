@@ -29,7 +29,7 @@ def test_whole_numbers_are_divided_as_python_divides_them(a: int, b: int) -> Non
     assert compiled("a, b : int", quotients)(a, b) == quotients(a, b)
 
 
-def test_a_division_by_zero_stops_nothing() -> None:
+def test_division_by_zero_gives_zero_for_integers_and_infinity_for_floats() -> None:
     assert compiled("a, b : int", quotients)(3, 0) == (0, 0, math.inf)
 
 
@@ -66,7 +66,7 @@ def loops(values: Array, most: int) -> tuple[float, int, int]:
     return total, count, i
 
 
-def test_loops_end_where_they_are_told_to() -> None:
+def test_break_continue_and_while_loops_run_as_in_python() -> None:
     values = np.array([0.5, np.nan, 0.25, 3.0, -1.0, 0.125])
     for most in (2, 100):
         assert compiled("values : ndarray, shape (n,)\nmost : int", loops)(values, most) == loops(values, most)
@@ -81,7 +81,7 @@ def widened(n: int) -> float:
     return total
 
 
-def test_a_variable_that_becomes_a_float_is_one() -> None:
+def test_a_variable_that_later_becomes_a_float_is_a_float_throughout() -> None:
     assert compiled("n : int", widened)(5) == widened(5)
 
 
@@ -96,7 +96,7 @@ def swapped(a: Array, steps: int) -> tuple[Array, Array, bool]:
     return new, old, steps > 1
 
 
-def test_arrays_change_places_and_come_back() -> None:
+def test_swapped_arrays_are_returned_as_in_python() -> None:
     a = np.array([1.0, 2.0, 4.0])
     for steps in (0, 1, 4):
         found, wanted = compiled("a : ndarray, shape (n,)\nsteps : int", swapped)(a, steps), swapped(a, steps)
@@ -122,7 +122,7 @@ def views(cube: Array, k: int) -> tuple[float, Array]:
     return turned(plane.T, cube[:, :, 1][:, 0:2].T), np.sqrt(plane[-1]) + plane[0, 1:].size
 
 
-def test_views_are_windows_on_their_array() -> None:
+def test_views_read_and_write_their_array_as_in_python() -> None:
     cube = np.arange(24.0).reshape(2, 4, 3)[:, :3].copy()
     mine, theirs = cube.copy(), cube.copy()
     found = compiled("cube : ndarray, shape (a, b, c)\nk : int", turned, views)(mine, 1)
@@ -154,7 +154,7 @@ def kept(flags: NDArray[np.bool_], counts: NDArray[np.int64]) -> int:
     return total
 
 
-def test_arrays_of_truths_and_of_whole_numbers() -> None:
+def test_arrays_of_booleans_and_of_integers_are_read_and_written() -> None:
     flags, counts = np.array([True, False, True, True]), np.array([1, 2, 3, 4])
     takes = "flags : ndarray of bool, shape (n,)\ncounts : ndarray of int, shape (n,)"
     assert compiled(takes, kept)(flags, counts) == 7
@@ -172,7 +172,7 @@ def counted(n: int, x: float) -> float:
     return total
 
 
-def test_tuples_are_spread_and_counted() -> None:
+def test_tuples_are_unpacked_and_indexed_as_in_python() -> None:
     assert compiled("n : int\nx : float", item, counted)(4, 0.7) == counted(4, 0.7)
 
 
@@ -197,6 +197,6 @@ def twofold(x: float) -> float:
         (twofold, "two names"),
     ],
 )
-def test_what_is_not_compiled_is_refused_by_its_line(function: Callable[..., Any], told: str) -> None:
+def test_code_that_cannot_be_compiled_is_refused_with_its_line(function: Callable[..., Any], told: str) -> None:
     with pytest.raises(KernelError, match=told):
         compiled("x : float", function)

@@ -33,13 +33,13 @@ def add() -> Any:
 VALUES, MORE = np.arange(6.0).reshape(3, 2), np.array([1.0, 2.0, 3.0])
 
 
-def test_whole_numbers_and_single_precision_are_taken_for_floats(add: Any) -> None:
+def test_integers_and_single_precision_are_converted_to_floats(add: Any) -> None:
     total = np.empty((3, 2))
     assert add(VALUES.astype(np.float32), np.array([1, 2, 3]), 2, total) == 2.0
     np.testing.assert_array_equal(total, VALUES + 2.0 * MORE[:, None])
 
 
-def test_arrays_with_gaps_are_copied_and_what_is_changed_goes_back(add: Any) -> None:
+def test_strided_arrays_are_copied_and_results_written_back(add: Any) -> None:
     room = np.zeros((3, 4))
     add(np.asfortranarray(VALUES), np.repeat(MORE, 2)[::2], 1.0, room[:, 1:3])
     np.testing.assert_array_equal(room[:, 1:3], VALUES + MORE[:, None])
@@ -64,12 +64,14 @@ def test_arrays_with_gaps_are_copied_and_what_is_changed_goes_back(add: Any) -> 
         ((VALUES, MORE, 1.0, np.broadcast_to(0.0, (3, 2))), TypeError, "total must be .* changed, got .* read-only"),
     ],
 )
-def test_what_does_not_fit_is_named(add: Any, given: tuple[Any, ...], error: type[Exception], told: str) -> None:
+def test_an_argument_of_the_wrong_kind_or_shape_is_named_in_the_error(
+    add: Any, given: tuple[Any, ...], error: type[Exception], told: str
+) -> None:
     with pytest.raises(error, match=told):
         add(*given)
 
 
-def test_a_call_on_the_same_arrays_is_laid_out_once() -> None:
+def test_a_repeated_call_on_the_same_arrays_sees_their_new_values() -> None:
     text = "def double(values, result):\n    for i in range(len(values)):\n        result[i] = 2.0 * values[i]\n"
     entry = load_native("doubling", text, {"double": signature("values, result : ndarray, shape (n,)")}).double
     values, result = np.array([1.0, 2.0]), np.empty(2)
@@ -97,7 +99,7 @@ def test_python_runs_on_while_a_kernel_runs() -> None:
     assert ticks > 5
 
 
-def test_a_signature_is_read_off_the_documentation() -> None:
+def test_a_signature_is_read_from_the_docstring() -> None:
     def scaled(
         kernel: object, rows: object, drive: object, near: object, far: object, step: float, states: object
     ) -> None:
@@ -126,7 +128,7 @@ def test_a_signature_is_read_off_the_documentation() -> None:
     assert (rows.kind.name, step.kind.name) == ("array of int, 2-dimensional", "float")
 
 
-def test_a_parameter_without_documentation_is_no_signature() -> None:
+def test_an_undocumented_parameter_is_refused() -> None:
     def bare(x: float, y: np.ndarray[Any, Any]) -> None:
         """Do.
 
@@ -139,7 +141,7 @@ def test_a_parameter_without_documentation_is_no_signature() -> None:
         signature_of(bare)
 
 
-def test_a_part_of_an_array_and_one_that_is_read_only_are_read_where_they_lie() -> None:
+def test_slices_of_a_read_only_array_are_read_correctly() -> None:
     total = load_native("total_of_parts", TOTAL_OF_PARTS, {"total": signature("values : ndarray, shape (n,)")}).total
     values = np.arange(10.0)
     values.flags.writeable = False
@@ -156,9 +158,7 @@ def total(values):
 
 
 @pytest.mark.parametrize(("moved", "turns"), [("c = b", 2), ("c = d\n        d = b", 3)])
-def test_an_array_that_a_loop_writes_by_a_name_it_got_in_turns_before_is_known_to_change(
-    moved: str, turns: int
-) -> None:
+def test_an_array_that_a_loop_writes_through_an_alias_counts_as_written(moved: str, turns: int) -> None:
     turn = f"        c[0] = 1.0 + k\n        {moved}\n"
     text = f"def fill(a, b, n):\n    c = a\n    d = a\n    for k in range(n):\n{turn}"
     fill = load_native("fill_by_turns", text, {"fill": signature("a, b : ndarray, shape (k,)\nn : int")}).fill

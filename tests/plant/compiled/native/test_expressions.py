@@ -41,19 +41,21 @@ COMPUTED = [
 
 
 @pytest.mark.parametrize("expression", COMPUTED)
-def test_an_expression_is_what_python_makes_of_it(expression: str) -> None:
+def test_an_expression_has_the_same_value_as_in_python(expression: str) -> None:
     names = dict(zip(("x", "n", "flag", "values", "whole"), GIVEN, strict=True))
     wanted = eval(expression, {"math": math, "np": np}, names)  # noqa: S307  our own text
     assert kernel(f"return {expression}")(*GIVEN) == pytest.approx(wanted, rel=1e-15)
 
 
-def test_a_whole_number_is_divided_by_a_known_one_as_python_does_and_by_a_known_zero_to_zero() -> None:
+def test_integer_division_by_a_constant_is_that_of_python_and_by_constant_zero_gives_zero() -> None:
     assert kernel("return n // 4, n % 4, -n // 4, -n % 4, n // -4, n % -4", "known")(*GIVEN) == (1, 2, -2, 2, -2, -2)
     assert kernel("return n // 0, n % 0, 7 // 0, 7 % 0", "nothing")(*GIVEN) == (0, 0, 0, 0)
 
 
 @pytest.mark.parametrize(("divisor", "guarded"), [("0", True), ("%k", True), ("4", False), ("-4", False)])
-def test_no_processor_divides_by_zero_and_what_is_known_not_to_be_is_not_asked(divisor: str, guarded: bool) -> None:
+def test_integer_division_is_guarded_against_zero_unless_the_divisor_is_a_nonzero_constant(
+    divisor: str, guarded: bool
+) -> None:
     lines: list[str] = []
 
     def op(text: str) -> str:
@@ -98,6 +100,6 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("body", REFUSED)
-def test_what_is_not_compiled_is_refused_in_words(body: str) -> None:
+def test_an_unsupported_expression_is_refused_with_a_message(body: str) -> None:
     with pytest.raises(KernelError, match=REFUSED[body]):
         kernel(body)

@@ -44,7 +44,7 @@ def test_lines_compute_what_python_does(width: int) -> None:
 
 
 @pytest.mark.parametrize("width", [1, 8])
-def test_a_fused_product_is_rounded_once_and_what_is_no_number_is_seen(width: int) -> None:
+def test_a_fused_product_is_rounded_once_and_nan_is_detected(width: int) -> None:
     pairs = [(Fraction(x), Fraction(y)) for x, y in zip(X.tolist(), Y.tolist(), strict=True)]
     found = of(fused, width)
     assert found["a"] == [float(x * y + Fraction(0.1)) for x, y in pairs]
@@ -53,7 +53,7 @@ def test_a_fused_product_is_rounded_once_and_what_is_no_number_is_seen(width: in
 
 
 @pytest.mark.parametrize("width", [1, 2, 8])
-def test_the_sign_of_no_number_and_of_either_zero_is_zero(width: int) -> None:
+def test_the_sign_of_nan_and_of_either_zero_is_positive_zero(width: int) -> None:
     numbers = np.array([np.nan, -0.0, 0.0, np.inf, -np.inf, 5e-324, -5e-324, -2.0])
     found = stepped("def lines(x):\n    return {'a': 1.0 / sign(x)}", "lines", {"x": numbers}, "a", width)
     assert found["a"].tolist() == [np.inf, np.inf, np.inf, 1.0, -1.0, 1.0, -1.0, -1.0]  # sign gives a positive zero
@@ -63,7 +63,7 @@ def both(x: float, y: float, *, of_both: Callable[[tuple[float, float]], tuple[f
     return of_both((x, y))
 
 
-def test_a_function_of_numbers_gives_a_tuple() -> None:
+def test_function_of_returns_the_outputs_of_lines_as_a_tuple() -> None:
     text = kernel_text("lines of two numbers", pasted(plain), "of_both = function_of(plain, 5)", pasted(both))
     kernel = load_native("lines_of_two", text, {"both": signature("x, y : float")})
     assert kernel.both(0.7, -0.2) == tuple(in_python(plain)(0.7, -0.2).values())
@@ -73,7 +73,7 @@ def wild(x: Any) -> Mapping[str, Any]:
     return {"a": OPERATIONS["sin"](x)}
 
 
-def test_what_is_no_line_is_refused() -> None:
+def test_an_operation_that_cannot_be_compiled_is_refused() -> None:
     with pytest.raises(KernelError, match="is none of the operations that are compiled"):
         stepped(pasted(wild), "wild", {"x": X}, "a", 1)
 
@@ -87,13 +87,13 @@ def test_what_is_no_line_is_refused() -> None:
         ("return {'a': gamma(x)}", "gamma is none of the operations that are compiled"),
     ],
 )
-def test_lines_of_another_shape_are_refused_in_words(body: str, told: str) -> None:
+def test_unsupported_statements_in_lines_are_refused_with_a_message(body: str, told: str) -> None:
     with pytest.raises(KernelError, match=told):
         stepped(f"def lines(x):\n    {body}", "lines", {"x": X}, "a", 1)
 
 
 @pytest.mark.parametrize("width", [1, 8])
-def test_what_has_no_place_is_not_stored(width: int) -> None:
+def test_an_output_without_a_slot_is_not_stored(width: int) -> None:
     found = stepped("def lines(x):\n    return {'a': x + 1.0, 'other': 2.0 * x}", "lines", {"x": X}, "a", width)
     assert found.keys() == {"a"}
     assert found["a"].tolist() == (X + 1.0).tolist()
@@ -104,7 +104,7 @@ def sums(values: Any, others: Any, found: Any) -> None:
 
 
 @pytest.mark.parametrize("width", [1, 2, 8])
-def test_numbers_stand_at_other_addresses_too(width: int) -> None:
+def test_lines_read_and_write_numbers_at_several_addresses(width: int) -> None:
     slots = {"a": 8, "b": (0, 16), "c": (1, 8)}
     step = f"SLOTS = {slots}\n\nadd = stepping(SLOTS, {width}, lines)"
     lines = "def lines(a, b):\n    return {'c': a - b}"
@@ -123,7 +123,7 @@ def whole(values: Any) -> bool:
 
 @pytest.mark.parametrize("width", [1, 2, 8])
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_one_number_that_is_missing_is_noticed_wherever_it_stands(width: int, count: int) -> None:
+def test_complete_detects_a_single_nan_at_any_place(width: int, count: int) -> None:
     text = kernel_text("whole", f"there = complete({width}, {count}, 80)", pasted(whole))
     kernel = load_native("whole", text, {"whole": signature("values : ndarray, shape (30,)")})
     values = np.full(30, np.inf)
@@ -139,7 +139,7 @@ def turned(places: Any, offset: int, rows: Any) -> None:
     transpose(places.ctypes.data, offset, 64, rows.ctypes.data, 64)  # type: ignore[name-defined]  # noqa: F821
 
 
-def test_numbers_from_eight_places_become_eight_rows() -> None:
+def test_transpose_copies_eight_samples_of_eight_logs_into_rows() -> None:
     logs = np.arange(8.0 * 24).reshape(8, 24)
     places = logs.ctypes.data + logs.strides[0] * np.arange(8)
     rows = np.zeros((8, 8))

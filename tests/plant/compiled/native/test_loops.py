@@ -44,7 +44,7 @@ def elsewhere(loop: Loop[..., Any], **names: Any) -> Loop[..., Any]:
     return Loop(FunctionType(function.__code__, {**function.__globals__, **names}, function.__name__), ())
 
 
-def test_a_loop_is_compiled_with_what_it_calls_and_reads() -> None:
+def test_a_loop_is_compiled_with_the_loops_it_calls_and_the_constants_it_reads() -> None:
     values = np.array([1.0, 2.0, 5.0])
     assert [summed(values), summed(2.0 * values)] == [2.0, 4.0]
     loops, constants = needed(summed)

@@ -13,7 +13,7 @@ def roots(values):
 """
 
 
-def test_loops_stay_rolled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_loops_are_not_unrolled(monkeypatch: pytest.MonkeyPatch) -> None:
     module = Module(TEXT)
     module.enter("roots", tuple(one.kind for one in signature("values : ndarray, shape (n,)")))
     rolled = machine.assembled(module.ir())

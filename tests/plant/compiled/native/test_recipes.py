@@ -34,7 +34,9 @@ def scale(written: list[str], made_of: object) -> float:
     return load_native("scale", text, {"scale": signature("x : float")}, made_of).scale(2.0)
 
 
-def test_a_text_is_written_once_where_sources_are_trusted(written: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kernels_text_is_written_once_if_sources_are_trusted(
+    written: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(recipes, "_trusted", [True])
     assert [scale(written, (pumped_flow, 1)) for _ in range(3)] == [6.0] * 3
     assert len(written) == 1
@@ -42,7 +44,9 @@ def test_a_text_is_written_once_where_sources_are_trusted(written: list[str], mo
     assert len(written) == 2
 
 
-def test_it_is_written_again_where_a_source_has_changed(written: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kernels_text_is_written_again_if_a_source_has_changed(
+    written: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(recipes, "_trusted", [True])
     scale(written, 1)
     monkeypatch.setattr(recipes, "_sources", lambda: "changed")
@@ -50,7 +54,7 @@ def test_it_is_written_again_where_a_source_has_changed(written: list[str], monk
     assert len(written) == 2
 
 
-def test_a_source_written_anew_is_seen_though_its_size_and_time_are_what_they_were(tmp_path: Path) -> None:
+def test_a_rewritten_source_is_detected_even_with_the_same_size_and_modification_time(tmp_path: Path) -> None:
     source = tmp_path / "package" / "one.py"
     source.parent.mkdir()
     source.write_text("A = 1")
@@ -64,12 +68,12 @@ def test_a_source_written_anew_is_seen_though_its_size_and_time_are_what_they_we
     assert len(before) == 1
 
 
-def test_it_is_always_written_where_sources_are_not_trusted(written: list[str]) -> None:
+def test_a_kernels_text_is_written_at_every_load_if_sources_are_not_trusted(written: list[str]) -> None:
     assert [scale(written, 1), scale(written, 1)] == [6.0, 6.0]
     assert len(written) == 2
 
 
-def test_a_recipe_without_its_kernel_is_none(
+def test_a_kernels_text_is_written_again_if_its_cached_file_is_damaged(
     written: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recipes, "_trusted", [True])
@@ -80,10 +84,10 @@ def test_a_recipe_without_its_kernel_is_none(
     assert len(written) == 2
 
 
-def test_only_what_the_sources_say_is_known() -> None:
+def test_things_not_determined_by_the_packages_have_no_identity() -> None:
     assert identity((EhaParameters, pumped_flow)) == (
         "(plant.eha.model:EhaParameters, plant.components.valves:pumped_flow)"
     )
     assert identity(EhaParameters()) != identity(EhaParameters(piston_area=2e-3))
-    for unknown in (lambda x: x, Path("x"), test_only_what_the_sources_say_is_known, [object()]):
+    for unknown in (lambda x: x, Path("x"), test_things_not_determined_by_the_packages_have_no_identity, [object()]):
         assert identity(unknown) is None

@@ -37,13 +37,13 @@ def either(x: float, n: int, flag: bool, values: Array) -> tuple[float, float, f
 
 
 @pytest.mark.parametrize("flag", [True, False])
-def test_what_two_branches_leave_is_one_kind(flag: bool) -> None:
+def test_variables_assigned_in_both_branches_get_one_kind(flag: bool) -> None:
     x, n, _, values = GIVEN
     assert compiled(TAKES, either)(x, n, flag, values) == either(x, n, flag, values)
 
 
 @pytest.mark.parametrize(("x", "n", "wanted"), [(2.0, 0, 2.0), (0.5, 3, 3.0), (0.5, 1, -1.0)])
-def test_a_choice_whose_every_branch_returns_ends_the_function(x: float, n: int, wanted: float) -> None:
+def test_an_if_whose_branches_all_return_ends_the_function(x: float, n: int, wanted: float) -> None:
     inner = "if n > 2:\n            return float(n)\n            x = 5.0\n        else:\n            return -1.0"
     body = f"if x > 1.0:\n        return x\n    else:\n        {inner}\n    return 7.0"
     assert kernel(body)(x, n, True, GIVEN[3]) == wanted
@@ -59,7 +59,7 @@ def stepped(n: int, by: int, values: Array) -> float:
 
 
 @pytest.mark.parametrize("by", [1, 2, 3])
-def test_a_range_goes_by_steps_that_a_variable_gives(by: int) -> None:
+def test_a_range_may_take_its_step_from_a_variable(by: int) -> None:
     assert compiled("n, by : int\nvalues : ndarray, shape (k,)", stepped)(4, by, GIVEN[3]) == stepped(4, by, GIVEN[3])
 
 
@@ -84,7 +84,7 @@ def lent(values: Array) -> float:
     return twice[0] + doubled(twice)[1]
 
 
-def test_an_array_that_a_function_makes_lives_on_in_its_caller() -> None:
+def test_an_array_returned_by_a_function_stays_valid_in_its_caller() -> None:
     assert compiled("values : ndarray, shape (n,)", doubled, lent)(GIVEN[3]) == lent(GIVEN[3])
 
 
@@ -96,11 +96,11 @@ def of_two(x: float, n: int) -> float:
     return twice((x, 2.0), n) - twice((2.0, x), n)
 
 
-def test_a_tuple_that_is_counted_twice_is_what_it_was() -> None:
+def test_a_tuple_may_be_indexed_more_than_once_by_a_variable() -> None:
     assert compiled("x : float\nn : int", twice, of_two)(0.5, 1) == of_two(0.5, 1)
 
 
-def test_constants_are_numbers_and_tuples_of_them() -> None:
+def test_a_constant_may_be_a_tuple_of_numbers() -> None:
     assert kernel("return PAIR[1] + PAIR[0] * x", above="PAIR = (2.0, 3)")(*GIVEN) == 4.5
 
 
@@ -121,17 +121,17 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("body", REFUSED)
-def test_what_means_nothing_is_refused_in_words(body: str) -> None:
+def test_an_invalid_statement_is_refused_with_a_message(body: str) -> None:
     with pytest.raises(KernelError, match=REFUSED[body]):
         kernel(body, above="made = somehow(1)\n\n\ndef other(y):\n    return y")
 
 
-def test_a_decorator_that_means_nothing_is_refused() -> None:
+def test_an_unknown_decorator_is_refused() -> None:
     with pytest.raises(KernelError, match="the decorator cached means nothing here"):
         kernel("return other(x)", above="@cached\ndef other(y):\n    return y")
 
 
-def test_kinds_that_do_not_settle_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_variables_whose_kinds_do_not_settle_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     body = "y = 0\n    for k in range(n):\n        y += x\n    return y"
     assert kernel(body)(*GIVEN) == 2.25
     monkeypatch.setattr("plant.compiled.native.program.MOST_PASSES", 1)
@@ -139,7 +139,7 @@ def test_kinds_that_do_not_settle_are_refused(monkeypatch: pytest.MonkeyPatch) -
         kernel(body + " + 0.0")
 
 
-def test_a_length_that_is_said_is_wanted() -> None:
+def test_a_length_stated_in_the_signature_is_required() -> None:
     total = kernel("return values[0] + values[2]", takes=TAKES.replace("(k,)", "(3,)"))
     with pytest.raises(ValueError, match="axis 0 of values must have length 3, got 4"):
         total(*GIVEN)

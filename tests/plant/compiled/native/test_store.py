@@ -55,7 +55,7 @@ def test_a_later_run_compiles_nothing(folder: Path, compiling: list[str]) -> Non
     assert [path.suffix for path in folder.iterdir()] == [".machine"]
 
 
-def test_another_text_is_another_kernel(folder: Path) -> None:
+def test_kernels_with_different_texts_have_separate_files(folder: Path) -> None:
     assert (scale(2.0)(3.0), scale(3.0)(3.0)) == (6.0, 9.0)
     assert len(list(folder.glob("*.machine"))) == 2
 
@@ -136,7 +136,9 @@ def test_a_file_that_others_may_write_to_is_built_anew(folder: Path, compiling: 
 
 
 @pytest.mark.parametrize("kind", ["link", "fifo", "folder"])
-def test_what_is_no_file_is_not_read(folder: Path, compiling: list[str], kind: str, tmp_path: Path) -> None:
+def test_a_link_fifo_or_folder_in_place_of_the_file_is_not_read(
+    folder: Path, compiling: list[str], kind: str, tmp_path: Path
+) -> None:
     scale()
     path = file_in(folder)
     if kind == "link":
@@ -150,7 +152,7 @@ def test_what_is_no_file_is_not_read(folder: Path, compiling: list[str], kind: s
 
 
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EDQUOT])
-def test_a_folder_that_cannot_be_written_costs_the_cache_and_not_the_result(
+def test_an_unwritable_folder_disables_the_cache_but_not_the_kernel(
     folder: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, code: int
 ) -> None:
     def full(*_: Any) -> None:

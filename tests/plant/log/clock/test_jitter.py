@@ -9,7 +9,7 @@ TICKS = np.arange(40.0)
 OFF = 0.05 * np.random.default_rng(1).uniform(-1.0, 1.0, 40)
 
 
-def test_a_channel_of_one_sample_is_missing_everywhere() -> None:
+def test_a_channel_with_a_single_value_has_no_value_after_resampling() -> None:
     grid = grid_of(TICKS + OFF)
     values = np.full(40, np.nan)
     values[3] = 1.0
@@ -18,18 +18,18 @@ def test_a_channel_of_one_sample_is_missing_everywhere() -> None:
 
 
 @pytest.mark.parametrize("count", [POINTS - 1, POINTS])
-def test_a_line_stays_a_line_however_few_its_samples(count: int) -> None:
+def test_resampling_a_straight_line_with_few_samples_is_exact(count: int) -> None:
     time = (TICKS + OFF)[:count]
     grid = grid_of(time)
     np.testing.assert_allclose(resampled(grid, time, 2.0 * time + np.pi), 2.0 * grid.times + np.pi, atol=1e-12)
 
 
-def test_a_channel_that_stands_still_stays_what_it_is() -> None:
+def test_resampling_a_constant_channel_is_exact() -> None:
     grid = grid_of(TICKS + OFF)
     np.testing.assert_array_equal(resampled(grid, TICKS + OFF, np.full(40, 0.1)), np.full(len(grid.times), 0.1))
 
 
-def test_values_without_a_quantum_are_not_rounded_and_those_with_one_are() -> None:
+def test_only_quantised_values_are_rounded_to_the_quantum_after_resampling() -> None:
     time = TICKS + OFF
     grid = grid_of(time)
     smooth, counts = np.sin(0.3 * time), np.round(8.0 * np.sin(0.3 * time)) / 4.0
@@ -43,12 +43,12 @@ def test_values_without_a_quantum_are_not_rounded_and_those_with_one_are() -> No
     [0.5 * TICKS, np.round(0.3 * TICKS)[::-1], TICKS + OFF],
     ids=["one step", "backward", "jitter"],
 )
-def test_stamps_that_rounding_does_not_explain_are_no_rounded_clock(time: np.ndarray) -> None:
+def test_time_stamps_that_rounding_does_not_explain_give_no_rounded_clock(time: np.ndarray) -> None:
     assert rounded_clock(time, TICKS) is None
 
 
 @pytest.mark.parametrize("count", [600, 1050])
-def test_a_few_stamps_say_the_sample_time_by_where_they_change(count: int) -> None:
+def test_the_sample_time_is_found_from_the_rows_at_which_coarse_stamps_change(count: int) -> None:
     ticks = np.arange(float(count))
     found = rounded_clock(0.1 * np.floor(ticks / 100.0), ticks)
     assert found is not None

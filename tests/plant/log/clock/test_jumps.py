@@ -30,26 +30,26 @@ def read(seconds: NDArray[np.float64]) -> tuple[float, int, list[Note]]:
 
 
 @pytest.mark.parametrize("hours", [-1, 1, 2, -24])
-def test_a_clock_that_is_set_by_hours_goes_on_evenly_with_a_note(hours: int) -> None:
+def test_a_clock_jump_by_whole_hours_is_removed_with_a_note(hours: int) -> None:
     sample_time, length, notes = read(EVEN + 3600.0 * hours * (EVEN > 9.995))
     assert sample_time == pytest.approx(0.01)
     assert length == len(EVEN)
     assert notes == [LogCode.TIME_SET.note(channel="time_s", hours=hours, row=1001)]
 
 
-def test_stamps_that_are_rounded_are_set_back_first() -> None:
+def test_a_clock_jump_is_removed_before_rounded_time_stamps_are_made_uniform() -> None:
     sample_time, length, notes = read(np.floor(EVEN - 3600.0 * (EVEN > 9.995)))
     assert (sample_time, length) == (pytest.approx(0.01), len(EVEN))
     assert [str(note.code) for note in notes] == ["time_set", "time_rounded"]
 
 
 @pytest.mark.parametrize("by", [-5.0, -3605.0, 3605.0, 5.0])
-def test_a_jump_that_no_change_of_hours_explains_is_refused_by_its_row(by: float) -> None:
+def test_a_clock_jump_by_other_than_whole_hours_is_refused_with_its_row(by: float) -> None:
     with pytest.raises(LogError, match=r"in row 1001 after .* keep one side|gap is before row 1001"):
         read(EVEN + by * (EVEN > 9.995))
 
 
-def test_pauses_of_an_hour_between_slow_samples_or_three_of_them_stand() -> None:
+def test_hourly_pauses_between_slow_samples_and_repeated_hourly_pauses_are_kept() -> None:
     slow = 30.0 * np.arange(100.0)
     for time in (slow + 3600.0 * (slow > 900.0), EVEN + 3600.0 * np.floor(EVEN / 5.0)):
         kept, jumps = without_jumps(time)
@@ -60,7 +60,7 @@ def test_pauses_of_an_hour_between_slow_samples_or_three_of_them_stand() -> None
 @pytest.mark.parametrize(
     ("bits", "tick", "start"), [(16, 1e-3, 50.0), (16, 1e-6, 0.0), (24, 1e-6, 9.0), (32, 1e-6, 4290.0)]
 )
-def test_a_counter_that_runs_over_is_read_on_with_a_note(bits: int, tick: float, start: float) -> None:
+def test_an_overflow_of_a_tick_counter_is_corrected_with_a_note(bits: int, tick: float, start: float) -> None:
     ticks = np.rint((start + 1e-3 * np.arange(20_000.0)) / tick) % 2**bits
     ramp = np.arange(float(len(ticks)))
     with warnings.catch_warnings(record=True) as caught:
@@ -74,12 +74,12 @@ def test_a_counter_that_runs_over_is_read_on_with_a_note(bits: int, tick: float,
 
 
 @pytest.mark.parametrize("rows", [2**16, 1000, 65_537])
-def test_a_test_that_begins_again_is_no_counter_that_runs_over(rows: int) -> None:
+def test_a_restarted_test_is_not_taken_for_a_counter_overflow(rows: int) -> None:
     time = 1e-3 * (np.arange(1.5 * rows) % rows)
     assert without_overruns(time)[1] is None
     assert without_overruns(time + 7.0)[1] is None
 
 
-def test_one_fall_of_slow_stamps_may_be_as_long_by_chance() -> None:
+def test_a_single_backward_step_of_slow_stamps_is_not_taken_for_a_counter_overflow() -> None:
     time = np.arange(1000.0)
     assert without_overruns(time - 65.0 * (time > 500.0))[1] is None

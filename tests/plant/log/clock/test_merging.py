@@ -21,7 +21,7 @@ def logger(path: Path, name: str, time: np.ndarray, stamps: np.ndarray | None = 
 
 
 @pytest.mark.parametrize(("step", "late"), [(T, 0.3e-3), (T, 0.2), (4e-3, 0.0), (4e-3, 1.3e-3)])
-def test_two_loggers_are_put_on_the_clock_of_the_faster_while_both_run(
+def test_logs_of_two_loggers_are_merged_on_the_faster_clock_over_their_common_time(
     tmp_path: Path, step: float, late: float
 ) -> None:
     motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", T * np.arange(2000))
@@ -43,7 +43,7 @@ def test_a_file_of_one_clock_is_merged_without_a_note(tmp_path: Path) -> None:
     assert list(record) == ["motor_speed_rad_s", "position_m"]
 
 
-def test_loggers_that_never_ran_together_are_refused(tmp_path: Path) -> None:
+def test_two_logs_that_do_not_overlap_in_time_are_refused(tmp_path: Path) -> None:
     motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", T * np.arange(200))
     other = logger(tmp_path / "b.csv", "position_m", 5.0 + T * np.arange(200))
     with pytest.raises(LogError, match=r"a\.csv \(0 to 0\.199 s\) and b\.csv \(5 to 5\.199 s\) do not overlap in time"):
@@ -57,7 +57,7 @@ def test_a_channel_that_both_have_is_refused(tmp_path: Path) -> None:
         read_record(motor, beside=[other])
 
 
-def test_dates_and_seconds_are_not_laid_beside_each_other(tmp_path: Path) -> None:
+def test_merging_a_log_with_dates_and_one_without_is_refused(tmp_path: Path) -> None:
     time = T * np.arange(200)
     dates = np.datetime64("2026-03-01T00:00:00", "ms") + np.arange(200)
     motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", time, dates)
@@ -66,13 +66,13 @@ def test_dates_and_seconds_are_not_laid_beside_each_other(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("begin", [0.0, 1000.0])
-def test_clocks_are_the_same_by_their_step_however_late_they_begin(begin: float) -> None:
+def test_clocks_are_compared_with_a_tolerance_relative_to_their_step(begin: float) -> None:
     time = begin + T * np.arange(200)
     assert _same_time(time, time + 0.5 * SAME * T)
     assert not _same_time(time, time + 2.0 * SAME * T)
 
 
-def test_a_refusal_has_the_times_of_both_and_says_where_day_and_month_may_be_exchanged(tmp_path: Path) -> None:
+def test_the_refusal_of_logs_that_do_not_overlap_suggests_an_exchanged_day_and_month(tmp_path: Path) -> None:
     """01/03/2026 used to be read as 3 January beside a logger of 1 March, without a message."""
     steps = 0.01 * np.arange(300)
     american, iso = (np.array([f"{day} 12:00:{one:06.3f}" for one in steps]) for day in ("01/03/2026", "2026-03-01"))

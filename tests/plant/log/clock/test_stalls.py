@@ -37,7 +37,7 @@ def read(time: Array, sampled: Array = EVEN) -> tuple[float, Array, list[Note]]:
 
 @pytest.mark.parametrize("jitter", [0.0, 2e-4])
 @pytest.mark.parametrize("apart", [0.0, 1e-4])
-def test_rows_that_waited_are_put_back_where_they_were_sampled(apart: float, jitter: float) -> None:
+def test_rows_stamped_late_in_a_queue_are_put_back_at_their_sampling_times(apart: float, jitter: float) -> None:
     time = np.sort(stalled(apart=apart) + jitter * RNG.uniform(0.0, 1.0, len(EVEN)))
     sample_time, position, (note,) = read(time)
     assert (note.code, note.data["count"]) == ("time_stalls", 3)
@@ -47,7 +47,7 @@ def test_rows_that_waited_are_put_back_where_they_were_sampled(apart: float, jit
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
-def test_rows_of_a_loop_that_sampled_late_and_caught_up_are_taken_when_they_say(noise: float) -> None:
+def test_rows_sampled_late_by_an_overrun_loop_keep_their_time_stamps(noise: float) -> None:
     """Its stamps look like a queue's; on an even clock, a sine of 2 Hz was wrong by its whole amplitude."""
     time = stalled(length=0.0098, apart=1e-5)
     _, position, notes = read(time, time + noise / 9.0 * RNG.standard_normal(len(time)))
@@ -56,7 +56,7 @@ def test_rows_of_a_loop_that_sampled_late_and_caught_up_are_taken_when_they_say(
     assert np.nanmax(np.abs(position - 1e-2 * np.sin(9.0 * even))) < 1e-4 + 6e-2 * noise
 
 
-def test_channels_that_stand_still_leave_an_even_clock() -> None:
+def test_constant_and_noisy_channels_do_not_contradict_an_even_clock() -> None:
     time = stalled(apart=1e-4)
     still = {"held": np.ones(len(time)), "noise": RNG.standard_normal(len(time)), "missing": np.full(len(time), np.nan)}
     found = stalled_clock(time)
@@ -64,19 +64,19 @@ def test_channels_that_stand_still_leave_an_even_clock() -> None:
     assert waited_in_a_queue(time, still, found.sample_time)
 
 
-def test_rows_that_were_lost_or_a_clock_that_jitters_are_no_stall() -> None:
+def test_lost_rows_jitter_and_rounding_are_not_taken_for_a_stalled_clock() -> None:
     lost = np.delete(EVEN, np.arange(700, 720))
     for time in (lost, EVEN, EVEN + 2e-4 * RNG.uniform(-1.0, 1.0, len(EVEN)), np.floor(EVEN / 0.02) * 0.02):
         assert stalled_clock(time) is None
 
 
-def test_a_clock_that_goes_slower_for_a_while_is_no_stall() -> None:
+def test_a_clock_that_slows_down_for_a_while_is_not_taken_for_a_stalled_clock() -> None:
     """Late rows then do not arrive all at once: they were sampled at their stamps."""
     time = EVEN + 5e-3 * np.clip(1.0 - np.abs(EVEN - 2.0) / 0.05, 0.0, 1.0)
     assert stalled_clock(time) is None
 
 
-def test_rows_that_come_at_once_beside_lost_ones_are_read() -> None:
+def test_a_log_with_both_lost_rows_and_rows_stamped_at_once_is_resampled() -> None:
     """Then no clock can be found, and no cubic fits stamps a nanosecond apart."""
     time = np.delete(stalled(apart=1e-9), np.arange(2500, 2503))
     sample_time, position, notes = read(

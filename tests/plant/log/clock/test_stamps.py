@@ -52,12 +52,12 @@ def read(*cells: str) -> list[str]:
         "20260301T140000.250+0200",
     ],
 )
-def test_one_moment_is_read_however_it_is_written(cell: str) -> None:
+def test_one_date_and_time_is_read_in_every_notation(cell: str) -> None:
     assert is_stamp(cell)
     assert read(cell) == ["2026-03-01T12:00:00.250"]
 
 
-def test_a_day_that_is_no_month_comes_first() -> None:
+def test_a_first_number_above_12_shows_that_the_day_precedes_the_month() -> None:
     assert read("1/2/2026 0:00:00", "13/2/2026 0:00:00") == ["2026-02-01T00:00:00.000", "2026-02-13T00:00:00.000"]
 
 
@@ -65,7 +65,7 @@ def test_a_day_that_is_no_month_comes_first() -> None:
     ("evening", "morning"),
     [("4/3/2026", "5/3/2026"), ("3/4/2026", "3/5/2026"), ("11/11/2026", "12/11/2026"), ("31/3/2026", "1/4/2026")],
 )
-def test_days_that_would_be_months_apart_are_read_the_other_way(evening: str, morning: str) -> None:
+def test_day_and_month_are_read_in_the_order_that_makes_consecutive_days(evening: str, morning: str) -> None:
     last, first = (np.datetime64(one) for one in read(f"{evening} 23:59:59.5", f"{morning} 00:00:00.5"))
     assert first - last == np.timedelta64(1, "s")
 
@@ -75,11 +75,11 @@ def test_a_day_of_the_year_without_the_year_counts_days() -> None:
     assert first - last == np.timedelta64(1, "s")
 
 
-def test_a_time_of_the_day_goes_on_over_midnight() -> None:
+def test_times_of_day_continue_past_midnight() -> None:
     assert read("23:59:59.9", "00:00:00.1") == ["1970-01-01T23:59:59.900", "1970-01-02T00:00:00.100"]
 
 
-def test_summer_time_that_ends_within_a_log_does_not_set_it_back_where_the_zone_is_written() -> None:
+def test_the_end_of_summer_time_does_not_set_back_stamps_with_a_time_zone() -> None:
     before, after = read("2026-10-25T02:59:59+02:00", "2026-10-25T02:00:00+01:00")
     assert (np.datetime64(after) - np.datetime64(before)) == np.timedelta64(1, "s")
 
@@ -97,7 +97,7 @@ def test_summer_time_that_ends_within_a_log_does_not_set_it_back_where_the_zone_
         "9" * 500,
     ],
 )
-def test_what_is_no_moment_is_refused_with_its_row(cell: str) -> None:
+def test_an_invalid_date_or_time_is_refused_with_its_row(cell: str) -> None:
     with pytest.raises(ValueError, match=r"^1 "):
         read("2026-01-01 00:00:00", cell)
 
@@ -106,7 +106,7 @@ def test_an_empty_cell_is_missing() -> None:
     assert read("2026-01-01 00:00:00", "")[1] == "NaT"
 
 
-def test_minutes_and_seconds_alone_are_a_time() -> None:
+def test_minutes_and_seconds_without_hours_are_read() -> None:
     stamps = read_stamps(["01:02.5", "01:03.25", "02:00.0"], lambda row, cell: ValueError(f"{row} {cell}"))
     assert np.diff(stamps).astype("timedelta64[ms]").astype(int).tolist() == [750, 56_750]
 

@@ -25,7 +25,7 @@ def written(folder: Path, names: tuple[str, ...], units: tuple[str, ...], betwee
 
 @pytest.mark.parametrize("between", [" ", "", "\u00a0"])
 @pytest.mark.parametrize("point", [".", ","])
-def test_the_unit_behind_each_number_is_that_of_the_column(tmp_path: Path, between: str, point: str) -> None:
+def test_a_unit_after_each_number_becomes_the_unit_of_the_column(tmp_path: Path, between: str, point: str) -> None:
     record = read_record(written(tmp_path, NAMES, ("ms", "rpm", "mm"), between, point))
     assert record.sample_time == pytest.approx(1e-3)
     np.testing.assert_allclose(record["position_m"], 0.05 - 0.02 * np.cos(40.0 * TIME), atol=1e-7)
@@ -42,12 +42,12 @@ def test_a_unit_may_end_in_a_power(tmp_path: Path, unit: str, step: float, pasca
     np.testing.assert_allclose(found, step * pascal * np.arange(400))
 
 
-def test_a_word_for_no_value_may_end_like_the_unit_of_its_column() -> None:
+def test_a_word_for_no_value_keeps_a_last_letter_that_equals_the_unit() -> None:
     words = ("NaN", "NA", "N/A", "#N/A")
     assert tuple(without_that_unit(word, word[-1]) for word in words) == words
 
 
-def test_another_unit_than_the_name_says_is_refused(tmp_path: Path) -> None:
+def test_a_unit_after_the_numbers_that_contradicts_the_column_name_is_refused(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"'Position \[m\]' says m by its name and mm beside it"):
         read_record(written(tmp_path, ("Time", "Motor speed", "Position [m]"), ("ms", "rpm", "mm"), " ", "."))
 

@@ -13,7 +13,7 @@ def test_numbers_as_loggers_write_them_are_read(text: str, value: float) -> None
 
 
 @pytest.mark.parametrize("text", MISSING)
-def test_a_cell_that_says_nothing_was_measured_is_missing(text: str) -> None:
+def test_every_text_for_a_missing_value_is_read_as_missing(text: str) -> None:
     assert math.isnan(number(text))
 
 
@@ -44,5 +44,5 @@ def test_a_table_is_no_column() -> None:
         numbers(np.eye(2), "speed", "a.csv")
 
 
-def test_a_minus_as_swedish_programs_write_it_is_one() -> None:
+def test_the_unicode_minus_sign_is_read_as_a_minus() -> None:
     assert number("\u22121.5e\u22123") == -1.5e-3

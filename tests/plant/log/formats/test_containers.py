@@ -44,7 +44,7 @@ def read(table: Table) -> dict[str, np.ndarray]:
 NUMBERS = [["time_s", "position_m"], *([0.1 * k, 0.01 * k] for k in range(6))]
 
 
-def test_cells_that_show_how_long_it_lasts_are_seconds(tmp_path: Path) -> None:
+def test_duration_cells_of_a_sheet_are_read_in_seconds(tmp_path: Path) -> None:
     rows = [["Time", "position_m"], *([timedelta(milliseconds=100 * k), 0.01 * k] for k in range(6))]
     (table,) = open_xlsx(workbook(tmp_path / "log.xlsx", rows))
     assert table.headings[0].unit == "s"
@@ -67,7 +67,7 @@ def test_an_empty_sheet_of_charts_is_passed_over(tmp_path: Path) -> None:
     assert len(open_xlsx(tmp_path / "log.xlsx")) == 1
 
 
-def test_units_that_another_sheet_lists_are_those_of_its_columns(tmp_path: Path) -> None:
+def test_columns_take_their_units_from_a_list_of_channels_on_another_sheet(tmp_path: Path) -> None:
     rows = [["T", "Pos [m]", "DP", "A"], *([0.001 * k, 1.0 * k, 2.0 * k, 3.0 * k] for k in range(30))]
     listed = [["channels"], [None], ["No", "Channel", "Einheit", "Sensor"], [1, "T", "s", "clock"]]
     listed += [[2, "Pos [m]", "mm", "LVDT"], [3, "DP", "bar", "A"], [4, "A", "V", "none"], [5, "unused"]]
@@ -103,11 +103,11 @@ def test_too_many_cells_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         (True, "1"),
     ],
 )
-def test_a_cell_is_said_as_a_text_log_would_have_it(cell: Any, said: str) -> None:
+def test_a_cell_is_converted_to_the_text_of_a_csv_log(cell: Any, said: str) -> None:
     assert xlsx._said(cell) == said
 
 
-def test_hdf5_gives_fields_named_columns_and_units_and_passes_over_what_is_no_vector(tmp_path: Path) -> None:
+def test_hdf5_fields_named_columns_and_units_are_read_and_other_data_sets_are_skipped(tmp_path: Path) -> None:
     path = tmp_path / "log.h5"
     rows = np.zeros(5, dtype=[("time_s", "f8"), ("name", "S3"), ("speed", "i4")])
     rows["speed"] = np.arange(5)
@@ -128,7 +128,7 @@ def test_hdf5_gives_fields_named_columns_and_units_and_passes_over_what_is_no_ve
     assert found["vector"].headings[0].said == "mm"
 
 
-def test_hdf5_of_matlab_counts_the_other_way_and_keeps_its_metadata(tmp_path: Path) -> None:
+def test_a_matlab_hdf5_matrix_is_transposed_and_files_without_numbers_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "log.mat"
     with h5py.File(path, "w") as file:
         file["record/data"] = np.arange(10.0).reshape(2, 5)
@@ -153,7 +153,7 @@ def test_an_archive_without_a_workbook_is_no_log(tmp_path: Path) -> None:
         open_xlsx(tmp_path / "logs.xlsx")
 
 
-def test_columns_and_rows_that_hold_nothing_are_left_out_of_a_sheet() -> None:
+def test_empty_columns_and_rows_of_a_sheet_are_left_out() -> None:
     rows = [["time_s", "position_m", None], *([0.1 * k, 0.01 * k, None] for k in range(6)), [None, None]]
     table = xlsx._table(Path("log.xlsx"), "sheet", rows)
     assert table is not None
@@ -173,7 +173,7 @@ def test_a_sheet_of_text_is_no_table(rows: list[list[Any]]) -> None:
     assert xlsx._table(Path("log.xlsx"), "sheet", rows) is None
 
 
-def test_a_sheet_is_read_with_its_dates_and_a_word_among_numbers_is_refused_with_its_row(tmp_path: Path) -> None:
+def test_dates_and_numbers_of_a_sheet_are_read_and_text_among_them_is_refused_with_its_row(tmp_path: Path) -> None:
     noon = datetime(2026, 3, 1, 12)
     rows = [["when", "force", "way_mm"], *([noon + timedelta(seconds=k), 0.5 * k, str(k)] for k in range(6))]
     (table,) = open_xlsx(workbook(tmp_path / "log.xlsx", rows))
@@ -191,7 +191,7 @@ def test_a_sheet_is_read_with_its_dates_and_a_word_among_numbers_is_refused_with
         table.read([Column(0, "when", "time_s")])
 
 
-def test_a_workbook_that_unpacks_to_more_than_a_log_or_breaks_off_is_refused(
+def test_a_workbook_beyond_the_unpacking_limit_or_cut_short_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = workbook(tmp_path / "log.xlsx", NUMBERS)
@@ -216,7 +216,7 @@ def matlab(file: Any, name: str, text: str) -> None:
     file[name].attrs["MATLAB_class"] = np.bytes_("char")
 
 
-def test_hdf5_of_matlab_gives_the_record_that_was_written_and_nothing_beside_it(tmp_path: Path) -> None:
+def test_only_the_written_record_is_read_from_a_matlab_hdf5_file(tmp_path: Path) -> None:
     path = tmp_path / "log.mat"
     with h5py.File(path, "w") as file:
         file["record/position_m"] = np.arange(5.0)
@@ -253,7 +253,7 @@ def test_what_simulink_calls_a_structure_with_time_is_a_table() -> None:
     assert names(alone) == ["time", "speed"]
 
 
-def test_structs_within_structs_are_columns_with_both_names_and_none_is_refused() -> None:
+def test_nested_structs_give_columns_with_both_names_and_a_file_without_vectors_is_refused() -> None:
     (table,) = tables_of({"log": {"rod": {"way": np.arange(4.0)}, "speed": np.arange(4.0), "who": "me"}}, "a.mat")
     assert names(table) == ["rod.way", "speed"]
     with pytest.raises(LogError, match=re.escape(f"a.mat: {OBJECTS}")):
@@ -272,16 +272,14 @@ def test_structs_within_structs_are_columns_with_both_names_and_none_is_refused(
         (b"\xef\xbb\xbf <TABLE border=1><tr>", "XML or HTML"),
     ],
 )
-def test_files_that_benches_write_and_nobody_reads_here_are_refused_with_what_to_do(
-    tmp_path: Path, start: bytes, said: str
-) -> None:
+def test_unsupported_bench_formats_are_refused_with_the_remedy(tmp_path: Path, start: bytes, said: str) -> None:
     path = tmp_path / "log.csv"
     path.write_bytes(start + bytes(600))
     with pytest.raises(LogError, match=said):
         open_tables(path)
 
 
-def test_formulas_whose_values_are_not_stored_are_named_and_yes_among_numbers_is_none(tmp_path: Path) -> None:
+def test_a_boolean_among_numbers_is_missing_and_formulas_without_stored_values_are_refused(tmp_path: Path) -> None:
     rows: list[list[Any]] = [["t", "x"], *([0.1 * k, float(k)] for k in range(200))]
     rows[50][1] = True
     (table,) = open_xlsx(workbook(tmp_path / "log.xlsx", rows))
@@ -293,7 +291,7 @@ def test_formulas_whose_values_are_not_stored_are_named_and_yes_among_numbers_is
         table.read([Column(1, "x", "position_m")])
 
 
-def test_hdf5_of_netcdf_is_unpacked_as_it_says(tmp_path: Path) -> None:
+def test_netcdf_scale_offset_fill_value_and_units_are_applied(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "log.h5", "w") as file:
         way = file.create_dataset("way", data=np.arange(20, dtype="i2"))
         way.attrs.update({"scale_factor": 0.5, "add_offset": [3.0], "_FillValue": np.int16(7), "units": "mm"})
@@ -318,7 +316,7 @@ def test_json_of_more_parts_than_a_log_is_refused(tmp_path: Path, monkeypatch: p
         open_tables(tmp_path / "log.json")
 
 
-def test_hdf5_gives_a_data_set_by_each_of_its_names_and_ends_where_groups_hold_each_other(tmp_path: Path) -> None:
+def test_an_hdf5_data_set_is_read_under_each_link_and_cyclic_groups_end_the_search(tmp_path: Path) -> None:
     path = tmp_path / "log.h5"
     with h5py.File(path, "w") as file:
         run = file.create_group("run")

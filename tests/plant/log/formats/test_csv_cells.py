@@ -38,12 +38,12 @@ def test_a_comment_or_the_header_again_among_the_rows_is_skipped(line: str, tmp_
     assert notes == [LogCode.LINES_SKIPPED.note(count=1)]
 
 
-def test_a_mark_of_the_order_of_bytes_within_a_log_is_no_part_of_a_number(tmp_path: Path) -> None:
+def test_a_byte_order_mark_within_a_log_is_ignored(tmp_path: Path) -> None:
     record, notes = read(written(tmp_path, *ROWS[:40], f"\ufeff{ROWS[40]}", *ROWS[41:]))
     assert (len(record), notes) == (len(ROWS), [])
 
 
-def test_a_header_with_an_empty_name_is_skipped_where_it_comes_again(tmp_path: Path) -> None:
+def test_a_repeated_header_with_an_empty_name_is_skipped(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     lines = [f",{line}" for line in (HEADER, *ROWS[:40], HEADER, *ROWS[40:])]
     path.write_text("\n".join(lines) + "\n")
@@ -61,14 +61,16 @@ def test_a_header_with_an_empty_name_is_skipped_where_it_comes_again(tmp_path: P
         (["end of test"] * 15, "\n"),
     ],
 )
-def test_a_cut_last_row_and_sums_below_the_data_are_left_out(after: list[str], end: str, tmp_path: Path) -> None:
+def test_a_cut_last_row_and_summary_lines_below_the_data_are_left_out(
+    after: list[str], end: str, tmp_path: Path
+) -> None:
     record, notes = read(written(tmp_path, *ROWS, *after, end=end))
     assert len(record) == len(ROWS)
     np.testing.assert_allclose(record["position_m"], 0.001 * np.arange(len(ROWS)))
     assert notes == [LogCode.END_LEFT_OUT.note(count=sum(map(bool, after)), taken=len(ROWS))]
 
 
-def test_sums_below_the_data_are_no_part_of_any_column_that_is_shown(tmp_path: Path) -> None:
+def test_summary_lines_below_the_data_are_left_out_of_every_column(tmp_path: Path) -> None:
     (table,) = open_tables(written(tmp_path, *ROWS, "Mean,1,2,3"))
     with pytest.warns(LogWarning, match="lines after row 1500, .*: 1"):
         found = table.numbers()
@@ -86,7 +88,9 @@ def test_sums_below_the_data_are_no_part_of_any_column_that_is_shown(tmp_path: P
         ('0.040,5,0.5,"x,1,2,text', "0.040, 5, 0.5, "),
     ],
 )
-def test_a_row_of_garbage_within_a_log_leaves_a_gap_and_is_said(line: str, said: str, tmp_path: Path) -> None:
+def test_a_row_of_garbage_within_a_log_becomes_a_missing_sample_with_a_note(
+    line: str, said: str, tmp_path: Path
+) -> None:
     record, notes = read(written(tmp_path, *ROWS[:40], line, *ROWS[41:]))
     (left_out,) = (note for note in notes if note.code is LogCode.ROWS_LEFT_OUT)
     assert (left_out.data["count"], left_out.data["line"]) == (1, 42)
@@ -112,7 +116,7 @@ GARBAGE = (
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_garbage_moves_no_sample_and_is_never_left_out_in_silence(seed: int, tmp_path: Path) -> None:
+def test_garbage_shifts_no_sample_and_always_raises_a_note(seed: int, tmp_path: Path) -> None:
     rng, rows = np.random.default_rng(seed), list(ROWS)
     for place, line in zip(rng.integers(1, len(rows) - 1, 6), rng.choice(GARBAGE, 6), strict=True):
         if rng.random() < 0.5:
@@ -153,19 +157,21 @@ def test_a_quote_that_is_never_closed_swallows_no_rows(tmp_path: Path) -> None:
         ([*ROWS[:9], "time_s,position_m,motor_speed_rad_s,said", *ROWS[9:]], "got another header in row 10"),
     ],
 )
-def test_many_such_rows_or_another_header_are_refused_by_their_row(lines: list[str], said: str, tmp_path: Path) -> None:
+def test_many_rows_of_garbage_or_another_header_are_refused_with_their_row(
+    lines: list[str], said: str, tmp_path: Path
+) -> None:
     with pytest.raises(LogError, match=said):
         read_record(written(tmp_path, *lines))
 
 
-def test_without_a_time_no_row_is_left_out_within_the_data(tmp_path: Path) -> None:
+def test_a_row_of_garbage_in_a_log_without_time_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path, *ROWS[:40], "1,2", *ROWS[40:])
     path.write_text(path.read_text().replace("time_s", "count"))
     with pytest.raises(LogError, match="got 2 in row 41"):
         read_record(path, sample_time=1e-3)
 
 
-def test_a_stamp_of_no_day_is_a_row_without_time(tmp_path: Path) -> None:
+def test_a_row_with_an_invalid_date_becomes_a_missing_sample(tmp_path: Path) -> None:
     rows = [f"2026-03-01 12:00:{0.01 * k:06.3f},{k % 7},{0.001 * k:.4f},text" for k in range(500)]
     rows[40] = rows[40].replace("-03-", "-93-")
     record, notes = read(written(tmp_path, *rows))
@@ -173,7 +179,7 @@ def test_a_stamp_of_no_day_is_a_row_without_time(tmp_path: Path) -> None:
     assert np.flatnonzero(np.isnan(record["position_m"])).tolist() == [40]
 
 
-def test_a_channel_of_text_that_nobody_asked_for_is_left_out(tmp_path: Path) -> None:
+def test_an_optional_channel_of_text_is_left_out_with_a_note(tmp_path: Path) -> None:
     path = written(tmp_path, *ROWS)
     path.write_text(path.read_text().replace("said", "differential_pressure_bar", 1))
     record, notes = read(path)
@@ -184,7 +190,7 @@ def test_a_channel_of_text_that_nobody_asked_for_is_left_out(tmp_path: Path) -> 
         read_record(path, required=("differential_pressure_pa",))
 
 
-def test_a_number_in_a_column_of_dates_is_told_as_no_date(tmp_path: Path) -> None:
+def test_a_number_in_a_column_of_dates_is_refused_as_not_a_date(tmp_path: Path) -> None:
     """The message used to ask for numbers, and to name a number as the fault."""
     stamps = [f"2026-11-29 10:00:00.{k:03d}" if k < 30 else f"{0.001 * k:.3f}" for k in range(60)]
     rows = [f"{stamp},{k}.5,0.{k:03d}" for k, stamp in enumerate(stamps)]
@@ -195,7 +201,7 @@ def test_a_number_in_a_column_of_dates_is_told_as_no_date(tmp_path: Path) -> Non
         read_record(tmp_path / "log.csv")
 
 
-def test_cells_that_loggers_and_spreadsheets_leave_for_nothing_are_missing(tmp_path: Path) -> None:
+def test_placeholders_of_loggers_and_spreadsheets_for_no_value_are_missing(tmp_path: Path) -> None:
     rows = list(ROWS)
     for k, cell in enumerate(("-", "---", "OL", "#DIV/0!", "1.#QNAN", "-1.#IND")):
         rows[10 * k] = rows[10 * k].replace(f",{0.01 * k:.4f},", f",{cell},")
@@ -204,7 +210,7 @@ def test_cells_that_loggers_and_spreadsheets_leave_for_nothing_are_missing(tmp_p
 
 
 @pytest.mark.parametrize(("delimiter", "cell"), [(",", '"-1,234.5"'), (";", "-1.234,5")])
-def test_thousands_may_be_apart_where_a_fraction_says_which_mark_is_which(
+def test_thousands_separators_are_read_if_a_fraction_identifies_the_decimal_sign(
     delimiter: str, cell: str, tmp_path: Path
 ) -> None:
     point = "," if delimiter == ";" else "."
@@ -216,7 +222,7 @@ def test_thousands_may_be_apart_where_a_fraction_says_which_mark_is_which(
     assert set(record["differential_pressure_pa"]) == {-1234.5}
 
 
-def test_a_sheet_is_read_by_the_same_rules(tmp_path: Path) -> None:
+def test_comments_and_summary_rows_of_a_sheet_are_left_out_as_in_csv(tmp_path: Path) -> None:
     book = pytest.importorskip("openpyxl").Workbook()
     header = ("time_s", "motor_speed_rad_s", "position_m")
     rows = [(0.001 * k, k % 7 or None, 0.01 * k if k % 2 else f"{0.01 * k:.2f}") for k in range(150)]
@@ -234,7 +240,7 @@ def test_a_sheet_is_read_by_the_same_rules(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("end", ["END", "END,,,", "\x1a", "Total,20", "1.5,3,0.0"])
-def test_one_line_below_a_short_log_says_that_it_ends(end: str, tmp_path: Path) -> None:
+def test_one_line_of_text_below_a_short_log_is_left_out_and_more_are_refused(end: str, tmp_path: Path) -> None:
     record, notes = read(written(tmp_path, *ROWS[:40], end))
     assert (len(record), notes) == (40, [LogCode.END_LEFT_OUT.note(count=1, taken=40)])
     with pytest.raises(LogError, match="row 41"):

@@ -35,11 +35,11 @@ def test_a_log_without_a_header_has_numbered_columns() -> None:
     assert names(layout("0.0,1.0", "0.1,1.5")) == ["column 1", "column 2"]
 
 
-def test_a_delimiter_that_closes_every_row_makes_no_column_of_its_own() -> None:
+def test_a_delimiter_at_the_end_of_every_row_gives_a_numbered_column() -> None:
     assert names(layout("t;x", "0;1;", "1;2;")) == ["t", "x", "column 3"]
 
 
-def test_a_broken_first_row_is_a_row_and_no_header() -> None:
+def test_a_first_row_with_text_cells_is_not_taken_for_the_header() -> None:
     assert layout("t,x,v", "0.0,oops,oops", "0.1,1.5,2.5", "0.2,1.5,2.5").skipped == 1
 
 
@@ -52,7 +52,7 @@ def test_blank_lines_alone_are_refused() -> None:
         layout("", " ")
 
 
-def test_wide_letters_without_a_mark_are_known_by_their_zeros(tmp_path: Path) -> None:
+def test_utf_16_without_a_byte_order_mark_is_recognised(tmp_path: Path) -> None:
     text = "t,x\n" + "".join(f"{k},{k}\n" for k in range(20))
     for encoding in ("utf-16-le", "utf-16-be"):
         path = tmp_path / encoding
@@ -64,7 +64,7 @@ def test_wide_letters_without_a_mark_are_known_by_their_zeros(tmp_path: Path) ->
         layout_of(tmp_path / "binary")
 
 
-def test_the_last_line_that_was_looked_at_is_cut_and_does_not_count(
+def test_a_line_cut_at_the_end_of_the_examined_bytes_does_not_change_the_layout(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "a.csv"
@@ -79,24 +79,24 @@ def test_a_block_above_a_blank_line_is_not_the_header() -> None:
     assert names(made) == ["t", "x"]
 
 
-def test_the_row_of_units_may_stand_below_another() -> None:
+def test_a_row_of_units_below_a_second_row_of_names_is_found() -> None:
     made = layout("t,x", "time,way", "s,mm", "0.0,1.0", "0.1,2.0")
     assert [one.unit for one in made.headings] == ["s", "mm"]
 
 
-def test_a_log_without_a_number_has_its_first_line_for_a_header_and_all_others_for_rows() -> None:
+def test_in_a_log_without_numbers_the_first_nonblank_line_is_the_header() -> None:
     made = layout("", "name;place", "press;hall", "lift;yard")
     assert (names(made), made.skipped, made.delimiter) == (["name", "place"], 2, ";")
     assert layout("name,place", "press,hall").skipped == 1
 
 
-def test_one_number_a_row_under_a_header_with_as_many_commas_is_two_cells() -> None:
+def test_a_comma_is_the_delimiter_if_the_header_has_as_many_commas_as_the_rows() -> None:
     made = layout("time_s,motor_speed_rad_s", "0,1", "1,x")
     assert (names(made), made.delimiter, made.decimal_point) == (["time_s", "motor_speed_rad_s"], ",", ".")
     assert layout("Weg", "0,1", "1,x").decimal_point == ","
 
 
-def test_a_unit_of_micrometres_and_a_word_for_units_make_a_row_of_units() -> None:
+def test_rows_of_units_with_micrometres_or_unit_words_are_recognised() -> None:
     made = layout("Zeit,Weg", "(ms),(µm)", "", "0.0,1.0", "0.1,2.0")
     assert [(one.bare, one.unit) for one in made.headings] == [("Zeit", "ms"), ("Weg", "µm")]
     made = layout("path,,way", "unit,s,um", "rows,0.0,1.0", ",0.1,2.0", ",0.2,2.0")
@@ -111,7 +111,7 @@ def test_a_unit_of_micrometres_and_a_word_for_units_make_a_row_of_units() -> Non
 @pytest.mark.parametrize(
     ("header", "row"), [("X_Value\tWay\tComment", "0.{k}\t1.{k}"), ("X_Value\tWay", "0.{k}\t1.{k}")]
 )
-def test_labview_may_name_a_column_of_remarks_that_no_row_has(header: str, row: str) -> None:
+def test_a_labview_header_may_name_a_comment_column_that_the_rows_lack(header: str, row: str) -> None:
     above = (
         "LabVIEW Measurement",
         "X_Columns\tOne",
@@ -133,7 +133,7 @@ def scope(step: str, rows: list[str], *more: str, names_of: str = "Name\tWay\tNa
     return layout("Name\tProject", "File\tx.svdx", "", names_of, steps, *more, "", *rows, "EOF")
 
 
-def test_twincat_scope_has_one_clock_in_milliseconds_where_all_channels_share_it() -> None:
+def test_a_twincat_scope_log_has_one_clock_in_milliseconds_if_all_its_channels_share_it() -> None:
     rows = [f"{2 * k}\t1,{k}\t{2 * k}\t3,{k}" for k in range(5)]
     made = scope("2", rows, "Port\t851\tPort\t851", "Unit\tum\tUnit\t(None)")
     assert names(made) == ["Time", "Way", "Time of Speed", "Speed"]
@@ -148,7 +148,7 @@ def test_twincat_scope_has_one_clock_in_milliseconds_where_all_channels_share_it
         assert scope("2", hostile).headings
 
 
-def test_channels_of_twincat_that_share_a_sample_time_share_a_clock() -> None:
+def test_twincat_channels_with_one_shared_time_column_have_a_clock_in_milliseconds() -> None:
     made = layout(
         "Name\tProject",
         "",
@@ -161,6 +161,6 @@ def test_channels_of_twincat_that_share_a_sample_time_share_a_clock() -> None:
     assert ((made.headings[0].name, made.headings[0].unit), made.skipped) == (("Time", "ms"), 6)
 
 
-def test_a_first_line_of_very_many_cells_is_no_header() -> None:
+def test_a_first_line_with_more_than_10000_cells_is_refused() -> None:
     with pytest.raises(LogError, match=r"at most 10,000 columns are read, the first line has 20,001 cells"):
         layout_of_lines(["0," * 20_000], "utf-8", "a.csv")

@@ -41,7 +41,7 @@ def written(folder: Path, name: str, text: str) -> Path:
     return path
 
 
-def test_of_a_folder_of_like_files_only_the_first_is_looked_at_line_by_line(tmp_path: Path, looked: list[str]) -> None:
+def test_of_several_files_with_one_layout_only_the_first_is_examined(tmp_path: Path, looked: list[str]) -> None:
     made = [layout_of(written(tmp_path, f"{k}.csv", HEADER + rows(100 + 90 * k, k))) for k in range(5)]
     assert looked == ["0.csv"]
     assert made == [made[0]] * 5
@@ -63,14 +63,14 @@ def test_of_a_folder_of_like_files_only_the_first_is_looked_at_line_by_line(tmp_
         HEADER + rows(400).replace("\n", "\r"),
     ],
 )
-def test_what_is_written_otherwise_is_looked_at(text: str, tmp_path: Path, looked: list[str]) -> None:
+def test_a_file_with_another_layout_is_examined(text: str, tmp_path: Path, looked: list[str]) -> None:
     layout_of(written(tmp_path, "first.csv", HEADER + rows(400)))
     layout_of(written(tmp_path, "other.csv", text))
     assert looked == ["first.csv", "other.csv"]
 
 
 @pytest.mark.parametrize("header", ["t,x\n", "", "\r".join(["a,b,c", "Time,Speed,Way", ""]), "a;b;c\n"])
-def test_a_layout_stays_what_it_is_on_its_own(header: str, tmp_path: Path) -> None:
+def test_a_reused_layout_equals_the_one_found_by_examination(header: str, tmp_path: Path) -> None:
     width = 2 if header == "t,x\n" else 3
     text = header + "".join(",".join(line.split(",")[:width]) + "\n" for line in rows(400).splitlines())
     first, again = (layout_of(written(tmp_path, name, text)) for name in ("first.csv", "again.csv"))

@@ -52,7 +52,7 @@ def test_every_kind_of_variable_comes_back_as_scipy_wrote_it(compress: bool) -> 
         assert agrees(variables[name], value), name
 
 
-def test_cells_are_skipped_struct_arrays_are_lists_and_their_neighbours_are_read() -> None:
+def test_cell_arrays_are_skipped_and_struct_arrays_become_lists() -> None:
     structs = np.zeros(3, dtype=[("a", float)])
     content = {"cells": np.array(["a", 1], dtype=object), "structs": structs, "wave": np.arange(3.0)}
     variables = read_variables(written(content, compress=False))
@@ -97,7 +97,7 @@ def test_no_single_wrong_byte_can_crash_the_reader(value: int) -> None:
             variables_or_damage(bytes(damaged))
 
 
-def test_a_file_cut_anywhere_is_refused_or_read_to_the_cut() -> None:
+def test_a_file_cut_at_any_byte_is_read_or_refused_as_damaged() -> None:
     for stop in range(len(WHOLE[False])):
         variables_or_damage(WHOLE[False][:stop])
 
@@ -107,7 +107,7 @@ def test_random_bytes_after_the_header_cannot_crash_the_reader(tail: bytes) -> N
     variables_or_damage(WHOLE[False][:128] + tail)
 
 
-def test_structs_within_structs_are_read_as_deep_as_they_may_be_and_no_deeper() -> None:
+def test_nested_structs_are_read_up_to_the_depth_limit_and_refused_beyond() -> None:
     def nested(depth: int) -> dict[str, Any]:
         content: Any = np.arange(3.0)
         for _ in range(depth):

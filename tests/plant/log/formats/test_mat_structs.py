@@ -21,7 +21,7 @@ def read(content: Any) -> Any:
     return gathered(tables_of(content, "a.mat"), None, (), "a.mat").columns
 
 
-def test_a_struct_within_another_that_has_its_own_time_is_a_table() -> None:
+def test_a_nested_struct_with_its_own_time_is_a_table() -> None:
     rod = {"time_s": TIME[::2], "position_m": WAY[::2]}
     test = {"bench": "2", "motor": {"time_s": TIME, "motor_speed_rad_s": SPEED}, "rod": rod}
     assert names({"test": test}) == {
@@ -32,7 +32,7 @@ def test_a_struct_within_another_that_has_its_own_time_is_a_table() -> None:
 
 
 @pytest.mark.parametrize("timed", [True, False])
-def test_an_array_of_signals_has_a_column_of_each_name_in_its_unit(timed: bool) -> None:
+def test_an_array_of_signal_structs_gives_a_column_with_unit_for_each(timed: bool) -> None:
     own = {"time_s": TIME} if timed else {}
     signals = [
         {"Name": "motor speed", "Unit": "rpm", "Data": SPEED, **own},
@@ -43,13 +43,13 @@ def test_an_array_of_signals_has_a_column_of_each_name_in_its_unit(timed: bool) 
     np.testing.assert_allclose(found["motor_speed_rad_s"], SPEED * np.pi / 30.0)
 
 
-def test_of_two_signals_with_one_name_none_is_lost() -> None:
+def test_two_signals_with_the_same_name_are_refused() -> None:
     signals = [{"name": "position_m", "data": WAY}, {"name": "position_m", "data": SPEED}]
     with pytest.raises(LogError, match="'signals' and 'signals\\(2\\)' both give position_m"):
         read({"signals": signals, "time_s": TIME})
 
 
-def test_an_array_with_a_struct_a_sample_is_a_table() -> None:
+def test_an_array_of_one_struct_per_sample_is_a_table() -> None:
     rows = [
         {"time_s": np.array([t]), "position_m": np.array([[w]]), "said": "ok"} for t, w in zip(TIME, WAY, strict=True)
     ]

@@ -39,7 +39,7 @@ def test_a_group_is_a_table_with_its_clock_and_units(two_groups: Path) -> None:
     np.testing.assert_allclose(values[2], 2.0 * TIME)
 
 
-def test_a_group_of_more_rows_than_a_log_is_refused(two_groups: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_group_larger_than_the_unpacking_limit_is_refused(two_groups: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with asammdf.MDF(two_groups) as file:
         largest = max(one.channel_group.samples_byte_nr * one.channel_group.cycles_nr for one in file.groups)
     assert largest >= 8 * len(TIME)
@@ -50,7 +50,7 @@ def test_a_group_of_more_rows_than_a_log_is_refused(two_groups: Path, monkeypatc
     assert len(open_mdf(two_groups)) == 2
 
 
-def test_bytes_that_say_which_samples_are_invalid_count_too(tmp_path: Path) -> None:
+def test_invalidation_bytes_count_toward_the_unpacking_limit(tmp_path: Path) -> None:
     path = written(tmp_path / "log.mf4", [("speed", "rpm", TIME), ("way", "", TIME)])
     with asammdf.MDF(path) as file:
         file.groups[0].channel_group.invalidation_bytes_nr = 0xFF000000  # the library would allocate as much
@@ -65,7 +65,7 @@ def test_a_file_without_a_channel_is_refused(tmp_path: Path) -> None:
         open_mdf(path)
 
 
-def test_a_clock_alone_is_no_table(tmp_path: Path) -> None:
+def test_a_group_with_only_a_clock_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path / "log.mf4", [("speed", "rpm", TIME), ("way", "", TIME)])
     with asammdf.MDF(path) as file:
         del file.groups[0].channels[1:]
@@ -83,13 +83,13 @@ class _Opened:
         return self._file
 
 
-def test_what_is_no_mdf_is_refused_in_one_sentence(tmp_path: Path) -> None:
+def test_a_damaged_mdf_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "log.mf4").write_bytes(b"MDF     4.10" + bytes(200))
     with pytest.raises(LogError, match="cannot be read as mdf"):
         open_mdf(tmp_path / "log.mf4")
 
 
-def test_a_sample_that_the_logger_calls_invalid_is_missing_and_moves_no_other(tmp_path: Path) -> None:
+def test_a_sample_marked_invalid_is_missing_and_all_others_stay_at_their_rows(tmp_path: Path) -> None:
     from asammdf import MDF, Signal
 
     time, marks = 1e-3 * np.arange(50), np.arange(50)
@@ -108,7 +108,7 @@ def test_a_sample_that_the_logger_calls_invalid_is_missing_and_moves_no_other(tm
 
 
 @pytest.mark.parametrize("version", ["3.30", "4.10"])
-def test_a_formula_is_evaluated_or_refused_and_never_run_or_passed_over(tmp_path: Path, version: str) -> None:
+def test_a_conversion_formula_is_evaluated_as_arithmetic_or_refused(tmp_path: Path, version: str) -> None:
     raw = np.arange(1, 31, dtype=np.int16)
     formulas = {"speed": "(X - 1)/100", "way": "pow(X, 2)", "force": "9**9**9**9", "other": "open(X).read()"}
     with asammdf.MDF(version=version) as file:
@@ -124,7 +124,7 @@ def test_a_formula_is_evaluated_or_refused_and_never_run_or_passed_over(tmp_path
         others[1].read([Column(1, "other", "other")])
 
 
-def test_a_group_that_is_counted_by_an_angle_has_no_time(tmp_path: Path) -> None:
+def test_a_group_whose_master_channel_is_an_angle_has_no_time(tmp_path: Path) -> None:
     signal = asammdf.Signal(TIME, TIME, name="speed", unit="rpm", master_metadata=("crank angle", 2))
     with asammdf.MDF(version="4.10") as file:
         file.append([signal])
@@ -132,7 +132,7 @@ def test_a_group_that_is_counted_by_an_angle_has_no_time(tmp_path: Path) -> None
     assert [(one.name, one.said) for one in table.headings] == [("crank angle", "deg"), ("speed", "rpm")]
 
 
-def test_two_channels_of_one_name_keep_their_devices(tmp_path: Path) -> None:
+def test_channels_of_the_same_name_keep_their_device_names(tmp_path: Path) -> None:
     path = written(tmp_path / "log.mf4", [("way\\CAN", "mm", TIME), ("way\\XCP", "mm", 2.0 * TIME)])
     (table,) = open_mdf(path)
     assert [one.name for one in table.headings] == ["time", "way\\CAN", "way\\XCP"]

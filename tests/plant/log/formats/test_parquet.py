@@ -46,20 +46,20 @@ def test_times_are_read_as_times_and_durations_as_seconds(tmp_path: Path, kind: 
     np.testing.assert_array_equal(values[3], [1.0, 2.0, np.nan, 4.0])
 
 
-def test_a_text_that_is_no_time_among_times_is_refused_with_its_row(tmp_path: Path) -> None:
+def test_other_text_in_a_column_of_times_is_refused_with_its_row(tmp_path: Path) -> None:
     said = [str(STAMPS[0]), "later", str(STAMPS[2])]
     table = open_parquet(written(tmp_path / "log.parquet", "parquet", said=said))
     with pytest.raises(LogError, match=r"log\.parquet: column 'said' must hold times, got 'later' in row 2"):
         table.read([Column(0, "said", "time_s")])
 
 
-def test_text_that_is_no_number_is_no_column_of_numbers(tmp_path: Path) -> None:
+def test_a_text_column_is_not_among_the_columns_of_numbers(tmp_path: Path) -> None:
     table = open_parquet(written(tmp_path / "log.parquet", "parquet", who=["a", "b"], way=[1.0, 2.0]))
     assert list(table.numbers()) == [1]
 
 
 @pytest.mark.parametrize("kind", ["parquet", "feather"])
-def test_more_rows_than_a_log_of_that_size_are_refused(
+def test_a_file_that_unpacks_beyond_the_limit_is_refused(
     tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = written(tmp_path / f"log.{kind}", kind, way=np.arange(100.0))
@@ -70,14 +70,14 @@ def test_more_rows_than_a_log_of_that_size_are_refused(
         opened(path)
 
 
-def test_a_column_that_holds_nothing_is_missing_and_yes_and_no_are_numbers(tmp_path: Path) -> None:
+def test_a_column_of_nulls_is_missing_and_booleans_become_numbers(tmp_path: Path) -> None:
     table = open_parquet(written(tmp_path / "log.parquet", "parquet", none=pa.nulls(3), on=[True, None, False]))
     values = table.numbers()
     assert np.isnan(values[0]).all()
     np.testing.assert_array_equal(values[1], [1.0, np.nan, 0.0])
 
 
-def test_a_table_of_very_many_columns_is_read_some_at_a_time_and_each_is_itself(
+def test_a_wide_table_read_in_batches_of_columns_keeps_their_values(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(parquet, "MANY", 3)
@@ -90,7 +90,7 @@ def test_a_table_of_very_many_columns_is_read_some_at_a_time_and_each_is_itself(
 
 
 @pytest.mark.parametrize("kind", ["parquet", "feather"])
-def test_a_duration_is_in_the_unit_that_its_name_says(tmp_path: Path, kind: str) -> None:
+def test_a_duration_column_gives_the_same_time_whatever_unit_its_name_has(tmp_path: Path, kind: str) -> None:
     since = pa.array(np.arange(20) * 10, pa.duration("ms"))
     names = ["time_ms", "Time [us]", "elapsed_time"]
     course = 0.01 * np.arange(20.0)
@@ -100,7 +100,7 @@ def test_a_duration_is_in_the_unit_that_its_name_says(tmp_path: Path, kind: str)
         assert log.sample_time == pytest.approx(0.01), name
 
 
-def test_a_name_with_a_point_is_no_field_of_a_structure(tmp_path: Path) -> None:
+def test_a_column_name_with_a_dot_is_not_taken_for_a_struct_field(tmp_path: Path) -> None:
     inner = pa.array([{"b": 5.0}] * 4)
     path = tmp_path / "log.parquet"
     table = pa.table([inner, np.arange(4.0), np.arange(4.0) + 9.0, np.arange(4.0)], names=["a", "a.b", "c", "c"])
@@ -113,7 +113,7 @@ def test_a_name_with_a_point_is_no_field_of_a_structure(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [pa.time32("ms"), pa.time64("us")])
-def test_times_of_the_day_are_stamps_that_go_on_over_midnight(tmp_path: Path, kind: pa.DataType) -> None:
+def test_times_of_day_continue_past_midnight(tmp_path: Path, kind: pa.DataType) -> None:
     of_day = pa.array([86_399_990, 0, None, 20], pa.int32()).cast(pa.time32("ms")).cast(kind)
     table = open_parquet(written(tmp_path / "log.parquet", "parquet", Time=of_day))
     assert table.headings[0].stamped

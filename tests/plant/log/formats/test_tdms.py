@@ -35,7 +35,7 @@ def test_channels_of_one_length_and_step_are_one_table(tmp_path: Path) -> None:
     assert ([one.name for one in slow.headings], slow.step, slow.began) == (["Slow"], 0.04, None)
 
 
-def test_channels_that_begin_at_other_times_are_laid_beside_each_other_by_them(tmp_path: Path) -> None:
+def test_channels_with_different_start_times_are_aligned_in_time(tmp_path: Path) -> None:
     values, step = np.arange(40.0), 0.01
     later = START + np.timedelta64(50, "ms")
     path = written(
@@ -51,7 +51,7 @@ def test_channels_that_begin_at_other_times_are_laid_beside_each_other_by_them(t
     np.testing.assert_allclose(log.channels["position_m"], 1e-3 * values[:30])
 
 
-def test_an_offset_is_of_the_channel_that_says_it_and_a_date_of_its_whole_group(tmp_path: Path) -> None:
+def test_a_start_offset_belongs_to_its_channel_and_a_start_date_to_the_whole_group(tmp_path: Path) -> None:
     values, step = np.arange(40.0), {"wf_increment": 0.01}
     path = written(
         tmp_path / "log.tdms",
@@ -66,7 +66,7 @@ def test_an_offset_is_of_the_channel_that_says_it_and_a_date_of_its_whole_group(
     np.testing.assert_allclose(log.channels["velocity_m_s"], 1e-3 * values[5:35])
 
 
-def test_a_beginning_without_a_date_is_the_first_time(tmp_path: Path) -> None:
+def test_a_start_offset_without_a_date_is_the_start_time(tmp_path: Path) -> None:
     offset = {"wf_increment": 0.01, "wf_start_offset": 0.25}
     values = np.arange(20.0)
     channels = [("Bench", "motor_speed_rad_s", values, offset), ("Bench", "velocity_m_s", 1e-3 * values, offset)]
@@ -74,13 +74,13 @@ def test_a_beginning_without_a_date_is_the_first_time(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("step", [0.0, -1.0, 1e7, "fast"])
-def test_a_step_that_is_none_is_not_taken_for_one(tmp_path: Path, step: Any) -> None:
+def test_an_invalid_time_step_is_ignored(tmp_path: Path, step: Any) -> None:
     (table,) = open_tdms(written(tmp_path / "log.tdms", ("Bench", "Speed", np.arange(5.0), {"wf_increment": step})))
     assert table.step is None
 
 
 @pytest.mark.parametrize("start", [np.datetime64("1904-01-01T00:00:00", "us"), "noon"])
-def test_a_beginning_that_says_nothing_is_none(tmp_path: Path, start: Any) -> None:
+def test_an_unset_or_invalid_start_date_is_ignored(tmp_path: Path, start: Any) -> None:
     (table,) = open_tdms(written(tmp_path / "log.tdms", ("Bench", "Speed", np.arange(5.0), {"wf_start_time": start})))
     assert table.began is None
 
@@ -101,7 +101,9 @@ class _Longer:
         return 10**9
 
 
-def test_a_file_that_says_it_is_longer_than_it_is_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_declares_more_samples_than_it_holds_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = written(tmp_path / "log.tdms", ("Bench", "Speed", np.arange(5.0), {}))
     monkeypatch.setattr(nptdms.TdmsGroup, "channels", lambda _: [_Longer()])
     with pytest.raises(LogError, match=r"it ends before the 1000000000 samples that 'Speed' has"):

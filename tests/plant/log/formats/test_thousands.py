@@ -18,13 +18,13 @@ def written(folder: Path, cells: list[str], name: str) -> Path:
     return path
 
 
-def test_whole_numbers_with_their_thousands_apart_are_refused_not_read_as_thousandths(tmp_path: Path) -> None:
+def test_whole_numbers_with_ambiguous_thousands_separators_are_refused(tmp_path: Path) -> None:
     cells = [f"{one:,.0f}".replace(",", ".") for one in SPEED]
     with pytest.raises(LogError, match=r"'Motor speed \[rpm\]' has separators of thousands"):
         read_record(written(tmp_path, cells, "log.csv"))
 
 
-def test_so_they_are_behind_a_header_that_was_read_before(tmp_path: Path) -> None:
+def test_thousands_separators_are_refused_in_a_second_file_with_the_same_header(tmp_path: Path) -> None:
     header = "time_s,motor_speed_rad_s,position_m\n"
     plain, grouped = tmp_path / "plain.csv", tmp_path / "grouped.csv"
     rows = [f"{t:.3f},{one:.0f},{1e-3 * t:.7f}" for t, one in zip(TIME, SPEED, strict=True)]
@@ -40,12 +40,12 @@ def test_so_they_are_behind_a_header_that_was_read_before(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("digits", [1, 3, 4])
-def test_decimals_are_none(tmp_path: Path, digits: int) -> None:
+def test_decimals_are_not_taken_for_thousands_separators(tmp_path: Path, digits: int) -> None:
     path = written(tmp_path, [f"{one / 7.0:.{digits}f}" for one in SPEED], "log.csv")
     assert len(read_record(path)) == len(TIME)
 
 
-def test_few_cells_are_not_judged() -> None:
+def test_two_cells_are_too_few_to_recognise_thousands_separators() -> None:
     assert not groups_thousands(["998", "1.002"])
 
 
@@ -57,14 +57,14 @@ def late(folder: Path, cells: list[str]) -> Path:
     return path
 
 
-def test_thousands_that_are_reached_late_are_refused_too(tmp_path: Path) -> None:
+def test_thousands_separators_that_first_appear_late_in_a_log_are_refused(tmp_path: Path) -> None:
     path = late(tmp_path, [f"{max(k - 300, k % 7):,d}".replace(",", ".") for k in range(0, 3600, 2)])
     with pytest.raises(LogError, match=r"thousands, as in '1\.000'"):
         read_record(path)
     assert len(read_record(late(tmp_path, [f"{0.004 * k:g}" for k in range(1800)]))) == 1800
 
 
-def test_where_decimals_have_a_comma_a_point_that_parts_thousands_is_refused(tmp_path: Path) -> None:
+def test_a_point_as_thousands_separator_among_decimal_commas_is_refused(tmp_path: Path) -> None:
     cells = [f"{one:d},5" for one in range(600)]
     path = tmp_path / "log.csv"
     for last, said in (("1.002", r"thousands, as in '1\.002'"), ("0.98", "")):
@@ -78,14 +78,16 @@ def test_where_decimals_have_a_comma_a_point_that_parts_thousands_is_refused(tmp
 
 
 @pytest.mark.parametrize("apart", ["'", "\u2019", " ", "\u00a0", "\u202f", "\u2009", ","])
-def test_thousands_that_can_be_nothing_else_are_read(tmp_path: Path, apart: str) -> None:
+def test_unambiguous_thousands_separators_are_read(tmp_path: Path, apart: str) -> None:
     cells = [f"{one / 3.0:,.4f}".replace(",", apart) for one in 2.0 * SPEED]
     read = read_record(written(tmp_path, cells, "log.csv"))["motor_speed_rad_s"]
     np.testing.assert_allclose(read, 2.0 * SPEED / 3.0 * np.pi / 30.0, atol=1e-4)
 
 
 @pytest.mark.parametrize(("apart", "point"), [(" ", ","), (".", ","), (",", ".")])
-def test_of_whole_numbers_one_beyond_a_million_says_what_its_signs_are(tmp_path: Path, apart: str, point: str) -> None:
+def test_a_whole_number_beyond_a_million_identifies_the_thousands_separator(
+    tmp_path: Path, apart: str, point: str
+) -> None:
     pressure = np.round(2e6 * np.sin(40.0 * TIME))
     cells = [f"{one:,.0f}".replace(",", apart) for one in pressure]
     rows = [f"{t:.3f};{99.0 * t:.4f}".replace(".", point) + f";{cell}" for t, cell in zip(TIME, cells, strict=True)]
@@ -95,7 +97,7 @@ def test_of_whole_numbers_one_beyond_a_million_says_what_its_signs_are(tmp_path:
     np.testing.assert_allclose(read, pressure)
 
 
-def test_decimal_commas_between_commas_are_refused_with_what_to_do(tmp_path: Path) -> None:
+def test_decimal_commas_with_a_comma_delimiter_are_refused_with_the_remedy(tmp_path: Path) -> None:
     """The two cells below each name used to be read as columns without names."""
     rows = [f"{0.001 * k:.3f},{k / 3.0:.4f},-{k / 7.0:.2f}".replace(".", ",") for k in range(40)]
     (tmp_path / "log.csv").write_text("\n".join(["time_s,motor_speed_rad_s,position_m", *rows]))
@@ -103,7 +105,7 @@ def test_decimal_commas_between_commas_are_refused_with_what_to_do(tmp_path: Pat
         read_record(tmp_path / "log.csv")
 
 
-def test_a_column_of_text_with_another_decimal_sign_than_the_log_is_read_by_its_own(tmp_path: Path) -> None:
+def test_a_column_with_another_decimal_sign_than_the_rest_of_the_log_is_read(tmp_path: Path) -> None:
     cells = [f"{one / 7.0:.4f}".replace(".", ",") for one in SPEED]
     read = read_record(written(tmp_path, cells, "log.csv"))["motor_speed_rad_s"]
     np.testing.assert_allclose(read, SPEED / 7.0 * np.pi / 30.0, atol=1e-4)

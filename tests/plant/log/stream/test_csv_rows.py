@@ -42,7 +42,7 @@ def test_samples_come_before_the_stream_ends() -> None:
     assert len(first) == 5
 
 
-def test_a_short_gap_is_filled_and_a_long_one_told() -> None:
+def test_a_short_gap_is_filled_with_missing_samples_and_a_long_one_is_reported() -> None:
     short = _taken([HEADER, *_rows(60), *_rows(40, start=65)], most=1000)
     ((_, samples, gap),) = short
     assert not gap
@@ -136,7 +136,7 @@ def test_a_clock_that_runs_backwards_from_the_start_is_refused() -> None:
         CsvStream([HEADER, *reversed(_rows(100))], source="bench")
 
 
-def test_a_stream_of_something_else_says_what_came() -> None:
+def test_the_refusal_of_a_stream_of_garbage_counts_the_rows_received() -> None:
     with pytest.raises(LogError, match=r"at least two rows .* got 0, and 3 that were garbage; every row must"):
         CsvStream([HEADER, "a\n", "b\n", "c\n"], source="bench")
 
@@ -151,12 +151,12 @@ def test_a_stream_of_something_else_says_what_came() -> None:
         (["time_furlong,position_mm\n", "1,1\n"], "cannot become time_s"),
     ],
 )
-def test_a_stream_without_a_beginning_is_refused(lines: list[str], said: str) -> None:
+def test_a_stream_without_a_header_two_rows_or_a_valid_time_is_refused(lines: list[str], said: str) -> None:
     with pytest.raises(LogError, match=said):
         _taken(lines)
 
 
-def test_a_long_gap_right_after_a_piece_is_told_with_the_next() -> None:
+def test_a_long_gap_right_after_a_piece_is_reported_with_the_next_piece() -> None:
     pieces = _taken([HEADER, *_rows(10), *_rows(5, 90_000)], most=10)
     assert [(len(piece), gap) for _, piece, gap in pieces] == [(10, False), (5, True)]
 
@@ -169,13 +169,13 @@ def test_blank_lines_and_quoted_cells_are_read() -> None:
     np.testing.assert_allclose(samples[:, 0], 2.0 * np.pi * np.arange(12))
 
 
-def test_a_column_that_was_left_unread_and_may_be_pressure_is_named() -> None:
+def test_a_warning_names_an_unread_column_that_may_be_pressure() -> None:
     lines = ["time_ms,motor_speed_rpm,position_mm,Druck [bar]\n", *(f"{k},1,2,3\n" for k in range(5))]
     with pytest.warns(LogWarning, match=r"column 'Druck \[bar\]' was not used, but it may be differential_pressure_pa"):
         CsvStream(lines, source="bench")
 
 
-def test_a_line_with_an_end_within_it_is_garbage_and_a_long_header_is_not_told_whole() -> None:
+def test_a_row_with_a_carriage_return_is_left_out_and_a_long_header_is_quoted_shortened() -> None:
     rows = _rows(300)
     rows[100] = '1.0,"1\r2",3\n'
     (piece,) = (piece for _, piece, _ in _taken([HEADER, *rows], most=1000))
@@ -186,7 +186,7 @@ def test_a_line_with_an_end_within_it_is_garbage_and_a_long_header_is_not_told_w
         CsvStream([",".join(["name"] * 5002) + "\n"], source="bench")
 
 
-def test_a_number_that_stands_for_a_lost_sample_is_missing_unless_it_stays() -> None:
+def test_a_number_that_marks_lost_samples_is_missing_unless_it_persists() -> None:
     lines = [HEADER, *(f"{k},{900 + k % 7},{k % 9}\n" for k in range(400))]
     for k in (201, 251, 301):
         lines[k] = f"{k - 1},9999,-9999\n"

@@ -17,7 +17,7 @@ def rows(begin: int, end: int) -> np.ndarray:
     return np.concatenate([1e-3 * n, np.sin(n), 1.0 / (1.0 + n)], axis=1)
 
 
-def test_a_writer_that_waits_loses_no_row_and_no_bit(tmp_path: Path) -> None:
+def test_all_rows_of_a_writer_that_waits_for_the_reader_arrive_unchanged(tmp_path: Path) -> None:
     path, count, received = tmp_path / "ring", 3 * MOST, BatchCounts()
     writer = RingWriter(path, HEADER, 100)
 
@@ -34,7 +34,7 @@ def test_a_writer_that_waits_loses_no_row_and_no_bit(tmp_path: Path) -> None:
     assert (received.batches, received.lost, received.what) == (count, 0, "rows")
 
 
-def test_rows_that_a_writer_wrote_over_are_counted_and_the_others_are_whole(tmp_path: Path) -> None:
+def test_overwritten_rows_are_counted_as_lost_and_the_others_are_read(tmp_path: Path) -> None:
     with RingWriter(tmp_path / "ring", HEADER, 10) as writer:
         reader = RingReader(tmp_path / "ring")
         writer.write(rows(0, 4))
@@ -63,7 +63,7 @@ def test_a_missing_value_is_an_empty_cell(tmp_path: Path) -> None:
     assert is_stream("ring:/dev/shm/bench")
 
 
-def test_what_is_no_ring_is_refused(tmp_path: Path) -> None:
+def test_an_invalid_ring_file_address_or_size_is_refused(tmp_path: Path) -> None:
     with RingWriter(tmp_path / "ring", HEADER, 10):
         pass
     content = bytearray((tmp_path / "ring").read_bytes())

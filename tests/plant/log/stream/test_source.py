@@ -91,7 +91,9 @@ def test_a_sender_that_never_ends_its_line_is_refused_before_it_fills_the_memory
     assert refused.value.source == address
 
 
-def test_a_bench_that_lost_its_power_is_noticed_within_a_minute_or_two(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tcp_keepalive_is_set_to_detect_a_bench_without_power_within_two_minutes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A watch used to wait for ever, because nobody had closed the connection."""
     made: list[socket.socket] = []
     connect = socket.create_connection
@@ -145,7 +147,7 @@ def test_rows_of_a_tcp_connection_wait_at_the_sender_until_they_are_read() -> No
         assert not sender.is_alive()
 
 
-def test_what_is_no_stream_is_refused_in_a_sentence() -> None:
+def test_an_invalid_or_unreachable_stream_address_is_refused() -> None:
     assert is_stream("tcp://here:1")
     assert not is_stream("bench.csv")
     assert is_stream("http://here:1/x")  # an address, but not of a kind that can be read
@@ -172,7 +174,7 @@ def test_a_message_that_is_no_batch_ends_the_stream_with_an_error(broker: int) -
     assert "a batch must begin with 'rows NUMBER' and a header, got 'hello'" in str(raised[0])
 
 
-def test_what_is_published_goes_to_one_topic_of_a_broker() -> None:
+def test_a_publish_address_must_name_one_topic_of_an_mqtt_broker() -> None:
     assert broker_of("mqtt://bench:99/press/events") == ("bench", 99, "press/events")
     for address in ("tcp://bench/press", "mqtt:///press", "mqtt://bench/", "mqtt://bench/a/+/b", "mqtt://bench/a#b"):
         with pytest.raises(HydrostateError, match=r"a topic to publish on must be mqtt://HOST\[:PORT\]/TOPIC"):
