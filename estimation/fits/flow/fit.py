@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -177,15 +176,15 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
             continue
         plain = by_course(logged, plain)
         asked, open_ends = _asked(plain, sensed, traits)
-        hints = list[Note]()
+        hints: Sequence[Note] = ()
         try:
             with work.counted():
                 if not start.turns_read and _misread(corrected, plain, asked, traits):
                     return Answered(plain, (), (), None)
-                strange = _strange(plain, asked, traits, hints) if asked else None
+                strange, hints = _ask(plain, asked, traits) if asked else (None, ())
                 for one in asked_alone(plain, asked):
-                    strange = likelier(strange, _strange(plain, (one,), traits))
-                plain, strange = offset_settled(plain, strange, asked, partial(_strange, traits=traits))
+                    strange = likelier(strange, _ask(plain, (one,), traits)[0])
+                plain, strange = offset_settled(plain, strange, asked, lambda one, these: _ask(one, these, traits)[0])
                 if asked and strange is None:
                     plain = with_open_turns(logged, plain)
         except WorkSpentError:
@@ -200,7 +199,7 @@ def _misread(corrected: CorrectedLogs, plain: PlainFits, asked: Sequence[Hypothe
     if corrected.misread(plain, plain.best, paired=not corrected.is_kin(plain, plain.best)) is None:
         return False
     unlike = [one for one in asked if one.name in UNLIKE_SLIPS]
-    strange = None if plain.explains(plain.best) or not unlike else _strange(plain, unlike, traits)
+    strange = None if plain.explains(plain.best) or not unlike else _ask(plain, unlike, traits)[0]
     return strange is None or not corrected.is_sound(plain, strange)
 
 
@@ -217,10 +216,8 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
     return asked, open_ends
 
 
-def _strange(
-    plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits, hints: list[Note] | None = None
-) -> Explanation | None:
-    """Return the hypotheses that explain a log, if believed, else hint at what nearly does; `BEGUN` is alone."""
+def _ask(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> tuple[Explanation | None, Sequence[Note]]:
+    """Return the hypotheses that explain a log, if believed, else hints at what nearly does; `BEGUN` is alone."""
     explains = told_by(plain, begun=BEGUN in asked)
     moving, astray = traits.loaded or traits.moving, is_astray(plain.log, plain.swinging, plain.start.parameters)
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=moving, astray=astray)
@@ -240,14 +237,12 @@ def _strange(
         useful=wanted_in((asked[0].name,), plain, traits, 0.0) if alone else np.inf,
     )
     if strange is None:
-        return None
+        return None, ()
     lower = strange.fit.cost < wanted_in(strange.names, plain, traits, strange.fit.chi_square[0])
     crossed = PLAY.name not in strange.names or not doubted(strange.fit)  # beside a play only sensor noise may be left
     if lower and crossed and explains(strange.fit):
-        return strange
-    if hints is not None:
-        hints += nearly_explained(plain, strange)
-    return None
+        return strange, ()
+    return None, nearly_explained(plain, strange)
 
 
 def _uneven(plain: PlainFits, traits: LogTraits) -> VaryingLoss | None:

@@ -36,9 +36,11 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
     accepted : callable
         ``accepted(fit)``: whether a fit explains the log.
     """
-    best, *rivals = sorted(counted, key=lambda one: one.cost - TEMPER * math.log(prior_weight(log, one)))
-    fits = tuple(fit for one in (best, *rivals) for fit in one.fits)
-    likely = tuple(prior_weight(log, one) for one in (best, *rivals) for _ in one.fits)
+    weighted = [(one, prior_weight(log, one)) for one in counted]
+    weighted.sort(key=lambda pair: pair[0].cost - TEMPER * math.log(pair[1]))
+    best, *rivals = (one for one, _ in weighted)
+    fits = tuple(fit for one, _ in weighted for fit in one.fits)
+    likely = tuple(weight for one, weight in weighted for _ in one.fits)
     values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()}
     values |= dict(weighed(fits, priors=likely))
     if any(name in values for name in GROWTH):  # the reported leakage is that at the end of the log

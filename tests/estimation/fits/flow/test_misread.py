@@ -93,7 +93,7 @@ def test_a_log_that_is_fitted_again_is_tested_for_slips_again(monkeypatch: pytes
     monkeypatch.setattr(flow_fit, "with_open_turns", lambda _, plain: plain)
     monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, *_: (plain, strange))
     monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY,), ()))
-    monkeypatch.setattr(flow_fit, "_strange", lambda *_: "a lower valley")
+    monkeypatch.setattr(flow_fit, "_ask", lambda *_: ("a lower valley", ()))
     monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: FitStart(RIG, 2e8))
     corrected: Any = SimpleNamespace(
         logged=nothing,
@@ -121,7 +121,7 @@ def test_slips_are_tested_before_every_hypothesis_except_a_pressure_offset(
     monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, *_: (plain, strange))
     monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY, OFFSET), ()))
     by_offset = named == OFFSET.name
-    monkeypatch.setattr(flow_fit, "_strange", lambda _, asked, *__: strange if by_offset or len(asked) > 1 else None)
+    monkeypatch.setattr(flow_fit, "_ask", lambda _, asked, *__: (strange if by_offset or len(asked) > 1 else None, ()))
     monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: None)
     monkeypatch.setattr(flow_fit, "quieter", lambda *_: None)
     monkeypatch.setattr(CorrectedLogs, "is_kin", lambda _, __, found: found == "kin")
@@ -190,7 +190,7 @@ def test_oil_seven_times_stiffer_than_the_rigs_is_not_mistaken_for_a_pressure_un
 def _strange_rigs_are_searched_for(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """No hypothesis about the rig explains a log in another unit, and most of the work is to find that out."""
     if not request.param:
-        monkeypatch.setattr(flow_fit, "_strange", lambda *_: None)
+        monkeypatch.setattr(flow_fit, "_ask", lambda *_: (None, ()))
 
 
 @pytest.mark.usefixtures("_strange_rigs_are_searched_for")
