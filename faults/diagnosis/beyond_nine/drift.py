@@ -21,8 +21,10 @@ from faults.diagnosis.changes.warming import with_course
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_fit import LASTING, misfit
+from faults.diagnosis.circuits.class_fit import LASTING, least_scales, misfit
 from faults.diagnosis.circuits.class_regions import fit_classes
+from faults.diagnosis.circuits.model_doubt import NOISE_ALONE
+from faults.diagnosis.circuits.rivals import LOOKS
 from faults.diagnosis.evidence import Scoreboard, models_scores
 from faults.diagnosis.severity import severities
 from faults.notes import AgainstCode
@@ -119,7 +121,8 @@ def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str
     Parameters
     ----------
     found : sequence of Diagnosis
-        Diagnoses; they count by their evidences if all compare the same part of the log, otherwise equally.
+        Diagnoses; they count by their evidences, as far as a wrong model's error lets them (`_looks`), if all compare
+        the same part of the log, otherwise equally.
     calibration : Calibration
         Weights of the evidences.
 
@@ -131,10 +134,23 @@ def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str
     boards = [one.scoreboard for one in found]
     counts = boards[0].blocks.counts
     alike = all(np.array_equal(board.blocks.counts, counts) for board in boards)
-    shares = np.array([_evidence(board, calibration) for board in boards]) if alike else np.zeros(len(boards))
-    shares = np.exp(shares - np.max(shares))
+    shares = np.ones(len(boards))
+    if alike:
+        evidences = np.array([_evidence(board, calibration) for board in boards])
+        shares = np.exp(min(map(_looks, boards)) * (evidences - np.max(evidences)))
     each: Array = np.array([list(one.probabilities.values()) for one in found])
     return dict(zip(found[0].probabilities, (float(one) for one in shares @ each / np.sum(shares)), strict=True))
+
+
+def _looks(board: Scoreboard) -> float:
+    """Return the share of a log's evidence that counts between places of the rig file's oil [fraction].
+
+    Places differ by friction of a few percent, and so does a friction law from the real one. Residuals beyond noise are
+    that law's error: however long a log is, they give `LOOKS` looks at it.
+    """
+    blocks = board.blocks
+    error = np.maximum(1.0 - (NOISE_ALONE * least_scales(blocks) / board.fits.best.scales) ** 2, 0.0)
+    return float(np.min(LASTING / (LASTING + error * blocks.counts / LOOKS)))
 
 
 def _evidence(board: Scoreboard, calibration: Calibration) -> float:

@@ -19,6 +19,8 @@ from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.class_fit import LASTING, least_scales
+from faults.diagnosis.circuits.model_doubt import NOISE_ALONE
 from faults.diagnosis.severity import severities_at
 from faults.diagnosis.severity_total import with_totals
 from faults.notes import AgainstCode
@@ -118,7 +120,7 @@ def test_a_drifting_log_keeps_an_objection_only_if_every_place_in_the_drift_has_
     assert against((outside,), (bias,), ()) == (bias,)
 
 
-def test_places_are_weighted_by_evidence_and_equally_if_their_blocks_differ() -> None:
+def test_places_count_by_evidence_less_if_no_circuit_follows_to_noise_and_alike_if_blocks_differ() -> None:
     one = weighed_over_drift("minor_leakage", 1.0)
     sure = {name: {"normal": 1.0}.get(name, 0.0) for name in CONDITIONS}
     other = {name: {"major_friction": 1.0}.get(name, 0.0) for name in CONDITIONS}
@@ -129,6 +131,15 @@ def test_places_are_weighted_by_evidence_and_equally_if_their_blocks_differ() ->
     two = replace(one, probabilities=sure), replace(one, probabilities=other, scoreboard=worse)
     found = weighed(two, calibration)
     assert found["normal"] / found["major_friction"] == pytest.approx(np.exp(2.0))
+    # residuals of twice the noise are a wrong model's error: 5 looks at it in the whole log, in place of its blocks
+    blocks, scales = one.scoreboard.blocks, 2.0 * NOISE_ALONE * least_scales(one.scoreboard.blocks)
+    rough = [
+        replace(each, scoreboard=replace(board, fits=replace(board.fits, best=replace(board.fits.best, scales=scales))))
+        for each, board in ((each, each.scoreboard) for each in two)
+    ]
+    looks = LASTING / (LASTING + 0.75 * np.max(blocks.counts) / 5.0)
+    found = weighed(rough, calibration)
+    assert found["normal"] / found["major_friction"] == pytest.approx(np.exp(2.0 * looks))
     cut = replace(one.scoreboard.blocks, velocity=one.scoreboard.blocks.velocity * np.nan)
     elsewhere = replace(two[1], scoreboard=replace(worse, blocks=cut))
     assert weighed((two[0], elsewhere), calibration)["normal"] == pytest.approx(0.5)
