@@ -26,7 +26,7 @@ from faults.diagnosis.beyond_nine.left_open import (
     presumed_of_wear,
     probabilities_of,
 )
-from faults.diagnosis.beyond_nine.sound_circuit import Tried, largest_pressure, sound_circuit
+from faults.diagnosis.beyond_nine.sound_circuit import Tried, largest_pressure, likely, sound_circuit
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
@@ -132,6 +132,44 @@ class _Fault:
     beyond: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """Circuits with faults beside the best sound one: what each gains over it in explaining a log."""
+
+    blocks: Blocks
+    faulty: tuple[tuple[_Fault, Tried], ...]
+    sound: Tried
+
+    def gain(self, fault: _Fault, tried: Tried) -> float:
+        """Return the log-likelihood that a fault gains, with the prior of its size [dimensionless]."""
+        gain = likely(self.blocks, tried) - likely(self.blocks, self.sound)
+        return gain + fault.presumed + _by_scale(self.blocks, tried, self.sound)
+
+    @property
+    def leading(self) -> tuple[_Fault, Tried]:
+        """The fault that gains most, and its circuit."""
+        return max(self.faulty, key=lambda one: self.gain(*one) - one[0].beyond)
+
+    @property
+    def delivered(self) -> list[float]:
+        """How well pumps with each of `DELIVERIES` explain the log [dimensionless]."""
+        return [likely(self.blocks, tried) for fault, tried in self.faulty if fault.name == WORN]
+
+    @property
+    def wear(self) -> float:
+        """Log-odds of a well worn pump against a sound one."""
+        return odds_of_wear(self.delivered, likely(self.blocks, self.sound))
+
+    @property
+    def shown(self) -> Note | None:
+        """The fault that is likelier than a sound actuator."""
+        fault, tried = self.leading
+        if self.gain(fault, tried) - fault.beyond > GAIN:
+            return fault.note
+        worn = self.wear > math.log(LIKELIER)
+        return _delivering(DELIVERIES[int(np.argmax(self.delivered))]) if worn else None
+
+
 def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outside:
     """Return the fault outside the nine conditions that a log without pressure shows, and those that it leaves open.
 
@@ -153,29 +191,21 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         return Outside()
     runs = nominal_runs(blocks, actuator)
     sound = sound_circuit(blocks, fits, actuator, runs)
-    gains, likeliest, worn = dict[str, float](), dict[str, Array](), list[Tried]()
-    found: tuple[float, _Fault, Tried] | None = None
-    for fault, tried in _with_each(blocks, sound, runs):
-        gain = tried.score - sound.score + fault.presumed + _by_scale(blocks, tried, sound)
+    beside = _Beside(blocks, tuple(_with_each(blocks, sound, runs)), sound)
+    asked = list[_Fault]()
+    while beside.shown is not None and (leading := beside.leading)[0] not in asked:
+        # a search may end short of the best: the sound circuit is searched again from the faulty one, and once anew
+        starts = (leading[1].fits.best.coordinates, *(() if asked else (None,)))
+        again = [Tried(sound.actuator, fit_classes(blocks, sound.actuator, runs=runs, start=start)) for start in starts]
+        beside = replace(beside, sound=max([beside.sound, *again], key=lambda one: likely(blocks, one)))
+        asked.append(leading[0])
+    if (shown := beside.shown) is not None:
+        return Outside((shown,))
+    sound, gains, likeliest, wear = beside.sound, dict[str, float](), dict[str, Array](), beside.wear
+    for fault, tried in beside.faulty:
+        gain = beside.gain(fault, tried)
         if gain >= gains.get(fault.name, gain):
             gains[fault.name], likeliest[fault.name] = gain, tried.fits.scores
-        worn += [tried] if fault.name == WORN else []
-        if found is None or gain - fault.beyond > found[0]:
-            found = gain - fault.beyond, fault, tried
-    delivered = [one.score for one in worn]
-    wear = odds_of_wear(delivered, sound.score)
-    if found is not None and (found[0] > GAIN or wear > math.log(LIKELIER)):
-        # a search may end short of the optimum: fit the sound circuit from the faulty one's end, and anew
-        _, fault, tried = found
-        starts = (tried.fits.best.coordinates, None)
-        again = [fit_classes(blocks, sound.actuator, runs=runs, start=start) for start in starts]
-        sound = max([sound, *(Tried(sound.actuator, fits) for fits in again)], key=lambda one: one.score)
-        gains[fault.name] = tried.score - sound.score + fault.presumed + _by_scale(blocks, tried, sound)
-        if gains[fault.name] - fault.beyond > GAIN:
-            return Outside((fault.note,))
-        wear = odds_of_wear(delivered, sound.score)
-        if wear > math.log(LIKELIER):
-            return Outside((_delivering(DELIVERIES[int(np.argmax(delivered))]),))
     odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
     if WORN in odds:
         odds[WORN] = wear
@@ -190,7 +220,8 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     told = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
     above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"} if likeliest[EARLY] is best else {}
     open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
-    scores = np.array([best, *(one.fits.scores for one in worn)]) if WORN in odds else None
+    worn = [tried.fits.scores for fault, tried in beside.faulty if fault.name == WORN]
+    scores = np.array([best, *worn]) if WORN in odds else None
     return Outside((), not_excluded(open_, best), scores, sum(chances.values()))
 
 

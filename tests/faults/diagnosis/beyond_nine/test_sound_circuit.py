@@ -8,10 +8,10 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from experiments.open_benchmark.kinds import make
 from faults.diagnosis.beyond_nine import sound_circuit as subject
-from faults.diagnosis.beyond_nine.sound_circuit import WIDER, another_sound_circuit, sound_circuit
+from faults.diagnosis.beyond_nine.sound_circuit import WIDER, Tried, another_sound_circuit, likely, sound_circuit
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits import yielding
-from faults.diagnosis.circuits.class_fit import nominal_runs
+from faults.diagnosis.circuits.class_fit import LASTING, nominal_runs
 from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.diagnosis.circuits.out_of_model import unexplained
 from plant.eha.model import EhaParameters
@@ -25,6 +25,16 @@ def test_the_rig_files_circuit_has_the_best_score_for_its_own_log() -> None:
     found = sound_circuit(LOG, FITS, ACTUATOR, nominal_runs(LOG, ACTUATOR))
     assert found.score >= float(np.max(FITS.scores))
     assert found.score - float(np.max(FITS.scores)) < 1.0
+
+
+def test_circuits_that_follow_a_log_to_half_a_percent_explain_it_equally_well() -> None:
+    def tried(score: float, share: float) -> Tried:
+        best = replace(FITS.best, scales=share * LOG.sizes)
+        return Tried(ACTUATOR, replace(FITS, best=best, scores=np.full(9, score)))
+
+    gained = float(LOG.counts[0]) / LASTING * np.log(2.5)
+    assert likely(LOG, tried(gained, 0.002)) == pytest.approx(likely(LOG, tried(0.0, 0.005)), abs=1e-9)
+    assert likely(LOG, tried(3.0, 0.01)) == 3.0
 
 
 def test_another_sound_circuit_is_accepted_only_if_it_follows_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
