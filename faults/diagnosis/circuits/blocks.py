@@ -16,25 +16,14 @@ from estimation.eha.explanation_notes import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged, filled
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.dropout import long_gaps
-from estimation.log_checks.first_belief import begins_in_motion
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from faults.diagnosis.circuits.beginning import SETTLING, beginning_of
 from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.record import Record
 
 BLOCK = 0.01
 """Time over which velocity and pressure are averaged [s]."""
-
-SETTLING = 0.1
-"""Time at the start that does not count [s]: the circuit starts at rest, a log may not."""
-
-FORGOTTEN = 1.0
-"""The same for a log that begins in motion without a pressure [s]: pressure that a stuck piston holds leaks off in
-about that time, ``V / (beta L)`` of the healthy actuator."""
-
-STIRRED = 0.05
-"""First motor speed over the log's root mean square from which the log begins in motion [fraction]: a motor also passes
-through zero, and the noise of logs that begin at rest is some 0.001."""
 
 FEWEST = 8
 """Least number of blocks in a log [count]."""
@@ -48,9 +37,6 @@ RATE = 1e-3
 MOST_BLURRED = 0.01
 """Share of the speed, root mean square, that averaging may remove at edges [fraction]. With a motor that lags, sines
 lose 0.2 %, steps up to 0.6 %, and binary signals 1.3 %, which put leakage 0.3 to 1.3 % low."""
-
-LEAST_BEGUN = 0.1
-"""First pressure over the log's root mean square from which it is more than noise [fraction]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +69,8 @@ class Blocks:
         Differential pressure [Pa] and velocity [m/s] at the beginning of the log; None at rest, or if unknown.
     opening : tuple of float, or None
         The same [Pa, m/s] even if it is within noise: under a load a piston without pressure is not at rest.
+    sliding : float
+        Velocity with which a log without pressure begins [m/s]; 0 if motor or piston is at rest, and with pressure.
     place : float
         Position at the beginning of the log [m]; 0 if none is logged.
     settling : float
@@ -109,6 +97,7 @@ class Blocks:
     stop: float | None = None
     begun: tuple[float, float] | None = None
     opening: tuple[float, float] | None = None
+    sliding: float = 0.0
     place: float = 0.0
     settling: float = SETTLING
     averaged: bool = False
@@ -220,8 +209,7 @@ def blocks_of(record: Record) -> Blocks:
     blind = _with_gaps(whole["motor_speed_rad_s"], block, round(SETTLING / sample_time))
     velocity = np.where(blind | _with_gaps(whole.get("position_m"), block), np.nan, velocity)
     pressure = None if pressure is None else np.where(blind, np.nan, pressure)
-    noise, course, opening = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _opening(whole, velocity)
-    begun = opening if opening is not None and _pressed(opening[0], whole[PRESSURE]) else None
+    noise, course = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE)
     if pressure is not None and rows > 1:
         # a block holds fewer samples of pressure, and interpolated values between them add no noise
         noise[-1] = (measurement_variances(record, [PRESSURE])[PRESSURE] * rows / (block * pooled)) ** 0.5
@@ -233,12 +221,10 @@ def blocks_of(record: Record) -> Blocks:
         pressure,
         noise,
         course=course,
-        begun=begun,
-        opening=opening,
         place=_place(whole),
-        settling=_settling(record, whole),
         averaged=pooled > 1,
         differenced=_position_goes(whole),
+        **beginning_of(record, whole.get(PRESSURE), velocity)._asdict(),
     )
 
 
@@ -284,25 +270,6 @@ def _with_gaps(values: Array | None, block: int, behind: int = 0) -> NDArray[np.
     sums = np.cumsum(np.concatenate([np.zeros(behind + 1, dtype=np.intp), gone]))
     within = sums[behind + 1 :] > sums[: -behind - 1]
     return np.any(within[: (len(values) - 1) // block * block].reshape(-1, block), axis=1)
-
-
-def _settling(record: Record, whole: Mapping[str, Array]) -> float:
-    """Return the time at the start of a log that does not count [s]: a fifth of it at most."""
-    if PRESSURE in whole or not begins_in_motion(record, STIRRED):
-        return SETTLING
-    return float(np.clip(0.2 * record.duration, SETTLING, FORGOTTEN))
-
-
-def _opening(whole: Mapping[str, Array], velocity: Array) -> tuple[float, float] | None:
-    """Return pressure and velocity at the start of a log."""
-    if PRESSURE not in whole or not np.isfinite(whole[PRESSURE][0]):
-        return None
-    return float(whole[PRESSURE][0]), float(np.nan_to_num(velocity[0]))
-
-
-def _pressed(first: float, pressure: Array) -> bool:
-    """Return whether a log does not begin at rest, by its first pressure [Pa]."""
-    return abs(first) > LEAST_BEGUN * float(np.sqrt(np.nanmean(pressure**2)))
 
 
 def _place(whole: Mapping[str, Array]) -> float:

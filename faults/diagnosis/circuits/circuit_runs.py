@@ -13,6 +13,7 @@ from estimation.arrays import IntArray
 from estimation.log_checks.channel_names import PRESSURE
 from faults.diagnosis.circuits.blocks import Blocks
 from plant.arrays import Array
+from plant.components.friction import quadratic_friction
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
 from plant.eha.circuit_start import at_rest, under_pressure
 from plant.eha.model import EhaParameters
@@ -269,10 +270,15 @@ def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> A
 def _starts(blocks: Blocks, rows: Array) -> Array:
     """Return the initial states of circuits, shape (m, states): at rest, or as the log begins.
 
-    Under a load, rest is at the pressure that holds it: a log that begins at another pressure begins in motion.
+    Under a load, rest is at the pressure that holds it: a log that begins at another pressure begins in motion. A log
+    without pressure that begins in motion begins with the pressure that the circuit's own friction takes.
     """
     p = circuit_values(rows)
     begun = blocks.opening if blocks.begun is None and np.any(p.load_force) else blocks.begun
+    if blocks.sliding:
+        way, speed = np.sign(blocks.sliding), abs(blocks.sliding)
+        force = quadratic_friction(speed, 1.0, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
+        begun = (way * force + p.load_force) / p.piston_area, blocks.sliding
     states = at_rest(p) if begun is None else under_pressure(*begun, p)
     found = np.empty((len(rows), len(states)))
     for place, state in enumerate(states):

@@ -13,7 +13,8 @@ import numpy as np
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
-from faults.diagnosis.circuits.blocks import SETTLING, Blocks
+from faults.diagnosis.circuits.beginning import SETTLING
+from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import LASTING, PointFit, fit_freely, least_scales, scales_of
 from faults.diagnosis.circuits.model_doubt import NOISE_ALONE

@@ -5,7 +5,8 @@ import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.actuator import actuator_of
-from faults.diagnosis.circuits.blocks import FORGOTTEN, SETTLING, blocks_of, root_mean_square
+from faults.diagnosis.circuits.beginning import SETTLING
+from faults.diagnosis.circuits.blocks import blocks_of, root_mean_square
 from faults.diagnosis.circuits.circuit_runs import coordinates_of, parameter_rows, predicted
 from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.diagnosis.circuits.rivals import creeps
@@ -22,29 +23,10 @@ HEALTHY, PRESSURE = EhaParameters(), "differential_pressure_pa"
 def running(seconds: float, first: float) -> Record:
     """Return a part of a test under major friction that begins at a motor speed [rad/s]."""
     rng = np.random.default_rng(3)
-    speed = np.concatenate([[0.0], make_drive("steps", 12.0, 2e-3, HEALTHY, rng)])
+    speed = np.concatenate([[0.0], make_drive("steps", 16.0, 2e-3, HEALTHY, rng)])
     log = simulate(CIRCUIT, speed, 2e-3, parameters_for(CONDITIONS["major_friction"]), sensors=RIG, rng=rng)
     place = int(np.argmin(np.abs(log["motor_speed_rad_s"][1000:2000] - first))) + 1000 if first else 0
     return log.slice(place, place + round(seconds / 2e-3))
-
-
-@pytest.mark.parametrize(
-    ("seconds", "first", "pressure", "settling"),
-    [
-        (6.0, 60.0, False, FORGOTTEN),
-        (3.0, 60.0, False, 0.6),
-        (6.0, 0.0, False, SETTLING),
-        (6.0, 60.0, True, SETTLING),
-    ],
-)
-def test_without_pressure_a_log_that_begins_in_motion_has_a_longer_settling_time(
-    seconds: float, first: float, pressure: bool, settling: float
-) -> None:
-    log = running(seconds, first)
-    blocks = blocks_of(log if pressure else log.replace(**{PRESSURE: None}))
-    assert blocks.settling == pytest.approx(settling, rel=2e-3)
-    assert blocks.first == round(blocks.settling / 0.01)
-    assert len(blocks.seen) == len(blocks.velocity) - blocks.first
 
 
 def test_a_circuit_started_at_rest_follows_a_running_log_after_the_settling_time() -> None:

@@ -149,6 +149,20 @@ def test_a_circuit_starts_under_pressure_if_its_log_does() -> None:
     assert at_rest > 0.3
 
 
+def test_without_pressure_a_circuit_starts_with_the_pressure_of_its_own_friction() -> None:
+    p = parameters_for(CONDITIONS["major_friction"])
+    run = simulate(CIRCUIT, np.repeat([100.0, -20.0, 0.0, 15.0], 400), 1e-3, p)
+    blocks = blocks_of(run.slice(350, len(run)).replace(differential_pressure_pa=None))
+    rows = parameter_rows(coordinates_of(circuit_of(p), ACTUATOR.rated)[None], ACTUATOR.circuit, ACTUATOR.rated)
+    assert blocks.sliding == blocks.velocity[0]
+    left, at_rest = (
+        np.sqrt(np.mean((velocity_of(one, rows) - one.velocity)[:20] ** 2)) / abs(blocks.sliding)
+        for one in (blocks, replace(blocks, sliding=0.0))
+    )
+    assert left < 0.05
+    assert at_rest > 0.2
+
+
 def test_a_circuit_under_a_load_starts_at_the_position_and_spring_force_of_its_log() -> None:
     still, area = np.zeros(81 * 10), ACTUATOR.circuit.piston_area
     blocks = Blocks(still, 1e-3, 10, np.zeros(80), np.zeros(80), np.ones(2))

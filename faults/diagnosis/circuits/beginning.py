@@ -1,0 +1,82 @@
+"""`beginning_of(record, pressure, velocity) -> Beginning`: with what a log begins, and what of it does not count.
+
+A circuit starts with both chambers at the accumulator's pressure, but for a differential pressure. A log that begins in
+motion may have oil shut in on both sides.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.log_checks.first_belief import begins_in_motion
+from plant.arrays import Array
+from plant.log.record import Record
+
+SETTLING = 0.1
+"""Time at the start that does not count [s]: the circuit starts at rest, a log may not."""
+
+FORGOTTEN = 1.0
+"""The same if the motor turns as a log without pressure begins, a fifth of the log at most [s]: pressure that a stuck
+piston holds leaks off in about that time, ``V / (beta L)`` of the healthy actuator."""
+
+REFILLED = 3.0
+"""The same if the piston slides as well, three tenths of the log at most [s]: three times that for the oil that its
+motion has shut in."""
+
+STIRRED = 0.05
+"""First motor speed over the log's root mean square from which the log begins in motion [fraction]: a motor also passes
+through zero, and the noise of logs that begin at rest is some 0.001."""
+
+LEAST_BEGUN = 0.1
+"""First pressure over the log's root mean square from which it is more than noise [fraction]."""
+
+
+class Beginning(NamedTuple):
+    """With what a log begins.
+
+    Parameters
+    ----------
+    begun : tuple of float, or None
+        Differential pressure [Pa] and velocity [m/s]; None at rest, or if unknown.
+    opening : tuple of float, or None
+        The same [Pa, m/s] even if it is within noise: under a load a piston without pressure is not at rest.
+    sliding : float
+        Velocity with which a log without pressure begins [m/s]; 0 if motor or piston is at rest, and with pressure.
+    settling : float
+        Time at the start that does not count [s].
+    """
+
+    begun: tuple[float, float] | None
+    opening: tuple[float, float] | None
+    sliding: float
+    settling: float
+
+
+def beginning_of(record: Record, pressure: Array | None, velocity: Array) -> Beginning:
+    """Return with what a log begins.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    pressure : ndarray, shape (samples,), or None
+        Differential pressure [Pa]; None without.
+    velocity : ndarray, shape (n,)
+        Mean velocity over blocks [m/s]; NaN where unknown.
+
+    Returns
+    -------
+    Beginning
+        At rest if nothing says otherwise.
+    """
+    first = float(np.nan_to_num(velocity[0]))
+    if pressure is not None:
+        opening = (float(pressure[0]), first) if np.isfinite(pressure[0]) else None
+        pressed = opening is not None and abs(opening[0]) > LEAST_BEGUN * float(np.sqrt(np.nanmean(pressure**2)))
+        return Beginning(opening if pressed else None, opening, 0.0, SETTLING)
+    if not begins_in_motion(record, STIRRED):
+        return Beginning(None, None, 0.0, SETTLING)
+    slides = abs(first) > STIRRED * float(np.sqrt(np.nanmean(velocity**2)))
+    share, most = (0.3, REFILLED) if slides else (0.2, FORGOTTEN)
+    settling = float(np.clip(share * record.duration, SETTLING, most))
+    return Beginning(None, None, first if slides else 0.0, settling)
