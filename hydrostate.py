@@ -95,9 +95,9 @@ _refuse_shadows()
 from experiments.python_user.answers import Answer, Model, no_such, refuse  # noqa: E402 - after the check
 from experiments.python_user.log import Log, known_options  # noqa: E402 - likewise
 from experiments.python_user.python_words import options_by_name  # noqa: E402 - likewise
-from plant.lazy import lazily  # noqa: E402 - likewise
+from plant.lazy import lazy_getattr  # noqa: E402 - likewise
 
-_late = lazily("hydrostate", __file__)
+_late = lazy_getattr("hydrostate", __file__)
 
 
 def __getattr__(name: str) -> Any:
@@ -302,12 +302,12 @@ def simulate(
     HydrostateError
         If the condition or an option is unknown or not usable.
     """
-    from experiments.actuators import actuator, offered
+    from experiments.actuators import actuator, verb_of_kind
 
     with options_by_name():
         kind = actuator(plant)
     bench = _rig(rig, kind)
-    simulation = offered(kind, "simulate")
+    simulation = verb_of_kind(kind, "simulate")
     if condition is not None:
         options["condition" if "condition" in simulation.options else "fault"] = condition
     asked = {**simulation.options, **known_options(options, simulation.options, "simulate")}

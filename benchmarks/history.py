@@ -25,11 +25,11 @@ from benchmarks.targets import Check
 HISTORY = Path(__file__).with_name("history.jsonl")
 """File of the figures, one on each line."""
 
-NOTICED = 0.25
+REPORTED_CHANGE = 0.25
 """Change for the worse that is always reported, as a share of the earlier median. Two shared cores scatter by some 10
 %."""
 
-SCATTERS = 3.0
+SCATTER_FACTOR = 3.0
 """Number of median absolute deviations of the earlier figures that a change must also exceed [dimensionless]."""
 
 
@@ -100,8 +100,8 @@ def regression(checks: Sequence[Check]) -> str | None:
     """Describe how the newest figure is worse than the earlier ones, or return None.
 
     A figure is worse if it misses a range that the previous figure met. A figure with one limit is also worse if it
-    moved towards that limit by more than `NOTICED` of the earlier median and more than `SCATTERS` of the earlier
-    scatter.
+    moved towards that limit by more than `REPORTED_CHANGE` of the earlier median and more than `SCATTER_FACTOR` of the
+    earlier scatter.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def regression(checks: Sequence[Check]) -> str | None:
     middle = median(check.value for check in before)
     scatter = median(abs(check.value - middle) for check in before)
     worse = (last.value - middle) * (1.0 if isfinite(last.most) else -1.0)
-    if worse <= max(NOTICED * abs(middle), SCATTERS * scatter):
+    if worse <= max(REPORTED_CHANGE * abs(middle), SCATTER_FACTOR * scatter):
         return None
     share = f"worse by {100.0 * worse / abs(middle):.0f} %" if middle else "worse"
     return f"{share}: {last.value:.4g}, {middle:.4g} before"

@@ -45,26 +45,26 @@ kept: list[Check] = []
 """Every figure since the benchmarks began, for the history."""
 
 
-def keep(check: Check) -> Check:
+def keep_figure(check: Check) -> Check:
     """Keep a figure for the history, without printing it."""
     kept.append(check)
     return check
 
 
-def printed(checks: list[Check]) -> list[Check]:
+def print_and_keep(checks: list[Check]) -> list[Check]:
     """Print figures, keep them for the history, and return them."""
-    print("\n".join(str(keep(check)) for check in checks), flush=True)
+    print("\n".join(str(keep_figure(check)) for check in checks), flush=True)
     return checks
 
 
-def say(what: str, value: float, bound: float, *, most: bool = True) -> None:
+def check_target(what: str, value: float, bound: float, *, most: bool = True) -> None:
     """Print a figure with its target, and record a miss."""
-    [check] = printed([Check(what, value, most=bound) if most else Check(what, value, least=bound)])
+    [check] = print_and_keep([Check(what, value, most=bound) if most else Check(what, value, least=bound)])
     if not check.met:
         misses.append(what)
 
 
-def timed(work: Callable[[], T]) -> tuple[float, T]:
+def processor_time(work: Callable[[], T]) -> tuple[float, T]:
     """Return the processor time of some work [s], and its result."""
     start = time.process_time()
     found = work()

@@ -29,7 +29,7 @@ run_filter             run_filter(METHODS["ekf"], FORMS["pressure"], prior, reco
 
 from typing import TYPE_CHECKING
 
-from plant.lazy import lazily
+from plant.lazy import lazy_getattr
 
 if TYPE_CHECKING:
     from estimation.diaphragm_motor.estimate import estimate_motor as estimate_motor
@@ -54,4 +54,4 @@ if TYPE_CHECKING:
     from estimation.trust.consistency import consistency_gate as consistency_gate
     from estimation.trust.consistency import nees as nees
 
-__getattr__ = lazily(__name__, __file__)
+__getattr__ = lazy_getattr(__name__, __file__)

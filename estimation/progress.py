@@ -8,7 +8,7 @@ _LISTENER: ContextVar[Callable[[str], None] | None] = ContextVar("listener", def
 
 
 @contextmanager
-def listening(listener: Callable[[str], None]) -> Generator[None]:
+def reporting_to(listener: Callable[[str], None]) -> Generator[None]:
     """Report to a listener what is tried within a block.
 
     Parameters
@@ -19,9 +19,9 @@ def listening(listener: Callable[[str], None]) -> Generator[None]:
     Examples
     --------
     >>> heard = list[str]()
-    >>> with listening(heard.append):
-    ...     tell("linear models")
-    >>> tell("nobody listens")
+    >>> with reporting_to(heard.append):
+    ...     report_progress("linear models")
+    >>> report_progress("nobody listens")
     >>> heard
     ['linear models']
     """
@@ -32,7 +32,7 @@ def listening(listener: Callable[[str], None]) -> Generator[None]:
         _LISTENER.reset(token)
 
 
-def tell(what: str) -> None:
+def report_progress(what: str) -> None:
     """Report what is tried next, if there is a listener.
 
     Parameters

@@ -15,7 +15,7 @@ main          main()
 
 from typing import TYPE_CHECKING
 
-from plant.lazy import lazily
+from plant.lazy import lazy_getattr
 
 if TYPE_CHECKING:
     from experiments.actuator_kind import ActuatorKind as ActuatorKind
@@ -26,4 +26,4 @@ if TYPE_CHECKING:
     from experiments.python_user.answers import Answer as Answer
     from experiments.python_user.log import Log as Log
 
-__getattr__ = lazily(__name__, __file__)
+__getattr__ = lazy_getattr(__name__, __file__)

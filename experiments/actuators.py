@@ -46,7 +46,7 @@ def actuator(name: str) -> "ActuatorKind":
         If there is no such kind.
     """
     if name in ACTUATORS:
-        return _loaded(name, ACTUATORS[name])
+        return _load_kind(name, ACTUATORS[name])
     for kind in actuators():
         if name == kind.name or name in kind.models:
             return kind
@@ -63,9 +63,9 @@ def actuators() -> "Iterator[ActuatorKind]":
     """Yield every kind of actuator, the project's own kinds first."""
     from importlib.metadata import entry_points  # takes 20 ms, and the project's own kinds do not need it
 
-    yield from (_loaded(name, place) for name, place in ACTUATORS.items())
+    yield from (_load_kind(name, place) for name, place in ACTUATORS.items())
     installed = {one.name: one.value for one in entry_points(group=ENTRY_POINTS)}
-    yield from (_loaded(name, place) for name, place in installed.items() if name not in ACTUATORS)
+    yield from (_load_kind(name, place) for name, place in installed.items() if name not in ACTUATORS)
 
 
 def kinds_by_columns(columns: Collection[str]) -> tuple[str, ...]:
@@ -90,19 +90,19 @@ def kinds_by_columns(columns: Collection[str]) -> tuple[str, ...]:
     >>> kinds_by_columns(["time_s", "drive_voltage_v", "position_m"])
     ('piezo-stack', 'diaphragm-motor')
     """
-    from plant.log.checks import lacking
+    from plant.log.checks import missing_required
 
-    if not lacking(_loaded(DEFAULT, ACTUATORS[DEFAULT]).required, columns):
+    if not missing_required(_load_kind(DEFAULT, ACTUATORS[DEFAULT]).required, columns):
         return (DEFAULT,)
     shared = {
         kind.name: len(kind.channels.keys() & set(columns))
         for kind in actuators()
-        if not lacking(kind.required, columns)
+        if not missing_required(kind.required, columns)
     }
     return tuple(name for name, count in shared.items() if count == max(shared.values()))
 
 
-def kind_meant(error: "NoChannelError", plant: str | None, rig: object) -> str:
+def infer_kind(error: "NoChannelError", plant: str | None, rig: object) -> str:
     """Return the kind of actuator for a log that lacks the channels of the gear-pump actuator.
 
     Parameters
@@ -130,7 +130,7 @@ def kind_meant(error: "NoChannelError", plant: str | None, rig: object) -> str:
     raise error
 
 
-def _loaded(name: str, place: str) -> "ActuatorKind":
+def _load_kind(name: str, place: str) -> "ActuatorKind":
     from plant.log.columns import know_channels
 
     module, _, attribute = place.partition(":")
@@ -162,7 +162,7 @@ def read_own_rig(path: "Path", common: "ActuatorKind") -> "Rig[Any]":
     return (common if named is None else actuator(named)).read_rig(path)
 
 
-def offered(kind: "ActuatorKind", verb: str) -> Any:
+def verb_of_kind(kind: "ActuatorKind", verb: str) -> Any:
     """Return a kind of actuator's function for a verb.
 
     Parameters

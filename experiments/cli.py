@@ -16,7 +16,7 @@ import typer
 from experiments.command.terminal import INTERRUPTED, HydrostateGroup, emit
 from plant.compiled.native.recipes import trust_sources
 
-LEFT_TO_END = 10.0
+SHUTDOWN_WAIT = 10.0
 """Longest wait for threads that still run when a command has finished [s]."""
 
 OBJECTS_AT_START = 500_000
@@ -71,7 +71,7 @@ VERBS: Mapping[str, Sequence[str]] = {
 GROUPS = {"verbs.rig": "rig", "verbs.export": "export", "open_benchmark.command": "benchmark"}
 """Modules whose verbs follow the name of a group."""
 
-ALONE = {"estimate": "verbs.estimate", "diagnose": "verbs.diagnose", "identify": "verbs.identify"}
+VERBS_LOADED_ALONE = {"estimate": "verbs.estimate", "diagnose": "verbs.diagnose", "identify": "verbs.identify"}
 """Verbs for a single log. Their module is imported alone, since importing all takes a twentieth of a short run."""
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> Any:
     if name != "app":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return _whole()
+    return _full_app()
 
 
 def _show_version(wanted: bool) -> None:
@@ -102,7 +102,7 @@ def _root(
     del shown
 
 
-def _of(verbs: Mapping[str, Sequence[str]]) -> typer.Typer:
+def _app_of_verbs(verbs: Mapping[str, Sequence[str]]) -> typer.Typer:
     """Return the command line with the verbs of some modules, under their headings."""
     made = typer.Typer(
         name="hydrostate",
@@ -126,14 +126,14 @@ def _of(verbs: Mapping[str, Sequence[str]]) -> typer.Typer:
 
 
 @cache
-def _whole() -> typer.Typer:
-    return _of(VERBS)
+def _full_app() -> typer.Typer:
+    return _app_of_verbs(VERBS)
 
 
 def app_for(words: Sequence[str]) -> typer.Typer:
     """Return a command line that includes the verb that was typed."""
-    alone = ALONE.get(words[0]) if words else None
-    return _whole() if alone is None else _of({"": [alone]})
+    alone = VERBS_LOADED_ALONE.get(words[0]) if words else None
+    return _full_app() if alone is None else _app_of_verbs({"": [alone]})
 
 
 def _with_streams() -> None:
@@ -157,7 +157,7 @@ def main() -> None:
     os.environ["MPLBACKEND"] = "agg"  # figures go to files; a backend set by a notebook would fail here
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
-    if ALONE.keys() & set(sys.argv[1:2]):
+    if VERBS_LOADED_ALONE.keys() & set(sys.argv[1:2]):
         from experiments.command.memory import keep_freed_memory
 
         keep_freed_memory()
@@ -171,7 +171,7 @@ def main() -> None:
             raise
         for thread in threading.enumerate():
             if thread is not threading.current_thread() and not thread.daemon:
-                thread.join(LEFT_TO_END)  # otherwise destructors in libraries would abort the process
+                thread.join(SHUTDOWN_WAIT)  # otherwise destructors in libraries would abort the process
         atexit._run_exitfuncs()  # pyright: ignore[reportPrivateUsage]  as the interpreter would
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):

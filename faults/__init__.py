@@ -22,7 +22,7 @@ watch_record        watch_record(record, EhaParameters())
 
 from typing import TYPE_CHECKING
 
-from plant.lazy import lazily
+from plant.lazy import lazy_getattr
 
 if TYPE_CHECKING:
     from faults.conditions import CONDITIONS as CONDITIONS
@@ -40,4 +40,4 @@ if TYPE_CHECKING:
     from faults.piezo_stack.faults import STACK_FAULTS as STACK_FAULTS
     from faults.watch.watch import watch_record as watch_record
 
-__getattr__ = lazily(__name__, __file__)
+__getattr__ = lazy_getattr(__name__, __file__)

@@ -169,12 +169,12 @@ def severity(leakage: float, friction: float, base: EhaParameters = PAPER_RIG) -
 @lru_cache(maxsize=256)
 def _at_severity(leakage: float, friction: float, base: EhaParameters) -> EhaParameters:
     """Return the actuator described by `severity`; cached, since a batch requests the same nine with every log."""
-    leaking = _changed(base, LEAKAGE_TABLE, leakage, leakage_scales(base))
-    rubbing = _changed(base, FRICTION_TABLE, friction, friction_scales(base))
+    leaking = _with_increments(base, LEAKAGE_TABLE, leakage, leakage_scales(base))
+    rubbing = _with_increments(base, FRICTION_TABLE, friction, friction_scales(base))
     return replace(base, **leaking, **rubbing)
 
 
-def _changed(
+def _with_increments(
     base: EhaParameters,
     table: Mapping[Level, LeakageLevel] | Mapping[Level, FrictionLevel],
     amount: float,

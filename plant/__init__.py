@@ -30,7 +30,7 @@ write_record              write_record(record, "run.parquet")
 
 from typing import TYPE_CHECKING
 
-from plant.lazy import lazily
+from plant.lazy import lazy_getattr
 
 if TYPE_CHECKING:
     from plant.diaphragm_motor.parameters import DiaphragmMotorParameters as DiaphragmMotorParameters
@@ -56,4 +56,4 @@ if TYPE_CHECKING:
     from plant.units import SI as SI
     from plant.units import notes as notes
 
-__getattr__ = lazily(__name__, __file__)
+__getattr__ = lazy_getattr(__name__, __file__)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 
-def lazily(package: str, file: str) -> Callable[[str], Any]:
+def lazy_getattr(package: str, file: str) -> Callable[[str], Any]:
     """Return a package's ``__getattr__`` (PEP 562), built from the imports that it makes only for type checkers.
 
     Its ``__all__`` comes from the same imports: their names.

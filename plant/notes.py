@@ -23,14 +23,14 @@ WORKSHOP: Mapping[str, float] = {
 }
 """Units that a sentence may use for a number, and their factor from SI."""
 
-WRITTEN_OUT = 1e7
+LARGEST_WRITTEN_OUT = 1e7
 """Size below which a number is written without a power of ten."""
 
 
 MOST_DECIMALS = 6
 """Largest number of decimals of a value with a half-width [count]."""
 
-UNTOLD = " ± inf"
+UNBOUNDED = " ± inf"
 """Text of a half-width that no log bounds."""
 
 
@@ -52,7 +52,7 @@ def written_out(value: float, spec: str) -> str:
     '+120000'
     """
     said, sign = format(value, spec), "+" if spec.startswith("+") else ""
-    return f"{float(said):{sign}.0f}" if "e+" in said and abs(value) < WRITTEN_OUT else said
+    return f"{float(said):{sign}.0f}" if "e+" in said and abs(value) < LARGEST_WRITTEN_OUT else said
 
 
 class _Sentence(Formatter):
@@ -76,7 +76,7 @@ _WITH_HALF_WIDTH = re.compile(r"(\{\w+:z?\.\d)[fg](\|[^}]+)?\} ± \{(\w+):\.2g(\
 """A value and its half-width, which has two significant digits."""
 
 
-def _in_step(template: str, data: Mapping[str, Any]) -> str:
+def _with_matching_decimals(template: str, data: Mapping[str, Any]) -> str:
     """Return a template in which each value has as many decimals as its half-width."""
 
     def decimals(found: re.Match[str]) -> str:
@@ -148,9 +148,11 @@ class Note:
     data: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __str__(self) -> str:
-        said = _SENTENCE.format(_in_step(self.code.template, self.data), **self.data)
+        said = _SENTENCE.format(_with_matching_decimals(self.code.template, self.data), **self.data)
         return (
-            said if UNTOLD not in said else f"{said.replace(UNTOLD, '')}; the log does not tell how far off this may be"
+            said
+            if UNBOUNDED not in said
+            else f"{said.replace(UNBOUNDED, '')}; the log does not tell how far off this may be"
         )
 
     def __repr__(self) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 LARGEST = 1 << 20
 """Size of the largest file that is read [bytes]."""
 
-_SLIPS = {
+_COMMON_MISTAKES = {
     "has a minus sign that is none of TOML, write a hyphen (-)": re.compile("[\u2212\u2013\u2014]"),
     'has quotes that are none of TOML, write "': re.compile("[\u201c\u201d\u201e\u00ab\u00bb\u2018\u2019]"),
     "has a decimal comma, write a point": re.compile(r"=\s*[-+]?\d+,\d+(?:[eE][-+]?\d+)?$"),
@@ -23,7 +23,7 @@ _SLIPS = {
 }
 """Common mistakes in a line of TOML, and the patterns that find them."""
 
-SHOWN = 120
+MOST_SHOWN = 120
 """Largest number of characters of an entry in an error [count]."""
 
 
@@ -69,28 +69,28 @@ def small_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         place = re.search(r"at line (\d+)", str(error))
-        hint = _slip(text.splitlines()[int(place[1]) - 1]) if place else ""
+        hint = _common_mistake(text.splitlines()[int(place[1]) - 1]) if place else ""
         raise ValueError(f"{error}{hint}") from error
 
 
-def _slip(line: str) -> str:
+def _common_mistake(line: str) -> str:
     """Return the mistake in an invalid line of TOML if it is a common one, else an empty text."""
     entry = line.partition("#")[0].strip()
-    slip = next((slip for slip, form in _SLIPS.items() if form.search(entry)), "")
-    return f"; {entry[:SHOWN]} {slip}" if slip else ""
+    slip = next((slip for slip, form in _COMMON_MISTAKES.items() if form.search(entry)), "")
+    return f"; {entry[:MOST_SHOWN]} {slip}" if slip else ""
 
 
-def shown(entry: object) -> str:
+def entry_text(entry: object) -> str:
     """Return an entry of a file for an error message, as it would be written; a long one is cut.
 
     Returns
     -------
     str
-        At most `SHOWN` characters.
+        At most `MOST_SHOWN` characters.
 
     Examples
     --------
-    >>> shown("x"), len(shown("x" * 5000))
+    >>> entry_text("x"), len(entry_text("x" * 5000))
     ("'x'", 120)
     """
-    return repr(entry)[:SHOWN]
+    return repr(entry)[:MOST_SHOWN]

@@ -25,7 +25,7 @@ def spare_processors() -> int:
     return allowed - 1
 
 
-def begun(work: Callable[[], Found]) -> Callable[[], Found] | None:
+def start_if_idle(work: Callable[[], Found]) -> Callable[[], Found] | None:
     """Start work that may be needed later, if a processor is idle.
 
     Parameters
@@ -40,7 +40,7 @@ def begun(work: Callable[[], Found]) -> Callable[[], Found] | None:
 
     Examples
     --------
-    >>> waiting = begun(lambda: 6 * 7)
+    >>> waiting = start_if_idle(lambda: 6 * 7)
     >>> waiting is None or waiting() == 42
     True
     """
@@ -52,7 +52,7 @@ def begun(work: Callable[[], Found]) -> Callable[[], Found] | None:
     return future.result
 
 
-def each(run: Callable[[Case], Found], cases: Iterable[Case]) -> list[Found]:
+def map_cases(run: Callable[[Case], Found], cases: Iterable[Case]) -> list[Found]:
     """Return the results of independent cases, in their order; idle processors take part.
 
     Parameters
@@ -64,7 +64,7 @@ def each(run: Callable[[Case], Found], cases: Iterable[Case]) -> list[Found]:
 
     Examples
     --------
-    >>> each(abs, [-2, 3])
+    >>> map_cases(abs, [-2, 3])
     [2, 3]
     """
     waiting = list(cases)

@@ -264,10 +264,10 @@ def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
         if of != wanted:
             raise ValueError(f"unit {unit!r} does not convert to {wanted!r}")
         return factor, 0.0
-    return by_pint(unit, name, wanted)
+    return pint_conversion(unit, name, wanted)
 
 
-def by_pint(unit: str, name: str, wanted: str) -> tuple[float, float]:
+def pint_conversion(unit: str, name: str, wanted: str) -> tuple[float, float]:
     """Return the result of `conversion_to` for any unit that Pint knows.
 
     Parameters

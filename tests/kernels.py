@@ -20,7 +20,7 @@ from plant.compiled.native.load import load_native
 from plant.compiled.native.loops import Loop
 from plant.compiled.native.recipes import PACKAGES
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import bare_text, kernel_text, pasted
+from plant.compiled.paste import bare_text, functions_text, kernel_text
 from plant.compiled.source import lines_source
 
 
@@ -138,7 +138,7 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "ratios": lambda a, b: [x / y for x, y in zip(a, b, strict=True)],
     "roots": lambda values: [math.sqrt(x) for x in values],
 }
-"""The operations that lines may call (`plant.compiled.source.CALLED`), on floats."""
+"""The operations that lines may call (`plant.compiled.source.CALLED_OPERATIONS`), on floats."""
 
 
 def in_python(lines: FunctionType) -> Callable[..., Any]:
@@ -172,7 +172,9 @@ def stepped(
     """Return what named lines compute for 8 numbers each, ``width`` at a time, without outputs that are all NaN."""
     slots = {one: 8 * i for i, one in enumerate((*given, *results))}
     step = f"SLOTS = {slots}\n\nstep = stepping(SLOTS, {width}, {name})"
-    whole = kernel_text(f"{name}, {width} at a time", text, step, pasted(every_lane, constants={"WIDTH": width}))
+    whole = kernel_text(
+        f"{name}, {width} at a time", text, step, functions_text(every_lane, constants={"WIDTH": width})
+    )
     kernel = load_native(f"stepped_{name}", whole, {"every_lane": signature_of(every_lane)})
     work = np.concatenate([*given.values(), np.full(8 * len(results), np.nan)])
     kernel.every_lane(work)

@@ -19,19 +19,19 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from benchmarks.targets import Check, keep
+from benchmarks.targets import Check, keep_figure
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import NORMAL_95
 from experiments.open_benchmark.kinds import make
-from experiments.open_benchmark.logger import PLAIN
-from experiments.running.executors import side_by_side
+from experiments.open_benchmark.logger import PLAIN_CHANNELS
+from experiments.running.executors import map_in_parallel
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.severity import severities_at
-from faults.eha.inject import spread
+from faults.eha.inject import varied_actuator
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -43,7 +43,7 @@ from plant.sensors.sensors import BENCH
 
 HEALTHY = EhaParameters()
 
-OPEN = "open benchmark"
+OPEN_BENCHMARK = "open benchmark"
 """Name of the plant that is not ours."""
 
 DRIVES = ("steps", "prbs")
@@ -57,10 +57,10 @@ SPREAD = 0.2
 DURATION = 10.0
 """Length of a log of our own plants [s]."""
 
-COVERED = (90.0, 98.0)
+WANTED_COVERAGE = (90.0, 98.0)
 """Required coverage on each line [%]."""
 
-WIDTH = (0.8, 1.3)
+WANTED_Z = (0.8, 1.3)
 """Required root mean square of z on our own plants [dimensionless]."""
 
 
@@ -84,27 +84,27 @@ class Log(NamedTuple):
     rig: EhaParameters
 
 
-def logged(case: Case) -> Log:
+def draw_log(case: Case) -> Log:
     """Return a log of a randomly drawn actuator."""
-    if case.plant == OPEN:
-        return _foreign(case)
+    if case.plant == OPEN_BENCHMARK:
+        return _foreign_log(case)
     rng = stream(case.seed, "coverage", case.plant, case.drive, case.condition, case.rate)
     known = ("piston_area", "pump_displacement", "chamber_volume", "moving_mass")
-    rig = replace(HEALTHY, **{name: getattr(HEALTHY, name) * _about_one(RIG_SPREAD, rng) for name in known})
+    rig = replace(HEALTHY, **{name: getattr(HEALTHY, name) * _factor_near_one(RIG_SPREAD, rng) for name in known})
     faulty = parameters_for(CONDITIONS[case.condition], rig)
-    true = spread(faulty, rng, SPREAD, SPREAD, SPREAD)
+    true = varied_actuator(faulty, rng, SPREAD, SPREAD, SPREAD)
     if case.plant == CIRCUIT.name:
         circuit = circuit_of(true)
-        true = replace(circuit, presliding_displacement=circuit.presliding_displacement * _about_one(SPREAD, rng))
+        true = replace(circuit, presliding_displacement=circuit.presliding_displacement * _factor_near_one(SPREAD, rng))
     drive = make_drive(case.drive, DURATION, 1.0 / case.rate, rig, rng)
     return Log(simulate(PLANTS[case.plant], drive, 1.0 / case.rate, true, sensors=BENCH, rng=rng), true, rig)
 
 
-def _about_one(width: float, rng: np.random.Generator) -> float:
+def _factor_near_one(width: float, rng: np.random.Generator) -> float:
     return float(rng.uniform(1.0 - width, 1.0 + width))
 
 
-def _foreign(case: Case) -> Log:
+def _foreign_log(case: Case) -> Log:
     made = make("plain", "validation", case.seed)
     logger = replace(made.setup.logger, sample_time=1.0 / case.rate)
     log = logger.log(made.states, stream(case.seed, "coverage", case.plant, case.rate))
@@ -118,13 +118,13 @@ def _foreign(case: Case) -> Log:
         friction_linear=machine.linear,
         friction_coulomb=machine.coulomb,
     )
-    return Log(Record(1.0 / case.rate, {name: log[name].to_numpy() for name in PLAIN}), true, HEALTHY)
+    return Log(Record(1.0 / case.rate, {name: log[name].to_numpy() for name in PLAIN_CHANNELS}), true, HEALTHY)
 
 
-def asked(case: Case) -> list[dict[str, object]]:
+def quantity_rows(case: Case) -> list[dict[str, object]]:
     """Return one row for each quantity of a log: its z, and why it has no usable interval, if so."""
     warnings.simplefilter("ignore")
-    log = logged(case)
+    log = draw_log(case)
     try:
         found = list(_severities(log) if case.form == "severities" else _bulk_modulus(case, log))
     except HydrostateError as error:
@@ -154,7 +154,7 @@ def _severities(log: Log) -> Iterator[tuple[str, float, str]]:
             yield name, NORMAL_95 * (2.0 * exact[name] - low - high) / (low - high), ""
 
 
-def summarised(rows: pd.DataFrame) -> pd.DataFrame:
+def summarise(rows: pd.DataFrame) -> pd.DataFrame:
     """Return a line for each plant, form, rate and quantity."""
     lines: list[dict[str, object]] = []
     for key, part in rows.groupby(["plant", "form", "rate", "quantity"], sort=False):
@@ -182,7 +182,7 @@ def cases_of(options: argparse.Namespace) -> list[Case]:
     forms = ["flow", *(["severities"] if options.severities else [])]
     cases: list[Case] = []
     for plant, rate in product(options.plants, options.rates):
-        if plant == OPEN:
+        if plant == OPEN_BENCHMARK:
             cases += [Case(plant, form, rate, "", "", seed) for form in forms for seed in range(9 * options.seeds)]
             continue
         # the pressure form is equation 5.8, which describes the lumped plant
@@ -199,24 +199,32 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=2, help="logs a condition; 20 is the acceptance")
     parser.add_argument("--rates", type=int, nargs="+", default=[1000, 10000], help="samples a second")
-    parser.add_argument("--plants", nargs="+", choices=["lumped", "circuit", OPEN], default=["lumped", "circuit", OPEN])
+    parser.add_argument(
+        "--plants",
+        nargs="+",
+        choices=["lumped", "circuit", OPEN_BENCHMARK],
+        default=["lumped", "circuit", OPEN_BENCHMARK],
+    )
     parser.add_argument("--pressure", action="store_true", help="also by the pressure form, which takes longer")
     parser.add_argument("--severities", action="store_true", help="also those of a diagnosis")
     parser.add_argument("--rows", help="CSV file for a row a quantity of each log")
     options = parser.parse_args(arguments)
-    rows = pd.DataFrame([row for some in side_by_side(asked, cases_of(options)) for row in some])
+    rows = pd.DataFrame([row for some in map_in_parallel(quantity_rows, cases_of(options)) for row in some])
     if options.rows:
         rows.to_csv(options.rows, index=False)
-    table = summarised(rows)
+    table = summarise(rows)
     print(table.to_string(index=False, float_format="%.2f"))
     missed = 0
     for line in table.to_dict("records"):
         which = f"{line['plant']}, {line['form']} form, {line['rate']} Hz, {line['quantity']}"
-        keep(Check(f"{which}: coverage [%]", line["covered_%"], *COVERED))
-        fits = COVERED[0] <= line["covered_%"] <= COVERED[1]
-        if line["plant"] != OPEN:
-            keep(Check(f"{which}: z", line["z"], *WIDTH))
-            fits = fits and WIDTH[0] <= line["z"] <= WIDTH[1]
+        keep_figure(Check(f"{which}: coverage [%]", line["covered_%"], *WANTED_COVERAGE))
+        fits = WANTED_COVERAGE[0] <= line["covered_%"] <= WANTED_COVERAGE[1]
+        if line["plant"] != OPEN_BENCHMARK:
+            keep_figure(Check(f"{which}: z", line["z"], *WANTED_Z))
+            fits = fits and WANTED_Z[0] <= line["z"] <= WANTED_Z[1]
         missed += not fits
-    print(f"\noutside {COVERED[0]:g} to {COVERED[1]:g} %, or of z on our own plants {WIDTH[0]} to {WIDTH[1]}: {missed}")
+    print(
+        f"\noutside {WANTED_COVERAGE[0]:g} to {WANTED_COVERAGE[1]:g} %, or of z on our own plants {WANTED_Z[0]} to "
+        f"{WANTED_Z[1]}: {missed}"
+    )
     return missed

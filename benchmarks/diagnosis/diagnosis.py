@@ -14,18 +14,18 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.diagnosis.diagnosis_checks import (
-    PAPER,
+    PAPER_RIG,
+    coverage_by_severity,
     foreign_checks,
     limit_checks,
     onset_checks,
     speed_checks,
     stuck_checks,
-    told,
     unknown_checks,
 )
-from benchmarks.diagnosis.population import TEST, Drawn, draw_logs
+from benchmarks.diagnosis.population import TEST, DrawnLog, draw_logs
 from benchmarks.diagnosis.scores import calibration_error, share_interval
-from benchmarks.targets import Check, printed
+from benchmarks.targets import Check, print_and_keep
 from estimation.finding import Finding
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
@@ -45,10 +45,10 @@ LUMPED_SEEDS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class DiagnosedLog:
     """One log of the population, diagnosed."""
 
-    log: Drawn
+    log: DrawnLog
     found: Finding
     covered: Mapping[str, bool]
 
@@ -64,42 +64,45 @@ def main(arguments: list[str]) -> int:
 
     for pressure, wanted in ((True, 98.0), (False, 94.0)):
         began = time.process_time()
-        judged = list(judge(draw_logs(range(TEST, TEST + options.seeds)), actuator, pressure=pressure))
-        print(f"\n{len(judged)} logs {which(pressure)}, {(time.process_time() - began) / len(judged):.3f} CPU s each")
+        judged = list(diagnose_logs(draw_logs(range(TEST, TEST + options.seeds)), actuator, pressure=pressure))
+        seconds = (time.process_time() - began) / len(judged)
+        print(f"\n{len(judged)} logs {log_set_name(pressure)}, {seconds:.3f} CPU s each")
         print(confusions(judged).to_string())
-        checks += printed(population_checks(judged, which(pressure), wanted))
+        checks += print_and_keep(population_checks(judged, log_set_name(pressure), wanted))
     for pressure in (True, False):
-        checks += printed(other_circuits(actuator, seeds=max(1, options.seeds // 5), pressure=pressure))
+        checks += print_and_keep(other_circuits(actuator, seeds=max(1, options.seeds // 5), pressure=pressure))
     if options.draws:
-        checks += printed(limit_checks(seeds=max(2, options.seeds // 4), draws=options.draws))
-    checks += printed(onset_checks(seeds=max(1, options.seeds // 10)))
-    checks += printed(unknown_checks(seeds=max(1, options.seeds // 25)))
-    checks += printed(foreign_checks(actuator))
-    checks += printed(stuck_checks())
-    checks += printed(speed_checks())
+        checks += print_and_keep(limit_checks(seeds=max(2, options.seeds // 4), draws=options.draws))
+    checks += print_and_keep(onset_checks(seeds=max(1, options.seeds // 10)))
+    checks += print_and_keep(unknown_checks(seeds=max(1, options.seeds // 25)))
+    checks += print_and_keep(foreign_checks(actuator))
+    checks += print_and_keep(stuck_checks())
+    checks += print_and_keep(speed_checks())
     short = sum(not check.met for check in checks)
     print(f"{short} of {len(checks)} fall short")
     return short
 
 
-def which(pressure: bool) -> str:
+def log_set_name(pressure: bool) -> str:
     """Return the name of a set of logs."""
     return "with dp" if pressure else "without dp"
 
 
-def judge(logs: Iterable[Drawn], actuator: Actuator, *, pressure: bool) -> Iterable[Judged]:
+def diagnose_logs(logs: Iterable[DrawnLog], actuator: Actuator, *, pressure: bool) -> Iterable[DiagnosedLog]:
     """Diagnose logs and compare the results with the truth."""
     for log in logs:
         record = log.record if pressure else log.record.replace(**{PRESSURE: None})
-        found = diagnose_log(record, PAPER)
+        found = diagnose_log(record, PAPER_RIG)
         true = severities_at(coordinates_of(log.parameters, actuator.rated), actuator)
-        yield Judged(log, found, told(found, true))
+        yield DiagnosedLog(log, found, coverage_by_severity(found, true))
 
 
 def other_circuits(actuator: Actuator, seeds: int, *, pressure: bool) -> list[Check]:
     """Return accuracy and coverage on circuits of a different kind from the fitted one."""
-    judged = list(judge(draw_logs(range(TEST + 300, TEST + 300 + seeds), like=False), actuator, pressure=pressure))
-    name = f"{len(judged)} logs of other circuits {which(pressure)}"
+    judged = list(
+        diagnose_logs(draw_logs(range(TEST + 300, TEST + 300 + seeds), like=False), actuator, pressure=pressure)
+    )
+    name = f"{len(judged)} logs of other circuits {log_set_name(pressure)}"
     right = 100.0 * float(np.mean([one.found.condition == one.log.condition for one in judged]))
     covered = 100.0 * float(np.mean([list(one.covered.values()) for one in judged]))
     dated = sum(one.found.since is not None for one in judged)
@@ -110,13 +113,13 @@ def other_circuits(actuator: Actuator, seeds: int, *, pressure: bool) -> list[Ch
     ]
 
 
-def confusions(judged: list[Judged]) -> pd.DataFrame:
+def confusions(judged: list[DiagnosedLog]) -> pd.DataFrame:
     """Return the confused pairs, true against found."""
     wrong = [(one.log.condition, one.found.condition) for one in judged if one.log.condition != one.found.condition]
     return pd.DataFrame(wrong, columns=["true", "found"]).value_counts().rename("count").reset_index()
 
 
-def population_checks(judged: list[Judged], name: str, wanted: float) -> list[Check]:
+def population_checks(judged: list[DiagnosedLog], name: str, wanted: float) -> list[Check]:
     """Return accuracy, calibration, coverage and false flags of the population."""
     truths = [one.log.condition for one in judged]
     right = np.array([one.found.condition == true for one, true in zip(judged, truths, strict=True)])
@@ -145,7 +148,7 @@ def population_checks(judged: list[Judged], name: str, wanted: float) -> list[Ch
     return checks
 
 
-def lumped_accuracy(judged: list[Judged], name: str) -> float:
+def lumped_accuracy(judged: list[DiagnosedLog], name: str) -> float:
     """Return the share of logs for which the true condition's lumped model has the smallest error."""
     bank = mathematical_bank(EhaParameters())
     some = [one.log for one in judged if int(one.log.record.metadata["seed"]) < TEST + LUMPED_SEEDS]

@@ -25,10 +25,10 @@ from estimation.finding import Finding
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
-from faults.diagnosis.circuits.circuit_runs import coordinates_of, predicted
+from faults.diagnosis.circuits.circuit_runs import coordinates_of, predicted_outputs
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.severity import severities_at
-from faults.eha.inject import abrupt
+from faults.eha.inject import abrupt_fault
 from plant.arrays import Array
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -41,17 +41,17 @@ from plant.solvers.steps import parameter_row
 
 PRESSURE = "differential_pressure_pa"
 
-WIDE = 0.2
+WIDE_SPREAD = 0.2
 """Spread at which the limit is computed [dimensionless]."""
 
-PAPER = Rig(EhaParameters())
+PAPER_RIG = Rig(EhaParameters())
 """The paper's rig, which a user without a rig file gets."""
 
 CHUNK = 64
 """Number of draws simulated at a time."""
 
 
-def told(found: Finding, true: Mapping[str, float]) -> dict[str, bool]:
+def coverage_by_severity(found: Finding, true: Mapping[str, float]) -> dict[str, bool]:
     """Return, for each severity with an interval, whether the interval covers the true value."""
     names = [name for name, one in found.severities.items() if name in true and one.ci95 is not None]
     return {name: found.severities[name].covers(true[name]) for name in names if name != "entrained_air"}
@@ -64,13 +64,13 @@ def limit_checks(seeds: int, draws: int) -> list[Check]:
         rng = np.random.default_rng([TEST, which, 20])
         speed = make_drive(drive, DURATION, SAMPLE_TIME, EhaParameters(), rng)
         truths = [name for _ in range(seeds) for name in CONDITIONS]
-        actuators = [draw_parameters(name, rng, WIDE) for name in truths]
+        actuators = [draw_parameters(name, rng, WIDE_SPREAD) for name in truths]
         records = simulate_each(CIRCUIT, speed, SAMPLE_TIME, actuators, sensors=RIG, rngs=rng.spawn(len(truths)))
         logs = [blocks_of(record) for record in records]
         for name, found in marginal_choices(logs, speed, draws, np.random.default_rng([TRAINING, which])).items():
             for record, true, best in zip(records, truths, found, strict=True):
                 seen = record if name == "with dp" else record.replace(**{PRESSURE: None})
-                rights[name].append((diagnose_log(seen, PAPER).condition == true, best == true))
+                rights[name].append((diagnose_log(seen, PAPER_RIG).condition == true, best == true))
     checks: list[Check] = []
     for name, pairs in rights.items():
         ours, best = (100.0 * float(np.mean(each)) for each in zip(*pairs, strict=True))
@@ -89,8 +89,8 @@ def marginal_choices(logs: list[Blocks], speed: Array, draws: int, rng: np.rando
     totals = np.full((2, len(CONDITIONS), len(logs)), -np.inf)
     for c, name in enumerate(CONDITIONS):
         for begin in range(0, draws, CHUNK):
-            drawn = [draw_parameters(name, rng, WIDE) for _ in range(min(CHUNK, draws - begin))]
-            runs = predicted(driven, np.array([parameter_row(p) for p in drawn])) / noise
+            drawn = [draw_parameters(name, rng, WIDE_SPREAD) for _ in range(min(CHUNK, draws - begin))]
+            runs = predicted_outputs(driven, np.array([parameter_row(p) for p in drawn])) / noise
             apart = np.array([_squares(measured[:, :, k], runs[:, :, k]) for k in range(2)])
             for row, squares in enumerate((apart[0] + apart[1], apart[0])):
                 totals[row, c] = np.logaddexp(totals[row, c], np.logaddexp.reduce(-0.5 * squares, axis=1))
@@ -111,7 +111,7 @@ def unknown_checks(seeds: int) -> list[Check]:
     for log in draw_logs(range(TEST + 500, TEST + 500 + seeds)):
         count += 1
         for kind, changed in OUT_OF_MODEL.items():
-            flagged[kind] += diagnose_log(changed(log), PAPER).unknown
+            flagged[kind] += diagnose_log(changed(log), PAPER_RIG).unknown
     print(f"\nout of the model, flagged of {count} logs each")
     for kind in OUT_OF_MODEL:
         print(f"  {kind}: {100.0 * flagged[kind] / count:.0f} %")
@@ -142,10 +142,10 @@ def foreign_checks(actuator: Actuator) -> list[Check]:
     for pressure in (True, False):
         right, flagged, covered = 0, 0, []
         for name, true, record in foreign_logs(folder):
-            found = diagnose_log(record if pressure else record.replace(**{PRESSURE: None}), PAPER)
+            found = diagnose_log(record if pressure else record.replace(**{PRESSURE: None}), PAPER_RIG)
             right, flagged = right + (found.condition == name), flagged + found.unknown
             truth = severities_at(coordinates_of(true, actuator.rated), actuator)
-            covered += told(found, truth).values()
+            covered += coverage_by_severity(found, truth).values()
         with_or_without = "with dp" if pressure else "without dp"
         share = 100.0 * float(np.mean(covered))
         checks.append(Check(f"foreign logs {with_or_without}: class right, of 18", right, 18, 18))
@@ -165,13 +165,13 @@ def onset_checks(seeds: int) -> list[Check]:
             speed = make_drive(drive, DURATION, SAMPLE_TIME, EhaParameters(), rng)
             for name in names:
                 at = float(rng.uniform(0.2, 0.8)) * DURATION
-                path = abrupt(draw_parameters("normal", rng, 0.1), draw_parameters(name, rng, 0.1), at)
+                path = abrupt_fault(draw_parameters("normal", rng, 0.1), draw_parameters(name, rng, 0.1), at)
                 logs.append((name, at, simulate(CIRCUIT, speed, SAMPLE_TIME, path, sensors=RIG, rng=rng)))
     for pressure in (True, False):
         right, dated, held = 0, 0, 0
         late: list[float] = []
         for name, at, record in logs:
-            found = diagnose_log(record if pressure else record.replace(**{PRESSURE: None}), PAPER)
+            found = diagnose_log(record if pressure else record.replace(**{PRESSURE: None}), PAPER_RIG)
             onset = found.since
             right += found.condition == name
             if onset is not None:
@@ -192,7 +192,7 @@ def stuck_checks() -> list[Check]:
         p = draw_parameters(name, np.random.default_rng([TEST, seed]), 0.0)
         drive = make_drive("sine", DURATION, SAMPLE_TIME, p, np.random.default_rng(seed))
         record = simulate(CIRCUIT, drive, SAMPLE_TIME, p, sensors=RIG, rng=np.random.default_rng(seed))
-        found = diagnose_log(record, PAPER)
+        found = diagnose_log(record, PAPER_RIG)
         shares = found.probabilities
         level = {c: sum(v for n, v in shares.items() if CONDITIONS[n].leakage == c) for c in ("none", "minor", "major")}
         alike = [v for n, v in shares.items() if CONDITIONS[n].leakage == condition.leakage]
@@ -216,9 +216,9 @@ def speed_checks() -> list[Check]:
     for duration, sample_time, most in ((20.0, 1e-3, 0.5), (10.0, 1e-4, 2.0)):
         taken: list[float] = []
         for log in draw_logs([TEST + 900], duration=duration, sample_time=sample_time):
-            diagnose_log(log.record, PAPER)
+            diagnose_log(log.record, PAPER_RIG)
             began = time.process_time()
-            diagnose_log(log.record, PAPER)
+            diagnose_log(log.record, PAPER_RIG)
             taken.append(time.process_time() - began)
         what = f"one log of {duration:g} s at {1e-3 / sample_time:g} kHz, CPU s: median {np.median(taken):.2f}"
         checks.append(Check(f"{what}, slowest of {len(taken)}", max(taken), 0.0, most))

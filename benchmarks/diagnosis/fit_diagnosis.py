@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import hydrostate
-from benchmarks.diagnosis.population import DRIVES, TRAINING, Drawn, draw_logs
+from benchmarks.diagnosis.population import DRIVES, TRAINING, DrawnLog, draw_logs
 from experiments.open_benchmark.folders import write_set
 from experiments.open_benchmark.kinds import VERSION
 from experiments.open_benchmark.loaders import read_truth, rows_of
@@ -32,7 +32,7 @@ from faults.diagnosis.changes.onset import last_part
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.circuits.class_regions import ClassFits
-from faults.diagnosis.evidence import EVIDENCES, weigh
+from faults.diagnosis.evidence import EVIDENCES, weigh_evidence
 from faults.diagnosis.severity import UNITS, severities, severities_at
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -63,10 +63,10 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--widths", action="store_true", help="fit the widths with pressure alone")
     options = parser.parse_args(arguments)
     if options.widths:
-        return _only_widths(options.seeds, options.out)
+        return _fit_widths(options.seeds, options.out)
     modes = {"with_pressure": True, "without_pressure": False}
     with ProcessPoolExecutor(len(modes)) as pool:
-        parts = pool.map(fitted, len(modes) * [options.seeds], modes.values())
+        parts = pool.map(weights_and_widths, len(modes) * [options.seeds], modes.values())
         found: dict[str, object] = dict(zip(modes, parts, strict=True))
     for name, part in found.items():
         print(name, len(CONDITIONS) * len(DRIVES) * options.seeds * (len(POPULATIONS) + 1), "logs", part)
@@ -86,11 +86,11 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _only_widths(seeds: int, out: Path) -> int:
+def _fit_widths(seeds: int, out: Path) -> int:
     """Fit the widths with pressure and add them to the existing file; return 0."""
     actuator = actuator_of(EhaParameters())
-    ratios = _no_ratios()
-    for _, log in _training(range(TRAINING, TRAINING + seeds)):
+    ratios = _empty_ratios()
+    for _, log in _training_logs(range(TRAINING, TRAINING + seeds)):
         _add_ratios(ratios, last_part(log.record, actuator).fits, log.parameters, actuator)
     found = json.loads(out.read_text(encoding="utf-8"))
     found["with_pressure"]["widths"] = _widths(ratios)
@@ -106,9 +106,9 @@ def _only_widths(seeds: int, out: Path) -> int:
     return 0
 
 
-def fitted(seeds: int, pressure: bool) -> dict[str, dict[str, float]]:
+def weights_and_widths(seeds: int, pressure: bool) -> dict[str, dict[str, float]]:
     """Return the weights and the widths, with or without pressure."""
-    odds, truths, ratios = gathered(range(TRAINING, TRAINING + seeds), pressure=pressure)
+    odds, truths, ratios = training_data(range(TRAINING, TRAINING + seeds), pressure=pressure)
     weights = fitted_weights(odds, truths)
     return {
         "weights": dict(zip(EVIDENCES, weights.round(4).tolist(), strict=True)),
@@ -120,15 +120,15 @@ def _widths(ratios: dict[str, list[float]]) -> dict[str, float]:
     return {key: round(fitted_width(values), 3) for key, values in ratios.items()}
 
 
-def gathered(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np.int64], dict[str, list[float]]]:
+def training_data(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np.int64], dict[str, list[float]]]:
     """Return log-odds (logs, evidences, 9), true conditions, and errors divided by half-widths for each severity."""
     actuator, library = actuator_of(EhaParameters()), read_library()
     odds: list[Array] = []
     truths: list[int] = []
-    ratios = _no_ratios()
-    for weighed, log in _training(seeds):
+    ratios = _empty_ratios()
+    for weighed, log in _training_logs(seeds):
         record = log.record if pressure else log.record.replace(**{PRESSURE: None})
-        board = weigh(record, actuator, library)
+        board = weigh_evidence(record, actuator, library)
         if weighed:
             odds.append(np.array([board.log_odds[name] for name in EVIDENCES]))
             truths.append(list(CONDITIONS).index(log.condition))
@@ -136,7 +136,7 @@ def gathered(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np
     return np.array(odds), np.array(truths), ratios
 
 
-def _training(seeds: Sequence[int]) -> Iterator[tuple[bool, "Drawn | OpenLog"]]:
+def _training_logs(seeds: Sequence[int]) -> Iterator[tuple[bool, "DrawnLog | OpenLog"]]:
     """Yield each training log, and whether the weights use it."""
     for width, like in POPULATIONS:
         for log in draw_logs(seeds, width=width, like=like):
@@ -145,7 +145,7 @@ def _training(seeds: Sequence[int]) -> Iterator[tuple[bool, "Drawn | OpenLog"]]:
         yield True, log
 
 
-def _no_ratios() -> dict[str, list[float]]:
+def _empty_ratios() -> dict[str, list[float]]:
     return {name: [] for name in UNITS if name != "entrained_air"}
 
 

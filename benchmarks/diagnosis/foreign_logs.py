@@ -25,10 +25,10 @@ HEALTHY = EhaParameters()
 SAFE_PERCENT = 10.0
 """Error above which the gate must reject the estimate [%]."""
 
-Online = Callable[[Record], float]
+OnlineFilter = Callable[[Record], float]
 """Final effective bulk modulus [Pa] of an online filter, condition unknown."""
 
-ONLINE: Mapping[str, Online] = {}
+ONLINE: Mapping[str, OnlineFilter] = {}
 """Online filters by name; each adds a column and a count. The flow form's filter belongs here."""
 
 
@@ -39,13 +39,13 @@ def main(arguments: list[str]) -> int:
         print(f"skipped: no logs in {folder}")
         return 0
     bank = mathematical_bank(HEALTHY) if "--class" in arguments else None
-    warmed_up(read_record(folder / "run000.csv").slice(0, 300))
+    compile_kernels(read_record(folder / "run000.csv").slice(0, 300))
     rows: list[dict[str, object]] = []
     for truth in pd.read_csv(folder / "truth.csv", keep_default_na=False).itertuples():
         record, true = read_record(folder / str(truth.file)), float(str(truth.bulk_modulus_pa))
         row: dict[str, object] = {"file": truth.file, "leakage": truth.leakage, "friction": truth.friction}
-        row |= judged(record, true, "with")
-        row |= judged(record.replace(differential_pressure_pa=None), true, "without")
+        row |= estimate_row(record, true, "with")
+        row |= estimate_row(record.replace(differential_pressure_pa=None), true, "without")
         row |= {name: 100.0 * (online(record) / true - 1.0) for name, online in ONLINE.items()}
         if bank is not None:
             wanted = {(c.leakage, c.friction): name for name, c in CONDITIONS.items()}
@@ -53,16 +53,16 @@ def main(arguments: list[str]) -> int:
         rows.append(row)
     table = pd.DataFrame(rows)
     print(table.to_string(index=False, float_format="%.2f"))
-    return counted(table)
+    return print_counts(table)
 
 
-def warmed_up(record: Record) -> None:
+def compile_kernels(record: Record) -> None:
     """Compile every kernel, so that no timing includes compilation."""
     for log in (record, record.replace(differential_pressure_pa=None)):
         estimate_bulk_modulus(log, HEALTHY)
 
 
-def judged(record: Record, true: float, which: str) -> dict[str, object]:
+def estimate_row(record: Record, true: float, which: str) -> dict[str, object]:
     """Return error, half-width, coverage, gate and time of one estimate, in percent and seconds."""
     began = time.process_time()
     found = estimate_bulk_modulus(record, HEALTHY)
@@ -82,7 +82,7 @@ def error(found: BulkModulusEstimate, true: float) -> float:
     return float("inf") if found.value is None else 100.0 * (found.value / true - 1.0)
 
 
-def counted(table: pd.DataFrame) -> int:
+def print_counts(table: pd.DataFrame) -> int:
     """Print every count with its target; return how many fall short."""
     pressure, motion = table["with_dp_%"].abs(), table["without_dp_%"].abs()
     believed = motion[table["without_gate"] & np.isfinite(motion)]

@@ -14,10 +14,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from benchmarks.diagnosis.diagnosis_checks import PAPER
+from benchmarks.diagnosis.diagnosis_checks import PAPER_RIG
 from benchmarks.diagnosis.population import TEST, draw_logs
 from benchmarks.diagnosis.scores import calibration_error, share_interval
-from benchmarks.targets import Check, printed
+from benchmarks.targets import Check, print_and_keep
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import NORMAL_95
 from faults.diagnosis.diagnose import diagnose_log
@@ -25,7 +25,7 @@ from plant.eha.model import EhaParameters
 from plant.errors import LogWarning
 from plant.sensors.sensors import RIG, Sensors
 
-FIRST = TEST + 900
+FIRST_SEED = TEST + 900
 """First seed, separate from those of other benchmarks."""
 
 SENSORS: Mapping[str, Sensors] = MappingProxyType(
@@ -42,10 +42,10 @@ SENSORS: Mapping[str, Sensors] = MappingProxyType(
 )
 """Sensors to compare, including the rig's."""
 
-HARD = replace(RIG, position_noise=2e-4, position_quantum=2e-4, pressure_noise=1e5, speed_noise=1.0)
+HARD_SENSORS = replace(RIG, position_noise=2e-4, position_quantum=2e-4, pressure_noise=1e5, speed_noise=1.0)
 """Position to 0.2 mm, pressure to 1 bar, speed to 1 rad/s."""
 
-SURE = 0.9
+OVERCONFIDENT = 0.9
 """Probability above which a wrong class counts as overconfident [probability]."""
 
 
@@ -57,18 +57,18 @@ def main(arguments: list[str]) -> int:
     warnings.simplefilter("ignore", LogWarning)
     checks: list[Check] = []
     for name, sensors in SENSORS.items():
-        checks += moduli(name, sensors, options.seeds)
-    checks += odds(options.seeds)
+        checks += bulk_modulus_checks(name, sensors, options.seeds)
+    checks += probability_checks(options.seeds)
     short = sum(not check.met for check in checks)
     print(f"{short} of {len(checks)} fall short")
     return short
 
 
-def moduli(name: str, sensors: Sensors, seeds: int) -> list[Check]:
+def bulk_modulus_checks(name: str, sensors: Sensors, seeds: int) -> list[Check]:
     """Return the errors and coverage of bulk modulus for some sensors."""
     began = time.process_time()
     logs, passed, errors, sizes = 0, 0, list[float](), list[float]()
-    for log in draw_logs(range(FIRST, FIRST + seeds), sensors=sensors):
+    for log in draw_logs(range(FIRST_SEED, FIRST_SEED + seeds), sensors=sensors):
         found = estimate_bulk_modulus(log.record, EhaParameters())
         logs += 1
         if found.value is None or found.std is None:
@@ -84,14 +84,14 @@ def moduli(name: str, sensors: Sensors, seeds: int) -> list[Check]:
         f"{(time.process_time() - began) / logs:.2f} s CPU a log"
     )
     covered = 100.0 * float(np.mean(np.abs(z) < NORMAL_95))
-    return printed([Check(f"{name}: 95 % intervals of bulk modulus that cover, %", covered, 90.0, 100.0)])
+    return print_and_keep([Check(f"{name}: 95 % intervals of bulk modulus that cover, %", covered, 90.0, 100.0)])
 
 
-def odds(seeds: int) -> list[Check]:
+def probability_checks(seeds: int) -> list[Check]:
     """Return the calibration of class probabilities on logs that are hard to classify."""
     sure, right, unknown, silent = list[float](), list[bool](), 0, 0
-    for log in draw_logs(range(FIRST, FIRST + 2 * seeds), sensors=HARD, duration=1.0):
-        found = diagnose_log(log.record, PAPER)
+    for log in draw_logs(range(FIRST_SEED, FIRST_SEED + 2 * seeds), sensors=HARD_SENSORS, duration=1.0):
+        found = diagnose_log(log.record, PAPER_RIG)
         unknown += found.unknown
         silent += found.condition is None
         if found.condition is not None:
@@ -104,12 +104,12 @@ def odds(seeds: int) -> list[Check]:
         some = (believed >= least) & (believed < most)
         if np.any(some):
             print(f"  said {100 * np.mean(believed[some]):.0f} %: {100 * np.mean(hits[some]):.0f} % of {np.sum(some)}")
-    broken = int(np.sum(~hits & (believed > SURE)))
-    return printed(
+    broken = int(np.sum(~hits & (believed > OVERCONFIDENT)))
+    return print_and_keep(
         [
             Check("hard logs: taken for another condition, %", 100.0 * float(np.mean(~hits)), 5.0, 20.0),
             Check("hard logs: calibration error (ECE, 15 bins)", calibration_error(believed, hits), 0.0, 0.1),
-            Check(f"hard logs: wrong at over {100 * SURE:.0f} %, of {len(hits)}", broken, 0, 0.01 * len(hits)),
+            Check(f"hard logs: wrong at over {100 * OVERCONFIDENT:.0f} %, of {len(hits)}", broken, 0, 0.01 * len(hits)),
             Check("hard logs: taken for unknown, %", 100.0 * unknown / (len(hits) + silent), 0.0, 3.0),
         ]
     )

@@ -18,7 +18,7 @@ from experiments.open_benchmark.folders import write_set
 from experiments.open_benchmark.kinds import KINDS, SPLITS, VERSION, drawn_pairs
 from experiments.open_benchmark.score import coverage, score_set, summary
 
-NONE_WANTED = ("silent_beta", "silent_class", "false_unknown", "false_since")
+ZERO_COUNTS = ("silent_beta", "silent_class", "false_unknown", "false_since")
 """Counts that should be zero if pressure is logged."""
 
 USUAL_PAIRS = (
@@ -47,22 +47,22 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     print(f"open benchmark {VERSION}, {options.split if not options.folder else 'given'} sets", flush=True)
     with tempfile.TemporaryDirectory() as made:
-        rows = scored(options, Path(made))
+        rows = score_sets(options, Path(made))
     if options.rows:
         pd.DataFrame(rows).to_csv(options.rows, index=False)
     if options.coverage:
         print(coverage(rows).to_string(index=False, float_format="%.2f"))
     table = summary(rows)
-    counts = table[table["pressure"]][list(NONE_WANTED)].sum()
+    counts = table[table["pressure"]][list(ZERO_COUNTS)].sum()
     for name, count in counts.items():
         print(f"with pressure, {name}: {count} of {table['logs'][table['pressure']].sum()} (none wanted)")
     return int((counts > 0).sum())
 
 
-def scored(options: argparse.Namespace, made: Path) -> Sequence[dict[str, Any]]:
+def score_sets(options: argparse.Namespace, made: Path) -> Sequence[dict[str, Any]]:
     """Return one row for each log, and print each set's line as it is finished."""
     rows: list[dict[str, Any]] = []
-    for folder, count in sets(options, made):
+    for folder, count in log_folders(options, made):
         for pressure, logs in ((True, count), (False, min(count, options.without))):
             found = list(score_set(folder, logs, pressure=pressure))
             if found:
@@ -72,7 +72,7 @@ def scored(options: argparse.Namespace, made: Path) -> Sequence[dict[str, Any]]:
     return rows
 
 
-def sets(options: argparse.Namespace, made: Path) -> Iterator[tuple[Path, int]]:
+def log_folders(options: argparse.Namespace, made: Path) -> Iterator[tuple[Path, int]]:
     """Yield the folder of each set, made on demand, with the number of logs to score."""
     if options.folder:
         yield from ((folder, options.count) for folder in options.folder)

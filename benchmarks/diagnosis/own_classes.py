@@ -22,7 +22,7 @@ COMPONENTS = ("pump_leak", "valve_pct", "cooler_pct", "accumulator_bar")
 """Label columns: internal leakage of the pump (0 none, 1 weak, 2 severe), how far the valve switches [%], the cooler's
 efficiency [%], and the accumulator's pressure [bar]."""
 
-FALSE_UNKNOWN = 0.01
+MOST_FALSE_UNKNOWN = 0.01
 """Allowed share of runs of known classes that are called unknown [fraction]."""
 
 
@@ -74,7 +74,7 @@ def rig_verdicts(features: pd.DataFrame, labels: pd.DataFrame) -> "Mapping[str, 
     return {name: hs.Classifier().judge(features, labels[name], blocks=BLOCKS) for name in COMPONENTS}
 
 
-def found_unknown(features: pd.DataFrame, labels: pd.Series) -> dict[str, float]:
+def unknown_shares(features: pd.DataFrame, labels: pd.Series) -> dict[str, float]:
     """Return the share of each class that is called unknown by a classifier trained on only the other classes.
 
     Parameters
@@ -92,6 +92,6 @@ def found_unknown(features: pd.DataFrame, labels: pd.Series) -> dict[str, float]
     shares: dict[str, float] = {}
     for left_out in np.unique(labels):
         strange = (labels == left_out).to_numpy()
-        learnt = hs.Classifier(unknown=FALSE_UNKNOWN).fit(features[~strange], labels[~strange])
+        learnt = hs.Classifier(unknown=MOST_FALSE_UNKNOWN).fit(features[~strange], labels[~strange])
         shares[str(left_out)] = float(np.mean(learnt.predict(features[strange]) == "unknown"))
     return shares

@@ -7,8 +7,8 @@ from types import MappingProxyType
 import numpy as np
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.eha.inject import spread
-from faults.eha.physical import aerated, drifted_relief
+from faults.eha.inject import varied_actuator
+from faults.eha.physical import aerated, with_drifted_relief
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.drives import make_drive
@@ -32,7 +32,7 @@ TRAINING, TEST = 1_000_000, 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnLog:
     """One log of the population with its truth.
 
     Parameters
@@ -81,12 +81,12 @@ def draw_parameters(
     True
     """
     faulty = parameters_for(CONDITIONS[condition], EhaParameters() if rig is None else rig)
-    drawn = circuit_of(spread(faulty, rng, leakage=width, friction=width, bulk_modulus=2.0 * width))
+    drawn = circuit_of(varied_actuator(faulty, rng, leakage=width, friction=width, bulk_modulus=2.0 * width))
     factor = 1.0 + width * float(rng.uniform(-1.0, 1.0))
     return replace(drawn, presliding_displacement=factor * drawn.presliding_displacement)
 
 
-def unlike(p: CircuitParameters, rng: np.random.Generator) -> CircuitParameters:
+def other_circuit(p: CircuitParameters, rng: np.random.Generator) -> CircuitParameters:
     """Return an actuator whose circuit differs from the one that a diagnosis fits.
 
     Seals, make-up valves, motor, moving mass, accumulator and the pump's share of the leakage are drawn at random from
@@ -94,18 +94,20 @@ def unlike(p: CircuitParameters, rng: np.random.Generator) -> CircuitParameters:
 
     Examples
     --------
-    >>> other = unlike(CircuitParameters(), np.random.default_rng(0))
+    >>> other = other_circuit(CircuitParameters(), np.random.default_rng(0))
     >>> other.leakage_coefficient == CircuitParameters().leakage_coefficient, other.motor_lag == 2e-3
     (True, False)
     """
-    factors = {name: float(np.exp(rng.uniform(-np.log(most), np.log(most)))) for name, most in UNLIKE.items()}
+    factors = {
+        name: float(np.exp(rng.uniform(-np.log(most), np.log(most)))) for name, most in OTHER_CIRCUIT_FACTORS.items()
+    }
     drawn = {name: factor * getattr(p, name) for name, factor in factors.items()}
     case = float(rng.uniform(0.0, 2.0)) * p.pump_case_leakage
     within = float(rng.uniform(0.05, 0.95)) * (p.leakage_coefficient - 1.5 * case)
     return replace(p, **drawn, pump_case_leakage=case, pump_crossport_leakage=within)
 
 
-UNLIKE: Mapping[str, float] = MappingProxyType(
+OTHER_CIRCUIT_FACTORS: Mapping[str, float] = MappingProxyType(
     {
         "presliding_displacement": 4.0,
         "presliding_damping": 2.5,
@@ -115,7 +117,7 @@ UNLIKE: Mapping[str, float] = MappingProxyType(
         "accumulator_pressure": 1.5,
     }
 )
-"""Largest factors by which `unlike` multiplies or divides [dimensionless], judged: a rig file seldom states these."""
+"""Largest factors by which `other_circuit` multiplies or divides [dimensionless], judged: seldom in rig files."""
 
 
 def draw_logs(
@@ -127,7 +129,7 @@ def draw_logs(
     sensors: Sensors = RIG,
     duration: float = DURATION,
     sample_time: float = SAMPLE_TIME,
-) -> Iterator[Drawn]:
+) -> Iterator[DrawnLog]:
     """Yield nine logs, one for each condition, for every seed and drive; the nine logs of a seed share its drive.
 
     Parameters
@@ -137,7 +139,7 @@ def draw_logs(
     width : float
         Half-width of the spread [dimensionless], see `draw_parameters`.
     like : bool
-        Whether the circuits are of the kind that a diagnosis fits; if not, see `unlike`.
+        Whether the circuits are of the kind that a diagnosis fits; if not, see `other_circuit`.
     drives : sequence of str
         Names of drives.
     sensors : Sensors
@@ -155,10 +157,10 @@ def draw_logs(
             rng = np.random.default_rng([seed, which])
             speed = make_drive(drive, duration, sample_time, EhaParameters(), rng)
             actuators = [draw_parameters(name, rng, width) for name in CONDITIONS]
-            actuators = actuators if like else [unlike(p, rng) for p in actuators]
+            actuators = actuators if like else [other_circuit(p, rng) for p in actuators]
             records = simulate_each(CIRCUIT, speed, sample_time, actuators, sensors=sensors, rngs=rng.spawn(9))
             for name, parameters, record in zip(CONDITIONS, actuators, records, strict=True):
-                yield Drawn(name, parameters, record.annotate(drive=drive, seed=seed), speed)
+                yield DrawnLog(name, parameters, record.annotate(drive=drive, seed=seed), speed)
 
 
 def _faulty_sensor(record: Record, channel: str, kind: Kind, size: float = 0.0, start: float = 0.0) -> Record:
@@ -170,43 +172,46 @@ def _faulty_sensor(record: Record, channel: str, kind: Kind, size: float = 0.0, 
     return faulty.replace(velocity_m_s=velocity)
 
 
-def _share(record: Record, channel: str, share: float) -> float:
+def _share_of_peak(record: Record, channel: str, share: float) -> float:
     return share * float(np.max(np.abs(record[channel])))
 
 
 PRESSURE, SPEED, POSITION = "differential_pressure_pa", "motor_speed_rad_s", "position_m"
 
-OUT_OF_MODEL: Mapping[str, Callable[[Drawn], Record]] = MappingProxyType(
+OUT_OF_MODEL: Mapping[str, Callable[[DrawnLog], Record]] = MappingProxyType(
     {
         "pressure bias, 15 % of its peak": lambda log: _faulty_sensor(
-            log.record, PRESSURE, "bias", _share(log.record, PRESSURE, 0.15)
+            log.record, PRESSURE, "bias", _share_of_peak(log.record, PRESSURE, 0.15)
         ),
         "pressure gain, + 60 %": lambda log: _faulty_sensor(log.record, PRESSURE, "gain", 0.6),
         "pressure frozen half-way": lambda log: _faulty_sensor(
             log.record, PRESSURE, "freeze", start=0.5 * log.record.duration
         ),
         "pressure saturates at 60 %": lambda log: _faulty_sensor(
-            log.record, PRESSURE, "saturation", _share(log.record, PRESSURE, 0.6)
+            log.record, PRESSURE, "saturation", _share_of_peak(log.record, PRESSURE, 0.6)
         ),
         "speed bias, 8 % of its peak": lambda log: _faulty_sensor(
-            log.record, SPEED, "bias", _share(log.record, SPEED, 0.08)
+            log.record, SPEED, "bias", _share_of_peak(log.record, SPEED, 0.08)
         ),
         "speed gain, + 25 %": lambda log: _faulty_sensor(log.record, SPEED, "gain", 0.25),
         "speed frozen half-way": lambda log: _faulty_sensor(
             log.record, SPEED, "freeze", start=0.5 * log.record.duration
         ),
         "speed saturates at 70 %": lambda log: _faulty_sensor(
-            log.record, SPEED, "saturation", _share(log.record, SPEED, 0.7)
+            log.record, SPEED, "saturation", _share_of_peak(log.record, SPEED, 0.7)
         ),
         "encoder gain, - 30 %": lambda log: _faulty_sensor(log.record, POSITION, "gain", -0.3),
         "encoder frozen half-way": lambda log: _faulty_sensor(
             log.record, POSITION, "freeze", start=0.5 * log.record.duration
         ),
-        "air, 5 % of the oil": lambda log: _again(log, aerated(log.parameters, 0.05)),
-        "relief valve at 60 % of the pressure that the log reaches": lambda log: _again(
-            log, drifted_relief(log.parameters, _share(log.record, PRESSURE, 0.6) / log.parameters.relief_pressure)
+        "air, 5 % of the oil": lambda log: _log_of_circuit(log, aerated(log.parameters, 0.05)),
+        "relief valve at 60 % of the pressure that the log reaches": lambda log: _log_of_circuit(
+            log,
+            with_drifted_relief(
+                log.parameters, _share_of_peak(log.record, PRESSURE, 0.6) / log.parameters.relief_pressure
+            ),
         ),
-        "a foreign actuator, piston 40 % larger": lambda log: _again(
+        "a foreign actuator, piston 40 % larger": lambda log: _log_of_circuit(
             log, replace(log.parameters, piston_area=1.4 * log.parameters.piston_area)
         ),
     }
@@ -214,7 +219,7 @@ OUT_OF_MODEL: Mapping[str, Callable[[Drawn], Record]] = MappingProxyType(
 """Logs in none of the nine conditions, by kind: each function maps a log in a condition to one outside them."""
 
 
-def _again(log: Drawn, parameters: CircuitParameters) -> Record:
+def _log_of_circuit(log: DrawnLog, parameters: CircuitParameters) -> Record:
     """Return the log that another circuit would give under the same drive."""
     rng = np.random.default_rng(int(log.record.metadata["seed"]))
     return simulate(CIRCUIT, log.drive, log.record.sample_time, parameters, sensors=RIG, rng=rng)

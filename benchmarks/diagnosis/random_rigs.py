@@ -12,18 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.diagnosis.rig_draws import draw_bench, wrong_file
+from benchmarks.diagnosis.rig_draws import draw_bench, wrong_rig_file
 from benchmarks.diagnosis.scores import share_interval
-from benchmarks.targets import Check, printed
+from benchmarks.targets import Check, print_and_keep
 from estimation.finding import NORMAL_95
-from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
+from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, names_cause
 from experiments.python_user.log import Log
 from plant.eha.rig import Rig
 from plant.errors import HydrostateError, LogWarning
 
 FAILED = {"outcome": "failed"}
 
-USUAL = {"known_as_the_rig", "nothing"}
+USUAL_NOTES = {"known_as_the_rig", "nothing"}
 """Codes of notes that say nothing about the log: the limit of the total interval, and that no advice is needed."""
 
 
@@ -38,13 +38,13 @@ def main(arguments: list[str]) -> int:
     warnings.simplefilter("ignore", LogWarning)
     rows: list[dict[str, Any]] = []
     for seed in range(int(first), int(last or first) + 1):
-        rows.append(scored(seed, wrong=options.wrong, pressure=not options.without_pressure))
-        print(line_of(rows[-1]), flush=True)
-    checks = printed(summarised(rows, wrong=options.wrong))
+        rows.append(score_rig(seed, wrong=options.wrong, pressure=not options.without_pressure))
+        print(row_as_text(rows[-1]), flush=True)
+    checks = print_and_keep(print_figures(rows, wrong=options.wrong))
     return sum(not check.met for check in checks)
 
 
-def scored(seed: int, *, wrong: bool, pressure: bool) -> dict[str, Any]:
+def score_rig(seed: int, *, wrong: bool, pressure: bool) -> dict[str, Any]:
     """Return the results of both verbs for one rig, compared with its truth.
 
     Parameters
@@ -63,13 +63,13 @@ def scored(seed: int, *, wrong: bool, pressure: bool) -> dict[str, Any]:
         ``notes``, their codes; ``seconds`` of processor time.
     """
     bench = draw_bench(seed)
-    rig = Rig("drawn", wrong_file(bench.healthy, seed) if wrong else bench.healthy)
+    rig = Rig("drawn", wrong_rig_file(bench.healthy, seed) if wrong else bench.healthy)
     log, began = Log(bench.record, rig), time.process_time()
-    row = row_of(log, {"bulk_modulus": bench.true.bulk_modulus, "condition": bench.condition}, pressure=pressure)
+    row = score_log(log, {"bulk_modulus": bench.true.bulk_modulus, "condition": bench.condition}, pressure=pressure)
     return {"seed": seed, "about": bench.about, **row, "seconds": time.process_time() - began}
 
 
-def row_of(log: Log, truth: dict[str, Any], *, pressure: bool) -> dict[str, Any]:
+def score_log(log: Log, truth: dict[str, Any], *, pressure: bool) -> dict[str, Any]:
     """Return the results of both verbs for a log, compared with its truth.
 
     Parameters
@@ -84,12 +84,12 @@ def row_of(log: Log, truth: dict[str, Any], *, pressure: bool) -> dict[str, Any]
     Returns
     -------
     dict[str, Any]
-        As from `scored`, without the entries about the rig.
+        As from `score_rig`, without the entries about the rig.
     """
-    return row_of_answers(_asked(log, "estimate", pressure), _asked(log, "diagnose", pressure), truth)
+    return score_results(_verb_result(log, "estimate", pressure), _verb_result(log, "diagnose", pressure), truth)
 
 
-def row_of_answers(estimate: dict[str, Any], diagnosis: dict[str, Any], truth: dict[str, Any]) -> dict[str, Any]:
+def score_results(estimate: dict[str, Any], diagnosis: dict[str, Any], truth: dict[str, Any]) -> dict[str, Any]:
     """Return the scores of two answers.
 
     Parameters
@@ -97,12 +97,12 @@ def row_of_answers(estimate: dict[str, Any], diagnosis: dict[str, Any], truth: d
     estimate, diagnosis : dict
         Entries of the JSON contract.
     truth : dict
-        As for `row_of`.
+        As for `score_log`.
 
     Returns
     -------
     dict[str, Any]
-        As from `row_of`.
+        As from `score_log`.
     """
     modulus = truth["bulk_modulus"]
     judged = {"beta_lo": modulus, "beta_hi": modulus, "accept": truth["condition"], **truth}
@@ -111,23 +111,23 @@ def row_of_answers(estimate: dict[str, Any], diagnosis: dict[str, Any], truth: d
     if said.get("value") is not None:
         low, high = said["ci95"]
         row["z"] = 2.0 * NORMAL_95 * (said["value"] - modulus) / (high - low)
-    row["named"] = named(judged.get("named", ""), estimate, diagnosis)
+    row["named"] = names_cause(judged.get("named", ""), estimate, diagnosis)
     condition = diagnosis.get("condition")
     row["said"] = condition, (diagnosis.get("probabilities") or {}).get(condition, 0.0)
     told = (*estimate.get("notes", ()), *diagnosis.get("notes", ()))
-    row["notes"] = sorted({note["code"] for note in told} - USUAL)
+    row["notes"] = sorted({note["code"] for note in told} - USUAL_NOTES)
     row["reasons"] = [*(estimate.get("gate") or {}).get("reasons", ()), *diagnosis.get("reasons", ())]
     return row | {"failed": [one["message"] for one in (estimate, diagnosis) if one["outcome"] == "failed"]}
 
 
-def _asked(log: Log, verb: str, pressure: bool) -> dict[str, Any]:
+def _verb_result(log: Log, verb: str, pressure: bool) -> dict[str, Any]:
     try:
         return dict(getattr(log, verb)(no_pressure=not pressure).to_dict())
     except HydrostateError as error:
         return {**FAILED, "message": str(error)}
 
 
-def line_of(row: dict[str, Any]) -> str:
+def row_as_text(row: dict[str, Any]) -> str:
     """Return a row as a line of text."""
     error = "no number" if row["error"] is None else f"error {100.0 * row['error']:.2f} %, z {row['z']:.1f}"
     covers = "".join("+" if row[name] else "-" for name in ("covered", "covered_total") if row["error"] is not None)
@@ -138,7 +138,7 @@ def line_of(row: dict[str, Any]) -> str:
     return f"{row['seed']} {verdict} | {flag} {error} {covers} | {row['seconds']:.1f} s | {row['about']} | {words}"
 
 
-def summarised(rows: Sequence[dict[str, Any]], *, wrong: bool) -> list[Check]:
+def print_figures(rows: Sequence[dict[str, Any]], *, wrong: bool) -> list[Check]:
     """Return the figures of a population, and print each share with its bounds."""
     count = len(rows)
     verdicts = [row["verdict"] for row in rows]

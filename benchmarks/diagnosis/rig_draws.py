@@ -17,7 +17,7 @@ from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters, oil_demand
-from plant.eha.doubts import DOUBTS
+from plant.eha.doubts import DEFAULT_UNCERTAINTIES
 from plant.eha.drives import STEPS, chirp, multisine, nine_steps, prbs, sine
 from plant.eha.model import PARAMETER_NAMES, EhaParameters, load_on_rod
 from plant.eha.scales import natural_frequency
@@ -38,10 +38,10 @@ MOST_SAMPLES = 30_000
 SPREAD = 0.1
 """Half-width of leakage, friction and presliding about their condition; bulk modulus has twice that [fraction]."""
 
-BULK_MODULUS_DOUBT = 0.3
+BULK_MODULUS_SPREAD = 0.3
 """Standard deviation of the logarithm of a file's bulk modulus: air and hoses are seldom considered."""
 
-WRONG = ("pump_displacement", "piston_area", "chamber_volume", "moving_mass")
+UNCERTAIN_ENTRIES = ("pump_displacement", "piston_area", "chamber_volume", "moving_mass")
 """Entries of a wrong rig file that are off by the uncertainties of `plant.eha.doubts`, all at once."""
 
 
@@ -104,10 +104,10 @@ def draw_bench(seed: int) -> Bench:
             record = simulate(CIRCUIT, speed, sample_time, true, sensors=sensors, rng=rng)
         except HydrostateError:  # the run left the range of the circuit model, for example with an empty accumulator
             continue
-        if moves(record, sensors):
+        if is_moving(record, sensors):
             kept = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
             record = Record(sample_time, {channel: record[channel] for channel in kept})
-            return Bench(condition, true, file_of(healthy), name, record)
+            return Bench(condition, true, rig_file_of(healthy), name, record)
 
 
 def draw_rig(rng: np.random.Generator) -> CircuitParameters:
@@ -124,18 +124,20 @@ def draw_rig(rng: np.random.Generator) -> CircuitParameters:
     >>> 3e-4 <= rig.piston_area <= 8e-3
     True
     """
-    area = _between(3e-4, 8e-3, rng)  # pistons of 20 to 100 mm
-    velocity = _between(0.03, 0.4, rng)  # at rated speed [m/s]; seals are rated to about 0.5
-    stroke = _between(0.05, 0.5, rng)
-    rated = _between(120.0, 420.0, rng)  # 1,150 to 4,000 rpm
-    relief = _between(35e5, 250e5, rng)
-    oil = _between(2e8, 1.4e9, rng)  # effective: hoses and air below 1 GPa, steel lines above
-    volume = 0.25 * area * stroke * (1.0 + _between(0.15, 1.0, rng))  # the swept volume, plus ports and lines
+    area = _log_uniform(3e-4, 8e-3, rng)  # pistons of 20 to 100 mm
+    velocity = _log_uniform(0.03, 0.4, rng)  # at rated speed [m/s]; seals are rated to about 0.5
+    stroke = _log_uniform(0.05, 0.5, rng)
+    rated = _log_uniform(120.0, 420.0, rng)  # 1,150 to 4,000 rpm
+    relief = _log_uniform(35e5, 250e5, rng)
+    oil = _log_uniform(2e8, 1.4e9, rng)  # effective: hoses and air below 1 GPa, steel lines above
+    volume = 0.25 * area * stroke * (1.0 + _log_uniform(0.15, 1.0, rng))  # the swept volume, plus ports and lines
     stiffness = oil * area**2 / volume
-    mass = stiffness / (2.0 * pi * _between(15.0, 350.0, rng)) ** 2
+    mass = stiffness / (2.0 * pi * _log_uniform(15.0, 350.0, rng)) ** 2
     flow = area * velocity
-    leak = flow * _between(0.005, 0.05, rng) / relief  # volumetric efficiency of 95 to 99.5 % at the relief pressure
-    healthy_pressure = min(_between(1e5, 8e5, rng), 0.13 * relief)  # taken by seals and lines at rated velocity
+    leak = (
+        flow * _log_uniform(0.005, 0.05, rng) / relief
+    )  # volumetric efficiency of 95 to 99.5 % at the relief pressure
+    healthy_pressure = min(_log_uniform(1e5, 8e5, rng), 0.13 * relief)  # taken by seals and lines at rated velocity
     shares = rng.dirichlet((6.0, 3.0, 2.0))  # Coulomb, linear, quadratic
     push = area * healthy_pressure * shares
     single = bool(rng.random() < 0.3)
@@ -150,28 +152,28 @@ def draw_rig(rng: np.random.Generator) -> CircuitParameters:
         moving_mass=mass,
         bulk_modulus=oil,
         leakage_coefficient=leak,
-        flow_bias=flow * _between(0.002, 0.04, rng),
+        flow_bias=flow * _log_uniform(0.002, 0.04, rng),
         friction_coulomb=float(push[0]),
         friction_linear=float(push[1]) / velocity,
         friction_quadratic=float(push[2]) / velocity**2,
         relief_pressure=relief,
-        relief_conductance=flow / (_between(0.005, 0.05, rng) * relief),
-        accumulator_pressure=_between(2e5, 15e5, rng),
-        makeup_conductance=flow / _between(0.3e5, 2e5, rng),
-        makeup_opening=_between(3e3, 3e4, rng),
+        relief_conductance=flow / (_log_uniform(0.005, 0.05, rng) * relief),
+        accumulator_pressure=_log_uniform(2e5, 15e5, rng),
+        makeup_conductance=flow / _log_uniform(0.3e5, 2e5, rng),
+        makeup_opening=_log_uniform(3e3, 3e4, rng),
         motor_speed_per_volt=0.25 * rated,
         motor_speed_limit=2.0 * rated,
         stroke=stroke,
         area_difference=uneven,
         volume_difference=max(uneven * float(rng.uniform(0.5, 1.0)), uneven and needed),
         pilot_share=float(rng.uniform(0.5, 2.0)) if single and rng.random() < 0.5 else 0.0,
-        load_force=float(rng.choice((-1.0, 1.0))) * _between(0.03, 0.2, rng) * most if loaded else 0.0,
-        load_stiffness=_between(0.05, 0.15, rng) * most / (0.5 * stroke) if sprung else 0.0,
+        load_force=float(rng.choice((-1.0, 1.0))) * _log_uniform(0.03, 0.2, rng) * most if loaded else 0.0,
+        load_stiffness=_log_uniform(0.05, 0.15, rng) * most / (0.5 * stroke) if sprung else 0.0,
         pump_crossport_leakage=float(rng.uniform(0.2, 0.6)) * leak,
         pump_case_leakage=float(rng.uniform(0.0, 0.1)) * leak,
-        motor_lag=_between(3e-3, 2e-2, rng),  # servo drives of 8 to 50 Hz
-        presliding_displacement=_between(5e-6, 5e-5, rng),
-        presliding_damping=_between(0.1, 0.4, rng),
+        motor_lag=_log_uniform(3e-3, 2e-2, rng),  # servo drives of 8 to 50 Hz
+        presliding_displacement=_log_uniform(5e-6, 5e-5, rng),
+        presliding_damping=_log_uniform(0.1, 0.4, rng),
         throttle_rated_flow=20.0 * flow,
         end_stop_stiffness=10.0 * stiffness,
         accumulator_gas=1.0,
@@ -181,12 +183,12 @@ def draw_rig(rng: np.random.Generator) -> CircuitParameters:
     return replace(made, accumulator_gas=taken, accumulator_oil=taken)
 
 
-def file_of(rig: EhaParameters) -> EhaParameters:
+def rig_file_of(rig: EhaParameters) -> EhaParameters:
     """Return the content of an actuator's rig file: of its circuit, only the gas volume of the accumulator."""
     return EhaParameters(**{name: getattr(rig, name) for name in PARAMETER_NAMES})
 
 
-def wrong_file(right: EhaParameters, seed: int) -> EhaParameters:
+def wrong_rig_file(right: EhaParameters, seed: int) -> EhaParameters:
     """Return a rig file whose entries have the usual errors, all at once.
 
     Parameters
@@ -197,12 +199,14 @@ def wrong_file(right: EhaParameters, seed: int) -> EhaParameters:
         Seed of the errors.
     """
     rng = stream(seed, "random rigs", "file")
-    spreads: Mapping[str, float] = MappingProxyType({name: DOUBTS[name].usual.down for name in WRONG})
-    off = {**spreads, "bulk_modulus": BULK_MODULUS_DOUBT}
+    spreads: Mapping[str, float] = MappingProxyType(
+        {name: DEFAULT_UNCERTAINTIES[name].usual.down for name in UNCERTAIN_ENTRIES}
+    )
+    off = {**spreads, "bulk_modulus": BULK_MODULUS_SPREAD}
     return replace(right, **{name: getattr(right, name) * float(np.exp(s * rng.normal())) for name, s in off.items()})
 
 
-def _between(least: float, most: float, rng: np.random.Generator) -> float:
+def _log_uniform(least: float, most: float, rng: np.random.Generator) -> float:
     """Return a log-uniform number: sizes of machines vary by ratios."""
     return float(least * (most / least) ** rng.random())
 
@@ -234,12 +238,12 @@ def _drive(p: CircuitParameters, rng: np.random.Generator) -> tuple[str, Array, 
         return name, speed, sample_time
     if name == "sine":
         least = velocity / (pi * 0.45 * stroke)
-        often = _between(least, max(least, min(10.0, 0.5 * frequency)), rng)
+        often = _log_uniform(least, max(least, min(10.0, 0.5 * frequency)), rng)
         speed = sine(duration, sample_time, amplitude, often)
     elif name == "chirp":
         speed = chirp(duration, sample_time, amplitude, 0.5, highest)
     elif name == "prbs":
-        speed = prbs(duration, sample_time, amplitude, _between(0.02, 0.2, rng), rng)
+        speed = prbs(duration, sample_time, amplitude, _log_uniform(0.02, 0.2, rng), rng)
     else:
         speed = multisine(duration, sample_time, amplitude, rng, 0.5, highest)
     way = np.cumsum(speed) * sample_time * p.pump_displacement / p.piston_area
@@ -250,11 +254,11 @@ def _drive(p: CircuitParameters, rng: np.random.Generator) -> tuple[str, Array, 
 def _sensors(p: CircuitParameters, sample_time: float, rng: np.random.Generator) -> Sensors:
     """Return sensors with the ranges that the rig needs."""
     velocity = p.pump_displacement * p.rated_speed / p.piston_area
-    quantum = _between(5e-7, 5e-6, rng)  # linear encoders of 0.5 to 5 um
+    quantum = _log_uniform(5e-7, 5e-6, rng)  # linear encoders of 0.5 to 5 um
     return Sensors(
-        speed_noise=_between(2e-4, 1e-3, rng) * p.rated_speed,
-        velocity_noise=_between(2e-3, 2e-2, rng) * velocity,
-        pressure_noise=_between(3e-4, 2e-3, rng) * p.relief_pressure,  # for transmitters of that range
+        speed_noise=_log_uniform(2e-4, 1e-3, rng) * p.rated_speed,
+        velocity_noise=_log_uniform(2e-3, 2e-2, rng) * velocity,
+        pressure_noise=_log_uniform(3e-4, 2e-3, rng) * p.relief_pressure,  # for transmitters of that range
         pressure_quantum=2.0**-14 * p.relief_pressure,
         position_noise=float(rng.uniform(0.0, 1.0)) * quantum,
         position_quantum=quantum,
@@ -263,6 +267,6 @@ def _sensors(p: CircuitParameters, sample_time: float, rng: np.random.Generator)
     )
 
 
-def moves(record: Record, sensors: Sensors) -> bool:
+def is_moving(record: Record, sensors: Sensors) -> bool:
     """Return whether the piston travels more than 100 encoder steps."""
     return float(np.ptp(record["position_m"])) > 100.0 * sensors.position_quantum

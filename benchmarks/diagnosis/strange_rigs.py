@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.diagnosis.random_rigs import FAILED, line_of, row_of, row_of_answers, summarised
-from benchmarks.diagnosis.rig_draws import SAMPLE_TIMES, draw_rig, file_of, is_sound
-from benchmarks.diagnosis.typed_rigs import FILES, USES, Use, plain_setup, table_of
-from benchmarks.targets import printed
+from benchmarks.diagnosis.random_rigs import FAILED, print_figures, row_as_text, score_log, score_results
+from benchmarks.diagnosis.rig_draws import SAMPLE_TIMES, draw_rig, is_sound, rig_file_of
+from benchmarks.diagnosis.typed_rigs import FILES, RIG_USES, RigUse, plain_setup, table_of
+from benchmarks.targets import print_and_keep
 from experiments.open_benchmark.drives import CLOSED, OPEN
-from experiments.open_benchmark.kind import MAYBE, UNKNOWN, Draw, Kind
+from experiments.open_benchmark.kind import OWN_OR_UNKNOWN, UNKNOWN, Draw, Kind
 from experiments.open_benchmark.kinds import KINDS
 from experiments.open_benchmark.logger import DIFFERENCE, POSITION, PRESSURES, SPEED
-from experiments.open_benchmark.logger_kinds import REVERSED, RPM
+from experiments.open_benchmark.logger_kinds import REVERSED_WORDS, RPM
 from experiments.open_benchmark.oil import stiffness
 from experiments.open_benchmark.setup import Setup
 from experiments.running.random_streams import stream
@@ -36,18 +36,18 @@ from plant.eha.rig import Rig, read_rig
 from plant.eha.scales import natural_frequency
 from plant.errors import HydrostateError, LogWarning
 
-RANDOM = "random "
+RANDOM_PREFIX = "random "
 """Prefix of the names of random rigs, before their seed."""
 
-RIGS = (*USES, *(f"{RANDOM}{seed}" for seed in (1780, 1783, 1785, 1786, 1791, 1793, 1795, 1797)))
+RIGS = (*RIG_USES, *(f"{RANDOM_PREFIX}{seed}" for seed in (1780, 1783, 1785, 1786, 1791, 1793, 1795, 1797)))
 
-SAMPLED = (*SAMPLE_TIMES, 5e-3)
+SAMPLE_TIME_CHOICES = (*SAMPLE_TIMES, 5e-3)
 """Sample times that loggers offer [s]; the limit is the slowest with six samples in each period of the resonance."""
 
 DURATION = 6.0
 """Length of a log [s]."""
 
-AS_THEY_ARE = (
+UNSCALED_KINDS = (
     *("plain", "no_velocity", "chamber_pressures", "clock_jitters", "clock_stalls", "begins_in_motion"),
     *("pressure_lags_2_ms", "pressure_5_ms_late", "pressure_gain_3_percent_high", "pressure_gain_20_percent_high"),
     *("pressure_held", "pressure_averaged", "position_held", "position_zero_at_stop", "speed_held", "held_apart"),
@@ -78,32 +78,32 @@ def _frozen(channel: str) -> Change:
     return change
 
 
-def _lost(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+def _without_some_rows(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
     return table[rng.random(len(table)) > 0.02].reset_index(drop=True)
 
 
-FROZEN = r"fr[eo]ze|\bdead\b|\bheld\b"
+FROZEN_WORDS = r"fr[eo]ze|\bdead\b|\bheld\b"
 """Words for a frozen sensor."""
 
-WRITTEN: Mapping[str, tuple[Change, Kind]] = {
-    "rows_lost": (_lost, Kind("rows_lost", "2 % of the rows are lost")),
-    "position_freezes": (_frozen(POSITION), Kind("", "", accept=MAYBE, named=FROZEN)),
-    "pressure_freezes": (_frozen(DIFFERENCE), Kind("", "", accept=MAYBE, named=FROZEN)),
-    "speed_freezes": (_frozen(SPEED), Kind("", "", accept=MAYBE, named=FROZEN)),
+LOG_MISTAKES: Mapping[str, tuple[Change, Kind]] = {
+    "rows_lost": (_without_some_rows, Kind("rows_lost", "2 % of the rows are lost")),
+    "position_freezes": (_frozen(POSITION), Kind("", "", accept=OWN_OR_UNKNOWN, named=FROZEN_WORDS)),
+    "pressure_freezes": (_frozen(DIFFERENCE), Kind("", "", accept=OWN_OR_UNKNOWN, named=FROZEN_WORDS)),
+    "speed_freezes": (_frozen(SPEED), Kind("", "", accept=OWN_OR_UNKNOWN, named=FROZEN_WORDS)),
     "pressure_in_bar": (_times(DIFFERENCE, 1e-5), Kind("", "", accept=(UNKNOWN,), named=r"\bbar\b")),
     "position_in_mm": (_times(POSITION, 1e3), Kind("", "", accept=(UNKNOWN,), named=r"\bmm\b")),
-    "position_reversed": (_times(POSITION, -1.0), Kind("", "", accept=(UNKNOWN,), named=REVERSED)),
+    "position_reversed": (_times(POSITION, -1.0), Kind("", "", accept=(UNKNOWN,), named=REVERSED_WORDS)),
     "speed_in_degrees": (_times(SPEED, 6.0 * RPM), Kind("", "", accept=(UNKNOWN,), named=r"deg/s")),
 }
 """Mistakes introduced into a written log, and the right answer for each."""
 
 
-def _either(low: float, high: float, rng: np.random.Generator) -> float:
+def _random_signed(low: float, high: float, rng: np.random.Generator) -> float:
     """Return a number between two limits, of random sign."""
     return float(rng.choice((-1.0, 1.0)) * rng.uniform(low, high))
 
 
-def sized(healthy: EhaParameters) -> Mapping[str, Draw]:
+def draws_for_rig(healthy: EhaParameters) -> Mapping[str, Draw]:
     """Return draws of kinds of the open benchmark, scaled to a rig."""
     p, force = healthy, healthy.relief_pressure * healthy.piston_area
     stroke = healthy.stroke or 0.0
@@ -127,11 +127,11 @@ def sized(healthy: EhaParameters) -> Mapping[str, Draw]:
         "pressure_offset_drifts": pressure("drift", 0.01, 0.06),
         "pressure_hums": pressure("hum", 0.003, 0.015),
         "coarse_converters": coarse,
-        "speed_offset": lambda s, rng: s.with_sensor((SPEED,), offset=_either(0.001, 0.02, rng) * p.rated_speed),
+        "speed_offset": lambda s, rng: s.with_sensor((SPEED,), offset=_random_signed(0.001, 0.02, rng) * p.rated_speed),
         "position_has_play": lambda s, rng: s.with_sensor((POSITION,), play=rng.uniform(1e-4, 4e-4) * stroke),
         "stiff_oil": lambda s, rng: s.with_machine(bulk_modulus=rng.uniform(1.4, 2.0) * p.bulk_modulus),
         "soft_oil": lambda s, rng: s.with_machine(bulk_modulus=rng.uniform(0.25, 0.5) * p.bulk_modulus),
-        "constant_load": lambda s, rng: s.with_machine(load=s.machine.load + _either(0.08, 0.25, rng) * force),
+        "constant_load": lambda s, rng: s.with_machine(load=s.machine.load + _random_signed(0.08, 0.25, rng) * force),
         "spring_load": sprung,
         "makeup_check_leaks": lambda s, rng: s.with_machine(seat_leak_a=rng.uniform(0.5, 2.0) * major),
         "leakage_grows": lambda s, _: s.with_change(wear=major / s.machine.leakage),
@@ -139,11 +139,11 @@ def sized(healthy: EhaParameters) -> Mapping[str, Draw]:
     }
 
 
-NAMES = (*AS_THEY_ARE, *sized(EhaParameters(stroke=0.5)), *WRITTEN)
+NAMES = (*UNSCALED_KINDS, *draws_for_rig(EhaParameters(stroke=0.5)), *LOG_MISTAKES)
 """Every kind by name."""
 
 
-def rig_of(name: str) -> tuple[EhaParameters, Use]:
+def rig_of(name: str) -> tuple[EhaParameters, RigUse]:
     """Return the content of a rig's right file, and how the rig is used.
 
     Parameters
@@ -151,16 +151,16 @@ def rig_of(name: str) -> tuple[EhaParameters, Use]:
     name : str
         Name of a typed rig or of a random one.
     """
-    if name in USES:
-        return read_rig(FILES / f"{name}.toml").parameters, USES[name]
-    rng = stream(int(name.removeprefix(RANDOM)), "strange rigs")
+    if name in RIG_USES:
+        return read_rig(FILES / f"{name}.toml").parameters, RIG_USES[name]
+    rng = stream(int(name.removeprefix(RANDOM_PREFIX)), "strange rigs")
     drawn = draw_rig(rng)
     while not is_sound(drawn):
         drawn = draw_rig(rng)
-    return file_of(drawn), Use((*OPEN, *CLOSED), SAMPLE_TIMES[0], drawn.accumulator_gas)
+    return rig_file_of(drawn), RigUse((*OPEN, *CLOSED), SAMPLE_TIMES[0], drawn.accumulator_gas)
 
 
-def made(rig: str, kind: str, seed: int) -> tuple[pd.DataFrame, dict[str, Any], Setup]:
+def draw_strange_log(rig: str, kind: str, seed: int) -> tuple[pd.DataFrame, dict[str, Any], Setup]:
     """Return a strange log of a rig, its truth, and its setup.
 
     Parameters
@@ -173,48 +173,48 @@ def made(rig: str, kind: str, seed: int) -> tuple[pd.DataFrame, dict[str, Any], 
     Returns
     -------
     tuple of (pandas.DataFrame, dict, Setup)
-        The log as in its file; the truth as `row_of` takes it; the setup.
+        The log as in its file; the truth as `score_log` takes it; the setup.
     """
     (healthy, use), rng = rig_of(rig), stream(seed, "strange rigs", rig, kind)
-    change, one = WRITTEN.get(kind) or (None, KINDS[kind])
-    slowest = max(1.0 / (6.0 * natural_frequency(healthy)), SAMPLED[0])
-    sample_time = float(rng.choice([some for some in SAMPLED if some <= slowest]))
+    change, one = LOG_MISTAKES.get(kind) or (None, KINDS[kind])
+    slowest = max(1.0 / (6.0 * natural_frequency(healthy)), SAMPLE_TIME_CHOICES[0])
+    sample_time = float(rng.choice([some for some in SAMPLE_TIME_CHOICES if some <= slowest]))
     drives = one.drives if one.drives != tuple(OPEN) else (*use.drives, *OPEN)
     condition = str(rng.choice(one.conditions))
     use = replace(use, sample_time=sample_time, drives=drives)
     setup = replace(plain_setup(healthy, use, condition, int(rng.integers(99)), rng), duration=DURATION)
-    setup = sized(healthy).get(kind, one.draw)(setup, rng)
+    setup = draws_for_rig(healthy).get(kind, one.draw)(setup, rng)
     table = table_of(setup, rng)
     m, air = setup.machine, setup.change.air + setup.change.late_air
     truth = {
         "bulk_modulus": m.bulk_modulus,
         "beta_lo": stiffness(m.supply, air, m) if air > 0.0 else m.bulk_modulus,
         "condition": condition,
-        "accept": ";".join(one.accepted(condition)),
+        "accept": ";".join(one.right_verdicts(condition)),
         "named": one.named,
     }
     return change(table, rng) if change else table, truth, setup
 
 
-def scored(rig: str, kind: str, seed: int) -> dict[str, Any]:
+def score_strange_log(rig: str, kind: str, seed: int) -> dict[str, Any]:
     """Return the results of both verbs for one log, compared with its truth.
 
     Parameters
     ----------
     rig, kind, seed
-        As of `made`.
+        As of `draw_strange_log`.
 
     Returns
     -------
     dict[str, Any]
-        As from `benchmarks.diagnosis.random_rigs.scored`.
+        As from `benchmarks.diagnosis.random_rigs.score_rig`.
     """
-    (table, truth, setup), began = made(rig, kind, seed), time.process_time()
+    (table, truth, setup), began = draw_strange_log(rig, kind, seed), time.process_time()
     try:
-        row = row_of(read(table, rig=Rig(rig, rig_of(rig)[0])), truth, pressure=True)
+        row = score_log(read(table, rig=Rig(rig, rig_of(rig)[0])), truth, pressure=True)
     except HydrostateError as error:
         refused = {**FAILED, "message": str(error)}
-        row = row_of_answers(refused, refused, truth)
+        row = score_results(refused, refused, truth)
     about = f"{setup.condition}; {setup.drive}, {1e3 * setup.logger.sample_time:g} ms"
     unnamed = ", not named" if row["named"] is False else ""
     about = f"{kind}{unnamed}; {rig}; {about}"
@@ -234,11 +234,11 @@ def main(arguments: list[str]) -> int:
     rows: list[dict[str, Any]] = []
     for seed in range(int(first), int(last or first) + 1):
         for place, rig in enumerate(rigs):
-            rows.append(scored(rig, kinds[(seed + place) % len(kinds)], seed))
-            print(line_of(rows[-1]), flush=True)
+            rows.append(score_strange_log(rig, kinds[(seed + place) % len(kinds)], seed))
+            print(row_as_text(rows[-1]), flush=True)
     # for many kinds, "unknown" is the right verdict
     judged = [{**row, "verdict": "right"} if row["right"] else row for row in rows]
-    checks = printed(summarised(judged, wrong=True))
+    checks = print_and_keep(print_figures(judged, wrong=True))
     told = [row["named"] for row in rows if row["named"] is not None]
     print(f"causes named: {sum(told)} of {len(told)}")
     return sum(not check.met for check in checks)

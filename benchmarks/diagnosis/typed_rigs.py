@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.diagnosis.random_rigs import line_of, row_of, summarised
-from benchmarks.targets import printed
+from benchmarks.diagnosis.random_rigs import print_figures, row_as_text, score_log
+from benchmarks.targets import print_and_keep
 from experiments.open_benchmark.draws import course_of
 from experiments.open_benchmark.drives import CLOSED
 from experiments.open_benchmark.logger import POSITION, PRESSURES, SPEED, VELOCITY, Logger, Sensor
@@ -39,7 +39,7 @@ FILES = Path(__file__).parent / "typed_rigs"
 
 
 @dataclass(frozen=True)
-class Use:
+class RigUse:
     """How a rig is used, and data that its file may omit.
 
     Parameters
@@ -60,17 +60,17 @@ class Use:
     travel: float = 0.7
 
 
-USES: Mapping[str, Use] = {
-    "blade_pitch": Use(("posn", "track"), 2e-3, 8e-3),
-    "excavator_boom": Use(("track", "posn"), 2e-3, 6e-3),
-    "flight_control": Use(("track", "posn"), 1e-3, 6e-5),
-    "laboratory": Use(("steps", "prbs", "multisine"), 1e-3, 1e-3),
-    "light_aircraft": Use(("track", "sines"), 5e-4, 1.2e-5),
-    "mini_pack": Use(("track", "posn"), 1e-3, 2.5e-4),
-    "press": Use(("posn", "track"), 1e-3, 1e-2),
-    "robot_leg": Use(("track", "posn"), 5e-4, 1.5e-5),
-    "steering_gear": Use(("posn", "sines"), 2e-3, 5e-3),
-    "suspension": Use(("sines", "multisine"), 1e-3, 5e-5),
+RIG_USES: Mapping[str, RigUse] = {
+    "blade_pitch": RigUse(("posn", "track"), 2e-3, 8e-3),
+    "excavator_boom": RigUse(("track", "posn"), 2e-3, 6e-3),
+    "flight_control": RigUse(("track", "posn"), 1e-3, 6e-5),
+    "laboratory": RigUse(("steps", "prbs", "multisine"), 1e-3, 1e-3),
+    "light_aircraft": RigUse(("track", "sines"), 5e-4, 1.2e-5),
+    "mini_pack": RigUse(("track", "posn"), 1e-3, 2.5e-4),
+    "press": RigUse(("posn", "track"), 1e-3, 1e-2),
+    "robot_leg": RigUse(("track", "posn"), 5e-4, 1.5e-5),
+    "steering_gear": RigUse(("posn", "sines"), 2e-3, 5e-3),
+    "suspension": RigUse(("sines", "multisine"), 1e-3, 5e-5),
 }
 """Use of each rig, by name of its file; the gas volume agrees with the file if the file states it."""
 
@@ -84,7 +84,7 @@ benchmark's."""
 DURATION = 10.0
 """Length of a log [s]."""
 
-UNSTABLE = 0.3
+LARGEST_STEP = 0.3
 """Largest step of Heun's method, as a fraction of a chamber's shortest time constant [dimensionless]."""
 
 
@@ -92,20 +92,20 @@ def main(arguments: list[str]) -> int:
     """Print one line for each log, and every figure with its target; return how many fall short."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", default="0:2", metavar="A:B", help="first and last seed of each rig")
-    parser.add_argument("--rigs", default=",".join(USES), metavar="NAME,NAME")
+    parser.add_argument("--rigs", default=",".join(RIG_USES), metavar="NAME,NAME")
     options = parser.parse_args(arguments)
     first, _, last = options.seeds.partition(":")
     warnings.simplefilter("ignore", LogWarning)
     rows: list[dict[str, Any]] = []
     for name in options.rigs.split(","):
         for seed in range(int(first), int(last or first) + 1):
-            rows.append(scored(name, seed))
-            print(f"{name} {line_of(rows[-1])}", flush=True)
-    checks = printed(summarised(rows, wrong=False))
+            rows.append(score_rig_log(name, seed))
+            print(f"{name} {row_as_text(rows[-1])}", flush=True)
+    checks = print_and_keep(print_figures(rows, wrong=False))
     return sum(not check.met for check in checks)
 
 
-def scored(name: str, seed: int) -> dict[str, Any]:
+def score_rig_log(name: str, seed: int) -> dict[str, Any]:
     """Return the results of both verbs for one log of a rig, compared with its truth.
 
     Parameters
@@ -118,18 +118,18 @@ def scored(name: str, seed: int) -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        As from `benchmarks.diagnosis.random_rigs.scored`.
+        As from `benchmarks.diagnosis.random_rigs.score_rig`.
     """
     rig = read_rig(FILES / f"{name}.toml")
-    setup, record = logged(name, rig, seed)
+    setup, record = draw_log(name, rig, seed)
     log, began = Log(record, rig), time.process_time()
     truth = {"bulk_modulus": setup.machine.bulk_modulus, "condition": setup.condition}
-    row = row_of(log, truth, pressure=True)
+    row = score_log(log, truth, pressure=True)
     about = f"{setup.condition}; {setup.drive}, {1e3 * record.sample_time:g} ms"
     return {"seed": seed, "about": about, **row, "seconds": time.process_time() - began}
 
 
-def logged(name: str, rig: Rig[EhaParameters], seed: int) -> tuple[Setup, Record]:
+def draw_log(name: str, rig: Rig[EhaParameters], seed: int) -> tuple[Setup, Record]:
     """Return the true setup of a log of a rig, and the log.
 
     Parameters
@@ -148,12 +148,12 @@ def logged(name: str, rig: Rig[EhaParameters], seed: int) -> tuple[Setup, Record
     """
     rng = stream(seed, "typed rigs", name)
     condition = "normal" if seed % 3 == 0 else str(rng.choice(list(CONDITIONS)))
-    setup = plain_setup(rig.parameters, USES[name], condition, seed, rng)
+    setup = plain_setup(rig.parameters, RIG_USES[name], condition, seed, rng)
     table = table_of(setup, rng)
     return setup, Record(setup.logger.sample_time, {one: table[one].to_numpy() for one in setup.logger.channels})
 
 
-def plain_setup(healthy: EhaParameters, use: Use, condition: str, turn: int, rng: np.random.Generator) -> Setup:
+def plain_setup(healthy: EhaParameters, use: RigUse, condition: str, turn: int, rng: np.random.Generator) -> Setup:
     """Return the true setup of a log without disturbances.
 
     Parameters
@@ -190,12 +190,12 @@ def table_of(setup: Setup, rng: np.random.Generator) -> pd.DataFrame:
         Source of the drive and of noise.
     """
     course = course_of(setup, rng)
-    states = run(setup.machine, course, _held(setup.machine), refine=_refined(setup.machine))
+    states = run(setup.machine, course, _states_at_rest(setup.machine), refine=_refinement(setup.machine))
     states[:, 4:6] = np.maximum(states[:, 4:6], setup.machine.vapour)
     return setup.logger.log(states, rng)
 
 
-def _machine(healthy: EhaParameters, condition: str, use: Use, rng: np.random.Generator) -> Machine:
+def _machine(healthy: EhaParameters, condition: str, use: RigUse, rng: np.random.Generator) -> Machine:
     """Return the actuator of a rig file in a condition; what no file states is sized to suit its flow."""
     p = parameters_for(CONDITIONS[condition], healthy)
     (area_a, area_b), made = piston_areas(p), machine_of(p)
@@ -242,7 +242,7 @@ def _sensors(p: EhaParameters) -> Mapping[str, Sensor]:
     }
 
 
-def _held(m: Machine) -> Array:
+def _states_at_rest(m: Machine) -> Array:
     """Return the states at rest in mid-stroke, with the load held by the loaded chamber."""
     states = at_rest(m)
     states[4] += max(m.load, 0.0) / m.area_a
@@ -250,12 +250,12 @@ def _held(m: Machine) -> Array:
     return states
 
 
-def _refined(m: Machine) -> int:
+def _refinement(m: Machine) -> int:
     """Return the factor by which steps must be finer than usual: small chambers settle quickly through their valves."""
     filled = max(m.check_a / sqrt(PRELOAD), m.relief_slope) * m.bulk_modulus / (0.5 * min(m.volume_a, m.volume_b))
     ringing = sqrt(4.0 * m.bulk_modulus * max(m.area_a, m.area_b) ** 2 / (min(m.volume_a, m.volume_b) * m.mass))
     usual = RECORD / substeps_for(m, m.speed_limit)
-    return max(1, ceil(usual * max(filled, ringing / (2.0 * pi)) / UNSTABLE))
+    return max(1, ceil(usual * max(filled, ringing / (2.0 * pi)) / LARGEST_STEP))
 
 
 if __name__ == "__main__":

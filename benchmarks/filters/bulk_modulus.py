@@ -11,14 +11,14 @@ import pandas as pd
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import Outcome
-from experiments.running.executors import side_by_side
+from experiments.running.executors import map_in_parallel
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.simulate import PLANTS, simulate
 from plant.sensors.sensors import BENCH
 
-STARTS = (0.0, 0.5e8, 1e8, 2e8, 3e8, 4e8, 5e8)
+FIRST_GUESSES = (0.0, 0.5e8, 1e8, 2e8, 3e8, 4e8, 5e8)
 
 CELLS = (
     ("reduced", "acceleration", "sine", False, 3.0),
@@ -40,7 +40,7 @@ def run_case(case: tuple[Cell, str, int]) -> list[dict[str, object]]:
     record = simulate(PLANTS[plant], make_drive(drive_name, 10.0, 1e-4, p, rng), 1e-4, p, sensors=BENCH, rng=rng)
     seen = record if logged else record.replace(differential_pressure_pa=None)
     rows: list[dict[str, object]] = []
-    for start in STARTS:
+    for start in FIRST_GUESSES:
         found = estimate_bulk_modulus(seen, p, form=form, start=start)
         error = float("nan") if found.value is None else 100.0 * (found.value / p.bulk_modulus - 1.0)
         right = found.outcome is Outcome.NOT_OBSERVABLE if tolerance is None else abs(error) <= tolerance
@@ -68,7 +68,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--csv", help="write every estimate to this file")
     options = parser.parse_args(arguments)
     rows: list[dict[str, object]] = []
-    for found in side_by_side(run_case, product(CELLS, CONDITIONS, range(options.seeds))):
+    for found in map_in_parallel(run_case, product(CELLS, CONDITIONS, range(options.seeds))):
         rows += found
     table = pd.DataFrame(rows)
     if options.csv:

@@ -11,9 +11,9 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from benchmarks.targets import misses, say
+from benchmarks.targets import check_target, misses
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from experiments.running.executors import side_by_side
+from experiments.running.executors import map_in_parallel
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.drives import make_drive
@@ -25,16 +25,16 @@ from plant.sensors.sensors import BENCH
 HEALTHY = EhaParameters()
 
 
-def on_circuit(condition: str, seed: int, drive: str = "steps", duration: float = 10.0) -> Record:
+def circuit_log(condition: str, seed: int, drive: str = "steps", duration: float = 10.0) -> Record:
     """Return a log of the circuit plant in a condition."""
     p, rng = circuit_of(parameters_for(CONDITIONS[condition], CircuitParameters())), np.random.default_rng([seed, 7])
     return simulate(CIRCUIT, make_drive(drive, duration, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
 
-def judged(case: tuple[str, int]) -> dict[str, object]:
+def filter_figures(case: tuple[str, int]) -> dict[str, object]:
     """Return error [%], z and gate of the filter on one log."""
     condition, seed = case
-    found = estimate_bulk_modulus(on_circuit(condition, seed), HEALTHY, method="chamber-ekf")
+    found = estimate_bulk_modulus(circuit_log(condition, seed), HEALTHY, method="chamber-ekf")
     error = (found.value or np.nan) - HEALTHY.bulk_modulus
     return {
         "condition": condition,
@@ -51,7 +51,7 @@ def main(arguments: Sequence[str]) -> int:
     options = parser.parse_args(arguments)
     misses.clear()
     cases = list(product(CONDITIONS, range(options.seeds)))
-    table = pd.DataFrame(list(side_by_side(judged, cases)))
+    table = pd.DataFrame(list(map_in_parallel(filter_figures, cases)))
     rows = table.groupby("condition", sort=False).agg(
         worst_percent=("error_percent", lambda errors: float(errors.abs().max())),
         z_rms=("z", lambda z: float(np.sqrt(np.mean(z**2)))),
@@ -59,8 +59,8 @@ def main(arguments: Sequence[str]) -> int:
     )
     print(rows.to_string(float_format="%.3f"))
     z_rms = float(np.sqrt(np.mean(table["z"].to_numpy(dtype=np.float64) ** 2)))
-    say("logs within 1 %, %", 100.0 * float((table["error_percent"].abs() < 1.0).mean()), 100.0, most=False)
-    say("gates that pass, %", 100.0 * float(table["passed"].mean()), 100.0, most=False)
-    say("z of bulk modulus, rms, at most", z_rms, 1.3)
-    say("z of bulk modulus, rms, at least", z_rms, 0.8, most=False)
+    check_target("logs within 1 %, %", 100.0 * float((table["error_percent"].abs() < 1.0).mean()), 100.0, most=False)
+    check_target("gates that pass, %", 100.0 * float(table["passed"].mean()), 100.0, most=False)
+    check_target("z of bulk modulus, rms, at most", z_rms, 1.3)
+    check_target("z of bulk modulus, rms, at least", z_rms, 0.8, most=False)
     return len(misses)

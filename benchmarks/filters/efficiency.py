@@ -24,7 +24,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import beta, chi2
 
-from benchmarks.targets import Check, keep
+from benchmarks.targets import Check, keep_figure
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.by_filter import GROUPS
 from estimation.eha.result import LARGEST_BOUND
@@ -36,7 +36,7 @@ from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.models.augment import augmented, augmented_prior
 from estimation.models.eha_forms import BULK_MODULUS, PRESSURE_FORM
 from estimation.trust.bounds import bulk_modulus_bound
-from experiments.running.executors import side_by_side
+from experiments.running.executors import map_in_parallel
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -56,7 +56,7 @@ MOTION = ("position_m", "velocity_m_s")
 MODEL = replace(PRESSURE_FORM, longest_step=1e-4 / LUMPED.substeps)
 """The form at the simulator's own step: relative to a bound of 0.001 %, steps of 0.1 ms show a bias of 0.0013 %."""
 
-DEGREES = {True: (1.0, 1.0), False: (1e4, 1e2, 1.0, 1.0)}
+NOISE_FACTORS = {True: (1.0, 1.0), False: (1e4, 1e2, 1.0, 1.0)}
 """Factor on the process noise in each pass of the filter, with and without pressure; each pass begins at the bulk
 modulus that the previous one found."""
 
@@ -101,11 +101,11 @@ def bound_of(case: Case, record: Record, p: EhaParameters) -> float:
     return bulk_modulus_bound(model, prior, record, p, channels=case.channels, variances=variances, noise=noise)
 
 
-def by_degrees(case: Case, record: Record, p: EhaParameters) -> tuple[float, float]:
+def by_filter_passes(case: Case, record: Record, p: EhaParameters) -> tuple[float, float]:
     """Return bulk modulus and its standard deviation [Pa] by a filter with known noise levels."""
     variances = {name: noise_variances(SENSORS)[name] for name in case.channels}
     value, std = FIRST_GUESS, START_STD
-    for factor in DEGREES[case.pressure]:
+    for factor in NOISE_FACTORS[case.pressure]:
         noise = {name: factor * density for name, density in speed_noise(p).items()}
         prior = first_belief(MODEL, record, value, START_STD)
         found = run_filter(ekf, MODEL, prior, record, p, channels=case.channels, variances=variances, noise=noise)
@@ -113,7 +113,7 @@ def by_degrees(case: Case, record: Record, p: EhaParameters) -> tuple[float, flo
     return value, std
 
 
-def by_the_smoother(case: Case, record: Record, p: EhaParameters) -> tuple[float, float]:
+def by_smoother(case: Case, record: Record, p: EhaParameters) -> tuple[float, float]:
     """Return bulk modulus and its standard deviation [Pa] by the iterated smoother with known noise levels."""
     variances = {name: noise_variances(SENSORS)[name] for name in case.channels}
     prior, noise = first_belief(MODEL, record, FIRST_GUESS, START_STD), speed_noise(p)
@@ -123,7 +123,7 @@ def by_the_smoother(case: Case, record: Record, p: EhaParameters) -> tuple[float
     return float(found.track(BULK_MODULUS)[0][-1]), float(found.track(BULK_MODULUS)[1][-1])
 
 
-def by_the_verb(case: Case, record: Record, p: EhaParameters) -> tuple[float, float]:
+def by_estimate_verb(case: Case, record: Record, p: EhaParameters) -> tuple[float, float]:
     """Return bulk modulus and its standard deviation [Pa] as `hydrostate estimate` does; NaN if it gives none."""
     log = Record(record.sample_time, {name: record[name] for name in ("motor_speed_rad_s", *case.channels)})
     if case.estimator == "unknown":
@@ -134,8 +134,8 @@ def by_the_verb(case: Case, record: Record, p: EhaParameters) -> tuple[float, fl
 
 
 ESTIMATE: Mapping[str, Callable[[Case, Record, EhaParameters], tuple[float, float]]] = {
-    "stated": by_degrees,
-    "smoothed": by_the_smoother,
+    "stated": by_filter_passes,
+    "smoothed": by_smoother,
 }
 """Estimators with known noise levels; the others use the verb."""
 
@@ -146,7 +146,7 @@ def run_case(case: Case) -> dict[str, object]:
     p = parameters_for(CONDITIONS[case.condition])
     drive = make_drive(case.drive, DURATION, SAMPLE_TIME, p, rng)
     record = simulate(LUMPED, drive, SAMPLE_TIME, p, sensors=SENSORS, rng=rng)
-    value, std = ESTIMATE.get(case.estimator, by_the_verb)(case, record, p)
+    value, std = ESTIMATE.get(case.estimator, by_estimate_verb)(case, record, p)
     bound = bound_of(case, record, p) / p.bulk_modulus
     z = (value - p.bulk_modulus) / std
     return {
@@ -165,7 +165,7 @@ def _rms(values: Iterable[float]) -> float:
     return float(np.sqrt(np.nanmean(np.square(np.asarray(values, dtype=np.float64)))))
 
 
-def summarised(rows: pd.DataFrame) -> dict[str, float]:
+def summary_of_runs(rows: pd.DataFrame) -> dict[str, float]:
     """Return error, bound, coverage and NEES of some runs, with the 95 % range of NEES by chance."""
     n = len(rows)
     low, high = (float(chi2.ppf(level, n)) / n for level in (0.025, 0.975))
@@ -198,7 +198,7 @@ def coverage_verdict(covered: int, runs: int, wanted: tuple[float, float]) -> st
     return "missed" if high < wanted[0] or low > wanted[1] else "undecided"
 
 
-def judged(met: bool) -> str:
+def verdict_word(met: bool) -> str:
     """Return the word for a met or missed target."""
     return "met" if met else "missed"
 
@@ -219,12 +219,12 @@ def main(arguments: list[str]) -> int:
         for condition in options.conditions
         for seed in range(options.seeds)
     ]
-    rows = pd.DataFrame(list(side_by_side(run_case, cases)))
+    rows = pd.DataFrame(list(map_in_parallel(run_case, cases)))
     if options.csv:
         rows.to_csv(options.csv, index=False)
     cells = pd.DataFrame(
         [
-            {"drive": drive, "condition": condition} | summarised(cell)
+            {"drive": drive, "condition": condition} | summary_of_runs(cell)
             for (drive, condition), cell in rows.groupby(["drive", "condition"], sort=False)
         ]
     )
@@ -233,23 +233,25 @@ def main(arguments: list[str]) -> int:
         for c, n in zip(cells["coverage"], cells["runs"], strict=True)
     ]
     print(cells.to_string(index=False, float_format="%.4f"))
-    pooled, covered, wanted = summarised(rows), int(rows["covered"].sum()), WANTED_RATIO[pressure]
+    pooled, covered, wanted = summary_of_runs(rows), int(rows["covered"].sum()), WANTED_RATIO[pressure]
     low, high = coverage_range(covered, len(rows))
     worst = float(cells["over_bound"].max())
     verdicts = {
         f"coverage of {len(rows)} intervals {pooled['coverage']:.1f} % (95 % range {low:.1f} to {high:.1f}), wanted "
         f"{WANTED_POOLED[0]} to {WANTED_POOLED[1]}": coverage_verdict(covered, len(rows), WANTED_POOLED),
         f"cells whose coverage is out of {WANTED_CELL[0]} to {WANTED_CELL[1]} % by more than chance: "
-        f"{(cells['in_cell'] == 'missed').sum()} of {len(cells)}": judged(not (cells["in_cell"] == "missed").any()),
-        f"NEES {pooled['nees']:.3f}, wanted {pooled['nees_low']:.3f} to {pooled['nees_high']:.3f}": judged(
+        f"{(cells['in_cell'] == 'missed').sum()} of {len(cells)}": verdict_word(
+            not (cells["in_cell"] == "missed").any()
+        ),
+        f"NEES {pooled['nees']:.3f}, wanted {pooled['nees_low']:.3f} to {pooled['nees_high']:.3f}": verdict_word(
             pooled["nees_low"] <= pooled["nees"] <= pooled["nees_high"]
         ),
         f"RMSE over the bound {pooled['over_bound']:.3f} pooled, {worst:.3f} in the worst cell, wanted at most {wanted}"
-        " in each": judged(worst <= wanted),
+        " in each": verdict_word(worst <= wanted),
     }
     which = f"{options.estimator}, {'with' if pressure else 'without'} pressure"
-    keep(Check(f"{which}: RMSE over the bound, worst cell", worst, most=wanted))
-    keep(Check(f"{which}: coverage [%]", pooled["coverage"], *WANTED_POOLED))
+    keep_figure(Check(f"{which}: RMSE over the bound, worst cell", worst, most=wanted))
+    keep_figure(Check(f"{which}: coverage [%]", pooled["coverage"], *WANTED_POOLED))
     print("\npooled")
     print("\n".join(f"  {line}: {verdict}" for line, verdict in verdicts.items()))
     return len(verdicts) - list(verdicts.values()).count("met")

@@ -18,9 +18,9 @@ from statistics import median
 
 import numpy as np
 
-from benchmarks.filters.filter_speed import cost, problems
-from benchmarks.peers.c_filter import FUSING, CFilter, built
-from benchmarks.targets import Check, keep
+from benchmarks.filters.filter_speed import cost, filter_problems
+from benchmarks.peers.c_filter import FUSED_FLAGS, CFilter, build_filter
+from benchmarks.targets import Check, keep_figure
 from estimation.engine.contract import FilterProblem
 from estimation.export.task import EXPORTED_FORMS, filter_task
 from estimation.filters.methods import METHODS
@@ -33,7 +33,7 @@ from plant.sensors.sensors import BENCH
 
 SAMPLES, SAMPLE_TIME, ROUNDS = 100_000, 1e-4, 9
 WANTED = {"agreement": 1e-12, "acceleration": 25.0, "pressure": 60.0}
-OF_GCC = (
+GCC_FLAGS = (
     "-fno-math-errno",
     "-mtune=generic",
     "-fno-guess-branch-probability",
@@ -41,8 +41,8 @@ OF_GCC = (
     "-fno-if-conversion2",
 )
 BUILDS = {
-    "gcc": ("gcc", ("-march=native", *OF_GCC, "-fno-tree-slp-vectorize")),
-    "gcc, choices": ("gcc", FUSING),
+    "gcc": ("gcc", ("-march=native", *GCC_FLAGS, "-fno-tree-slp-vectorize")),
+    "gcc, choices": ("gcc", FUSED_FLAGS),
     "gcc, no fma": ("gcc", ()),
     "gcc, contracting": ("gcc", ("-std=gnu17", "-march=native")),
     "clang": ("clang", ("-march=native", "-fno-math-errno", "-fno-slp-vectorize")),
@@ -51,14 +51,14 @@ BUILDS = {
 """Compilers with their flags in addition to ``-std=c99 -O2``: as in the Makefile, with branch-free choices by the
 compiler, for any x86-64 processor, and with the compiler's own contraction of multiply-adds allowed."""
 
-AGREEING = ("gcc", "gcc, choices", "gcc, no fma", "gcc, contracting", "clang", "clang, no fma")
+COMPARED_BUILDS = ("gcc", "gcc, choices", "gcc, no fma", "gcc, contracting", "clang", "clang, no fma")
 """Builds compared with Python in every form and condition."""
 
 BINS = (50, 100, 200, 300, 500, 1000, 2000, 5000, 10_000, 100_000, 1_000_000, 10_000_000)
 """Edges of the histogram of step times [ns]."""
 
 
-def task(form: str, condition: str, samples: int) -> FilterProblem:
+def filter_problem(form: str, condition: str, samples: int) -> FilterProblem:
     """Return a filter with the condition's leakage and friction, on a log of the plant that it models.
 
     Parameters
@@ -94,35 +94,35 @@ def agreement(folder: Path, samples: int) -> Iterator[tuple[str, str, str, float
     """Yield form, method, condition, and the worst difference over the compilers and of float."""
     for form in EXPORTED_FORMS:
         for condition in CONDITIONS:
-            problem = task(form, condition, samples)
+            problem = filter_problem(form, condition, samples)
             for method in ("ekf", "imm") if form == "pressure" else ("ekf",):
-                for name in AGREEING:
+                for name in COMPARED_BUILDS:
                     compiler, flags = BUILDS[name]
                     where = folder / f"{form}_{method}_{condition}_{name}".replace(", ", "_").replace(" ", "_")
-                    c = built(problem, method, where, compiler=compiler, flags=flags)
+                    c = build_filter(problem, method, where, compiler=compiler, flags=flags)
                     yield form, f"{method}, {name}", condition, difference(c, method)[0]
                 where = folder / f"{form}_{method}_{condition}_float"
                 yield (
                     form,
                     f"{method}, float",
                     condition,
-                    difference(built(problem, method, where, precision="float"), method)[0],
+                    difference(build_filter(problem, method, where, precision="float"), method)[0],
                 )
 
 
 def costs(folder: Path, form: str) -> dict[str, float]:
     """Return median CPU nanoseconds per step: Python's kernel, and C for each compiler."""
-    problem = problems(form, 1, SAMPLES)[0]
+    problem = filter_problems(form, 1, SAMPLES)[0]
     libraries = {
-        name: built(problem, "ekf", folder / f"cost_{form}_{i}", compiler=compiler, flags=flags)
+        name: build_filter(problem, "ekf", folder / f"cost_{form}_{i}", compiler=compiler, flags=flags)
         for i, (name, (compiler, flags)) in enumerate(BUILDS.items())
     }
-    libraries["gcc, float"] = built(problem, "ekf", folder / f"cost_{form}_float", precision="float")
+    libraries["gcc, float"] = build_filter(problem, "ekf", folder / f"cost_{form}_float", precision="float")
     rounds: dict[str, list[float]] = {}
     for _ in range(ROUNDS + 1):
         rounds.setdefault("Python's kernel", []).append(cost(lambda: METHODS["ekf"](problem), SAMPLES))
         for name, library in libraries.items():
-            rounds.setdefault(name, []).append(cost(library.worked, SAMPLES))
+            rounds.setdefault(name, []).append(cost(library.filter_without_results, SAMPLES))
     return {name: median(values[1:]) for name, values in rounds.items()}
 
 
@@ -146,7 +146,7 @@ def histogram(c: CFilter, *, loaded: bool) -> tuple[Array, Array]:
 
 def show_real_time(folder: Path) -> None:
     """Print the histogram of the pressure form's steps at 10 kHz, alone and under load."""
-    c = built(problems("pressure", 1, SAMPLES)[0], "ekf", folder / "real_time")
+    c = build_filter(filter_problems("pressure", 1, SAMPLES)[0], "ekf", folder / "real_time")
     steps = {
         "back to back": c.clocked().astype(float),
         "at 10 kHz": histogram(c, loaded=False),
@@ -183,7 +183,7 @@ def main(arguments: list[str]) -> int:
                 worst[form, build] = max(worst.get((form, build), (0.0, condition)), (found, condition))
             for (form, build), (found, condition) in worst.items():
                 bound = inf if "float" in build else WANTED["agreement"]
-                met = keep(Check(f"{form}, {build}: largest relative difference", found, most=bound)).met
+                met = keep_figure(Check(f"{form}, {build}: largest relative difference", found, most=bound)).met
                 missed += not met
                 print(f"{form:14s}{build:20s}{found:10.1e}  worst in {condition}{'' if met else '  MISSED'}")
         if options.only in (None, "cost"):
@@ -193,7 +193,7 @@ def main(arguments: list[str]) -> int:
                 for build, value in found.items():
                     print(f"{form:14s}{build:20s}{value:8.1f} ns a step, {value / kernel:5.2f} of Python's kernel")
                 quicker = min(found["gcc"], found["clang"])
-                met = keep(Check(f"{form}: a step, the quicker compiler [ns]", quicker, most=WANTED[form])).met
+                met = keep_figure(Check(f"{form}: a step, the quicker compiler [ns]", quicker, most=WANTED[form])).met
                 missed += not met
                 print(f"{form:14s}wanted: at most {WANTED[form]:g} ns{'' if met else '  MISSED'}", file=sys.stderr)
         if options.only in (None, "real-time"):

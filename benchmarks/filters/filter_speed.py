@@ -26,11 +26,11 @@ import numpy as np
 
 from benchmarks.peers import cpp_lanes, filterpy_user
 from benchmarks.peers.acceleration_form import coefficients
-from benchmarks.targets import Check, printed
+from benchmarks.targets import Check, print_and_keep
 from estimation.engine.contract import FilterProblem
 from estimation.engine.kernels import LANES, compile_kernel
-from estimation.engine.layout import all_present, at_sample, counting_missing, halves_of, layout
-from estimation.engine.runner import aligned, constant_row
+from estimation.engine.layout import full_sample_update, halves_of, layout, step_at_sample, with_missing_counted
+from estimation.engine.runner import aligned_array, constant_row
 from estimation.filters.batch import filter_batch
 from estimation.filters.ekf import EKF, ekf
 from estimation.filters.filterpy_bridge import filterpy_ekf
@@ -60,7 +60,7 @@ WANTED = {
     "pressure filterpy": 2000.0,
     "pressure bridge": 1000.0,
 }
-SAME = 1e-4
+SAME_STATES = 1e-4
 """Largest relative difference between states that count as equal: the peer's Jacobian uses finite differences
 [fraction]."""
 
@@ -75,7 +75,7 @@ def cost(work: Callable[[], object], steps: int) -> float:
     return (time.process_time_ns() - begin) / steps
 
 
-def problems(form: str, count: int, samples: int) -> list[FilterProblem]:
+def filter_problems(form: str, count: int, samples: int) -> list[FilterProblem]:
     """Return filters on one run of the reduced plant, each with its own noise."""
     p, rng = EhaParameters(), np.random.default_rng(1)
     drive = make_drive("sine", samples * SAMPLE_TIME, SAMPLE_TIME, p, rng)
@@ -113,7 +113,7 @@ def kernel_work(batch: list[FilterProblem]) -> Callable[[], None]:
         full = [*block, *[block[0]] * (LANES - len(block))]
         data.append((_lanes([one.drives for one in full]), _lanes([one.measured for one in full])))
     begin = np.concatenate([places.start(first.mean, first.covariance), constant_row(first, {})])
-    works = [aligned(kernel.LINES, LANES) for _ in blocks]
+    works = [aligned_array(kernel.LINES, LANES) for _ in blocks]
     track, logs = np.empty((1, first.model.width, LANES)), np.zeros((len(first.channels), LANES))
     count, nothing = len(first.measured), np.empty((0, 0))
 
@@ -217,9 +217,9 @@ def filterpy_pressure(problem: FilterProblem) -> tuple[Callable[[], None], Array
 
 def acceleration_table(count: int, samples: int, jax: str | None, processor: str) -> Iterator[tuple[str, float]]:
     """Yield each engine's median cost on the acceleration form; the first is ours in lanes."""
-    batch = problems("acceleration", count, samples)
+    batch = filter_problems("acceleration", count, samples)
     short = replace(batch[0], drives=batch[0].drives[:1000], measured=batch[0].measured[:1000])
-    long = problems("acceleration", 1, 100_000)[0]
+    long = filter_problems("acceleration", 1, 100_000)[0]
     kernel, slow = kernel_work(batch), filterpy_work(short)
     cpp = {f"{CPP}{name}": cpp_work(batch, library) for name, library in cpp_lanes.builds(processor).items()}
     rounds: dict[str, list[float]] = {}
@@ -238,9 +238,9 @@ def acceleration_table(count: int, samples: int, jax: str | None, processor: str
 
 def pressure_table(count: int, samples: int) -> Iterator[tuple[str, float]]:
     """Yield each engine's median cost on the pressure form; the bridge gives filterpy our compiled model."""
-    batch = problems("pressure", count, samples)
+    batch = filter_problems("pressure", count, samples)
     short = replace(batch[0], drives=batch[0].drives[:1000], measured=batch[0].measured[:1000], every=1)
-    long = problems("pressure", 1, 100_000)[0]
+    long = filter_problems("pressure", 1, 100_000)[0]
     by_hand, ended = filterpy_pressure(short)
     rounds: dict[str, list[float]] = {}
     for _ in range(ROUNDS + 1):
@@ -249,7 +249,7 @@ def pressure_table(count: int, samples: int) -> Iterator[tuple[str, float]]:
         rounds.setdefault("filterpy", []).append(cost(by_hand, 1000))
         rounds.setdefault("bridge", []).append(cost(lambda: filterpy_ekf(short), 1000))
     apart = np.max(np.abs(ended - ekf(short).track[-1]) / np.abs(ended))
-    if apart > SAME:
+    if apart > SAME_STATES:
         raise SystemExit(f"filterpy by hand and our filter are {apart:.1g} apart on the pressure form")
     for name, values in rounds.items():
         yield name, median(values[1:])
@@ -258,9 +258,9 @@ def pressure_table(count: int, samples: int) -> Iterator[tuple[str, float]]:
 def operations() -> int:
     """Return the number of arithmetic instructions of a filter step in lanes, acceleration form, no sample missing."""
     halves = halves_of(EKF, ACCELERATION_FORM, CHANNELS)
-    update = all_present(counting_missing(halves.update))
+    update = full_sample_update(with_missing_counted(halves.update))
     kept = layout(EKF, ACCELERATION_FORM, CHANNELS).carried
-    outputs = [*at_sample(halves.predict).values(), *(value for name, value in update.items() if name in kept)]
+    outputs = [*step_at_sample(halves.predict).values(), *(value for name, value in update.items() if name in kept)]
     return sum(item.operation in FUSED or item.operation in "+-*/" for item in ordered(outputs))
 
 
@@ -289,7 +289,10 @@ def main(arguments: list[str]) -> int:
     print(f"{'engine':24s}{'acceleration ns':>18s}{'pressure ns':>14s}")
     for name in (*found, "bridge"):
         print(f"{name:24s}{found.get(name, float('nan')):18.1f}{pressure.get(name, float('nan')):14.1f}")
-    peak, cpp = cpp_lanes.peak(options.processor), [cost for name, cost in found.items() if name.startswith(CPP)]
+    peak, cpp = (
+        cpp_lanes.peak_arithmetic(options.processor),
+        [cost for name, cost in found.items() if name.startswith(CPP)],
+    )
     floor = None if peak is None else 1e9 * operations() / (peak / 2.0)
     if floor is not None:
         print(f"{operations()} arithmetic instructions a step: floor {floor:.1f} ns")
@@ -309,6 +312,6 @@ def main(arguments: list[str]) -> int:
         if value is None:
             print(f"{name:20s} not measured: no compiler, or no --jax", file=sys.stderr)
             continue
-        [check] = printed([Check(name, value, most=wanted) if most else Check(name, value, least=wanted)])
+        [check] = print_and_keep([Check(name, value, most=wanted) if most else Check(name, value, least=wanted)])
         missed += not check.met
     return missed

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.targets import Check, keep
+from benchmarks.targets import Check, keep_figure
 from plant.arrays import Array
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
@@ -28,7 +28,7 @@ TOOLS = {"libcosim": ("2.0",), "ecos": ("2.0", "3.0")}
 WORKER = Path(__file__).parents[1] / "peers" / "fmu_tools.py"
 
 
-def native(plant: Plant, parameters: EhaParameters, speeds: Array) -> Array:
+def native_velocity(plant: Plant, parameters: EhaParameters, speeds: Array) -> Array:
     """Return the velocity for a drive held between samples, shape (samples + 1,) [m/s]."""
     row = parameter_row(plant.complete(parameters))
     run = compile_trajectory(plant.name, plant.step, len(plant.states), plant.parameter_class)
@@ -38,7 +38,7 @@ def native(plant: Plant, parameters: EhaParameters, speeds: Array) -> Array:
     return np.asarray(plant.channels(np.array(states), row[None])["velocity_m_s"])
 
 
-def by_fmpy(path: Path, speeds: Array) -> tuple[list[str], Array]:
+def fmpy_velocity(path: Path, speeds: Array) -> tuple[list[str], Array]:
     """Return the complaints of FMPy's validation, and its velocity, shape (samples + 1,) [m/s]."""
     import fmpy
     from fmpy.validation import validate_fmu
@@ -52,7 +52,7 @@ def by_fmpy(path: Path, speeds: Array) -> tuple[list[str], Array]:
     return list(validate_fmu(str(path))), np.asarray(found["velocity_m_s"])
 
 
-def by_tool(python: Path, tool: str, path: Path, speeds: Array) -> Array:
+def tool_velocity(python: Path, tool: str, path: Path, speeds: Array) -> Array:
     """Return the velocity computed by a tool, shape (samples + 1,) [m/s]."""
     command = [str(python), str(WORKER), tool, str(path), repr(STEP)]
     given = "\n".join(map(repr, speeds.tolist()))
@@ -73,17 +73,19 @@ def main(arguments: list[str]) -> int:
     speeds = sine(SECONDS, STEP, p.rated_speed, 5.0)
     with tempfile.TemporaryDirectory() as folder:
         for plant in PLANTS.values():
-            wanted = native(plant, p, speeds)
+            wanted = native_velocity(plant, p, speeds)
             for version in ("2.0", "3.0"):
                 path = Path(folder) / f"{plant.name}_{version[0]}.fmu"
                 path.write_bytes(plant_fmu(plant, p, STEP, version, name=f"{plant.name}_plant"))
-                objections, seen = by_fmpy(path, speeds)
+                objections, seen = fmpy_velocity(path, speeds)
                 found = {"FMPy": seen}
                 if python is not None:
-                    found |= {tool: by_tool(python, tool, path, speeds) for tool in TOOLS if version in TOOLS[tool]}
+                    found |= {
+                        tool: tool_velocity(python, tool, path, speeds) for tool in TOOLS if version in TOOLS[tool]
+                    }
                 for tool, velocity in found.items():
                     apart = float(np.max(np.abs(velocity - wanted)) / np.max(np.abs(wanted)))
-                    check = keep(
+                    check = keep_figure(
                         Check(f"{plant.name} FMI {version} in {tool}: relative difference", apart, most=WANTED)
                     )
                     met = check.met and not (tool == "FMPy" and objections)

@@ -29,7 +29,7 @@ VARIANCES = {"position_m": 1e-12, "velocity_m_s": 1e-6}
 WANTED_SECONDS, WANTED_BYTES = 6.0, 1e9
 
 
-def problems(seeds: int, samples: int) -> Iterator[FilterProblem]:
+def filter_problems(seeds: int, samples: int) -> Iterator[FilterProblem]:
     """Yield the filters, condition by condition; all first guesses of a run share its noise."""
     for number, condition in enumerate(CONDITIONS.values()):
         p = parameters_for(condition)
@@ -52,9 +52,9 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--seeds", type=int, default=16)
     parser.add_argument("--samples", type=int, default=100_000)
     options = parser.parse_args(arguments)
-    list(filter_batch(problems(1, 100)))
+    list(filter_batch(filter_problems(1, 100)))
     begin = time.process_time()
-    finals = np.array([trace.mean[-1] for trace in filter_batch(problems(options.seeds, options.samples))])
+    finals = np.array([trace.mean[-1] for trace in filter_batch(filter_problems(options.seeds, options.samples))])
     seconds = time.process_time() - begin
     peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024.0 if sys.platform == "darwin" else 1.0)
     within = np.mean(np.abs(finals / 2.07 - 1.0) < 0.03)

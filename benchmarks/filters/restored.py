@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.targets import Check, keep
+from benchmarks.targets import Check, keep_figure
 from estimation.eha.online import StreamFilterOptions, begin_filter, load_filter, save_filter
 from estimation.export.task import EXPORTED_FORMS
 from estimation.filters.online import RULES, OnlineFilter
@@ -34,7 +34,7 @@ def filter_on(filtered: OnlineFilter, record: Record, begin: int, end: int) -> N
         begin = stop
 
 
-def same(ours: OnlineFilter, wanted: OnlineFilter) -> bool:
+def is_same_memory(ours: OnlineFilter, wanted: OnlineFilter) -> bool:
     """Return whether the memories of two filters are bit-identical."""
     kept, other = ours.remembered(), wanted.remembered()
     return all(kept[name].tobytes() == other[name].tobytes() for name in kept)
@@ -60,10 +60,10 @@ def main(arguments: list[str]) -> int:
                     filter_on(ours, record, begin, end)
                     save_filter(path, asked, ours, 0.0)
                     ours, _ = load_filter(path, asked)
-                met = same(ours, whole)
+                met = is_same_memory(ours, whole)
                 missed, count = missed + (not met), count + 1
                 finite = bool(np.all(np.isfinite(whole.now().values)))
                 print(f"{form:18s}{method:6s}{'to the bit' if met else 'MISSED'}{'' if finite else ' (it diverged)'}")
-    keep(Check("filters that do not continue to the last bit", missed, most=0))
+    keep_figure(Check("filters that do not continue to the last bit", missed, most=0))
     print(f"{count - missed} of {count} continue to the last bit over {RESTARTS} restarts")
     return missed

@@ -13,7 +13,7 @@ import pandas as pd
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import Outcome
-from experiments.running.executors import side_by_side
+from experiments.running.executors import map_in_parallel
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -27,7 +27,7 @@ SAMPLE_TIME, DURATION = 1e-3, 10.0
 FIRST_GUESS = 3e8
 WANTED_RATIO = 2.0
 
-SHARE = 0.01
+DISTURBED_SHARE = 0.01
 """Share of each channel's samples that are missing or outliers [fraction]."""
 
 OUTLIER = 20.0
@@ -46,7 +46,7 @@ ESTIMATORS: Mapping[str, tuple[str, str, str]] = {
 
 def _missing(record: Record, rng: np.random.Generator) -> Record:
     for channel in record:
-        record = drop_samples(record, SHARE, rng, [channel])
+        record = drop_samples(record, DISTURBED_SHARE, rng, [channel])
     return record
 
 
@@ -54,7 +54,7 @@ def _outliers(record: Record, rng: np.random.Generator) -> Record:
     spoilt: dict[str, np.ndarray] = {}
     for channel in record:
         values = record[channel].copy()
-        hit = rng.choice(len(values), round(SHARE * len(values)), replace=False)
+        hit = rng.choice(len(values), round(DISTURBED_SHARE * len(values)), replace=False)
         values[hit] += OUTLIER * np.std(values) * rng.choice((-1.0, 1.0), len(hit))
         spoilt[channel] = values
     return record.replace(**spoilt)
@@ -69,7 +69,7 @@ def _dropout(record: Record, rng: np.random.Generator) -> Record:
     return record.replace(**gaps)
 
 
-def _broken(channel: str, kind: str, start: float) -> Callable[[Record, np.random.Generator], Record]:
+def _with_broken_sensor(channel: str, kind: str, start: float) -> Callable[[Record, np.random.Generator], Record]:
     fault = SensorFault(channel=channel, kind="gain" if kind == "dead" else "freeze", size=-1.0, start=start)
     return lambda record, rng: with_fault(record, fault, rng)
 
@@ -81,11 +81,11 @@ DISTURBANCES: Mapping[str, Callable[[Record, np.random.Generator], Record]] = {
     "1 % gross outliers": _outliers,
     "0.1 s drop-out": _dropout,
 }
-BROKEN: Mapping[str, Callable[[Record, np.random.Generator], Record]] = {
-    "encoder frozen from 5 s": _broken("position_m", "frozen", 5.0),
-    "pressure frozen from 5 s": _broken("differential_pressure_pa", "frozen", 5.0),
-    "pressure dead throughout": _broken("differential_pressure_pa", "dead", 0.0),
-    "pressure dead from 5 s": _broken("differential_pressure_pa", "dead", 5.0),
+BROKEN_SENSORS: Mapping[str, Callable[[Record, np.random.Generator], Record]] = {
+    "encoder frozen from 5 s": _with_broken_sensor("position_m", "frozen", 5.0),
+    "pressure frozen from 5 s": _with_broken_sensor("differential_pressure_pa", "frozen", 5.0),
+    "pressure dead throughout": _with_broken_sensor("differential_pressure_pa", "dead", 0.0),
+    "pressure dead from 5 s": _with_broken_sensor("differential_pressure_pa", "dead", 5.0),
 }
 
 
@@ -97,7 +97,7 @@ def run_case(case: tuple[str, int]) -> list[dict[str, object]]:
     drive = make_drive("prbs", DURATION, SAMPLE_TIME, p, rng)
     record = simulate(LUMPED, drive, SAMPLE_TIME, p, sensors=BENCH, rng=rng)
     rows: list[dict[str, object]] = []
-    for log, change in {**DISTURBANCES, **BROKEN}.items():
+    for log, change in {**DISTURBANCES, **BROKEN_SENSORS}.items():
         changed = change(record, stream(seed, "robustness benchmark", condition, log))
         for name, (form, method, robust) in ESTIMATORS.items():
             known = p if form == "pressure" else EhaParameters()
@@ -146,7 +146,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--csv", help="write every estimate to this file")
     options = parser.parse_args(arguments)
     rows: list[dict[str, object]] = []
-    for found in side_by_side(run_case, product(options.conditions, range(options.seeds))):
+    for found in map_in_parallel(run_case, product(options.conditions, range(options.seeds))):
         rows += found
     table = pd.DataFrame(rows)
     if options.csv:
@@ -154,7 +154,7 @@ def main(arguments: list[str]) -> int:
     summary = accuracy(table)
     print(summary.to_string(float_format="%.3f"))
     print(f"wanted: a value from every log, RMSE at most {WANTED_RATIO:g} times the clean one\n")
-    broken = table[table["log"].isin(list(BROKEN))]
+    broken = table[table["log"].isin(list(BROKEN_SENSORS))]
     reports = broken.groupby(["log", "estimator"], sort=False).agg(
         runs=("reported", "size"), share=("reported", "mean")
     )

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.targets import misses, say
+from benchmarks.targets import check_target, misses
 from estimation.arrays import Array
 from estimation.finding import NORMAL_95
 from estimation.identification.free_run.data import Channels, channels_from
@@ -29,7 +29,7 @@ LEVEL, OFFSET = 2.0, 5.0
 
 
 @dataclass(frozen=True)
-class Planted:
+class PlantedNonlinearity:
     """A nonlinearity with its values in units of the input."""
 
     kind: str
@@ -41,21 +41,21 @@ def _steps(rng: np.random.Generator) -> Array:
     return np.repeat(rng.normal(size=SAMPLES // 10), 10)
 
 
-def _wander(rng: np.random.Generator) -> Array:
+def _slow_noise(rng: np.random.Generator) -> Array:
     slow = filtered([1.0], [1.0, -0.95], rng.normal(size=SAMPLES))
     return slow / slow.std()
 
 
-PLANTED = (
-    Planted("dead-zone", {"lower": LEVEL - 0.4, "upper": LEVEL + 0.6}, _steps),
-    Planted("saturation", {"lower": LEVEL - 1.0, "upper": LEVEL + 0.8}, _steps),
-    Planted("backlash", {"half_width": 0.3}, _wander),
+PLANTED_NONLINEARITIES = (
+    PlantedNonlinearity("dead-zone", {"lower": LEVEL - 0.4, "upper": LEVEL + 0.6}, _steps),
+    PlantedNonlinearity("saturation", {"lower": LEVEL - 1.0, "upper": LEVEL + 0.8}, _steps),
+    PlantedNonlinearity("backlash", {"half_width": 0.3}, _slow_noise),
 )
 
 
-def logged(planted: Planted, seed: int) -> Channels:
+def draw_log(planted: PlantedNonlinearity, seed: int) -> Channels:
     """Return a log of one plant."""
-    rng = np.random.default_rng([seed, PLANTED.index(planted)])
+    rng = np.random.default_rng([seed, PLANTED_NONLINEARITIES.index(planted)])
     u = LEVEL + planted.drive(rng)
     bent, _ = NONLINEARITIES[planted.kind].apply(u, np.array(list(planted.values.values())), float(u[0]))
     y = filtered([0.0, 0.1, 0.05], [1.0, -1.6, 0.75], bent)[100:]
@@ -71,21 +71,21 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = options.parse_args(arguments)
     form: dict[str, Any] = {} if chosen.order == "auto" else {"order": int(chosen.order), "delay": 1}
     misses.clear()
-    for planted in PLANTED:
-        found = [_found(planted, seed, form) for seed in range(chosen.seeds)]
+    for planted in PLANTED_NONLINEARITIES:
+        found = [_scaled_errors(planted, seed, form) for seed in range(chosen.seeds)]
         hits = {name: np.array([one[name] for one in found if one]) for name in planted.values}
-        say(f"{planted.kind}: found [%]", 100.0 * sum(map(bool, found)) / chosen.seeds, 100.0, most=False)
+        check_target(f"{planted.kind}: found [%]", 100.0 * sum(map(bool, found)) / chosen.seeds, 100.0, most=False)
         for name, scores in hits.items():
             covered = 100.0 * float(np.mean(np.abs(scores) <= NORMAL_95))
             print(f"{planted.kind}, {name}: error over its deviation {scores.mean():.2f} +- {scores.std():.2f}")
-            say(f"{planted.kind}, {name}: intervals that cover [%]", covered, 90.0, most=False)
-            say(f"{planted.kind}, {name}: intervals that cover [%]", covered, 98.0)
+            check_target(f"{planted.kind}, {name}: intervals that cover [%]", covered, 90.0, most=False)
+            check_target(f"{planted.kind}, {name}: intervals that cover [%]", covered, 98.0)
     return len(misses)
 
 
-def _found(planted: Planted, seed: int, form: Mapping[str, Any]) -> dict[str, float]:
+def _scaled_errors(planted: PlantedNonlinearity, seed: int, form: Mapping[str, Any]) -> dict[str, float]:
     """Return the errors divided by their standard deviations; empty if another kind is found."""
-    model = identify_channels(logged(planted, seed), structure="hammerstein", **form).model
+    model = identify_channels(draw_log(planted, seed), structure="hammerstein", **form).model
     if not isinstance(model.dynamics, HammersteinDynamics) or model.dynamics.at_input != planted.kind:
         return {}
     said = model.dynamics.nonlinearity(model.scaling)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.targets import misses, say
+from benchmarks.targets import check_target, misses
 from estimation.arrays import Array, IntArray
 from estimation.identification.model.recursion import filtered
 from estimation.identification.signals.distortion import best_linear_approximation
@@ -48,7 +48,7 @@ def multisine(lines: IntArray, rng: np.random.Generator) -> Array:
     return one / one.std()
 
 
-def bent(u: Array, denominator: Sequence[float]) -> Array:
+def plant_output(u: Array, denominator: Sequence[float]) -> Array:
     """Return the plant's output: a filter, then a cubic."""
     inner = filtered(NUMERATOR, denominator, u)
     size = inner[PERIOD:].std()
@@ -62,7 +62,7 @@ def _true_level(realisations: int, denominator: Sequence[float]) -> float:
     ratios = np.empty((realisations, len(lines)), dtype=np.complex128)
     for row in ratios:
         u = multisine(lines, rng)
-        y = bent(np.tile(u, 2), denominator)[PERIOD:]
+        y = plant_output(np.tile(u, 2), denominator)[PERIOD:]
         row[:] = np.fft.rfft(y)[lines] / np.fft.rfft(u)[lines]
     size = 1.0 / (2.0 * len(lines))  # |U/N|^2 of a multisine of unit power
     return float(np.mean(np.var(ratios, axis=0, ddof=1)) * size)
@@ -85,10 +85,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         truth = np.polyval(NUMERATOR[::-1], z) / np.polyval(DENOMINATOR[::-1], z)
         covered.append(float(np.mean(np.abs(found.response - truth) <= found.radius())))
     share = 100.0 * float(np.mean(covered))
-    say("local polynomial: circles that cover [%]", share, 93.0, most=False)
-    say("local polynomial: circles that cover [%]", share, 97.0)
+    check_target("local polynomial: circles that cover [%]", share, 93.0, most=False)
+    check_target("local polynomial: circles that cover [%]", share, 97.0)
     for name, denominator in (("damped", DAMPED), ("resonant", DENOMINATOR)):
-        every = [[_levels(seed, one, denominator) for one in range(LOGS)] for seed in range(chosen.seeds)]
+        every = [[_distortion_levels(seed, one, denominator) for one in range(LOGS)] for seed in range(chosen.seeds)]
         truth, levels = _true_level(chosen.realisations, denominator), np.mean(np.array(every)[:, :, :2], axis=1)
         single, away = (10.0 * np.log10(one / truth) for one in (np.array(every)[:, 0, 0], levels[:, 0]))
         print(f"planted cubic, {name}: error of its odd level {away.mean():.2f} +- {away.std():.2f} dB")
@@ -99,19 +99,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(
             f"planted cubic, {name}: single logs within 1 dB {near:.0f} %, wanted periods {np.median(logs[:, 4]):.0f}"
         )
-        say(f"planted cubic, {name}: intervals of single logs that hold the level [%]", held, 90.0, most=False)
-        say(f"planted cubic, {name}: intervals of single logs that hold the level [%]", held, 98.0)
+        check_target(f"planted cubic, {name}: intervals of single logs that hold the level [%]", held, 90.0, most=False)
+        check_target(f"planted cubic, {name}: intervals of single logs that hold the level [%]", held, 98.0)
         if name == "damped":
-            say("planted cubic: largest error of its odd level [dB]", float(np.abs(away).max()), 1.0)
+            check_target("planted cubic: largest error of its odd level [dB]", float(np.abs(away).max()), 1.0)
             even = float(np.abs(levels[:, 1]).max() / truth)
-            say("planted cubic: even level, which is not there, over the odd one", even, 0.05)
+            check_target("planted cubic: even level, which is not there, over the odd one", even, 0.05)
     return len(misses)
 
 
-def _levels(seed: int, log: int, denominator: Sequence[float]) -> tuple[float, ...]:
+def _distortion_levels(seed: int, log: int, denominator: Sequence[float]) -> tuple[float, ...]:
     """Return the odd and even levels from one log, the odd one's interval, and the recommended period."""
     rng = np.random.default_rng([seed, log])
-    y = bent(u := np.tile(multisine(odd_lines(rng), rng), PERIODS), denominator)
+    y = plant_output(u := np.tile(multisine(odd_lines(rng), rng), PERIODS), denominator)
     told = best_linear_approximation(u, y + NOISE * y.std() * rng.normal(size=len(u)), 1.0)
     ends = told.level_interval(odd=True)
     return told.level(odd=True), told.level(odd=False), *ends, float(told.period_wanted(odd=True) or np.nan)

@@ -21,7 +21,7 @@ from estimation.identification.search.experiments import Experiments
 from plant.errors import LogWarning
 
 FORM = {"n_numerator": 3, "n_denominator": 2}
-WORSE = 1e-6
+MOST_EXCESS_COST = 1e-6
 """Excess cost relative to a fit started at the truth, above which the optimum counts as missed."""
 
 
@@ -61,8 +61,8 @@ def table6_figures(seeds: int) -> int:
         (f"mean efficiency {mean:.3f} (0.95 to 1.05)", 0.95 <= mean <= 1.05),
         (f"optimum missed at 1 and 10 %: {quiet:.0f} of {18 * seeds} (0)", quiet == 0),
         (f"optimum missed at 50 %: {loud:.0f} of {9 * seeds} (2)", loud <= 2 * seeds / 100),
-        (f"pooled coverage {min(covers):.3f} to {max(covers):.3f} (0.92 to 0.98)", _inside(covers, 0.92, 0.98)),
-        (f"gain coverage {min(gains):.3f} to {max(gains):.3f} (0.90 to 0.99)", _inside(gains, 0.90, 0.99)),
+        (f"pooled coverage {min(covers):.3f} to {max(covers):.3f} (0.92 to 0.98)", _all_within(covers, 0.92, 0.98)),
+        (f"gain coverage {min(gains):.3f} to {max(gains):.3f} (0.90 to 0.99)", _all_within(gains, 0.90, 0.99)),
         (
             f"minor leakage at 50 %: flagged {rows[hard]['flagged']:.2f}, profile covers {rows[hard]['profile']:.3f}",
             rows[hard]["flagged"] >= 0.9 and rows[hard]["profile"] >= 0.90,
@@ -84,7 +84,7 @@ def one_case(name: str, noise: float, seeds: int) -> dict[str, float]:
         distance.append(float(error @ information(case) @ error) / error.size)
         covered.append(np.abs(error) <= NORMAL_95 * model.coefficient_std)
         gains.append(abs(model.dc_gain - case.truth.dc_gain) <= NORMAL_95 * model.dc_gain_std)
-        missed += cost_of(model, case) > (1.0 + WORSE) * cost_from_truth(case)
+        missed += cost_of(model, case) > (1.0 + MOST_EXCESS_COST) * cost_from_truth(case)
         flagged.append(bool(model.cancellations))
         if model.cancellations:
             low, high = dc_gain_interval(model, case.u, case.y)
@@ -139,7 +139,7 @@ def random_figures(systems: int) -> int:
         begun = time.process_time()
         model = fit_output_error(case.u, case.y, 1.0, n_numerator=case.truth.numerator.size, n_denominator=order)
         spent.append(time.process_time() - begun)
-        missed[order].append(cost_of(model, case) > (1.0 + WORSE) * cost_from_truth(case))
+        missed[order].append(cost_of(model, case) > (1.0 + MOST_EXCESS_COST) * cost_from_truth(case))
         if missed[order][-1]:
             print(
                 f"  missed: system {seed}, order {order}, excess {cost_of(model, case) / cost_from_truth(case) - 1:.2g}"
@@ -159,5 +159,5 @@ def report(lines: list[tuple[str, bool]]) -> int:
     return sum(not met for _, met in lines)
 
 
-def _inside(values: list[float], low: float, high: float) -> bool:
+def _all_within(values: list[float], low: float, high: float) -> bool:
     return min(values) >= low and max(values) <= high

@@ -38,7 +38,7 @@ class Case:
 def table6_case(name: str, noise: float, seed: int, n: int = 20_000) -> Case:
     """Return a record of one model of Table 6."""
     rng = np.random.default_rng([6, list(TABLE_6).index(name), round(100 * noise), seed, n])
-    return noisy(TABLE_6[name], random_binary(rng, n), noise, rng)
+    return noisy_case(TABLE_6[name], random_binary(rng, n), noise, rng)
 
 
 def random_binary(rng: np.random.Generator, n: int, hold: int = 50) -> np.ndarray:
@@ -46,7 +46,7 @@ def random_binary(rng: np.random.Generator, n: int, hold: int = 50) -> np.ndarra
     return 125.66 * np.repeat(rng.choice([-1.0, 1.0], n // hold + 1), hold)[:n]
 
 
-def noisy(truth: LinearModel, u: np.ndarray, share: float, rng: np.random.Generator) -> Case:
+def noisy_case(truth: LinearModel, u: np.ndarray, share: float, rng: np.random.Generator) -> Case:
     """Return a record with white output noise."""
     clean = truth.simulate(u)
     std = share * float(clean.std())
@@ -65,7 +65,7 @@ def random_system(seed: int, n: int = 2_000) -> Case:
     b = np.real(np.poly(_roots(rng, order, 0.0, 1.2)))
     truth = LinearModel(b * f.sum() / max(abs(b.sum()), 0.05), f, 1.0, "u", "y")
     u = np.repeat(rng.choice([-1.0, 1.0], n), int(rng.integers(1, 11)))[:n]
-    return noisy(truth, u, 10.0 ** (-rng.uniform(10.0, 30.0) / 20.0), rng)
+    return noisy_case(truth, u, 10.0 ** (-rng.uniform(10.0, 30.0) / 20.0), rng)
 
 
 def _roots(rng: np.random.Generator, order: int, low: float, high: float) -> np.ndarray:

@@ -11,7 +11,7 @@ from estimation.identification.model.recursion import filtered
 SIZES = {"train": (600, 2500), "test": (400, 1200)}
 """Number of samples, from and to."""
 
-FINE = 10
+STEPS_PER_SAMPLE = 10
 """Simulation steps in one sample."""
 
 NOISE = (0.003, 0.03)
@@ -57,13 +57,15 @@ def _input(n: int, rng: np.random.Generator) -> Array:
     return (u - u.mean()) / u.std() + float(rng.choice([0.0, 0.5]))
 
 
-def _stepped(u: Array, state: Array, slope: Callable[[Array, float], Array], output: Callable[[Array], float]) -> Array:
+def _euler_output(
+    u: Array, state: Array, slope: Callable[[Array, float], Array], output: Callable[[Array], float]
+) -> Array:
     """Return the measured output of a state integrated by Euler steps, with the input held over each sample."""
     out = np.zeros(u.size)
     for t, value in enumerate(u):
         out[t] = output(state)
-        for _ in range(FINE):
-            state = state + slope(state, float(value)) / FINE
+        for _ in range(STEPS_PER_SAMPLE):
+            state = state + slope(state, float(value)) / STEPS_PER_SAMPLE
     return out
 
 
@@ -74,7 +76,7 @@ def _damper(u: Array, rng: np.random.Generator) -> Array:
     def slope(x: Array, v: float) -> Array:
         return np.array([lag * (v - 0.8 * abs(v) * x[0]), v - 0.02 * x[1], v - x[2]])
 
-    return _stepped(u, np.zeros(3), slope, lambda x: yielding * np.tanh(2.0 * x[0]) + stiff * x[1] + 0.3 * x[2])
+    return _euler_output(u, np.zeros(3), slope, lambda x: yielding * np.tanh(2.0 * x[0]) + stiff * x[1] + 0.3 * x[2])
 
 
 def _crane(u: Array, rng: np.random.Generator) -> Array:
@@ -86,7 +88,7 @@ def _crane(u: Array, rng: np.random.Generator) -> Array:
         flow = 0.4 * opened * np.sqrt(max(4.0 - np.sign(opened) * x[0], 0.0))
         return np.array([stiff * (flow - x[1]) * 3.0 - 0.02 * x[0], 0.3 * (x[0] - 0.05 * x[2]) - damp * x[1], x[1]])
 
-    return _stepped(u, np.zeros(3), slope, lambda x: float(x[0]))
+    return _euler_output(u, np.zeros(3), slope, lambda x: float(x[0]))
 
 
 def _cylinder(u: Array, rng: np.random.Generator) -> Array:
@@ -99,7 +101,7 @@ def _cylinder(u: Array, rng: np.random.Generator) -> Array:
         drop = 2.0 * np.tanh(v) - x[0]
         return np.array([fill * np.sign(drop) * np.sqrt(abs(drop)) - 0.2 * x[1], 0.2 * force, x[1]])
 
-    return _stepped(u, np.zeros(3), slope, lambda x: float(x[2]))
+    return _euler_output(u, np.zeros(3), slope, lambda x: float(x[2]))
 
 
 def _drive(u: Array, rng: np.random.Generator) -> Array:
@@ -111,7 +113,7 @@ def _drive(u: Array, rng: np.random.Generator) -> Array:
         rubbed = rub * np.tanh(x[0] / 0.05)
         return np.array([0.2 * (v - rubbed - 0.3 * x[0]) - pull, pull - 0.05 * x[1], x[0] - x[1]])
 
-    return _stepped(u, np.zeros(3), slope, lambda x: abs(float(x[1])) if blind else float(x[1]))
+    return _euler_output(u, np.zeros(3), slope, lambda x: abs(float(x[1])) if blind else float(x[1]))
 
 
 def _position(u: Array, rng: np.random.Generator) -> Array:
@@ -121,7 +123,7 @@ def _position(u: Array, rng: np.random.Generator) -> Array:
     def slope(x: Array, v: float) -> Array:
         return np.array([0.3 * (v - rub * np.tanh(x[0] / 0.05)) - damp * x[0], x[0]])
 
-    return _stepped(u, np.zeros(2), slope, lambda x: float(x[1]))
+    return _euler_output(u, np.zeros(2), slope, lambda x: float(x[1]))
 
 
 def _circuit(u: Array, rng: np.random.Generator) -> Array:
@@ -132,7 +134,7 @@ def _circuit(u: Array, rng: np.random.Generator) -> Array:
         loss = diode * max(x[0] - 0.6, 0.0)
         return np.array([x[1] - loss, 0.3 * (v - x[0] - hard * x[0] ** 3) - damp * x[1]])
 
-    return _stepped(u, np.zeros(2), slope, lambda x: float(x[0]))
+    return _euler_output(u, np.zeros(2), slope, lambda x: float(x[0]))
 
 
 def _tank(u: Array, rng: np.random.Generator) -> Array:
@@ -144,7 +146,7 @@ def _tank(u: Array, rng: np.random.Generator) -> Array:
         over = max(x[0] - rim, 0.0)
         return np.array([0.05 * max(v + 1.5, 0.0) - out - over, out + 0.3 * over - through])
 
-    return _stepped(u, np.ones(2), slope, lambda x: float(x[1]))
+    return _euler_output(u, np.ones(2), slope, lambda x: float(x[1]))
 
 
 MACHINES: Mapping[str, Callable[[Array, np.random.Generator], Array]] = {

@@ -45,8 +45,8 @@ def main(arguments: list[str]) -> int:
     cases = [_unit(table6_case(name, NOISE, 0, options.samples)) for name in list(TABLE_6)[: options.records]]
     best = [cost_from_truth(case) for case in cases]
     with threadpool_limits(1):
-        ours = [_own(case) for case in cases]
-        ours = [_own(case) for case in cases]  # the first round compiles
+        ours = [_own_fit(case) for case in cases]
+        ours = [_own_fit(case) for case in cases]  # the first round compiles
     mean = float(np.mean([row["cpu_seconds"] for row in ours]))
     right = sum(_succeeds(row, case, least) for row, case, least in zip(ours, cases, best, strict=True))
     print(f"{'hydrostate':12s} {1e3 * mean:10.0f} ms            right {right} of {len(cases)}")
@@ -60,7 +60,7 @@ def main(arguments: list[str]) -> int:
             if not python.exists():
                 print(f"{name:12s} skipped: no {python} (make peers)")
                 continue
-            rows = _run(name, python, data, Path(folder) / f"{name}.json", options.timeout)
+            rows = _run_peer(name, python, data, Path(folder) / f"{name}.json", options.timeout)
             if not rows:
                 lines.append((f"{name}: nothing came back", False))
                 continue
@@ -85,14 +85,14 @@ def _unit(case: Case) -> Case:
     return Case(truth, case.u / size_u, case.y / size_y, case.noise_std / size_y)
 
 
-def _own(case: Case) -> dict[str, Any]:
+def _own_fit(case: Case) -> dict[str, Any]:
     begun = time.process_time()
     model = fit_output_error(case.u, case.y, 1e-3, n_numerator=3, n_denominator=2)
     spent = time.process_time() - begun
     return {"b": model.numerator.tolist(), "f": model.denominator.tolist(), "error": "", "cpu_seconds": spent}
 
 
-def _run(name: str, python: Path, data: Path, result: Path, timeout: float) -> list[dict[str, Any]]:
+def _run_peer(name: str, python: Path, data: Path, result: Path, timeout: float) -> list[dict[str, Any]]:
     worker = Path(__file__).with_name("identification_peer_worker.py")
     one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:

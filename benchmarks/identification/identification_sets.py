@@ -35,7 +35,7 @@ from benchmarks.identification.identification_machines import machine_sets
 from benchmarks.identification.identification_sets_data import DATA, Part, PublicSet, public_sets
 from benchmarks.identification.identification_simulated import simulated_sets
 from benchmarks.identification.identification_stand_ins import stand_in_sets
-from benchmarks.identification.other_records import WORSE, OtherRecords
+from benchmarks.identification.other_records import WORSE_RATIO, OtherRecords
 from benchmarks.identification.paired_blocks import error_ratio
 from estimation.arrays import Array
 from estimation.identification.free_run.data import channels_from
@@ -57,19 +57,19 @@ PUBLISHED = {
 }
 """Published figures, with their source."""
 
-MOST_PEER = 10_000
+MOST_PEER_SAMPLES = 10_000
 """Maximum samples given to peers, so that they finish."""
 
-LOSES = 1.05
+LOSING_RATIO = 1.05
 """Ratio to the better baseline's error from which the default counts as losing."""
 
-BEHIND = {"default": (("sippy", "jax-sysid"), 1.02), "nonlinear": (("sysidentpy", "jax-sysid-nonlinear"), 1.10)}
+PEER_LIMITS = {"default": (("sippy", "jax-sysid"), 1.02), "nonlinear": (("sysidentpy", "jax-sysid-nonlinear"), 1.10)}
 """Peers that the default, and our best possibly nonlinear model, are compared with, and the allowed error ratio."""
 
-LOOKS_AHEAD = 100.0
+LOOKAHEAD_GROWTH = 100.0
 """Growth of a peer's state over the test from which its start encodes outputs instead of inputs."""
 
-OURS = {"default": "output-error", "auto": "auto", "narx": "narx", "hammerstein": "hammerstein"}
+OUR_STRUCTURES = {"default": "output-error", "auto": "auto", "narx": "narx", "hammerstein": "hammerstein"}
 """Our columns and their structures."""
 
 
@@ -82,7 +82,9 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--machines", type=int, nargs=2, default=(0, 0), metavar=seeds, help="simulated machines")
     parser.add_argument("--stand-ins", type=int, nargs=2, default=(0, 0), metavar=seeds, help="of sets kept back")
     parser.add_argument("--again", type=int, default=0, metavar="COUNT", help="other records of each stand-in")
-    parser.add_argument("--ours", nargs="*", default=list(OURS), choices=list(OURS), help="columns of ours")
+    parser.add_argument(
+        "--ours", nargs="*", default=list(OUR_STRUCTURES), choices=list(OUR_STRUCTURES), help="columns of ours"
+    )
     parser.add_argument("--peers", nargs="*", default=list(PEERS), choices=list(PEERS))
     parser.add_argument("--begun", type=float, default=1.0, metavar="SHARE", help="of the test that states come from")
     parser.add_argument("--timeout", type=float, default=300.0, help="for each peer and set [s of CPU]")
@@ -92,7 +94,7 @@ def main(arguments: list[str]) -> int:
     made += [one for seed in range(*options.stand_ins) for one in stand_in_sets(seed, options.again)]
     chosen = made or public_sets(options.sets)
     if not chosen:
-        parser.error(_no_set(options.sets))
+        parser.error(_no_set_reason(options.sets))
     peers = [name for name in options.peers if _python(name).exists()] if not made else []
     names = ("first", "scipy", *options.ours, *peers)
     wide = {name: max(11, len(name)) for name in names}
@@ -101,7 +103,7 @@ def main(arguments: list[str]) -> int:
     for one in chosen:
         with threadpool_limits(1), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            runs, seconds, ahead = _runs(_begun(one, options.begun), options.ours, peers, options.timeout)
+            runs, seconds, ahead = _runs(_with_initial_share(one, options.begun), options.ours, peers, options.timeout)
         for test, part in one.tests.items():
             errors = {name: _error(run.get(test), part, one.skipped) for name, run in runs.items()}
             title = f"{one.name} {test}".strip()
@@ -111,14 +113,14 @@ def main(arguments: list[str]) -> int:
             rmse = auto * float(np.std(part[1]))
             if title in PUBLISHED and rmse > 0.0:
                 print(f"{'':28s}auto {rmse:.4g} = {20.0 * np.log10(rmse):.1f} dB; published: {PUBLISHED[title]}")
-            for line in _behind(one, test, {name: run for name, run in runs.items() if name not in ahead}):
+            for line in _peers_ahead(one, test, {name: run for name, run in runs.items() if name not in ahead}):
                 print(f"{'':28s}{line}")
-            for line in others.told(one, runs):
+            for line in others.comparison_lines(one, runs):
                 print(f"{'':28s}{line}")
-            missed += default > WORSE * errors["first"] or auto > WORSE * default
+            missed += default > WORSE_RATIO * errors["first"] or auto > WORSE_RATIO * default
             ratios.append(default / min(errors["first"], errors["scipy"]))
     print(f"default worse than first order, or auto than default: {missed}")
-    lost, mean = sum(one > LOSES for one in ratios), float(np.exp(np.mean(np.log(ratios))))
+    lost, mean = sum(one > LOSING_RATIO for one in ratios), float(np.exp(np.mean(np.log(ratios))))
     print(f"default over the better of first and scipy: {lost} of {len(ratios)} lose more than 5 %,", end=" ")
     print(f"worst {max(ratios):.2f}-fold, geometric mean {mean:.3f}")
     for line in others.summary():
@@ -126,7 +128,7 @@ def main(arguments: list[str]) -> int:
     return missed
 
 
-def _no_set(wanted: list[str]) -> str:
+def _no_set_reason(wanted: list[str]) -> str:
     """Return why there is nothing to compare: no data, or no set with one of these parts in its name."""
     known = ", ".join(one.name for one in public_sets())
     if not known:
@@ -134,14 +136,14 @@ def _no_set(wanted: list[str]) -> str:
     return f"no set's name has {' or '.join(map(repr, wanted))} in it; there are {known}"
 
 
-def _behind(one: PublicSet, test: str, runs: dict[str, dict[str, Array]]) -> list[str]:
+def _peers_ahead(one: PublicSet, test: str, runs: dict[str, dict[str, Array]]) -> list[str]:
     """Return lines on peers that are ahead of ours by more than allowed, with the confidence from the test."""
     y = one.tests[test][1][one.skipped :]
     left = {name: run[test][one.skipped :] - y for name, run in runs.items() if test in run}
     errors = {name: float(np.sqrt(np.mean(value**2))) for name, value in left.items() if np.isfinite(value).all()}
     lines: list[str] = []
-    for kind, (peers, allowed) in BEHIND.items():
-        ours = [(errors[name], name) for name in OURS if name in errors and kind in (name, "nonlinear")]
+    for kind, (peers, allowed) in PEER_LIMITS.items():
+        ours = [(errors[name], name) for name in OUR_STRUCTURES if name in errors and kind in (name, "nonlinear")]
         theirs = [(errors[name], name) for name in peers if name in errors]
         if ours and theirs and min(ours)[0] > allowed * min(theirs)[0]:
             own, peer = min(ours)[1], min(theirs)[1]
@@ -150,15 +152,15 @@ def _behind(one: PublicSet, test: str, runs: dict[str, dict[str, Array]]) -> lis
     return lines
 
 
-def _root() -> Path:
+def _peer_folder() -> Path:
     return Path(os.environ.get("HYDROSTATE_PEERS", ".peers"))
 
 
 def _python(peer: str) -> Path:
-    return _root() / PEERS[peer] / "bin" / "python"
+    return _peer_folder() / PEERS[peer] / "bin" / "python"
 
 
-def _begun(one: PublicSet, share: float) -> PublicSet:
+def _with_initial_share(one: PublicSet, share: float) -> PublicSet:
     """Return a set whose tests give the runs only an initial share of their outputs."""
 
     def begun(parts: dict[str, Part]) -> dict[str, Part]:
@@ -179,12 +181,12 @@ def _runs(
 ) -> tuple[dict[str, dict[str, Array]], str, list[str]]:
     inputs = [f"u{k}" for k in range(one.train[0].shape[1])]
     data = channels_from([one.train[0]], [one.train[1]], one.sample_time, inputs, "y")
-    found: dict[str, dict[str, Array]] = {"first": _first(one), "scipy": _scipy(one)}
+    found: dict[str, dict[str, Array]] = {"first": _first_order_runs(one), "scipy": _scipy(one)}
     seconds: list[str] = []
     for name in ours:
         begun = time.process_time()
         try:
-            model = identify_channels(data, structure=OURS[name]).model
+            model = identify_channels(data, structure=OUR_STRUCTURES[name]).model
         except ValueError as error:
             print(f"{one.name} {name}: {error}")
             found[name] = {}
@@ -194,7 +196,7 @@ def _runs(
     ahead = list[str]()
     for name in peers:
         found[name], growth = _peer(name, one, timeout)
-        if growth > LOOKS_AHEAD:
+        if growth > LOOKAHEAD_GROWTH:
             ahead.append(name)
             print(f"{one.name} {name}: grows {growth:.1g}-fold over the test, so its start looks ahead: not compared")
     return found, " ".join(seconds), ahead
@@ -241,7 +243,7 @@ def _fitted(one: PublicSet, n: int) -> tuple[Array, float, tuple[Array, Array, f
     return best, y.size * float(np.log(cost)) + theta.size * float(np.log(y.size)), scale
 
 
-def _first(one: PublicSet) -> dict[str, Array]:
+def _first_order_runs(one: PublicSet) -> dict[str, Array]:
     theta, _, scale = _fitted(one, 1)
     return {test: _with_start(theta, 1, part, scale) for test, part in one.parts.items()}
 
@@ -259,7 +261,11 @@ def _peer(name: str, one: PublicSet, timeout: float) -> tuple[dict[str, Array], 
     with tempfile.TemporaryDirectory() as folder:
         data, result = Path(folder) / "set.npz", Path(folder) / "result.npz"
         parts = {f"{key}{k}": part[i] for k, part in enumerate(one.tests.values()) for i, key in enumerate("uy")}
-        train = {"u": one.train[0][:MOST_PEER], "y": one.train[1][:MOST_PEER], "tests": np.array(len(one.tests))}
+        train = {
+            "u": one.train[0][:MOST_PEER_SAMPLES],
+            "y": one.train[1][:MOST_PEER_SAMPLES],
+            "tests": np.array(len(one.tests)),
+        }
         np.savez(data, allow_pickle=False, **train, **parts)
         try:
             subprocess.run(  # noqa: S603 - our own worker, in an environment that the user made

@@ -60,11 +60,11 @@ def public_sets(wanted: Sequence[str] = ()) -> list[PublicSet]:
     wanted : sequence of str
         Parts of names; all sets if not given.
     """
-    found = [one for make in (_tanks, _bouc_wen, _emps, _daisy) for one in _present(make)]
+    found = [one for make in (_tanks, _bouc_wen, _emps, _daisy) for one in _sets_if_present(make)]
     return [one for one in found if not wanted or any(part in one.name for part in wanted)]
 
 
-def _present(make: Callable[[], list[PublicSet]]) -> list[PublicSet]:
+def _sets_if_present(make: Callable[[], list[PublicSet]]) -> list[PublicSet]:
     try:
         return make()
     except FileNotFoundError:

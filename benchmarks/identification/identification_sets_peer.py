@@ -32,7 +32,7 @@ def growth(A, tests):
         return radius ** max(len(u) for u, _ in tests)
 
 
-def held_out(fit, run, sizes, u, y):
+def size_by_held_out(fit, run, sizes, u, y):
     """Return the size with the best free run on the last third, fitted to the rest."""
     cut = 2 * len(y) // 3
     errors = {}
@@ -59,7 +59,7 @@ def sippy(u, y, tests):
     def run(model, u, y):
         return state_space_run(*model, u, y)
 
-    n, stable = held_out(fit, run, [(n, stable) for stable in (False, True) for n in (1, 2, 3, 4, 5, 6)], u, y)
+    n, stable = size_by_held_out(fit, run, [(n, stable) for stable in (False, True) for n in (1, 2, 3, 4, 5, 6)], u, y)
     try:
         model = fit(u, y, (n, stable))
         return [run(model, *test) for test in tests], growth(model[0], tests)
@@ -85,7 +85,7 @@ def jax_sysid(u, y, tests):
     def run(model, u, y):
         return state_space_run(*model, u, y)
 
-    model = fit(u, y, held_out(fit, run, (2, 4), u, y))
+    model = fit(u, y, size_by_held_out(fit, run, (2, 4), u, y))
     return [run(model, *test) for test in tests], growth(model[0], tests)
 
 
@@ -126,7 +126,7 @@ def jax_sysid_nonlinear(u, y, tests):
         x0 = model.learn_x0(u[:known], y[:known].reshape(-1, 1), RTS_epochs=10, verbosity=False)
         return np.ravel(np.asarray(model.predict(np.asarray(x0), u)[0], dtype=float))
 
-    model = fit(u, y, held_out(fit, run, (2, 4), u, y))
+    model = fit(u, y, size_by_held_out(fit, run, (2, 4), u, y))
     return [run(model, *test) for test in tests], 0.0
 
 
@@ -155,7 +155,7 @@ def sysidentpy(u, y, tests):
         return np.ravel(model.predict(X=u, y=y[: model.max_lag].reshape(-1, 1)))
 
     sizes = [(lags, degree) for lags in (1, 2, 3, 4) for degree in (1, 2, 3) if lags * (1 + u.shape[1]) * degree < 30]
-    model = fit(u, y, held_out(fit, run, sizes, u, y))
+    model = fit(u, y, size_by_held_out(fit, run, sizes, u, y))
     return [run(model, *test) for test in tests], 0.0
 
 

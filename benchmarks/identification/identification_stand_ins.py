@@ -18,19 +18,19 @@ from estimation.identification.model.recursion import filtered
 SIZES = (420, 2000)
 """Number of samples of a log, from and to."""
 
-TRAINED = 0.6
+TRAINING_SHARE = 0.6
 """Share of a log for fitting."""
 
 NOISE = (0.004, 0.01)
 """Standard deviation of the sensor's noise relative to that of the output, from and to."""
 
-SKIPPED = 5
+SKIPPED_SAMPLES = 5
 """Samples at the start of a test that are excluded."""
 
 ATMOSPHERE, SUPPLY = 1.0, 6.0
 """Ambient and supply pressure of a pneumatic cylinder [bar]."""
 
-CRITICAL = 0.528
+CRITICAL_PRESSURE_RATIO = 0.528
 """Critical pressure ratio, below which air flow is choked [dimensionless]."""
 
 CELLS = 8
@@ -42,7 +42,7 @@ Outputs = dict[str, Array]
 Drive = Callable[[np.random.Generator], Array]
 """Draws one input of a kind, shape (n,)."""
 
-OTHERS = 78
+OTHER_RECORDS_SEED = 78
 """Seed part that separates the draws of other records from all other draws."""
 
 
@@ -66,10 +66,10 @@ def _sets(name: str, seed: int, again: int) -> list[PublicSet]:
     n = int(rng.integers(*SIZES))
     drive = _steps(n, rng) if rng.integers(2) else _noise(n, rng)
     u, machine = drive(rng), deepcopy(rng)
-    cut = int(TRAINED * n)
+    cut = int(TRAINING_SHARE * n)
     logged = {output: _noisy(clean, rng) for output, clean in make(u, rng).items()}
     others: dict[str, dict[str, Part]] = {output: {} for output in logged}
-    rng = np.random.default_rng([seed, OTHERS, index])
+    rng = np.random.default_rng([seed, OTHER_RECORDS_SEED, index])
     for number in range(again):
         v = drive(rng)
         for output, clean in make(v, deepcopy(machine)).items():
@@ -81,7 +81,7 @@ def _sets(name: str, seed: int, again: int) -> list[PublicSet]:
             sample_time,
             (u[:cut, None], y[:cut]),
             {"": (u[cut:, None], y[cut:])},
-            SKIPPED,
+            SKIPPED_SAMPLES,
             others[output],
         )
         for output, y in logged.items()
@@ -114,7 +114,15 @@ def _flow(opening: float, above: float, below: float) -> float:
     if above < below:
         return -_flow(opening, below, above)
     ratio = below / above
-    return opening * above * (1.0 if ratio < CRITICAL else sqrt(1.0 - ((ratio - CRITICAL) / (1.0 - CRITICAL)) ** 2))
+    return (
+        opening
+        * above
+        * (
+            1.0
+            if ratio < CRITICAL_PRESSURE_RATIO
+            else sqrt(1.0 - ((ratio - CRITICAL_PRESSURE_RATIO) / (1.0 - CRITICAL_PRESSURE_RATIO)) ** 2)
+        )
+    )
 
 
 def _pneumatic(u: Array, rng: np.random.Generator) -> Outputs:

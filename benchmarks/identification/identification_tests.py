@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from threadpoolctl import threadpool_limits
 
 from benchmarks.identification.identification import coefficients, report
-from benchmarks.identification.identification_data import TABLE_6, Case, noisy, random_binary, table6_case
+from benchmarks.identification.identification_data import TABLE_6, Case, noisy_case, random_binary, table6_case
 from estimation.finding import NORMAL_95
 from estimation.identification import (
     FrequencyResponse,
@@ -119,7 +119,7 @@ def size_lines(seeds: int) -> list[Line]:
     truth = TABLE_6["major_leakage"]
     for seed in range(seeds):
         rng = np.random.default_rng([5, seed])
-        case = noisy(truth, random_binary(rng, 5_000), 0.1, rng)
+        case = noisy_case(truth, random_binary(rng, 5_000), 0.1, rng)
         found = validate(fit_output_error(case.u, case.y, 1e-3, **FORM), case.u, case.y, fitted=True)
         white.append(not found.whiteness.passed())
         crossed.append(not found.cross_correlation.passed())

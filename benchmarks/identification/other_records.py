@@ -9,7 +9,7 @@ from benchmarks.identification.identification_sets_data import PublicSet
 from benchmarks.identification.paired_blocks import records_ratio
 from estimation.arrays import Array
 
-WORSE = 1.02
+WORSE_RATIO = 1.02
 """Allowed ratio of a default's error to a baseline's on the test data."""
 
 PAIRS = (("default", "first"), ("auto", "default"))
@@ -23,7 +23,7 @@ class OtherRecords:
         self.ratios: dict[str, list[float]] = defaultdict(list)
         self.verdicts: dict[str, Counter[str]] = defaultdict(Counter)
 
-    def told(self, one: PublicSet, runs: Mapping[str, Mapping[str, Array]]) -> list[str]:
+    def comparison_lines(self, one: PublicSet, runs: Mapping[str, Mapping[str, Array]]) -> list[str]:
         """Return one line for each pair of models, and count its result.
 
         Parameters
@@ -67,6 +67,6 @@ class OtherRecords:
 
 def _verdict(ratio: float, low: float, high: float) -> str:
     """Return whether a model is worse than another by over 2 %, and whether the interval confirms it."""
-    if ratio > WORSE:
+    if ratio > WORSE_RATIO:
         return "worse" if low > 1.0 else "perhaps"
     return "better" if high < 1.0 else "as good"

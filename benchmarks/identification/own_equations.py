@@ -20,14 +20,14 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 import hydrostate as hs
-from benchmarks.targets import misses, say, timed
+from benchmarks.targets import check_target, misses, processor_time
 from estimation.arrays import Array
 from estimation.equations.kernel import compile_equations
 
 WANTED_RATIO = 20.0
 """Ratio of the peer's processor time to ours."""
 
-EQUAL = 0.1
+EQUAL_DISTANCE = 0.1
 """Distance from the peer's own optimum within which answers count as equal, in standard deviations."""
 
 SETTINGS: Mapping[str, Any] = {"diff_step": 1e-5, "xtol": 1e-12, "ftol": 1e-12}
@@ -124,7 +124,7 @@ def cases(samples: int) -> list[Case]:
     ]
 
 
-def logged(case: Case, seed: int) -> pd.DataFrame:
+def noisy_log(case: Case, seed: int) -> pd.DataFrame:
     """Return the log of a case with fresh noise."""
     truth = case.model.simulate(case.log, case.truth, initial=case.first)
     (output,) = truth.columns
@@ -137,7 +137,7 @@ def residual_of(case: Case, log: pd.DataFrame) -> Callable[[Array], Array]:
     model = case.model.equations
     time, (source,), (output,) = log.index.to_numpy(), model.inputs, model.outputs
     driven, measured = log[source].to_numpy(), log[output].to_numpy()
-    sizes = _sizes(case)
+    sizes = _parameter_starts(case)
 
     def residual(x: Array) -> Array:
         values = dict(zip(model.parameters, x[: len(sizes)] * sizes, strict=True))
@@ -162,11 +162,11 @@ def residual_of(case: Case, log: pd.DataFrame) -> Callable[[Array], Array]:
     return residual
 
 
-def _sizes(case: Case) -> Array:
+def _parameter_starts(case: Case) -> Array:
     return np.array([one.start for one in case.model.equations.parameters.values()])
 
 
-def peer(case: Case, log: pd.DataFrame) -> Array:
+def peer_solution(case: Case, log: pd.DataFrame) -> Array:
     """Return the solution of least_squares around solve_ivp: parameters over their starts, then initial states."""
     model, count = case.model.equations, len(case.model.equations.parameters)
     (output,) = model.outputs
@@ -177,13 +177,13 @@ def peer(case: Case, log: pd.DataFrame) -> Array:
     return least_squares(residual_of(case, log), start, bounds=(least, most), x_scale="jac", **SETTINGS).x
 
 
-def _beside(case: Case, log: pd.DataFrame) -> None:
+def _compare_with_peer(case: Case, log: pd.DataFrame) -> None:
     """Compare time and answers on one log."""
     compile_equations.cache_clear()
-    cold, _ = timed(lambda: case.model.fit(log))
-    ours, found = timed(lambda: case.model.fit(log))
-    theirs, values = timed(lambda: peer(case, log))
-    sizes, count = _sizes(case), len(case.truth)
+    cold, _ = processor_time(lambda: case.model.fit(log))
+    ours, found = processor_time(lambda: case.model.fit(log))
+    theirs, values = processor_time(lambda: peer_solution(case, log))
+    sizes, count = _parameter_starts(case), len(case.truth)
     first = [found.quantities[f"initial {name}"].value for name in case.model.equations.states]
     own = np.array([*(found.values[name] for name in case.truth), *first])
     own[:count] /= sizes
@@ -193,20 +193,24 @@ def _beside(case: Case, log: pd.DataFrame) -> None:
     more = 0.5 * float(np.sum(residual(own) ** 2) - np.sum(residual(values) ** 2))
     print(f"{case.name}: ours {ours:.3f} s ({cold:.2f} s with compilation), least_squares and solve_ivp {theirs:.1f} s")
     print(f"{case.name}: the answers differ by {away:.2g} standard deviations at most")
-    say(f"{case.name}: times faster", theirs / ours, WANTED_RATIO, most=False)
-    say(f"{case.name}: times faster, compilation counted", theirs / cold, WANTED_RATIO, most=False)
-    say(f"{case.name}: half the sum of squares by the peer's own residual, ours less the peer's", more, 0.5 * EQUAL**2)
+    check_target(f"{case.name}: times faster", theirs / ours, WANTED_RATIO, most=False)
+    check_target(f"{case.name}: times faster, compilation counted", theirs / cold, WANTED_RATIO, most=False)
+    check_target(
+        f"{case.name}: half the sum of squares by the peer's own residual, ours less the peer's",
+        more,
+        0.5 * EQUAL_DISTANCE**2,
+    )
 
 
-def _covered(case: Case, seeds: int) -> None:
+def _check_coverage(case: Case, seeds: int) -> None:
     """Count intervals that cover, and gates that pass, on logs with fresh noise."""
-    find: Callable[[int], Any] = lambda seed: case.model.fit(logged(case, seed))  # noqa: E731 -- short, and used once
+    find: Callable[[int], Any] = lambda seed: case.model.fit(noisy_log(case, seed))  # noqa: E731 -- short, and used once
     fits = [find(100 + seed) for seed in range(seeds)]
     hits = [one.quantities[name].covers(value) for one in fits for name, value in case.truth.items()]
     share = 100.0 * float(np.mean(hits))
     print(f"{case.name}: {sum(one.believed for one in fits)} of {seeds} gates pass")
     reach = 100.0 * 2.6 * (0.95 * 0.05 / len(hits)) ** 0.5
-    say(f"{case.name}: intervals that cover [%], {len(hits)}", share, 95.0 - reach, most=False)
+    check_target(f"{case.name}: intervals that cover [%], {len(hits)}", share, 95.0 - reach, most=False)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -219,6 +223,6 @@ def main(arguments: list[str] | None = None) -> int:
     with TemporaryDirectory() as empty:  # an empty cache, so that compilation is counted
         os.environ["HYDROSTATE_CACHE"] = empty
         for case in cases(chosen.samples):
-            _beside(case, logged(case, 1))
-            _covered(case, chosen.seeds)
+            _compare_with_peer(case, noisy_log(case, 1))
+            _check_coverage(case, chosen.seeds)
     return len(misses)

@@ -11,13 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.targets import misses, say
+from benchmarks.targets import check_target, misses
 from estimation.arrays import Array
 from estimation.finding import NORMAL_95
 from estimation.identification.free_run.data import Channels, channels_from
 from estimation.identification.state_space.dynamics import StateSpaceDynamics, system_in_units
 from estimation.identification.state_space.identify import identify_state_space
-from estimation.identification.state_space.joint import Joint, joined
+from estimation.identification.state_space.joint import Joint, joined_outputs
 from estimation.identification.state_space.problem import Problem, Size, Values
 from estimation.identification.state_space.system import StateSpace
 
@@ -40,7 +40,7 @@ def plant() -> StateSpace:
     return StateSpace(A, B, C, np.zeros((2, 2)), LEVEL, (0, 0), False, SAMPLE_TIME, none)
 
 
-def logged(seed: int, samples: int = SAMPLES) -> list[Channels]:
+def draw_log(seed: int, samples: int = SAMPLES) -> list[Channels]:
     """Return a log of the plant, one entry for each output."""
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], size=(samples // 4 + 1, 2)), 4, axis=0)[:samples]
@@ -52,9 +52,11 @@ def logged(seed: int, samples: int = SAMPLES) -> list[Channels]:
     return [channels_from([u], [y[:, k]], SAMPLE_TIME, ["a", "b"], name) for k, name in enumerate("yz")]
 
 
-def bound(data: list[Channels]) -> StateSpace:
+def with_covariance_bound(data: list[Channels]) -> StateSpace:
     """Return the plant with the covariance bound of unbiased estimates from one log."""
-    together = Joint(SAMPLE_TIME, joined(data).u, tuple(np.full_like(y, np.nan) for y in joined(data).y))
+    together = Joint(
+        SAMPLE_TIME, joined_outputs(data).u, tuple(np.full_like(y, np.nan) for y in joined_outputs(data).y)
+    )
     size = Size(3, 2, 2, direct=False)
     problem = Problem(size, together)
     theta = problem.packed(Values(A, B, C, np.zeros((2, 2)), LEVEL, np.zeros((1, 3))))
@@ -65,7 +67,7 @@ def bound(data: list[Channels]) -> StateSpace:
     return replace(plant(), covariance=(basis @ np.linalg.inv(white.T @ white) @ basis.T)[:k, :k])
 
 
-def told(system: StateSpace) -> tuple[Array, Array]:
+def model_values(system: StateSpace) -> tuple[Array, Array]:
     """Return poles, steady gains and responses of a model as real numbers, with their standard deviations."""
     order = np.lexsort((system.poles.imag, system.poles.real))
     poles, spread = system.poles[order], system.pole_std[order]
@@ -79,7 +81,7 @@ def told(system: StateSpace) -> tuple[Array, Array]:
     return together, deviations
 
 
-def identified(data: list[Channels], order: int | None) -> StateSpace:
+def identified_model(data: list[Channels], order: int | None) -> StateSpace:
     """Return the model identified from a log, in its units."""
     models = [one.model for one in identify_state_space(data, order=order, delay=None if order is None else 1)]
     outputs = [one.dynamics for one in models if isinstance(one.dynamics, StateSpaceDynamics)]
@@ -94,29 +96,29 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = options.parse_args(arguments)
     misses.clear()
     if chosen.order == "auto":
-        orders = [identified(logged(seed), None).order for seed in range(chosen.seeds)]
+        orders = [identified_model(draw_log(seed), None).order for seed in range(chosen.seeds)]
         print("orders chosen:", {int(n): orders.count(int(n)) for n in np.unique(orders)})
-        say("order found [%]", 100.0 * orders.count(3) / len(orders), 90.0, most=False)
+        check_target("order found [%]", 100.0 * orders.count(3) / len(orders), 90.0, most=False)
         return len(misses)
-    truth = told(plant())[0]
+    truth = model_values(plant())[0]
     errors, said, least = list[Array](), list[Array](), list[Array]()
     for seed in range(chosen.seeds):
-        data = logged(seed)
-        values, deviations = told(identified(data, int(chosen.order)))
+        data = draw_log(seed)
+        values, deviations = model_values(identified_model(data, int(chosen.order)))
         errors.append(values - truth)
         said.append(deviations)
-        least.append(told(bound(data))[1])
+        least.append(model_values(with_covariance_bound(data))[1])
     free = np.array(least).mean(axis=0) > 1e-9  # a real pole and a steady gain have no imaginary part
     error, deviation, limit = (np.array(one)[:, free] for one in (errors, said, least))
     ratio = float(np.sqrt(np.mean((error / limit) ** 2)))
-    say("rms error over the bound", ratio, 0.95, most=False)
-    say("rms error over the bound", ratio, 1.05)
+    check_target("rms error over the bound", ratio, 0.95, most=False)
+    check_target("rms error over the bound", ratio, 1.05)
     own = float(np.sqrt(np.mean((error / deviation) ** 2)))
-    say("rms error over the deviation said", own, 0.95, most=False)
-    say("rms error over the deviation said", own, 1.05)
+    check_target("rms error over the deviation said", own, 0.95, most=False)
+    check_target("rms error over the deviation said", own, 1.05)
     share = 100.0 * float(np.mean(np.abs(error) <= NORMAL_95 * deviation))
-    say("95 % intervals that cover [%]", share, 93.0, most=False)
-    say("95 % intervals that cover [%]", share, 97.0)
+    check_target("95 % intervals that cover [%]", share, 93.0, most=False)
+    check_target("95 % intervals that cover [%]", share, 97.0)
     worst = np.sqrt(np.mean((error / limit) ** 2, axis=0))
     print(f"single quantities: error over the bound {worst.min():.2f} to {worst.max():.2f}")
     return len(misses)

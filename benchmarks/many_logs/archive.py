@@ -25,13 +25,13 @@ from plant.sensors.sensors import BENCH
 SAMPLE_TIME = 1e-3
 WANTED_SPEED = 5.0
 ROUNDS = 5
-BAD = ("empty.csv", "words.csv", "short.csv")
+UNUSABLE_LOGS = ("empty.csv", "words.csv", "short.csv")
 
 
 def make_archive(folder: Path, logs: int, duration: float) -> None:
     """Write logs of all nine conditions in turn, and three unusable ones."""
     names = list(CONDITIONS)
-    for number in range(logs - len(BAD)):
+    for number in range(logs - len(UNUSABLE_LOGS)):
         name, rng = names[number % len(names)], np.random.default_rng(number)
         p = parameters_for(CONDITIONS[name])
         speed = make_drive("steps", duration, SAMPLE_TIME, p, rng)
@@ -39,12 +39,14 @@ def make_archive(folder: Path, logs: int, duration: float) -> None:
         write_record(record, folder / f"actuator{number // 50:02d}" / f"run{number:04d}.csv")
     good = (folder / "actuator00" / "run0000.csv").read_text(encoding="utf-8")
     header, first, *rest = good.splitlines()
-    (folder / BAD[0]).write_text("", encoding="utf-8")
-    (folder / BAD[1]).write_text("\n".join([header, first, *rest[:100], "not,a,number,at,all"]), encoding="utf-8")
-    (folder / BAD[2]).write_text("\n".join([header, first[: len(first) // 2]]), encoding="utf-8")
+    (folder / UNUSABLE_LOGS[0]).write_text("", encoding="utf-8")
+    (folder / UNUSABLE_LOGS[1]).write_text(
+        "\n".join([header, first, *rest[:100], "not,a,number,at,all"]), encoding="utf-8"
+    )
+    (folder / UNUSABLE_LOGS[2]).write_text("\n".join([header, first[: len(first) // 2]]), encoding="utf-8")
 
 
-def reading(paths: list[Path]) -> tuple[float, float, float, float]:
+def read_rates(paths: list[Path]) -> tuple[float, float, float, float]:
     """Return the read rates of ours and of pandas in megabytes per second, by wall time, then by CPU time."""
 
     def ours(path: Path) -> object:
@@ -52,21 +54,22 @@ def reading(paths: list[Path]) -> tuple[float, float, float, float]:
 
     size = sum(path.stat().st_size for path in paths) / 1e6
     measured = {
-        name: [_timed(read, paths) for _ in range(ROUNDS)] for name, read in (("ours", ours), ("pandas", pd.read_csv))
+        name: [_read_times(read, paths) for _ in range(ROUNDS)]
+        for name, read in (("ours", ours), ("pandas", pd.read_csv))
     }
     wall = {name: statistics.median(one[0] for one in times) for name, times in measured.items()}
     cpu = {name: statistics.median(one[1] for one in times) for name, times in measured.items()}
     return size / wall["ours"], size / wall["pandas"], size / cpu["ours"], size / cpu["pandas"]
 
 
-def _timed(read: Callable[[Path], object], paths: list[Path]) -> tuple[float, float]:
+def _read_times(read: Callable[[Path], object], paths: list[Path]) -> tuple[float, float]:
     wall, cpu = time.perf_counter(), time.process_time()
     for path in paths:
         read(path)
     return time.perf_counter() - wall, time.process_time() - cpu
 
 
-def diagnosed(folder: Path, workers: int) -> tuple[int, int]:
+def diagnose_archive(folder: Path, workers: int) -> tuple[int, int]:
     """Diagnose the archive in one command, and print the outcome; return how many logs succeed and how many fail."""
     (folder / "study.toml").write_text(
         'name = "archive"\n[[logs]]\nglob = "archive/**/*.csv"\nmethods = [{ verb = "diagnose" }]\n', encoding="utf-8"
@@ -84,12 +87,12 @@ def diagnosed(folder: Path, workers: int) -> tuple[int, int]:
     right = pd.read_csv(folder / "store" / "tables" / "diagnosis.csv")
     correct, classes = int(right["right"].sum()), int(right["cases"].sum())
     print(f"{found['done']} logs in one command: {seconds:.1f} s with {workers} workers")
-    print(f"{found['failed']} failed, {len(BAD)} are bad; {correct} of {classes} classes right")
+    print(f"{found['failed']} failed, {len(UNUSABLE_LOGS)} are bad; {correct} of {classes} classes right")
     print("\n".join(f"  {line}" for line in done.stderr.splitlines() if ".csv" in line))
     return found["done"], found["failed"]
 
 
-def read_beside_pandas(folder: Path) -> float:
+def compare_with_pandas(folder: Path) -> float:
     """Print read rates of short logs and a long one; return the smallest ratio to pandas' rate by wall time."""
     logs = sorted((folder / "archive").glob("actuator*/*.csv"))[:200]
     long = folder / "long.csv"
@@ -97,7 +100,7 @@ def read_beside_pandas(folder: Path) -> float:
     rows.assign(time_s=SAMPLE_TIME * rows.index).to_csv(long, index=False, float_format="%.9g")
     ratios: list[float] = []
     for words, paths in (("archive's logs", logs), ("one long log", [long] * 5)):
-        ours, theirs, our_cpu, their_cpu = reading(paths)
+        ours, theirs, our_cpu, their_cpu = read_rates(paths)
         ratios.append(ours / theirs)
         size = statistics.mean(path.stat().st_size for path in paths) / 1e6
         print(
@@ -121,6 +124,6 @@ def main(arguments: list[str]) -> int:
         for number in range(options.logs // 50 + 1):
             (folder / "archive" / f"actuator{number:02d}").mkdir()
         make_archive(folder / "archive", options.logs, options.duration)
-        done, failed = diagnosed(folder, options.workers)
-        speed = read_beside_pandas(folder)
-    return int(failed != len(BAD) or done != options.logs) + int(speed < WANTED_SPEED)
+        done, failed = diagnose_archive(folder, options.workers)
+        speed = compare_with_pandas(folder)
+    return int(failed != len(UNUSABLE_LOGS) or done != options.logs) + int(speed < WANTED_SPEED)

@@ -65,7 +65,7 @@ def plan_of(cases: int, samples: int) -> Plan:
     return plan_study(parse_study({"name": "scale", "runs": [runs]}, "scale"), Path())
 
 
-def bare(cases: int, samples: int) -> float:
+def bare_filters(cases: int, samples: int) -> float:
     """Run the same filters on the same kind of series without any overhead; return CPU seconds [s]."""
     begin = time.process_time()
     values = [float(trace.track[-1, 3]) for trace in filter_batch(_problems(cases, samples))]
@@ -145,13 +145,13 @@ def _processes() -> list[list[str]]:
     return [Path(f"/proc/{number}/stat").read_text().rsplit(")", 1)[1].split() for number in numbers]
 
 
-def bare_side_by_side(executor: Executor, width: int, cases: int, samples: int) -> float:
+def bare_in_parallel(executor: Executor, width: int, cases: int, samples: int) -> float:
     """Return the CPU seconds of a bare case, with every worker busy at once as in a study."""
-    futures = [executor.submit(bare, cases, samples) for _ in range(width)]
+    futures = [executor.submit(bare_filters, cases, samples) for _ in range(width)]
     return statistics.mean(future.result() for future in futures) / cases
 
 
-def dispatch(executor: Executor, width: int, tasks: int) -> float:
+def dispatch_seconds(executor: Executor, width: int, tasks: int) -> float:
     """Return the seconds that the dispatching side needs for one empty task, run as in a batch."""
     flying: set[Future[bytes]] = set()
     begin = time.perf_counter()
@@ -194,22 +194,22 @@ def main(arguments: list[str]) -> int:
         study(warm, options.samples, executor, width)
         begun = cpu_seconds() - idle
         begun -= study(warm, options.samples, executor, width)[0]
-        bare_side_by_side(executor, width, warm, options.samples)
+        bare_in_parallel(executor, width, warm, options.samples)
         bares: list[float] = []
         for size in sorted({size for size in (1_000, 10_000, options.cases) if size <= options.cases}):
             size -= size % (len(NAMES) * len(STARTS))
             repeats = max(1, min(5, 20_000 // size))
-            bares.append(bare_side_by_side(executor, width, 4000, options.samples))
+            bares.append(bare_in_parallel(executor, width, 4000, options.samples))
             runs = [study(size, options.samples, executor, width) for _ in range(repeats)]
-            bares.append(bare_side_by_side(executor, width, 4000, options.samples))
+            bares.append(bare_in_parallel(executor, width, 4000, options.samples))
             cpu, wall = (statistics.median(run[place] for run in runs) for place in (0, 1))
             each[size], memory = cpu / size, runs[-1][2]
             print(
                 f"{size:7,} runs of {options.samples:,} steps: {cpu:.1f} s CPU, {wall:.1f} s wall, "
                 f"{1e6 * each[size]:.0f} us CPU a case; peak memory {memory.peak / 1e6:.0f} MB"
             )
-        dispatch(executor, width, 20)
-        per_task = dispatch(executor, width, 500)
+        dispatch_seconds(executor, width, 20)
+        per_task = dispatch_seconds(executor, width, 500)
     kernel = statistics.median(bares)
     overhead, ratio = (each[max(each)] + begun / max(each)) / kernel - 1.0, max(each.values()) / min(each.values())
     at = memory.at
@@ -222,7 +222,7 @@ def main(arguments: list[str]) -> int:
     print(f"cost a case, dearest over cheapest size: {ratio:.2f} (wanted: within {WANTED_RATIO})")
     print(f"memory in the first and last quarter: {early / 1e6:.0f} and {late / 1e6:.0f} MB")
     print(f"memory at its peak: {memory.peak / 1e6:.0f} MB (wanted: flat, under {WANTED_BYTES / 1e6:.0f} MB)")
-    extrapolate(max(per_task, _dask_dispatch()), _writing(), options.workers)
+    extrapolate(max(per_task, _dask_dispatch()), _write_seconds(), options.workers)
     return int(overhead >= WANTED_OVERHEAD) + int(ratio > WANTED_RATIO) + int(memory.peak >= WANTED_BYTES)
 
 
@@ -237,11 +237,11 @@ def _dask_dispatch() -> float:
         LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         open_executor(cluster=cluster.scheduler_address) as (executor, width),
     ):
-        dispatch(executor, width, 20)
-        return dispatch(executor, width, 500)
+        dispatch_seconds(executor, width, 20)
+        return dispatch_seconds(executor, width, 500)
 
 
-def _writing() -> float:
+def _write_seconds() -> float:
     """Return the seconds for storing a part of 2048 rows."""
     with tempfile.TemporaryDirectory() as folder:
         store, content = open_store(Path(folder) / "store"), os.urandom(200_000)

@@ -23,7 +23,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from benchmarks.targets import misses, say
+from benchmarks.targets import check_target, misses
 from estimation.finding import NORMAL_95
 from experiments.batch.part_store import open_store
 from experiments.batch.rows import SCHEMA
@@ -36,7 +36,7 @@ from plant.sensors.sensors import BENCH
 
 SAMPLE_TIME, DURATION = 1e-3, 2.0
 PATTERN = "{actuator}_{date}.csv"
-ONE_IN = 10
+ONE_FAULTY_IN = 10
 """One actuator in this many is faulty [count]."""
 
 HEALTHY, LIMIT, STD = 1.0, 3.0, 0.06
@@ -48,7 +48,7 @@ PAGE_IN, WHOLE_IN = 5.0, 240.0
 
 def is_sick(actuator: int) -> bool:
     """Return whether an actuator has growing leakage."""
-    return actuator % ONE_IN == ONE_IN // 2
+    return actuator % ONE_FAULTY_IN == ONE_FAULTY_IN // 2
 
 
 def name_of(actuator: int, log: int) -> str:
@@ -57,7 +57,7 @@ def name_of(actuator: int, log: int) -> str:
     return f"A{actuator:03d}_{date}.csv"
 
 
-def courses(actuators: int, logs: int) -> Array:
+def severity_courses(actuators: int, logs: int) -> Array:
     """Return how close each actuator is to its limit after each log, shape (actuators, logs) [fraction]."""
     sick = np.array([is_sick(one) for one in range(actuators)])
     reached = np.linspace(0.95, 1.4, actuators)
@@ -106,30 +106,30 @@ def write_logs(folder: Path, course: Array, most: int) -> int:
     return len(places)
 
 
-class Taken(NamedTuple):
+class CommandTime(NamedTuple):
     """Time of the shipped command: wall time, and processor time of all its processes [s]."""
 
     wall: float
     used: float
 
 
-def _but(all_of: Taken, part: Taken) -> Taken:
+def _time_difference(all_of: CommandTime, part: CommandTime) -> CommandTime:
     """Return the difference in time between two runs."""
-    return Taken(all_of.wall - part.wall, all_of.used - part.used)
+    return CommandTime(all_of.wall - part.wall, all_of.used - part.used)
 
 
-def _used() -> float:
+def _child_time() -> float:
     """Return the processor time of child processes that have ended [s]."""
     all_so_far = resource.getrusage(resource.RUSAGE_CHILDREN)
     return all_so_far.ru_utime + all_so_far.ru_stime
 
 
-def fleet_of(place: Path, out: Path, *options: str) -> tuple[Taken, list[str]]:
+def fleet_of(place: Path, out: Path, *options: str) -> tuple[CommandTime, list[str]]:
     """Return the time of the shipped command, and its actuators in ranked order."""
     command = [sys.executable, "-m", "experiments.cli", "fleet", str(place), "--pattern", PATTERN, "--out", str(out)]
-    begin, before = time.perf_counter(), _used()
+    begin, before = time.perf_counter(), _child_time()
     subprocess.run([*command, *options], check=True, capture_output=True)  # noqa: S603 -- our own command
-    taken = Taken(time.perf_counter() - begin, _used() - before)
+    taken = CommandTime(time.perf_counter() - begin, _child_time() - before)
     (data,) = re.findall(r'class="rows">(.*?)</script>', (out / "index.html").read_text("utf-8"), re.DOTALL)
     return taken, [row[0] for row in json.loads(data)["rows"]]
 
@@ -148,14 +148,14 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--raw-logs", type=int, default=480)
     options = parser.parse_args(arguments)
     misses.clear()
-    course = courses(options.actuators, options.logs)
+    course = severity_courses(options.actuators, options.logs)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         write_store(folder / "store", course)
         fleet_of(folder / "store", folder / "warm")
         taken, order = fleet_of(folder / "store", folder / "pages")
-        say("page from the store, pages of the 20 sickest included [s]", taken.wall, PAGE_IN)
-        say("sound actuators among the top rows, from the store", wrong_rows(order), 0)
+        check_target("page from the store, pages of the 20 sickest included [s]", taken.wall, PAGE_IN)
+        check_target("sound actuators among the top rows, from the store", wrong_rows(order), 0)
         if not options.raw_logs:
             print(f"processor time of the page from the store: {taken.used:.1f} s")
             return len(misses)
@@ -166,16 +166,16 @@ def main(arguments: list[str]) -> int:
         whole, used = taken
         if count < course.size:
             few = write_logs(folder / "few", course, count // 4)
-            start = _but(
+            start = _time_difference(
                 fleet_of(folder / "few", folder / "from-few")[0], fleet_of(folder / "few", folder / "from-few")[0]
             )
-            wall, processor = (one / (count - few) for one in _but(_but(taken, pages), start))
+            wall, processor = (one / (count - few) for one in _time_difference(_time_difference(taken, pages), start))
             print(f"a log: {wall:.3f} s, {processor:.3f} s of processor time, the start of the processes apart")
             whole, used = (
                 all_of + one * (course.size - count) for all_of, one in zip(taken, (wall, processor), strict=True)
             )
         said = "measured" if count == course.size else "reckoned from these"
-        say(f"all {course.size} raw logs, {said} [s]", whole, WHOLE_IN)
+        check_target(f"all {course.size} raw logs, {said} [s]", whole, WHOLE_IN)
         print(f"their processor time on two processors that have nothing else to do: {used / 2.0:.0f} s")
-        say("sound actuators among the top rows, from raw logs", wrong_rows(order), 0)
+        check_target("sound actuators among the top rows, from raw logs", wrong_rows(order), 0)
     return len(misses)

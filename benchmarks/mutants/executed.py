@@ -14,7 +14,7 @@ from pathlib import Path
 
 from coverage import CoverageData
 
-from benchmarks.mutants.mutation import mirrored
+from benchmarks.mutants.mutation import mirrored_tests
 
 PACKAGES = ("plant", "estimation", "faults", "experiments")
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
@@ -74,7 +74,7 @@ class Executed:
         """Where each name is read: functions, or statements of a module or class."""
         found: dict[str, list[tuple[str, ast.stmt]]] = defaultdict(list)
         for path, tree in self.trees.items():
-            for place in _places(tree):
+            for place in _code_places(tree):
                 for name in _names(place):
                     found[name].append((path, place))
         return found
@@ -94,44 +94,48 @@ class Executed:
         list of str
             Names of tests. Within a group, tests that execute the fewest lines come first.
         """
-        near = mirrored(self.root, path)
-        groups = [self._at(path, line), self._kept_numbers(near), *self._later(path, line)]
+        near = mirrored_tests(self.root, path)
+        groups = [self._tests_at(path, line), self._kept_numbers(near), *self._further_tests(path, line)]
         groups.append({test for file, tests in self.all_tests.items() if file.startswith(near[-1]) for test in tests})
         ordered: dict[str, None] = {}
         for group in groups:
-            ordered |= dict.fromkeys(sorted(group, key=lambda test: (_far(test, near), self._cost[test], test)))
+            ordered |= dict.fromkeys(
+                sorted(group, key=lambda test: (_test_distance(test, near), self._cost[test], test))
+            )
         return [test for test in ordered if (self.root / test.partition("::")[0]).is_file()]
 
     def _kept_numbers(self, near: Sequence[str]) -> set[str]:
         """Return the kept numbers of the mirrored folder, which take seconds and cover constants."""
         return {test for file in near if "test_numbers" in file for test in self.all_tests.get(file, ())}
 
-    def _at(self, path: str, line: int) -> set[str]:
+    def _tests_at(self, path: str, line: int) -> set[str]:
         statement = _innermost(self.trees[path], line)
         end = min([one.lineno - 1 for one in _body(statement)], default=statement.end_lineno or line)
         at = self.of_file(path)
         return set().union(*(at.get(one, set()) for one in range(statement.lineno, max(end, line) + 1)))
 
-    def _later(self, path: str, line: int) -> Iterator[set[str]]:
+    def _further_tests(self, path: str, line: int) -> Iterator[set[str]]:
         """Yield tests of code that uses the name defined on the line, and of the rest of the file."""
-        place = next((one for one in _places(self.trees[path]) if _spans(one, line)), None)
-        names = _defined(place) if place is not None else set()
+        place = next((one for one in _code_places(self.trees[path]) if _spans_line(one, line)), None)
+        names = _defined_names(place) if place is not None else set()
         seen = set(names)
-        users = self._within(path, place) if isinstance(place, FUNCTIONS) else set[str]()
+        users = self._tests_within(path, place) if isinstance(place, FUNCTIONS) else set[str]()
         while names:
             more: set[str] = set()
             for name in names:
                 for file, use in self._uses.get(name, ()):
                     if isinstance(use, FUNCTIONS):
-                        users |= self._within(file, use)
+                        users |= self._tests_within(file, use)
                     else:
-                        more |= _defined(use)
+                        more |= _defined_names(use)
             names = more - seen
             seen |= names
         yield users
-        yield set().union(*(self._within(path, one) for one in _places(self.trees[path]) if isinstance(one, FUNCTIONS)))
+        yield set().union(
+            *(self._tests_within(path, one) for one in _code_places(self.trees[path]) if isinstance(one, FUNCTIONS))
+        )
 
-    def _within(self, path: str, function: ast.stmt) -> set[str]:
+    def _tests_within(self, path: str, function: ast.stmt) -> set[str]:
         first = min((one.lineno for one in _body(function)), default=function.lineno)
         at = self.of_file(path)
         return set().union(*(at.get(one, set()) for one in range(first, (function.end_lineno or first) + 1)))
@@ -147,7 +151,7 @@ def _test(context: str) -> str:
     return context.rpartition("|")[0] or context
 
 
-def _far(test: str, near: Sequence[str]) -> int:
+def _test_distance(test: str, near: Sequence[str]) -> int:
     """Return the distance of a test from a file: its own and its folder's kept numbers, its folder's, all others.
 
     The first two rank equally: a quick test among them comes before kept numbers of a whole search.
@@ -162,27 +166,27 @@ def _body(statement: ast.stmt) -> list[ast.stmt]:
     return [*getattr(statement, "body", []), *handlers, *cases]
 
 
-def _spans(statement: ast.stmt, line: int) -> bool:
+def _spans_line(statement: ast.stmt, line: int) -> bool:
     decorators = getattr(statement, "decorator_list", [])
     first = min([statement.lineno, *(one.lineno for one in decorators)])
     return first <= line <= (statement.end_lineno or first)
 
 
 def _innermost(tree: ast.Module, line: int) -> ast.stmt:
-    found = [one for one in ast.walk(tree) if isinstance(one, ast.stmt) and _spans(one, line)]
+    found = [one for one in ast.walk(tree) if isinstance(one, ast.stmt) and _spans_line(one, line)]
     return min(found, key=lambda one: (one.end_lineno or one.lineno) - one.lineno)
 
 
-def _places(tree: ast.Module | ast.ClassDef) -> Iterator[ast.stmt]:
+def _code_places(tree: ast.Module | ast.ClassDef) -> Iterator[ast.stmt]:
     """Yield functions, methods, and statements of modules and classes."""
     for one in tree.body:
         if isinstance(one, ast.ClassDef):
-            yield from _places(one)
+            yield from _code_places(one)
         else:
             yield one
 
 
-def _defined(place: ast.stmt) -> set[str]:
+def _defined_names(place: ast.stmt) -> set[str]:
     if isinstance(place, FUNCTIONS):
         return {place.name}
     targets: Iterable[ast.AST] = (

@@ -19,14 +19,14 @@ from typing import Any
 
 import pytest
 
-PATIENCE = 60
+MOST_EXCESS_SECONDS = 60
 """A run counts as hanging if it exceeds its allowed processor time by this much [s]."""
 
-SLEPT = 900
+MOST_SECONDS = 900
 """A run counts as hanging after this time, however little it does [s]."""
 
 OPTIONS = ("-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:terminalreporter", "-p", "no:xdist")
-QUIET = ("-W", "ignore::pytest.PytestAssertRewriteWarning")
+WARNING_OPTIONS = ("-W", "ignore::pytest.PytestAssertRewriteWarning")
 """Modules imported before pytest sees them keep their assertions unrewritten; this silences the warning."""
 
 
@@ -76,7 +76,7 @@ class Chosen:
             item.session.shouldstop = "time is up"
 
 
-def ran(task: Mapping[str, Any]) -> dict[str, Any]:
+def run_forked(task: Mapping[str, Any]) -> dict[str, Any]:
     """Run tests in a fork and return their results.
 
     Parameters
@@ -95,43 +95,43 @@ def ran(task: Mapping[str, Any]) -> dict[str, Any]:
         answer = Path(folder) / "answer.json"
         child = os.fork()
         if not child:
-            _in_the_fork(task, answer)
-        signal.signal(signal.SIGALRM, lambda *_: _end(child))
-        signal.alarm(SLEPT)
+            _run_in_fork(task, answer)
+        signal.signal(signal.SIGALRM, lambda *_: _kill_group(child))
+        signal.alarm(MOST_SECONDS)
         os.waitpid(child, 0)
         signal.alarm(0)
-        _end(child)  # also ends the processes that it started
+        _kill_group(child)  # also ends the processes that it started
         hung = {"code": None, "failed": [], "tried": 0, "cut_short": False}
         told = json.loads(answer.read_text()) if answer.exists() else hung
     return {**told, "seconds": time.monotonic() - begin}
 
 
-def _end(child: int) -> None:
+def _kill_group(child: int) -> None:
     with suppress(ProcessLookupError, PermissionError):
         os.killpg(child, signal.SIGKILL)
 
 
-def _in_the_fork(task: Mapping[str, Any], answer: Path) -> None:
+def _run_in_fork(task: Mapping[str, Any], answer: Path) -> None:
     os.setsid()
     # With bytecode left behind, a fault of the same size within a second of the last one would be taken for that one.
     sys.dont_write_bytecode = True
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
-    limit = int(task["seconds"] + time.process_time()) + PATIENCE
+    limit = int(task["seconds"] + time.process_time()) + MOST_EXCESS_SECONDS
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(nothing, stream)
     plugin = Chosen(task["tests"], task["seconds"] + time.process_time())
     how = ["--collect-only"] if task.get("collect") else [] if task.get("all") else ["-x"]
-    code = int(pytest.main([*OPTIONS, *QUIET, *how, *task["files"]], plugins=[plugin]))
+    code = int(pytest.main([*OPTIONS, *WARNING_OPTIONS, *how, *task["files"]], plugins=[plugin]))
     told: dict[str, Any] = {"code": code, "failed": plugin.failed, "tried": plugin.tried}
     if task.get("collect"):
-        told["modules"] = _not_of_the_tree()
+        told["modules"] = _modules_outside_tree()
     answer.write_text(json.dumps({**told, "cut_short": plugin.cut_short}))
     os._exit(0)
 
 
-def _not_of_the_tree() -> list[str]:
+def _modules_outside_tree() -> list[str]:
     here = str(Path.cwd())
     files = {name: getattr(module, "__file__", None) for name, module in list(sys.modules.items())}
     return [name for name, file in files.items() if file and not (file.startswith(here) and ".venv" not in file)]
@@ -141,7 +141,7 @@ def main() -> int:
     """Answer tasks until input ends."""
     for line in sys.stdin:
         task = json.loads(line)
-        answer = ran(task)
+        answer = run_forked(task)
         for name in answer.pop("modules", []):
             with suppress(Exception):
                 importlib.import_module(name)

@@ -28,20 +28,20 @@ from queue import SimpleQueue
 from typing import Any
 
 from benchmarks.mutants.executed import Executed
-from benchmarks.mutants.mutation import Mutant, count_mutants, mirrored, mutants_of
+from benchmarks.mutants.mutation import Mutant, count_mutants, mirrored_tests, mutants_of
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("plant", "estimation", "faults")
 LEAST_SCORE = 0.9
 """Minimum share of faults that the fast tests must notice [fraction]."""
 
-RECORD = "build/coverage/data"
+COVERAGE_DATA = "build/coverage/data"
 """Where `make coverage` stores which test executes which line."""
 
-FEW = 5
+FIRST_FILES = 5
 """Number of test files that run before all others [count]."""
 
-LEFT_BEHIND = (".git", ".venv", ".peers", "results", "build", "dist", ".hypothesis", ".ruff_cache", "__pycache__")
+NOT_COPIED = (".git", ".venv", ".peers", "results", "build", "dist", ".hypothesis", ".ruff_cache", "__pycache__")
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str]) -> int:
 
         with ThreadPoolExecutor(given.workers) as threads:
             list(threads.map(tried, [mutant for mutant in chosen if results.verdict(mutant) is None]))
-    return _said(chosen, results)
+    return _print_score(chosen, results)
 
 
 def _options() -> argparse.ArgumentParser:
@@ -75,7 +75,7 @@ def _options() -> argparse.ArgumentParser:
     parser.add_argument("--folder", action="append", help="folder or file of plant, estimation or faults; repeatable")
     parser.add_argument("--sample", type=int, default=40, help="how many faults are drawn")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--record", default=RECORD, help="what `make coverage` left")
+    parser.add_argument("--record", default=COVERAGE_DATA, help="what `make coverage` left")
     parser.add_argument("--results", help="file of verdicts, one a line; those it has are not tried again")
     parser.add_argument("--workers", type=int, default=1, help="how many faults are tried at once")
     parser.add_argument("--seconds", type=float, default=120.0, help="processor time after which a fault has survived")
@@ -108,7 +108,7 @@ def _sources(place: Path) -> list[Path]:
 
 
 def _tests(executed: Executed | None, mutant: Mutant) -> list[str]:
-    return mirrored(ROOT, mutant.path) if executed is None else executed.tests(mutant.path, mutant.line)
+    return mirrored_tests(ROOT, mutant.path) if executed is None else executed.tests(mutant.path, mutant.line)
 
 
 class Tree:
@@ -118,7 +118,7 @@ class Tree:
         self._stack = ExitStack()
         kept = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="mutants-")))
         self.place = kept / "tree"
-        shutil.copytree(ROOT, self.place, ignore=shutil.ignore_patterns(*LEFT_BEHIND), symlinks=True)
+        shutil.copytree(ROOT, self.place, ignore=shutil.ignore_patterns(*NOT_COPIED), symlinks=True)
         environment = {
             "HYDROSTATE_CACHE": str(kept / "kernels"),
             **os.environ,
@@ -147,7 +147,7 @@ class Tree:
         self._stack.close()
 
     def ran(self, tests: Sequence[str], files: Sequence[str], seconds: float, **how: bool) -> dict[str, Any]:
-        """Run tests in the current state of the copy, see `benchmarks.mutants.forked.ran`."""
+        """Run tests in the current state of the copy, see `benchmarks.mutants.forked.run_forked`."""
         assert self._runner.stdin is not None  # noqa: S101  it is a pipe
         assert self._runner.stdout is not None  # noqa: S101  likewise
         print(
@@ -172,7 +172,7 @@ class Tree:
             chosen = [test for test in tests if self._sound.get(test, True)]
             place.write_text(mutant.source, encoding="utf-8")
             os.utime(place, (self._planted, self._planted))  # so that no two faults share compiled code
-            found = self._of(chosen, seconds)
+            found = self._run_tests(chosen, seconds)
             place.write_text(sound, encoding="utf-8")
             os.utime(place, ns=(dated.st_atime_ns, dated.st_mtime_ns))
             spent += found["seconds"]
@@ -182,11 +182,11 @@ class Tree:
                 told = {key: found[key] for key in ("code", "tried", "cut_short")}
                 return {"noticed": noticed or by is not None, "by": by, **told, "seconds": round(spent, 1)}
 
-    def _of(self, tests: Sequence[str], seconds: float) -> dict[str, Any]:
+    def _run_tests(self, tests: Sequence[str], seconds: float) -> dict[str, Any]:
         """Run the tests of a few files first: importing a hundred files takes longer than most faults survive."""
         files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
         told = {"code": 5, "failed": [], "tried": 0, "cut_short": False, "seconds": 0.0}
-        for some in (files[:FEW], files[FEW:]):
+        for some in (files[:FIRST_FILES], files[FIRST_FILES:]):
             if some and told["code"] in {0, 5} and not told["cut_short"]:
                 named = [test for test in tests if "::" in test and test.partition("::")[0] in some]
                 found = self.ran(named, some, seconds)
@@ -196,7 +196,7 @@ class Tree:
     def _passes(self, test: str) -> bool:
         """Return whether a test passes without any fault."""
         if test not in self._sound:
-            self._sound[test] = self._of([test], 300.0)["code"] in {0, 5}
+            self._sound[test] = self._run_tests([test], 300.0)["code"] in {0, 5}
             if not self._sound[test]:
                 print(f"fails without any fault: {test}", flush=True)
         return self._sound[test]
@@ -241,7 +241,7 @@ def _name(mutant: Mutant) -> str:
     return f"{mutant.path}:{mutant.line}  {mutant.change}"
 
 
-def _said(chosen: Sequence[Mutant], results: Results) -> int:
+def _print_score(chosen: Sequence[Mutant], results: Results) -> int:
     verdicts = [(mutant, found) for mutant, found in _with_verdicts(chosen, results)]
     survivors = [mutant for mutant, found in verdicts if not found["noticed"]]
     score = 1.0 - len(survivors) / max(len(verdicts), 1)

@@ -37,11 +37,11 @@ COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
 FACTORS = (2, 100)
 """Factors by which constants are multiplied [dimensionless]; zero becomes one."""
 
-WHAT_IS_LEFT = "reshape"
+INFERRING_METHOD = "reshape"
 """Method that treats all negative lengths alike: NumPy then infers the length. Changing the magnitude of such a length
 is no fault; changing its sign is."""
 
-SPARED = (ast.Raise, ast.Assert, ast.JoinedStr, ast.Import, ast.ImportFrom)
+WITHOUT_FORMULAS = (ast.Raise, ast.Assert, ast.JoinedStr, ast.Import, ast.ImportFrom)
 """Statements and expressions without formulas: messages, imports."""
 
 
@@ -109,23 +109,23 @@ def mutants_of(path: str, text: str, chosen: Sequence[int]) -> Iterator[Mutant]:
         old = edit.swap()
         after = ast.unparse(edit.node) if isinstance(edit.key, str) and edit.owner is edit.node else None
         source = ast.unparse(ast.fix_missing_locations(tree))
-        change = f"{before}  ->  {after if after is not None else _shown(edit, before)}"
+        change = f"{before}  ->  {after if after is not None else _edit_text(edit, before)}"
         _Edit(edit.node, edit.owner, edit.key, old).swap()
         yield Mutant(path, edit.node.lineno, change, source)
 
 
-def _shown(edit: _Edit, before: str) -> str:
+def _edit_text(edit: _Edit, before: str) -> str:
     if isinstance(edit.value, ast.expr):
         return ast.unparse(edit.value)
     return f"{before} with {type(edit.value).__name__}"
 
 
 def _edits(tree: ast.Module) -> Iterator[_Edit]:
-    yield from _below(tree)
+    yield from _edits_below(tree)
 
 
-def _below(node: ast.AST) -> Iterator[_Edit]:
-    if isinstance(node, SPARED) or _is_type_checking(node):
+def _edits_below(node: ast.AST) -> Iterator[_Edit]:
+    if isinstance(node, WITHOUT_FORMULAS) or _is_type_checking(node):
         return
     for name, value in ast.iter_fields(node):
         if name in {"annotation", "returns", "slice", "decorator_list"} and not isinstance(value, ast.BinOp):
@@ -133,16 +133,16 @@ def _below(node: ast.AST) -> Iterator[_Edit]:
         entries = list(enumerate(value)) if isinstance(value, list) else [(name, value)]
         for key, child in entries:
             if isinstance(child, ast.expr):
-                yield from _here(child, value if isinstance(value, list) else node, key)
+                yield from _edits_of(child, value if isinstance(value, list) else node, key)
             if isinstance(child, ast.AST) and not (_is_negative(child) and _is_length(node, name)):
-                yield from _below(child)
+                yield from _edits_below(child)
 
 
 def _is_length(call: ast.AST, name: str) -> bool:
     """Return whether a field of a node is a length passed to an array's method."""
     match call:
         case ast.Call(func=ast.Attribute(attr=method)):
-            return name == "args" and method == WHAT_IS_LEFT
+            return name == "args" and method == INFERRING_METHOD
         case _:
             return False
 
@@ -159,7 +159,7 @@ def _is_type_checking(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
 
 
-def _here(node: ast.expr, owner: Any, key: str | int) -> Iterator[_Edit]:
+def _edits_of(node: ast.expr, owner: Any, key: str | int) -> Iterator[_Edit]:
     match node:
         case ast.BinOp(op=op) if type(op) in OPERATORS and not _is_text(node):
             yield _Edit(node, node, "op", OPERATORS[type(op)]())
@@ -187,7 +187,7 @@ def _is_number(side: ast.expr) -> bool:
     return isinstance(side, ast.Constant) and isinstance(side.value, int | float | complex)
 
 
-def mirrored(root: Path, path: str) -> list[str]:
+def mirrored_tests(root: Path, path: str) -> list[str]:
     """Return the tests that mirror a file: its folder's kept numbers, its own test, its docstrings, its folder's.
 
     Kept numbers come first, because they run all formulas of a folder in seconds.

@@ -16,7 +16,7 @@ from plant.arrays import Array
 
 SOURCE = Path(__file__).with_suffix(".c")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
-FUSING = ("-mfma", "-mavx2")
+FUSED_FLAGS = ("-mfma", "-mavx2")
 """Instructions that Python's kernels use too, if the processor supports them."""
 
 
@@ -53,7 +53,7 @@ class CFilter:
         gate = self.library.run(ctypes.c_long(len(drives)), *places)
         return values.astype(float), deviations.astype(float), sums[:-1].astype(float), float(sums[-1]), gate
 
-    def worked(self) -> None:
+    def filter_without_results(self) -> None:
         """Filter the log and discard the results."""
         drives, measured = self.logs()
         places = (ctypes.c_void_p(one.ctypes.data) for one in (drives, measured))
@@ -87,13 +87,13 @@ class CFilter:
         return late, times
 
 
-def built(
+def build_filter(
     problem: FilterProblem,
     method: str,
     folder: Path,
     *,
     compiler: str = "gcc",
-    flags: Sequence[str] = FUSING,
+    flags: Sequence[str] = FUSED_FLAGS,
     precision: str = "double",
 ) -> CFilter:
     """Export a filter, compile it and load it.

@@ -11,7 +11,7 @@ from plant.arrays import Array
 from plant.compiled.expression import as_expression, jacobian, symbol
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.compiled.source import lines_source
 from plant.solvers.steps import Derivative, Parameters, parameter_names, parameter_symbols
 
@@ -150,7 +150,7 @@ def compiled_model(derivative: Derivative, width: int, parameter_class: type[Par
         f"load = loading({width})",
         f"rates_of = advancing({given}, {slots}, rate_lines, {width})",
         f"slopes_of = advancing({given}, {slots}, slope_lines, {width**2})",
-        pasted(drive_at, *ENTRIES),
+        functions_text(drive_at, *ENTRIES),
     )
     title = f"rates of {derivative.__name__} and their Jacobian"
     entries = {one.__name__: signature_of(one, states=width) for one in ENTRIES}

@@ -57,7 +57,7 @@ def builds(processor: str) -> dict[str, ctypes.CDLL]:
     return {name: library for name, library in found.items() if library is not None}
 
 
-def peak(processor: str) -> float | None:
+def peak_arithmetic(processor: str) -> float | None:
     """Return the additions and multiplications of a core, the best of three tries [1/s]; None without C++."""
     march, best = PROCESSORS[processor], 0.0
     wide = processor == "own" and "avx512f" in Path("/proc/cpuinfo").read_text(encoding="utf-8")

@@ -64,15 +64,15 @@ class PressureFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy ca
         super().__init__(dim_x=4, dim_z=2)
         self.p, self.step, self.scale = p, step, scale
 
-    def moved(self, state: Array, speeds: tuple[float, float]) -> Array:
+    def next_state(self, state: Array, speeds: tuple[float, float]) -> Array:
         """Return the scaled state one step later."""
         found = pressure_step(tuple((state * self.scale).tolist()), speeds, self.p, self.step)
         return np.array([float(one) for one in found]) / self.scale
 
     def predict_x(self, u: tuple[float, float] = (0.0, 0.0)) -> None:
         """Advance the mean by one step between two motor speeds."""
-        here = self.moved(self.x, u)
-        self.F = np.column_stack([(self.moved(self.x + 1e-6 * one, u) - here) / 1e-6 for one in np.eye(4)])
+        here = self.next_state(self.x, u)
+        self.F = np.column_stack([(self.next_state(self.x + 1e-6 * one, u) - here) / 1e-6 for one in np.eye(4)])
         self.x = here
 
 

@@ -23,7 +23,7 @@ from plant.solvers.steps import Derivative, Parameters, parameter_row
 Method: TypeAlias = Literal["LSODA", "Radau", "BDF", "odeint", "CVODE"]
 """Scipy's three stiff methods of ``solve_ivp``, its ``odeint`` (LSODA without the overhead), SUNDIALS' CVODE."""
 
-CORNER = 1e-2
+CORNER_BEND = 1e-2
 """Bend of the drive, relative to its largest value, at which a solver may stop."""
 
 
@@ -44,16 +44,16 @@ class _Problem:
 
     @cached_property
     def rates(self) -> "OfTime":
-        return self._of_time(self.kernel.rates_at, len(self.initial))
+        return self._as_function_of_time(self.kernel.rates_at, len(self.initial))
 
     @cached_property
     def slopes(self) -> "OfTime":
-        return self._of_time(self.kernel.slopes_at, len(self.initial), len(self.initial))
+        return self._as_function_of_time(self.kernel.slopes_at, len(self.initial), len(self.initial))
 
-    def _of_time(self, entry: Any, *shape: int) -> "OfTime":
+    def _as_function_of_time(self, entry: Any, *shape: int) -> "OfTime":
         """Return rates or slopes as a function of time and state, at the cost of a call and two small copies."""
         at, state, result = np.empty(1), np.empty(len(self.initial)), np.empty(shape)
-        call = entry.again(at, state, self.speed, self.piece, self.sample_time, self.row, result)
+        call = entry.prepared_call(at, state, self.speed, self.piece, self.sample_time, self.row, result)
 
         def of_time(t: float, x: Array) -> Array:
             at[0] = t
@@ -114,7 +114,7 @@ def reference_trajectory(
     HydrostateError
         If CVODE is asked for and not installed.
     """
-    bends = np.abs(np.diff(speed, 2)) > CORNER * np.max(np.abs(speed))
+    bends = np.abs(np.diff(speed, 2)) > CORNER_BEND * np.max(np.abs(speed))
     problem = _Problem(
         compiled_model(derivative, len(initial), type(parameters)),
         initial,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from estimation.piezo_stack.bouc_wen import HysteresisFit, fitted
+from estimation.piezo_stack.bouc_wen import HysteresisFit, fit_displacement
 from estimation.tuning.step_sensitivity import sensitivity_step
 from plant.arrays import Array
 from plant.compiled.functions import Scalar
@@ -114,7 +114,7 @@ def fit_oscillator(
     first = np.array([getattr(start, name) for name in names])
     scale = np.abs(first)
     scale[4:] = max(float(scale[4:].max()), 1e2)
-    return fitted(simulate, displacement, first, scale, tuple(names))
+    return fit_displacement(simulate, displacement, first, scale, tuple(names))
 
 
 def simulate_oscillator(

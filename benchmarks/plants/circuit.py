@@ -25,16 +25,16 @@ from plant.eha.simulate import CIRCUIT, run_plant
 from plant.solvers.steps import parameter_row
 
 SAMPLE_TIME = 1e-4
-LADDER = tuple(base * 10.0**-k for k in range(4, 10) for base in (1.0, 0.5, 0.2))
+TOLERANCES = tuple(base * 10.0**-k for k in range(4, 10) for base in (1.0, 0.5, 0.2))
 CHANNELS = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
 WANTED_SECONDS = 1.0
 WANTED_RATIO = 20.0
 REPEATS = 3
-SLOWER = 3.0
+TOO_SLOW = 3.0
 """A peer that takes this many times as long as the best so far is not tried at tighter tolerances."""
 
 
-def timed(work: Callable[[], Array], repeats: int = 1) -> tuple[float, Array]:
+def shortest_time(work: Callable[[], Array], repeats: int = 1) -> tuple[float, Array]:
     """Return the shortest processor time of some work [s], and its result."""
     least, result = np.inf, np.empty(0)
     for _ in range(repeats):
@@ -44,12 +44,12 @@ def timed(work: Callable[[], Array], repeats: int = 1) -> tuple[float, Array]:
     return least, result
 
 
-def together(circuits: list[CircuitParameters], speed: Array) -> Array:
+def run_side_by_side(circuits: list[CircuitParameters], speed: Array) -> Array:
     """Return the states of circuits computed side by side by our kernel."""
     return run_plant(CIRCUIT, speed, SAMPLE_TIME, np.array([parameter_row(p) for p in circuits])[None])
 
 
-def peer(p: CircuitParameters, speed: Array, method: Method, tolerance: float, *, stops: bool) -> Array:
+def peer_states(p: CircuitParameters, speed: Array, method: Method, tolerance: float, *, stops: bool) -> Array:
     """Return the states computed by one of the peers."""
     return reference_trajectory(
         circuit_derivative,
@@ -77,13 +77,15 @@ def best_peer(
     """Return the fastest peer with an error no larger than ours: name and tolerance, time [s], error."""
     best = ("none", np.inf, np.inf)
     for method, stops in product(methods, (True, False)):
-        for tolerance in LADDER:
-            seconds, states = timed(lambda m=method, t=tolerance, c=stops: peer(p, speed, m, t, stops=c))
-            if seconds > SLOWER * best[1]:
+        for tolerance in TOLERANCES:
+            seconds, states = shortest_time(lambda m=method, t=tolerance, c=stops: peer_states(p, speed, m, t, stops=c))
+            if seconds > TOO_SLOW * best[1]:
                 break
             reached = error(states, truth, p)
             if reached <= ours:
-                again, _ = timed(lambda m=method, t=tolerance, c=stops: peer(p, speed, m, t, stops=c), REPEATS - 1)
+                again, _ = shortest_time(
+                    lambda m=method, t=tolerance, c=stops: peer_states(p, speed, m, t, stops=c), REPEATS - 1
+                )
                 name = f"{method} {tolerance:g}{' stopped' if stops else ''}"
                 best = min(best, (name, min(seconds, again), reached), key=lambda one: one[1])
                 break
@@ -96,11 +98,11 @@ def compare(chosen: list[str], seconds: float, methods: list[Method]) -> pd.Data
     circuits = {n: circuit_of(parameters_for(c, CircuitParameters())) for n, c in CONDITIONS.items()}
     for drive in DRIVES:
         speed = make_drive(drive, seconds, SAMPLE_TIME, circuits["normal"], np.random.default_rng(1))
-        nine_s, states = timed(lambda u=speed: together(list(circuits.values()), u), REPEATS)
+        nine_s, states = shortest_time(lambda u=speed: run_side_by_side(list(circuits.values()), u), REPEATS)
         for name in chosen:
             p = circuits[name]
-            truth = peer(p, speed, "odeint", 1e-11, stops=True)
-            alone_s, alone = timed(lambda q=p, u=speed: together([q], u), REPEATS)
+            truth = peer_states(p, speed, "odeint", 1e-11, stops=True)
+            alone_s, alone = shortest_time(lambda q=p, u=speed: run_side_by_side([q], u), REPEATS)
             found: dict[str, object] = {"drive": drive, "condition": name}
             ways = {"nine": (nine_s / len(circuits), states[list(circuits).index(name)]), "alone": (alone_s, alone[0])}
             for way, (own_s, own) in ways.items():
@@ -115,7 +117,7 @@ def nine_conditions(drive: str) -> float:
     """Return the time for nine conditions, 10 s each at 10 kHz, after compilation [s]."""
     circuits = [circuit_of(parameters_for(condition, CircuitParameters())) for condition in CONDITIONS.values()]
     speed = make_drive(drive, 10.0, SAMPLE_TIME, CircuitParameters(), np.random.default_rng(1))
-    return timed(lambda: together(circuits, speed), REPEATS)[0]
+    return shortest_time(lambda: run_side_by_side(circuits, speed), REPEATS)[0]
 
 
 def main(arguments: list[str]) -> int:
@@ -132,8 +134,8 @@ def main(arguments: list[str]) -> int:
         methods.append("CVODE")
     if options.every_method:
         methods.extend(("LSODA", "Radau", "BDF"))
-    together([CircuitParameters()] * 2, np.zeros(3))
-    together([CircuitParameters()], np.zeros(3))
+    run_side_by_side([CircuitParameters()] * 2, np.zeros(3))
+    run_side_by_side([CircuitParameters()], np.zeros(3))
     nine = {drive: nine_conditions(drive) for drive in DRIVES}
     for drive, seconds in nine.items():
         print(f"nine conditions x 10 s at 10 kHz, {drive}: {seconds:.3f} s (wanted: under {WANTED_SECONDS:g} s)")

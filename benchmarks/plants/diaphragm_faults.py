@@ -13,11 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.targets import misses, say
+from benchmarks.targets import check_target, misses
 from estimation.diaphragm_motor.card import flow_change, motor_card
 from estimation.diaphragm_motor.estimate import estimate_motor
 from estimation.diaphragm_motor.signature import GAIN_TOLERANCE, TOLERANCE, logged_signature
-from faults.diaphragm_motor.diagnose import TOLD_APART, MotorDiagnosis, diagnose_motor, separations
+from faults.diaphragm_motor.diagnose import LEAST_SEPARATION, MotorDiagnosis, diagnose_motor, separations
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, motor_with_fault
 from plant.diaphragm_motor.flow import pump_alone
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
@@ -45,11 +45,11 @@ SINGLE: Mapping[str, float] = {
 }
 """Fourteen single faults and their severities; faults of one place are moved to a random place for each seed."""
 
-TOGETHER = frozenset({"friction", "load"})
+INDISTINGUISHABLE = frozenset({"friction", "load"})
 """Faults that no sensor of the motor can distinguish."""
 
 
-def logged(motor: DiaphragmMotorParameters | Schedule, seed: int, seconds: float = 0.2) -> Record:
+def noisy_log(motor: DiaphragmMotorParameters | Schedule, seed: int, seconds: float = 0.2) -> Record:
     """Return a log with the bench's noise, 20 mV and 2 um."""
     drive = motor_drive(FREQUENCY, SWING, seconds, SAMPLE_TIME)
     return simulate_motor(motor, drive, SAMPLE_TIME, sensors=BENCH_SENSORS, rng=np.random.default_rng(seed))
@@ -62,21 +62,21 @@ def spread_motor(rng: np.random.Generator, factor: float) -> DiaphragmMotorParam
     return replace(MOTOR, **drawn, sensor_gain=tuple(gains.tolist()))
 
 
-def placed(name: str, rng: np.random.Generator) -> str:
+def fault_at_random_place(name: str, rng: np.random.Generator) -> str:
     """Return the same kind of fault at a random place."""
     alike = [fault.name for fault in MOTOR_FAULTS.values() if fault.kind == MOTOR_FAULTS[name].kind]
     return str(rng.choice(alike))
 
 
-def right(found: MotorDiagnosis, name: str) -> bool:
+def is_right(found: MotorDiagnosis, name: str) -> bool:
     """Return whether a diagnosis names the fault, or its group if it has one, and calls it known."""
     names = {match.name for match in found.group}
-    if name in TOGETHER:
-        return not found.unknown and names == TOGETHER
+    if name in INDISTINGUISHABLE:
+        return not found.unknown and names == INDISTINGUISHABLE
     return not found.unknown and found.best.name == name
 
 
-def isolate(seeds: int, factor: float, *, calibrated: bool) -> tuple[float, float, float, Counter[str], float]:
+def isolation_shares(seeds: int, factor: float, *, calibrated: bool) -> tuple[float, float, float, Counter[str], float]:
     """Return shares of right, unknown, and intervals that cover; the wrong results; seconds per log [fractions, s]."""
     hits = unknown = covered = total = 0
     wrong: Counter[str] = Counter()
@@ -84,14 +84,14 @@ def isolate(seeds: int, factor: float, *, calibrated: bool) -> tuple[float, floa
     for seed in range(seeds):
         rng = np.random.default_rng([seed, 9])
         for first, severity in SINGLE.items():
-            name = placed(first, rng)
+            name = fault_at_random_place(first, rng)
             motor = spread_motor(rng, factor)
-            log = logged(motor_with_fault(motor, name, severity), seed)
-            calibration = logged_signature(logged(motor, seed + 1000)) if calibrated else None
+            log = noisy_log(motor_with_fault(motor, name, severity), seed)
+            calibration = logged_signature(noisy_log(motor, seed + 1000)) if calibrated else None
             start = time.process_time()
             found = diagnose_motor(log, MOTOR, calibration=calibration)
             spent += time.process_time() - start
-            good = right(found, name)
+            good = is_right(found, name)
             own = next(match for match in found.matches if match.name == name)
             hits, unknown, total = hits + good, unknown + found.unknown, total + 1
             covered += own.interval[0] <= severity <= own.interval[1]
@@ -109,10 +109,10 @@ def isolation(seeds: int) -> None:
         ("four times, calibrated on a healthy run", 4.0, True, False),
     )
     for what, factor, calibrated, wanted in cases:
-        share, unknown, covered, wrong, seconds = isolate(seeds, factor, calibrated=calibrated)
+        share, unknown, covered, wrong, seconds = isolation_shares(seeds, factor, calibrated=calibrated)
         said = f"isolation, {seeds} seeds x {len(SINGLE)} faults, {what}, right [%]"
         if wanted:
-            say(said, 100.0 * share, 95.0, most=False)
+            check_target(said, 100.0 * share, 95.0, most=False)
         else:
             print(f"       {said}: {100.0 * share:.4g}")
         print(
@@ -121,9 +121,11 @@ def isolation(seeds: int) -> None:
         )
         for case, count in wrong.most_common(5):
             print(f"       wrong {count} times: {case}")
-    alarms = [diagnose_motor(logged(spread_motor(np.random.default_rng([s, 1]), 1.0), s), MOTOR) for s in range(seeds)]
+    alarms = [
+        diagnose_motor(noisy_log(spread_motor(np.random.default_rng([s, 1]), 1.0), s), MOTOR) for s in range(seeds)
+    ]
     named = sum(found.unknown or found.best.name != HEALTHY for found in alarms)
-    say(f"healthy motors within tolerance that are called faulty, of {seeds}", named, 0.05 * seeds)
+    check_target(f"healthy motors within tolerance that are called faulty, of {seeds}", named, 0.05 * seeds)
 
 
 def pairs() -> None:
@@ -134,16 +136,16 @@ def pairs() -> None:
         (first, other, distance)
         for first, others in apart.items()
         for other, distance in others.items()
-        if distance < TOLD_APART
+        if distance < LEAST_SEPARATION
     ]
     for first, other, distance in close:
         print(f"       not told apart: {first} and {other}, {distance:.2f} standard deviations")
-    odd = [pair for pair in close if {pair[0], pair[1]} != TOGETHER]
-    say("pairs that are not told apart, beside friction and load", len(odd), 0)
+    odd = [pair for pair in close if {pair[0], pair[1]} != INDISTINGUISHABLE]
+    check_target("pairs that are not told apart, beside friction and load", len(odd), 0)
     for first, other in (("soft_clamp", "gas_everywhere"), ("clogged_ports", "load"), ("friction", "load")):
-        found = diagnose_motor(logged(motor_with_fault(MOTOR, first, sizes[first]), 0), MOTOR)
+        found = diagnose_motor(noisy_log(motor_with_fault(MOTOR, first, sizes[first]), 0), MOTOR)
         print(f"       {first} and {other}: {apart[first][other]:.1f} standard deviations apart")
-        say(f"{first}: {other} is named as a look-alike", float(other in found.lookalikes), 1.0, most=False)
+        check_target(f"{first}: {other} is named as a look-alike", float(other in found.lookalikes), 1.0, most=False)
 
 
 def estimates(seeds: int) -> None:
@@ -154,21 +156,21 @@ def estimates(seeds: int) -> None:
         for load in (10.0, 20.0):
             for leakage in (2e-12, 5e-12):
                 motor = replace(MOTOR, load_force=load, crossport_leakage=leakage)
-                found = estimate_motor(logged(motor, seed, 0.5), DiaphragmMotorParameters())
+                found = estimate_motor(noisy_log(motor, seed, 0.5), DiaphragmMotorParameters())
                 leaks.append(abs(found.values["crossport_leakage"] / leakage - 1.0))
                 loads.append(abs(found.values["load_force"] - load))
                 missed += found.track.alarm_time is None
-    say("leakage of 2e-12 and 5e-12 at 10 and 20 N, worst error [%]", 100.0 * max(leaks), 15.0)
-    say("load, worst error [N]", max(loads), 1.0)
-    say("leaks without an alarm", missed, 0)
+    check_target("leakage of 2e-12 and 5e-12 at 10 and 20 N, worst error [%]", 100.0 * max(leaks), 15.0)
+    check_target("load, worst error [N]", max(loads), 1.0)
+    check_target("leaks without an alarm", missed, 0)
     alarms = 0
     for seed in range(seeds):
         at = 0.25 + 0.2 * float(np.random.default_rng([seed, 3]).random())
         for before, after in ((5.0, 15.0), (15.0, 5.0), (0.0, 20.0), (20.0, 0.0)):
             steps = ((0.0, replace(MOTOR, load_force=before)), (at, replace(MOTOR, load_force=after)))
-            found = estimate_motor(logged(steps, seed, 0.8), DiaphragmMotorParameters())
+            found = estimate_motor(noisy_log(steps, seed, 0.8), DiaphragmMotorParameters())
             alarms += found.track.alarm_time is not None
-    say(f"false alarms of leakage on {4 * seeds} load steps", alarms, 0)
+    check_target(f"false alarms of leakage on {4 * seeds} load steps", alarms, 0)
 
 
 def bulk_modulus() -> None:
@@ -178,11 +180,13 @@ def bulk_modulus() -> None:
             100.0 * abs(flow_change(motor, FREQUENCY, SWING, factor))
             for motor in (pump_alone(MOTOR), replace(MOTOR, load_force=0.0), MOTOR)
         )
-        say(f"flow of the pump alone, bulk modulus times {factor:g}, change [%]", alone, 0.1)
-        say(f"flow without load, bulk modulus times {factor:g}, change [%]", free, 0.1)
+        check_target(f"flow of the pump alone, bulk modulus times {factor:g}, change [%]", alone, 0.1)
+        check_target(f"flow without load, bulk modulus times {factor:g}, change [%]", free, 0.1)
         print(f"       the same against {LOAD:g} N: {loaded:.3g} %")
     bound = 100.0 * motor_card(MOTOR, FREQUENCY, SWING).relative_std["bulk_modulus"]
-    say(f"bound of bulk modulus on the card, 100 is nothing learnt, load {LOAD:g} N [%]", bound, 90.0, most=False)
+    check_target(
+        f"bound of bulk modulus on the card, 100 is nothing learnt, load {LOAD:g} N [%]", bound, 90.0, most=False
+    )
 
 
 def main(arguments: list[str]) -> int:

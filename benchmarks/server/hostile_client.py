@@ -8,10 +8,10 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
-PATIENCE = 40.0
+TIMEOUT = 40.0
 """Maximum wait for an answer [s]."""
 
-HUGE = 1 << 30
+HUGE_BODY = 1 << 30
 """Size of an oversized body [bytes]."""
 
 LINE = b"\r\n"
@@ -71,7 +71,7 @@ GARBAGE = (
 )
 
 
-class Hostile:
+class HostileClients:
     """Hostile clients of a server.
 
     Parameters
@@ -125,7 +125,7 @@ class Hostile:
                 pass
 
     def _ask(self, *parts: bytes, wait: bool = True) -> bytes:
-        with socket.create_connection(self._place, PATIENCE) as connection:
+        with socket.create_connection(self._place, TIMEOUT) as connection:
             try:
                 for part in parts:
                     connection.sendall(part)
@@ -160,18 +160,18 @@ class Hostile:
         return self._ask(self._head(chance.choice((b"/", b"/api/logs", b"/api/health", b"/openapi.json", b"/fleet"))))
 
     def _huge(self, chance: random.Random) -> bytes:
-        head = self._head(b"/api/logs?name=huge.csv", b"Content-Length: %d" % HUGE, method=b"POST")
+        head = self._head(b"/api/logs?name=huge.csv", b"Content-Length: %d" % HUGE_BODY, method=b"POST")
         return self._ask(head, bytes(chance.randrange(1 << 16)))
 
     def _chunked(self, _: random.Random) -> bytes:
         """Send a body of a gigabyte without stating its length, until the server answers."""
         head = self._head(b"/api/logs?name=huge.csv", b"Transfer-Encoding: chunked", method=b"POST")
         block = b"%x\r\n" % (1 << 20) + bytes(1 << 20) + LINE
-        with socket.create_connection(self._place, PATIENCE) as connection:
+        with socket.create_connection(self._place, TIMEOUT) as connection:
             connection.sendall(head)
             connection.setblocking(False)
-            until = time.monotonic() + PATIENCE
-            for _ in range(HUGE >> 20):
+            until = time.monotonic() + TIMEOUT
+            for _ in range(HUGE_BODY >> 20):
                 rest = memoryview(block)
                 while rest and time.monotonic() < until:
                     try:
@@ -180,7 +180,7 @@ class Hostile:
                         time.sleep(0.002)
                     try:
                         if connection.recv(1, socket.MSG_PEEK):
-                            connection.settimeout(PATIENCE)
+                            connection.settimeout(TIMEOUT)
                             return first_line(connection)
                         return b""
                     except BlockingIOError:
@@ -189,7 +189,7 @@ class Hostile:
 
     def _slow(self, _: random.Random) -> bytes:
         """Send a header one letter at a time, until the server gives up."""
-        with socket.create_connection(self._place, PATIENCE) as connection:
+        with socket.create_connection(self._place, TIMEOUT) as connection:
             for letter in self._head(b"/"):
                 try:
                     connection.sendall(bytes([letter]))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from benchmarks.server.hostile_client import server_errors
 from benchmarks.server.server_trials import attack, kill, stream
-from benchmarks.targets import misses, say
+from benchmarks.targets import check_target, misses
 
 MB = 1 << 20
 
@@ -34,22 +34,22 @@ def main(arguments: Sequence[str]) -> int:
             honest = {status: found.polite.count(status) for status in set(found.polite)}
             told = ", ".join(f"{one / MB:.0f}" for one in found.memory)
             print(f"an honest client meanwhile: {honest}; memory before and after each quarter: {told} MB")
-            say("answers with a status of 500 or more", sum(server_errors(found.answers).values()), 0.0)
-            say("files outside the folder", len(found.strange), 0.0)
-            say("growth of memory in the last half [MB]", (found.memory[-1] - found.memory[2]) / MB, 10.0)
-            say("growth of memory at its height [MB]", (found.most - found.memory[0]) / MB, 60.0)
-            say("an honest client's longest wait [s]", found.slowest, 10.0)
+            check_target("answers with a status of 500 or more", sum(server_errors(found.answers).values()), 0.0)
+            check_target("files outside the folder", len(found.strange), 0.0)
+            check_target("growth of memory in the last half [MB]", (found.memory[-1] - found.memory[2]) / MB, 10.0)
+            check_target("growth of memory at its height [MB]", (found.most - found.memory[0]) / MB, 60.0)
+            check_target("an honest client's longest wait [s]", found.slowest, 10.0)
         if asked.uploads:
             killed = kill(folder(place, "killed"), asked.uploads, asked.uploads // 4)
             print(f"killed with {killed.accepted} logs taken and {killed.finished} finished")
-            say("finished results lost", len(killed.lost), 0.0)
-            say("taken logs neither finished nor said to be interrupted", len(killed.unfinished), 0.0)
+            check_target("finished results lost", len(killed.lost), 0.0)
+            check_target("taken logs neither finished nor said to be interrupted", len(killed.unfinished), 0.0)
         if asked.seconds:
             streamed = stream(folder(place, "streamed"), asked.seconds, asked.rate)
             print(f"{streamed.sent} rows in {asked.seconds:g} s, all taken {streamed.behind:.1f} s after the last")
-            say("rows lost", streamed.sent - streamed.taken, 0.0)
-            say("gaps", streamed.gaps, 0.0)
-            say("processor time [% of a core]", 100.0 * streamed.share, 30.0)
+            check_target("rows lost", streamed.sent - streamed.taken, 0.0)
+            check_target("gaps", streamed.gaps, 0.0)
+            check_target("processor time [% of a core]", 100.0 * streamed.share, 30.0)
     return len(misses)
 
 

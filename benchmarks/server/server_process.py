@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Self
 from urllib.parse import quote, urlsplit
 
-STARTED_IN = 60.0
+START_TIMEOUT = 60.0
 """Time limit for a server to start listening [s]."""
 
 
@@ -32,7 +32,7 @@ class Server:
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)  # noqa: S603 -- our own command
         said = (self.process.stdout.readline() if self.process.stdout else "").strip()
         if not said.startswith("http://"):
-            raise RuntimeError(f"the server did not start: {said!r}, code {self.process.wait(STARTED_IN)}")
+            raise RuntimeError(f"the server did not start: {said!r}, code {self.process.wait(START_TIMEOUT)}")
         parts = urlsplit(said)
         self.base = f"http://{parts.netloc}"
         self.host, self.port = parts.hostname or "", parts.port or 0
@@ -72,7 +72,7 @@ class Server:
             raise RuntimeError(f"{path}: {status} {body[:200]!r}")
         return json.loads(body)
 
-    def drop(self, name: str, content: bytes, verb: str = "estimate") -> str:
+    def upload_log(self, name: str, content: bytes, verb: str = "estimate") -> str:
         """Upload a log, retrying while the server is busy; return its identity."""
         while True:
             status, body = self.ask("POST", f"/api/logs?name={quote(name)}&verb={verb}", content)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.server.hostile_client import MIX, Hostile
+from benchmarks.server.hostile_client import MIX, HostileClients
 from benchmarks.server.server_process import Server
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -23,11 +23,11 @@ from plant.sensors.sensors import BENCH
 
 HEADER = "time_s,motor_speed_rad_s,position_m,differential_pressure_pa\n"
 
-ROOM = ("--largest", "64", "--room", "2048")
+SERVER_LIMITS = ("--largest", "64", "--room", "2048")
 """Limits of a server under attack."""
 
 
-def moving(seconds: float, sample_time: float, seed: int = 0) -> Record:
+def reversing_log(seconds: float, sample_time: float, seed: int = 0) -> Record:
     """Return a log of a healthy actuator that reverses at random, with physics simple enough to compute quickly.
 
     Parameters
@@ -65,7 +65,7 @@ def bench_log(path: Path, seconds: float = 4.0) -> bytes:
 
 
 @dataclass(frozen=True)
-class Attacked:
+class AttackResult:
     """The state of a server after an attack.
 
     Parameters
@@ -95,7 +95,7 @@ class Attacked:
     seconds: float
 
 
-def attack(place: Path, count: int, clients: int, mix: Mapping[str, float] = MIX) -> Attacked:
+def attack(place: Path, count: int, clients: int, mix: Mapping[str, float] = MIX) -> AttackResult:
     """Attack a new server while an honest client uses it too.
 
     Parameters
@@ -108,11 +108,11 @@ def attack(place: Path, count: int, clients: int, mix: Mapping[str, float] = MIX
     polite: list[tuple[int, float]] = []
     heights: list[int] = []
     over = threading.Event()
-    with Server(place / "kept", *ROOM) as server:
-        hostile = Hostile(server.host, server.port)
+    with Server(place / "kept", *SERVER_LIMITS) as server:
+        hostile = HostileClients(server.host, server.port)
         hostile.attack(count // 20, clients, mix, seed=-1)  # warm-up: buffers and threads exist from here on
         hostile.answers.clear()
-        memory, listed = [server.memory()], names_around(place)
+        memory, listed = [server.memory()], files_around(place)
 
         def ask() -> None:
             while not over.is_set():
@@ -133,13 +133,13 @@ def attack(place: Path, count: int, clients: int, mix: Mapping[str, float] = MIX
             over.set()
             asking.join()
         seconds = time.monotonic() - began
-        strange = tuple(sorted(names_around(place) - listed))
+        strange = tuple(sorted(files_around(place) - listed))
     statuses = tuple(status for status, _ in polite)
     slowest = max((waited for _, waited in polite), default=0.0)
-    return Attacked(dict(hostile.answers), statuses, slowest, tuple(memory), max(heights), strange, seconds)
+    return AttackResult(dict(hostile.answers), statuses, slowest, tuple(memory), max(heights), strange, seconds)
 
 
-def names_around(place: Path) -> set[str]:
+def files_around(place: Path) -> set[str]:
     """Return the files in places a log could have escaped to: beside the server's folder, above it, and in /tmp."""
     found = {str(one) for one in place.rglob("*") if place / "kept" not in one.parents}
     above = [*place.parents[:2], Path("/tmp"), Path.cwd()]  # noqa: S108 -- looked at, not written
@@ -147,7 +147,7 @@ def names_around(place: Path) -> set[str]:
 
 
 @dataclass(frozen=True)
-class Killed:
+class KillResult:
     """State of a server before and after it was killed.
 
     Parameters
@@ -166,7 +166,7 @@ class Killed:
     unfinished: tuple[str, ...]
 
 
-def kill(place: Path, uploads: int, after: int) -> Killed:
+def kill(place: Path, uploads: int, after: int) -> KillResult:
     """Kill a server during uploads and start it again.
 
     Parameters
@@ -185,7 +185,7 @@ def kill(place: Path, uploads: int, after: int) -> Killed:
     def drop(number: int) -> None:
         time.sleep(0.3)
         try:
-            accepted.append(server.drop(f"run{number}.csv", content))
+            accepted.append(server.upload_log(f"run{number}.csv", content))
         except (OSError, RuntimeError):  # the server was killed meanwhile
             return
 
@@ -209,7 +209,7 @@ def kill(place: Path, uploads: int, after: int) -> Killed:
                 state = "lost"
             if state not in ("done", "interrupted"):
                 left.append(identity)
-    return Killed(len(accepted), len(done), tuple(lost), tuple(left))
+    return KillResult(len(accepted), len(done), tuple(lost), tuple(left))
 
 
 def result_of(server: Server, identity: str) -> tuple[Any, bytes]:
@@ -218,7 +218,7 @@ def result_of(server: Server, identity: str) -> tuple[Any, bytes]:
 
 
 @dataclass(frozen=True)
-class Streamed:
+class StreamResult:
     """Results of a server with a stream.
 
     Parameters
@@ -239,7 +239,7 @@ class Streamed:
     behind: float
 
 
-def stream(place: Path, seconds: float, rate: float) -> Streamed:
+def stream(place: Path, seconds: float, rate: float) -> StreamResult:
     """Send a stream to a server in real time, with a viewer connected.
 
     Parameters
@@ -249,8 +249,8 @@ def stream(place: Path, seconds: float, rate: float) -> Streamed:
     rate : float
         Rows per second [1/s].
     """
-    with feeding(seconds, rate) as (address, sent), Server(place / "kept", "--watch", f"bench={address}") as server:
-        looking = threading.Thread(target=look_on, args=(server,), daemon=True)
+    with send_rows(seconds, rate) as (address, sent), Server(place / "kept", "--watch", f"bench={address}") as server:
+        looking = threading.Thread(target=view_events, args=(server,), daemon=True)
         looking.start()
         while not sent.began:
             time.sleep(0.05)
@@ -259,12 +259,12 @@ def stream(place: Path, seconds: float, rate: float) -> Streamed:
         while not sent.ended:
             time.sleep(0.2)
         share = (server.cpu() - cpu) / (time.monotonic() - began)
-        gauges = settled(server, sent.rows)
+        gauges = last_gauges(server, sent.rows)
         behind = time.monotonic() - sent.ended
-        return Streamed(sent.rows, gauges["rows"], gauges["gaps"], share, behind)
+        return StreamResult(sent.rows, gauges["rows"], gauges["gaps"], share, behind)
 
 
-def settled(server: Server, rows: int) -> Any:
+def last_gauges(server: Server, rows: int) -> Any:
     """Return the last gauges once all rows have arrived, or no more arrive."""
     until = time.monotonic() + 20.0
     gauges = server.json("/api/streams/bench")["gauges"]
@@ -274,7 +274,7 @@ def settled(server: Server, rows: int) -> Any:
     return gauges
 
 
-def look_on(server: Server) -> None:
+def view_events(server: Server) -> None:
     """Read the events of the stream, as a page does."""
     with socket.create_connection((server.host, server.port)) as connection:
         connection.sendall(f"GET /api/streams/bench/events HTTP/1.1\r\nHost: {server.host}\r\n\r\n".encode())
@@ -283,7 +283,7 @@ def look_on(server: Server) -> None:
 
 
 @dataclass
-class Sent:
+class SendProgress:
     """Progress of a bench: rows sent, and start and end time [s]."""
 
     rows: int = 0
@@ -292,12 +292,12 @@ class Sent:
 
 
 @contextmanager
-def feeding(seconds: float, rate: float) -> Iterator[tuple[str, Sent]]:
+def send_rows(seconds: float, rate: float) -> Iterator[tuple[str, SendProgress]]:
     """Send rows in real time to the first client that connects; yields the address and the progress."""
-    record = moving(20.0, 1.0 / rate)
+    record = reversing_log(20.0, 1.0 / rate)
     columns = [record[name] for name in ("motor_speed_rad_s", "position_m", "differential_pressure_pa")]
     bodies = [f"{a:.6g},{b:.9g},{c:.7g}\n" for a, b, c in zip(*columns, strict=True)]
-    sent = Sent()
+    sent = SendProgress()
 
     def feed(server: socket.socket) -> None:
         connection, _ = server.accept()

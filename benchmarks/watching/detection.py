@@ -12,8 +12,8 @@ from time import process_time
 import numpy as np
 
 from benchmarks.diagnosis.scores import alarm_rate, median_delay
-from benchmarks.targets import Check, keep
-from benchmarks.watching.watching import PIECE, SAMPLE_TIME, CircuitStream, detect_fault, false_alarms, learnt
+from benchmarks.targets import Check, keep_figure
+from benchmarks.watching.watching import PIECE, SAMPLE_TIME, CircuitStream, detect_fault, false_alarms, learnt_watch
 from faults.watch.events import Alarm
 from faults.watch.watch import LEARNING, Watch
 from plant.eha.circuit_parameters import CircuitParameters
@@ -22,20 +22,20 @@ FAULTS = ("minor_leakage", "minor_friction")
 LONGEST_DELAY = 0.5
 FEWEST, MOST = 20.0 / 30.0, 41.0 / 30.0
 LEARNING_HOURS = 1.0
-FAST = 1e-4
+FAST_SAMPLE_TIME = 1e-4
 SEED = 2031
 
 
-def delays(seeds: int) -> int:
+def delay_misses(seeds: int) -> int:
     """Print the delay of every fault; return the number of misses."""
-    running, watch = learnt(SEED, LEARNING_HOURS)
+    running, watch = learnt_watch(SEED, LEARNING_HOURS)
     misses = 0
     for condition in FAULTS:
         found = [detect_fault(running, watch, condition, seed) for seed in range(seeds)]
         middle, (low, high) = median_delay([one.delay for one in found])
         covered = np.mean([one.covered for one in found])
         missed = sum(one.delay == float("inf") for one in found)
-        right = keep(Check(f"{condition}: median delay [s]", middle, most=LONGEST_DELAY)).met
+        right = keep_figure(Check(f"{condition}: median delay [s]", middle, most=LONGEST_DELAY)).met
         misses += not right
         print(
             f"{condition}: median delay {middle:.3f} s (95 % {low:.3f} to {high:.3f}, target {LONGEST_DELAY:g}), "
@@ -45,12 +45,12 @@ def delays(seeds: int) -> int:
     return misses
 
 
-def alarms(hours: float) -> int:
+def false_alarm_miss(hours: float) -> int:
     """Print the false alarms at one per hour; return whether they miss the target."""
-    running, watch = learnt(SEED + 1, LEARNING_HOURS)
+    running, watch = learnt_watch(SEED + 1, LEARNING_HOURS)
     count = len(false_alarms(running, watch, hours))
     rate, (low, high) = alarm_rate(count, hours)
-    right = keep(Check("false alarms an hour, set to one", rate, FEWEST, MOST)).met
+    right = keep_figure(Check("false alarms an hour, set to one", rate, FEWEST, MOST)).met
     print(
         f"set to 1 false alarm an hour, {LEARNING_HOURS:g} h learnt: {count} in {hours:g} h, {rate:.2f} an hour "
         f"(95 % {low:.2f} to {high:.2f}, target {FEWEST:.2f} to {MOST:.2f}): {'met' if right else 'MISSED'}"
@@ -58,7 +58,7 @@ def alarms(hours: float) -> int:
     return int(not right)
 
 
-def cold(streams: int) -> None:
+def print_cold_alarms(streams: int) -> None:
     """Print the false alarms of one-hour streams watched after two minutes; there is no target."""
     counts, hours = {True: 0, False: 0}, streams * (1.0 - LEARNING / 3600.0)
     for seed in range(SEED + 2, SEED + 2 + streams):
@@ -78,10 +78,10 @@ def cold(streams: int) -> None:
 
 def speed() -> int:
     """Print the CPU time per sample at 10 kHz, in blocks of one second; return whether one core cannot keep up."""
-    samples = np.repeat(CircuitStream(SEED).run(PIECE), round(SAMPLE_TIME / FAST), axis=0)
-    watch = Watch(CircuitParameters(), FAST)
+    samples = np.repeat(CircuitStream(SEED).run(PIECE), round(SAMPLE_TIME / FAST_SAMPLE_TIME), axis=0)
+    watch = Watch(CircuitParameters(), FAST_SAMPLE_TIME)
     watch.take(samples[:20000])
-    count, spent = round(1.0 / FAST), []
+    count, spent = round(1.0 / FAST_SAMPLE_TIME), []
     for first in range(20000, len(samples) - count, count):
         begin = process_time()
         watch.take(samples[first : first + count])
@@ -98,7 +98,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--streams", type=int, default=10)
     options = parser.parse_args(arguments)
-    misses = delays(options.seeds) + alarms(options.hours) + speed()
+    misses = delay_misses(options.seeds) + false_alarm_miss(options.hours) + speed()
     if options.streams:
-        cold(options.streams)
+        print_cold_alarms(options.streams)
     return misses

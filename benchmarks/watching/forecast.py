@@ -13,16 +13,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.targets import misses, say
+from benchmarks.targets import check_target, misses
 from faults.trend.trend import Series, trends
 from plant.arrays import Array
 
-GROWING = ("steady", "exponential", "wandering rate", "bursts", "stopping")
-SOUND = ("healthy", "wandering level")
+GROWING_KINDS = ("steady", "exponential", "wandering rate", "bursts", "stopping")
+SOUND_KINDS = ("healthy", "wandering level")
 LOGS, AHEAD = 60, 240
 """Observed logs, and further logs over which the truth continues [count]."""
 
-RECENT = 10
+RECENT_LOGS = 10
 """Number of recent logs in which a true alarm must have seen growth [count]."""
 
 
@@ -83,7 +83,7 @@ def judge(kind: str, rng: np.random.Generator, tally: Tally) -> None:
         tally.logs += 1
         if alarm is None and trend.alarm:
             alarm = trend.place
-            grown = truth[alarm] - truth[max(alarm - RECENT, 0)] > 0.0 and kind in GROWING
+            grown = truth[alarm] - truth[max(alarm - RECENT_LOGS, 0)] > 0.0 and kind in GROWING_KINDS
             tally.false += not grown
             tally.early += grown and not np.isfinite(crossed)
         if alarm is not None and (trend.place - alarm) % 5 == 0 and np.isfinite(crossed) and trend.crossing:
@@ -103,7 +103,7 @@ def _crossing(truth: Array) -> float:
     return last - float((truth[last] - 1.0) / (truth[last] - truth[last - 1]))
 
 
-def _all(tallies: dict[str, Tally], name: str) -> Iterator[float]:
+def _all_values(tallies: dict[str, Tally], name: str) -> Iterator[float]:
     return (value for tally in tallies.values() for value in getattr(tally, name))
 
 
@@ -117,10 +117,10 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     misses.clear()
     rng = np.random.default_rng(options.seed)
-    tallies = {kind: Tally() for kind in (*GROWING, *SOUND)}
+    tallies = {kind: Tally() for kind in (*GROWING_KINDS, *SOUND_KINDS)}
     for number in range(options.actuators):
         half = number % 2
-        kinds = SOUND if half else GROWING
+        kinds = SOUND_KINDS if half else GROWING_KINDS
         kind = kinds[number // 2 % len(kinds)]
         judge(kind, rng, tallies[kind])
     for kind, one in tallies.items():
@@ -131,12 +131,14 @@ def main(arguments: list[str]) -> int:
             inside = [100.0 * float(np.mean(one)) for one in (one.in90, one.in50)]
             said += f", {len(one.in90)} forecasts, 90 % covers {inside[0]:.0f} %, 50 % {inside[1]:.0f} %"
         print(said)
-    covered = 100.0 * float(np.mean(list(_all(tallies, "in90"))))
-    say("90 % intervals cover [%]", covered, 85.0, most=False)
-    say("90 % intervals cover [%]", covered, 95.0)
-    say("median lead of alarms [logs]", float(np.median(list(_all(tallies, "leads")))), 10.0, most=False)
+    covered = 100.0 * float(np.mean(list(_all_values(tallies, "in90"))))
+    check_target("90 % intervals cover [%]", covered, 85.0, most=False)
+    check_target("90 % intervals cover [%]", covered, 95.0)
+    check_target(
+        "median lead of alarms [logs]", float(np.median(list(_all_values(tallies, "leads")))), 10.0, most=False
+    )
     false, logs = (sum(getattr(one, name) for one in tallies.values()) for name in ("false", "logs"))
-    say("false alarms in 1,000 logs", 1000.0 * false / logs, 1.0)
-    sound = [tallies[kind] for kind in SOUND]
+    check_target("false alarms in 1,000 logs", 1000.0 * false / logs, 1.0)
+    sound = [tallies[kind] for kind in SOUND_KINDS]
     print(f"of them on sound actuators: {sum(one.false for one in sound)} in {sum(one.logs for one in sound)} logs")
     return len(misses)

@@ -110,7 +110,7 @@ class CircuitStream:
             raise HydrostateError(f"a piece must be over 0 and at most {PIECE:g} s, got {seconds:g} s")
         base = self._circuit()
         before = parameter_row(at_oil_temperature(base, self.warmer))
-        self._warm(seconds)
+        self._warm_oil(seconds)
         self.grown = min(1.0, self.grown + self.growth * seconds)
         after = parameter_row(at_oil_temperature(self._circuit(), self.warmer))
         count = round(seconds / SAMPLE_TIME)
@@ -141,7 +141,7 @@ class CircuitStream:
             raise HydrostateError("the circuit must stay a circuit in every condition")
         return base
 
-    def _warm(self, seconds: float) -> None:
+    def _warm_oil(self, seconds: float) -> None:
         if self._time % DUTY < seconds:
             self._target = float(self._rng.uniform(-SWING, SWING))
         self._time += seconds
@@ -154,7 +154,7 @@ class CircuitStream:
 
 
 @dataclass(frozen=True)
-class Found:
+class DetectedFault:
     """Result of a watch for an abrupt fault.
 
     Parameters
@@ -178,7 +178,7 @@ class Found:
     covered: bool = False
 
 
-def learnt(seed: int, hours: float, false_alarms: float = 1.0) -> tuple[CircuitStream, Watch]:
+def learnt_watch(seed: int, hours: float, false_alarms: float = 1.0) -> tuple[CircuitStream, Watch]:
     """Return a healthy circuit and a watch that has learnt it.
 
     Parameters
@@ -211,7 +211,9 @@ def false_alarms(running: CircuitStream, watch: Watch, hours: float) -> list[Ala
     return [event for event in events if isinstance(event, Alarm)]
 
 
-def detect_fault(running: CircuitStream, watch: Watch, condition: str, seed: int, seconds: float = 5.0) -> Found:
+def detect_fault(
+    running: CircuitStream, watch: Watch, condition: str, seed: int, seconds: float = 5.0
+) -> DetectedFault:
     """Introduce a fault into a copy of a healthy stream, at a time drawn from the seed.
 
     Parameters
@@ -235,7 +237,7 @@ def detect_fault(running: CircuitStream, watch: Watch, condition: str, seed: int
     running.condition = condition
     alarms = [event for event in watch.take(running.run(seconds)) if isinstance(event, Alarm)]
     if not alarms:
-        return Found(condition, float("inf"))
+        return DetectedFault(condition, float("inf"))
     first = alarms[0]
     low, high = first.interval
-    return Found(condition, first.time - fault, first.balance, first.since - fault, low <= fault <= high)
+    return DetectedFault(condition, first.time - fault, first.balance, first.since - fault, low <= fault <= high)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from estimation.diaphragm_motor.signature import (
-    SETTLED,
+    SETTLING_TIME,
     Drive,
     Signature,
     logged_signature,
@@ -30,7 +30,7 @@ CALIBRATED_SHARE = 0.2
 """Share of both tolerances that remains after a healthy run of the same motor has set the gains, judged
 [dimensionless]."""
 
-PATTERN_BELOW = 1e-3
+LEAST_PATTERN_PROBABILITY = 1e-3
 """Probability of the chi-square of the electrodes' pattern below which the maps are not used."""
 
 
@@ -80,8 +80,8 @@ def estimate_motor(
     length = len(record) * record.sample_time
     gains = np.ones(len(ELECTRODES)) if calibration is None else _gains(calibration, healthy)
     read = record.replace(**{name: record[name] / gain for name, gain in zip(ELECTRODES, gains, strict=True)})
-    seen = logged_signature(read, max(SETTLED, length - _PATTERN_TIME))
-    gas, gas_std, pattern, freedom = _gas_fitted(seen, healthy)
+    seen = logged_signature(read, max(SETTLING_TIME, length - _PATTERN_TIME))
+    gas, gas_std, pattern, freedom = _gas_and_load_fit(seen, healthy)
     more = gas if abs(gas - 1.0) > _SURE_GAS * gas_std else 1.0
     pump = replace(healthy, gas_fraction=tuple(more * share for share in healthy.gas_fraction))
     trust = 1.0 if calibration is None else CALIBRATED_SHARE
@@ -93,7 +93,7 @@ def estimate_motor(
         {"crossport_leakage": leakage, "load_force": load, "gas_fraction": gas * share},
         {"crossport_leakage": leakage_std, "load_force": load_std, "gas_fraction": gas_std * share},
         pattern / freedom,
-        pattern <= float(chdtri(freedom, PATTERN_BELOW)),
+        pattern <= float(chdtri(freedom, LEAST_PATTERN_PROBABILITY)),
         seen.drive,
         track,
         replace(pump, crossport_leakage=max(0.0, leakage), load_force=load),
@@ -107,7 +107,7 @@ def _gains(calibration: Signature, healthy: DiaphragmMotorParameters) -> Floats:
     return np.abs(calibration.tones) / np.hypot(model[:7], model[7:14])
 
 
-def _gas_fitted(seen: Signature, healthy: DiaphragmMotorParameters) -> tuple[float, float, float, int]:
+def _gas_and_load_fit(seen: Signature, healthy: DiaphragmMotorParameters) -> tuple[float, float, float, int]:
     """Fit gas, as a factor, and load to the tones: factor, its deviation, chi-square, degrees of freedom."""
     point = seen.drive.frequency, seen.drive.peak_to_peak
     tones = slice(0, len(seen.values) - 1)

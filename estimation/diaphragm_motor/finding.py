@@ -22,7 +22,7 @@ SIZES: Mapping[str, tuple[str, float]] = {
 }
 """Unit of each quantity, and the size of a small fault to which its deviation is compared."""
 
-CLEARLY = 4.0
+CLEARLY_NEGATIVE_DEVIATIONS = 4.0
 """Standard deviations of a negative leakage from which the maps are rejected."""
 
 
@@ -73,7 +73,7 @@ def motor_finding(
         If the log cannot be used.
     """
     found = estimate_motor(record, healthy, calibration=calibration)
-    reasons = _doubts(found)
+    reasons = _pattern_notes(found)
     quantities = {name: _quantity(name, found, told=not reasons) for name in SIZES}
     lost = [name for name, one in quantities.items() if one.value is None]
     believed = healthy if reasons else found.parameters
@@ -125,11 +125,11 @@ def motor_prospect(motor: DiaphragmMotorParameters, frequency: float, peak_to_pe
     return Finding(NAME, Outcome.OK, quantities, Gate(True, ()), card.channels, evidence=card)
 
 
-def _doubts(found: MotorEstimate) -> tuple[Note, ...]:
+def _pattern_notes(found: MotorEstimate) -> tuple[Note, ...]:
     leakage, deviation = (one["crossport_leakage"] for one in (found.values, found.deviations))
     if not found.pattern_holds:
         return (MotorCode.PATTERN_BROKEN.note(chi_square=found.pattern),)
-    if leakage < -CLEARLY * deviation:
+    if leakage < -CLEARLY_NEGATIVE_DEVIATIONS * deviation:
         return (MotorCode.FASTER_THAN_MAPS.note(leakage=leakage),)
     return ()
 

@@ -79,8 +79,8 @@ class MotorMaps:
         HydrostateError
             If frequency or voltage lie off the map.
         """
-        i, a = _place("frequency", self.frequencies, frequency, "Hz")
-        j, b = _place("voltage", self.swings, swing, "V")
+        i, a = _grid_cell("frequency", self.frequencies, frequency, "Hz")
+        j, b = _grid_cell("voltage", self.swings, swing, "V")
         k = min(i + 1, len(self.frequencies) - 1)
         low = (1.0 - b) * values[i, j] + b * values[i, j + 1]
         return low if a == 0.0 else (1.0 - a) * low + a * ((1.0 - b) * values[k, j] + b * values[k, j + 1])
@@ -109,7 +109,7 @@ class MotorMaps:
         return flow, pressure
 
 
-def _place(name: str, axis: Array, value: float, unit: str) -> tuple[int, float]:
+def _grid_cell(name: str, axis: Array, value: float, unit: str) -> tuple[int, float]:
     """Return the cell of an axis that contains a value, and its position within the cell."""
     if not axis[0] - 1e-9 <= value <= axis[-1] + 1e-9:
         raise HydrostateError(f"the map's {name} goes from {axis[0]:g} to {axis[-1]:g} {unit}, got {value:g} {unit}")
@@ -150,7 +150,7 @@ def motor_maps(
     for i, frequency in enumerate(axes[0]):
         for j, swing in enumerate(axes[1]):
             points = [
-                operate(motor, float(frequency), float(swing), start=_pressed(motor, float(pressure)))
+                operate(motor, float(frequency), float(swing), start=_rest_state_under_load(motor, float(pressure)))
                 for motor, pressure in zip(loaded, axes[2], strict=True)
             ]
             reached = np.array([point.pressure for point in points])
@@ -162,7 +162,7 @@ def motor_maps(
     return MotorMaps(p, axes[0], axes[1], axes[2], flow, tones)
 
 
-def _pressed(p: DiaphragmMotorParameters, pressure: float) -> Array:
+def _rest_state_under_load(p: DiaphragmMotorParameters, pressure: float) -> Array:
     """Return the state at rest under a load that the fed side already carries."""
     state = at_rest(p)
     state[SIDE_A] = pressure

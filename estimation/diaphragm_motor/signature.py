@@ -24,7 +24,7 @@ from plant.log.record import Record
 DRIVE, POSITION = "drive_voltage_v", "position_m"
 """Channels besides the electrodes."""
 
-SETTLED = 0.1
+SETTLING_TIME = 0.1
 """Time from a log's start after which the motor has settled; the research gives 22 ms for 90 % [s]."""
 
 FEWEST_CYCLES = 20
@@ -33,7 +33,7 @@ FEWEST_CYCLES = 20
 HARMONICS = 6
 """Number of harmonics that are fitted, so that the residuals are noise."""
 
-STEADY = 0.01
+LARGEST_UNSTEADINESS = 0.01
 """Largest deviation of a drive from a steady sine: root mean square over the sine's amplitude [dimensionless]."""
 
 TOLERANCE: Mapping[str, float] = {
@@ -49,7 +49,7 @@ TOLERANCE: Mapping[str, float] = {
 GAIN_TOLERANCE = 0.005
 """Relative standard deviation of each electrode's gain, judged [dimensionless]."""
 
-FLOOR = 0.002
+MODEL_ERROR = 0.002
 """Assumed error of the model in any tone, over the mean fundamental, and in velocity [dimensionless]."""
 
 
@@ -148,13 +148,13 @@ def tolerance(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float
         own = np.zeros(len(base))
         own[i : 4 * len(ELECTRODES) : len(ELECTRODES)] = GAIN_TOLERANCE
         columns.append(own * base)
-    floor = np.full(len(base), FLOOR * float(np.mean(np.hypot(base[:7], base[7:14]))))
-    floor[-1] = FLOOR * max(abs(float(base[-1])), _LEAST_SPEED)
+    floor = np.full(len(base), MODEL_ERROR * float(np.mean(np.hypot(base[:7], base[7:14]))))
+    floor[-1] = MODEL_ERROR * max(abs(float(base[-1])), _LEAST_SPEED)
     spread = np.column_stack(columns)
     return spread @ spread.T + np.diag(floor**2)
 
 
-def logged_signature(record: Record, start: float = SETTLED) -> Signature:
+def logged_signature(record: Record, start: float = SETTLING_TIME) -> Signature:
     """Return the signature of a log after settling, over whole cycles, by least squares.
 
     Parameters
@@ -215,7 +215,7 @@ def steady_drive(voltage: Floats, sample_time: float) -> Drive:
     """
     size = len(voltage)
     if size < 8 or float(np.ptp(voltage)) <= 0.0:
-        raise LogError(f"{DRIVE} must be a steady sine from {SETTLED:g} s on, got no swing")
+        raise LogError(f"{DRIVE} must be a steady sine from {SETTLING_TIME:g} s on, got no swing")
     spectrum = np.abs(np.fft.rfft((voltage - voltage.mean()) * np.hanning(size)))
     frequency = float(np.argmax(spectrum)) / (size * sample_time)
     time = sample_time * np.arange(size)
@@ -229,12 +229,12 @@ def steady_drive(voltage: Floats, sample_time: float) -> Drive:
     design, found = _sine_fit(voltage, frequency, time)
     amplitude = float(np.hypot(found[0], found[1]))
     left = float(np.sqrt(np.mean((voltage - design @ found) ** 2)))
-    if left > STEADY * amplitude or not 0.0 < frequency <= HIGHEST_FREQUENCY:
+    if left > LARGEST_UNSTEADINESS * amplitude or not 0.0 < frequency <= HIGHEST_FREQUENCY:
         raise LogError(
-            f"{DRIVE} must be a steady sine of up to {HIGHEST_FREQUENCY:g} Hz from {SETTLED:g} s on, got "
+            f"{DRIVE} must be a steady sine of up to {HIGHEST_FREQUENCY:g} Hz from {SETTLING_TIME:g} s on, got "
             f"{100.0 * left / max(amplitude, 1e-12):.3g} % beside a sine of {frequency:.4g} Hz"
         )
-    if amplitude > HIGHEST_VOLTAGE * (1.0 + STEADY):
+    if amplitude > HIGHEST_VOLTAGE * (1.0 + LARGEST_UNSTEADINESS):
         raise LogError(f"the diaphragms take {HIGHEST_VOLTAGE:g} V of either sign, got {DRIVE} of {amplitude:.4g} V")
     return Drive(frequency, 2.0 * amplitude, float(np.arctan2(found[1], found[0])))
 
@@ -288,7 +288,7 @@ def whole_cycles(samples: int, sample_time: float, frequency: float) -> int:
     whole = int(samples * sample_time * frequency + 1e-6)
     if whole < FEWEST_CYCLES:
         raise LogError(
-            f"{FEWEST_CYCLES} cycles of {frequency:.4g} Hz are needed after the first {SETTLED:g} s, got {whole}"
+            f"{FEWEST_CYCLES} cycles of {frequency:.4g} Hz are needed after the first {SETTLING_TIME:g} s, got {whole}"
         )
     return whole
 
@@ -308,8 +308,10 @@ def require_channels(record: Record) -> None:
         if lost:
             raise LogError(f"{name} must be whole, got {lost} missing samples")
     length = len(record) * record.sample_time
-    if length <= SETTLED:
-        raise LogError(f"a log must be longer than the {SETTLED:g} s in which the motor settles, got {length:.3g} s")
+    if length <= SETTLING_TIME:
+        raise LogError(
+            f"a log must be longer than the {SETTLING_TIME:g} s in which the motor settles, got {length:.3g} s"
+        )
     require_live(record, [POSITION])  # an electrode may be dead: its gain is estimated
 
 

@@ -18,7 +18,7 @@ from estimation.diaphragm_motor.signature import (
     FEWEST_CYCLES,
     GAIN_TOLERANCE,
     POSITION,
-    SETTLED,
+    SETTLING_TIME,
     Drive,
     fitted_tones,
     whole_cycles,
@@ -162,7 +162,7 @@ def motor_blocks(record: Record, drive: Drive) -> list[Block]:
         If the log holds none.
     """
     between = record.sample_time
-    first = ceil(SETTLED / between)
+    first = ceil(SETTLING_TIME / between)
     whole_cycles(len(record) - first, between, drive.frequency)
     count = round(FEWEST_CYCLES / (drive.frequency * between))
     angle = 2.0 * pi * drive.frequency * between * np.arange(count)
@@ -199,13 +199,13 @@ def track_leakage(
         pressure = float(maps.pressure(block.amplitude))
         slope = abs(float(maps.pressure.deriv()(block.amplitude)))
         jumped = abs(pressure - before) > max(_STILL, _SURE * slope * float(block.deviations[0]))
-        waiting = _WAIT if jumped else max(0, waiting - 1)
+        waiting = _BLOCKS_HELD if jumped else max(0, waiting - 1)
         seen, noise = _balances(block, (pressure - before) / block.length, p, maps)
         known = known + np.diag([_LEAKAGE_WALK**2, (_FIRST_LOAD if jumped else _LOAD_WALK) ** 2])
         design = np.array([[pressure, 0.0], [0.0, 1.0]])
         chosen = [1] if waiting else [0, 1]
-        state, known = _updated(state, known, seen[chosen], design[chosen], noise[np.ix_(chosen, chosen)])
-        spread = np.sqrt(np.diag(known) + (trust * _tilts(block, state, p, maps)) ** 2)
+        state, known = _updated_belief(state, known, seen[chosen], design[chosen], noise[np.ix_(chosen, chosen)])
+        spread = np.sqrt(np.diag(known) + (trust * _tolerance_errors(block, state, p, maps)) ** 2)
         rows.append((block.end, state[0], spread[0], state[1], spread[1], float(waiting > 0)))
         before = pressure
     time, leakage, leakage_std, load, load_std, held = np.array(rows).T
@@ -230,14 +230,14 @@ def _balances(block: Block, rate: float, p: DiaphragmMotorParameters, maps: Heal
     return np.array([lost, force]), slopes @ np.diag(block.deviations**2) @ slopes.T
 
 
-def _updated(state: Floats, known: Floats, seen: Floats, design: Floats, noise: Floats) -> tuple[Floats, Floats]:
+def _updated_belief(state: Floats, known: Floats, seen: Floats, design: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Return the Kalman filter's belief after a measurement, by Joseph's form."""
     gain = known @ design.T @ np.linalg.inv(design @ known @ design.T + noise)
     left = np.eye(len(state)) - gain @ design
     return state + gain @ (seen - design @ state), left @ known @ left.T + gain @ noise @ gain.T
 
 
-def _tilts(block: Block, state: Floats, p: DiaphragmMotorParameters, maps: HealthyMaps) -> Floats:
+def _tolerance_errors(block: Block, state: Floats, p: DiaphragmMotorParameters, maps: HealthyMaps) -> Floats:
     """Return the errors of leakage and load due to the tolerances of an electrode's gain and of a map."""
     off = GAIN_TOLERANCE * block.amplitude
     pressure, flow = float(maps.pressure(block.amplitude)), float(maps.flow(block.amplitude))
@@ -265,5 +265,5 @@ _STILL, _SURE = 300.0, 6.0
 """Change of pressure between blocks up to which there is no jump [Pa], and the same in deviations of its noise;
 judged."""
 
-_WAIT = 3
+_BLOCKS_HELD = 3
 """Blocks for which leakage is held after a jump [count]; judged."""

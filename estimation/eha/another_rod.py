@@ -6,23 +6,23 @@ from estimation.eha.result import is_vague
 from estimation.finding import NORMAL_95
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.notes import RigCode
-from plant.eha.doubts import DOUBTS
+from plant.eha.doubts import DEFAULT_UNCERTAINTIES
 from plant.notes import Note
 
-VAGUE_AREAS = 0.5 * max(DOUBTS["piston_area"].usual)
+VAGUE_AREAS = 0.5 * max(DEFAULT_UNCERTAINTIES["piston_area"].usual)
 """Relative standard deviation of the ratio of a piston's areas from which an explanation by it is doubted [fraction]:
 half that of an area in a rig file. Right ratios are known to 0.7 % at most; a wrong one, with bulk modulus 14 to 22 %
 too high, to 2 to 3 %."""
 
-THROUGH = 0.001
+THROUGH_ROD_DIFFERENCE = 0.001
 """Difference of the logarithm of a piston's two areas up to which its rod is a through rod [dimensionless]."""
 
-OTHER_ROD = 2.0 * 2.0**0.5 * max(DOUBTS["piston_area"].usual)
+ANOTHER_ROD_DIFFERENCE = 2.0 * 2.0**0.5 * max(DEFAULT_UNCERTAINTIES["piston_area"].usual)
 """Difference of that logarithm between fit and rig file from which the areas are not the file's [dimensionless]: two
 deviations."""
 
 
-def vague_areas(found: Explanation | None) -> tuple[Note, ...]:
+def vague_area_notes(found: Explanation | None) -> tuple[Note, ...]:
     """Return the objection to an explanation by two areas whose ratio is known no better than a rig file's areas are.
 
     Parameters
@@ -44,7 +44,7 @@ def vague_areas(found: Explanation | None) -> tuple[Note, ...]:
     return (RigCode.AREAS_VAGUE.note(percent=min(100.0 * NORMAL_95 * std / ratio, 999.0)),)
 
 
-def of_another_rod(note: Note) -> bool:
+def is_of_another_rod(note: Note) -> bool:
     """Return whether a note reports areas that contradict a rig file with a single rod.
 
     An error of such a rig file may be absorbed by the areas, such as a displacement 6 % off by 10 % of an area. Bulk
@@ -53,7 +53,7 @@ def of_another_rod(note: Note) -> bool:
     if note.code is not RigCode.SINGLE_ROD:
         return False
     told, written = (math.log(0.01 * float(note.data[name])) for name in ("percent", "rig_percent"))
-    return abs(written) > THROUGH and abs(told - written) > OTHER_ROD
+    return abs(written) > THROUGH_ROD_DIFFERENCE and abs(told - written) > ANOTHER_ROD_DIFFERENCE
 
 
 def b_over_a(difference: float) -> float:

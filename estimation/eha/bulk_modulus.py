@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from estimation.eha.another_rig import unless_another_rig, unless_rig_contradicted
-from estimation.eha.another_rod import vague_areas
-from estimation.eha.foreign_oil import shows_no_motion, unless_foreign
+from estimation.eha.another_rig import rejected_if_another_rig, slips_or_rig_contradiction
+from estimation.eha.another_rod import vague_area_notes
+from estimation.eha.foreign_oil import no_motion_notes, rejected_if_foreign_oil
 from estimation.eha.named_methods import NAMED
-from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, is_vague, too_wide, without_number
+from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, is_vague, wide_bound_note, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
@@ -19,7 +19,7 @@ from estimation.fits.flow.fit import REPORTED, fit_flow
 from estimation.fits.flow.log import FLOW_CHANNELS, require_flow_channels
 from estimation.fits.flow.log_traits import LogTraits
 from estimation.fits.hypothesis_search.form_fit import FormFit
-from estimation.fits.hypothesis_search.pump_delivery import delivered
+from estimation.fits.hypothesis_search.pump_delivery import delivery_share
 from estimation.fits.motion.fit import MOTION_CHANNELS, fit_motion
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
 from estimation.log_checks.clean import CleanLog, clean_log
@@ -136,12 +136,12 @@ def estimate_bulk_modulus(
     """
     log = clean_log(record, parameters)
     found = estimate_clean(log, parameters, EstimateOptions(**options), uncertainties)
-    for note in left_out(log, found):
+    for note in left_out_notes(log, found):
         warnings.warn(LogWarning(note), stacklevel=2)
     return found
 
 
-def left_out(log: CleanLog, found: BulkModulusEstimate) -> tuple[Note, ...]:
+def left_out_notes(log: CleanLog, found: BulkModulusEstimate) -> tuple[Note, ...]:
     """Return the notes on data left out of the channels that an estimate used.
 
     Returns
@@ -182,26 +182,26 @@ def estimate_clean(
             f"the first guess must be 0 Pa or more, its deviation positive, got {guess}, {options.start_std}"
         )
     automatic, filtering = options.form == "auto", options.filtering
-    form = _form(options, log.record)
+    form = _form_to_fit(options, log.record)
     if log.mistakes:
-        return _misread(log, form)
-    if automatic and not filtering and (wrong := _wrong_sensors(log, form)):
+        return _mistaken_channels_estimate(log, form)
+    if automatic and not filtering and (wrong := _sensor_objections(log, form)):
         return without_number(Outcome.MISMATCH, wrong, form, FITTED[form][1])
     if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
-        return without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
-    if automatic and form == "flow" and not filtering and (still := shows_no_motion(log.record, parameters)):
+        return without_number(Outcome.NOT_OBSERVABLE, (wide_bound_note(bound),), form, MOTION_CHANNELS, bound)
+    if automatic and form == "flow" and not filtering and (still := no_motion_notes(log.record, parameters)):
         return without_number(Outcome.NOT_OBSERVABLE, still, form, FLOW_CHANNELS)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
     if fit is not None and (slips := _channel_slips(fit, parameters)):
-        slips = unless_rig_contradicted(slips, log.record, parameters)
+        slips = slips_or_rig_contradiction(slips, log.record, parameters)
         return without_number(Outcome.MISMATCH, slips, form, FITTED[form][1])
     if fit is None:
-        found = _filtered(log, parameters, form, guess, options)
+        found = _filtered_estimate(log, parameters, form, guess, options)
     else:
-        found = _fitted(fit, form, FITTED[form][1])
+        found = _fitted_estimate(fit, form, FITTED[form][1])
         found = replace(found, responses=fitted_responses(fit)) if form == "flow" else found
-    found = unless_another_rig(_with_rig(found, parameters, spreads), log, parameters)
-    return _doubting_sensors(unless_foreign(found, log.record, parameters) if form == "flow" else found, log)
+    found = rejected_if_another_rig(_with_rig_uncertainty(found, parameters, spreads), log, parameters)
+    return _gated_by_sensors(rejected_if_foreign_oil(found, log.record, parameters) if form == "flow" else found, log)
 
 
 def _fit(
@@ -224,7 +224,7 @@ def _fit(
     return None if loaded and fit.explanation is None and not (ended or plain) else fit
 
 
-def _filtered(
+def _filtered_estimate(
     log: CleanLog, parameters: EhaParameters, form: str, guess: float, options: EstimateOptions
 ) -> BulkModulusEstimate:
     """Return the estimate of a filter; imported only here, so that a fitted log does not load it."""
@@ -241,12 +241,12 @@ def _filtered(
     return estimate_by_filter(log, parameters, FORMS[form], guess, options.start_std, chosen)
 
 
-def _wrong_sensors(log: CleanLog, form: str) -> tuple[Note, ...]:
+def _sensor_objections(log: CleanLog, form: str) -> tuple[Note, ...]:
     """Return the objections to the sensors that a fit would use: it would explain their errors by false faults."""
     return log.objections_to((*FITTED[form][1], SPEED)) if form in FITTED else ()
 
 
-def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:
+def _gated_by_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:
     """Return the estimate with the gate shut if a sensor that was used has failed."""
     said = log.objections_to((*found.channels, SPEED))
     if not said:
@@ -254,7 +254,7 @@ def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusE
     return replace(found, gate=replace(found.gate, passed=False, reasons=(*said, *found.gate.reasons)))
 
 
-def _form(options: EstimateOptions, record: Record) -> str:
+def _form_to_fit(options: EstimateOptions, record: Record) -> str:
     """Return the form to fit: that of a named method, the chosen one, or the one that the log allows."""
     if options.method in NAMED:
         own = NAMED[options.method].form
@@ -263,10 +263,10 @@ def _form(options: EstimateOptions, record: Record) -> str:
         return own
     if options.form != "auto":
         return options.form
-    return "pressure" if options.filtering else _automatic(record)
+    return "pressure" if options.filtering else _automatic_form(record)
 
 
-def _automatic(record: Record) -> str:
+def _automatic_form(record: Record) -> str:
     if all(channel in record for channel in FLOW_CHANNELS):
         return "flow"
     return "motion" if all(channel in record for channel in MOTION_CHANNELS) else "pressure"
@@ -297,19 +297,19 @@ def rigid_bound(log: CleanLog, parameters: EhaParameters) -> float:
 
 def _channel_slips(fit: FormFit, parameters: EhaParameters) -> tuple[Note, ...]:
     """Return the wrong signs and units that a fit names; no pump delivers several times its displacement."""
-    share = None if fit.explanation is None else delivered(fit.explanation, parameters)
+    share = None if fit.explanation is None else delivery_share(fit.explanation, parameters)
     if share is None or share <= FARTHEST:
         return tuple(note for note in fit.reasons if isinstance(note.code, ChannelCode))
     return (ChannelCode.CHANNEL_UNIT.note(channel=SPEED, against=POSITION, factor=1.0 / share, slip=TURNS[RPM]),)
 
 
-def _misread(log: CleanLog, form: str) -> BulkModulusEstimate:
+def _mistaken_channels_estimate(log: CleanLog, form: str) -> BulkModulusEstimate:
     """Return an outcome without a number, since the log's channels are not what their names say."""
     used = tuple(name for name in FLOW_CHANNELS if name in log.record)
     return without_number(Outcome.MISMATCH, log.mistakes, form, used)
 
 
-def _with_rig(
+def _with_rig_uncertainty(
     found: BulkModulusEstimate, parameters: EhaParameters, spreads: Mapping[str, Spread]
 ) -> BulkModulusEstimate:
     """Return an estimate with the rig's uncertainty, by the laws of dimension if the fit has no responses."""
@@ -320,13 +320,13 @@ def _with_rig(
     return replace(found, responses=scaled_responses(parameters, values, pressure=PRESSURE in found.channels))
 
 
-def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEstimate:
+def _fitted_estimate(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEstimate:
     value, std = fit.parameters["bulk_modulus"]
-    reasons = (*fit.reasons, *vague_areas(fit.explanation))
+    reasons = (*fit.reasons, *vague_area_notes(fit.explanation))
     gate, outcome = Gate(not reasons, reasons), Outcome.OK if fit.chi_square < MISMATCH_NIS else Outcome.MISMATCH
     known_to = max(fit.bound, std / value if is_vague(value, std) else 0.0)
     if outcome is Outcome.OK and known_to > LARGEST_BOUND:
-        outcome, gate = Outcome.NOT_OBSERVABLE, Gate(False, (too_wide(known_to), *reasons))
+        outcome, gate = Outcome.NOT_OBSERVABLE, Gate(False, (wide_bound_note(known_to), *reasons))
     known = outcome is Outcome.OK
     return BulkModulusEstimate(
         outcome=outcome,

@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.eha.by_flow_filter import filter_flow
 from estimation.eha.named_methods import NAMED, NamedMethod
-from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
+from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, wide_bound_note
 from estimation.filters.iterated_smoother import LONGEST
 from estimation.filters.methods import METHODS
 from estimation.filters.run import Estimate, available_channels, run_filter
@@ -16,13 +16,13 @@ from estimation.finding import Gate, Outcome
 from estimation.log_checks.channel_names import POSITION, PRESSURE
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
-from estimation.log_checks.told_once import told_once
+from estimation.log_checks.told_once import with_repeats_used_once
 from estimation.models.augment import AUGMENTABLE, augmented, augmented_prior
 from estimation.models.eha_forms import BULK_MODULUS
 from estimation.models.model import ProcessModel
 from estimation.notes import EstimateCode
 from estimation.trust.bounds import at_bulk_modulus, bulk_modulus_bound
-from estimation.trust.consistency import consistency_gate, describes
+from estimation.trust.consistency import consistency_gate, describes_log
 from estimation.tuning.tuning import Tuning, tune
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, require_known
@@ -111,7 +111,7 @@ def estimate_by_filter(
     require_known("method", options.method, ["auto", *METHODS, *NAMED])
     record = log.record
     if options.tuned:  # the noise levels used without tuning are large enough for an encoder at rest
-        record = told_once(record)
+        record = with_repeats_used_once(record)
         longest = max(record.sample_time / STEPS_A_SAMPLE, SHORTEST_STEP)
         model = replace(model, longest_step=min(model.longest_step, longest))
     named = NAMED.get(options.method, NamedMethod(model.name, options.method))
@@ -127,7 +127,7 @@ def estimate_by_filter(
     found: Tuning | None = None
     if options.tuned:
         prior = first_belief(model, record, guess, start_std)
-        found = tune(log.record, model, prior, parameters, **known, told=record)
+        found = tune(log.record, model, prior, parameters, **known, received=record)
         known |= {"variances": found.tuned.variances, "noise": found.tuned.noise}
         guess = float(found.prior.mean[model.index(BULK_MODULUS)])
 
@@ -144,7 +144,7 @@ def estimate_by_filter(
             bulk_modulus_bound(model, prior, record, at_bulk_modulus(parameters, bulk_modulus), **known) / bulk_modulus
         )
 
-    estimate, first = _settled(filtered, guess)
+    estimate, first = _settled_run(filtered, guess)
     value, _ = estimate.settled(BULK_MODULUS)
     nominal = parameters.bulk_modulus
     bound = max(bound_at(nominal), bound_at(max(value, 1e-3 * nominal))) if np.isfinite(value) else float("inf")
@@ -261,12 +261,12 @@ def _verdict(estimate: Estimate, record: Record, finite: bool, bound: float) -> 
     if not finite:
         return Outcome.DIVERGED, Gate(False, (EstimateCode.DIVERGED.note(),))
     if bound > LARGEST_BOUND:
-        return Outcome.NOT_OBSERVABLE, Gate(False, (too_wide(bound),))
+        return Outcome.NOT_OBSERVABLE, Gate(False, (wide_bound_note(bound),))
     gate = consistency_gate(estimate, BULK_MODULUS, record if len(estimate.residuals) else None)
-    return (Outcome.OK if describes(estimate, BULK_MODULUS) else Outcome.MISMATCH), gate
+    return (Outcome.OK if describes_log(estimate, BULK_MODULUS) else Outcome.MISMATCH), gate
 
 
-def _settled(filtered: Callable[[float], Estimate], guess: float) -> tuple[Estimate, Estimate]:
+def _settled_run(filtered: Callable[[float], Estimate], guess: float) -> tuple[Estimate, Estimate]:
     """Filter from the first guess; if that was far too low or the gate objects, again from where the filter ended.
 
     A first guess far below the truth predicts no motion at all, and the filter may then use up its prior on the wrong

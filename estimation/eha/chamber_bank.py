@@ -26,16 +26,16 @@ GROWTH = 3.0
 FIRST_LOOK = 2.0
 """Time from which the log so far is processed again [s]: by then it tells a wrong minimum from a right one."""
 
-HEARD = {0.0: 1000, 0.5: 64, 1.0: 16}
+MOST_SURVIVORS = {0.0: 1000, 0.5: 64, 1.0: 16}
 """Filters of a model that continue after a block that ends at this time or later [s]."""
 
-READ_AGAIN, KEPT = 4, 2
+MOST_REPROCESSED, KEPT = 4, 2
 """Filters of a model that process the log again, and how many of them continue."""
 
-NEAR = 1.0
+SAME_FILTER_DEVIATIONS = 1.0
 """Deviations of bulk modulus and leakage within which two filters count as one [dimensionless]."""
 
-LONGEST_READ_AGAIN = 300_000
+LONGEST_REPROCESSED = 300_000
 """Longest log so far that is processed again [samples]."""
 
 
@@ -93,14 +93,14 @@ def run_bank(members: Sequence[Member], near: tuple[int, ...]) -> Reading:
     trace = empty_trace(replace(first, keep_innovations=False))
     trace.track[:], trace.track_variance[:] = np.nan, np.nan
     heard, begin = list(members), 0
-    for end in _ends(samples, every, first.sample_time):
+    for end in _block_ends(samples, every, first.sample_time):
         weights = _weights(heard)
-        found = list(_of_each_model(heard, begin, end))
+        found = list(_block_traces(heard, begin, end))
         rows = slice(-(-begin // every) + (begin > 0), (end - 1) // every + 1)
         skipped = int(begin > 0)
         tracks = np.array([one.track[skipped:] for one in found])
         spreads = np.array([one.track_variance[skipped:] for one in found])
-        trace.track[rows], trace.track_variance[rows] = _mixed(weights, tracks, spreads)
+        trace.track[rows], trace.track_variance[rows] = _mixture_moments(weights, tracks, spreads)
         after = zip(heard, found, strict=True)
         heard = [
             Member(was.problem, one.mean, one.covariance, was.score + one.log_likelihood)
@@ -113,10 +113,10 @@ def run_bank(members: Sequence[Member], near: tuple[int, ...]) -> Reading:
             return Reading(first, gone, gone)
         heard = _survivors(heard, near, end, samples)
         begin = (end - 1) // every * every
-    return _concluded(trace, heard)
+    return _final_reading(trace, heard)
 
 
-def _ends(samples: int, every: int, sample_time: float) -> list[int]:
+def _block_ends(samples: int, every: int, sample_time: float) -> list[int]:
     """Return the ends of blocks: one past a sample that the track keeps, or the end of the log."""
     times = list(BLOCKS)
     while times[-1] < samples * sample_time:
@@ -125,7 +125,7 @@ def _ends(samples: int, every: int, sample_time: float) -> list[int]:
     return [*sorted(end for end in ends if 1 < end < samples), samples]
 
 
-def _part(problem: FilterProblem, begin: int, end: int) -> FilterProblem:
+def _block_task(problem: FilterProblem, begin: int, end: int) -> FilterProblem:
     """Return the task of a block, from the last sample of the one before, which is not used twice."""
     measured = problem.measured[begin:end]
     if begin > 0:
@@ -134,11 +134,11 @@ def _part(problem: FilterProblem, begin: int, end: int) -> FilterProblem:
     return replace(problem, drives=problem.drives[begin:end], measured=measured)
 
 
-def _of_each_model(heard: Sequence[Member], begin: int, end: int) -> Iterable[Trace]:
+def _block_traces(heard: Sequence[Member], begin: int, end: int) -> Iterable[Trace]:
     groups = (list(group) for _, group in groupby(heard, key=lambda member: member.problem.model.name))
     return chain.from_iterable(
         filter_batch(
-            replace(_part(member.problem, begin, end), mean=member.mean, covariance=member.covariance)
+            replace(_block_task(member.problem, begin, end), mean=member.mean, covariance=member.covariance)
             for member in group
         )
         for group in groups
@@ -152,7 +152,7 @@ def _weights(heard: Sequence[Member]) -> Array:
     return weights / np.sum(weights)
 
 
-def _mixed(weights: Array, means: Array, variances: Array) -> tuple[Array, Array]:
+def _mixture_moments(weights: Array, means: Array, variances: Array) -> tuple[Array, Array]:
     """Return the moments of a mixture; diverged filters and those without weight are left out."""
     sound = (weights > 1e-12) & np.all(np.isfinite(means), axis=(1, 2)) & np.all(np.isfinite(variances), axis=(1, 2))
     if not np.any(sound):
@@ -165,40 +165,40 @@ def _mixed(weights: Array, means: Array, variances: Array) -> tuple[Array, Array
 def _survivors(heard: list[Member], near: tuple[int, ...], end: int, samples: int) -> list[Member]:
     """Return the filters that continue, model by model, after processing the log so far again if it is time."""
     time = end * heard[0].problem.sample_time
-    again = (time >= FIRST_LOOK or end == samples) and end <= LONGEST_READ_AGAIN
-    most = [count for since, count in HEARD.items() if time >= since][-1]
+    again = (time >= FIRST_LOOK or end == samples) and end <= LONGEST_REPROCESSED
+    most = [count for since, count in MOST_SURVIVORS.items() if time >= since][-1]
     kept: list[Member] = []
     for _, group in groupby(heard, key=lambda member: member.problem.model.name):
         best = sorted(group, key=lambda member: -member.score)
         if again:
-            few = (_read_again(member, end) for member in _apart(best, near)[:READ_AGAIN])
+            few = (_reprocessed(member, end) for member in _distinct_filters(best, near)[:MOST_REPROCESSED])
             best = sorted((one for one in few if np.isfinite(one.score)), key=lambda member: -member.score)
-            best = _apart(best, near)[:KEPT]
+            best = _distinct_filters(best, near)[:KEPT]
         kept += best[:most]
     return kept or heard
 
 
-def _read_again(member: Member, end: int) -> Member:
-    found = relinearised(_part(member.problem, 0, end), member.mean, member.covariance)
+def _reprocessed(member: Member, end: int) -> Member:
+    found = relinearised(_block_task(member.problem, 0, end), member.mean, member.covariance)
     return replace(member, mean=found.mean, covariance=found.covariance, score=found.log_likelihood)
 
 
-def _apart(members: Sequence[Member], near: tuple[int, ...]) -> list[Member]:
+def _distinct_filters(members: Sequence[Member], near: tuple[int, ...]) -> list[Member]:
     """Return the likelier of any two filters that count as one."""
     kept: list[Member] = []
     for member in members:
-        if not any(_same(member, other, near) for other in kept):
+        if not any(_count_as_one(member, other, near) for other in kept):
             kept.append(member)
     return kept
 
 
-def _same(one: Member, other: Member, near: tuple[int, ...]) -> bool:
+def _count_as_one(one: Member, other: Member, near: tuple[int, ...]) -> bool:
     places = list(near)
     deviation = np.sqrt(np.maximum(np.diag(other.covariance)[places], 0.0))  # rounding may make a variance negative
-    return bool(np.all(np.abs(one.mean - other.mean)[places] < NEAR * deviation))
+    return bool(np.all(np.abs(one.mean - other.mean)[places] < SAME_FILTER_DEVIATIONS * deviation))
 
 
-def _concluded(trace: Trace, heard: Sequence[Member]) -> Reading:
+def _final_reading(trace: Trace, heard: Sequence[Member]) -> Reading:
     """Return the mixture after the last sample, with the innovations of its likeliest filter."""
     weights = _weights(heard)
     mean = np.sum([weight * member.mean for weight, member in zip(weights, heard, strict=True)], axis=0)

@@ -9,11 +9,11 @@ from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.notes import Note
 
-WARMED = 3.0
+LARGEST_WARMING_FACTOR = 3.0
 """Factor up to which leakage follows the oil's viscosity and is no fault [dimensionless]: the viscosity of mineral oil
 falls to a third as it warms by some 25 K (ISO 3448 VG 46 between 40 and 65 degrees Celsius, about)."""
 
-LEAST_GROWN = 1e-3
+LEAST_RELATIVE_LEAKAGE = 1e-3
 """Least leakage over its value halfway [dimensionless]: a parabola may cross zero outside the fitted range."""
 
 
@@ -25,11 +25,11 @@ def growth_note(found: Explanation, _: EhaParameters) -> Note:
     Note
         With the factor of the change, and leakage at the start and the end [m^3/(s Pa)].
     """
-    begun, ended = leakage_over(found, np.array([0.0, 1.0]))
-    return changed_note(float(ended / begun), found.values["leakage_coefficient"][0])
+    begun, ended = relative_leakage(found, np.array([0.0, 1.0]))
+    return changed_leakage_note(float(ended / begun), found.values["leakage_coefficient"][0])
 
 
-def changed_note(factor: float, last: float) -> Note:
+def changed_leakage_note(factor: float, last: float) -> Note:
     """Return the note on leakage that changes within a log: it drifts, or it grows.
 
     Parameters
@@ -44,7 +44,11 @@ def changed_note(factor: float, last: float) -> Note:
     Note
         That it drifts, as when oil warms or cools, or that it grows by more than that.
     """
-    code = RigCode.LEAKAGE_DRIFTS if 1.0 / WARMED < factor < WARMED else RigCode.LEAKAGE_GROWS
+    code = (
+        RigCode.LEAKAGE_DRIFTS
+        if 1.0 / LARGEST_WARMING_FACTOR < factor < LARGEST_WARMING_FACTOR
+        else RigCode.LEAKAGE_GROWS
+    )
     return code.note(factor=factor, first=last / factor, last=last)
 
 
@@ -65,7 +69,7 @@ def step_note(found: Explanation, _: EhaParameters) -> Note:
     )
 
 
-def leakage_over(found: Explanation, elapsed: Array) -> Array:
+def relative_leakage(found: Explanation, elapsed: Array) -> Array:
     """Return a leakage that changes throughout a log, over its value halfway.
 
     Parameters
@@ -80,4 +84,6 @@ def leakage_over(found: Explanation, elapsed: Array) -> Array:
     ndarray, shape (n,)
         Dimensionless, positive.
     """
-    return np.maximum(grown_leakage(elapsed, *(found.values.get(name, (0.0, 0.0))[0] for name in GROWTH)), LEAST_GROWN)
+    return np.maximum(
+        grown_leakage(elapsed, *(found.values.get(name, (0.0, 0.0))[0] for name in GROWTH)), LEAST_RELATIVE_LEAKAGE
+    )

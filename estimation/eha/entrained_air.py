@@ -9,7 +9,7 @@ from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.models.wide_flow import QUICKNESS
 from estimation.notes import RigCode
 from plant.components.oil import ATMOSPHERE
-from plant.eha.aerated import aerated
+from plant.eha.aerated import with_air_in_oil
 from plant.eha.circuit_parameters import MOST_AIR
 from plant.eha.doubts import Spread
 from plant.eha.model import EhaParameters
@@ -100,7 +100,9 @@ def with_air(parameters: EhaParameters, found: Explanation | None) -> EhaParamet
         return parameters
     air = air.isothermal(parameters.accumulator_pressure)
     fraction = air.share / (1.0 + air.share)
-    return aerated(parameters, fraction, air.liquid) if air.liquid > 0.0 and fraction <= MOST_AIR else parameters
+    return (
+        with_air_in_oil(parameters, fraction, air.liquid) if air.liquid > 0.0 and fraction <= MOST_AIR else parameters
+    )
 
 
 def amount_of_air(

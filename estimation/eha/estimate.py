@@ -1,9 +1,9 @@
 """`estimate_log(record, rig) -> Finding`: bulk modulus and leakage from a log of the gear-pump actuator."""
 
-from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, FITTED, EstimateOptions, estimate_clean, left_out
+from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, FITTED, EstimateOptions, estimate_clean, left_out_notes
 from estimation.eha.explanation_notes import notes_of
 from estimation.eha.result import BulkModulusEstimate
-from estimation.eha.rig_share import another_oil
+from estimation.eha.rig_share import another_oil_notes
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
@@ -17,7 +17,7 @@ from plant.units import notes as parameter_notes
 KIND = "eha"
 """Name of the gear-pump actuator in the registry."""
 
-NOT_THE_LOGS = {
+BULK_MODULUS_REASONS = {
     EstimateCode.BOUND_TOO_WIDE,
     EstimateCode.PRESSURE_RESIDUALS_SMALL,
     EstimateCode.POSITION_RESIDUALS_LARGE,
@@ -33,7 +33,7 @@ LARGEST_SHARE = 0.06
 """Largest share of the motion that a fit without pressure may leave before nothing is concluded from the log
 [fraction]: as much as means over 0.1 s may differ from a circuit's (`faults.diagnosis.circuits.out_of_model`)."""
 
-NOT_TOLD = frozenset({RigCode.MAKEUP_UNSEEN})
+UNDETERMINED_REMARKS = frozenset({RigCode.MAKEUP_UNSEEN})
 """Remarks of a fit on what a log does not determine, which say nothing about its numbers."""
 
 
@@ -61,10 +61,10 @@ def estimate_log(record: Record, rig: Rig, options: EstimateOptions = DEFAULT_OP
     LogError
         If the log lacks what the form needs.
     """
-    return finding_of(*estimated(clean_log(record, rig.parameters), rig, options), rig)
+    return finding_of(*checked_estimate(clean_log(record, rig.parameters), rig, options), rig)
 
 
-def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanLog, BulkModulusEstimate]:
+def checked_estimate(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanLog, BulkModulusEstimate]:
     """Return a log, after its checks, with its estimate."""
     return log, estimate_clean(log, rig.parameters, options, rig.spreads)
 
@@ -74,22 +74,22 @@ def finding_of(log: CleanLog, found: BulkModulusEstimate, rig: Rig) -> Finding:
     return Finding(
         actuator=KIND,
         outcome=found.outcome,
-        quantities={"bulk_modulus": found.quantity, **_others(found)},
+        quantities={"bulk_modulus": found.quantity, **_other_quantities(found)},
         gate=found.gate,
         channels=found.channels,
         notes=(
-            *left_out(log, found),
-            *absences(found),
-            *explained(found, rig.parameters),
-            *another_oil(found.value if found.gate.passed else None, rig.parameters),
+            *left_out_notes(log, found),
+            *missing_pressure_notes(found),
+            *explanation_and_remarks(found, rig.parameters),
+            *another_oil_notes(found.value if found.gate.passed else None, rig.parameters),
             *found.rig_notes,
         ),
-        not_told=tuple(note for note in found.remarks if note.code in NOT_TOLD),
+        not_told=tuple(note for note in found.remarks if note.code in UNDETERMINED_REMARKS),
         evidence=found,
     )
 
 
-def _others(found: BulkModulusEstimate) -> dict[str, Quantity]:
+def _other_quantities(found: BulkModulusEstimate) -> dict[str, Quantity]:
     units = {name: note.unit for name, note in parameter_notes(EhaParameters).items()}
     return {
         name: found.with_total(name, Quantity.normal(value, std, units.get(name, "1")))
@@ -97,7 +97,7 @@ def _others(found: BulkModulusEstimate) -> dict[str, Quantity]:
     }
 
 
-def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[Note, ...]:
+def explanation_and_remarks(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[Note, ...]:
     """Return the notes on the explanation of a log by rig, oil or logger, and the remarks of its fit.
 
     Parameters
@@ -111,10 +111,10 @@ def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[No
         Empty for a plain log.
     """
     strange = () if found.explanation is None else notes_of(found.explanation, parameters)
-    return (*strange, *(note for note in found.remarks if note.code not in NOT_TOLD))
+    return (*strange, *(note for note in found.remarks if note.code not in UNDETERMINED_REMARKS))
 
 
-def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:
+def missing_pressure_notes(found: BulkModulusEstimate) -> tuple[Note, ...]:
     """Return the note on what is lost without differential pressure; empty if it is used.
 
     Returns
@@ -129,7 +129,7 @@ def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:
     return (EstimateCode.PRESSURE_ABSENT.note(),)
 
 
-def refused(found: BulkModulusEstimate) -> tuple[Note, ...]:
+def rejection_notes(found: BulkModulusEstimate) -> tuple[Note, ...]:
     """Return why the fit of a log is rejected, so that nothing can be concluded from it.
 
     A form with given leakage and friction may be rejected because the actuator has others; that is no objection to the
@@ -143,11 +143,11 @@ def refused(found: BulkModulusEstimate) -> tuple[Note, ...]:
     """
     if found.form not in FITTED:
         return ()
-    spared = {EstimateCode.BOUND_TOO_WIDE} if _moves_otherwise(found) else NOT_THE_LOGS
+    spared = {EstimateCode.BOUND_TOO_WIDE} if _is_motion_wrong(found) else BULK_MODULUS_REASONS
     return tuple(note for note in found.gate.reasons if note.code not in spared)
 
 
-def _moves_otherwise(found: BulkModulusEstimate) -> bool:
+def _is_motion_wrong(found: BulkModulusEstimate) -> bool:
     """Return whether the residual is a large share of the piston's motion, and not only large beside the noise."""
     large = [note for note in found.gate.reasons if note.code == EstimateCode.POSITION_RESIDUALS_LARGE]
     share = max((float(note.data["motion_percent"]) for note in large), default=float("inf"))

@@ -1,4 +1,4 @@
-"""`unless_foreign(...)`: a bulk modulus that no oil has, or that a piston at rest leaves undetermined.
+"""`rejected_if_foreign_oil(...)`: a bulk modulus that no oil has, or that a piston at rest leaves undetermined.
 
 Motion confirms the units of speed and pressure: the piston moves as far as it is pumped, and slides at the pressure
 that friction takes. Compression of oil behind a piston at rest confirms no scale.
@@ -14,7 +14,7 @@ from estimation.finding import Outcome
 from estimation.fits.flow.misread import FOREIGN, KIN
 from estimation.fits.hypotheses import AIR, AIR_MIDWAY
 from estimation.log_checks.channel_names import POSITION, PRESSURE, VELOCITY
-from estimation.log_checks.channel_physics import PRESSURE_OFF
+from estimation.log_checks.channel_physics import PRESSURE_UNIT_RATIO
 from estimation.log_checks.standstill import travels
 from estimation.notes import ChannelCode, EstimateCode
 from plant.eha.model import EhaParameters
@@ -29,7 +29,7 @@ SOFTEST = 3e7
 """Least bulk modulus of any oil without bubbles [Pa]; judged. The softest oil of the open benchmark has 40 MPa, and the
 paper's in psi read as bar 14 MPa."""
 
-UNLIKE = 0.2
+UNLIKE_RIG_OIL = 0.2
 """Logarithm of bulk modulus over the rig file's from which units are doubted if no motion confirms them
 [dimensionless]; judged."""
 
@@ -38,7 +38,7 @@ VAGUE_STILL = 0.1
 slips of scale that cancel had 13 to 30 %, logs without a slip 1 to 3 %."""
 
 
-def shows_no_motion(record: Record, p: EhaParameters) -> tuple[Note, ...]:
+def no_motion_notes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     """Return the objection to a log in which neither pump nor piston moves, or no sensor of the piston ever changes.
 
     A piston at rest yields on its seals, which is 2 % of bulk modulus; a sensor that does not show it is dead or too
@@ -65,7 +65,7 @@ def shows_no_motion(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     return (EstimateCode.POSITION_CONSTANT.note(channel=POSITION),)
 
 
-def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters) -> BulkModulusEstimate:
+def rejected_if_foreign_oil(found: BulkModulusEstimate, record: Record, p: EhaParameters) -> BulkModulusEstimate:
     """Return an estimate, without a number if no oil is like that.
 
     Parameters
@@ -87,21 +87,22 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     if found.value is None:
         return found
     ratio = found.value / p.bulk_modulus
-    if not 1.0 / PRESSURE_OFF < ratio < PRESSURE_OFF or _is_none(found, ratio):
-        return _without(found, Outcome.MISMATCH, ChannelCode.NO_SUCH_OIL.note(channel=PRESSURE, ratio=ratio))
+    if not 1.0 / PRESSURE_UNIT_RATIO < ratio < PRESSURE_UNIT_RATIO or _is_foreign(found, ratio):
+        return _rejected(found, Outcome.MISMATCH, ChannelCode.NO_SUCH_OIL.note(channel=PRESSURE, ratio=ratio))
     gone = travels(record, p)
     if gone is None or not gone.still:
         return found
     unlike = abs(ln(ratio))
-    doubted = gone.stuck or unlike > UNLIKE
+    doubted = gone.stuck or unlike > UNLIKE_RIG_OIL
     said = (EstimateCode.PISTON_STANDS_STILL.note(moved_m=gone.piston, pumped_m=gone.pump),) if doubted else ()
-    most = ln(KIN) if found.explanation is None else UNLIKE  # an offset absorbs half of the information about the scale
+    # an offset absorbs half of the information about the scale
+    most = ln(KIN) if found.explanation is None else UNLIKE_RIG_OIL
     if unlike < most and not is_vague(found.value, found.std, VAGUE_STILL):
         return replace(found, remarks=(*found.remarks, *said))
-    return _without(found, Outcome.NOT_OBSERVABLE, *said, EstimateCode.STILL_AND_FOREIGN.note(ratio=ratio))
+    return _rejected(found, Outcome.NOT_OBSERVABLE, *said, EstimateCode.STILL_AND_FOREIGN.note(ratio=ratio))
 
 
-def _is_none(found: BulkModulusEstimate, ratio: float) -> bool:
+def _is_foreign(found: BulkModulusEstimate, ratio: float) -> bool:
     """Return whether oil without bubbles, measured with pressure, is softer or stiffer than any.
 
     Pressure in another unit scales bulk modulus and leakage, and the flow balance explains that as well.
@@ -113,5 +114,5 @@ def _is_none(found: BulkModulusEstimate, ratio: float) -> bool:
     return (softer and found.value < SOFTEST) or (stiffer and found.value > STIFFEST)
 
 
-def _without(found: BulkModulusEstimate, outcome: Outcome, *said: Note) -> BulkModulusEstimate:
+def _rejected(found: BulkModulusEstimate, outcome: Outcome, *said: Note) -> BulkModulusEstimate:
     return without_number(outcome, (*said, *found.gate.reasons), found.form, found.channels, found.bound)

@@ -19,7 +19,7 @@ from estimation.models.augment import augmented
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, LogError
 from plant.kept import read_kept, write_kept
-from plant.log.chamber_pressures import with_difference
+from plant.log.chamber_pressures import with_pressure_difference
 from plant.log.record import Record
 from plant.log.stream.csv_rows import SAME_RATE
 from plant.solvers.steps import parameter_row
@@ -67,11 +67,13 @@ def begin_filter(asked: StreamFilterOptions, first: Record, like: Record | None 
     LogError
         If the stream lacks what the form needs, or the log another channel or rate.
     """
-    told = _with_pressure(first)
-    full = Record(told.sample_time, {name: told[name][_whole(told)] for name in told})
+    told = _with_differential_pressure(first)
+    full = Record(told.sample_time, {name: told[name][_complete_rows(told)] for name in told})
     task = filter_task(full, asked.parameters, asked.form, states=asked.states, tuned=asked.tuned and like is None)
     if like is not None:
-        other = filter_task(_with_pressure(like), asked.parameters, asked.form, states=asked.states, tuned=asked.tuned)
+        other = filter_task(
+            _with_differential_pressure(like), asked.parameters, asked.form, states=asked.states, tuned=asked.tuned
+        )
         if other.channels != task.channels or abs(like.sample_time / first.sample_time - 1.0) > SAME_RATE:
             raise LogError(
                 f"the log must have the stream's channels ({', '.join(task.channels)}) at its rate, "
@@ -81,11 +83,11 @@ def begin_filter(asked: StreamFilterOptions, first: Record, like: Record | None 
     return OnlineFilter(task, asked.method)
 
 
-def _with_pressure(record: Record) -> Record:
-    return record.replace(**with_difference(record.channels))
+def _with_differential_pressure(record: Record) -> Record:
+    return record.replace(**with_pressure_difference(record.channels))
 
 
-def _whole(record: Record) -> NDArray[np.bool_]:
+def _complete_rows(record: Record) -> NDArray[np.bool_]:
     """Return which samples have every channel; noise is determined from these."""
     return np.all([np.isfinite(record[name]) for name in record], axis=0)
 
@@ -108,7 +110,7 @@ def samples_of(filtered: OnlineFilter, channels: Mapping[str, Array]) -> tuple[A
     LogError
         If a channel is missing.
     """
-    known = with_difference(channels)
+    known = with_pressure_difference(channels)
     wanted = (*filtered.problem.model.drives, *filtered.problem.channels)
     missing = [name for name in wanted if name not in known]
     if missing:

@@ -12,7 +12,7 @@ from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 
-def most_drained(p: EhaParameters) -> float:
+def largest_port_drain(p: EhaParameters) -> float:
     """Return the prior upper limit of a sound pump's case drain per port.
 
     The prior is a twentieth of the healthy leakage, known to a factor of e: 97.5 % drain less than a third of it.
@@ -24,7 +24,7 @@ def most_drained(p: EhaParameters) -> float:
 
     Examples
     --------
-    >>> round(most_drained(EhaParameters(leakage_coefficient=1e-11)) * 1e12, 2)
+    >>> round(largest_port_drain(EhaParameters(leakage_coefficient=1e-11)) * 1e12, 2)
     3.55
     """
     return DRAIN_START * leakage_guess(p) * exp(NORMAL_95 * PRESUMED_STD)
@@ -52,8 +52,8 @@ def drain_note(side: str) -> Callable[[Explanation, EhaParameters], Note]:
         case = found.values["case_leakage"][0]
         drains = {side: case * found.values[f"drain_share_{side}"][0], other: case}
         most = max(drains, key=lambda one: drains[one])
-        if drains[most] > most_drained(p):
+        if drains[most] > largest_port_drain(p):
             return RigCode.PORT_DRAINS.note(side=most.upper(), drain=drains[most])
-        return RigCode.PORTS_DRAIN_APART.note(drain_a=drains["a"], drain_b=drains["b"], sound=most_drained(p))
+        return RigCode.PORTS_DRAIN_APART.note(drain_a=drains["a"], drain_b=drains["b"], sound=largest_port_drain(p))
 
     return note

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from estimation.eha.rig_share import Responses, rig_notes, with_total
 from estimation.filters.run import Estimate
 from estimation.finding import Gate, Outcome, Quantity, positive_interval_95
-from estimation.fits.greybox.pump_ripple import EVENLY, Turning
+from estimation.fits.greybox.pump_ripple import NO_RIPPLE, Turning
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.notes import EstimateCode
 from plant.eha.doubts import Spread
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 LARGEST_BOUND = 0.03
 """Relative Cramér-Rao bound above which bulk modulus is called not observable (errata E13) [fraction]."""
 
-VAGUE = 0.5
+VAGUE_DEVIATION = 0.5
 """Relative standard deviation above which a value is not reported, whatever its bound [fraction]; judged. If a model
 chatters, the bound may vanish: a log of chambers that leak empty within a sample had 147 % beside a bound of 1e-9."""
 
@@ -89,7 +89,7 @@ class BulkModulusEstimate:
     explanation: Explanation | None = None
     remarks: tuple[Note, ...] = ()
     method: str = "least-squares"
-    turning: Turning = EVENLY
+    turning: Turning = NO_RIPPLE
     correlation: float = 0.0
 
     @property
@@ -122,7 +122,7 @@ class BulkModulusEstimate:
         return positive_interval_95(self.value, self.std)
 
 
-def is_vague(value: float, std: float | None, share: float = VAGUE) -> bool:
+def is_vague(value: float, std: float | None, share: float = VAGUE_DEVIATION) -> bool:
     """Return whether a value is too uncertain to be reported.
 
     Parameters
@@ -142,7 +142,7 @@ def is_vague(value: float, std: float | None, share: float = VAGUE) -> bool:
     return std is None or not std <= share * abs(value)
 
 
-def too_wide(bound: float) -> Note:
+def wide_bound_note(bound: float) -> Note:
     """Return the note for a bound above the limit.
 
     Parameters

@@ -20,7 +20,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from estimation.finding import LARGE, NORMAL_95, Quantity
-from estimation.fits.flow.told_volume import is_told
+from estimation.fits.flow.told_volume import determines_volume
 from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.notes import EstimateCode, RigCode
 from plant.eha.doubts import PRESSURE_GAIN, Spread
@@ -37,7 +37,7 @@ GAIN: Mapping[str, float] = MappingProxyType({"bulk_modulus": -1.0, "leakage_coe
 DELIVERY_ENTRY = "pump_displacement"
 """The entry of a rig file that a worn pump does not reach."""
 
-SOFT = 0.55
+SOFT_OIL_RATIO = 0.55
 """Share of the rig's bulk modulus below which the oil contains air [dimensionless]; above the inverse it is too
 stiff."""
 
@@ -59,7 +59,9 @@ def fitted_responses(fit: FormFit) -> Mapping[str, Responses]:
         | {PRESSURE_GAIN: GAIN.get(name, 0.0)}
         for name, (value, _) in fit.parameters.items()
     }
-    return told | ({"bulk_modulus": {PRESSURE_GAIN: GAIN["bulk_modulus"]}} if is_told(fit.explanation) else {})
+    return told | (
+        {"bulk_modulus": {PRESSURE_GAIN: GAIN["bulk_modulus"]}} if determines_volume(fit.explanation) else {}
+    )
 
 
 def scaled_responses(
@@ -95,7 +97,7 @@ def scaled_responses(
     }
 
 
-def _reaches(responses: Responses, spreads: Mapping[str, Spread]) -> dict[str, tuple[float, float]]:
+def _entry_shifts(responses: Responses, spreads: Mapping[str, Spread]) -> dict[str, tuple[float, float]]:
     """Return the shift of a quantity, down and up, by each entry within the entry's 95 % [fraction of the quantity]."""
     found: dict[str, tuple[float, float]] = {}
     for entry, power in responses.items():
@@ -132,11 +134,11 @@ def with_total(
     """
     if one.value is None or one.ci95 is None or responses is None:
         return one
-    reaches = _reaches(responses, spreads).values()
+    reaches = _entry_shifts(responses, spreads).values()
     down, up = (abs(one.value if size is None else size) * math.hypot(*ends) for ends in zip(*reaches, strict=True))
     low = one.value - math.hypot(one.value - one.ci95[0], down) if down else one.ci95[0]
     high = one.value + math.hypot(one.ci95[1] - one.value, up) if up else one.ci95[1]
-    if one.value > 0.0 and one.ci95[0] > 0.0 and _of_logarithm(one.value, one.ci95):
+    if one.value > 0.0 and one.ci95[0] > 0.0 and _is_logarithmic(one.value, one.ci95):
         low = one.value * math.exp(-math.hypot(math.log(one.value / one.ci95[0]), _log_ratio(one.value, -down)))
         high = one.value * math.exp(math.hypot(math.log(one.ci95[1] / one.value), _log_ratio(one.value, up)))
     elif size is None and one.value > 0.0:
@@ -144,7 +146,7 @@ def with_total(
     return replace(one, ci95_total=(low, high))
 
 
-def _of_logarithm(value: float, ends: tuple[float, float]) -> bool:
+def _is_logarithmic(value: float, ends: tuple[float, float]) -> bool:
     """Return whether an interval is wide, and symmetric in the logarithm of its value (`positive_interval_95`)."""
     return ends[0] < value * math.exp(-NORMAL_95 * LARGE) and math.isclose(ends[0] * ends[1], value**2, rel_tol=1e-9)
 
@@ -154,7 +156,7 @@ def _log_ratio(value: float, more: float) -> float:
     return math.log1p(max(more / value, -0.99))
 
 
-def wear_left_open(remarks: Sequence[Note]) -> float:
+def undetermined_wear(remarks: Sequence[Note]) -> float:
     """Return the uncertainty of pump delivery below displacement, if a log cannot separate wear from leakage.
 
     Returns
@@ -162,11 +164,11 @@ def wear_left_open(remarks: Sequence[Note]) -> float:
     float
         Standard deviation of the logarithm [dimensionless]; zero if the log determines it, or a worn pump was found.
     """
-    said = _said_of_wear(remarks)
+    said = _wear_note_data(remarks)
     return 0.005 * float(said["percent"]) if said else 0.0
 
 
-class OpenDelivery(NamedTuple):
+class UndeterminedDelivery(NamedTuple):
     """Pump delivery from a log that cannot separate wear from leakage.
 
     Parameters
@@ -183,7 +185,7 @@ class OpenDelivery(NamedTuple):
     least: float = -math.inf
 
 
-def delivery_left_open(remarks: Sequence[Note]) -> OpenDelivery | None:
+def undetermined_delivery(remarks: Sequence[Note]) -> UndeterminedDelivery | None:
     """Return the pump delivery from a log that cannot separate wear from leakage.
 
     Returns
@@ -191,16 +193,16 @@ def delivery_left_open(remarks: Sequence[Note]) -> OpenDelivery | None:
     OpenDelivery or None
         The delivery; None if the log determines it, or a worn pump was found.
     """
-    said = _said_of_wear(remarks)
+    said = _wear_note_data(remarks)
     if said is None:
         return None
     width, less = float(said["half_width"]), float(said["percent"])
     if "most" in said:
-        return OpenDelivery(0.01 * float(said["likeliest"]), 0.005 * width, -0.01 * float(said["most"]))
-    return OpenDelivery(0.01 * (width - less), 0.005 * width)
+        return UndeterminedDelivery(0.01 * float(said["likeliest"]), 0.005 * width, -0.01 * float(said["most"]))
+    return UndeterminedDelivery(0.01 * (width - less), 0.005 * width)
 
 
-def _said_of_wear(remarks: Sequence[Note]) -> Mapping[str, Any] | None:
+def _wear_note_data(remarks: Sequence[Note]) -> Mapping[str, Any] | None:
     """Return the figures of the note that wear is not excluded, None if there is none."""
     return next((note.data for note in remarks if note.code is RigCode.WEAR_NOT_EXCLUDED), None)
 
@@ -208,7 +210,7 @@ def _said_of_wear(remarks: Sequence[Note]) -> Mapping[str, Any] | None:
 def with_wear(spreads: Mapping[str, Spread], remarks: Sequence[Note]) -> Mapping[str, Spread]:
     """Return the uncertainties of rig entries, with displacement's lower one widened by undetermined pump wear."""
     down, up = spreads.get(DELIVERY_ENTRY, (0.0, 0.0))
-    worn = wear_left_open(remarks)
+    worn = undetermined_wear(remarks)
     return {**spreads, DELIVERY_ENTRY: Spread(worn, up)} if worn > down else spreads
 
 
@@ -236,13 +238,13 @@ def rig_notes(name: str, one: Quantity, responses: Responses, spreads: Mapping[s
     given, total = (high - low for low, high in (one.ci95, one.ci95_total))
     if not total > MOSTLY_RIG * given:
         return ()
-    squares = {entry: (one.value * (down + up)) ** 2 for entry, (down, up) in _reaches(responses, spreads).items()}
+    squares = {entry: (one.value * (down + up)) ** 2 for entry, (down, up) in _entry_shifts(responses, spreads).items()}
     entry = max(squares, key=lambda name: squares[name])
     share = 100.0 * squares[entry] / (sum(squares.values()) + given**2)
     return (EstimateCode.KNOWN_AS_THE_RIG.note(quantity=name, entry=entry, percent=share),)
 
 
-def another_oil(value: float | None, rig: EhaParameters) -> tuple[Note, ...]:
+def another_oil_notes(value: float | None, rig: EhaParameters) -> tuple[Note, ...]:
     """Return a note if a believed bulk modulus is not that of the rig's oil.
 
     Parameters
@@ -258,7 +260,7 @@ def another_oil(value: float | None, rig: EhaParameters) -> tuple[Note, ...]:
         One at most: the possible causes, and the chamber volume that would explain it.
     """
     ratio = 1.0 if value is None else value / rig.bulk_modulus
-    if SOFT <= ratio <= 1.0 / SOFT:
+    if SOFT_OIL_RATIO <= ratio <= 1.0 / SOFT_OIL_RATIO:
         return ()
     code = EstimateCode.SOFTER_THAN_RIG if ratio < 1.0 else EstimateCode.STIFFER_THAN_RIG
     return (code.note(ratio=ratio, written=rig.chamber_volume, volume=rig.chamber_volume / ratio),)

@@ -86,7 +86,7 @@ class FilterProblem:
         return Samples(self.drives, self.measured, self.substeps, self.every)
 
     @property
-    def opened(self) -> Array:
+    def added_variance(self) -> Array:
         """Variance that each sample adds to each state besides the process noise, shape (samples, n), scaled."""
         added = np.zeros((len(self.drives), self.model.width))
         for i, state in enumerate(self.model.states):

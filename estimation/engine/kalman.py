@@ -78,7 +78,7 @@ def drive_symbols(model: ProcessModel) -> list[tuple[Expression, Expression]]:
     return pairs
 
 
-def moved(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
+def next_state(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
     """Advance a state by one step of the model, both in the filter's units.
 
     Returns
@@ -104,7 +104,7 @@ def _over_scale(z: Expression, old: Expression, new: Expression, state: StateVar
     return z + added[0] / state.scale if len(added) == 1 else new / state.scale
 
 
-def observed(model: ProcessModel, mean: Sequence[Expression], channels: Sequence[str]) -> list[Expression]:
+def predicted_outputs(model: ProcessModel, mean: Sequence[Expression], channels: Sequence[str]) -> list[Expression]:
     """Return the model's prediction of each channel.
 
     Parameters
@@ -121,7 +121,7 @@ def observed(model: ProcessModel, mean: Sequence[Expression], channels: Sequence
     return [as_expression(predicted[channel]) for channel in channels]
 
 
-def bounded(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
+def bounded_mean(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
     """Hold the mean to its physical bounds; NaN stays NaN, so that a diverged filter shows.
 
     Parameters
@@ -137,7 +137,7 @@ def bounded(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]
     return held
 
 
-def projected(covariance: Covariance, H: Sequence[Expression]) -> tuple[list[Expression], Expression]:
+def channel_projection(covariance: Covariance, H: Sequence[Expression]) -> tuple[list[Expression], Expression]:
     """Return the projection of a covariance on a channel: cross-covariance and variance.
 
     Parameters
@@ -157,7 +157,7 @@ def projected(covariance: Covariance, H: Sequence[Expression]) -> tuple[list[Exp
     return PH, total([H[i] * PH[i] for i in range(n)])
 
 
-def corrected(
+def corrected_belief(
     mean: Mean, covariance: Covariance, PH: Sequence[Expression], step: Expression, loss: Expression
 ) -> tuple[list[Expression], Covariance]:
     """Correct a belief by a channel.
@@ -182,7 +182,7 @@ def corrected(
     return moved_on, {(i, j): value - PH[i] * PH[j] * loss for (i, j), value in covariance.items()}
 
 
-def believed(model: ProcessModel, mean: Sequence[Expression], covariance: Covariance) -> Outputs:
+def bounded_belief(model: ProcessModel, mean: Sequence[Expression], covariance: Covariance) -> Outputs:
     """Return a belief by the names of its symbols, with the mean held to its bounds.
 
     Parameters
@@ -192,7 +192,7 @@ def believed(model: ProcessModel, mean: Sequence[Expression], covariance: Covari
     covariance : dict
         Upper triangle.
     """
-    held = {f"z{i}": z for i, z in enumerate(bounded(model, mean))}
+    held = {f"z{i}": z for i, z in enumerate(bounded_mean(model, mean))}
     return held | {f"P{i}_{j}": value for (i, j), value in covariance.items()}
 
 
@@ -205,7 +205,7 @@ def scaled_step(model: ProcessModel) -> tuple[list[Expression], list[list[Expres
         The state one step later, and its Jacobian by the state.
     """
     mean, _ = belief_symbols(model)
-    stepped = moved(model, mean)
+    stepped = next_state(model, mean)
     return stepped, eliminated_jacobian(stepped, mean)
 
 

@@ -9,14 +9,14 @@ from functools import cache
 
 from estimation.engine import lanes as lanes_loop
 from estimation.engine.lanes import flush, hold, keep, lay_side_by_side, run, steps, tally
-from estimation.engine.layout import Halves, all_present, at_sample, counting_missing, halves_of, layout
+from estimation.engine.layout import Halves, full_sample_update, halves_of, layout, step_at_sample, with_missing_counted
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ordered
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.machine import native_width
 from plant.compiled.native.signature import signature
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.compiled.source import ROWS, Slot, lines_source, operations_source
 
 LANES = 32
@@ -55,17 +55,17 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
     sizes |= {"STATES": model.width, "DRIVES": d, "CHANNELS": m, "LAST": line * names.index("last0")}
     sizes |= {x.upper(): lanes * names.index(f"{x}0") for x in ("count", "product")} | {"SEEN": len(names) - len(seen)}
     settings = {"FLUSH": lanes_loop.FLUSH, "LARGE": lanes_loop.LARGE, "AHEAD": lanes_loop.AHEAD, "ROWS": ROWS}
-    update = counting_missing(halves.update)
+    update = with_missing_counted(halves.update)
     written = {"prepare": halves.constants, "predict": halves.predict, "update": update}
-    written |= {"onward": at_sample(halves.predict), "whole": all_present(update)}
+    written |= {"onward": step_at_sample(halves.predict), "whole": full_sample_update(update)}
     lines = {name: lines_source(name, outputs) for name, outputs in written.items()}
     parts = (
         operations_source(lines, slots, width),
         f"both_at = stepping(SLOTS, {width}, onward, whole)\nmove = moving({width})\n"
         f"complete_at = complete({width}, {m}, {line})",
-        pasted(hold, keep, flush, tally, constants={**sizes, **settings}, inlined=True),
-        pasted(steps),
-        *([pasted(lay_side_by_side, inlined=True), pasted(run)] if lanes > 1 else []),
+        functions_text(hold, keep, flush, tally, constants={**sizes, **settings}, inlined=True),
+        functions_text(steps),
+        *([functions_text(lay_side_by_side, inlined=True), functions_text(run)] if lanes > 1 else []),
     )
     return kernel_text(f"{rule.name} on the {model.name} form, {lanes} side by side", *parts)
 

@@ -16,7 +16,7 @@ from plant.compiled.expression import ONE, ZERO, Expression, select, symbol, una
 from plant.compiled.hoist import hoisted
 from plant.compiled.late_last import late_last
 from plant.compiled.simplify import Nodes, fused, rewritten, simplified
-from plant.compiled.source import CALLED, symbols_in
+from plant.compiled.source import CALLED_OPERATIONS, symbols_in
 from plant.errors import HydrostateError
 
 _NUMBERED = re.compile(r"[abykcdtw](?:0|[1-9]\d{0,3})")
@@ -109,7 +109,7 @@ def layout(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Layout
     parameters = tuple(field.name for field in fields(model.parameters))
     noise = tuple(f"q{i}" for i in range(model.width)) + tuple(f"r{c}" for c in range(len(channels)))
     settings = tuple(setting.name for setting in rule.settings)
-    own = {*carried, *noise, *settings, *CALLED, "h", "share", "j"}
+    own = {*carried, *noise, *settings, *CALLED_OPERATIONS, "h", "share", "j"}
     if clash := [name for name in sorted(parameters) if name in own or _NUMBERED.fullmatch(name)]:
         raise HydrostateError(f"{model.name}: a parameter may not be named {clash[0]!r}, the kernel uses it")
     return Layout(carried, (*parameters, *noise, *settings, "h", "share"), len(channels))
@@ -182,7 +182,7 @@ def halves_of(rule: Rule, model: ProcessModel, channels: tuple[str, ...], *, sco
     return Halves(before | after, fused(predict), fused(update))
 
 
-def counting_missing(update: Outputs) -> Outputs:
+def with_missing_counted(update: Outputs) -> Outputs:
     """Return an update that subtracts missing samples from the sums ``count``; the caller adds all samples.
 
     So the sums stay untouched if no sample is missing.
@@ -200,13 +200,13 @@ def counting_missing(update: Outputs) -> Outputs:
     return {name: counted(name) if name.startswith("count") else value for name, value in update.items()}
 
 
-def all_present(update: Outputs) -> Outputs:
+def full_sample_update(update: Outputs) -> Outputs:
     """Return the update for a sample without missing channels, bit-identical to the general one.
 
     Parameters
     ----------
     update : dict[str, Expression]
-        As from `counting_missing`; rounding was fixed before (`plant.compiled.simplify.fused`).
+        As from `with_missing_counted`; rounding was fixed before (`plant.compiled.simplify.fused`).
     """
 
     def chosen(item: Expression, new: Nodes) -> Expression | None:
@@ -217,7 +217,7 @@ def all_present(update: Outputs) -> Outputs:
     return rewritten({name: value for name, value in update.items() if not name.startswith("count")}, chosen)
 
 
-def at_sample(predict: Outputs) -> Outputs:
+def step_at_sample(predict: Outputs) -> Outputs:
     """Return the model step that begins at a sample, with sub-step ``j`` 0, for finite drives.
 
     Parameters

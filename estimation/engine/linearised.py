@@ -8,13 +8,13 @@ from typing import TypeAlias
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.engine.kalman import bounded, scaled_step
+from estimation.engine.kalman import bounded_mean, scaled_step
 from estimation.engine.parts import function_source
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ZERO, Expression
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 
 Fill: TypeAlias = Callable[[Array, Array, Array, Array, float, float, float, Array, Array], None]
 """``fill(mean, start, end, parameters, h, j, share, moved, slopes)``: compute the new mean and its Jacobian."""
@@ -56,7 +56,7 @@ def compile_step(model: ProcessModel) -> NativeKernel:
     """
     n = model.width
     mean, F = scaled_step(model)
-    outputs: Mapping[str, Expression] = {f"m{i}": z for i, z in enumerate(bounded(model, mean))} | {
+    outputs: Mapping[str, Expression] = {f"m{i}": z for i, z in enumerate(bounded_mean(model, mean))} | {
         f"f{i}_{k}": F[i][k] for i in range(n) for k in range(n) if F[i][k] is not ZERO
     }
     reads = {f"z{i}": f"mean[{i}]" for i in range(n)}
@@ -68,6 +68,6 @@ def compile_step(model: ProcessModel) -> NativeKernel:
         name: f"moved[{name[1:]}]" if name[0] == "m" else f"slopes[{name[1:].replace('_', ', ')}]" for name in outputs
     }
     arguments = "mean, start, end, parameters, h, j, share, moved, slopes"
-    parts = (function_source("fill", arguments, reads, outputs, writes), pasted(step))
+    parts = (function_source("fill", arguments, reads, outputs, writes), functions_text(step))
     title = f"one step of the {model.name} form, and its Jacobian, in scaled units"
     return load_native(f"step_{model.name}", kernel_text(title, *parts), {"step": signature_of(step)})

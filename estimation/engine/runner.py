@@ -68,15 +68,15 @@ def run_rule(rule: Rule, problem: FilterProblem) -> Trace:
         If a setting is not known or not what it must be, or the rule has no robust update and one is asked for.
     """
     trace = empty_trace(problem)
-    places, kernel, work = prepared(rule, [problem])
+    places, kernel, work = prepared_kernel(rule, [problem])
     drives, measured = (np.ascontiguousarray(one, np.float64) for one in (problem.drives, problem.measured))
     where, logs = (drives.ctypes.data, measured.ctypes.data), np.zeros((len(problem.channels), 1))
     results = trace.track, trace.track_variance, logs, trace.residuals, trace.residual_variances
     kernel.steps(work.ravel(), *where, 0, 0, len(measured), problem.substeps, problem.every, results)
-    return read_off(places, [problem], work, logs, [trace])[0]
+    return final_traces(places, [problem], work, logs, [trace])[0]
 
 
-def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, NativeKernel, Array]:
+def prepared_kernel(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, NativeKernel, Array]:
     """Return layout and kernel of a rule, and the kernel's buffer before the first sample.
 
     Parameters
@@ -97,13 +97,13 @@ def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, Native
     settings, rule = chosen_settings(first, rule.name, rule.settings), weighing(rule, first.robust)
     places = layout(rule, first.model, first.channels)
     kernel = compile_kernel(rule, first.model, first.channels, len(lanes))
-    carried, work = len(places.carried), aligned(kernel.LINES, len(lanes))
+    carried, work = len(places.carried), aligned_array(kernel.LINES, len(lanes))
     work[:carried] = places.start(np.array([one.mean for one in lanes]), np.array([one.covariance for one in lanes]))
     work[carried : carried + len(places.rows)] = constant_rows(lanes, settings)
     return places, kernel, work
 
 
-def aligned(*shape: int) -> Array:
+def aligned_array(*shape: int) -> Array:
     """Return an array that begins at a cache line: a vector across two cache lines takes twice as long.
 
     Parameters
@@ -122,7 +122,7 @@ def aligned(*shape: int) -> Array:
     return buffer[begin : begin + size].reshape(shape)
 
 
-def read_off(
+def final_traces(
     places: Layout, lanes: Sequence[FilterProblem], work: Array, logs: Array, traces: Sequence[Trace]
 ) -> list[Trace]:
     """Read final beliefs and scores from a kernel's buffer.

@@ -37,12 +37,12 @@ def spread(outputs: Sequence[Expression], inputs: Sequence[Expression], covarian
     """
     n, known, units, mixed = len(inputs), list(inputs), [ONE] * len(inputs), list[dict[int, Expression]]()
     for item in waypoints_of(outputs):
-        mixture = _mixed(item, known, units)
+        mixture = _scaled_slopes(item, known, units)
         unit = next((slope for slope in mixture.values() if slope.operation == "constant"), ONE)
         mixed.append({k: ONE if slope is unit else slope / unit for k, slope in mixture.items()})
         known.append(item)
         units.append(unit)
-    mixed += [_mixed(item, known, units) for item in outputs]
+    mixed += [_scaled_slopes(item, known, units) for item in outputs]
     made: Covariance = {}
 
     def between(i: int, j: int) -> Expression:
@@ -58,7 +58,7 @@ def spread(outputs: Sequence[Expression], inputs: Sequence[Expression], covarian
     return {(i, j): between(len(known) + i, len(known) + j) for i in range(n) for j in range(i, n)}
 
 
-def _mixed(item: Expression, known: Sequence[Expression], units: Sequence[Expression]) -> dict[int, Expression]:
+def _scaled_slopes(item: Expression, known: Sequence[Expression], units: Sequence[Expression]) -> dict[int, Expression]:
     """Return the nonzero slopes of a quantity by the known ones, each scaled by its own unit."""
     slopes = eliminated_jacobian([item], known)[0]
     return {k: slope * unit for k, (slope, unit) in enumerate(zip(slopes, units, strict=True)) if slope is not ZERO}

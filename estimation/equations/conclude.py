@@ -10,32 +10,32 @@ from scipy.special import stdtrit
 from estimation.arrays import Array
 from estimation.equations.notes import EquationsCode
 from estimation.equations.problem import Problem, spread
-from estimation.equations.search import MOST_STEPS, SETTLED, Solution, noise_of
-from estimation.equations.stops import standing
+from estimation.equations.search import LARGEST_SHIFT, MOST_STEPS, Solution, noise_of
+from estimation.equations.stops import standing_ends
 from estimation.finding import Finding, Gate, Outcome, Quantity
 from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
 from estimation.identification.fit.residual_tests import cross_correlation_test
 from plant.errors import HydrostateError
 from plant.notes import Note
 
-LOST = 1e-6
+LEAST_SINGULAR_VALUE = 1e-6
 """Singular value of the scaled sensitivities, over the largest, below which a direction is not determined
 [fraction]."""
 
-TOUCHED = 1e-3
+UNDETERMINED_SHARE = 1e-3
 """Share of an unknown in such a direction above which the unknown is not determined either [fraction]."""
 
-POOR = 0.5
+POOR_DEVIATION = 0.5
 """Relative deviation above which an unknown is called poorly determined [fraction]."""
 
-CHANCE = 3.0
+CHANCE_FACTOR = 3.0
 """Explained variance, relative to what as many unknowns explain of white noise, up to which nothing counts as explained
 [dimensionless]."""
 
-BEYOND = 1.2
+LARGEST_MISFIT = 1.2
 """Residuals over given noise above which the equations miss something [dimensionless]."""
 
-CORRELATED = 0.2
+LARGEST_CORRELATION = 0.2
 """Correlation of neighbouring residuals above which they are not noise [dimensionless]."""
 
 FOLLOWED, SURE = 0.01, 1e-3
@@ -49,10 +49,10 @@ MISSED, LEAST = 3.0, 1e-3
 """Residuals at a limit, over the noise, above which the equations do not include the limit [dimensionless], and the
 least noise that counts, over the channel's spread [fraction]."""
 
-AS_WELL = 2.0
+EQUAL_LIKELIHOOD = 2.0
 """Difference of log-likelihood up to which two solutions explain the logs equally well [dimensionless]."""
 
-APART = 3.0
+DISTINCT_DEVIATIONS = 3.0
 """Standard deviations above which two solutions differ."""
 
 
@@ -94,9 +94,11 @@ def covariance_of(problem: Problem, theta: Array) -> Covariance:
     felt = np.flatnonzero(size > 0.0)
     groups = [(int(j),) for j in np.flatnonzero(size == 0.0)]
     _, values, directions = np.linalg.svd(slopes[:, felt] / size[felt], full_matrices=False)
-    lost = values < LOST * values[0]
-    touched = felt[np.any(np.abs(directions[lost]) > TOUCHED, axis=0)]
-    groups += [tuple(int(felt[j]) for j in np.flatnonzero(np.abs(one) > TOUCHED)) for one in directions[lost]]
+    lost = values < LEAST_SINGULAR_VALUE * values[0]
+    touched = felt[np.any(np.abs(directions[lost]) > UNDETERMINED_SHARE, axis=0)]
+    groups += [
+        tuple(int(felt[j]) for j in np.flatnonzero(np.abs(one) > UNDETERMINED_SHARE)) for one in directions[lost]
+    ]
     order = qr(slopes[:, felt] / size[felt], mode="r", pivoting=True)[1][: int(np.count_nonzero(~lost))]
     kept = felt[np.sort(order)]
     used = int(np.count_nonzero(np.concatenate([~np.isnan(part.measured).ravel() for part in problem.parts])))
@@ -113,7 +115,7 @@ def covariance_of(problem: Problem, theta: Array) -> Covariance:
     return Covariance(std, correlation, condition, tuple(dict.fromkeys(groups)))
 
 
-def concluded(solution: Solution, given: Array) -> tuple[Finding, Covariance]:
+def concluded_finding(solution: Solution, given: Array) -> tuple[Finding, Covariance]:
     """Return the finding of a solution, and its covariance.
 
     Parameters
@@ -130,14 +132,14 @@ def concluded(solution: Solution, given: Array) -> tuple[Finding, Covariance]:
     found = covariance_of(problem, theta)
     residuals = problem.residuals(theta)
     samples = int(np.count_nonzero(~np.isnan(np.concatenate([part.measured.ravel() for part in problem.parts]))))
-    chance = 100.0 * (1.0 - np.sqrt(max(1.0 - CHANCE * len(theta) / samples, 0.0)))
-    empty = [_nothing(problem, i, fit) for i, fit in enumerate(fits_of(problem, theta)) if not fit > chance]
+    chance = 100.0 * (1.0 - np.sqrt(max(1.0 - CHANCE_FACTOR * len(theta) / samples, 0.0)))
+    empty = [_no_fit_note(problem, i, fit) for i, fit in enumerate(fits_of(problem, theta)) if not fit > chance]
     limits, held = _limits(problem, residuals)
     reasons = (
         *empty,
         *(() if empty else _misfits(problem, theta, residuals, given)),
         *_at_bounds(problem, theta),
-        *_doubts(solution),
+        *_convergence_notes(solution),
         *limits,
     )
     quantities = _quantities(problem, theta, found, samples)
@@ -149,8 +151,8 @@ def concluded(solution: Solution, given: Array) -> tuple[Finding, Covariance]:
         quantities=quantities,
         gate=Gate(not reasons, tuple(reasons)),
         channels=(*problem.equations.inputs, *problem.equations.outputs),
-        notes=(*held, *_missing(problem), *_others(solution, found)),
-        not_told=_not_told(problem, theta, found),
+        notes=(*held, *_missing_sample_notes(problem), *_other_solution_notes(solution, found)),
+        not_told=_undetermined_notes(problem, theta, found),
     )
     return finding, found
 
@@ -175,7 +177,7 @@ def fits_of(problem: Problem, theta: Array) -> list[float]:
     ]
 
 
-def _nothing(problem: Problem, place: int, fit: float) -> Note:
+def _no_fit_note(problem: Problem, place: int, fit: float) -> Note:
     return EquationsCode.EQUATIONS_EXPLAIN_NOTHING.note(channel=list(problem.equations.outputs)[place], fit=fit)
 
 
@@ -209,14 +211,16 @@ def _misfits(problem: Problem, theta: Array, residuals: Sequence[Array], given: 
         power = sum(float(row @ row) for row in rows)
         count = sum(int(np.count_nonzero(one)) for one in seen)
         ratio = (power / count) ** 0.5
-        if np.isfinite(given[i]) and ratio > BEYOND:
+        if np.isfinite(given[i]) and ratio > LARGEST_MISFIT:
             notes.append(EquationsCode.MISFIT_BEYOND_NOISE.note(channel=channel, ratio=ratio))
         neighbours = sum(float(row[1:] @ row[:-1]) for row in rows) / max(power, np.finfo(float).tiny)
-        if abs(neighbours) > max(CORRELATED, 4.0 / count**0.5):
+        if abs(neighbours) > max(LARGEST_CORRELATION, 4.0 / count**0.5):
             notes.append(EquationsCode.MISFIT_CORRELATED.note(channel=channel, correlation=neighbours))
         for j, source in enumerate(problem.equations.inputs):
             shares = [
-                _followed(np.where(kept, row, np.nan), part.inputs[:, j], slope.reshape(len(one), len(row), -1)[i])
+                _explained_share(
+                    np.where(kept, row, np.nan), part.inputs[:, j], slope.reshape(len(one), len(row), -1)[i]
+                )
                 for row, kept, part, slope, one in zip(rows, seen, problem.parts, slopes, residuals, strict=True)
             ]
             if max(shares) > FOLLOWED:
@@ -226,7 +230,7 @@ def _misfits(problem: Problem, theta: Array, residuals: Sequence[Array], given: 
     return notes
 
 
-def _followed(residual: Array, source: Array, slopes: Array) -> float:
+def _explained_share(residual: Array, source: Array, slopes: Array) -> float:
     """Return the share of a residual that the past of an input explains; 0 if chance would [fraction]."""
     part = slice(0, MOST_TESTED)
     if np.ptp(source[part]) == 0.0:
@@ -249,9 +253,9 @@ def _at_bounds(problem: Problem, theta: Array) -> list[Note]:
     return notes
 
 
-def _doubts(solution: Solution) -> list[Note]:
+def _convergence_notes(solution: Solution) -> list[Note]:
     notes: list[Note] = []
-    if solution.moved > SETTLED:
+    if solution.moved > LARGEST_SHIFT:
         notes.append(EquationsCode.STEPS_TOO_LONG.note(deviations=solution.moved, steps=2 * MOST_STEPS))
     if solution.evaluations:
         notes.append(EquationsCode.NOT_CONVERGED.note(evaluations=solution.evaluations))
@@ -263,7 +267,7 @@ def _limits(problem: Problem, residuals: Sequence[Array]) -> tuple[list[Note], l
     against, known = list[Note](), list[Note]()
     noise, typical = noise_of(problem.parts), spread(problem.parts)
     for i, channel in enumerate(problem.equations.outputs):
-        for one in standing([part.measured[i] for part in problem.parts], float(noise[i])):
+        for one in standing_ends([part.measured[i] for part in problem.parts], float(noise[i])):
             errors, there = np.concatenate([row[i] for row in residuals]), np.concatenate(one.where)
             ratio = float(np.sqrt(np.mean(errors[there] ** 2)) * problem.noise[i] / max(noise[i], LEAST * typical[i]))
             value, percent = one.value, 100.0 * one.share
@@ -278,13 +282,13 @@ def _limits(problem: Problem, residuals: Sequence[Array]) -> tuple[list[Note], l
                     EquationsCode.OUTPUT_AT_LIMIT.note(channel=channel, end=one.end, value=value, percent=percent)
                 )
     for j, channel in enumerate(problem.equations.inputs):
-        for one in standing([part.inputs[:, j] for part in problem.parts], 0.0):
+        for one in standing_ends([part.inputs[:, j] for part in problem.parts], 0.0):
             value, percent = one.value, 100.0 * one.share
             known.append(EquationsCode.INPUT_AT_LIMIT.note(channel=channel, end=one.end, value=value, percent=percent))
     return against, known
 
 
-def _missing(problem: Problem) -> list[Note]:
+def _missing_sample_notes(problem: Problem) -> list[Note]:
     notes: list[Note] = []
     for i, channel in enumerate(problem.equations.outputs):
         rows = np.concatenate([part.measured[i] for part in problem.parts])
@@ -294,7 +298,7 @@ def _missing(problem: Problem) -> list[Note]:
     return notes
 
 
-def _not_told(problem: Problem, theta: Array, found: Covariance) -> tuple[Note, ...]:
+def _undetermined_notes(problem: Problem, theta: Array, found: Covariance) -> tuple[Note, ...]:
     """Return the unknowns that the logs do not determine, or determine poorly."""
     notes, names = list[Note](), problem.names
     for group in found.groups:
@@ -307,7 +311,7 @@ def _not_told(problem: Problem, theta: Array, found: Covariance) -> tuple[Note, 
     for j, name in enumerate(problem.equations.parameters):
         one, std = problem.unknowns[j], found.std[j]
         share = std if one.logarithmic else std * one.size / max(abs(values[j]), one.size)
-        if np.isfinite(std) and share > POOR:
+        if np.isfinite(std) and share > POOR_DEVIATION:
             others = np.where(np.arange(len(names)) == j, 0.0, np.nan_to_num(found.correlation[j]))
             other = int(np.argmax(np.abs(others)))
             correlation = float(others[other])
@@ -319,12 +323,12 @@ def _not_told(problem: Problem, theta: Array, found: Covariance) -> tuple[Note, 
     return tuple(notes)
 
 
-def _others(solution: Solution, found: Covariance) -> list[Note]:
+def _other_solution_notes(solution: Solution, found: Covariance) -> list[Note]:
     """Return a solution from another start that explains the logs equally well but lies elsewhere."""
     problem, best = solution.problem, solution.point
     for other in solution.others:
         away = np.abs(other - best.theta) / np.where(np.isfinite(found.std), found.std, np.inf)
-        if away.max() > APART and problem.at(other).cost < best.cost + AS_WELL:
+        if away.max() > DISTINCT_DEVIATIONS and problem.at(other).cost < best.cost + EQUAL_LIKELIHOOD:
             j = int(np.argmax(away))
             value = float(problem.values(other)[j])
             return [EquationsCode.STARTS_DISAGREE.note(parameter=problem.names[j], value=value)]

@@ -85,8 +85,8 @@ class Equations:
     derivative : callable
         ``derivative(state, inputs, parameters)``: the rates of all states, in their order. States and inputs are tuples
         whose elements also have names, parameters are accessed by name. Arithmetic, comparisons and NumPy's functions
-        (`plant.compiled.numpy_calls.KNOWN`) may be used; a choice that depends on a state is made by ``np.where``, not
-        ``if``.
+        (`plant.compiled.numpy_calls.SUPPORTED`) may be used; a choice that depends on a state is made by ``np.where``,
+        not ``if``.
     states, inputs, outputs : Mapping[str, str]
         Their names, each with its unit. Inputs and outputs are channels of a log.
     parameters : Mapping[str, Parameter]

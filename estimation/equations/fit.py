@@ -7,15 +7,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.arrays import Array
-from estimation.equations.conclude import Covariance, concluded, fits_of
+from estimation.equations.conclude import Covariance, concluded_finding, fits_of
 from estimation.equations.definition import Equations
 from estimation.equations.problem import Part, Problem, known_noise, part_of, start_of
-from estimation.equations.search import Solution, searched, stepped
+from estimation.equations.search import Solution, best_solution, with_enough_steps
 from estimation.finding import Finding
 from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
 
-EXACT = 1e-5
+STEP_ERROR_SHARE = 1e-5
 """Error from a simulation's step length that counts, over the output's range [fraction]."""
 
 
@@ -71,7 +71,7 @@ class EquationsFit:
         HydrostateError
             If a state that is named is none.
         """
-        return predicted(self, record, initial or {})
+        return predicted_outputs(self, record, initial or {})
 
 
 def fit_equations(
@@ -116,8 +116,8 @@ def fit_equations(
     if samples <= unknowns:
         raise LogError(f"more samples than unknowns are needed, got {samples} for {unknowns}")
     with threadpool_limits(limits=1, user_api="blas"):
-        solution = searched(equations, parts, given, robust=robust, starts=starts, seed=seed)
-        finding, covariance = concluded(solution, given)
+        solution = best_solution(equations, parts, given, robust=robust, starts=starts, seed=seed)
+        finding, covariance = concluded_finding(solution, given)
         problem, theta = solution.problem, solution.point.theta
         runs = problem.predicted(theta)
         return EquationsFit(
@@ -134,7 +134,7 @@ def fit_equations(
         )
 
 
-def predicted(fit: EquationsFit, record: Record, initial: Mapping[str, float]) -> Mapping[str, Array]:
+def predicted_outputs(fit: EquationsFit, record: Record, initial: Mapping[str, float]) -> Mapping[str, Array]:
     """Return the prediction of fitted equations on a log; see `EquationsFit.predicted`.
 
     Parameters
@@ -148,16 +148,16 @@ def predicted(fit: EquationsFit, record: Record, initial: Mapping[str, float]) -
         By output [its unit], shape (n,).
     """
     model, ours = fit.equations, fit.solution.problem
-    part = _driven(model, record)
+    part = _log_with_missing_outputs(model, record)
     problem = Problem(model, (part,), ours.scheme, ours.substeps, np.ones(len(model.outputs)))
     theta = _theta(problem, fit.values, initial)
     free = [j for j, name in enumerate(model.free, start=len(model.parameters)) if name not in initial]
     if free and np.isfinite(part.measured).any():
-        theta = _started(problem, theta, free)
+        theta = _with_fitted_starts(problem, theta, free)
     return dict(zip(model.outputs, problem.predicted(theta)[0], strict=True))
 
 
-def simulated(
+def simulated_outputs(
     equations: Equations, record: Record, values: Mapping[str, float], initial: Mapping[str, float]
 ) -> Mapping[str, Array]:
     """Return the simulation of equations with given parameters.
@@ -184,7 +184,7 @@ def simulated(
     strangers = [name for name in values if name not in equations.parameters]
     if strangers:
         raise HydrostateError(f"values names {strangers[0]!r}, which is none of {', '.join(equations.parameters)}")
-    part = _driven(equations, record)
+    part = _log_with_missing_outputs(equations, record)
     part = Part(part.inputs, np.full_like(part.measured, np.nan), part.sample_time)
     problem = Problem(equations, (part,), "rk4", 1, np.ones(len(equations.outputs)))
     starts = {name: one.start for name, one in equations.parameters.items()}
@@ -192,9 +192,9 @@ def simulated(
     bare = Part(part.inputs, np.zeros_like(part.measured), part.sample_time)
     rough = Problem(equations, (bare,), "rk4", 1, np.ones(len(equations.outputs)))
     for _ in range(2):  # the second pass chooses its steps by the size of the outputs, which the first one finds
-        rough = stepped(rough, theta)
+        rough = with_enough_steps(rough, theta)
         size = np.maximum(np.ptp(rough.predicted(theta)[0], axis=1), np.finfo(float).tiny)
-        rough = rough.with_noise(EXACT * size)
+        rough = rough.with_noise(STEP_ERROR_SHARE * size)
     return dict(zip(equations.outputs, rough.predicted(theta)[0], strict=True))
 
 
@@ -211,7 +211,7 @@ def _theta(problem: Problem, values: Mapping[str, float], initial: Mapping[str, 
     return problem.coordinates(np.array([*(float(values[name]) for name in model.parameters), *first]))
 
 
-def _driven(model: Equations, record: Record) -> Part:
+def _log_with_missing_outputs(model: Equations, record: Record) -> Part:
     """Return a log whose outputs may be missing."""
     absent = [name for name in model.outputs if name not in record or not np.isfinite(record[name]).any()]
     part = part_of(model, record.replace(**{name: np.zeros(len(record)) for name in absent}))
@@ -220,7 +220,7 @@ def _driven(model: Equations, record: Record) -> Part:
     return Part(part.inputs, measured, part.sample_time)
 
 
-def _started(problem: Problem, theta: Array, free: Sequence[int]) -> Array:
+def _with_fitted_starts(problem: Problem, theta: Array, free: Sequence[int]) -> Array:
     """Return the coordinates with the free initial states fitted to the log, by Gauss-Newton steps."""
     for _ in range(10):
         point = problem.at(theta)

@@ -14,7 +14,7 @@ from plant.compiled.functions import Scalar
 from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.solvers.steps import rk4_step, ros2_step
 
 Run: TypeAlias = Callable[[Array, Array, Array, float, int, Array, Array], None]
@@ -61,8 +61,8 @@ def traceable(equations: Equations) -> None:
         If they cannot be traced, or return what does not fit.
     """
     own = _Symbols(equations)
-    _moved(equations, "rk4", own)
-    _observed(equations, own)
+    _next_states(equations, "rk4", own)
+    _output_expressions(equations, own)
 
 
 class _Symbols:
@@ -91,14 +91,14 @@ def _source(model: Equations, scheme: str) -> str:
     columns = range(len(own.unknowns))
     point = places("point", [f"{s}{i}" for i in range(len(own.states)) for s in ("x", *(f"s{j}_" for j in columns))])
     data = {f"{when}{i}": f"{when}[{i}]" for when in ("before", "after") for i in range(len(model.inputs))}
-    moved = _rows(_moved(model, scheme, own), own.states, own.unknowns)
-    shown = _rows(_observed(model, own), own.states, own.unknowns)
+    moved = _values_and_slopes(_next_states(model, scheme, own), own.states, own.unknowns)
+    shown = _values_and_slopes(_output_expressions(model, own), own.states, own.unknowns)
     width = 1 + len(own.unknowns)
     seen = {f"shown[{k // width}, {k % width}]": value for k, value in enumerate(shown)}
     every = dict(zip(point, moved, strict=True)) | seen
     settled, rest = hoisted(every, {*point, *data, "start", "end", "h"}, "c")
     reads = point | data | places("fixed", settled)
-    begin = dict(zip(point, _rows(own.first, [], own.unknowns), strict=True))
+    begin = dict(zip(point, _values_and_slopes(own.first, [], own.unknowns), strict=True))
     return kernel_text(
         "a user's equations, with their sensitivities",
         function_source("settle", "values, known", own.places, settled),
@@ -107,13 +107,13 @@ def _source(model: Equations, scheme: str) -> str:
         function_source(
             "observe", "point, fixed, after, shown", reads, {one: rest[one] for one in seen}, {one: one for one in seen}
         ),
-        pasted(run, constants={"UNKNOWNS": len(own.unknowns), "OUTPUTS": len(model.outputs)}),
+        functions_text(run, constants={"UNKNOWNS": len(own.unknowns), "OUTPUTS": len(model.outputs)}),
     )
 
 
-def _moved(model: Equations, scheme: str, own: _Symbols) -> list[Expression]:
+def _next_states(model: Equations, scheme: str, own: _Symbols) -> list[Expression]:
     """Return the states after a step."""
-    ends = [_between(i, held=name in model.held) for i, name in enumerate(model.inputs)]
+    ends = [_start_and_rise(i, held=name in model.held) for i, name in enumerate(model.inputs)]
 
     def rates(now: Any, share: Scalar, parameters: Named) -> tuple[Scalar, ...]:
         inputs = grouped("Inputs", tuple(model.inputs), [low + share * rise for low, rise in ends])
@@ -125,13 +125,13 @@ def _moved(model: Equations, scheme: str, own: _Symbols) -> list[Expression]:
     )
 
 
-def _between(place: int, *, held: bool) -> tuple[Expression, Expression | float]:
+def _start_and_rise(place: int, *, held: bool) -> tuple[Expression, Expression | float]:
     """Return an input at the earlier sample, and its increase up to the later one."""
     before = symbol(f"before{place}")
     return before, 0.0 if held else symbol(f"after{place}") - before
 
 
-def _observed(model: Equations, own: _Symbols) -> list[Expression]:
+def _output_expressions(model: Equations, own: _Symbols) -> list[Expression]:
     if model.observe is None:
         return [own.states[list(model.states).index(name)] for name in model.outputs]
     inputs = grouped("Inputs", tuple(model.inputs), [symbol(f"after{i}") for i in range(len(model.inputs))])
@@ -139,7 +139,7 @@ def _observed(model: Equations, own: _Symbols) -> list[Expression]:
     return traced("observe", model.observe, tuple(model.outputs), state, inputs, own.parameters)
 
 
-def _rows(
+def _values_and_slopes(
     values: Sequence[Expression], state: Sequence[Expression], unknowns: Sequence[Expression]
 ) -> list[Expression]:
     """Return each value and its derivatives by the unknowns (chain rule, ``S' = F S + G``)."""

@@ -16,13 +16,13 @@ from plant.errors import HydrostateError
 MOST_STEPS = 64
 """Largest number of model steps for each sample."""
 
-STEPPED_WELL = 0.1
+LARGEST_STEP_CHANGE = 0.1
 """Change of the prediction with steps of half the length, over the noise, up to which a search may begin [fraction]."""
 
-SETTLED = 0.05
+LARGEST_SHIFT = 0.05
 """Change of the solution with steps of half the length, in its own standard deviations, up to which it is accepted."""
 
-BALANCED = 0.1
+BALANCED_NOISE = 0.1
 """Noise assumed for every output while a search begins, over its spread [fraction]: no output outweighs the others."""
 
 LEAST_NOISE = 1e-6
@@ -31,7 +31,7 @@ LEAST_NOISE = 1e-6
 EVALUATIONS, SCREENING = 100, 15
 """Evaluations that a descent may take, and evaluations for every start if there are several."""
 
-PROMISED = 1e-7
+LEAST_PREDICTED_GAIN = 1e-7
 """Decrease of half the sum of squares predicted for a further step, below which the search ends: less moves no unknown
 by a 2000th of its deviation."""
 
@@ -41,7 +41,7 @@ FINALISTS = 3
 LENGTHS = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 """Beginnings of the logs on which a search is guided if it failed on the whole [fraction]."""
 
-ASTRAY = 3.0
+UNEXPLAINED_RATIO = 3.0
 """Residuals over the noise from the log's second differences, above which this is tried [dimensionless]."""
 
 FEWEST_AT_FIRST = 30
@@ -74,7 +74,7 @@ class Solution:
     evaluations: int = 0
 
 
-def searched(
+def best_solution(
     equations: Equations, parts: Sequence[Part], noise: Array, *, robust: bool, starts: int, seed: int
 ) -> Solution:
     """Return the best fit found.
@@ -102,15 +102,15 @@ def searched(
     first = np.where(np.isnan(noise), np.maximum(noise_of(parts), LEAST_NOISE * typical), noise)
     problem = Problem(equations, tuple(parts), "rk4", 1, first, robust)
     guesses = _guesses(problem, starts, seed)
-    problem = stepped(problem, guesses[0])
-    rough = problem.with_noise(BALANCED * typical)
-    ends = _descended(rough, guesses)
-    if not _explained(problem, ends[0].theta, first):
-        ends = sorted([*ends, _lengthened(rough, guesses[0])], key=lambda point: point.cost)
-    solution = _refined(problem, ends[0], noise, typical)
-    while solution.moved > SETTLED and solution.problem.substeps < MOST_STEPS:
+    problem = with_enough_steps(problem, guesses[0])
+    rough = problem.with_noise(BALANCED_NOISE * typical)
+    ends = _optima(rough, guesses)
+    if not _is_explained(problem, ends[0].theta, first):
+        ends = sorted([*ends, _optimum_by_lengthening(rough, guesses[0])], key=lambda point: point.cost)
+    solution = _refined_solution(problem, ends[0], noise, typical)
+    while solution.moved > LARGEST_SHIFT and solution.problem.substeps < MOST_STEPS:
         finer = replace(solution.problem, substeps=2 * solution.problem.substeps)
-        solution = _refined(finer, solution.point, noise, typical)
+        solution = _refined_solution(finer, solution.point, noise, typical)
     return replace(solution, others=tuple(end.theta for end in ends[1:]))
 
 
@@ -143,7 +143,7 @@ def _guesses(problem: Problem, starts: int, seed: int) -> list[Array]:
     return found
 
 
-def stepped(problem: Problem, theta: Array) -> Problem:
+def with_enough_steps(problem: Problem, theta: Array) -> Problem:
     """Return the problem with the fewest steps that predict well: explicit, or implicit if the equations are stiff.
 
     Parameters
@@ -163,11 +163,11 @@ def stepped(problem: Problem, theta: Array) -> Problem:
             one = replace(problem, scheme=scheme, substeps=steps)
             for count in (steps, 2 * steps):
                 if count not in runs:
-                    runs[count] = _whole(replace(one, substeps=count), theta)
+                    runs[count] = _finite_residuals(replace(one, substeps=count), theta)
             coarse, fine = runs[steps], runs[2 * steps]
             if coarse is not None and fine is not None:
                 change = float(np.sqrt(np.mean((coarse - fine) ** 2)))
-                if change < STEPPED_WELL:
+                if change < LARGEST_STEP_CHANGE:
                     return one
                 tried.append((change, one))
             steps *= 2
@@ -176,13 +176,13 @@ def stepped(problem: Problem, theta: Array) -> Problem:
     return min(tried, key=lambda pair: pair[0])[1]
 
 
-def _whole(problem: Problem, theta: Array) -> Array | None:
+def _finite_residuals(problem: Problem, theta: Array) -> Array | None:
     """Return all residuals, or None if they are not finite."""
     errors = np.concatenate([one.ravel() for one in problem.residuals(theta)])
     return errors if np.isfinite(errors).all() else None
 
 
-def _descended(problem: Problem, guesses: Sequence[Array]) -> list[Point]:
+def _optima(problem: Problem, guesses: Sequence[Array]) -> list[Point]:
     """Return the optima reached from the better starts, best first."""
     points = [problem.at(guess) for guess in guesses]
     able = [point.theta for point in points if np.isfinite(point.cost)]
@@ -195,13 +195,13 @@ def _descended(problem: Problem, guesses: Sequence[Array]) -> list[Point]:
     return sorted(ends, key=lambda point: point.cost)
 
 
-def _explained(problem: Problem, theta: Array, noise: Array) -> bool:
+def _is_explained(problem: Problem, theta: Array, noise: Array) -> bool:
     """Return whether the residuals are as small as the noise of the measured outputs."""
     errors = np.concatenate(problem.with_noise(noise).residuals(theta), axis=1)
-    return bool(np.isfinite(errors).all() and np.sqrt(np.mean(errors**2, axis=1)).max() < ASTRAY)
+    return bool(np.isfinite(errors).all() and np.sqrt(np.mean(errors**2, axis=1)).max() < UNEXPLAINED_RATIO)
 
 
-def _lengthened(problem: Problem, guess: Array) -> Point:
+def _optimum_by_lengthening(problem: Problem, guess: Array) -> Point:
     """Return the result of a search along ever longer beginnings, which keeps an oscillation in phase."""
     theta = guess
     for share in LENGTHS:
@@ -215,20 +215,20 @@ def _lengthened(problem: Problem, guess: Array) -> Point:
     return problem.at(theta)
 
 
-def _refined(problem: Problem, point: Point, noise: Array, typical: Array) -> Solution:
+def _refined_solution(problem: Problem, point: Point, noise: Array, typical: Array) -> Solution:
     """Return the fit continued until noise and unknowns agree, and how far it depends on the steps' length."""
     left = 0
     for _ in range(ROUNDS):
-        deviations = np.where(np.isnan(noise), _shown(problem, point.theta, typical), noise)
+        deviations = np.where(np.isnan(noise), _residual_deviations(problem, point.theta, typical), noise)
         same = bool(np.allclose(deviations, problem.noise, rtol=0.01))
         problem = problem.with_noise(deviations)
-        point, left = _finished(problem, point.theta)
+        point, left = _final_descent(problem, point.theta)
         if same:
             break
-    return Solution(problem, point, moved=_moved(problem, point), evaluations=left)
+    return Solution(problem, point, moved=_step_length_shift(problem, point), evaluations=left)
 
 
-def _finished(problem: Problem, theta: Array) -> tuple[Point, int]:
+def _final_descent(problem: Problem, theta: Array) -> tuple[Point, int]:
     counted = 0
 
     def at(where: Array) -> Point:
@@ -236,11 +236,11 @@ def _finished(problem: Problem, theta: Array) -> tuple[Point, int]:
         counted += 1
         return problem.at(where)
 
-    point = descend(at, theta, EVALUATIONS, problem.bounds, PROMISED)
+    point = descend(at, theta, EVALUATIONS, problem.bounds, LEAST_PREDICTED_GAIN)
     return point, EVALUATIONS if counted >= EVALUATIONS else 0
 
 
-def _shown(problem: Problem, theta: Array, typical: Array) -> Array:
+def _residual_deviations(problem: Problem, theta: Array, typical: Array) -> Array:
     """Return the deviation of each output's residuals; degrees of freedom are shared in proportion to samples."""
     errors = problem.errors(theta)
     free = max(1.0 - len(theta) / sum(map(len, errors)), 0.1)
@@ -251,10 +251,10 @@ def _shown(problem: Problem, theta: Array, typical: Array) -> Array:
     return np.maximum(size, LEAST_NOISE * typical)
 
 
-def _moved(problem: Problem, point: Point) -> float:
+def _step_length_shift(problem: Problem, point: Point) -> float:
     """Return the shift of the solution with steps of half the length, in standard deviations: ``|Q'e|``."""
-    finer = _whole(replace(problem, substeps=2 * problem.substeps), point.theta)
-    coarse = _whole(problem, point.theta)
+    finer = _finite_residuals(replace(problem, substeps=2 * problem.substeps), point.theta)
+    coarse = _finite_residuals(problem, point.theta)
     if finer is None or coarse is None:
         return np.inf
     values, vectors = np.linalg.eigh(point.gram)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plant.compiled.expression import Expression, as_expression
-from plant.compiled.numpy_calls import KNOWN
+from plant.compiled.numpy_calls import SUPPORTED
 from plant.errors import HydrostateError
 
 
@@ -78,7 +78,7 @@ def traced(
     except TypeError as error:
         said = str(error)
         if "Expression" in said:  # the message of math functions and float for a symbol
-            said = f"{said.replace('Expression', 'a symbol')}; it may call NumPy's {KNOWN}, and no function of math"
+            said = f"{said.replace('Expression', 'a symbol')}; it may call NumPy's {SUPPORTED}, and no function of math"
         raise HydrostateError(f"{name} cannot be traced: {said}") from error
     except HydrostateError as error:
         raise HydrostateError(f"{name}: {error.message}") from None

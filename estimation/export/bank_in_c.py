@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from estimation.export.rule_in_c import RuleInC
 from estimation.filters.imm_loops import STEP
 from estimation.models.model import ProcessModel
-from plant.compiled.c99.loops import Outside, Translation
+from plant.compiled.c99.loops import ExternalFunction, Translation
 from plant.compiled.c99.precision import Precision
 from plant.compiled.c99.shapes import Block, Scalar, Thing
 
@@ -49,10 +49,12 @@ def bank_in_c(
     """
     belief = model.width + model.width * (model.width + 1) // 2
     outside = {
-        "predict": Outside(
+        "predict": ExternalFunction(
             f"{prefix}_predict_mode", (False, True, False, False, False, False), rule.operations["predict"]
         ),
-        "update": Outside(f"{prefix}_update_mode", (False, True, False, False, True), rule.operations["update"]),
+        "update": ExternalFunction(
+            f"{prefix}_update_mode", (False, True, False, False, True), rule.operations["update"]
+        ),
     }
     constants = {"WIDTH": model.width, "BELIEF": belief}
     translation = Translation({one.__name__: one for one in STEP}, constants, outside, precision, prefix)
@@ -76,6 +78,8 @@ def bank_in_c(
         (each, block("seen", modes, 2, channels), each, each, each, room),
         (sample, sample, block("innovations", 2, channels)),
     ]
-    step = translation.entered("step_bank", given, {"substeps": substeps})
-    translation.entered("combine", [Scalar("density"), states, each, block("shift", belief), block("overall", belief)])
+    step = translation.translate("step_bank", given, {"substeps": substeps})
+    translation.translate(
+        "combine", [Scalar("density"), states, each, block("shift", belief), block("overall", belief)]
+    )
     return BankInC(translation.text, step.operations)

@@ -89,7 +89,7 @@ def filter_in_c(problem: FilterProblem, method: str = "ekf", *, name: str, preci
     """
     require_known("a method that can be exported", method, EXPORTED)
     real, name = precision_of(precision), checked_name(name)
-    rule, _, numbers = _chosen(problem, method)
+    rule, _, numbers = _rule_and_numbers(problem, method)
     written = rule_in_c(rule, problem.model, problem.channels, real, name, scored=method != "imm")
     bank = None
     if method == "imm":
@@ -112,7 +112,7 @@ def filter_in_c(problem: FilterProblem, method: str = "ekf", *, name: str, preci
     return c_files("estimation", "filter", name, real, facts)
 
 
-def _chosen(problem: FilterProblem, method: str) -> tuple[Rule, Sequence[Setting], Numbers]:
+def _rule_and_numbers(problem: FilterProblem, method: str) -> tuple[Rule, Sequence[Setting], Numbers]:
     rule = weighing(RULES.get(method, EKF), problem.robust)
     chosen = chosen_settings(problem, method, IMM_SETTINGS if method == "imm" else rule.settings)
     packed = problem.covariance[upper_triangle(problem.model.width)]
@@ -159,7 +159,7 @@ def numbers_of(problem: FilterProblem, method: str) -> Array:
     ndarray, shape (modes, rows)
         Its values, named by `row_notes`.
     """
-    return _chosen(problem, method)[2].rows
+    return _rule_and_numbers(problem, method)[2].rows
 
 
 def row_notes(problem: FilterProblem, method: str) -> list[tuple[str, str, str]]:
@@ -175,18 +175,18 @@ def row_notes(problem: FilterProblem, method: str) -> list[tuple[str, str, str]]
     list of (str, str, str)
         One for each row of `numbers_of`.
     """
-    model, settings = problem.model, _chosen(problem, method)[1]
+    model, settings = problem.model, _rule_and_numbers(problem, method)[1]
     told = [(name, note.unit, note.meaning) for name, note in notes(model.parameters).items()]
     for state in model.states:
         size = "" if state.logarithmic else f" over ({state.scale:g} {state.unit})^2"
         kind = "the logarithm of " if state.logarithmic else ""
         told.append((f"noise_{state.name}", "1/s", f"process-noise density of {kind}{state.name}{size}"))
-    told += [(f"variance_{one}", _squared(CHANNELS[one]), f"variance of {one}") for one in problem.channels]
+    told += [(f"variance_{one}", _squared_unit(CHANNELS[one]), f"variance of {one}") for one in problem.channels]
     told += [(setting.name, "1", "setting of the filter") for setting in settings]
     return [*told, ("step", "s", "step of the model"), ("share", "1", "its share of a sample")]
 
 
-def _squared(unit: str) -> str:
+def _squared_unit(unit: str) -> str:
     return "/".join(f"{part}^2" for part in unit.split("/"))
 
 

@@ -3,7 +3,7 @@
 from estimation.engine.contract import FilterProblem
 from estimation.export.c_filter import filter_in_c, numbers_of, row_notes
 from plant.export.fmu import archive
-from plant.export.fmu_description import Described, Variable
+from plant.export.fmu_description import ModelDescription, Variable
 from plant.log.record import CHANNELS
 
 
@@ -48,5 +48,5 @@ def filter_fmu(problem: FilterProblem, method: str, fmi: str, *, name: str) -> b
         ]
     variables.append(Variable("gate", "1", "what speaks against the estimate, 0 for nothing", "output"))
     about = f"{method} on the {problem.model.name} form of the electro-hydrostatic actuator"
-    model = Described(name, about, "", variables, problem.sample_time, interpolates=False)
+    model = ModelDescription(name, about, "", variables, problem.sample_time, interpolates=False)
     return archive(model, files, ("estimation", "export/templates", "fmu_filter.c", "filter"), fmi)

@@ -66,7 +66,7 @@ def filter_task(
     model.require_drives(record)
     guess = parameters.bulk_modulus if start is None else start
     if model is FLOW_FILTER or form in CHAMBER_FORMS:
-        return _by_flow(record, parameters, form, guess)
+        return _flow_task(record, parameters, form, guess)
     belief, channels = first_belief(model, record, guess, START_STD), available_channels(model, record)
     noise: Mapping[str, float] = {PRESSURE: PRESSURE_NOISE_LOGGED} if PRESSURE in channels else {}
     variances: Mapping[str, float] | None = None
@@ -81,7 +81,7 @@ def filter_task(
     return replace(problem, model=wide)
 
 
-def _by_flow(record: Record, parameters: EhaParameters, form: str, guess: float) -> FilterProblem:
+def _flow_task(record: Record, parameters: EhaParameters, form: str, guess: float) -> FilterProblem:
     """Return the task of a filter that is driven by measured flows and measures only differential pressure."""
     if PRESSURE not in record:
         raise LogError(f"the {form} form needs {PRESSURE}, the record has {', '.join(record)}")

@@ -16,7 +16,7 @@ from estimation.arrays import Array, IntArray
 from estimation.engine.contract import FilterProblem, Trace, empty_trace
 from estimation.engine.kernels import LANES
 from estimation.engine.rule import Rule
-from estimation.engine.runner import aligned, prepared, read_off, run_rule
+from estimation.engine.runner import aligned_array, final_traces, prepared_kernel, run_rule
 from estimation.filters.ekf import EKF
 from plant.compiled.source import ROWS
 from plant.errors import HydrostateError
@@ -78,33 +78,33 @@ def _run_block(rule: Rule, width: int, block: Sequence[FilterProblem]) -> list[T
     if len(block) < FEWEST_IN_LANES or len(first.measured) < ROWS:
         return [run_rule(rule, problem) for problem in block]
     lanes = [block[min(lane, len(block) - 1)] for lane in range(width)]
-    places, kernel, work = prepared(rule, lanes)
+    places, kernel, work = prepared_kernel(rule, lanes)
     track = np.empty(((len(first.measured) - 1) // first.every + 1, first.model.width, width))
     track_variance, logs = np.empty_like(track), np.zeros((len(first.channels), width))
     drives = [np.ascontiguousarray(problem.drives, np.float64) for problem in lanes]
     measured = [np.ascontiguousarray(problem.measured, np.float64) for problem in lanes]
     nothing = np.empty((0, len(first.channels)))
-    room = aligned(len(first.model.drives) + len(first.channels), ROWS, width)
+    room = aligned_array(len(first.model.drives) + len(first.channels), ROWS, width)
     results = track, track_variance, logs, nothing, nothing
-    where = _places(drives), _places(measured)
+    where = _addresses(drives), _addresses(measured)
     kernel.run(work.ravel(), *where, room, len(first.measured), first.substeps, first.every, results)
     tracks, spreads = (np.ascontiguousarray(np.moveaxis(one, -1, 0)) for one in (track, track_variance))
     blank = empty_trace(replace(first, keep_innovations=False))
     traces = [blank._replace(track=own, track_variance=spread) for own, spread in zip(tracks, spreads, strict=True)]
-    return read_off(places, lanes, work, logs, traces)[: len(block)]
+    return final_traces(places, lanes, work, logs, traces)[: len(block)]
 
 
-def _places(arrays: Sequence[Array]) -> IntArray:
+def _addresses(arrays: Sequence[Array]) -> IntArray:
     """Return the addresses at which arrays begin."""
     return np.array([one.ctypes.data for one in arrays])
 
 
-ALIKE = ("channels", "sample_time", "substeps", "every", "robust", "settings")
+SHARED_PROPERTIES = ("channels", "sample_time", "substeps", "every", "robust", "settings")
 """Properties that the filters of a block share besides the model."""
 
 
 def _require_alike(first: FilterProblem, problem: FilterProblem) -> None:
-    for name in ALIKE:
+    for name in SHARED_PROPERTIES:
         if getattr(problem, name) != getattr(first, name):
             raise HydrostateError(
                 f"filters of a batch must agree in {name}, got {getattr(first, name)} and {getattr(problem, name)}"

@@ -14,13 +14,13 @@ from estimation.engine.kalman import (
     Mean,
     Outputs,
     belief_symbols,
-    believed,
-    bounded,
+    bounded_belief,
+    bounded_mean,
+    channel_projection,
     entry,
-    moved,
-    observed,
+    next_state,
+    predicted_outputs,
     process_noise,
-    projected,
     scaled_step,
     total,
 )
@@ -41,17 +41,17 @@ def ekf_predict(model: ProcessModel) -> Outputs:
         New value of each mean ``z`` and covariance ``P`` symbol.
     """
     prior, P = belief_symbols(model)
-    mean = moved(model, prior)
-    held = bounded(model, mean)
+    mean = next_state(model, prior)
+    held = bounded_mean(model, mean)
     # a state that the model does not move is within its bounds already, from the previous update
     outputs = {f"z{i}": z if z.operation == "symbol" else held[i] for i, z in enumerate(mean)}
-    after = spread(mean, prior, P) if waypoints_of(mean) else _transformed(scaled_step(model)[1], P)
+    after = spread(mean, prior, P) if waypoints_of(mean) else _transformed_covariance(scaled_step(model)[1], P)
     for (i, j), value in after.items():
         outputs[f"P{i}_{j}"] = value + process_noise(model, i) if i == j else value
     return outputs
 
 
-def _transformed(F: Sequence[Sequence[Expression]], P: Covariance) -> Covariance:
+def _transformed_covariance(F: Sequence[Sequence[Expression]], P: Covariance) -> Covariance:
     """Return the upper triangle of ``F P F'``, each entry summed over the row of the Jacobian with fewer terms."""
     each = range(len(F))
     FP = [[total([F[i][k] * entry(P, k, j) for k in each]) for j in each] for i in each]
@@ -81,7 +81,7 @@ def ekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "none
     """
     prior, _ = belief_symbols(model)
     found = linearised_update(model, channels, prior, noise_symbols(channels), robust)
-    return found.seen | believed(model, found.mean, found.covariance)
+    return found.seen | bounded_belief(model, found.mean, found.covariance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,18 +138,18 @@ def linearised_update(
     mean, covariance = belief_symbols(model)
     seen, inflated, earlier = Outputs(), list[Expression](), None
     gains: list[tuple[list[Expression], list[Expression], Expression, Expression]] = []
-    for c, row in enumerate(jacobian(observed(model, point, channels), point)):
-        unit = _unit(row)
+    for c, row in enumerate(jacobian(predicted_outputs(model, point, channels), point)):
+        unit = _unit_slope(row)
         H = [ONE if slope is unit else slope for slope in row]
         present, r = unary("present", symbol(f"y{c}")), noise[c] / unit**2
-        residual = symbol(f"y{c}") / unit - _linearised(model, point, mean, channels, c) / unit
-        PH, projection = projected(covariance, H)
+        residual = symbol(f"y{c}") / unit - _linearised_prediction(model, point, mean, channels, c) / unit
+        PH, projection = channel_projection(covariance, H)
         r = r * inflation(robust, residual * residual / (projection + r))
         variance = projection + r
         inverse = 1.0 / variance if earlier is None else _second_inverse(earlier, H, r)
         if earlier is not None:
             seen[f"w{c}"] = inverse / unit**2
-        earlier = _Earlier(present, covariance, PH, variance) if earlier is None and robust == "none" else None
+        earlier = _EarlierChannel(present, covariance, PH, variance) if earlier is None and robust == "none" else None
         weight, clean = select(present, inverse, ZERO), select(present, residual, ZERO)
         gain = [value * weight for value in PH]
         covariance = {(i, j): value - gain[i] * PH[j] for (i, j), value in covariance.items()}
@@ -160,7 +160,7 @@ def linearised_update(
     return Update(mean, covariance, seen, inflated, gains)
 
 
-class _Earlier(NamedTuple):
+class _EarlierChannel(NamedTuple):
     """The first of two channels: whether it is present, the covariance before it, ``P H'``, and its variance."""
 
     present: Expression
@@ -169,29 +169,29 @@ class _Earlier(NamedTuple):
     variance: Expression
 
 
-def _second_inverse(earlier: _Earlier, H: Sequence[Expression], r: Expression) -> Expression:
+def _second_inverse(earlier: _EarlierChannel, H: Sequence[Expression], r: Expression) -> Expression:
     """Return one over the second channel's variance, without waiting for one over the first's.
 
     The variances of two channels in turn have the product ``S00 S11 - S01^2``, of variances before both.
     """
-    alone = projected(earlier.covariance, H)[1] + r
+    alone = channel_projection(earlier.covariance, H)[1] + r
     across = total([slope * value for slope, value in zip(H, earlier.PH, strict=True)])
     joint = earlier.variance * alone - across * across
     return select(earlier.present, earlier.variance, ONE) / select(earlier.present, joint, alone)
 
 
-def _unit(row: Sequence[Expression]) -> Expression:
+def _unit_slope(row: Sequence[Expression]) -> Expression:
     """Return the constant slope of a channel that observes a single state, as the unit of its update; else one."""
     seen = [slope for slope in row if slope is not ZERO]
     return seen[0] if len(seen) == 1 and seen[0].operation == "constant" else ONE
 
 
-def _linearised(model: ProcessModel, point: Mean, mean: Mean, channels: Sequence[str], c: int) -> Expression:
+def _linearised_prediction(model: ProcessModel, point: Mean, mean: Mean, channels: Sequence[str], c: int) -> Expression:
     """Return the prediction of a channel from a mean, with the model linearised about a point."""
-    predicted = observed(model, point, channels)[c]
+    predicted = predicted_outputs(model, point, channels)[c]
     row = jacobian([predicted], point)[0]
     if all(slope.operation == "constant" for slope in row):  # a linear channel
-        return observed(model, mean, channels)[c]
+        return predicted_outputs(model, mean, channels)[c]
     return predicted + total([slope * (new - old) for slope, new, old in zip(row, mean, point, strict=True)])
 
 

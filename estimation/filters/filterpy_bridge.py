@@ -46,7 +46,9 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", LinAlgWarning)  # an ill-conditioned covariance stays usable for a long time
         try:
-            log_likelihood = sum(_sample(kalman, problem, trace, H, bounds, k) for k in range(len(problem.measured)))
+            log_likelihood = sum(
+                _filter_sample(kalman, problem, trace, H, bounds, k) for k in range(len(problem.measured))
+            )
         except (np.linalg.LinAlgError, ValueError):  # numpy and scipy raise these if the covariance is no longer valid
             lost = np.full_like(problem.mean, np.nan)
             return trace._replace(mean=lost, covariance=np.outer(lost, lost), log_likelihood=math.nan)
@@ -58,12 +60,14 @@ def _filter(problem: FilterProblem) -> Any:
     from filterpy.kalman import ExtendedKalmanFilter
 
     kalman: Any = ExtendedKalmanFilter(dim_x=problem.model.width, dim_z=len(problem.channels))
-    kalman.x, kalman.P, kalman.opened = problem.mean.copy(), problem.covariance.copy(), problem.opened
+    kalman.x, kalman.P, kalman.added_variance = problem.mean.copy(), problem.covariance.copy(), problem.added_variance
     kalman.predict_x = lambda u=0: None  # noqa: ARG005  filterpy passes a drive
     return kalman
 
 
-def _sample(kalman: Any, problem: FilterProblem, trace: Trace, H: Array, bounds: tuple[Array, Array], k: int) -> float:
+def _filter_sample(
+    kalman: Any, problem: FilterProblem, trace: Trace, H: Array, bounds: tuple[Array, Array], k: int
+) -> float:
     """Predict to sample k and update with it; return its log-likelihood."""
     if k:
         _predict(kalman, problem, k)
@@ -108,7 +112,7 @@ def _observation_matrix(problem: FilterProblem) -> Array:
 def _predict(kalman: Any, problem: FilterProblem, k: int) -> None:
     step = compile_step(problem.model).step
     h = problem.sample_time / problem.substeps
-    kalman.Q = np.diag(problem.noise) * h + np.diag(kalman.opened[k]) / problem.substeps
+    kalman.Q = np.diag(problem.noise) * h + np.diag(kalman.added_variance[k]) / problem.substeps
     slope = (problem.drives[k] - problem.drives[k - 1]) / problem.substeps
     for j in range(problem.substeps):
         start = problem.drives[k - 1] + j * slope

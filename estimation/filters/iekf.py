@@ -16,7 +16,7 @@ state is logarithmic.
 from collections.abc import Sequence
 from functools import partial
 
-from estimation.engine.kalman import Outputs, belief_symbols, believed, bounded
+from estimation.engine.kalman import Outputs, belief_symbols, bounded_belief, bounded_mean
 from estimation.engine.rule import Rule
 from estimation.engine.runner import run_rule
 from estimation.filters.ekf import ekf_predict, ekf_update, linearised_update, noise_symbols
@@ -48,8 +48,8 @@ def iekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "non
     first = linearised_update(model, channels, prior, noise_symbols(channels), robust)
     found = first
     for _ in range(PASSES - 1):
-        found = linearised_update(model, channels, bounded(model, found.mean), first.noise)
-    return first.seen | believed(model, found.mean, found.covariance)
+        found = linearised_update(model, channels, bounded_mean(model, found.mean), first.noise)
+    return first.seen | bounded_belief(model, found.mean, found.covariance)
 
 
 IEKF = Rule("iekf", ekf_predict, iekf_update)

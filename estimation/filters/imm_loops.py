@@ -15,7 +15,7 @@ from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 
 Kind = tuple[Rule, ProcessModel]
 """A filter on a model, shared by modes that differ only in parameters."""
@@ -325,7 +325,7 @@ def compile_imm(kinds: tuple[Kind, ...], channels: tuple[str, ...]) -> ImmKernel
         _dispatch("prepare", "rows, constants", len(kinds)),
         _dispatch("predict", "state, constants, before, after, j", len(kinds)),
         _dispatch("update", "state, constants, sample, seen", len(kinds)),
-        pasted(*STEP, unpack, run, constants=sizes),
+        functions_text(*STEP, unpack, run, constants=sizes),
     )
     names = "_".join(f"{rule.name}_{model.name}" for rule, model in kinds)
     text = kernel_text(f"interacting models, {names}", *parts)

@@ -27,13 +27,13 @@ from plant.errors import HydrostateError
 ITERATIONS = 50
 """Largest number of corrections."""
 
-AT_REST = 1e-3
+SETTLED_DECREASE = 1e-3
 """Decrease of the sum of squares below which it has settled: a thirtieth of a standard deviation [dimensionless]."""
 
-SHORTENED = 0.4
+STEP_FACTOR = 0.4
 """Factor on a step that does not lower the sum of squares."""
 
-SHORTEST = 1e-4
+LEAST_STEP_SHARE = 1e-4
 """Share of a correction below which the search ends."""
 
 WEIGHINGS = 10
@@ -59,7 +59,7 @@ class _Search:
         n, (samples, channels) = problem.model.width, problem.measured.shape
         self.problem = problem
         self.kernel = compile_trajectory(problem.model, problem.channels, problem.robust)
-        self.opened = problem.opened + problem.noise * problem.sample_time
+        self.added_variance = problem.added_variance + problem.noise * problem.sample_time
         self.bounds = np.array([state.scaled_bounds for state in problem.model.states])
         drives, measured = (np.ascontiguousarray(one, np.float64) for one in (problem.drives, problem.measured))
         self.log = Log(
@@ -77,7 +77,7 @@ class _Search:
         """Return the model's run for an adjoint."""
         states, known = np.empty_like(adjoint), self.problem.covariance @ adjoint[0]
         start = self.problem.mean + known
-        cost = self.kernel.roll(start, adjoint, self.opened, self.bounds, self.log, states)
+        cost = self.kernel.roll(start, adjoint, self.added_variance, self.bounds, self.log, states)
         return _Trajectory(adjoint, states, float(cost + adjoint[0] @ known))
 
     def begin(self) -> _Trajectory:
@@ -94,7 +94,7 @@ class _Search:
     def linearise(self, at: _Trajectory) -> Array:
         """Linearise along a trajectory, and return the filter's covariance at the end of the log."""
         P = self.problem.covariance.copy()
-        way = (at.states, at.adjoint, self.opened, self.log)
+        way = (at.states, at.adjoint, self.added_variance, self.log)
         self.kernel.forward(self.problem.mean, P, *way, self.lines, self.problem.every)
         return P
 
@@ -104,11 +104,11 @@ class _Search:
         wanted = np.empty_like(at.adjoint)
         self.kernel.backward(self.lines, wanted)
         share = 1.0
-        while share > SHORTEST:
+        while share > LEAST_STEP_SHARE:
             candidate = self.run(at.adjoint + share * (wanted - at.adjoint))
             if candidate.cost < at.cost:
                 return candidate
-            share *= SHORTENED
+            share *= STEP_FACTOR
         return None
 
     def descend(self, at: _Trajectory) -> _Trajectory:
@@ -118,7 +118,7 @@ class _Search:
             if better is None:
                 break
             at, fallen = better, at.cost - better.cost
-            if fallen < AT_REST:
+            if fallen < SETTLED_DECREASE:
                 break
         return at
 
@@ -152,18 +152,18 @@ def iterated_smoother(problem: FilterProblem) -> Trace:
     search = _Search(problem)
     at = search.begin()
     if not np.isfinite(at.cost):
-        return _lost(problem)
+        return _diverged_trace(problem)
     at = search.descend(at)
     if problem.robust != "none":
         for _ in range(WEIGHINGS):
             before = search.reweigh(at)
             at = search.descend(before)
-            if before.cost - at.cost < AT_REST:
+            if before.cost - at.cost < SETTLED_DECREASE:
                 break
-    return _reported(search, at)
+    return _trace_along(search, at)
 
 
-def _lost(problem: FilterProblem) -> Trace:
+def _diverged_trace(problem: FilterProblem) -> Trace:
     trace = empty_trace(problem)
     for part in (trace.mean, trace.covariance, trace.track, trace.track_variance, trace.residuals):
         part.fill(np.nan)
@@ -171,7 +171,7 @@ def _lost(problem: FilterProblem) -> Trace:
     return trace._replace(log_likelihood=float("nan"))
 
 
-def _reported(search: _Search, at: _Trajectory) -> Trace:
+def _trace_along(search: _Search, at: _Trajectory) -> Trace:
     """Return the trajectory with the covariances and innovations of the filter linearised along it."""
     problem, lines = search.problem, search.lines
     final = search.linearise(at)

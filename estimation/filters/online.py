@@ -12,7 +12,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, empty_trace
 from estimation.engine.rule import Rule
-from estimation.engine.runner import prepared, read_off
+from estimation.engine.runner import final_traces, prepared_kernel
 from estimation.filters.ckf import CKF
 from estimation.filters.ekf import EKF
 from estimation.filters.iekf import IEKF
@@ -24,7 +24,7 @@ from plant.errors import HydrostateError, require_known
 RULES: Mapping[str, Rule] = {rule.name: rule for rule in (EKF, IEKF, UKF, CKF, SVSF, SIF)}
 """Filters that predict, then update, by name: those that can filter a stream."""
 
-NEVER = 1 << 62
+FIRST_ROW_ONLY = 1 << 62
 """Interval between rows of a track so long that only the first row is kept [samples]."""
 
 
@@ -68,7 +68,7 @@ class OnlineFilter:
     def __init__(self, problem: FilterProblem, method: str = "ekf") -> None:
         require_known("a method that filters a stream", method, RULES)
         self.problem, self.method = problem, method
-        self._places, self._kernel, self._work = prepared(RULES[method], [problem])
+        self._places, self._kernel, self._work = prepared_kernel(RULES[method], [problem])
         self._logs = np.zeros((len(problem.channels), 1))
         self._track = np.empty((2, 1, problem.model.width))
         self._seen = np.empty((2, 0, len(problem.channels)))
@@ -103,7 +103,7 @@ class OnlineFilter:
         where = held.ctypes.data, seen.ctypes.data
         results = (*self._track, self._logs, *self._seen)
         substeps = self.problem.substeps
-        self._kernel.steps(self._work.ravel(), *where, self.taken, 0, len(held), substeps, NEVER, results)
+        self._kernel.steps(self._work.ravel(), *where, self.taken, 0, len(held), substeps, FIRST_ROW_ONLY, results)
         self.taken += len(held)
         self._drive = held[-1].copy()
 
@@ -120,7 +120,7 @@ class OnlineFilter:
 
     def now(self) -> CurrentBelief:
         """Return the belief after the last sample."""
-        (trace,) = read_off(self._places, [self.problem], self._work, self._logs, [empty_trace(self.problem)])
+        (trace,) = final_traces(self._places, [self.problem], self._work, self._logs, [empty_trace(self.problem)])
         values, slope = self.problem.model.to_si(trace.mean)
         deviations = np.sqrt(np.maximum(np.diag(trace.covariance), 0.0)) * slope
         return CurrentBelief(values, deviations, trace.nis, trace.count, trace.log_likelihood)

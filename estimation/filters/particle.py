@@ -20,7 +20,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Samples, Trace, empty_trace
-from estimation.engine.kalman import belief_symbols, bounded, moved, observed, process_noise
+from estimation.engine.kalman import belief_symbols, bounded_mean, next_state, predicted_outputs, process_noise
 from estimation.engine.layout import layout
 from estimation.engine.parts import data_places, function_source
 from estimation.engine.rule import Setting, chosen_settings
@@ -30,7 +30,7 @@ from estimation.models.model import ProcessModel
 from plant.compiled.expression import unary
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.errors import HydrostateError
 
 Move: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
@@ -43,7 +43,7 @@ Spread: TypeAlias = Callable[[Array, Array, Array], None]
 """``spread(rows, after, deviations)``: standard deviation that the noise of a sub-step gives each state."""
 
 
-DRAWN = 1_000_000
+MOST_DRAWN = 1_000_000
 """Largest number of random numbers drawn at a time, or those of one sample if they are more [count]."""
 
 
@@ -211,15 +211,15 @@ def compile_particles(model: ProcessModel, channels: tuple[str, ...]) -> Callabl
     state = {f"z{i}": f"state[{i}]" for i in range(model.width)}
     rows = {name: f"rows[{i}]" for i, name in enumerate(layout(EKF, model, channels).rows)}
     reads = {**state, **rows, **data_places(model, channels)}
-    stepped = {f"z{i}": z for i, z in enumerate(bounded(model, moved(model, mean)))}
-    shown = {f"p{c}": value for c, value in enumerate(observed(model, mean, channels))}
+    stepped = {f"z{i}": z for i, z in enumerate(bounded_mean(model, next_state(model, mean)))}
+    shown = {f"p{c}": value for c, value in enumerate(predicted_outputs(model, mean, channels))}
     noise = {f"d{i}": unary("sqrt", process_noise(model, i)) for i in range(model.width)}
     parts = (
         function_source("move", "state, rows, before, after, j", reads, stepped, state),
         function_source("observe", "state, rows, seen", reads, shown, {n: f"seen[{n[1:]}]" for n in shown}),
         function_source("spread", "rows, after, deviations", reads, noise, {n: f"deviations[{n[1:]}]" for n in noise}),
-        pasted(is_logged, predicted, weigh, gather, resample, inlined=True),
-        pasted(run, constants={"WIDTH": model.width}),
+        functions_text(is_logged, predicted, weigh, gather, resample, inlined=True),
+        functions_text(run, constants={"WIDTH": model.width}),
     )
     text = kernel_text(f"particles on the {model.name} form", *parts)
     return load_native(f"particles_{model.name}", text, {"run": signature_of(run)}).run
@@ -273,7 +273,7 @@ def particle_filter(problem: FilterProblem, particles: int, rng: np.random.Gener
     cloud = np.clip(cloud, *limits)
     rows, log_likelihood = constant_row(problem, {}), 0.0
     each = (particles, problem.substeps, problem.model.width)
-    taken = max(1, DRAWN // math.prod(each))
+    taken = max(1, MOST_DRAWN // math.prod(each))
     for first in range(0, len(problem.measured), taken):
         count = min(taken, len(problem.measured) - first)
         drawn = rng.standard_normal((count, *each)), rng.random(count)

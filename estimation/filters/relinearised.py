@@ -22,7 +22,7 @@ the log a ninth too often, for which the returned covariance is corrected."""
 MOST_PASSES = 10
 """Largest number of passes over the same samples."""
 
-SAME = 0.3
+LEAST_LIKELIHOOD_GAIN = 0.3
 """Gain in log-likelihood below which no further pass is made [dimensionless]."""
 
 
@@ -43,22 +43,22 @@ def relinearised(problem: FilterProblem, mean: Array, covariance: Array, most: i
     Trace
         The most likely pass, its covariance of the constants no smaller than the log allows; NaN if all diverged.
     """
-    best = ekf(_begun_again(problem, mean, covariance))
+    best = ekf(_task_with_prior(problem, mean, covariance))
     found = best
     for _ in range(most - 1):
         if not np.isfinite(found.log_likelihood):
             break
-        found = ekf(_begun_again(problem, found.mean, found.covariance))
+        found = ekf(_task_with_prior(problem, found.mean, found.covariance))
         gain = found.log_likelihood - best.log_likelihood
         if gain > 0.0:
             best = found
-        if abs(gain) < SAME:
+        if abs(gain) < LEAST_LIKELIHOOD_GAIN:
             break
     wider = np.where(problem.noise == 0.0, np.sqrt(1.0 + INFLATION**-2), 1.0)
     return best._replace(covariance=np.outer(wider, wider) * best.covariance)
 
 
-def _begun_again(problem: FilterProblem, mean: Array, covariance: Array) -> FilterProblem:
+def _task_with_prior(problem: FilterProblem, mean: Array, covariance: Array) -> FilterProblem:
     """Return the task with a prior about the constants of an earlier pass, no wider than the first one."""
     constant = problem.noise == 0.0
     block = np.ix_(constant, constant)

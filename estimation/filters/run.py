@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Method, Trace
-from estimation.log_checks.bridging import with_gaps_open
+from estimation.log_checks.bridging import with_gap_uncertainty
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
@@ -170,7 +170,7 @@ def filter_problem(
         raise LogError(f"the {model.name} form needs {wanted}, the record has {', '.join(record)}")
     spread = variances if variances is not None else measurement_variances(record, used)
     scaled = model.to_filter(prior)
-    model, drives, comparable = with_gaps_open(model, record, parameters)
+    model, drives, comparable = with_gap_uncertainty(model, record, parameters)
     return FilterProblem(
         model=model,
         channels=used,

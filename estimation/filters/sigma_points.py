@@ -22,12 +22,12 @@ from estimation.engine.kalman import (
     Covariance,
     Outputs,
     belief_symbols,
-    believed,
-    bounded,
-    corrected,
+    bounded_belief,
+    bounded_mean,
+    corrected_belief,
     entry,
-    moved,
-    observed,
+    next_state,
+    predicted_outputs,
     process_noise,
     total,
 )
@@ -84,7 +84,7 @@ class Image:
     shift: Vector
 
 
-def root(P: Covariance, n: int) -> Matrix:
+def cholesky_root(P: Covariance, n: int) -> Matrix:
     """Return the Cholesky root of a covariance; a state determined by the previous ones has a column of zeros.
 
     Parameters
@@ -143,7 +143,7 @@ def all_affine(model: ProcessModel, channels: Sequence[str]) -> bool:
         Whether they are; one pass of the Kalman filter's update is then exact.
     """
     at, _ = belief_symbols(model)
-    return all(is_affine(value, at) for value in observed(model, at, channels))
+    return all(is_affine(value, at) for value in predicted_outputs(model, at, channels))
 
 
 def image(function: Callable[[Vector], Vector], at: Vector, mean: Vector, L: Matrix, spread: Spread) -> Image:
@@ -199,16 +199,16 @@ def sigma_predict(model: ProcessModel, spread_of: SpreadOf) -> Outputs:
     n = model.width
     mean, P = belief_symbols(model)
     spread = spread_of(n)
-    found = image(partial(_moved_within, model), mean, mean, root(P, n), spread)
+    found = image(partial(_step_within_bounds, model), mean, mean, cholesky_root(P, n), spread)
     covariance = {(i, j): covariance_of(found, i, j, spread) for i in range(n) for j in range(i, n)}
     for i in range(n):
         covariance[i, i] = covariance[i, i] + process_noise(model, i)
-    return believed(model, found.mean, covariance)
+    return bounded_belief(model, found.mean, covariance)
 
 
-def _moved_within(model: ProcessModel, point: Vector) -> Vector:
-    held = bounded(model, point) if any(z.operation != "symbol" for z in point) else point
-    stepped = moved(model, held)
+def _step_within_bounds(model: ProcessModel, point: Vector) -> Vector:
+    held = bounded_mean(model, point) if any(z.operation != "symbol" for z in point) else point
+    stepped = next_state(model, held)
     return [own if new is old else new for new, old, own in zip(stepped, held, point, strict=True)]
 
 
@@ -236,8 +236,8 @@ def sigma_update(model: ProcessModel, channels: Sequence[str], spread_of: Spread
     at, covariance = belief_symbols(model)
     mean, spread, outputs = list(at), spread_of(n), Outputs()
     for c, channel in enumerate(channels):
-        L = root(covariance, n)
-        seen = image(partial(observed, model, channels=(channel,)), list(at), mean, L, spread)
+        L = cholesky_root(covariance, n)
+        seen = image(partial(predicted_outputs, model, channels=(channel,)), list(at), mean, L, spread)
         y, r = symbol(f"y{c}"), symbol(f"r{c}")
         present, residual = unary("present", y), y - seen.mean[0]
         PH = [total([L[i][k] * seen.slopes[0][k] for k in range(n)]) for i in range(n)]
@@ -247,6 +247,6 @@ def sigma_update(model: ProcessModel, channels: Sequence[str], spread_of: Spread
             variance = own + r * inflation(robust, residual * residual / variance)
         weight = select(present, ONE / variance, ZERO)
         step = weight * select(present, residual, ZERO)
-        mean, covariance = corrected(mean, covariance, PH, step, weight)
+        mean, covariance = corrected_belief(mean, covariance, PH, step, weight)
         outputs |= {f"e{c}": residual, f"s{c}": variance}
-    return outputs | believed(model, mean, covariance)
+    return outputs | bounded_belief(model, mean, covariance)

@@ -16,7 +16,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from estimation.engine.kalman import Outputs, belief_symbols, believed, corrected, observed, projected, total
+from estimation.engine.kalman import (
+    Outputs,
+    belief_symbols,
+    bounded_belief,
+    channel_projection,
+    corrected_belief,
+    predicted_outputs,
+    total,
+)
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, Expression, jacobian, select, symbol, unary
 
@@ -65,18 +73,18 @@ def sliding_update(model: ProcessModel, channels: Sequence[str], share: Share) -
     """
     prior, covariance = belief_symbols(model)
     n, mean, outputs = model.width, list(prior), Outputs()
-    predicted = observed(model, prior, channels)
+    predicted = predicted_outputs(model, prior, channels)
     for c, H in enumerate(jacobian(predicted, prior)):
         y = symbol(f"y{c}")
         present = unary("present", y)
         residual = y - (predicted[c] + total([H[i] * (mean[i] - prior[i]) for i in range(n)]))
-        PH, spread = projected(covariance, H)
+        PH, spread = channel_projection(covariance, H)
         innovation = Innovation(c, residual, symbol(f"r{c}"), spread)
         inverse = select(innovation.spread > 0.0, ONE / innovation.spread, ZERO)
         part = select(present, share(innovation), ZERO)
         step = select(present, residual, ZERO) * part * inverse
         # the covariance update for any gain, multiplied out for K = P C' (C P C')^-1 part
         loss = (2.0 * part - part * part * innovation.variance * inverse) * inverse
-        mean, covariance = corrected(mean, covariance, PH, step, loss)
+        mean, covariance = corrected_belief(mean, covariance, PH, step, loss)
         outputs |= {f"e{c}": residual, f"s{c}": innovation.variance}
-    return outputs | believed(model, mean, covariance)
+    return outputs | bounded_belief(model, mean, covariance)

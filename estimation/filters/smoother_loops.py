@@ -12,7 +12,7 @@ from estimation.engine.kalman import (
     Outputs,
     belief_names,
     belief_symbols,
-    bounded,
+    bounded_mean,
     entry,
     scaled_step,
     total,
@@ -22,12 +22,12 @@ from estimation.engine.parts import Predict, Prepare, data_places, function_sour
 from estimation.engine.parts import Update as RuleUpdate
 from estimation.engine.rule import weighing
 from estimation.filters.ekf import EKF, Update, linearised_update, noise_symbols
-from estimation.filters.sigma_points import root
+from estimation.filters.sigma_points import cholesky_root
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, Expression, select, symbol
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 
 BackPredict: TypeAlias = Callable[[Array, Array, Array, Array, Array, float], None]
 """``back_predict(state, adjoint, rows, before, after, j)``: take the adjoint back over a sub-step from a state."""
@@ -171,7 +171,7 @@ def _adjoint_outputs(u: Sequence[Expression], U: Covariance) -> Outputs:
     return {f"u{i}": value for i, value in enumerate(u)} | {f"U{i}_{j}": value for (i, j), value in U.items()}
 
 
-def _filtered(model: ProcessModel, channels: Sequence[str], robust: str) -> Update:
+def _filter_update(model: ProcessModel, channels: Sequence[str], robust: str) -> Update:
     """Return the filter's update."""
     prior, _ = belief_symbols(model)
     return linearised_update(model, channels, prior, noise_symbols(channels), robust)
@@ -212,7 +212,7 @@ def back_update_expressions(model: ProcessModel, channels: Sequence[str], robust
     """
     n = model.width
     u, U = _adjoint(n)
-    for H, K, weight, residual in reversed(_filtered(model, channels, robust).gains):
+    for H, K, weight, residual in reversed(_filter_update(model, channels, robust).gains):
         seen = weight * residual - total([K[i] * u[i] for i in range(n)])
         UK = [total([entry(U, i, k) * K[k] for k in range(n)]) for i in range(n)]
         known = weight + total([K[i] * UK[i] for i in range(n)])
@@ -236,8 +236,8 @@ def hold_expressions(model: ProcessModel, channels: Sequence[str], robust: str) 
     dict[str, Expression]
         ``w`` of each state that has bounds, in the symbols of the belief before the update.
     """
-    found = _filtered(model, channels, robust).mean
-    held = bounded(model, found)
+    found = _filter_update(model, channels, robust).mean
+    held = bounded_mean(model, found)
     return {f"w{i}": to - z for i, (to, z) in enumerate(zip(held, found, strict=True)) if to is not z}
 
 
@@ -252,7 +252,7 @@ def lift_expressions(model: ProcessModel) -> Outputs:
     n = model.width
     _, covariance = belief_symbols(model)
     u, _ = _adjoint(n)
-    L = root(covariance, n)
+    L = cholesky_root(covariance, n)
     inverse = [select(L[i][i] > 0.0, ONE / L[i][i], ZERO) for i in range(n)]
     lower: list[Expression] = []
     for i in range(n):
@@ -276,7 +276,7 @@ def smooth_expressions(model: ProcessModel) -> Outputs:
     u, U = _adjoint(n)
     PU = [[total([entry(P, i, k) * entry(U, k, j) for k in range(n)]) for j in range(n)] for i in range(n)]
     moved = [z + total([entry(P, i, k) * u[k] for k in range(n)]) for i, z in enumerate(mean)]
-    outputs = {f"z{i}": z for i, z in enumerate(bounded(model, moved))}
+    outputs = {f"z{i}": z for i, z in enumerate(bounded_mean(model, moved))}
     return outputs | {
         f"P{i}_{j}": old - total([PU[i][k] * entry(P, k, j) for k in range(n)]) for (i, j), old in P.items()
     }
@@ -316,7 +316,7 @@ def compile_smoother(model: ProcessModel, channels: tuple[str, ...], robust: str
     parts = (
         filtering.source,
         *(function_source(name, arguments, reads, outputs, writes) for name, arguments, outputs, writes in generated),
-        pasted(forward, backward, is_moved, constants={"CONSTANTS": max(1, filtering.constants)}),
+        functions_text(forward, backward, is_moved, constants={"CONSTANTS": max(1, filtering.constants)}),
     )
     entries = {"forward": signature_of(forward), "backward": signature_of(backward)}
     return load_native(f"smoother_{model.name}", kernel_text(f"smoother on the {model.name} form", *parts), entries)

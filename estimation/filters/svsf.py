@@ -11,7 +11,7 @@ the unmeasured states follow; prediction is the extended Kalman filter's.
 from collections.abc import Sequence
 from functools import partial
 
-from estimation.engine.kalman import Outputs, observed
+from estimation.engine.kalman import Outputs, predicted_outputs
 from estimation.engine.rule import Rule, Setting, positive
 from estimation.engine.runner import run_rule
 from estimation.filters.ekf import ekf_predict
@@ -62,7 +62,7 @@ def svsf_update(model: ProcessModel, channels: Sequence[str]) -> Outputs:
     """
     outputs = sliding_update(model, channels, svsf_share)
     mean = [outputs[f"z{i}"] for i in range(model.width)]
-    for c, value in enumerate(observed(model, mean, channels)):
+    for c, value in enumerate(predicted_outputs(model, mean, channels)):
         y, name = symbol(f"y{c}"), f"posterior{c}"
         outputs[name] = select(unary("present", y), y - value, symbol(name))
     return outputs

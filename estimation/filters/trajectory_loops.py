@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.engine.kalman import belief_symbols, moved, observed, scaled_step
+from estimation.engine.kalman import belief_symbols, next_state, predicted_outputs, scaled_step
 from estimation.engine.layout import layout
 from estimation.engine.parts import data_places, function_source
 from estimation.engine.robust import inflation
@@ -23,7 +23,7 @@ from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, jacobian, symbol
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 
 Advance: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
 """``advance(state, rows, before, after, j)``: take sub-step j between samples of the drives."""
@@ -308,9 +308,9 @@ def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: s
     reads = {**place, **data_places(model, channels), **{name: f"rows[{i}]" for i, name in enumerate(names)}}
     stepped, F = scaled_step(model)
     slopes = {f"F{i}_{j}": F[i][j] for i in range(n) for j in range(n) if F[i][j] is not (ONE if i == j else ZERO)}
-    new = {f"z{i}": z for i, z in enumerate(moved(model, mean))}
+    new = {f"z{i}": z for i, z in enumerate(next_state(model, mean))}
     written = {**place, **{f"F{i}_{j}": f"jacobian[{i}, {j}]" for i in range(n) for j in range(n)}}
-    seen = observed(model, mean, channels)
+    seen = predicted_outputs(model, mean, channels)
     H = {f"H{c}_{i}": value for c, row in enumerate(jacobian(seen, mean)) for i, value in enumerate(row)}
     shown = {f"e{c}": value for c, value in enumerate(seen)}
     places = {name: f"seen[{name[1:]}]" for name in shown} | {
@@ -321,14 +321,14 @@ def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: s
         function_source("advance", "state, rows, before, after, j", reads, new, place),
         function_source("differentiate", "state, rows, before, after, j, jacobian", reads, linear, written),
         function_source("see", "state, rows, seen, slope", reads, {**shown, **H}, places),
-        pasted(roll, forward, backward, spread_back, constants={"WIDTH": n, "CHANNELS": len(channels)}),
-        pasted(update, multiply, copy, inlined=True),
+        functions_text(roll, forward, backward, spread_back, constants={"WIDTH": n, "CHANNELS": len(channels)}),
+        functions_text(update, multiply, copy, inlined=True),
     ]
     entries: list[Callable[..., Any]] = [roll, forward, backward, spread_back]
     if robust != "none":
         doubted = {"factor": inflation(robust, symbol("x"))}
         parts.append(function_source("doubt", "ratio", {"x": "ratio[0]"}, doubted, {"factor": "ratio[0]"}))
-        parts.append(pasted(reweigh))
+        parts.append(functions_text(reweigh))
         entries.append(reweigh)
     text = kernel_text(f"trajectories of the {model.name} form", *parts)
     return load_native(f"trajectory_{model.name}", text, {one.__name__: signature_of(one) for one in entries})

@@ -35,17 +35,17 @@ def convolved(values: Array, kernel: Array) -> Array:
         return values * kernel
     size, same = smooth_length(_cheapest_block(overlap), (2, 3, 5, 7, 11)), slice(overlap // 2, overlap // 2 + n)
     if size >= n:
-        return _product(values, kernel, smooth_length(n + overlap, (2, 3, 5)))[same]
+        return _row_convolutions(values, kernel, smooth_length(n + overlap, (2, 3, 5)))[same]
     step = size - overlap
     cut = np.zeros((ceil((n + overlap) / step), step))
     cut.flat[:n] = values
-    blocks = _product(cut, kernel, size)
+    blocks = _row_convolutions(cut, kernel, size)
     sums = blocks[:, :step]
     sums[1:, :overlap] += blocks[:-1, step:]
     return sums.reshape(-1)[same]
 
 
-def _product(values: Array, kernel: Array, size: int) -> Array:
+def _row_convolutions(values: Array, kernel: Array, size: int) -> Array:
     """Return the convolution of each row by transforms of a length that holds it whole."""
     return np.fft.irfft(np.fft.rfft(values, size) * np.fft.rfft(kernel, size), size)
 

@@ -12,7 +12,7 @@ from estimation.models.completed_flow import CRACKS, USUAL_CRACK
 from estimation.models.filtered_flow import FILTER_TIME
 from estimation.models.flow import STIFFNESS
 from estimation.models.inner_circuit import BEND
-from estimation.models.wide_flow import CROSSED, QUICKEST, QUICKNESS
+from estimation.models.wide_flow import OTHER_COURSES, QUICKEST, QUICKNESS
 from estimation.models.wrong_pressure import MOST_SETTLING, SETTLING
 
 
@@ -109,7 +109,7 @@ VOLUME = Hypothesis("volume", ("chamber_volume",))
 
 START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 
-BEGUN = replace(START_LOAD, from_first_sample=True, by_mass=True, beside=(STIFFNESS,))
+BEGUN_UNDER_LOAD = replace(START_LOAD, from_first_sample=True, by_mass=True, beside=(STIFFNESS,))
 """The same for a log that begins under load or in motion."""
 
 LEAST_PLAY = 5e-6
@@ -117,7 +117,7 @@ LEAST_PLAY = 5e-6
 
 PLAY = Hypothesis(
     "position_play",
-    ("position_play", *CROSSED),
+    ("position_play", *OTHER_COURSES),
     ({"position_play": 1e-5}, {"position_play": 5e-5}),
     beside=(*CRACKS, STIFFNESS),
     least=LEAST_PLAY,
@@ -334,7 +334,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
 """Physical limits of values [SI]. A make-up valve that opens within a smaller drop has a corner that neither the
 integrator nor a sensor resolves."""
 
-PRESUMED = {"chamber_volume": 0.15, "pump_displacement": 0.15}
+PRIOR_SPREADS = {"chamber_volume": 0.15, "pump_displacement": 0.15}
 """Prior standard deviation of the logarithm of rig file entries [dimensionless]: dead volume is seldom measured; a pump
 that delivers less than its displacement is worn."""
 
@@ -346,5 +346,5 @@ LEAST_SHARE, MOST_SHARE = 0.6, 1.25
 usual uncertainty of displacement and area allows 1.07 (two deviations), and a pump is replaced before it delivers
 0.6."""
 
-WORN = 0.9
+WORN_SHARE = 0.9
 """Delivery over displacement below which the pump is worn, rather than the rig file rounded [dimensionless]."""

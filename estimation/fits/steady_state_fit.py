@@ -175,7 +175,7 @@ def fit_leakage(points: SteadyPoints, p: EhaParameters) -> SteadyFit:
     def variance(found: Array) -> Array:
         return known + (found[0] * points.pressure_error) ** 2
 
-    return _fitted(("leakage_coefficient", "flow_bias"), design, lost, variance)
+    return _weighted_fit(("leakage_coefficient", "flow_bias"), design, lost, variance)
 
 
 def fit_friction(points: SteadyPoints, p: EhaParameters) -> SteadyFit:
@@ -206,7 +206,7 @@ def fit_friction(points: SteadyPoints, p: EhaParameters) -> SteadyFit:
         return (A * points.pressure_error) ** 2 + (slope * points.velocity_error) ** 2
 
     names = ("friction_quadratic", "friction_linear", "friction_coulomb")
-    return _fitted(names, design, A * points.pressure, variance)
+    return _weighted_fit(names, design, A * points.pressure, variance)
 
 
 def _points_of(record: Record, window: float) -> list[tuple[float, ...]]:
@@ -249,7 +249,7 @@ def _slope(values: Array, sample_time: float) -> tuple[float, float]:
     return slope, float(np.sqrt(rest @ rest / (len(values) - 2) / spread))
 
 
-def _fitted(names: Sequence[str], design: Array, target: Array, variance: Variance) -> SteadyFit:
+def _weighted_fit(names: Sequence[str], design: Array, target: Array, variance: Variance) -> SteadyFit:
     """Fit by least squares, weighted by variances that depend on the answer."""
     from scipy.stats import t as student
 

@@ -5,7 +5,7 @@ Modules are imported when one of their names is first used.
 
 from typing import TYPE_CHECKING
 
-from plant.lazy import lazily
+from plant.lazy import lazy_getattr
 
 if TYPE_CHECKING:
     from estimation.identification.choose import STRUCTURES as STRUCTURES
@@ -43,4 +43,4 @@ if TYPE_CHECKING:
     from estimation.identification.signals.preprocess import resample as resample
     from estimation.identification.signals.preprocess import zero_phase_filter as zero_phase_filter
 
-__getattr__ = lazily(__name__, __file__)
+__getattr__ = lazy_getattr(__name__, __file__)

@@ -20,7 +20,7 @@ from estimation.identification.fit.prediction_error import fit_armax, fit_box_je
 from estimation.identification.fit.subspace import fit_subspace
 from estimation.identification.fit.validate import fit_percent, validate
 from estimation.identification.model.linear_model import LinearModel
-from estimation.identification.search.experiments import Signals, listed
+from estimation.identification.search.experiments import Signals, signal_list
 from estimation.identification.structure_names import StructureName
 from plant.errors import HydrostateError, LogWarning
 
@@ -197,7 +197,7 @@ def split_record(u: Signals, y: Signals) -> tuple[tuple[list[Array], list[Array]
     tuple of tuple of list of ndarray
         Inputs and outputs fitted, inputs and outputs held back.
     """
-    inputs, outputs = listed(u), listed(y)
+    inputs, outputs = signal_list(u), signal_list(y)
     if len(inputs) > 2:
         cut = len(inputs) - max(1, round(HELD_BACK * len(inputs)))
         return (inputs[:cut], outputs[:cut]), (inputs[cut:], outputs[cut:])
@@ -237,7 +237,7 @@ def _subspace(
     u: Signals, y: Signals, sample_time: float, *, n_denominator: int, input_name: str, output_name: str, **_: Any
 ) -> LinearModel:
     names = {"input_name": input_name, "output_name": output_name}
-    return fit_subspace(listed(u)[0], listed(y)[0], sample_time, order=n_denominator, **names).model
+    return fit_subspace(signal_list(u)[0], signal_list(y)[0], sample_time, order=n_denominator, **names).model
 
 
 def _continuous(

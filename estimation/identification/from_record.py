@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.choose import STRUCTURES, choose_model
-from estimation.identification.design.sticking import rest_shares, rests
+from estimation.identification.design.sticking import is_sticking, rest_shares
 from estimation.identification.fit.feedback import FEEDBACK_SAMPLES, feedback_note
 from estimation.identification.fit.fitted import CovarianceKind
 from estimation.identification.free_run.from_records import without_gaps
@@ -139,7 +139,7 @@ def record_signals(
     LogWarning
         If the output is differentiated from position, or input samples are bridged.
     """
-    measured = _output(record, output)
+    measured = _output_signal(record, output)
     driven = without_gaps(record[input], input)
     u = resample(driven, record.sample_time, sample_time)
     y = resample(measured, record.sample_time, sample_time)
@@ -149,7 +149,7 @@ def record_signals(
 def _warn_of_rest(model: LinearModel, fit_percents: Mapping[Any, float], u: Array, y: Array) -> None:
     part = slice(0, RESTING_SAMPLES)
     measured, linear = rest_shares(u[part], y[part], model.sample_time)
-    if rests(measured, linear):
+    if is_sticking(measured, linear):
         fits = ", ".join(f"{fit:.1f} % ({order})" for order, fit in fit_percents.items())
         said = IdentificationCode.PISTON_RESTS.note(
             output=model.output_name,
@@ -172,7 +172,7 @@ def _warn_of_feedback(model: LinearModel, u: Array, y: Array) -> None:
         warnings.warn(LogWarning(said), stacklevel=3)
 
 
-def _output(record: Record, name: str) -> Array:
+def _output_signal(record: Record, name: str) -> Array:
     if name in record or name != "velocity_m_s" or "position_m" not in record:
         return record[name]
     if len(record) < 3:

@@ -161,10 +161,10 @@ GAIN_MEANS_NOTHING = frozenset(
 )
 """Notes by which a steady gain must not be used."""
 
-AGAINST = frozenset({IdentificationCode.SWAPPED, IdentificationCode.WALK_FOLLOWED, IdentificationCode.ANSWERS_LATE})
+UNRELIABLE = frozenset({IdentificationCode.SWAPPED, IdentificationCode.WALK_FOLLOWED, IdentificationCode.ANSWERS_LATE})
 """Notes by which a model is not to be relied on, whatever else is told of it."""
 
-WARNED = (
+RAISED_AS_WARNINGS = (
     IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
     IdentificationCode.NO_FIT,
     IdentificationCode.UNRELATED,

@@ -93,14 +93,14 @@ def identify_by_reference(data: Sequence[Channels], drives: Sequence[Channels], 
     HydrostateError
         If an input does not follow the references.
     """
-    explained = [_explained(one) for one in drives]
+    explained = [_explained_input(one) for one in drives]
     u = tuple(np.column_stack([runs[log] for runs, _ in explained]) for log in range(len(data[0].u)))
     found = identify_outputs([replace(one, u=u) for one in data], **options)
     notes = tuple(note for _, note in explained)
     return [replace(one, notes=(*one.notes, *notes)) for one in found]
 
 
-def _explained(drive: Channels) -> tuple[list[Array], Note]:
+def _explained_input(drive: Channels) -> tuple[list[Array], Note]:
     """Return the part of an input that references explain, for each log, with a note of its share."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)

@@ -22,7 +22,7 @@ from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.solvers.steps import Parameters
 
-WIDE = 1.5
+LEAST_GAP = 1.5
 """Distance of samples, over the channel's usual one, from which it is a gap [dimensionless]."""
 
 
@@ -75,7 +75,7 @@ def gaps(values: Array) -> tuple[Array, NDArray[np.bool_]]:
     [False, False]
     """
     n = np.diff(np.flatnonzero(np.isfinite(values))).astype(np.float64)
-    return n, n > WIDE * median(n) if len(n) else np.zeros(0, dtype=np.bool_)
+    return n, n > LEAST_GAP * median(n) if len(n) else np.zeros(0, dtype=np.bool_)
 
 
 def within_gaps(values: Array) -> NDArray[np.bool_]:
@@ -98,7 +98,7 @@ def within_gaps(values: Array) -> NDArray[np.bool_]:
     return within
 
 
-def filled(values: Array) -> tuple[Array, int]:
+def bridged_slow_channel(values: Array) -> tuple[Array, int]:
     """Return a slow channel with straight lines between its samples, and its spacing in rows.
 
     Parameters
@@ -114,7 +114,7 @@ def filled(values: Array) -> tuple[Array, int]:
     Examples
     --------
     >>> gone = np.nan
-    >>> filled(np.array([1.0, gone, 3.0, gone, 5.0, gone, gone, gone, gone, 9.0, gone]))[0].tolist()
+    >>> bridged_slow_channel(np.array([1.0, gone, 3.0, gone, 5.0, gone, gone, gone, gone, 9.0, gone]))[0].tolist()
     [1.0, 2.0, 3.0, 4.0, 5.0, nan, nan, nan, nan, 9.0, nan]
     """
     there = np.flatnonzero(np.isfinite(values))
@@ -130,7 +130,7 @@ def _per_sample(values: Array, each: Array, before: float, after: float) -> Arra
     return np.concatenate([np.zeros(1), ends[0], np.repeat(each, np.diff(present)), ends[1]])
 
 
-def unknown_angle(speed: Array, sample_time: float) -> Array:
+def angle_variance(speed: Array, sample_time: float) -> Array:
     """Return the variance of the pump's angle while its speed was not logged.
 
     A straight line across n sample times is wrong by the unknown time of a step d between the speeds at its ends. The
@@ -153,7 +153,7 @@ def unknown_angle(speed: Array, sample_time: float) -> Array:
 
     Examples
     --------
-    >>> unknown_angle(np.array([0.0, 0.0, np.nan, 12.0, 12.0, 12.0]), 1.0).round(3).tolist()
+    >>> angle_variance(np.array([0.0, 0.0, np.nan, 12.0, 12.0, 12.0]), 1.0).round(3).tolist()
     [0.0, 0.0, 18.0, 18.0, 0.0, 0.0]
     """
     present = np.flatnonzero(np.isfinite(speed))
@@ -168,7 +168,7 @@ def unknown_angle(speed: Array, sample_time: float) -> Array:
     return sample_time**2 * _per_sample(speed, open_by / n, float(before), float(after))
 
 
-def unknown_path(position: Array, sample_time: float) -> Array:
+def path_variance(position: Array, sample_time: float) -> Array:
     """Return the variance of the piston's position while it was not logged.
 
     In a gap of n sample times the velocity may have changed by increments of variance ``s^2`` per sample time. The
@@ -196,7 +196,7 @@ def unknown_path(position: Array, sample_time: float) -> Array:
     return sample_time**2 * _per_sample(position, open_by / n, 0.0, 0.0)
 
 
-def with_gaps_open(
+def with_gap_uncertainty(
     model: ProcessModel, record: Record, parameters: Parameters
 ) -> tuple[ProcessModel, Array, NDArray[np.bool_]]:
     """Return a model and its drives, with the uncertainty of straight lines across gaps.
@@ -224,19 +224,19 @@ def with_gaps_open(
         comparable = np.isfinite(record[POSITION]) | (beside == 0.0)
     if model.opening is not None:
         unknown = {
-            drive: (unknown_path if drive == POSITION else unknown_angle)(record[drive], record.sample_time)
+            drive: (path_variance if drive == POSITION else angle_variance)(record[drive], record.sample_time)
             for drive in model.drives
         }
         added, moved = model.opening(parameters, unknown, record.sample_time)
         if np.any(added > 0.0):
             opened = [state for state in model.states if state.name in moved]
             drives += [added * (moved[state.name] / state.scale) ** 2 for state in opened]
-            model = _opened(model, tuple(state.name for state in opened))
+            model = _model_with_gap_drives(model, tuple(state.name for state in opened))
     return model, np.column_stack(drives), comparable
 
 
 @cache
-def _opened(model: ProcessModel, names: tuple[str, ...]) -> ProcessModel:
+def _model_with_gap_drives(model: ProcessModel, names: tuple[str, ...]) -> ProcessModel:
     """Return the model with one more drive for each state affected by gaps; its step does not use them."""
     count = len(model.drives)
 

@@ -66,12 +66,12 @@ def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBl
     span = size * record.sample_time
 
     def mean(name: str) -> Array | None:
-        values = whole(record, name)
+        values = bridged_channel(record, name)
         count = (len(record) - 1) // size
         return None if values is None else values[: count * size].reshape(count, size).mean(axis=1)
 
     def slope(name: str) -> Array | None:
-        values = whole(record, name)
+        values = bridged_channel(record, name)
         return None if values is None else np.diff(values[::size][: (len(record) - 1) // size + 1]) / span
 
     speed = mean(SPEED)
@@ -86,14 +86,14 @@ def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBl
     )
 
 
-def whole(record: Record, name: str) -> Array | None:
+def bridged_channel(record: Record, name: str) -> Array | None:
     """Return a channel with its gaps bridged, None if it is not logged [its unit]."""
     if name not in record or not np.any(np.isfinite(record[name])):
         return None
     return bridged(record[name])
 
 
-def alike(y: Array | None, x: Array | None) -> tuple[float, float]:
+def correlation_and_ratio(y: Array | None, x: Array | None) -> tuple[float, float]:
     """Return the correlation of two signals, and their signed ratio of sizes.
 
     Parameters
@@ -116,7 +116,7 @@ def alike(y: Array | None, x: Array | None) -> tuple[float, float]:
     return correlation, float(np.sign(correlation)) * size_y / size_x
 
 
-def power_of(pressure: Array | None, flow: Array | None, piston: Array | None) -> float:
+def pressure_flow_correlation(pressure: Array | None, flow: Array | None, piston: Array | None) -> float:
     """Return the correlation of pressure with pumped flow, without the effect of a constant load and a spring.
 
     Sliding and leakage take power, whatever the load; a load returns what it took.
@@ -136,10 +136,10 @@ def power_of(pressure: Array | None, flow: Array | None, piston: Array | None) -
     travelled = np.cumsum(piston)
     far, level = travelled - travelled.mean(), pressure - pressure.mean()
     size = float(far @ far)
-    return alike(flow, level - far * float(far @ level) / size if size > 0.0 else level)[0]
+    return correlation_and_ratio(flow, level - far * float(far @ level) / size if size > 0.0 else level)[0]
 
 
-def gone_together(piston: Array | None, pumped: Array | None) -> tuple[float, float]:
+def path_agreement(piston: Array | None, pumped: Array | None) -> tuple[float, float]:
     """Return the agreement of the piston's path with the pumped volume, both detrended; slow motion counts most.
 
     Parameters
@@ -157,4 +157,4 @@ def gone_together(piston: Array | None, pumped: Array | None) -> tuple[float, fl
     ramp = np.linspace(-1.0, 1.0, len(piston))
     drift = np.linalg.qr(np.column_stack([np.ones_like(ramp), ramp, ramp**2]))[0]
     sums = (np.cumsum(one) for one in (piston, pumped))
-    return alike(*(one - drift @ (drift.T @ one) for one in sums))
+    return correlation_and_ratio(*(one - drift @ (drift.T @ one) for one in sums))

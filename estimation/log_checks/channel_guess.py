@@ -18,10 +18,10 @@ from estimation.log_checks.notes import GuessCode
 from plant.eha.model import EhaParameters
 from plant.log.clock.stamps import seconds_from_first
 from plant.log.columns import CHANNELS, TIME, UNITS
-from plant.log.guess import Guess, guessed, points_by_name
+from plant.log.guess import Guess, best_guesses, points_by_name
 from plant.log.headings import Heading
 from plant.log.inspection import clock_facts
-from plant.log.plausibility import LIMITS, SAMPLE_TIME
+from plant.log.plausibility import LIMITS, SAMPLE_TIME_RANGE
 from plant.notes import Note
 from plant.units import conversion_to
 
@@ -113,14 +113,14 @@ def guess_channels(
     with np.errstate(over="ignore", invalid="ignore"):  # columns may hold anything
         _by_clock(points, columns, why)
         time = max(points.get(TIME, {}), key=lambda place: points[TIME][place], default=None)
-        means = _means(_of_one_length(columns, time))
+        means = _means(_columns_of_one_length(columns, time))
         _by_motion(points, means, why)
         _by_pressure(points, means, why)
-        found = [one for one in guessed(points, headings) if one.sure >= 0.05]
+        found = [one for one in best_guesses(points, headings) if one.sure >= 0.05]
         return _with_units(found, headings, columns, why, p)
 
 
-def _add(points: dict[str, dict[int, float]], channel: str, place: int, worth: float) -> bool:
+def _add_evidence(points: dict[str, dict[int, float]], channel: str, place: int, worth: float) -> bool:
     """Add evidence for a column, if its unit allows it."""
     if place not in points.get(channel, {}):
         return False
@@ -145,12 +145,12 @@ def _by_clock(points: dict[str, dict[int, float]], columns: Mapping[int, Any], w
         facts = clock_facts(values)
         steady = facts is not None and facts.backward == 0 and facts.jitter < 0.4 and facts.repeats < 0.9 * len(values)
         if not steady or facts is None:
-            _add(points, TIME, place, 2.0 * STILL)
-        elif _add(points, TIME, place, CLOCK):
+            _add_evidence(points, TIME, place, 2.0 * STILL)
+        elif _add_evidence(points, TIME, place, CLOCK):
             why.setdefault((TIME, place), []).append(GuessCode.INCREASES.note(step=facts.step))
 
 
-def _of_one_length(columns: Mapping[int, Any], time: int | None) -> dict[int, Any]:
+def _columns_of_one_length(columns: Mapping[int, Any], time: int | None) -> dict[int, Any]:
     """Return the columns of numbers as long as the time, or as most are: only rows of the same time are compared."""
     lengths = Counter(map(len, columns.values()))
     wanted = max(lengths, key=lambda one: lengths[one], default=0) if time is None else len(columns[time])
@@ -177,7 +177,7 @@ def _means(columns: Mapping[int, Any]) -> dict[int, Array]:
     return out
 
 
-def _alike(one: Array, other: Array) -> float:
+def _correlation(one: Array, other: Array) -> float:
     """Return the correlation of two columns."""
     x, y = one - one.mean(), other - other.mean()
     size = float(np.linalg.norm(x) * np.linalg.norm(y))
@@ -202,12 +202,12 @@ def _by_motion(points: dict[str, dict[int, float]], means: Mapping[int, Array], 
         slope = GuessCode.HAS_SLOPE.note(column=first[1] + 1, correlation=first[0])
         why.setdefault((POSITION, place), []).append(slope)
         worth = SLOPE if second is not None else RUNNER_UP
-        if _add(points, VELOCITY, first[1], worth):
+        if _add_evidence(points, VELOCITY, first[1], worth):
             note = GuessCode.IS_SLOPE.note(column=place + 1, correlation=first[0])
             why.setdefault((VELOCITY, first[1]), []).append(note)
         for correlation, other in found[1:] if second is not None else found:
-            if _add(points, SPEED, other, RUNNER_UP):
-                note = _with_motion(place, correlation)
+            if _add_evidence(points, SPEED, other, RUNNER_UP):
+                note = _motion_note(place, correlation)
                 why.setdefault((SPEED, other), []).append(note)
 
 
@@ -224,14 +224,14 @@ def _by_pressure(points: dict[str, dict[int, float]], means: Mapping[int, Array]
                 note = GuessCode.IS_DIFFERENCE.note(one=likest[one] + 1, other=likest[other] + 1)
                 why.setdefault((PRESSURE, place), []).append(note)
         if pump in means and pump is not None and place != pump:
-            correlation = _alike(means[place], means[pump])
+            correlation = _correlation(means[place], means[pump])
             if abs(correlation) > WEAKLY:
                 points[PRESSURE][place] += TREND
-                note = _with_motion(pump, correlation)
+                note = _motion_note(pump, correlation)
                 why.setdefault((PRESSURE, place), []).append(note)
 
 
-def _with_motion(place: int, correlation: float) -> Note:
+def _motion_note(place: int, correlation: float) -> Note:
     """Return that a column follows the motion, with the same or the opposite sign."""
     code = GuessCode.FOLLOWS if correlation > 0.0 else GuessCode.OPPOSES
     return code.note(column=place + 1, correlation=correlation)
@@ -320,7 +320,7 @@ def _unit_of_slope(velocity: Array, known: Mapping[str, Guess], columns: Mapping
     if len(time) < 20:
         return None
     way = np.append(0.0, np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)))
-    if abs(_alike(way, position)) < SURE:
+    if abs(_correlation(way, position)) < SURE:
         return None
     ratio = float(np.std(position) / np.std(way))
     best = min(SPEEDS, key=lambda unit: abs(np.log(ratio / _factor(unit, "m/s"))))
@@ -335,7 +335,7 @@ def _usual_units(channel: str, values: Array, p: EhaParameters) -> list[str]:
     if channel == TIME:
         facts = clock_facts(values)
         step = 0.0 if facts is None else facts.step
-        return [one for one in CANDIDATES[TIME] if SAMPLE_TIME[0] <= step * _factor(one, "s") <= 0.1] or ["s"]
+        return [one for one in CANDIDATES[TIME] if SAMPLE_TIME_RANGE[0] <= step * _factor(one, "s") <= 0.1] or ["s"]
     size = float(np.ptp(present)) if channel == POSITION else float(np.abs(present).max())
     least, most = LIMITS[channel].least, LIMITS[channel].most
     if channel == SPEED:

@@ -11,10 +11,10 @@ import numpy as np
 
 from estimation.log_checks.channel_blocks import (
     ChannelBlocks,
-    alike,
     channel_blocks,
-    gone_together,
-    power_of,
+    correlation_and_ratio,
+    path_agreement,
+    pressure_flow_correlation,
 )
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.flow_balance import FlowBalance, flow_balance
@@ -23,7 +23,7 @@ from estimation.log_checks.unit_slips import DEGREES, FARTHEST, IN_DEGREES, LENG
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters, piston_areas
 from plant.log.columns import TIME
-from plant.log.plausibility import LIMITS, SAMPLE_TIME
+from plant.log.plausibility import LIMITS, SAMPLE_TIME_RANGE
 from plant.log.record import Record
 from plant.notes import Note
 
@@ -39,7 +39,7 @@ NEAR = 1.15
 LEAST, MOST, LOST = 0.6, 1.3, 0.5
 """Range of a balance's factor over that of a slip, and what a piston with large losses leaves of it [fraction]."""
 
-APART = 5.0
+LEAST_DISAGREEMENT = 5.0
 """Ratio of two sensors of one motion from which one has an unknown unit; judged: errors of gain are smaller
 [dimensionless]."""
 
@@ -50,16 +50,16 @@ SURE, FOLLOWS, OPPOSED = 0.9, 0.6, -0.3
 """Correlations of one motion measured twice, of a piston with its pump, and with one of opposite sign: compliance and
 friction never oppose their drive, neither in the long run nor from block to block."""
 
-BOTH_WAYS = 0.6
+LEAST_RETURN = 0.6
 """Least ratio between a piston's two directions from which speed lacks its sign: of its travel, its mean velocities,
 and the pumped volume meanwhile [fraction]; judged."""
 
-MOVES_ON = 0.5
+LEAST_PERSISTENCE = 0.5
 """Least correlation of a moving piston's speed from block to block [dimensionless]: it is 0.81 to 0.99 in the nine
 conditions under steps and binary signals. An encoder's noise has -0.5, a velocity sensor's 0."""
 
 UNKNOWN_UNIT, UNKNOWN_RIG = "another unit", "another unit, or a rig file of another actuator"
-LOSSY = "another unit, such as mm read as m where much of the flow is lost, or a rig file of another actuator"
+LOSSY_UNIT = "another unit, such as mm read as m where much of the flow is lost, or a rig file of another actuator"
 """Words for a factor that no known slip makes, or that one makes if most of the flow is lost."""
 
 INCHES = {1.0 / 0.0254: "inches read as m", 25.4: "inches read as mm, or mm read as inches"}
@@ -77,14 +77,14 @@ REFUTED = 2.0
 """Difference of the piston's flow from the rig's, over what a balance leaves unexplained, from which a slip of units is
 seen in it [dimensionless]."""
 
-HELD = 0.7
+HOLDING_FRICTION_SHARE = 0.7
 """Share of the rig's Coulomb friction up to which pressure moves no piston [fraction]; judged. With its seals a stuck
 piston takes a tenth of the oil of a sliding one, which was reported as rpm read as rad/s."""
 
 RESOLVED = 1e3
 """Travel of a position in a wrong unit, over its noise; a stuck piston has less [dimensionless]."""
 
-PRESSURE_OFF = 50.0
+PRESSURE_UNIT_RATIO = 50.0
 """Ratio to the rig's compressibility, or its inverse, that means a unit of pressure and no oil [dimensionless]."""
 
 
@@ -106,15 +106,15 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     if _repeats_one_row(record):
         return (ChannelCode.NOTHING_CHANGES.note(channel=" and ".join(one for one in MEASURED if one in record)),)
     short, middle, long = (channel_blocks(record, p, length) for length in (SHORT, MIDDLE, LONG))
-    found = _swapped(short) or _swapped(long) or _motions_disagree(short, long, p)
+    found = _swapped_notes(short) or _swapped_notes(long) or _motions_disagree(short, long, p)
     if found:
-        return tuple(_or_of_time(one, record.sample_time) for one in found)
+        return tuple(_time_unit_instead(one, record.sample_time) for one in found)
     balance = flow_balance(record, p, MIDDLE)
     if balance is not None and balance.explained < EXPLAINED:
         balance = None
-    units = tuple(_or_of_time(one, record.sample_time) for one in _pump_units(record, long, p, balance))
-    unsigned = _unsigned(record, middle, balance)
-    return unsigned or _reversed(record, middle, long, balance) or units or _pressure_units(middle, p, balance)
+    units = tuple(_time_unit_instead(one, record.sample_time) for one in _pump_units(record, long, p, balance))
+    unsigned = _unsigned_speed_notes(record, middle, balance)
+    return unsigned or _wrong_sign_notes(record, middle, long, balance) or units or _pressure_units(middle, p, balance)
 
 
 def _repeats_one_row(record: Record) -> bool:
@@ -123,30 +123,32 @@ def _repeats_one_row(record: Record) -> bool:
     return still and SPEED in record and bool(np.nanmax(np.abs(record[SPEED])) > LIMITS[SPEED].least)
 
 
-def _or_of_time(note: Note, sample_time: float) -> Note:
+def _time_unit_instead(note: Note, sample_time: float) -> Note:
     """Return a note on time where that alone explains a position that went a thousandfold too far or too short.
 
     A rate needs no clock to agree with another rate; a position does.
     """
     if note.code != ChannelCode.CHANNEL_UNIT or note.data["channel"] != POSITION:
         return note
-    if sample_time > SAMPLE_TIME[1] and note.data["slip"] == LENGTHS[1e-3]:
-        return _unit(TIME, POSITION, 1e3, "ms read as s")
-    if sample_time < SAMPLE_TIME[0] and note.data["slip"] == LENGTHS[1e3]:
-        return _unit(TIME, POSITION, 1e-3, "s read as ms")
+    if sample_time > SAMPLE_TIME_RANGE[1] and note.data["slip"] == LENGTHS[1e-3]:
+        return _unit_note(TIME, POSITION, 1e3, "ms read as s")
+    if sample_time < SAMPLE_TIME_RANGE[0] and note.data["slip"] == LENGTHS[1e3]:
+        return _unit_note(TIME, POSITION, 1e-3, "s read as ms")
     return note
 
 
-def _near(ratio: float, slips: Mapping[float, str], least: float = 1.0 / NEAR, most: float = NEAR) -> float | None:
+def _matching_slip(
+    ratio: float, slips: Mapping[float, str], least: float = 1.0 / NEAR, most: float = NEAR
+) -> float | None:
     """Return the factor of the slip that a ratio is near, None if there is none."""
     close = [one for one in slips if least <= ratio / one <= most]
     return min(close, key=lambda one: abs(np.log(ratio / one)), default=None)
 
 
-def _swapped(blocks: ChannelBlocks) -> tuple[Note, ...]:
+def _swapped_notes(blocks: ChannelBlocks) -> tuple[Note, ...]:
     """Compare the slope of velocity with position; the noise of a piston that hardly moves asks for long blocks."""
-    there, ratio = alike(blocks.velocity_slope, blocks.position)
-    here, _ = alike(blocks.slope, blocks.velocity)
+    there, ratio = correlation_and_ratio(blocks.velocity_slope, blocks.position)
+    here, _ = correlation_and_ratio(blocks.slope, blocks.velocity)
     if there < SURE or not 1.0 / NEAR <= ratio <= NEAR or here > 0.5:
         return ()
     return (ChannelCode.CHANNELS_SWAPPED.note(channel=POSITION, other=VELOCITY, correlation=there),)
@@ -154,12 +156,12 @@ def _swapped(blocks: ChannelBlocks) -> tuple[Note, ...]:
 
 def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameters) -> tuple[Note, ...]:
     """Compare the slope of position with velocity, and both with the pump to find which is wrong."""
-    same, ratio = alike(short.slope, short.velocity)
+    same, ratio = correlation_and_ratio(short.slope, short.velocity)
     if abs(same) < SURE:
         return ()
     with_pump = {
-        POSITION: gone_together(long.slope, long.pumped),
-        VELOCITY: gone_together(long.velocity, long.pumped),
+        POSITION: path_agreement(long.slope, long.pumped),
+        VELOCITY: path_agreement(long.velocity, long.pumped),
     }
     found: list[Note] = []
     if ratio < 0.0:
@@ -167,33 +169,35 @@ def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameter
         channel = against[0] if len(against) == 1 else f"{VELOCITY} or {POSITION}"
         other = POSITION if channel == VELOCITY else VELOCITY
         found.append(ChannelCode.CHANNEL_REVERSED.note(channel=channel, against=other, correlation=same))
-    factor = _near(abs(ratio), LENGTHS)
+    factor = _matching_slip(abs(ratio), LENGTHS)
     if factor is not None:
         large, small = (POSITION, VELOCITY) if factor > 1.0 else (VELOCITY, POSITION)
         too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
         guilty, other = (large, small) if too_far else (small, large)
         times = abs(ratio) if guilty == POSITION else 1.0 / abs(ratio)
         slip = factor if guilty == POSITION else min(LENGTHS, key=lambda one: abs(np.log(one * factor)))
-        found.append(_unit(guilty, other, times, LENGTHS[slip]))
-    elif not 1.0 / APART <= abs(ratio) <= APART:  # such as a furlong read as a metre: only a pump shows which is wrong
+        found.append(_unit_note(guilty, other, times, LENGTHS[slip]))
+    elif (
+        not 1.0 / LEAST_DISAGREEMENT <= abs(ratio) <= LEAST_DISAGREEMENT
+    ):  # such as a furlong read as a metre: only a pump shows which is wrong
         large, small = (POSITION, VELOCITY) if abs(ratio) > 1.0 else (VELOCITY, POSITION)
         too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
         guilty = large if too_far else f"{large} or {small}"
         times = max(abs(ratio), 1.0 / abs(ratio))
-        inches = _near(times, INCHES, 0.95, 1.05)
-        found.append(_unit(guilty, small, times, UNKNOWN_UNIT if inches is None else INCHES[inches]))
+        inches = _matching_slip(times, INCHES, 0.95, 1.05)
+        found.append(_unit_note(guilty, small, times, UNKNOWN_UNIT if inches is None else INCHES[inches]))
     return tuple(found)
 
 
-def _unit(channel: str, against: str, factor: float, slip: str) -> Note:
+def _unit_note(channel: str, against: str, factor: float, slip: str) -> Note:
     return ChannelCode.CHANNEL_UNIT.note(channel=channel, against=against, factor=factor, slip=slip)
 
 
-def _moved(record: Record) -> str:
+def _motion_channels(record: Record) -> str:
     return " and ".join(name for name in (POSITION, VELOCITY) if name in record)
 
 
-def _reversed(
+def _wrong_sign_notes(
     record: Record, middle: ChannelBlocks, long: ChannelBlocks, balance: FlowBalance | None
 ) -> tuple[Note, ...]:
     """Return which of pump, piston and pressure has the wrong sign: two of the three agree.
@@ -202,12 +206,14 @@ def _reversed(
     If half the period of a sine equals a long block, the result depends on the phase of the blocks: a piston with a
     small lag may then seem opposed. In shorter blocks it does not.
     """
-    together, _ = gone_together(long.piston, long.pumped)
-    apart = all(alike(one.piston, one.pumped)[0] < OPPOSED for one in (middle, long)) and together < OPPOSED
+    together, _ = path_agreement(long.piston, long.pumped)
+    apart = (
+        all(correlation_and_ratio(one.piston, one.pumped)[0] < OPPOSED for one in (middle, long)) and together < OPPOSED
+    )
     with_pump = together > FOLLOWS
     opposed = with_pressure = False
     if balance is not None and long.pumped is not None:
-        power = power_of(long.pressure, long.pumped, long.piston)
+        power = pressure_flow_correlation(long.pressure, long.pumped, long.piston)
         opposed = power * len(long.pumped) ** 0.5 < -REFUTED and balance.compressed < -TOLD * balance.compressed_std
         with_pressure = balance.compressed > TOLD * balance.compressed_std
         apart = apart or (together < 0.0 and balance.swept < -max(TOLD * balance.swept_std, 0.3))
@@ -215,19 +221,19 @@ def _reversed(
         with_pump = with_pump or goes_along
         # a spring drives the piston back while the pump, whose whole flow leaks, goes on
         apart = apart and not goes_along
-    moved = _moved(record)
+    moved = _motion_channels(record)
     if apart:
         channel = SPEED if opposed else moved if with_pressure else f"{SPEED} or {moved}"
         against = SPEED if channel == moved else moved
     elif opposed:
-        together = power_of(long.pressure, long.pumped, long.piston)
+        together = pressure_flow_correlation(long.pressure, long.pumped, long.piston)
         channel, against = (PRESSURE if with_pump else f"{PRESSURE} or {SPEED}"), SPEED
     else:
         return ()
     return (ChannelCode.CHANNEL_REVERSED.note(channel=channel, against=against, correlation=together),)
 
 
-def _unsigned(record: Record, middle: ChannelBlocks, balance: FlowBalance | None) -> tuple[Note, ...]:
+def _unsigned_speed_notes(record: Record, middle: ChannelBlocks, balance: FlowBalance | None) -> tuple[Note, ...]:
     """Return a note if a piston moves both ways, as fast and for as much oil, while speed is never negative.
 
     A load or a spring moves it back too, but against a pump that turns slowly, or so that leakage explains the flow.
@@ -239,11 +245,11 @@ def _unsigned(record: Record, middle: ChannelBlocks, balance: FlowBalance | None
     ways = (piston > 0.0, piston < 0.0)
     if not all(np.any(way) for way in ways):
         return ()
-    if not pumped.mean() > 0.0 or piston[1:] @ piston[:-1] < MOVES_ON * (piston @ piston):
+    if not pumped.mean() > 0.0 or piston[1:] @ piston[:-1] < LEAST_PERSISTENCE * (piston @ piston):
         return ()
     size = np.abs(piston)
     forth, back = (np.array([size[way].sum(), size[way].mean(), pumped[way].mean()]) for way in ways)
-    if np.any(np.minimum(forth, back) < BOTH_WAYS * np.maximum(forth, back)):
+    if np.any(np.minimum(forth, back) < LEAST_RETURN * np.maximum(forth, back)):
         return ()
     return (ChannelCode.SPEED_UNSIGNED.note(channel=SPEED),)
 
@@ -253,31 +259,33 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
 
     If the areas differ it moves farthest by the smaller one, which ``least`` uses.
     """
-    together, ratio = gone_together(long.piston, long.pumped)
+    together, ratio = path_agreement(long.piston, long.pumped)
     gone, least = p.piston_area * ratio, min(piston_areas(p)) * ratio
     far = gone > FARTHEST
     turn = length = None
     believed, alike = (False, False), set[float]()
     told = balance if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept else None
     degrees = told is not None and 1.0 / MOST <= DEGREES / told.swept <= 1.0 / LEAST
-    if told is not None and told.contradicts_rig > REFUTED and (far or _slides(record, p)):
+    if told is not None and told.rig_contradiction > REFUTED and (far or _slides(record, p)):
         times = 1.0 / told.swept
         far = far and times > 1.0
-        turn, length = (_near(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS))
+        turn, length = (
+            _matching_slip(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS)
+        )
         believed = (far or times < 1.0,) * 2
     elif together > SURE and balance is None and not far:
-        length = _near(gone, LENGTHS)
-        believed = False, gone < TINY * NEAR and _resolved(record, long)
+        length = _matching_slip(gone, LENGTHS)
+        believed = False, gone < TINY * NEAR and _exceeds_position_noise(record, long)
     if turn is None and length is None and far and together > FOLLOWS:  # a balance may take motion for leakage
-        turn, length = (_near(gone, slips, LOST) for slips in (TURNS, LENGTHS))
+        turn, length = (_matching_slip(gone, slips, LOST) for slips in (TURNS, LENGTHS))
         believed, alike = (True, True), {one for one in TURNS if LOST <= gone / one <= NEAR}
-        if length is not None and length < 100.0 and " and " in _moved(record):
+        if length is not None and length < 100.0 and " and " in _motion_channels(record):
             length = None  # two channels agree: a piston that drifts while stuck makes a slip of speed look as large
     fast = float(np.nanmax(np.abs(record[SPEED]))) / p.motor_speed_limit if SPEED in record else 0.0
     too_fast = fast > FARTHEST and least < NEAR * min(TURNS)
     if too_fast and (together > FOLLOWS or length is not None or degrees):
         turn, believed = min(TURNS), (True, believed[1])
-    moved = _moved(record)
+    moved = _motion_channels(record)
     slips: list[tuple[str, str, float]] = []
     if turn is not None and believed[0] and least < NEAR * turn:
         said = " or ".join(TURNS[one] for one in TURNS if one == turn or one in alike)
@@ -287,18 +295,18 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
     if length is not None and believed[1] and least < NEAR * length and not (slips and " and " in moved):
         slips.append((moved, LENGTHS[length], length))
     unlike = not slips and far and together > FOLLOWS and (balance is None or balance.swept * FARTHEST < 1.0)
-    if unlike and _swept_more(long, p):
+    if unlike and _sweeps_more_than_pumped(long, p):
         lossy = 100.0 * NEAR < gone < 1e3  # too far for cm read as m, and for any unit of speed
         channel = SPEED if " and " in moved and not lossy else f"{moved} or {SPEED}"
         times = 1.0 / gone if channel == SPEED else gone
-        return (_unit(channel, moved if channel == SPEED else SPEED, times, LOSSY if lossy else UNKNOWN_RIG),)
+        return (_unit_note(channel, moved if channel == SPEED else SPEED, times, LOSSY_UNIT if lossy else UNKNOWN_RIG),)
     if not slips:
         return ()
     channel, slip = " or ".join(one[0] for one in slips), " or ".join(one[1] for one in slips)
-    return (_unit(channel, moved if channel == SPEED else SPEED, slips[0][2], slip),)
+    return (_unit_note(channel, moved if channel == SPEED else SPEED, slips[0][2], slip),)
 
 
-def _swept_more(long: ChannelBlocks, p: EhaParameters) -> bool:
+def _sweeps_more_than_pumped(long: ChannelBlocks, p: EhaParameters) -> bool:
     """Return whether a piston swept more than was pumped in all; at one speed nothing else shows how far it moved."""
     if long.piston is None or long.pumped is None:
         return False
@@ -308,10 +316,10 @@ def _swept_more(long: ChannelBlocks, p: EhaParameters) -> bool:
 def _slides(record: Record, p: EhaParameters) -> bool:
     """Return whether pressure is ever high enough to move the piston; a stuck one only yields on its seals."""
     highest = float(np.nanmax(np.abs(record[PRESSURE]))) if PRESSURE in record else np.inf
-    return highest * p.piston_area > HELD * p.friction_coulomb
+    return highest * p.piston_area > HOLDING_FRICTION_SHARE * p.friction_coulomb
 
 
-def _resolved(record: Record, long: ChannelBlocks) -> bool:
+def _exceeds_position_noise(record: Record, long: ChannelBlocks) -> bool:
     """Return whether the motion of a piston that hardly moves is well above the noise of its position."""
     if long.position is None:
         return False
@@ -325,9 +333,9 @@ def _pressure_units(middle: ChannelBlocks, p: EhaParameters, balance: FlowBalanc
         return ()
     sliding = max(p.friction_coulomb / p.piston_area, 0.05 * p.relief_pressure)
     size = float(np.sqrt(np.mean(middle.pressure**2))) / sliding
-    small = size * PRESSURE_OFF < 1.0 and balance.compressed > PRESSURE_OFF
-    large = size > PRESSURE_OFF and balance.compressed * PRESSURE_OFF < 1.0
+    small = size * PRESSURE_UNIT_RATIO < 1.0 and balance.compressed > PRESSURE_UNIT_RATIO
+    large = size > PRESSURE_UNIT_RATIO and balance.compressed * PRESSURE_UNIT_RATIO < 1.0
     if not (small or large):
         return ()
     slip = "kPa, psi, bar or MPa read as Pa" if small else "Pa read as kPa, psi, bar or MPa"
-    return (_unit(PRESSURE, SPEED, 1.0 / balance.compressed, slip),)
+    return (_unit_note(PRESSURE, SPEED, 1.0 / balance.compressed, slip),)

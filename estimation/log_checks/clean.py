@@ -9,8 +9,8 @@ from estimation.log_checks.discontinuities import without_discontinuities
 from estimation.log_checks.dropout import without_dropouts
 from estimation.log_checks.few_digits import with_even_steps
 from estimation.log_checks.filtered import independent_variance, without_correlated_noise
-from estimation.log_checks.held import without_held
-from estimation.log_checks.held_alone import without_held_alone
+from estimation.log_checks.held import without_held_values
+from estimation.log_checks.held_alone import without_temporary_holds
 from estimation.log_checks.hum import without_hum
 from estimation.log_checks.late_velocity import without_late_velocity
 from estimation.log_checks.logged_on_change import logged_on_change
@@ -96,11 +96,11 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     """
     require_fast_enough(record.sample_time)
     written, digits = with_even_steps(record)
-    sampled, held = without_held(written)
+    sampled, held = without_held_values(written)
     sent_once, twice = without_rows_sent_twice(sampled)
     whole, dropouts = without_dropouts(sent_once)
     changes = unit_changes(whole)
-    live, alone = without_held_alone(whole)
+    live, alone = without_temporary_holds(whole)
     sound, outliers = without_gross_outliers(live, CLEANED)
     clipped: tuple[Note, ...] = ()
     if PRESSURE in sound:

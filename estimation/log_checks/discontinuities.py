@@ -34,30 +34,30 @@ grips."""
 NEAR = 4
 """Rows on either side over whose mean a step is computed [samples]."""
 
-LASTS = 0.5
+LASTING_SHARE = 0.5
 """Share of a step that must remain some rows later; of an outlier nothing remains [fraction]."""
 
-ALONE = 0.5
+MOST_STRAY_BESIDE = 0.5
 """Share of a step of pressure by which the rows beside it stray at most if a zero was set anew [fraction]: 0.06 in the
 middle of 153 made ones, 0.33 at most. Where a piston bounces off a stop, or chambers change places, it is 0.7 to 46."""
 
-BROKEN = 8.0
+JUMP_IF_ROWS_LOST = 8.0
 """Deviations of noise by which another channel jumps in the same row if rows were lost [dimensionless]."""
 
-STOPS = 0.1
+MOST_PAST_STOP = 0.1
 """Share of its travel before a stop by which a piston moves on after it, or stays short of it [fraction]; judged."""
 
 SOFT_STOP = 1e-3
 """Share of a log's travel by which a stop yields [fraction]; judged."""
 
-YIELDS = 1e-3
+STOP_YIELD_TIME = 1e-3
 """Sample time at which a stop has yielded after `NEAR` rows, and `APART` more show that it holds [s]; judged. Faster
 logs need more rows: a stop yields over milliseconds, and that may be a large part of the travel."""
 
-SETS_OFF = 0.02, 0.5
+START_SPEEDS = 0.02, 0.5
 """Shares of the log's highest speed between which a motor starts from rest [fraction]; judged."""
 
-SETTING_OFF = 0.1
+LONGEST_START = 0.1
 """Longest time of a motor's start [s]: if it turns slowly at first, its pressure may be zeroed then."""
 
 REST = 10
@@ -92,14 +92,15 @@ def without_discontinuities(record: Record) -> tuple[Record, tuple[Note, ...]]:
     pressed = (
         step
         for step in _steps_of_pressure(record)
-        if _beside(step.row, places) or not (_driven(record, step.row) or _meets_stop(record, step.row))
+        if _is_beside(step.row, places) or not (_is_driven(record, step.row) or _meets_stop(record, step.row))
     )
     if not (steps := [*moved, *pressed]):
         return record, ()
     if any(
-        step.channel == PRESSURE or (not _held_before(record, step) and _also(record, step, steps)) for step in steps
+        step.channel == PRESSURE or (not _held_before(record, step) and _other_jumping_channels(record, step, steps))
+        for step in steps
     ):
-        return _longest(record, steps)
+        return _longest_part(record, steps)
     notes: list[Note] = []
     position = record[POSITION].copy()
     for step in steps:
@@ -120,11 +121,11 @@ def _by_row(record: Record, steps: list[_Step]) -> dict[int, set[str]]:
     out: dict[int, set[str]] = {}
     for step in sorted(steps, key=lambda one: one.row):
         row = next((one for one in out if step.row - one <= APART), step.row)
-        out.setdefault(row, set()).update((step.channel, *_also(record, step, steps)))
+        out.setdefault(row, set()).update((step.channel, *_other_jumping_channels(record, step, steps)))
     return out
 
 
-def _longest(record: Record, steps: list[_Step]) -> tuple[Record, tuple[Note, ...]]:
+def _longest_part(record: Record, steps: list[_Step]) -> tuple[Record, tuple[Note, ...]]:
     """Return the longest part of a log between places at which pressure steps or rows were lost."""
     seams = _by_row(record, steps)
     ends = [0, *(row + 1 for row in seams), len(record)]
@@ -149,9 +150,9 @@ def _steps_of_position(record: Record) -> list[_Step]:
     gone, sure = np.diff(record[POSITION]), VELOCITY in record
     pace = record.sample_time * record[VELOCITY] if sure else np.zeros(len(record))
     strayed = gone - 0.5 * (pace[1:] + pace[:-1])
-    rows = _places(strayed, STEP if sure else STEP_ALONE)
-    farthest = float(np.nanmax(np.abs(_without(gone, rows))))
-    return [_Step(POSITION, k, _size(strayed, k)) for k in rows if abs(strayed[k]) > farthest]
+    rows = _step_rows(strayed, STEP if sure else STEP_ALONE)
+    farthest = float(np.nanmax(np.abs(_with_rows_zeroed(gone, rows))))
+    return [_Step(POSITION, k, _step_size(strayed, k)) for k in rows if abs(strayed[k]) > farthest]
 
 
 def _steps_of_pressure(record: Record) -> list[_Step]:
@@ -159,30 +160,30 @@ def _steps_of_pressure(record: Record) -> list[_Step]:
     if PRESSURE not in record or SPEED not in record or record.sample_time > SLOWEST_PRESSURE:
         return []
     strayed = pressure_strays(record, noisy=True)
-    strayed[_setting_off(record[SPEED], record.sample_time)] = 0.0
-    rows = _places(strayed, STEP_OF_PRESSURE)
+    strayed[_starting_rows(record[SPEED], record.sample_time)] = 0.0
+    rows = _step_rows(strayed, STEP_OF_PRESSURE)
     strayed = np.nan_to_num(pressure_strays(record)) if rows else strayed
-    alone = [k for k in rows if max(abs(strayed[k - 1]), abs(strayed[k + 1])) < ALONE * abs(strayed[k])]
-    return [_Step(PRESSURE, k, _size(strayed, k)) for k in alone]
+    alone = [k for k in rows if max(abs(strayed[k - 1]), abs(strayed[k + 1])) < MOST_STRAY_BESIDE * abs(strayed[k])]
+    return [_Step(PRESSURE, k, _step_size(strayed, k)) for k in alone]
 
 
-def _setting_off(speed: Array, sample_time: float) -> slice:
+def _starting_rows(speed: Array, sample_time: float) -> slice:
     """Return the rows in which a motor starts from rest; none if it turns when the log begins.
 
     Both chambers are at the accumulator's pressure then. Until one of them draws make-up flow, pressure rises twice as
     fast as it ever does again.
     """
     size = np.nan_to_num(np.abs(speed))
-    turns, away = (int(np.argmax(size > share * np.max(size))) for share in SETS_OFF)
-    away = min(away, turns + round(SETTING_OFF / sample_time))
+    turns, away = (int(np.argmax(size > share * np.max(size))) for share in START_SPEEDS)
+    away = min(away, turns + round(LONGEST_START / sample_time))
     return slice(turns, away + APART if turns > 0 else 0)
 
 
-def _beside(row: int, places: list[int]) -> bool:
+def _is_beside(row: int, places: list[int]) -> bool:
     return any(abs(row - place) <= 1 for place in places)
 
 
-def _driven(record: Record, row: int) -> bool:
+def _is_driven(record: Record, row: int) -> bool:
     """Return whether motor speed jumps near a row, which may move pressure within that row."""
     return any(_jumps(record[SPEED], one) for one in range(row - 2, row + 3))
 
@@ -193,17 +194,17 @@ def _meets_stop(record: Record, row: int) -> bool:
     The pump's delivery, or the pull of a load, then raises pressure at once.
     """
     position = record[POSITION]
-    near, apart = (max(rows, round(rows * YIELDS / record.sample_time)) for rows in (NEAR, APART))
+    near, apart = (max(rows, round(rows * STOP_YIELD_TIME / record.sample_time)) for rows in (NEAR, APART))
     first, before, after, last = (row + k for k in (-near - apart, -near, near, near + apart))
     if first < 0 or last >= len(position):
         return False
     came, went = abs(position[before] - position[first]), abs(position[last] - position[after])
     low, high = float(np.nanmin(position)), float(np.nanmax(position))
-    beside = max(STOPS * came, SOFT_STOP * (high - low))
-    return bool(went < STOPS * came and min(position[after] - low, high - position[after]) < beside)
+    beside = max(MOST_PAST_STOP * came, SOFT_STOP * (high - low))
+    return bool(went < MOST_PAST_STOP * came and min(position[after] - low, high - position[after]) < beside)
 
 
-def _without(values: Array, rows: list[int]) -> Array:
+def _with_rows_zeroed(values: Array, rows: list[int]) -> Array:
     """Return values with zeros about some rows."""
     out = np.nan_to_num(values)
     for k in rows:
@@ -256,7 +257,7 @@ def pressure_strays(record: Record, *, noisy: bool = False) -> Array:
     return left
 
 
-def _places(strayed: Array, least: float) -> list[int]:
+def _step_rows(strayed: Array, least: float) -> list[int]:
     """Return rows after which a channel steps farther than anywhere else, and stays; empty if there are none."""
     sizes = np.nan_to_num(np.abs(strayed))
     sizes[:APART] = sizes[-APART:] = 0.0  # a log may begin during a jerk
@@ -268,10 +269,10 @@ def _places(strayed: Array, least: float) -> list[int]:
     alone = [n for n in range(1, len(found)) if found[n - 1][1] > least * found[n][1] > 0.0]
     rows = [k for k, _ in found[: max(alone, default=0)]]
     sums = (float(np.nansum(strayed[k - APART : k + APART + 1])) / strayed[k] for k in rows)
-    return rows if all(lasting > LASTS for lasting in sums) else []
+    return rows if all(lasting > LASTING_SHARE for lasting in sums) else []
 
 
-def _size(strayed: Array, k: int) -> float:
+def _step_size(strayed: Array, k: int) -> float:
     """Return the size of a step at a row, from the means of some rows on either side."""
     course = np.cumsum(np.nan_to_num(strayed[k - NEAR : k + NEAR + 1]))
     return float(np.mean(course[NEAR:]) - np.mean(course[:NEAR]))
@@ -290,9 +291,9 @@ def _held_before(record: Record, step: _Step) -> int:
     return count - 1 if abs(gone - step.size) < 0.5 * abs(step.size) else 0
 
 
-def _also(record: Record, step: _Step, steps: list[_Step]) -> list[str]:
+def _other_jumping_channels(record: Record, step: _Step, steps: list[_Step]) -> list[str]:
     """Return the other channels that jump in the same row."""
-    names = [one.channel for one in steps if one.channel != step.channel and _beside(one.row, [step.row])]
+    names = [one.channel for one in steps if one.channel != step.channel and _is_beside(one.row, [step.row])]
     for name in (PRESSURE, VELOCITY, SPEED):
         if name in record and name not in (step.channel, *names) and _jumps(record[name], step.row):
             names.append(name)
@@ -312,4 +313,4 @@ def _jumps(values: Array, row: int) -> bool:
     near = steps[[i for i in (k - 2, k - 1, k + 1, k + 2) if 0 <= i < len(steps)]]
     expected = float(np.nanmedian(near))
     usual = 1.4826 * float(np.median(np.abs(beside - np.median(beside))))
-    return abs(float(steps[k]) - expected) > BROKEN * usual
+    return abs(float(steps[k]) - expected) > JUMP_IF_ROWS_LOST * usual

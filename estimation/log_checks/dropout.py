@@ -16,7 +16,7 @@ from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 
-ASKED = (SPEED, POSITION, VELOCITY, *PRESSURES)
+CHECKED_CHANNELS = (SPEED, POSITION, VELOCITY, *PRESSURES)
 """Channels that a row must repeat, if they are logged."""
 
 FEWEST_CHANNELS, FEWEST_ROWS = 3, 10
@@ -37,7 +37,7 @@ def without_dropouts(record: Record) -> tuple[Record, tuple[Note, ...]]:
     tuple of (Record, tuple of Note)
         The log, with those rows missing in all channels, and a note for each channel if there are any.
     """
-    asked = [name for name in ASKED if name in record]
+    asked = [name for name in CHECKED_CHANNELS if name in record]
     if len(asked) < FEWEST_CHANNELS:
         return record, ()
     again = record[asked[0]][1:] == record[asked[0]][:-1]

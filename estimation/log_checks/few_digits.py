@@ -16,7 +16,7 @@ from plant.notes import Note
 MOST_DIGITS = 5
 """Significant digits up to which a channel is checked [count]; with six, steps are finer than any encoder's."""
 
-LOOKED_AT = 200
+SAMPLES_CHECKED_FIRST = 200
 """Samples that are checked first, spread over the log [count]."""
 
 EXACT = 1e-9
@@ -70,7 +70,7 @@ def written_digits(values: Array) -> int:
     (3, 0)
     """
     there = _sizes(values)
-    few = there[:: 1 + len(there) // LOOKED_AT]
+    few = there[:: 1 + len(there) // SAMPLES_CHECKED_FIRST]
     if len(there) < FEWEST or not _has_digits(few, _power(few), MOST_DIGITS):
         return 0
     powers = _power(there)
@@ -78,16 +78,16 @@ def written_digits(values: Array) -> int:
     if not digits:
         return 0
     last_used = np.rint(there * 10.0 ** (digits - 1 - powers)) % 10.0 != 0.0
-    told = [np.mean(last_used[powers == power]) > USED for power in _common(powers)]
+    told = [np.mean(last_used[powers == power]) > USED for power in _common_powers(powers)]
     return digits if sum(told) > 1 else 0
 
 
 def _largest_power(values: Array) -> float:
     """Return the largest power of ten with enough samples: a spike must not coarsen the whole log."""
-    return float(_common(_power(_sizes(values)))[-1])
+    return float(_common_powers(_power(_sizes(values)))[-1])
 
 
-def _common(powers: Array) -> Array:
+def _common_powers(powers: Array) -> Array:
     """Return the powers with enough samples, in order."""
     found, counts = np.unique(powers, return_counts=True)  # without counts NumPy imports its masked arrays
     return found[counts >= FEWEST]

@@ -119,7 +119,7 @@ def is_white(values: Array) -> bool:
         The channel [any unit]; NaN where missing.
     """
     windows = _windows(values)
-    return len(windows) < FEWEST_WINDOWS or flatness(windows) > _white(len(windows))
+    return len(windows) < FEWEST_WINDOWS or flatness(windows) > _least_white_flatness(len(windows))
 
 
 def is_white_when_quiet(values: Array) -> bool:
@@ -140,15 +140,15 @@ def is_white_when_quiet(values: Array) -> bool:
     loud = np.sum(_spectra(windows)[:, np.arange(WINDOW // 2 + 1) >= BANDS[0] * WINDOW], axis=1)
     quiet = windows[loud <= np.sort(loud)[int(QUIET * (len(loud) - 1))]]  # np.quantile imports numpy.ma
     found = flatness(quiet)
-    return found > _white(len(quiet)) and 1.0 - found < NEARER * (1.0 - flatness(windows))
+    return found > _least_white_flatness(len(quiet)) and 1.0 - found < NEARER * (1.0 - flatness(windows))
 
 
-def _white(windows: int) -> float:
+def _least_white_flatness(windows: int) -> float:
     """Return the flatness above which noise in so many windows is white [dimensionless]."""
     return min(FLATTEST, 1.0 - CHANCE / windows**0.5)
 
 
-def _cut(values: Array) -> Array:
+def _overlapping_windows(values: Array) -> Array:
     """Return windows that overlap by half, shape (windows, `WINDOW`)."""
     if len(values) < WINDOW:
         return np.empty((0, WINDOW))
@@ -157,7 +157,7 @@ def _cut(values: Array) -> Array:
 
 def _windows(values: Array) -> Array:
     """Return windows without missing samples, shape (windows, `WINDOW`)."""
-    windows = _cut(values)
+    windows = _overlapping_windows(values)
     return windows[np.isfinite(windows).all(axis=1)]
 
 

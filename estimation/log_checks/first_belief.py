@@ -39,8 +39,8 @@ def first_belief(model: ProcessModel, record: Record, start: float, start_std: f
     start_std : float
         Its standard deviation [Pa].
     """
-    firsts = {POSITION: _first(record, POSITION), BULK_MODULUS: start}
-    firsts[PRESSURE] = _first(record, PRESSURE)
+    firsts = {POSITION: _first_sample(record, POSITION), BULK_MODULUS: start}
+    firsts[PRESSURE] = _first_sample(record, PRESSURE)
     spreads = {
         POSITION: 1e-5,
         VELOCITY: 1e-3,
@@ -72,7 +72,7 @@ def first_load(record: Record, variances: Mapping[str, float] | None = None) -> 
     >>> first_load(Record(1e-3, {"differential_pressure_pa": np.array([np.nan, -4e5, -5e5, -6e5])}))
     -400000.0
     """
-    first = _first(record, PRESSURE)
+    first = _first_sample(record, PRESSURE)
     noise = (variances or measurement_variances(record, (PRESSURE,)))[PRESSURE] ** 0.5
     return first if abs(first) > AT_REST + 5.0 * noise else 0.0
 
@@ -93,11 +93,11 @@ def begins_in_motion(record: Record, share: float = TURNING) -> bool:
         Whether the first motor speed exceeds that.
     """
     speed = record[SPEED]
-    first = abs(_first(record, SPEED))
+    first = abs(_first_sample(record, SPEED))
     return first > 0.0 and first > share * float(np.sqrt(np.nanmean(speed**2)))
 
 
-def _first(record: Record, channel: str) -> float:
+def _first_sample(record: Record, channel: str) -> float:
     if channel not in record:
         return 0.0
     present = record[channel][np.isfinite(record[channel])]

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.log_checks.channel_blocks import FEWEST_BLOCKS, alike, whole
+from estimation.log_checks.channel_blocks import FEWEST_BLOCKS, bridged_channel, correlation_and_ratio
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
-from estimation.log_checks.measurement_noise import position_variance, struck_variance
+from estimation.log_checks.measurement_noise import excited_noise_variance, position_variance
 from plant.arrays import Array
 from plant.eha.model import EhaParameters, piston_areas
 from plant.log.record import Record
@@ -57,7 +57,7 @@ class FlowBalance(NamedTuple):
     moving: float
 
     @property
-    def contradicts_rig(self) -> float:
+    def rig_contradiction(self) -> float:
         """Error of the piston's flow by the balance, over what the balance leaves unexplained [dimensionless].
 
         If the piston hardly moves and nearly all flow leaks, the motion absorbs whatever the balance omits.
@@ -77,7 +77,7 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
     length : float
         Length of the blocks over which flows are balanced [s].
     """
-    found = {name: whole(record, name) for name in (SPEED, PRESSURE, POSITION, VELOCITY)}
+    found = {name: bridged_channel(record, name) for name in (SPEED, PRESSURE, POSITION, VELOCITY)}
     moved = POSITION if found[POSITION] is not None else VELOCITY
     speed, pressure, piston = found[SPEED], found[PRESSURE], found[moved]
     size = max(FEWEST_SAMPLES, round(length / record.sample_time))
@@ -99,7 +99,7 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
     noises = [p.piston_area**2 * spread * noise_x, compliance**2 * window.of_slope * noise_p]
     noises += [window.of_mean * noise_p, 0.0]
     sign = window.mean(np.sign(speed))  # a block in which the pump reverses has both signs
-    return _whatever_the_bias(flow, sign, parts, np.array(noises), MOST_LOST * p.rated_flow)
+    return _averaged_over_biases(flow, sign, parts, np.array(noises), MOST_LOST * p.rated_flow)
 
 
 def _pumped_areas(pressure: Array, least: float, size: int, p: EhaParameters) -> Array:
@@ -118,7 +118,7 @@ def _pumped_areas(pressure: Array, least: float, size: int, p: EhaParameters) ->
 
 def _noise(values: Array) -> float:
     """Return the variance of a channel's noise [its unit squared], zero where the log does not show it."""
-    found = struck_variance(values)
+    found = excited_noise_variance(values)
     return found if np.isfinite(found) else 0.0
 
 
@@ -153,7 +153,7 @@ class _Window:
         return between[: count * size].reshape(count, size) @ self._weights
 
 
-def _whatever_the_bias(
+def _averaged_over_biases(
     flow: Array, sign: Array, parts: Sequence[Array], noises: Array, most: float
 ) -> FlowBalance | None:
     """Return the balance of a flow by its parts, averaged over the flow biases that it leaves open.
@@ -185,7 +185,7 @@ def _whatever_the_bias(
     without = np.stack([np.ones(BIASES), -biases])
     left, whole = (np.einsum("ib,ij,jb->b", without, np.cov(one.T, bias=True), without) for one in (rest, wanted))
     share = np.maximum(left / np.where(whole > 0.0, whole, np.inf), LEAST_SHARE)
-    repeats = _blocks_that_repeat(rest @ without[:, int(np.argmin(share))])
+    repeats = _blocks_per_independent_block(rest @ without[:, int(np.argmin(share))])
     weights = (np.min(share) / share) ** (0.5 * len(flow) / repeats)
     weights /= np.sum(weights)
 
@@ -200,14 +200,14 @@ def _whatever_the_bias(
     return FlowBalance(swept, swept_std, compressed, compressed_std, explained, moving)
 
 
-def _blocks_that_repeat(rest: Array) -> float:
+def _blocks_per_independent_block(rest: Array) -> float:
     """Return how many blocks are worth one independent block [dimensionless, 1 or more].
 
     Neighbours of a slow remainder repeat each other, and so do the periods of a sine, with the same model error in
     each. The number of independent blocks is then that of the lines of their spectrum (Welch's equivalent degrees of
     freedom, 1947).
     """
-    lasting = float(np.clip(alike(rest[1:], rest[:-1])[0], 0.0, 0.99))
+    lasting = float(np.clip(correlation_and_ratio(rest[1:], rest[:-1])[0], 0.0, 0.99))
     power = np.abs(np.fft.rfft(rest - rest.mean())[1:]) ** 2
     total = float(power.sum())
     lines = 2.0 * total**2 / float(power @ power) if total > 0.0 else np.inf

@@ -35,7 +35,7 @@ JUMP, BEYOND_PUMP = 10.0, 5.0
 """A step after a hold is a jump if it is so many times any other, and so many times what the pump can move."""
 
 
-def jumped(record: Record, hold: slice, p: EhaParameters) -> bool:
+def ends_with_jump(record: Record, hold: slice, p: EhaParameters) -> bool:
     """Return whether the encoder leaves a hold with a jump too fast for a piston.
 
     Parameters
@@ -62,7 +62,7 @@ def jumped(record: Record, hold: slice, p: EhaParameters) -> bool:
     return bool(rate[after] > max(JUMP * float(np.max(others, initial=0.0)), BEYOND_PUMP * fastest))
 
 
-def misses_seals(record: Record, hold: slice, p: EhaParameters) -> bool:
+def misses_yield_of_seals(record: Record, hold: slice, p: EhaParameters) -> bool:
     """Return whether a fine encoder repeats one value for long while the piston yields on its seals.
 
     Pressure varies meanwhile, and the encoder repeats itself for far longer than anywhere else.
@@ -97,7 +97,7 @@ def _range(values: Array) -> float:
     return float(np.subtract(*np.percentile(there, (99.0, 1.0)))) if len(there) > FEWEST else np.nan
 
 
-def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
+def misses_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     """Return whether pump delivery within a hold exceeds leakage, compression and relief flow.
 
     Leakage, flow bias and compressibility come from the rest of the log, in which the encoder shows where the oil goes.
@@ -128,7 +128,7 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     speed, pressure = (_means(bridged(record[name]), size, count) for name in (SPEED, PRESSURE))
     swept, rise = (np.diff(bridged(record[name])[::size][: count + 1]) for name in (POSITION, PRESSURE))
     pumped = p.pump_displacement * speed
-    losses = np.column_stack([pressure, _biased(pumped, p.flow_bias), rise / span])
+    losses = np.column_stack([pressure, _bias_flow(pumped, p.flow_bias), rise / span])
     blocks = np.arange(count)
     within = (blocks * size >= hold.start) & ((blocks + 1) * size <= hold.stop)
     away = ((blocks + 1) * size < hold.start) | (blocks * size > hold.stop)
@@ -138,9 +138,9 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     if np.count_nonzero(away) < FEWEST or not np.any(within):
         return False
     took = pumped[away] - p.piston_area * swept[away] / span
-    value, _ = _fitted(losses[away], took)
-    losses[:, 1] = _biased(pumped, float(value[1]))
-    value, std = _fitted(losses[away], took)
+    value, _ = _non_negative_fit(losses[away], took)
+    losses[:, 1] = _bias_flow(pumped, float(value[1]))
+    value, std = _non_negative_fit(losses[away], took)
     lost = np.sign(pumped) * np.minimum(np.abs(losses[:, :2] @ value[:2]), np.abs(pumped))
     left = np.where(relieved, 0.0, pumped - lost - losses[:, 2] * value[2])[within]
     uncertain = DEVIATIONS * np.abs(losses[within]) @ std + LOSSES_KNOWN * np.abs(lost[within])
@@ -152,7 +152,7 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     )
 
 
-def _biased(pumped: Array, bias: float) -> Array:
+def _bias_flow(pumped: Array, bias: float) -> Array:
     """Return the flow lost by a flow bias: no more than is pumped.
 
     At rest only noise is pumped, and its sign would hide the bias of a log with long rests.
@@ -164,7 +164,7 @@ def _means(values: Array, size: int, count: int) -> Array:
     return values[: count * size].reshape(count, size).mean(axis=1)
 
 
-def _fitted(columns: Array, found: Array) -> tuple[Array, Array]:
+def _non_negative_fit(columns: Array, found: Array) -> tuple[Array, Array]:
     """Return non-negative coefficients, with their deviations."""
     sizes = np.linalg.norm(columns, axis=0)
     sizes[sizes == 0.0] = 1.0

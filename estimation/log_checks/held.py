@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.log_checks.channel_names import POSITION, PRESSURES, SPEED, VELOCITY
-from estimation.log_checks.slow_speed import was_repeated
+from estimation.log_checks.slow_speed import is_repeated_by_logger
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 
-HELD = (POSITION, VELOCITY, *PRESSURES)
+CHECKED_CHANNELS = (POSITION, VELOCITY, *PRESSURES)
 """Channels that are checked: none can jump. A motor speed that is held may be the motor's own (`slow_speed`)."""
 
 LEAST_STEPS = 100
@@ -36,7 +36,7 @@ STRAIGHT, MOSTLY = 1e-3, 0.45
 such rows in a bridged channel, in which at most every second row is sampled."""
 
 
-class _Slow(NamedTuple):
+class _SlowSampling(NamedTuple):
     """A channel with a sample every so many rows, from the first of them on; repeated, or bridged by lines."""
 
     rows: int
@@ -44,7 +44,7 @@ class _Slow(NamedTuple):
     bridged: bool
 
 
-def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
+def without_held_values(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """Return a log without the values that its logger only repeated, or interpolated between samples.
 
     Returns
@@ -53,78 +53,80 @@ def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
         The log, and a note for each channel that was held or bridged. If all channels were, in the same rows, the log
         gets the clock of its samples, and so does one whose motor speed was repeated.
     """
-    slow = {name: one for name in HELD if name in record and (one := _slow(record[name])) is not None}
+    slow = {
+        name: one for name in CHECKED_CHANNELS if name in record and (one := _slow_sampling(record[name])) is not None
+    }
     turning = _slow_speed(record)
     if not slow and turning is None:
         return record, ()
     every = next(iter(slow.values()), turning)
-    asked = [name for name in (SPEED, *HELD) if name in record]
-    if every is not None and all(_only_at(record[name], every) for name in asked):
+    asked = [name for name in (SPEED, *CHECKED_CHANNELS) if name in record]
+    if every is not None and all(_changes_only_at_samples(record[name], every) for name in asked):
         return record.slice(every.first, None, every.rows), tuple(_notes(record, dict.fromkeys(asked, every)))
     changed: dict[str, Array] = {}
     for name, one in slow.items():
         values = record[name].copy()
-        values[~_sampled(record[name], one)] = np.nan
+        values[~_rows_of_samples(record[name], one)] = np.nan
         changed[name] = values
     found, notes = record.replace(**changed) if changed else record, tuple(_notes(record, slow))
-    if turning is None or not was_repeated(found, others=bool(slow)):
+    if turning is None or not is_repeated_by_logger(found, others=bool(slow)):
         return found, notes
-    said = SensorCode.SPEED_HELD.note(**_said(record, SPEED, turning))
+    said = SensorCode.SPEED_HELD.note(**_note_data(record, SPEED, turning))
     return found.slice(turning.first, None, turning.rows), (said, *notes)
 
 
-def _notes(record: Record, slow: Mapping[str, _Slow]) -> Iterator[Note]:
+def _notes(record: Record, slow: Mapping[str, _SlowSampling]) -> Iterator[Note]:
     for name, one in slow.items():
-        yield (SensorCode.BRIDGED if one.bridged else SensorCode.HELD).note(**_said(record, name, one))
+        yield (SensorCode.BRIDGED if one.bridged else SensorCode.HELD).note(**_note_data(record, name, one))
 
 
-def _said(record: Record, name: str, one: _Slow) -> dict[str, Any]:
+def _note_data(record: Record, name: str, one: _SlowSampling) -> dict[str, Any]:
     return {"channel": name, "rows": one.rows, "milliseconds": 1e3 * one.rows * record.sample_time}
 
 
-def _slow_speed(record: Record) -> _Slow | None:
+def _slow_speed(record: Record) -> _SlowSampling | None:
     """Return the hold of motor speed, by motor or logger; None if it is not held over a fixed number of rows."""
-    one = _repeated(record[SPEED]) if SPEED in record else None
-    return one if one is not None and _only_at(record[SPEED], one) else None
+    one = _repeated_sampling(record[SPEED]) if SPEED in record else None
+    return one if one is not None and _changes_only_at_samples(record[SPEED], one) else None
 
 
-def _repeated(values: Array) -> _Slow | None:
+def _repeated_sampling(values: Array) -> _SlowSampling | None:
     """Return the hold of a channel that repeats its samples; None if it does not."""
     if (rows := held_rows(values)) == 1:
         return None
-    return _Slow(rows, int(np.argmax(np.diff(values) != 0.0) + 1) % rows, bridged=False)
+    return _SlowSampling(rows, int(np.argmax(np.diff(values) != 0.0) + 1) % rows, bridged=False)
 
 
-def _slow(values: Array) -> _Slow | None:
+def _slow_sampling(values: Array) -> _SlowSampling | None:
     """Return the hold or bridging of a channel; None if it is sampled in every row."""
-    if (repeated := _repeated(values)) is not None:
+    if (repeated := _repeated_sampling(values)) is not None:
         return repeated
     if len(values) < LEAST_STEPS:
         return None
-    straight = _straight(values)
+    straight = _rows_on_line(values)
     if np.mean(straight) < MOSTLY or (knots := np.flatnonzero(~straight) + 1).size < LEAST_STEPS:
         return None
-    bridged = _Slow(int(np.median(np.diff(knots))), 0, bridged=True)
+    bridged = _SlowSampling(int(np.median(np.diff(knots))), 0, bridged=True)
     bridged = bridged._replace(first=int(knots[0]) % max(bridged.rows, 1))
-    return bridged if bridged.rows > 1 and _only_at(values, bridged) else None
+    return bridged if bridged.rows > 1 and _changes_only_at_samples(values, bridged) else None
 
 
-def _straight(values: Array) -> NDArray[np.bool_]:
+def _rows_on_line(values: Array) -> NDArray[np.bool_]:
     """Return which inner rows are on the line between their neighbours; none if a sample is missing."""
     bends = np.diff(values, 2)
     return np.abs(bends) < STRAIGHT * np.sqrt(np.mean(bends**2))
 
 
-def _sampled(values: Array, one: _Slow) -> NDArray[np.bool_]:
+def _rows_of_samples(values: Array, one: _SlowSampling) -> NDArray[np.bool_]:
     """Return the rows in which a slow channel has a sample."""
     if not one.bridged:
         return np.concatenate([[True], np.diff(values) != 0.0])
     return np.arange(len(values)) % one.rows == one.first
 
 
-def _only_at(values: Array, one: _Slow) -> bool:
+def _changes_only_at_samples(values: Array, one: _SlowSampling) -> bool:
     """Return whether a channel steps, or bends, only in the rows of its samples."""
-    moved = ~_straight(values) if one.bridged else np.diff(values) != 0.0
+    moved = ~_rows_on_line(values) if one.bridged else np.diff(values) != 0.0
     at = np.flatnonzero(moved) + 1
     return bool(np.all(at % one.rows == one.first)) and not np.any(np.isnan(values))
 

@@ -14,7 +14,7 @@ from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 
-ASKED = (SPEED, VELOCITY, *PRESSURES)
+CHECKED_CHANNELS = (SPEED, VELOCITY, *PRESSURES)
 """Channels that are checked. A piston at rest repeats its position too; a jump shows the difference
 (`discontinuities`)."""
 
@@ -29,11 +29,11 @@ NOISY, LEAST_NOISE = 1.0, 1e-5
 """Least ratio of fourth to third differences for noise, 1.9 on average and far smaller for motion [dimensionless]; and
 the least share of a channel's range that is noise, and not rounding of the file [fraction]."""
 
-MOST = 0.2
+MOST_HELD = 0.2
 """Largest share of a log for which a channel may be held [fraction]."""
 
 
-def without_held_alone(record: Record) -> tuple[Record, tuple[Note, ...]]:
+def without_temporary_holds(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """Return a log without the samples of a channel that its logger only repeated for a while.
 
     Parameters
@@ -43,8 +43,8 @@ def without_held_alone(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """
     changed: dict[str, Array] = {}
     notes: list[Note] = []
-    for name in (one for one in ASKED if one in record):
-        held = _held(record[name])
+    for name in (one for one in CHECKED_CHANNELS if one in record):
+        held = _held_samples(record[name])
         if not np.any(held):
             continue
         first, _ = stretches(held)
@@ -55,13 +55,13 @@ def without_held_alone(record: Record) -> tuple[Record, tuple[Note, ...]]:
     return (record.replace(**changed), tuple(notes)) if notes else (record, ())
 
 
-def _held(values: Array) -> BoolArray:
+def _held_samples(values: Array) -> BoolArray:
     """Return which samples repeat the one before, where the channel itself would not."""
     out = np.zeros(len(values), dtype=np.bool_)
     first, behind = stretches(np.append(False, np.diff(values) == 0.0))
     lengths = behind - first
     long = np.flatnonzero(lengths >= FEWEST_ROWS)
-    if not len(long) or np.sum(lengths[long]) > MOST * len(values):
+    if not len(long) or np.sum(lengths[long]) > MOST_HELD * len(values):
         return out
     rest = np.delete(lengths, long)
     usual = int(np.max(rest, initial=1))

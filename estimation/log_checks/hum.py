@@ -18,7 +18,7 @@ from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 
-MOVING = (SPEED, POSITION)
+CHANNELS_OF_MOTION = (SPEED, POSITION)
 """Channels whose lines are motion."""
 
 LOWEST = 40.0
@@ -71,7 +71,9 @@ def without_hum(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """
     if PRESSURE not in record or not np.any(np.isfinite(record[PRESSURE])):
         return record, ()
-    motion = [_lines(record[name]) for name in MOVING if name in record and np.any(np.isfinite(record[name]))]
+    motion = [
+        _lines(record[name]) for name in CHANNELS_OF_MOTION if name in record and np.any(np.isfinite(record[name]))
+    ]
     pressure, notes, of_teeth = record[PRESSURE], list[Note](), list[float]()
     while len(notes) < MOST_TONES and len(of_teeth) < MOST_TONES:
         lines = _lines(pressure)
@@ -82,9 +84,9 @@ def without_hum(record: Record) -> tuple[Record, tuple[Note, ...]]:
             within &= np.abs(frequencies - known) > WIDTH
         hums = np.where(within & (moved < SHARED * lines), lines, 0.0)
         place = int(np.argmax(hums))
-        if hums[place] < STANDS_OUT or not _alone(frequencies, lines, place):
+        if hums[place] < STANDS_OUT or not _is_single_line(frequencies, lines, place):
             break
-        frequency = _between(frequencies, lines, place)
+        frequency = _line_frequency(frequencies, lines, place)
         if _is_of_teeth(record, pressure, frequency, lines, place):
             of_teeth.append(frequency)
             continue
@@ -135,7 +137,7 @@ def _window(length: int) -> Array:
     return np.hanning(length)
 
 
-def _alone(frequencies: Array, lines: Array, place: int) -> bool:
+def _is_single_line(frequencies: Array, lines: Array, place: int) -> bool:
     """Return whether a spectral line has no others near it, and is no harmonic of a periodic drive.
 
     Harmonics come in rows, every one or every other: a line of a slow drive has others of its row near it. Only those
@@ -152,7 +154,7 @@ def _alone(frequencies: Array, lines: Array, place: int) -> bool:
     return bool(np.max(others, initial=0.0) < ALONE * lines[place])
 
 
-def _between(frequencies: Array, lines: Array, place: int) -> float:
+def _line_frequency(frequencies: Array, lines: Array, place: int) -> float:
     """Return the frequency of a line between two of the spectrum [Hz], by a parabola through logarithms."""
     if not 0 < place < len(lines) - 1:
         return float(frequencies[place])
@@ -167,10 +169,10 @@ def _tone(values: Array, per_sample: float) -> Array:
     phase = 2.0 * np.pi * per_sample * np.arange(len(values))
     waves: Array = np.column_stack([np.cos(phase), np.sin(phase)]).astype(np.float64)
     parts = np.array_split(np.arange(len(values)), max(1, round(len(values) * per_sample / STRETCH)))
-    return np.concatenate([_fitted(waves[part], values[part]) for part in parts])
+    return np.concatenate([_least_squares_fit(waves[part], values[part]) for part in parts])
 
 
-def _fitted(waves: Array, values: Array) -> Array:
+def _least_squares_fit(waves: Array, values: Array) -> Array:
     """Return the least-squares fit by columns; second differences are compared, in which motion is small."""
     bends = np.diff(values, n=2)
     there = np.isfinite(bends)

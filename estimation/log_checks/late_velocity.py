@@ -23,7 +23,7 @@ EXPLAINED = 0.5
 """Share of the difference that one delay must explain [fraction]; judged: the rest may be noise correlated by a filter.
 A wrong gain, proportional to velocity, explains none."""
 
-MATTERS, BLOCK = 0.04, 0.01
+LEAST_DIFFERENCE, BLOCK = 0.04, 0.01
 """Share of the velocity's root mean square from which the difference due to the delay matters [fraction], and the
 length of its means [s]: noise adds to it, and from 0.05 on the diagnosis reports that two sensors disagree."""
 
@@ -41,7 +41,7 @@ def without_late_velocity(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """
     if POSITION not in record or VELOCITY not in record:
         return record, ()
-    apart, change = _compared(record[POSITION], record[VELOCITY], record.sample_time)
+    apart, change = _differences_by_part(record[POSITION], record[VELOCITY], record.sample_time)
     late = _lateness(apart, change)
     if late < LEAST_LATE:
         return record, ()
@@ -49,7 +49,7 @@ def without_late_velocity(record: Record) -> tuple[Record, tuple[Note, ...]]:
     size = float(np.sqrt(np.nanmean(record[VELOCITY] ** 2)))
     differs = late * _fastest(record[VELOCITY], record.sample_time)
     explained = 1.0 - float(left @ left) / max(float(apart @ apart), float(np.finfo(float).tiny))
-    if explained < EXPLAINED or differs < MATTERS * size:
+    if explained < EXPLAINED or differs < LEAST_DIFFERENCE * size:
         return record, ()
     note = SensorCode.VELOCITY_LATE.note(channel=VELOCITY, late_ms=1e3 * late)
     return record.replace(**{VELOCITY: None}), (note,)
@@ -68,10 +68,10 @@ def velocity_lateness(record: Record) -> float:
     float
         Delay [s]; 0 if there are too few samples of both.
     """
-    return _lateness(*_compared(record[POSITION], record[VELOCITY], record.sample_time))
+    return _lateness(*_differences_by_part(record[POSITION], record[VELOCITY], record.sample_time))
 
 
-def velocity_apart(record: Record) -> float:
+def velocity_difference(record: Record) -> float:
     """Return the difference between velocity and the slope of position over parts of `STRETCH`.
 
     Parameters
@@ -84,7 +84,7 @@ def velocity_apart(record: Record) -> float:
     float
         Root mean square [m/s]; 0 if there are too few samples of both.
     """
-    apart, _ = _compared(record[POSITION], record[VELOCITY], record.sample_time)
+    apart, _ = _differences_by_part(record[POSITION], record[VELOCITY], record.sample_time)
     return float(np.sqrt(np.mean(apart**2))) / STRETCH if len(apart) else 0.0
 
 
@@ -101,7 +101,7 @@ def wrong_gain_explains(record: Record) -> float:
     float
         Share of the squared difference over parts of `STRETCH` [fraction]; 1 if they do not differ.
     """
-    gained, swept, _ = _stretches(record[POSITION], record[VELOCITY], record.sample_time)
+    gained, swept, _ = _changes_by_part(record[POSITION], record[VELOCITY], record.sample_time)
     apart = gained - swept
     both, left = float(apart @ apart), 0.0
     if both > 0.0:
@@ -122,13 +122,13 @@ def _fastest(velocity: Array, sample_time: float) -> float:
     return float(np.sqrt(np.nanmean(change**2))) / (rows * sample_time)
 
 
-def _compared(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
+def _differences_by_part(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
     """Return position's gain minus integrated velocity, and velocity's change, for each part."""
-    gained, swept, change = _stretches(position, velocity, sample_time)
+    gained, swept, change = _changes_by_part(position, velocity, sample_time)
     return gained - swept, change
 
 
-def _stretches(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array, Array]:
+def _changes_by_part(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array, Array]:
     """Return position's gain, integrated velocity, and velocity's change, for each part."""
     rows = max(1, round(STRETCH / sample_time))
     gone = 0.5 * sample_time * (velocity[1:] + velocity[:-1])

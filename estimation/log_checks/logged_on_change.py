@@ -36,7 +36,7 @@ NEARBY, LIKE, GRIDS = 100.0, 0.03, 121
 """Steps from the first value within which values are checked [steps], share by which the grid's step may differ from
 the smallest one, if that was rounded again [fraction], and the number of grids that are tried [count]."""
 
-MATTERS = 0.01
+LEAST_THRESHOLD = 0.01
 """Threshold over the channel's standard deviation from which it matters [fraction]; judged. At 0.05 bulk modulus is up
 to 1.3 % off, more than its interval."""
 
@@ -58,7 +58,7 @@ def logged_on_change(record: Record) -> tuple[Note, ...]:
     for channel in (SPEED, POSITION, PRESSURE):
         if channel in record and (threshold := dead_band(record[channel])) > 0.0:
             share = threshold / float(np.nanstd(record[channel]))
-            if share > MATTERS:
+            if share > LEAST_THRESHOLD:
                 found.append(LoggerCode.LOGGED_ON_CHANGE.note(channel=channel, percent=100.0 * share))
     return tuple(found)
 

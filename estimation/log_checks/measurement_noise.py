@@ -22,7 +22,7 @@ well below any bench sensor, so that a noiseless simulation stays solvable."""
 NORMAL_MAD = 1.482602218505602
 """Standard deviation of a normal variable over its median absolute deviation."""
 
-MOST_REMEMBERED = 32
+MOST_CACHED = 32
 """Variances that are cached, by content [count]."""
 
 ROUNDING = 1e-12
@@ -51,22 +51,22 @@ def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[st
     >>> round(measurement_variances(log, ["velocity_m_s"])["velocity_m_s"] * 1e6, 1)
     1.0
     """
-    return {channel: _once(_variance, record[channel], channel) for channel in channels}
+    return {channel: _cached_variance(_variance, record[channel], channel) for channel in channels}
 
 
-def _once(variance: Callable[..., float], values: Array, *more: str) -> float:
+def _cached_variance(variance: Callable[..., float], values: Array, *more: str) -> float:
     """Return a variance of a channel, computed once for all checks and fits that need it."""
     content = np.ascontiguousarray(values, dtype=np.float64)
     key = (variance.__name__, sha1(content.data, usedforsecurity=False).digest(), len(content), *more)
-    found = _remembered.get(key)
+    found = _cache.get(key)
     if found is None:
-        if len(_remembered) >= MOST_REMEMBERED:
-            _remembered.clear()
-        found = _remembered[key] = variance(content, *more)
+        if len(_cache) >= MOST_CACHED:
+            _cache.clear()
+        found = _cache[key] = variance(content, *more)
     return found
 
 
-_remembered: dict[tuple[object, ...], float] = {}
+_cache: dict[tuple[object, ...], float] = {}
 
 
 def _variance(values: Array, channel: str) -> float:
@@ -76,7 +76,7 @@ def _variance(values: Array, channel: str) -> float:
     smallest = max(SMALLEST_VARIANCE.get(channel, 0.0), rounded)
     if not len(bends):
         return smallest
-    return float(max(_squared(bends - median(bends), _step(values), 6), smallest))
+    return float(max(_variance_from_differences(bends - median(bends), _step(values), 6), smallest))
 
 
 COARSE, NEAR = 1.5, 4.0
@@ -85,7 +85,7 @@ deviations within which the mean square of differences is used then [dimensionle
 off, the mean square 2 %."""
 
 
-def _squared(bends: Array, step: float, gain: int) -> float:
+def _variance_from_differences(bends: Array, step: float, gain: int) -> float:
     """Return the variance of white noise from that of its differences, which is ``gain`` times as large."""
     deviation = NORMAL_MAD * _grouped_median(np.abs(bends), step) / gain**0.5
     if step > COARSE * deviation > 0.0:
@@ -182,7 +182,7 @@ def rounded_variance(values: Array) -> float:
     return max(quantum**2 / 12.0, float(np.mean(flickers**2)) / 6.0 if len(flickers) else 0.0)
 
 
-SMOOTH = 6
+DIFFERENCE_ORDER = 6
 """Order of the differences that remove a motion: at 1 kHz a ringing of 50 Hz is reduced to 0.1 %, while a second
 difference keeps 10 % of it and takes that for noise."""
 
@@ -218,10 +218,10 @@ def position_variance(position: Array) -> float:
     >>> round(position_variance(walked) * 12e12, 3)
     1.0
     """
-    return _once(_position_variance, position)
+    return _cached_variance(_position_variance, position)
 
 
-def struck_variance(values: Array) -> float:
+def excited_noise_variance(values: Array) -> float:
     """Return the variance of a channel's noise if a drive excites it every few samples.
 
     The ringing of stiff oil is so fast that second differences contain as much of it as of the noise; the median of
@@ -242,25 +242,31 @@ def struck_variance(values: Array) -> float:
     >>> time = 1e-3 * np.arange(20_000)
     >>> ringing = np.sin(2.0 * np.pi * 60.0 * time)
     >>> noise = np.random.default_rng(1).normal(0.0, 0.01, 20_000)
-    >>> round(struck_variance(ringing + noise) * 1e4, 1)
+    >>> round(excited_noise_variance(ringing + noise) * 1e4, 1)
     1.0
     """
-    return _once(_struck_variance, values)
+    return _cached_variance(_excited_noise_variance, values)
 
 
-def _struck_variance(values: Array) -> float:
-    bends = np.diff(values, n=SMOOTH)
+def _excited_noise_variance(values: Array) -> float:
+    bends = np.diff(values, n=DIFFERENCE_ORDER)
     bends = bends[np.isfinite(bends)]  # differences across missing samples would include the ringing
-    found = _squared(bends, _step(values[np.isfinite(values)]), comb(2 * SMOOTH, SMOOTH)) if len(bends) else 0.0
+    found = (
+        _variance_from_differences(
+            bends, _step(values[np.isfinite(values)]), comb(2 * DIFFERENCE_ORDER, DIFFERENCE_ORDER)
+        )
+        if len(bends)
+        else 0.0
+    )
     return max(found if found > 0.0 else np.inf, rounded_variance(values))
 
 
 def _position_variance(position: Array) -> float:
     position = position[np.isfinite(position)]  # a slow sensor never has seven samples in a row
-    bends, steps = np.diff(position, n=SMOOTH), np.abs(np.diff(position))
+    bends, steps = np.diff(position, n=DIFFERENCE_ORDER), np.abs(np.diff(position))
     moved = steps[steps > 0.0]
     if not (len(bends) and len(moved)):
         return SMALLEST_VARIANCE[POSITION]
     powers = [np.mean(part**2, axis=1) for part in stacked(bends, max(1, len(bends) // WINDOW))]
-    variance = median(np.concatenate(powers)) / comb(2 * SMOOTH, SMOOTH)
+    variance = median(np.concatenate(powers)) / comb(2 * DIFFERENCE_ORDER, DIFFERENCE_ORDER)
     return float(max(variance, np.min(moved) ** 2 / 12.0))

@@ -28,7 +28,7 @@ BENDS = 3.0
 """Spreads of the window's middle samples by which it must be farther away still: a peak is no outlier
 [dimensionless]."""
 
-USUAL = 95.0
+USUAL_PERCENT = 95.0
 """Share of the samples that are assumed to be no outliers [percent]."""
 
 ENDS = 3
@@ -45,7 +45,7 @@ FEWEST_ALIKE, MOST_ALIKE = 3, 0.8
 """Gross outliers of one value from which a logger writes it in place of a lost sample, and their share of all gross
 outliers of the channel [count, fraction]; judged."""
 
-CONFIRMING = 5e-3
+CONFIRMING_SPAN = 5e-3
 """Span over which motion of the encoder confirms a velocity [s]."""
 
 
@@ -81,9 +81,9 @@ def without_outliers(values: Array, noise: float = 0.0) -> Array:
         distance -= seen
         np.abs(distance, out=distance)
         spread *= BENDS
-        spread += GROSS * (percentile(distance, USUAL) + noise)
+        spread += GROSS * (percentile(distance, USUAL_PERCENT) + noise)
         seen[distance > spread] = np.nan
-        kept[np.isfinite(kept)] = _within_range(seen, noise)
+        kept[np.isfinite(kept)] = _without_end_outliers(seen, noise)
     return kept
 
 
@@ -115,7 +115,7 @@ def without_bursts(values: Array, sound: Array, noise: float) -> Array:
         return sound
     window, stands = WINDOWS[-1][0], there.copy()
     distance = np.abs(sound[there] - _running_ranks(sound[there], window, [window // 2])[0])
-    stands[there] = distance > BESIDE * (percentile(distance, USUAL) + noise)
+    stands[there] = distance > BESIDE * (percentile(distance, USUAL_PERCENT) + noise)
     near = np.convolve(lost, np.ones(2 * REACH + 1), "same") > 0.5
     return np.where(stands & near, np.nan, sound)
 
@@ -166,7 +166,7 @@ def _running_ranks(values: Array, window: int, ranks: Sequence[int]) -> Array:
         part = around[begin : begin + PART + window - 1]
         rows = [part[k : len(part) - window + 1 + k].copy() for k in range(window)]
         spare = np.empty_like(rows[0])
-        for low, high in exchanges(window):
+        for low, high in sorting_exchanges(window):
             lower = np.minimum(rows[low], rows[high], out=spare)
             np.maximum(rows[low], rows[high], out=rows[high])
             spare, rows[low] = rows[low], lower
@@ -175,7 +175,7 @@ def _running_ranks(values: Array, window: int, ranks: Sequence[int]) -> Array:
 
 
 @cache
-def exchanges(count: int) -> tuple[tuple[int, int], ...]:
+def sorting_exchanges(count: int) -> tuple[tuple[int, int], ...]:
     """Return the pairs to compare, and to exchange if necessary, that sort some numbers (Batcher's odd-even merges).
 
     All windows of a log are sorted together in this way, in a tenth of the time of sorting one after another.
@@ -192,7 +192,7 @@ def exchanges(count: int) -> tuple[tuple[int, int], ...]:
 
     Examples
     --------
-    >>> exchanges(3)
+    >>> sorting_exchanges(3)
     ((0, 2), (0, 1), (1, 2))
     """
     found: list[tuple[int, int]] = []
@@ -209,7 +209,7 @@ def exchanges(count: int) -> tuple[tuple[int, int], ...]:
     return tuple(found)
 
 
-def _within_range(seen: Array, noise: float) -> Array:
+def _without_end_outliers(seen: Array, noise: float) -> Array:
     """Return a channel without those of its first and last samples that are a full range beyond all others.
 
     One that its neighbours lead to is none: a log may begin at rest, and show how the motor speeds up.
@@ -254,20 +254,20 @@ def without_gross_outliers(record: Record, channels: Sequence[str]) -> tuple[Rec
         variance = measurement_variances(shown, (name,))[name]
         noise = max(variance, rounded_variance(values)) ** 0.5
         sound = without_outliers(values, noise)
-        if name == VELOCITY and POSITION in record and _missing(sound) > _missing(values):
-            span = max(CONFIRMING, 2.0 * record.sample_time)
+        if name == VELOCITY and POSITION in record and _missing_count(sound) > _missing_count(values):
+            span = max(CONFIRMING_SPAN, 2.0 * record.sample_time)
             moved = differentiated(bridged(record[POSITION]), record.sample_time, span)
             sound = np.where(np.isnan(without_outliers(values - moved, noise)), sound, values)
         # pressure is only compared with the model: unlike a driving channel, it can spare samples
         if name in PRESSURES:
             sound = without_bursts(values, sound, noise)
         sound = without_written_for_lost(values, sound, noise)
-        lost = _missing(sound) - _missing(values)
+        lost = _missing_count(sound) - _missing_count(values)
         if lost:
             said.append(SensorCode.OUTLIERS_LEFT_OUT.note(channel=name, count=lost, total=len(record)))
             record = record.replace(**{name: sound})
     return record, tuple(said)
 
 
-def _missing(values: Array) -> int:
+def _missing_count(values: Array) -> int:
     return int(np.count_nonzero(np.isnan(values)))

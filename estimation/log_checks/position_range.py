@@ -15,7 +15,7 @@ from plant.notes import Note
 FARTHEST = 1.5
 """Step of a position as it leaves its range or comes back, over its largest step elsewhere [dimensionless]."""
 
-ASKED = 5
+MOST_STAYS_TESTED = 5
 """Number of longest stays at a level that are tested for motion [count]."""
 
 
@@ -38,7 +38,7 @@ def without_position_beyond_range(record: Record) -> tuple[Record, tuple[Note, .
     seen = values[np.isfinite(values)]
     if len(seen) < FEWEST_HELD or np.ptp(seen) == 0.0:
         return record, ()
-    levels = [level for level in (float(np.max(seen)), float(np.min(seen))) if _ends_there(record, level)]
+    levels = [level for level in (float(np.max(seen)), float(np.min(seen))) if _is_end_of_range(record, level)]
     if not levels:
         return record, ()
     beyond = np.isin(values, levels)
@@ -51,14 +51,14 @@ def without_position_beyond_range(record: Record) -> tuple[Record, tuple[Note, .
     return record.replace(**{POSITION: np.where(beyond, np.nan, values)}), (note,)
 
 
-def _ends_there(record: Record, level: float) -> bool:
+def _is_end_of_range(record: Record, level: float) -> bool:
     """Return whether position stays at a level while the piston moves on, and leaves it without a jump."""
     values = record[POSITION]
     starts, lengths = holds(values)
     there = (values[starts] == level) & (lengths >= LEAST_RUN)
     first, behind = starts[there], starts[there] + lengths[there]
     came_back = behind < len(values)
-    longest = np.argsort((behind - first) * came_back)[::-1][:ASKED]
+    longest = np.argsort((behind - first) * came_back)[::-1][:MOST_STAYS_TESTED]
     if not any(
         came_back[at] and shows_motion(record, slice(int(first[at]), int(behind[at])))[0] for at in longest.tolist()
     ):

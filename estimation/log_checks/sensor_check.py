@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import CHAMBERS, POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
 from estimation.log_checks.filtered import independent_rows
-from estimation.log_checks.frozen_encoder import jumped, missed_motion, misses_seals
+from estimation.log_checks.frozen_encoder import ends_with_jump, misses_motion, misses_yield_of_seals
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.order import median
 from estimation.log_checks.velocity_strays import strays_unusually
@@ -30,7 +30,7 @@ FEWEST_HELD = 20
 USUAL_REPEATS = 0.5
 """Share of repeated samples above which a channel is coarse: a constant value then means nothing [fraction]."""
 
-BY_CHANCE = 1e-9
+CHANCE_OF_REPEATS = 1e-9
 """Probability of so many repetitions of the extreme value, for a sensor that repeats itself as often as this one does
 elsewhere, below which it is at the end of its range [probability]."""
 
@@ -45,7 +45,7 @@ AROUND, BAND = 0.01, 4.0
 """For a pressure near the end of the range only the lower half of its noise is seen, so samples near a clipped one in
 time [s] and in level [standard deviations] are left out with it."""
 
-HEAPED = 2.0
+LEAST_END_HEAP = 2.0
 """Ratio of samples at the end of a sensor's range to those close by [dimensionless]."""
 
 NOISY = 0.3
@@ -64,7 +64,7 @@ CLIPPED = 0.98
 """Share of its largest value above which a constant pressure is at the end of its range or at the relief valve
 [fraction]."""
 
-UNDELIVERED = 5.0
+MOTION_QUANTA = 5.0
 """Quanta of the encoder by which a velocity sensor must show motion [dimensionless]."""
 
 
@@ -153,7 +153,7 @@ def _frozen_velocity(record: Record) -> Note | None:
     travelled, quantum = float(position[-1] - position[0]), _quantum(record[POSITION])
     said = velocity * record.sample_time * float(there[-1] - there[0])
     strayed = max(abs(travelled - said), float(np.ptp(position)) - abs(said))
-    return _says_frozen(VELOCITY, stretch, record) if strayed > UNDELIVERED * max(quantum, 1e-6) else None
+    return _frozen_note(VELOCITY, stretch, record) if strayed > MOTION_QUANTA * max(quantum, 1e-6) else None
 
 
 def _frozen_pressure(record: Record, p: EhaParameters) -> Note | None:
@@ -165,20 +165,20 @@ def _frozen_pressure(record: Record, p: EhaParameters) -> Note | None:
     if np.all(np.isnan(record[PRESSURE]) | (record[PRESSURE] == value)):
         return SensorCode.SENSOR_CONSTANT.note(channel=PRESSURE, value=float(value))
     speed = bridged(record[SPEED])[stretch]
-    volume = np.cumsum(_pumped(speed, p)) * record.sample_time
+    volume = np.cumsum(_pumped_flow(speed, p)) * record.sample_time
     if np.ptp(speed) == 0.0:
         return None
     if abs(value) > CLIPPED * float(np.nanmax(np.abs(record[PRESSURE]))):
         return None
-    return _says_frozen(PRESSURE, stretch, record) if np.ptp(volume) > 0.0 else None
+    return _frozen_note(PRESSURE, stretch, record) if np.ptp(volume) > 0.0 else None
 
 
-def _pumped(speed: Array, p: EhaParameters) -> Array:
+def _pumped_flow(speed: Array, p: EhaParameters) -> Array:
     ideal = p.pump_displacement * speed
     return np.sign(ideal) * np.maximum(np.abs(ideal) - p.flow_bias, 0.0)
 
 
-def _says_frozen(channel: str, stretch: slice, record: Record) -> Note:
+def _frozen_note(channel: str, stretch: slice, record: Record) -> Note:
     start, length = stretch.start, stretch.stop - stretch.start
     begin = record.start_time + start * record.sample_time
     return SensorCode.SENSOR_FROZE.note(
@@ -195,8 +195,8 @@ def _frozen_position(record: Record, p: EhaParameters) -> Note | None:
     if stretch is None:
         return None
     slid, rests = shows_motion(record, stretch)
-    missed = not rests and (missed_motion(record, stretch, p) or misses_seals(record, stretch, p))
-    return _says_frozen(POSITION, stretch, record) if slid or missed or jumped(record, stretch, p) else None
+    missed = not rests and (misses_motion(record, stretch, p) or misses_yield_of_seals(record, stretch, p))
+    return _frozen_note(POSITION, stretch, record) if slid or missed or ends_with_jump(record, stretch, p) else None
 
 
 def shows_motion(record: Record, stretch: slice) -> tuple[bool, bool]:
@@ -223,7 +223,7 @@ def shows_motion(record: Record, stretch: slice) -> tuple[bool, bool]:
     step = 0.5 * (stretch.stop - stretch.start) * record.sample_time / len(velocity)
     travelled = np.cumsum(velocity) * step
     allowed = 6.0 * noise * step * (alike * len(velocity)) ** 0.5
-    resolved = UNDELIVERED * _quantum(record[POSITION])
+    resolved = MOTION_QUANTA * _quantum(record[POSITION])
     if np.ptp(travelled) <= max(allowed, resolved):
         return False, noise > 0.0
     return strays_unusually(record, slice(stretch.start + quarter, stretch.stop - quarter), resolved), False
@@ -325,7 +325,7 @@ def _is_clipped(seen: Array, level: float, p: EhaParameters) -> bool:
     moved = steps[steps > 0.0]
     usual = median(moved)
     far = ARRIVING * max(float(np.min(moved)), LEAST_ARRIVAL * usual)
-    if count <= HEAPED * (np.count_nonzero(depth <= far) - count):
+    if count <= LEAST_END_HEAP * (np.count_nonzero(depth <= far) - count):
         return False
     elsewhere = steps[(depth[1:] > 0.0) | (depth[:-1] > 0.0)]
     repeats = (np.count_nonzero(elsewhere == 0.0) + 1.0) / (len(elsewhere) + 1.0)
@@ -340,7 +340,7 @@ def _is_clipped(seen: Array, level: float, p: EhaParameters) -> bool:
         for start, length in zip(starts[here], lengths[here], strict=True)
         if noisy or (_moves(depth[:start][-LEAST_RUN:], far) and _moves(depth[start + length :][:LEAST_RUN], far))
     )
-    return bool(again * np.log(repeats) < np.log(BY_CHANCE))
+    return bool(again * np.log(repeats) < np.log(CHANCE_OF_REPEATS))
 
 
 def _moves(depth: Array, far: float) -> bool:

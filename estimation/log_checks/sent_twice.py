@@ -75,7 +75,7 @@ def without_rows_sent_twice(record: Record, columns: Sequence[str] | None = None
     for first, behind in zip(*copies, strict=True):
         copied[first:behind] = True
     shown = [record[name] for name in asked if name != SPEED or columns is not None]
-    time_passed = sum(_time_passed(values, *copies) for values in shown) > 0.0
+    time_passed = sum(_evidence_of_elapsed_time(values, *copies) for values in shown) > 0.0
     data = {"rows": int(np.count_nonzero(copied)), "count": len(copies[0])}
     notes = (SensorCode.SENT_TWICE.note(channel=SPEED if SPEED in asked else asked[0], **data),)
     if time_passed:
@@ -102,21 +102,23 @@ def _copies(rows: Array, *, known: bool) -> tuple[IntArray, IntArray]:
     for first, behind in zip(*stretches(np.append(False, same)), strict=True):
         often[order[first - 1 : behind]] = behind - first + 1 > MOST_PLACES
     again = (lag > 0) & (lag <= FARTHEST * len(keys)) & ~often & np.all(np.isfinite(rows), axis=0)
-    found = [(a, b) for a, b in _one_lag(again, lag) if b - a >= FEWEST_ROWS and b - a <= MOST_PLACES * lag[a]]
-    whole = [_widened(keys, a, b, int(lag[a])) for a, b in found]
+    found = [
+        (a, b) for a, b in _copies_at_one_lag(again, lag) if b - a >= FEWEST_ROWS and b - a <= MOST_PLACES * lag[a]
+    ]
+    whole = [_extended_copy(keys, a, b, int(lag[a])) for a, b in found]
     least = LEAST_NOISE * np.array([np.ptp(one[np.isfinite(one)]) for one in rows])
     if known:
         jumped = sum(_goes_back(rows, a, b) or _has_noise(rows[:, a:b], least) for a, b in whole)
         whole = whole if 2 * jumped >= len(whole) else []
     else:
-        whole = [(a, b) for a, b in whole if _never_by_chance(rows[:, a:b], least)]
+        whole = [(a, b) for a, b in whole if _is_certain_copy(rows[:, a:b], least)]
     if not whole:
         return none, none
     first, behind = np.array(whole, dtype=np.int64).T
     return first, behind
 
 
-def _one_lag(again: BoolArray, lag: IntArray) -> list[tuple[int, int]]:
+def _copies_at_one_lag(again: BoolArray, lag: IntArray) -> list[tuple[int, int]]:
     """Return stretches of rows that repeat others at one distance."""
     out: list[tuple[int, int]] = []
     for first, behind in zip(*stretches(again), strict=True):
@@ -126,7 +128,7 @@ def _one_lag(again: BoolArray, lag: IntArray) -> list[tuple[int, int]]:
     return out
 
 
-def _widened(keys: NDArray[np.uint64], first: int, behind: int, lag: int) -> tuple[int, int]:
+def _extended_copy(keys: NDArray[np.uint64], first: int, behind: int, lag: int) -> tuple[int, int]:
     """Return a copy with the rows at either end that occur in more places, as those of a rest do."""
     while first - 1 >= lag and behind - first < lag and keys[first - 1] == keys[first - 1 - lag]:
         first -= 1
@@ -146,14 +148,14 @@ def _has_noise(rows: Array, least: Array) -> bool:
     return sum(is_noisy(one, size) for one, size in zip(rows, least.tolist(), strict=True)) >= 2
 
 
-def _never_by_chance(rows: Array, least: Array) -> bool:
+def _is_certain_copy(rows: Array, least: Array) -> bool:
     """Return whether a copy is too long, and a channel of it too noisy, for a repetition by chance."""
     n = rows.shape[1]
     noisy = (is_noisy(one, size) and np.unique(one).size >= DISTINCT * n for one, size in zip(rows, least, strict=True))
     return n >= FEWEST_ANY and any(noisy)
 
 
-def _time_passed(values: Array, first: IntArray, behind: IntArray) -> float:
+def _evidence_of_elapsed_time(values: Array, first: IntArray, behind: IntArray) -> float:
     """Return the evidence of a channel that time went on while copies were written [log-likelihood]."""
     inner = behind < len(values)
     first, behind = first[inner], behind[inner]
@@ -166,10 +168,10 @@ def _time_passed(values: Array, first: IntArray, behind: IntArray) -> float:
         at_once, after = (float(np.nanmean((around[k:] - around[:-k]) ** 2)) for k in (1, over))
         step = float(values[b] - values[a - 1]) ** 2
         if min(at_once, after) > 0.0:
-            out += _unlikely(step, at_once) - _unlikely(step, after)
+            out += _step_cost(step, at_once) - _step_cost(step, after)
     return out
 
 
-def _unlikely(squared: float, variance: float) -> float:
+def _step_cost(squared: float, variance: float) -> float:
     """Return minus the log-likelihood of a step by Student's law with three degrees of freedom: it has long tails."""
     return 0.5 * np.log(variance) + 2.0 * np.log1p(squared / (3.0 * variance))

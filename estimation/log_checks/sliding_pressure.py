@@ -44,7 +44,7 @@ def sliding_pressure(record: Record, p: EhaParameters) -> float:
     return median(np.abs(blocks.pressure[slides]) * p.piston_area / rubs) if np.all(rubs > 0.0) else 1.0
 
 
-def beyond_sliding(ratio: float) -> float:
+def sliding_excess(ratio: float) -> float:
     """Return how far a ratio is below the least at which pistons slide (negative), or above the most [logarithm].
 
     Parameters
@@ -59,7 +59,7 @@ def beyond_sliding(ratio: float) -> float:
 
     Examples
     --------
-    >>> beyond_sliding(1.0), round(beyond_sliding(0.08), 3), round(beyond_sliding(60.0), 3)
+    >>> sliding_excess(1.0), round(sliding_excess(0.08), 3), round(sliding_excess(60.0), 3)
     (0.0, -2.303, 2.303)
     """
     return min(ln(max(ratio, 1e-12) / LEAST), 0.0) + max(ln(max(ratio, 1e-12) / MOST), 0.0)

@@ -10,12 +10,12 @@ from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from plant.arrays import Array
 from plant.log.record import Record
 
-SURE = 10.0
+SURE_GAIN = 10.0
 """Gain in log-likelihood by which straight lines must explain the pressure better [dimensionless]: odds of 20,000. If
 the logger repeats other channels too, a loss of up to as much is accepted."""
 
 
-def was_repeated(record: Record, *, others: bool) -> bool:
+def is_repeated_by_logger(record: Record, *, others: bool) -> bool:
     """Return whether a speed that changes only in some rows was repeated by its logger, not held by the motor.
 
     Parameters
@@ -41,13 +41,13 @@ def was_repeated(record: Record, *, others: bool) -> bool:
     if len(rise) <= 2 * known.shape[1]:
         return False
     turned = (np.append(0.0, np.cumsum(one)) for one in (speed[:-1], 0.5 * (line[:-1] + line[1:])))
-    as_logged, on_lines = (_left(known, np.diff(one[at]), rise) for one in turned)
+    as_logged, on_lines = (_rise_residual(known, np.diff(one[at]), rise) for one in turned)
     if min(as_logged, on_lines) <= 0.0:
         return False
-    return 0.5 * len(rise) * float(np.log(as_logged / on_lines)) > (-SURE if others else SURE)
+    return 0.5 * len(rise) * float(np.log(as_logged / on_lines)) > (-SURE_GAIN if others else SURE_GAIN)
 
 
-def _left(known: Array, turned: Array, rise: Array) -> float:
+def _rise_residual(known: Array, turned: Array, rise: Array) -> float:
     """Return the residual of the pressure's rise after pump, piston and leakage, a sum of squares [Pa squared]."""
     # all that the pump turns, less its flow bias
     pumped = np.column_stack([known, turned, np.sign(turned) * known[:, -1]])

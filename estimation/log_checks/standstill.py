@@ -56,13 +56,13 @@ def travels(record: Record, p: EhaParameters) -> Travels | None:
     offset = p.pump_displacement * LIMITS["motor_speed_rad_s"].least
     position = blocks.position
     if position is None and blocks.velocity is not None and len(blocks.velocity):
-        position = _swept(blocks.velocity, offset / p.piston_area) * blocks.length
+        position = _integrated_rate(blocks.velocity, offset / p.piston_area) * blocks.length
     if position is None or blocks.pumped is None or not len(blocks.pumped):
         return None
-    pumped = _swept(blocks.pumped, offset) * blocks.length
+    pumped = _integrated_rate(blocks.pumped, offset) * blocks.length
     return Travels(float(np.ptp(position)), float(np.ptp(pumped)) / p.piston_area)
 
 
-def _swept(rate: Array, offset: float) -> Array:
+def _integrated_rate(rate: Array, offset: float) -> Array:
     """Return the integral of a rate, without its mean as far as that may be an offset."""
     return np.cumsum(rate - np.clip(np.mean(rate), -offset, offset))

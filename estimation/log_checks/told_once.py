@@ -1,4 +1,4 @@
-"""`told_once(record) -> Record`: a repeated encoder reading is used where it changes, and once at rest.
+"""`with_repeats_used_once(record) -> Record`: a repeated encoder reading is used where it changes, and once at rest.
 
 An encoder rounds. Where its reading changes, the piston is halfway between the two readings, and their errors cancel.
 Between changes all rows have the same error: a filter that takes them for independent samples believes their mean.
@@ -20,14 +20,14 @@ REST = 10
 """Rows of one reading that are a rest [samples], of which the middle is used. Of two rows neither is the middle: with
 the first of them alone bulk modulus was 15 deviations off at 10 kHz."""
 
-SLOW = 2
+ROWS_OF_SLOW_CHANGE = 2
 """Rows of a reading from which its changes are slow [samples]: the piston then moves at most half a step per row, and
 the rows beside a change are wrong by half a step in opposite directions. After a faster change it may rest at once,
 with the same error as in the middle of the rest, which would count twice: at 1 kHz bulk modulus was half a deviation
 high."""
 
 
-def told_once(record: Record) -> Record:
+def with_repeats_used_once(record: Record) -> Record:
     """Return a log in which a repeated position is used once, if its rounding exceeds its noise.
 
     Returns
@@ -38,7 +38,7 @@ def told_once(record: Record) -> Record:
     Examples
     --------
     >>> turned = np.array([0.0, 0.0, 1e-6, 3e-6] + 100 * [4e-6])
-    >>> int(np.count_nonzero(np.isfinite(told_once(Record(1e-3, {"position_m": turned}))["position_m"])))
+    >>> int(np.count_nonzero(np.isfinite(with_repeats_used_once(Record(1e-3, {"position_m": turned}))["position_m"])))
     5
     """
     if POSITION not in record:
@@ -69,7 +69,7 @@ def changes_and_rests(values: Array) -> Array:
     first = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     after = np.append(first[1:], len(values))
     count = after - first
-    rests, slow = count >= REST, np.pad(count >= SLOW, 1)
+    rests, slow = count >= REST, np.pad(count >= ROWS_OF_SLOW_CHANGE, 1)
     begins, ends, middles = first[~rests | slow[:-2]], after[~rests | slow[2:]] - 1, (first + after - 1)[rests] // 2
     kept = np.concatenate([[0], begins, ends, middles])
     told = np.full(len(values), np.nan)

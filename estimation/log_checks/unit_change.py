@@ -42,7 +42,7 @@ def unit_changes(record: Record) -> tuple[Note, ...]:
     noise = {name: _noise(record[name], size, count) for name in asked}
     found: list[Note] = []
     for name in asked:
-        split = _split(noise[name])
+        split = _noise_change(noise[name])
         if split is None:
             continue
         k, factor = split
@@ -52,7 +52,7 @@ def unit_changes(record: Record) -> tuple[Note, ...]:
         others = [_ratio(noise[other], k) for other in asked if other != name]
         if any(max(one, 1.0 / one) > OTHERS for one in others):
             continue
-        begin = float(record.time[_exactly(record[name], k * size, size, factor)])
+        begin = float(record.time[_change_row(record[name], k * size, size, factor)])
         times = slip if factor > 1.0 else 1.0 / slip
         found.append(ChannelCode.UNIT_CHANGES.note(channel=name, begin_s=begin, factor=times))
     return tuple(found)
@@ -73,7 +73,7 @@ def _ratio(noise: Array, k: int) -> float:
     return float(np.median(behind) / np.median(before)) if len(before) and len(behind) else 1.0
 
 
-def _split(noise: Array) -> tuple[int, float] | None:
+def _noise_change(noise: Array) -> tuple[int, float] | None:
     """Return the block from which noise is different, and its factor, if no block is in between."""
     known = np.flatnonzero(np.isfinite(noise))
     if len(known) < 2 * FEWEST:
@@ -91,7 +91,7 @@ def _split(noise: Array) -> tuple[int, float] | None:
     return (at, factor) if max(factor, 1.0 / factor) > LEAST else None
 
 
-def _exactly(values: Array, near: int, size: int, factor: float) -> int:
+def _change_row(values: Array, near: int, size: int, factor: float) -> int:
     """Return the row from which a channel is larger by a factor, within two blocks."""
     first = max(1, near - size)
     steps = np.abs(np.diff(values[first - 1 : near + size]))

@@ -17,7 +17,7 @@ LEAST_PARTS = 8
 CERTAIN = 6.0
 """Standard errors from which an offset is believed [dimensionless]: with 14 degrees of freedom, one log in 30,000."""
 
-MATTERS = 0.01
+LEAST_OFFSET_SHARE = 0.01
 """Share of the velocity's root mean square from which an offset is subtracted [fraction]; judged: class and severities
 are less exact than that."""
 
@@ -41,7 +41,7 @@ def without_velocity_offset(record: Record) -> tuple[Record, tuple[Note, ...]]:
         return record, ()
     position, velocity = record[POSITION], record[VELOCITY]
     size = float(np.sqrt(np.nanmean(velocity**2))) if np.any(np.isfinite(velocity)) else 0.0
-    gained, mean = _compared(position, velocity, record.sample_time)
+    gained, mean = _mean_rates(position, velocity, record.sample_time)
     if len(mean) < LEAST_PARTS or size == 0.0:
         return record, ()
     sides = np.column_stack([np.ones(len(gained)), gained])
@@ -52,13 +52,13 @@ def without_velocity_offset(record: Record) -> tuple[Record, tuple[Note, ...]]:
     variance = float(left @ left) / (len(mean) - sides.shape[1])
     error = float(np.sqrt(variance * np.linalg.inv(sides.T @ sides)[0, 0]))
     offset = float(found[0])
-    if abs(offset) <= max(CERTAIN * error, MATTERS * size):
+    if abs(offset) <= max(CERTAIN * error, LEAST_OFFSET_SHARE * size):
         return record, ()
     note = SensorCode.VELOCITY_OFFSET.note(channel=VELOCITY, offset_m_s=offset)
     return record.replace(**{VELOCITY: velocity - offset}), (note,)
 
 
-def _compared(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
+def _mean_rates(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
     """Return the mean rate of position, and mean velocity, for each part with enough samples of both [m/s]."""
     gained: list[float] = []
     means: list[float] = []

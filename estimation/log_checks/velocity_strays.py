@@ -11,7 +11,7 @@ from estimation.log_checks.channel_names import POSITION, VELOCITY
 from estimation.log_checks.late_velocity import velocity_lateness
 from plant.log.record import Record
 
-USUAL = 5.0
+LEAST_STRAY_RATIO = 5.0
 """Ratio to the lower quartile by which velocity must deviate from a constant position to be believed [dimensionless].
 The quartile is that of a sound part even if position is often constant; in 36 plain training logs under eight filters
 of 20 to 150 Hz the ratio is never reached."""
@@ -43,7 +43,7 @@ def strays_unusually(record: Record, stretch: slice, resolved: float) -> bool:
     moving = [one for one in _windows(0, len(went), rows) if np.ptp(position[one]) > resolved]
     usual = sorted(float(np.ptp(went[one] - position[one])) for one in moving)
     here = max(float(np.ptp(went[one])) for one in _windows(stretch.start, stretch.stop, rows))
-    return not usual or here > USUAL * usual[len(usual) // 4]
+    return not usual or here > LEAST_STRAY_RATIO * usual[len(usual) // 4]
 
 
 def _windows(first: int, stop: int, rows: int) -> list[slice]:

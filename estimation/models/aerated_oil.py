@@ -36,22 +36,22 @@ def _bubbles(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) 
     return air / above * exp(p.air_quickness * log(above / ATMOSPHERE)) if quick else air / above
 
 
-def _before(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+def _stated_air(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
     """Return the volume of the air that the stated bulk modulus includes, over that of its oil [dimensionless]."""
     return where(p.air_onset < 0.0, _bubbles(p.stated_pressure, air, p, quick=quick), 0.0)
 
 
-def _liquid(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+def _liquid_share(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
     """Return the share of the stated oil's compliance that is due to the liquid, and not to air [fraction]."""
     slope = 1.0 - p.air_quickness if quick else 1.0
-    return 1.0 - p.bulk_modulus * slope * _before(air, p, quick=quick) / p.stated_pressure
+    return 1.0 - p.bulk_modulus * slope * _stated_air(air, p, quick=quick) / p.stated_pressure
 
 
-def _room(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+def _stiffness_times_volume(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
     """Return bulk modulus times the volume of oil and bubbles over that at the stated pressure, 1 by volume [Pa]."""
-    grown = p.by_mass * (_bubbles(pressure, air, p, quick=quick) - _before(air, p, quick=quick))
+    grown = p.by_mass * (_bubbles(pressure, air, p, quick=quick) - _stated_air(air, p, quick=quick))
     squeezed = pressure - (p.stated_pressure if quick else ATMOSPHERE)
-    return p.bulk_modulus * (1.0 + grown) - p.by_mass * squeezed * _liquid(air, p, quick=quick)
+    return p.bulk_modulus * (1.0 + grown) - p.by_mass * squeezed * _liquid_share(air, p, quick=quick)
 
 
 def tangent_stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool = False) -> Scalar:
@@ -80,8 +80,10 @@ def tangent_stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quic
     ratio, bubbles = VAPOUR / above, _bubbles(pressure, air, p, quick=quick)
     short = ratio * ratio
     slope = 1.0 - p.air_quickness if quick else 1.0
-    softer = slope * (bubbles / above - _before(air, p, quick=quick) / p.stated_pressure)
-    return _room(pressure, air, p, quick=quick) / maximum(1.0 + short * short + softer * p.bulk_modulus, STIFFEST)
+    softer = slope * (bubbles / above - _stated_air(air, p, quick=quick) / p.stated_pressure)
+    return _stiffness_times_volume(pressure, air, p, quick=quick) / maximum(
+        1.0 + short * short + softer * p.bulk_modulus, STIFFEST
+    )
 
 
 def swellings(p1: Scalar, p2: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool = False) -> tuple[Scalar, Scalar]:
@@ -104,6 +106,6 @@ def swellings(p1: Scalar, p2: Scalar, air: Scalar, p: SimpleNamespace, *, quick:
         Both zero if volumes are balanced [fraction].
     """
     freed = _bubbles(p2, air, p, quick=quick) - _bubbles(p1, air, p, quick=quick)
-    swells = (p1 - p2) * _liquid(air, p, quick=quick) + p.bulk_modulus * freed
-    first, second = (p.by_mass * swells / _room(one, air, p, quick=quick) for one in (p1, p2))
+    swells = (p1 - p2) * _liquid_share(air, p, quick=quick) + p.bulk_modulus * freed
+    first, second = (p.by_mass * swells / _stiffness_times_volume(one, air, p, quick=quick) for one in (p1, p2))
     return first, second

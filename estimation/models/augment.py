@@ -36,7 +36,7 @@ AUGMENTABLE = (
 )
 """Parameters that may be states beside bulk modulus."""
 
-MOST = 1e3
+LARGEST_RATIO = 1e3
 """Largest value of a parameter, over that of the healthy actuator [dimensionless]."""
 
 AIR = StateVariable(AIR_FRACTION, "1", 1e-2, 0.0, 1e-6, 0.2, logarithmic=True)
@@ -121,8 +121,8 @@ def _variable(name: str) -> StateVariable:
         return AIR
     healthy, unit = float(getattr(EhaParameters(), name)), notes(EhaParameters)[name].unit
     if name == "friction_linear":
-        return StateVariable(name, unit, healthy, 0.0, -MOST * healthy, MOST * healthy)
-    return StateVariable(name, unit, healthy, 0.0, healthy / MOST, MOST * healthy, logarithmic=True)
+        return StateVariable(name, unit, healthy, 0.0, -LARGEST_RATIO * healthy, LARGEST_RATIO * healthy)
+    return StateVariable(name, unit, healthy, 0.0, healthy / LARGEST_RATIO, LARGEST_RATIO * healthy, logarithmic=True)
 
 
 def augmented_prior(

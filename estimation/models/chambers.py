@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from estimation.models.eha_forms import BULK_MODULUS, volume_left_open
+from estimation.models.eha_forms import BULK_MODULUS, undetermined_volume
 from estimation.models.flow import Delivery, chamber_rates, delivered_flow
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel, StateVariable
@@ -83,7 +83,7 @@ MAKEUP, OPENING, DRAIN, LEAD = 1e-9, 1e3, 2.4e-13, 1e-5
 """First guesses of the make-up conductance [m^3/(s Pa)], of the drop at which a make-up valve is half open [Pa], of the
 drain a port [m^3/(s Pa)], and of the motor's lead on the straight line between samples [s]."""
 
-LEAST = 1e-3
+LEAST_GUESS_SHARE = 1e-3
 """Share of the default actuator's value at which a guess of zero begins [fraction]."""
 
 CONSTANTS = ("bulk_modulus", *(state.name for state in STATES[3:]))
@@ -155,7 +155,7 @@ CHAMBERS = ProcessModel(
     longest_step=2.5e-4,
     drives=("motor_speed_rad_s", "position_m"),
     parameters=EhaParameters,
-    opening=volume_left_open,
+    opening=undetermined_volume,
 )
 """Balanced by volume, equations 5.1 to 5.4."""
 
@@ -199,8 +199,8 @@ def chamber_belief(
         "pressure_a_pa": p.accumulator_pressure + max(load, 0.0),
         "pressure_b_pa": p.accumulator_pressure + max(-load, 0.0),
         BULK_MODULUS: modulus,
-        "leakage_coefficient": leakage * max(p.leakage_coefficient, LEAST * healthy.leakage_coefficient),
-        "flow_bias": bias * max(p.flow_bias, LEAST * healthy.flow_bias),
+        "leakage_coefficient": leakage * max(p.leakage_coefficient, LEAST_GUESS_SHARE * healthy.leakage_coefficient),
+        "flow_bias": bias * max(p.flow_bias, LEAST_GUESS_SHARE * healthy.flow_bias),
         "makeup_conductance": makeup,
         "makeup_opening": OPENING,
         "case_leakage": DRAIN,

@@ -21,7 +21,7 @@ BENT_BY_MASS = partial(fed_rates, by_mass=True, bent=True)
 """Rates with an accumulator; what is bent has orifices for make-up valves."""
 
 
-def completed(form: GreyBoxModel, *, bent: bool = False) -> GreyBoxModel:
+def completed_flow_form(form: GreyBoxModel, *, bent: bool = False) -> GreyBoxModel:
     """Return a form with make-up valves that leave their seats each at its own drop, and with an accumulator.
 
     Parameters

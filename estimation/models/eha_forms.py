@@ -120,7 +120,7 @@ def pressure_step(
     return (*lumped_step((x, v, dp), speeds, with_bulk_modulus(p, beta), step), beta)
 
 
-def volume_left_open(
+def undetermined_volume(
     p: EhaParameters, unknown: Mapping[str, Array], sample_time: float
 ) -> tuple[Array, Mapping[str, float]]:
     """Return the variance of chamber volume due to gaps in the drives, and the shift of each state with it.
@@ -174,7 +174,7 @@ ACCELERATION_FORM = ProcessModel(
     _observe_motion,
     longest_step=1e-4,
     parameters=EhaParameters,
-    opening=volume_left_open,
+    opening=undetermined_volume,
 )
 
 PRINTED_FORM = replace(ACCELERATION_FORM, name="acceleration_as_printed", step=printed_step)

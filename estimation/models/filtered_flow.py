@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from estimation.models.wide_flow import WIDE_FLOW_FORM, wide_rates
-from estimation.models.wrong_pressure import misread
+from estimation.models.wrong_pressure import pressure_error
 from plant.compiled.functions import Scalar
 
 FILTER_TIME = "filter_time"
@@ -27,7 +27,7 @@ def _rates(
     circuit = p1, p2, behind, supply
     rise, fall, _, fed = wide_rates(circuit, drives, p, share, turbulent=turbulent, quick=quick)
     begun, next_begun = drives[2]
-    left = behind + misread((p1, p2), begun + share * (next_begun - begun), p) - p.pressure_lag * climbs
+    left = behind + pressure_error((p1, p2), begun + share * (next_begun - begun), p) - p.pressure_lag * climbs
     return rise, fall, rise - fall - climbs, fed, left / (p.filter_time * p.filter_time)
 
 
@@ -35,7 +35,7 @@ def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
     return *WIDE_FLOW_FORM.initial(p), 0.0
 
 
-def _shown(state: tuple[Scalar, ...]) -> tuple[Scalar]:
+def _observed_pressure(state: tuple[Scalar, ...]) -> tuple[Scalar]:
     p1, p2, behind, _, _ = state
     return (p1 - p2 - behind,)
 
@@ -45,7 +45,7 @@ FILTERED_FLOW_FORM = replace(
     name="filtered_flow",
     initial=_at_rest,
     rates=_rates,
-    observe=_shown,
+    observe=_observed_pressure,
     jump=(*WIDE_FLOW_FORM.jump, 0.0),
 )
 FILTERED_TURBULENT_FLOW_FORM = replace(

@@ -251,7 +251,9 @@ def fed_rates(
     return *flow_rates((p1, p2), drives, fed, share, by_mass=by_mass, bend=bend), pushed_back
 
 
-def _held(state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar]:
+def _held_volume_rates(
+    state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar
+) -> tuple[Scalar, Scalar]:
     in_the_middle = _delivery(drives, p, share)._replace(position=0.0)
     return chamber_rates(state, in_the_middle, p, by_mass=False, cracks=(p.crack_a, p.crack_b))
 
@@ -306,7 +308,7 @@ MASS_FLOW_FORM = replace(
 """Balanced by mass, with an inner circuit whose pressure rises with the oil that it takes."""
 
 
-HELD_FLOW_FORM = replace(FLOW_FORM, name="flow_held", rates=_held)
+HELD_FLOW_FORM = replace(FLOW_FORM, name="flow_held", rates=_held_volume_rates)
 """The same with the volumes that the chambers have in mid-stroke, as equation 5.8 holds them: of an actuator whose dead
 volume is far larger than what the piston sweeps, and of the lumped plant."""
 
@@ -332,6 +334,6 @@ def reaches_relief(pressure: Array, setting: float) -> bool:
     return float(np.nanmax(np.abs(pressure))) > NEAR_RELIEF * setting
 
 
-def relieving(form: GreyBoxModel) -> GreyBoxModel:
+def form_with_relief(form: GreyBoxModel) -> GreyBoxModel:
     """Return the form for a log in which the relief valve opens: its setting and slope are then unknown too."""
     return replace(form, unknowns=(*form.unknowns, "relief_pressure", "relief_conductance"))

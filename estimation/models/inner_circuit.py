@@ -27,7 +27,7 @@ def inner_flows(
     cracks : tuple of float or Expression
         Drops at which the make-up valves leave their seats [Pa].
     bend : float or Expression
-        Inverse of the drop from which their flow bends, see `narrowed` [1/Pa].
+        Inverse of the drop from which their flow bends, see `orifice_conductance` [1/Pa].
 
     Returns
     -------
@@ -36,7 +36,9 @@ def inner_flows(
     """
     supply, opening, pilot = p.accumulator_pressure, p.makeup_opening, p.pilot_share
     into_1, into_2 = (
-        make_up_flow(chamber, other, seat, narrowed(seat - chamber, p.makeup_conductance, bend), opening, pilot)
+        make_up_flow(
+            chamber, other, seat, orifice_conductance(seat - chamber, p.makeup_conductance, bend), opening, pilot
+        )
         - p.case_leakage * (chamber - supply)
         for chamber, other, seat in zip(pressures, pressures[::-1], [supply - crack for crack in cracks], strict=True)
     )
@@ -67,7 +69,7 @@ def accumulator_rate(taken: Scalar, supply: Scalar, p: SimpleNamespace) -> Scala
     return -p.accumulator_stiffness * compressed * compressed * taken
 
 
-def narrowed(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
+def orifice_conductance(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
     """Return the conductance of a make-up valve, which falls with the root of a large drop, as an orifice's does.
 
     Parameters
@@ -86,8 +88,8 @@ def narrowed(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
 
     Examples
     --------
-    >>> narrowed(6e4, 1e-9, 0.0), float(narrowed(6e4, 1e-9, 5e-5)), float(narrowed(-6e4, 1e-9, 5e-5))
-    (1e-09, 5e-10, 5e-10)
+    >>> [float(orifice_conductance(drop, 1e-9, bend)) for drop, bend in ((6e4, 0.0), (6e4, 5e-5), (-6e4, 5e-5))]
+    [1e-09, 5e-10, 5e-10]
     """
     if isinstance(bend, float) and bend == 0.0:
         return conductance

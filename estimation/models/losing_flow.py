@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
-from estimation.models.completed_flow import completed
+from estimation.models.completed_flow import completed_flow_form
 from estimation.models.flow import MASS_FLOW_FORM, fed_rates
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
@@ -28,7 +28,7 @@ class LosingFlowParameters(FlowParameters):
     loss_size: float = si(0.0, "1", "units of one more loss from chamber to chamber", "fitted")
 
 
-def _losing(
+def _rates_with_loss(
     state: tuple[Scalar, Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar
 ) -> tuple[Scalar, Scalar, Scalar]:
     speeds, positions, (loss, next_loss), step = drives
@@ -40,14 +40,14 @@ def _losing(
     return rise - stiffness_1 * lost / volume_1, fall + stiffness_2 * lost / volume_2, supply
 
 
-_COMPLETED = completed(MASS_FLOW_FORM)
+_COMPLETED = completed_flow_form(MASS_FLOW_FORM)
 
 LOSING_FLOW_FORM: GreyBoxModel = replace(
     _COMPLETED,
     name="flow_losing",
     drives=(*_COMPLETED.drives, LOSS),
     unknowns=(*_COMPLETED.unknowns, LOSS_SIZE),
-    rates=_losing,
+    rates=_rates_with_loss,
     parameters=LosingFlowParameters,
     linear=(*_COMPLETED.linear, (LOSS_SIZE, 1.0)),
 )

@@ -48,7 +48,7 @@ UNKNOWNS = (
 )
 """What is fitted; stiffness in N/m and damping in N s/m, the rest as named in the nomenclature."""
 
-SEATED = 1.0
+HALF_OPEN_DROP = 1.0
 """Drop at which a make-up valve is half open here, as the log does not show it [Pa]: it opens at once."""
 
 LINEAR = {"friction_linear": 2e3}
@@ -116,17 +116,17 @@ def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
     return 0.0, 0.0, 0.0, supply + maximum(held, 0.0), supply + maximum(-held, 0.0)
 
 
-def _position(state: Any) -> tuple[Scalar]:
+def _observed_position(state: Any) -> tuple[Scalar]:
     return (state[0],)
 
 
-def _form(name: str, friction: Friction) -> GreyBoxModel:
+def _motion_form(name: str, friction: Friction) -> GreyBoxModel:
     def rates(state: Any, drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
         _, velocity, bristle, p1, p2 = state
         speeds, (x, next_x), step = drives
         yielding, force = friction(velocity, bristle, p)
         delivery = Delivery(delivered_flow(speeds, p, step, share), velocity, x + share * (next_x - x))
-        circuit = SimpleNamespace(**vars(p), makeup_opening=SEATED)
+        circuit = SimpleNamespace(**vars(p), makeup_opening=HALF_OPEN_DROP)
         pushing = chamber_rates((p1, p2), delivery, circuit, by_mass=False)
         area_1, area_2 = piston_areas(p)
         push = area_1 * (p1 - ATMOSPHERE) - area_2 * (p2 - ATMOSPHERE) - load_on_rod(x + share * (next_x - x), p)
@@ -139,11 +139,11 @@ def _form(name: str, friction: Friction) -> GreyBoxModel:
         unknowns=(),
         initial=_at_rest,
         rates=rates,
-        observe=_position,
+        observe=_observed_position,
         parameters=MotionParameters,
     )
 
 
-MOTION_FORMS = (_form("motion_lagging", lagging_friction), _form("motion_parallel", parallel_friction))
+MOTION_FORMS = (_motion_form("motion_lagging", lagging_friction), _motion_form("motion_parallel", parallel_friction))
 """The motion form with either structure of friction; position is counted from where the log begins, and the measured
 one sets the chambers' volumes."""

@@ -14,8 +14,8 @@ from estimation.models.completed_flow import CRACKS, USUAL_CRACK
 from estimation.models.flow import delivered_flow, leaked_flow, port_flows
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
-from estimation.models.inner_circuit import BEND, USUAL_BEND, accumulator_rate, narrowed
-from estimation.models.wrong_pressure import SETTLING, misread
+from estimation.models.inner_circuit import BEND, USUAL_BEND, accumulator_rate, orifice_conductance
+from estimation.models.wrong_pressure import SETTLING, pressure_error
 from plant.compiled.functions import Scalar, maximum, minimum, sqrt, where
 from plant.components.check_valve import make_up_flow
 from plant.eha.circuit import chamber_volumes
@@ -34,7 +34,7 @@ SHORTEST_LAG = 1e-6
 COURSES = ("side_of_play", "play_by_pressure", "play_at_once", "play_sprung")
 """Courses of the piston in its encoder's play, see `estimation.fits.greybox.play.crossings`."""
 
-CROSSED = COURSES[1:]
+OTHER_COURSES = COURSES[1:]
 """Parameters that state how far each of the others replaces the first."""
 
 QUICKNESS, QUICKEST = "air_quickness", 2.0 / 7.0
@@ -119,14 +119,14 @@ def wide_rates(
     """
     speeds, (read, next_read), (begun, next_begun), (rate, next_rate), *courses, step = drives
     p1, p2, behind, supply = state
-    side, next_side = _sides(courses, p)
+    side, next_side = _play_sides(courses, p)
     x = read + p.position_lag * rate + 0.5 * p.position_play * side
     next_x = next_read + p.position_lag * next_rate + 0.5 * p.position_play * next_side
     velocity, position = (next_x - x) / step, x + share * (next_x - x) - p.position_zero
-    delivered = delivered_flow(speeds, _ahead(p), step, share)
+    delivered = delivered_flow(speeds, _with_net_lead(p), step, share)
     (area_1, area_2), (volume_1, volume_2) = piston_areas(p), chamber_volumes(position, p)
     dp = p1 - p2
-    pumped = delivered * compressed(where(delivered > 0.0, dp, -dp) / p.bulk_modulus, p.pump_compression)
+    pumped = delivered * compressed_delivery(where(delivered > 0.0, dp, -dp) / p.bulk_modulus, p.pump_compression)
     elapsed = begun + share * (next_begun - begun)
     grown = grown_leakage(elapsed, p.leakage_growth, p.leakage_bend, p.leakage_rise)
     grown = grown * stepped_leakage(elapsed, p.leakage_before, p.step_at, p.step_width)
@@ -135,8 +135,8 @@ def wide_rates(
     opening, pilot, conductance = p.makeup_opening, p.pilot_share, p.makeup_conductance
     cracking, later = supply - p.crack_pressure, 0.5 * p.crack_difference
     from_1, from_2 = cracking - later - p.crack_a, cracking + later - p.crack_b
-    conductance_1 = narrowed(from_1 - p1, conductance, p.makeup_bend)
-    conductance_2 = narrowed(from_2 - p2, p.makeup_share_b * conductance, p.makeup_bend)
+    conductance_1 = orifice_conductance(from_1 - p1, conductance, p.makeup_bend)
+    conductance_2 = orifice_conductance(from_2 - p2, p.makeup_share_b * conductance, p.makeup_bend)
     fed_1 = make_up_flow(p1, p2, from_1, conductance_1, opening, pilot)
     fed_2 = make_up_flow(p2, p1, from_2, conductance_2, opening, pilot)
     drain = p.case_leakage * grown
@@ -147,11 +147,11 @@ def wide_rates(
     rise = tangent_stiffness(p1, air, p, quick=quick) * (at_1 - area_1 * velocity + into_1) / volume_1
     fall = tangent_stiffness(p2, air, p, quick=quick) * (area_2 * velocity - at_2 + into_2) / volume_2
     # `behind` stays small if the sensor's lag is short; a stiff step resolves it
-    lagging = rise - fall - (behind + misread((p1, p2), elapsed, p)) / (p.pressure_lag + SHORTEST_LAG)
+    lagging = rise - fall - (behind + pressure_error((p1, p2), elapsed, p)) / (p.pressure_lag + SHORTEST_LAG)
     return rise, fall, lagging, accumulator_rate(into_1 + into_2, supply, p)
 
 
-def _sides(courses: Any, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
+def _play_sides(courses: Any, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
     """Return the piston's position within its encoder's play at the start and end of a step, from -1 to 1."""
     late, by_pressure, at_once, sprung = courses
     start, end = (
@@ -161,7 +161,7 @@ def _sides(courses: Any, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
     return maximum(minimum(start, 1.0), -1.0), maximum(minimum(end, 1.0), -1.0)
 
 
-def _ahead(p: SimpleNamespace) -> SimpleNamespace:
+def _with_net_lead(p: SimpleNamespace) -> SimpleNamespace:
     """Return the parameters with the speed's lag added to its lead: a lag acts by its length times the slope."""
     return SimpleNamespace(**{**vars(p), "speed_lead": p.speed_lead + p.speed_lag})
 
@@ -236,7 +236,7 @@ def turbulent_leakage(dp: Scalar, share: Scalar) -> Scalar:
     return 1.0 + share * (sqrt(TURBULENT_AT / above) - 1.0)
 
 
-def compressed(squeezed: Scalar, share: Scalar) -> Scalar:
+def compressed_delivery(squeezed: Scalar, share: Scalar) -> Scalar:
     """Return a pump's delivery at outlet pressure, over its displacement: it fills at its inlet's pressure.
 
     A pump that delivers all that it draws loses the compression of that oil (a share of 1), and that of the oil that
@@ -263,7 +263,7 @@ def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
     return supply + maximum(held, 0.0), supply + maximum(-held, 0.0), -p.pressure_offset, p.accumulator_pressure
 
 
-def _shown(state: tuple[Scalar, ...]) -> tuple[Scalar]:
+def _observed_pressure(state: tuple[Scalar, ...]) -> tuple[Scalar]:
     p1, p2, behind, _ = state
     return (p1 - p2 - behind,)
 
@@ -275,7 +275,7 @@ WIDE_FLOW_FORM = GreyBoxModel(
     unknowns=(),
     initial=_at_rest,
     rates=wide_rates,
-    observe=_shown,
+    observe=_observed_pressure,
     parameters=WideFlowParameters,
     jump=(0.5, -0.5, 0.0, 0.0),
 )
@@ -294,7 +294,7 @@ LINEAR = {
     "speed_lead": 1e-5,
     **dict.fromkeys(("pressure_lag", "speed_lag", "position_lag"), 1e-3),
     "position_play": 1e-5,
-    **dict.fromkeys((*CROSSED, *GROWTH, "leakage_before", "pump_compression", "pilot_share", SETTLING), 1.0),
+    **dict.fromkeys((*OTHER_COURSES, *GROWTH, "leakage_before", "pump_compression", "pilot_share", SETTLING), 1.0),
     "pressure_sides": 0.01,
     **dict.fromkeys(("pressure_offset", "pressure_drift", "start_level", "crack_pressure", "crack_difference"), 1e4),
     "position_zero": 1e-2,

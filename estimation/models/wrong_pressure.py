@@ -1,4 +1,4 @@
-"""`misread(pressures, elapsed, p)`: error of a pressure sensor, apart from its lag."""
+"""`pressure_error(pressures, elapsed, p)`: error of a pressure sensor, apart from its lag."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -9,10 +9,10 @@ SETTLING = "drift_settling"
 """Parameter that states how far a drifting offset settles within the log."""
 
 MOST_SETTLING = 12.0
-"""Most time constants of a settling offset within a log [1]: `drifted` has an error of 0.002 there."""
+"""Most time constants of a settling offset within a log [1]: `relative_drift` has an error of 0.002 there."""
 
 
-def misread(pressures: tuple[Scalar, Scalar], elapsed: Scalar, p: SimpleNamespace) -> Scalar:
+def pressure_error(pressures: tuple[Scalar, Scalar], elapsed: Scalar, p: SimpleNamespace) -> Scalar:
     """Return the error of the pressure sensor, apart from its lag [Pa].
 
     Parameters
@@ -30,10 +30,10 @@ def misread(pressures: tuple[Scalar, Scalar], elapsed: Scalar, p: SimpleNamespac
         Pressure [Pa].
     """
     above = pressures[0] + pressures[1] - 2.0 * p.accumulator_pressure
-    return p.pressure_offset + p.pressure_drift * drifted(elapsed, p.drift_settling) + p.pressure_sides * above
+    return p.pressure_offset + p.pressure_drift * relative_drift(elapsed, p.drift_settling) + p.pressure_sides * above
 
 
-def drifted(elapsed: Any, settling: Any) -> Any:
+def relative_drift(elapsed: Any, settling: Any) -> Any:
     """Return how far an offset has drifted, over the drift of the whole log at its initial rate.
 
     A sensor that warms up after it is switched on settles by ``(1 - exp(-k x)) / k``; with k = 0 the drift is linear.

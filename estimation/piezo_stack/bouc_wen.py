@@ -96,11 +96,11 @@ def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = Tru
     """
     u, x = _checked_loop(voltage, displacement)
     if not from_rest:
-        u, x = (_averaged(values) for values in (u, x))
+        u, x = (_averaged_loop(values) for values in (u, x))
     stroke = float(np.ptp(x) / np.ptp(u))
     start = np.array([1.2 * stroke, 0.2 * stroke, 1.0 / np.ptp(u), 0.0, 0.0, 0.0, float(x.min()), 0.0])
     scale = np.array([stroke, stroke, *[1.0 / np.ptp(u)] * 4, float(np.ptp(x)), stroke])
-    fit = fitted(_loop_model(u, from_rest), x, start, scale, (*LOOP, "offset", "lag"))
+    fit = fit_displacement(_loop_model(u, from_rest), x, start, scale, (*LOOP, "offset", "lag"))
     if fit.condition > _WORST_CONDITION:
         raise LogError("the loop cannot tell the hysteresis' parameters apart, wanted two cycles or more from rest")
     return fit
@@ -162,7 +162,7 @@ def _loop_model(u: Array, from_rest: bool) -> Callable[[Array], tuple[Array, Arr
     return simulate
 
 
-def _averaged(values: Array) -> Array:
+def _averaged_loop(values: Array) -> Array:
     """Average a closed loop over neighbours until `_ENOUGH` samples remain: the fit is then many times faster."""
     many = max(1, (len(values) - 1) // _ENOUGH)
     count = (len(values) - 1) // many * many
@@ -182,7 +182,7 @@ def _checked_loop(voltage: Array, displacement: Array) -> tuple[Array, Array]:
     return u, x
 
 
-def fitted(
+def fit_displacement(
     simulate: Callable[[Array], tuple[Array, Array]],
     measured: Array,
     start: Array,

@@ -7,11 +7,11 @@ from math import sqrt
 from estimation.arrays import Array
 from plant.log.columns import UNITS
 
-ALIKE = 0.9
+LEAST_CORRELATION = 0.9
 """Correlation with a run above which a channel follows that run [dimensionless]. Each fault that is a first guess has
 over 0.99 with its own run."""
 
-NEAR = 2.0
+LARGEST_SIZE_FACTOR = 2.0
 """Factor by which a channel's size may be off because of a fault; more is a wrong unit [dimensionless]. The nearest
 wrong units are ten times apart."""
 
@@ -48,30 +48,34 @@ def channel_mistakes(measured: Mapping[str, Array], runs: Sequence[Mapping[str, 
     >>> channel_mistakes({"position_m": -run["position_m"], "stack_force_n": 1e-3 * run["stack_force_n"]}, [run])
     ('position_m has the opposite sign', 'stack_force_n is in kN')
     """
-    swapped = tuple(_swapped(measured, runs))
-    return swapped or tuple(_by_themselves(measured, runs))
+    swapped = tuple(_swapped_channels(measured, runs))
+    return swapped or tuple(_single_channel_mistakes(measured, runs))
 
 
-def _swapped(measured: Mapping[str, Array], runs: Sequence[Mapping[str, Array]]) -> Iterator[str]:
+def _swapped_channels(measured: Mapping[str, Array], runs: Sequence[Mapping[str, Array]]) -> Iterator[str]:
     for one, other in combinations(measured, 2):
-        crossed = _near(_share(measured[one], runs, other)) and _near(_share(measured[other], runs, one))
-        if crossed and not (_near(_share(measured[one], runs, one)) or _near(_share(measured[other], runs, other))):
+        crossed = _is_near(_relative_size(measured[one], runs, other)) and _is_near(
+            _relative_size(measured[other], runs, one)
+        )
+        if crossed and not (
+            _is_near(_relative_size(measured[one], runs, one)) or _is_near(_relative_size(measured[other], runs, other))
+        ):
             yield f"{one} and {other} are swapped"
 
 
-def _by_themselves(measured: Mapping[str, Array], runs: Sequence[Mapping[str, Array]]) -> Iterator[str]:
+def _single_channel_mistakes(measured: Mapping[str, Array], runs: Sequence[Mapping[str, Array]]) -> Iterator[str]:
     for name, values in measured.items():
-        share = _share(values, runs, name)
-        unit = next((unit for factor, unit in SLIPS[UNITS[name]].items() if _near(abs(share) / factor)), "")
-        said = ["has the opposite sign"] if share < 0.0 and (unit or _near(-share)) else []
+        share = _relative_size(values, runs, name)
+        unit = next((unit for factor, unit in SLIPS[UNITS[name]].items() if _is_near(abs(share) / factor)), "")
+        said = ["has the opposite sign"] if share < 0.0 and (unit or _is_near(-share)) else []
         said += [f"is in {unit}"] if unit else []
         if said:
             yield f"{name} {' and '.join(said)}"
 
 
-def _share(values: Array, runs: Sequence[Mapping[str, Array]], name: str) -> float:
+def _relative_size(values: Array, runs: Sequence[Mapping[str, Array]], name: str) -> float:
     """Return a channel relative to that of the run most like it [dimensionless]; 0 if no run is alike."""
-    best, share = ALIKE, 0.0
+    best, share = LEAST_CORRELATION, 0.0
     mine = values - values.mean()
     for run in runs:
         other = run[name] - run[name].mean()
@@ -82,5 +86,5 @@ def _share(values: Array, runs: Sequence[Mapping[str, Array]], name: str) -> flo
     return share
 
 
-def _near(ratio: float) -> bool:
-    return 1.0 / NEAR < ratio < NEAR
+def _is_near(ratio: float) -> bool:
+    return 1.0 / LARGEST_SIZE_FACTOR < ratio < LARGEST_SIZE_FACTOR

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from estimation.arrays import Array
 from estimation.finding import interval_95
 from estimation.piezo_stack.channel_mistakes import channel_mistakes
-from estimation.piezo_stack.runs import COARSE_SLOPE_STEP, COARSE_STEP, STACK_CHANNELS, StackRuns, prepared
-from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, told
+from estimation.piezo_stack.runs import COARSE_SLOPE_STEP, COARSE_STEP, STACK_CHANNELS, StackRuns, prepared_runs
+from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, reported_value
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.piezo_stack.parameters import LONGEST_STEP, PiezoStackParameters
@@ -93,21 +93,21 @@ def estimate_stack(
     HydrostateError
         If an unknown is not known, or no first guess is made of them.
     """
-    runs = prepared(record, healthy, tuple(unknowns), channels)
+    runs = prepared_runs(record, healthy, tuple(unknowns), channels)
     part = runs.beginning(max(round(_COARSE_SECONDS / runs.sample_time), round(_COARSE_SHARE * len(runs.voltage))))
     first, *others = _first_guesses(part, starts)[:_MOST_GUESSES]
-    theta, lowest = _coarsely_descended(part, first)
-    best = _descended(runs, theta)
+    theta, lowest = _optimum_in_coarse_runs(part, first)
+    best = _optimum_in_exact_runs(runs, theta)
     for guess in others:
         if best.spread < _UNEXPLAINED:
             break
-        theta, left = _coarsely_descended(part, guess)
+        theta, left = _optimum_in_coarse_runs(part, guess)
         if left < lowest:
-            lowest, best = left, min(best, _descended(runs, theta), key=_cost)
+            lowest, best = left, min(best, _optimum_in_exact_runs(runs, theta), key=_cost)
     if _UNEXPLAINED <= best.spread < _HOPELESS:  # slow effects show only in the whole log
-        theta, _ = _coarsely_descended(runs, best.theta)
-        best = min(best, _descended(runs, theta), key=_cost)
-    return _concluded(runs, best, runs.count + part.count)
+        theta, _ = _optimum_in_coarse_runs(runs, best.theta)
+        best = min(best, _optimum_in_exact_runs(runs, theta), key=_cost)
+    return _concluded_estimate(runs, best, runs.count + part.count)
 
 
 def _first_guesses(runs: StackRuns, starts: Sequence[Mapping[str, float]]) -> list[Array]:
@@ -138,7 +138,7 @@ def covariance(slopes: Array) -> Array:
     return (axes / np.maximum(known, _LEAST_KNOWN * known[-1])) @ axes.T / sizes
 
 
-def _shown(slopes: Array) -> Array:
+def _determined_covariance(slopes: Array) -> Array:
     """Return the same in the directions that the channels determine, and zero in all others: no step leads there."""
     normal, sizes = _normalised(slopes)
     return np.linalg.pinv(normal, rcond=_LEAST_KNOWN) / sizes
@@ -176,7 +176,7 @@ def stack_bounds(
     """
     noise = {name: value for name, value in asdict(BENCH_SENSORS).items() if name in channels}
     runs = StackRuns(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise, np.zeros(0))
-    deviations = np.sqrt(np.diag(covariance(runs.around(np.zeros(len(runs.names)), LONGEST_STEP)[1])))
+    deviations = np.sqrt(np.diag(covariance(runs.linearised_at(np.zeros(len(runs.names)), LONGEST_STEP)[1])))
     return {
         name: (UNKNOWNS[name].scale or 1.0) * float(deviation)
         for name, deviation in zip(runs.names, deviations, strict=True)
@@ -204,57 +204,57 @@ def _cost(one: _Optimum) -> float:
     return one.cost
 
 
-def _descended(runs: StackRuns, theta: Array) -> _Optimum:
+def _optimum_in_exact_runs(runs: StackRuns, theta: Array) -> _Optimum:
     """Descend by the Gauss-Newton method in exact runs.
 
     It ends when a step is a tenth of the standard deviations, which makes no practical difference.
     """
-    found, slopes = runs.around(theta, LONGEST_STEP)
-    known, shown = covariance(slopes), _shown(slopes)
+    found, slopes = runs.linearised_at(theta, LONGEST_STEP)
+    known, shown = covariance(slopes), _determined_covariance(slopes)
     residuals = found - runs.measured
     for _ in range(_MOST_EXACT):
         changes = np.outer(_SHORTENED, -shown @ (slopes.T @ residuals))
-        change, tried = _best(runs, theta, changes, LONGEST_STEP)
+        change, tried = _best_change(runs, theta, changes, LONGEST_STEP)
         if float(tried @ tried) >= float(residuals @ residuals):
             break
         theta, residuals = theta + change, tried
-        if _share(change, known) < _DONE:
+        if _largest_relative_change(change, known) < _SETTLED_CHANGE:
             break
     return _Optimum(theta, residuals, slopes)
 
 
-def _coarsely_descended(runs: StackRuns, start: Array) -> tuple[Array, float]:
+def _optimum_in_coarse_runs(runs: StackRuns, start: Array) -> tuple[Array, float]:
     """Descend by the Levenberg-Marquardt method in coarse runs, several dampings at a time; also return the misfit."""
     theta = start
-    found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
+    found, slopes = runs.linearised_at(theta, COARSE_STEP, COARSE_SLOPE_STEP)
     residuals = found - runs.measured
     left = float(residuals @ residuals)
     for _ in range(_MOST_STEPS):
         normal = slopes.T @ slopes
         own = np.diag(np.diag(normal) + 1e-12)
         changes = np.array([np.linalg.solve(normal + d * own, -slopes.T @ residuals) for d in _DAMPINGS])
-        if _share(changes[0], covariance(slopes)) < _NEAR:
+        if _largest_relative_change(changes[0], covariance(slopes)) < _NEAR_DEVIATIONS:
             break
-        change, tried = _best(runs, theta, np.asarray(changes, dtype=np.float64), COARSE_STEP)
+        change, tried = _best_change(runs, theta, np.asarray(changes, dtype=np.float64), COARSE_STEP)
         before, left = left, min(left, float(tried @ tried))
         if left >= before:
             break
         theta = theta + change
         if before - left < _LEAST_SHARE * before and left > _HOPELESS * len(tried):
             break
-        found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
+        found, slopes = runs.linearised_at(theta, COARSE_STEP, COARSE_SLOPE_STEP)
         residuals = found - runs.measured
     return theta, left
 
 
-def _best(runs: StackRuns, theta: Array, changes: NDArray[Any], step: float) -> tuple[Array, Array]:
+def _best_change(runs: StackRuns, theta: Array, changes: NDArray[Any], step: float) -> tuple[Array, Array]:
     """Return the change, of several run side by side, with the smallest misfit, and this misfit."""
     tried = runs.scaled([*(theta + changes)], step) - runs.measured
     best = int(np.argmin(np.sum(tried**2, axis=1)))
     return changes[best], tried[best]
 
 
-def _share(change: NDArray[Any], known: Array) -> float:
+def _largest_relative_change(change: NDArray[Any], known: Array) -> float:
     """Return the largest change relative to its standard deviation."""
     return float(np.max(np.abs(change) / np.sqrt(np.diag(known))))
 
@@ -271,8 +271,8 @@ _LEAST_SHARE, _HOPELESS = 0.01, 10.0
 """Least share of the misfit that a step must remove if the mean square exceeds the noise's by this factor: otherwise no
 such actuator explains the log [dimensionless]."""
 
-_NEAR = 3.0
-_DONE = 0.1
+_NEAR_DEVIATIONS = 3.0
+_SETTLED_CHANGE = 0.1
 _SHORTENED = (1.0, 0.5, 0.2)
 _MOST_EXACT = 6
 _DAMPINGS = (1e-6, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4)
@@ -280,11 +280,14 @@ _UNEXPLAINED = 1.1
 _MOST_GUESSES = 4
 
 
-def _concluded(runs: StackRuns, best: _Optimum, evaluations: int) -> StackEstimate:
+def _concluded_estimate(runs: StackRuns, best: _Optimum, evaluations: int) -> StackEstimate:
     scaled = max(1.0, best.spread) * covariance(best.slopes)
     p = runs.actuator(best.theta)
     deviations = np.sqrt(np.diag(scaled))
-    found = {name: told(p, runs.healthy, name, float(one)) for name, one in zip(runs.names, deviations, strict=True)}
+    found = {
+        name: reported_value(p, runs.healthy, name, float(one))
+        for name, one in zip(runs.names, deviations, strict=True)
+    }
     parts = np.split(best.residuals, len(runs.noise))
     return StackEstimate(
         MappingProxyType({name: value for name, (value, _) in found.items()}),

@@ -18,7 +18,7 @@ from plant.piezo_stack.trajectory import NAME
 MOST_MISFIT = 1.05
 """Residual over noise above which the model does not describe a log, chance apart [dimensionless]."""
 
-BY_CHANCE = 4.0
+CHANCE_ALLOWANCE = 4.0
 """Allowance for chance, over the root of the number of samples: three deviations of noise that was estimated from the
 log, which scatters by 1.3 of that [dimensionless]."""
 
@@ -64,7 +64,9 @@ def stack_finding(
     found = estimate_stack(record, healthy, channels=channels)
     quantities = stack_quantities(found, healthy)
     lost = [name for name, one in quantities.items() if one.value is None]
-    reasons = tuple(StackCode.CHANNEL_MISSED.note(channel=name, ratio=ratio) for name, ratio in missed(found).items())
+    reasons = tuple(
+        StackCode.CHANNEL_MISSED.note(channel=name, ratio=ratio) for name, ratio in undescribed_channels(found).items()
+    )
     if reasons:
         reasons += channel_disagrees(record, healthy, tuple(found.misfit))
         quantities = {name: Quantity(None, one.unit, None, one.std) for name, one in quantities.items()}
@@ -111,7 +113,7 @@ def stack_prospect(
     return Finding(NAME, Outcome.OK, quantities, Gate(True, ()), channels)
 
 
-def missed(found: StackEstimate) -> Mapping[str, float]:
+def undescribed_channels(found: StackEstimate) -> Mapping[str, float]:
     """Return the channels that the fitted actuator does not describe.
 
     Returns
@@ -119,7 +121,7 @@ def missed(found: StackEstimate) -> Mapping[str, float]:
     Mapping[str, float]
         Residual over noise, by channel [dimensionless].
     """
-    most = MOST_MISFIT + BY_CHANCE / sqrt(found.samples)
+    most = MOST_MISFIT + CHANCE_ALLOWANCE / sqrt(found.samples)
     return {name: ratio for name, ratio in found.misfit.items() if ratio > most}
 
 
@@ -142,7 +144,7 @@ def channel_disagrees(record: Record, healthy: PiezoStackParameters, channels: C
         would be left.
     """
     others = [tuple(name for name in channels if name != left) for left in channels] if len(channels) > 2 else []
-    explained = [not missed(estimate_stack(record, healthy, channels=some)) for some in others]
+    explained = [not undescribed_channels(estimate_stack(record, healthy, channels=some)) for some in others]
     if sum(explained) != 1:
         return ()
     return (StackCode.CHANNEL_DISAGREES.note(channel=tuple(channels)[explained.index(True)]),)

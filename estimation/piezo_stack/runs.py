@@ -9,8 +9,8 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.log_checks.longest_hold import require_live
-from estimation.log_checks.measurement_noise import struck_variance
-from estimation.piezo_stack.unknowns import UNKNOWNS, changed
+from estimation.log_checks.measurement_noise import excited_noise_variance
+from estimation.piezo_stack.unknowns import UNKNOWNS, changed_actuator
 from plant.errors import HydrostateError, LogError, require_known
 from plant.log.record import Record
 from plant.piezo_stack.parameters import LONGEST_STEP, PiezoStackParameters
@@ -86,7 +86,7 @@ class StackRuns:
         theta : ndarray, shape (unknowns,)
             The guess, scaled as in `UNKNOWNS` [dimensionless].
         """
-        return changed(self.healthy, dict(zip(self.names, theta.tolist(), strict=True)))
+        return changed_actuator(self.healthy, dict(zip(self.names, theta.tolist(), strict=True)))
 
     def scaled(self, thetas: Sequence[Array], longest_step: float = LONGEST_STEP) -> Array:
         """Return every channel over its noise, one after the other; the guesses run side by side.
@@ -111,7 +111,7 @@ class StackRuns:
             row[:] = over_noise(stack_channels(states, p), self.noise)
         return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, _HOPELESS)
 
-    def around(
+    def linearised_at(
         self, theta: Array, longest_step: float = LONGEST_STEP, slope_step: float = SLOPE_STEP
     ) -> tuple[Array, Array]:
         """Return the channels at a guess, and their slopes there.
@@ -194,7 +194,7 @@ def over_noise(channels: Mapping[str, Array], noise: Mapping[str, float]) -> Arr
     return np.concatenate([(one - one.mean() if free else one) / deviation for one, deviation, free in parts])
 
 
-def prepared(
+def prepared_runs(
     record: Record, healthy: PiezoStackParameters, names: tuple[str, ...], channels: Collection[str]
 ) -> StackRuns:
     """Check a log and return the data with which its runs are compared.
@@ -230,7 +230,7 @@ def prepared(
             raise LogError(f"{name} must be whole, got {int(np.sum(~np.isfinite(record[name])))} missing samples")
     voltage = checked_voltage(record[DRIVE], overshoot=OVERSHOOT * HIGHEST_VOLTAGE)
     require_live(record, used)
-    noise = {name: sqrt(struck_variance(record[name])) for name in used}
+    noise = {name: sqrt(excited_noise_variance(record[name])) for name in used}
     return StackRuns(
         voltage, record.sample_time, healthy, names, noise, over_noise({name: record[name] for name in noise}, noise)
     )

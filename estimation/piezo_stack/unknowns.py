@@ -64,7 +64,7 @@ STARTS: Sequence[Mapping[str, float]] = (
 """First guesses, scaled; the descent begins at the one that fits best."""
 
 
-def changed(healthy: PiezoStackParameters, changes: Mapping[str, float]) -> SimpleNamespace:
+def changed_actuator(healthy: PiezoStackParameters, changes: Mapping[str, float]) -> SimpleNamespace:
     """Return an actuator with scaled changes, factors as logarithms.
 
     Parameters
@@ -81,7 +81,7 @@ def changed(healthy: PiezoStackParameters, changes: Mapping[str, float]) -> Simp
 
     Examples
     --------
-    >>> round(changed(PiezoStackParameters(), {"coulomb_friction": 0.5}).coulomb_friction, 9)
+    >>> round(changed_actuator(PiezoStackParameters(), {"coulomb_friction": 0.5}).coulomb_friction, 9)
     70.0
     """
     values = asdict(healthy)
@@ -95,7 +95,9 @@ def changed(healthy: PiezoStackParameters, changes: Mapping[str, float]) -> Simp
     return SimpleNamespace(**values)
 
 
-def told(actuator: SimpleNamespace, healthy: PiezoStackParameters, name: str, deviation: float) -> tuple[float, float]:
+def reported_value(
+    actuator: SimpleNamespace, healthy: PiezoStackParameters, name: str, deviation: float
+) -> tuple[float, float]:
     """Return the value to report for a quantity and its deviation; a factor if it scales several parameters.
 
     Parameters

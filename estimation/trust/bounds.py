@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.engine.kalman import belief_symbols, bounded, observed, scaled_step, total
+from estimation.engine.kalman import belief_symbols, bounded_mean, predicted_outputs, scaled_step, total
 from estimation.engine.parts import data_places, function_source
 from estimation.filters.run import TRACK_ROWS
 from estimation.log_checks.bridging import bridged
@@ -19,7 +19,7 @@ from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, jacobian, symbol
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 from plant.log.record import Record
@@ -202,7 +202,7 @@ def run(
                     P[c, c] += noise[c]
         look(state, parameters, H)
         for c in range(len(variances)):
-            inform(P, H[c], variances[c], PH, WIDTH=WIDTH)
+            reduce_by_channel(P, H[c], variances[c], PH, WIDTH=WIDTH)
         if k % every == 0:
             track[k // every] = state
             for c in range(WIDTH):
@@ -210,7 +210,7 @@ def run(
     return P
 
 
-def inform(P: Array, H: Array, variance: float, PH: Array, *, WIDTH: int) -> None:
+def reduce_by_channel(P: Array, H: Array, variance: float, PH: Array, *, WIDTH: int) -> None:
     """Reduce a covariance by the information of a channel, as a Kalman filter does."""
     shown = 0.0
     for c in range(WIDTH):
@@ -235,14 +235,14 @@ def _compile(model: ProcessModel, channels: tuple[str, ...]) -> NativeKernel:
     n, every = model.width, range(model.width)
     mean, _ = belief_symbols(model)
     stepped, F = scaled_step(model)
-    H = jacobian(observed(model, mean, channels), mean)
+    H = jacobian(predicted_outputs(model, mean, channels), mean)
     moving = [i for i in every if any(F[i][k] is not (ONE if i == k else ZERO) for k in every)]
     slopes = {f"F{i}_{k}": F[i][k] for i in moving for k in every if F[i][k] is not ZERO}
     state = {f"z{i}": f"state[{i}]" for i in every}
     reads = state | data_places(model, channels)
     reads |= {field.name: f"parameters[{i}]" for i, field in enumerate(fields(model.parameters))}
     kept = {name: f"F[{i}]" for i, name in enumerate(slopes)}
-    moved = slopes | {f"z{i}": z for i, z in enumerate(bounded(model, stepped))}
+    moved = slopes | {f"z{i}": z for i, z in enumerate(bounded_mean(model, stepped))}
     product = {
         f"m{i}": total([symbol(f"F{i}_{k}") * symbol(f"x{k}") for k in every if F[i][k] is not ZERO])
         if i in moving
@@ -261,8 +261,8 @@ def _compile(model: ProcessModel, channels: tuple[str, ...]) -> NativeKernel:
         times("left", "F, P, FP, c", "P[{}, c]", "FP[{}, c]"),
         times("right", "F, FP, P, c", "FP[c, {}]", "P[c, {}]"),
         function_source("look", "state, parameters, H", reads, seen, shown),
-        pasted(inform, inlined=True),
-        pasted(run, constants={"WIDTH": n, "SLOPES": max(1, len(slopes))}),
+        functions_text(reduce_by_channel, inlined=True),
+        functions_text(run, constants={"WIDTH": n, "SLOPES": max(1, len(slopes))}),
     )
     title = f"the posterior Cramér-Rao bound of the {model.name} form, in scaled units"
     return load_native(f"bound_{model.name}", kernel_text(title, *parts), {"run": signature_of(run)})

@@ -76,7 +76,7 @@ def rank_drives(cards: Mapping[str, Card], parameter: str | None = None) -> list
     )
 
 
-def _words(name: str) -> str:
+def _in_words(name: str) -> str:
     return name.replace("_", " ")
 
 
@@ -103,7 +103,7 @@ def sentences(card: Card) -> tuple[str, ...]:
     said: list[str] = []
     lost = [name for name, std in card.relative_std.items() if std > OBSERVABLE]
     if lost:
-        named = ", ".join(f"{_words(name)} ({percent(card.relative_std[name])})" for name in lost)
+        named = ", ".join(f"{_in_words(name)} ({percent(card.relative_std[name])})" for name in lost)
         said.append(f"not observable with this drive and these sensors (bound over {percent(OBSERVABLE)}): {named}")
     if card.stuck > 0.5:
         said.append(
@@ -115,18 +115,18 @@ def sentences(card: Card) -> tuple[str, ...]:
                 else ": log differential pressure, or drive with larger, slower steps"
             )
         )
-    said += _inseparable(card)
+    said += _inseparable_sentences(card)
     if len(card.unknowns) > 1 and card.weakest_std > OBSERVABLE:
         largest = max(abs(weight) for weight in card.weakest.values())
         terms = [
-            f"{weight:+.2f} {_words(name)}" for name, weight in card.weakest.items() if abs(weight) > 0.2 * largest
+            f"{weight:+.2f} {_in_words(name)}" for name, weight in card.weakest.items() if abs(weight) > 0.2 * largest
         ]
         said.append(f"the combination known worst, to {percent(card.weakest_std)}: {' '.join(terms)} (of logarithms)")
-    said += _rig_share(card)
+    said += _rig_sentences(card)
     return tuple(said)
 
 
-def _inseparable(card: Card) -> list[str]:
+def _inseparable_sentences(card: Card) -> list[str]:
     """Return a sentence on each of the pairs that are hardest to tell apart, if it matters."""
     pairs: list[tuple[float, str]] = []
     for i, first in enumerate(card.unknowns):
@@ -137,14 +137,15 @@ def _inseparable(card: Card) -> list[str]:
                 continue
             sure = whole * math.sqrt(max(0.0, 1.0 - correlation**2))
             said = (
-                f"{_words(second)} and {_words(first)} are hard to tell apart (correlation {correlation:.2f}): with "
-                f"{_words(second)} known, {_words(first)} would be known to {percent(sure)}, not {percent(whole)}"
+                f"{_in_words(second)} and {_in_words(first)} are hard to tell apart (correlation {correlation:.2f}): "
+                f"with {_in_words(second)} known, {_in_words(first)} would be known to {percent(sure)}, "
+                f"not {percent(whole)}"
             )
             pairs.append((-abs(correlation), said))
     return [said for _, said in sorted(pairs)[:MOST_PAIRS]]
 
 
-def _rig_share(card: Card) -> list[str]:
+def _rig_sentences(card: Card) -> list[str]:
     if "bulk_modulus" not in card.unknowns:
         return []
     rule = "only the ratio of chamber volume to bulk modulus matters"
@@ -153,7 +154,7 @@ def _rig_share(card: Card) -> list[str]:
             f"{rule}: an error of 1 % in the volume is an error of 1 % in bulk modulus; these bounds take the volume "
             "as exact; list chamber_volume under [uncertainty] in the rig file, and they include its error"
         ]
-    given = ", ".join(f"{_words(name)} {percent(std)}" for name, std in card.uncertainties.items())
+    given = ", ".join(f"{_in_words(name)} {percent(std)}" for name, std in card.uncertainties.items())
     whole, alone = card.relative_std["bulk_modulus"], card.known_exactly["bulk_modulus"]
     return [
         f"{rule}: with what the rig file leaves uncertain ({given}) its bound is {percent(whole)}, "

@@ -98,12 +98,12 @@ def consistency_gate(estimate: Estimate, state: str, record: Record | None = Non
     """
     channels = () if record is None else whiteness(estimate, record)
     moves = wander(estimate, state)
-    reasons = [_overconfidence(channel, nis) for channel, nis in estimate.nis.items() if nis > LARGEST_NIS]
-    reasons += [_structure(channel) for channel in channels if channel.exceeded]
+    reasons = [_overconfidence_note(channel, nis) for channel, nis in estimate.nis.items() if nis > LARGEST_NIS]
+    reasons += [_structure_note(channel) for channel in channels if channel.exceeded]
     if moves > LARGEST_WANDER:
         reasons.append(EstimateCode.ESTIMATE_WANDERS.note(state=state, ratio=moves**0.5))
-    reasons += _unsettled(estimate, state)
-    reasons += _at_a_bound(estimate, state)
+    reasons += _unsettled_notes(estimate, state)
+    reasons += _at_bound_notes(estimate, state)
     structure = sum(channel.excess for channel in channels if channel.exceeded)
     return Gate(not reasons, tuple(reasons), max(1.0, moves + structure) ** 0.5, channels)
 
@@ -128,7 +128,7 @@ def wander(estimate: Estimate, state: str) -> float:
     return float(np.sum(np.diff(mean[marks]) ** 2)) / reduced
 
 
-def describes(estimate: Estimate, state: str) -> bool:
+def describes_log(estimate: Estimate, state: str) -> bool:
     """Return whether the model describes the log at least roughly.
 
     Returns
@@ -136,14 +136,14 @@ def describes(estimate: Estimate, state: str) -> bool:
     bool
         False if a channel's residuals are ten times larger than expected, or the state is at a physical bound.
     """
-    return not _at_a_bound(estimate, state) and all(nis < MISMATCH_NIS for nis in estimate.nis.values())
+    return not _at_bound_notes(estimate, state) and all(nis < MISMATCH_NIS for nis in estimate.nis.values())
 
 
-def _overconfidence(channel: str, nis: float) -> Note:
+def _overconfidence_note(channel: str, nis: float) -> Note:
     return EstimateCode.INNOVATIONS_LARGE.note(channel=channel, ratio=nis**0.5, nis=nis)
 
 
-def _structure(found: Whiteness) -> Note:
+def _structure_note(found: Whiteness) -> Note:
     code = EstimateCode.INNOVATIONS_FOLLOW_DRIVE if found.driven else EstimateCode.INNOVATIONS_BESIDE_DRIVE
     return code.note(
         channel=found.channel,
@@ -155,7 +155,7 @@ def _structure(found: Whiteness) -> Note:
     )
 
 
-def _unsettled(estimate: Estimate, state: str) -> list[Note]:
+def _unsettled_notes(estimate: Estimate, state: str) -> list[Note]:
     mean, std = estimate.track(state)
     fifth = max(1, len(mean) // 5)
     last, before = float(np.mean(mean[-fifth:])), float(np.mean(mean[-2 * fifth : -fifth]))
@@ -166,7 +166,7 @@ def _unsettled(estimate: Estimate, state: str) -> list[Note]:
     return [EstimateCode.NOT_SETTLED.note(state=state, moved=last - before, unit=unit)]
 
 
-def _at_a_bound(estimate: Estimate, state: str) -> list[Note]:
+def _at_bound_notes(estimate: Estimate, state: str) -> list[Note]:
     value, _ = estimate.settled(state)
     variable = estimate.model.states[estimate.model.index(state)]
     inside = variable.lower + variable.scale * 1e-3 < value < variable.upper * 0.999

@@ -40,10 +40,10 @@ UNKNOWN = (
 TAKEN_AS_KNOWN = ("chamber_volume", "pump_displacement", "piston_area", "moving_mass")
 """Parameters that are read from a drawing, with the uncertainty of the rig file."""
 
-SENSED = ("position_m", "velocity_m_s", "differential_pressure_pa")
+CARD_CHANNELS = ("position_m", "velocity_m_s", "differential_pressure_pa")
 """Channels that a card can have."""
 
-IGNORANCE = 1.0
+PRIOR_DEVIATION = 1.0
 """Standard deviation of an unknown's logarithm before the experiment: a factor of e in either direction."""
 
 
@@ -51,7 +51,7 @@ def identifiability_card(
     parameters: EhaParameters,
     speed: Array,
     sample_time: float,
-    channels: Sequence[str] = SENSED,
+    channels: Sequence[str] = CARD_CHANNELS,
     *,
     sensors: Sensors = BENCH,
     unknowns: Sequence[str] = UNKNOWN,
@@ -68,7 +68,7 @@ def identifiability_card(
     sample_time : float
         Time between samples [s].
     channels : sequence of str
-        Channels that would be logged besides motor speed, from `SENSED`.
+        Channels that would be logged besides motor speed, from `CARD_CHANNELS`.
     sensors : Sensors
         Their noise; that of motor speed drives the plant without being seen.
     unknowns : sequence of str
@@ -86,15 +86,15 @@ def identifiability_card(
     HydrostateError
         If a channel or an unknown is not one that a card can have, or a sensor's noise is zero.
     """
-    _check("a channel", channels, SENSED)
-    _check("an unknown", unknowns, UNKNOWN)
+    _require_names("a channel", channels, CARD_CHANNELS)
+    _require_names("an unknown", unknowns, UNKNOWN)
     variances = _variances(sensors, channels)
     spreads = {name: (uncertainties or {}).get(name, 0.0) for name in (*UNKNOWN, *TAKEN_AS_KNOWN)}
     noise = _speed_noise(parameters, sensors, sample_time)
     record = Record(sample_time, {"motor_speed_rad_s": speed})
 
     def bounded(known: Mapping[str, float]) -> tuple[Array, Array]:
-        prior = _prior(parameters, {**known, **dict.fromkeys(unknowns, IGNORANCE)})
+        prior = _prior(parameters, {**known, **dict.fromkeys(unknowns, PRIOR_DEVIATION)})
         bound = posterior_bound(CARD_FORM, prior, record, parameters, variances=variances, noise=noise)
         if bound.belief is None:
             raise HydrostateError("the lumped plant does not stay finite under this drive: check rig and drive")
@@ -130,7 +130,7 @@ def _card_step(state: tuple[Scalar, ...], speeds: Any, p: Any, h: Scalar) -> tup
 
 def _observe(state: tuple[Scalar, ...], p: Any) -> Mapping[str, Scalar]:
     del p
-    return dict(zip(SENSED, state[:3], strict=True))
+    return dict(zip(CARD_CHANNELS, state[:3], strict=True))
 
 
 def _as_state(name: str) -> StateVariable:
@@ -151,7 +151,7 @@ CARD_FORM = replace(
 """The lumped plant with every parameter of a card as a state; known ones have no variance."""
 
 
-def _check(what: str, given: Sequence[str], known: Sequence[str]) -> None:
+def _require_names(what: str, given: Sequence[str], known: Sequence[str]) -> None:
     if not given:
         raise HydrostateError(f"{what} is needed: one or more of {', '.join(known)}")
     require_each_known(what, given, known)
@@ -163,7 +163,7 @@ def _variances(sensors: Sensors, channels: Sequence[str]) -> Mapping[str, float]
     for channel in channels:
         if not noise.get(channel, 0.0) > 0.0:
             raise HydrostateError(f"these sensors give {channel} no noise, or do not have it: a card needs its noise")
-    return {channel: noise[channel] if channel in channels else math.inf for channel in SENSED}
+    return {channel: noise[channel] if channel in channels else math.inf for channel in CARD_CHANNELS}
 
 
 def _speed_noise(p: EhaParameters, sensors: Sensors, sample_time: float) -> Mapping[str, float]:

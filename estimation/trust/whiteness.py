@@ -37,10 +37,10 @@ DRIVEN_SHARE, DRIVEN_REACH = 0.95, 10.0
 answers a drive with harmonics, and parameters are learnt at their frequencies."""
 
 
-MOSTLY = 0.5
+ROUNDING_SHARE = 0.5
 """Share of rounding in a channel's predicted variance above which its noise is mostly rounding [fraction]."""
 
-OFTEN = 1e-3
+REPEATED_SHARE = 1e-3
 """A channel that repeats its value in at least this share of its samples is quantised [fraction]."""
 
 
@@ -117,7 +117,7 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
     length = len(normal) // SEGMENTS
     push = bridged(record[estimate.model.drives[0]])[first:]
     drive = np.mean(np.abs(_spectra(push - np.mean(push), length)) ** 2, axis=0)
-    band, concentration = _band(drive), float(np.max(drive) / max(np.sum(drive), np.finfo(float).tiny))
+    band, concentration = _counted_frequencies(drive), float(np.max(drive) / max(np.sum(drive), np.finfo(float).tiny))
     around = np.max([np.roll(np.pad(drive, 1), shift)[1:-1] for shift in (-1, 0, 1)], axis=0)
     driven = (around >= 0.1 * np.max(drive)) & bool(np.max(drive) > 0.0)
     beside = ~driven[:band]
@@ -149,7 +149,7 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
                 ljung_box=_ljung_box(lags, count),
                 autocorrelation=float(lags[np.argmax(np.abs(lags))]),
                 crosses=max((_correlation(values, normal[:, o]) for o in kept if o != c), default=0.0, key=abs),
-                with_drive=_explained(values, push - np.mean(push), length),
+                with_drive=_coherent_share(values, push - np.mean(push), length),
             )
         )
     return tuple(found)
@@ -166,7 +166,7 @@ def _normalised(estimate: Estimate, first: int) -> tuple[Array, BoolArray]:
 def _whole_steps(estimate: Estimate, first: int, channel: int, quantum: float) -> Array | None:
     """Return normalised innovations in whole steps of a channel whose noise is mostly rounding, None for others."""
     residuals, variances = estimate.residuals[first:, channel], estimate.residual_variances[first:, channel]
-    if not MOSTLY * float(np.nanmedian(variances)) <= quantum**2 / 12.0 < np.inf:
+    if not ROUNDING_SHARE * float(np.nanmedian(variances)) <= quantum**2 / 12.0 < np.inf:
         return None
     return np.where(np.isnan(residuals), 0.0, quantum * np.round(residuals / quantum) / np.sqrt(variances))
 
@@ -176,7 +176,7 @@ def _spectra(values: Array, length: int) -> Array:
     return np.fft.rfft(values[: SEGMENTS * length].reshape(SEGMENTS, length), axis=1) / np.sqrt(length)
 
 
-def _band(drive: Array) -> int:
+def _counted_frequencies(drive: Array) -> int:
     """Return the number of frequencies that count, from 0 upwards; a tenth of them without a drive."""
     total = np.cumsum(drive)
     if not total[-1] > 0.0:
@@ -212,7 +212,7 @@ def quantum(values: Array) -> float:
     moved = steps[steps > 0.0]
     if not len(moved):
         return float("inf")
-    return float(np.min(moved)) if np.count_nonzero(steps == 0.0) > OFTEN * len(steps) else 0.0
+    return float(np.min(moved)) if np.count_nonzero(steps == 0.0) > REPEATED_SHARE * len(steps) else 0.0
 
 
 def _autocorrelations(values: Array) -> Array:
@@ -236,7 +236,7 @@ def _correlation(a: Array, b: Array) -> float:
     return float(a @ b) / spread**0.5 if spread > 0.0 else 0.0
 
 
-def _explained(values: Array, push: Array, length: int) -> float:
+def _coherent_share(values: Array, push: Array, length: int) -> float:
     """Return the share of variance coherent with the drive, less the share expected by chance in so few segments."""
     ours, theirs = _spectra(values, length), _spectra(push, length)
     drive, power = np.mean(np.abs(theirs) ** 2, axis=0), np.mean(np.abs(ours) ** 2, axis=0)

@@ -10,10 +10,10 @@ from estimation.engine.contract import FilterProblem
 from estimation.engine.runner import constant_row
 from estimation.tuning.sensitivity import Sensitivity, innovation_sensitivity
 
-AT_REST = 1e-3
+LEAST_GAIN = 1e-3
 """The optimiser stops if a further step would gain less than this in log-likelihood [dimensionless]."""
 
-FARTHEST = 5.0
+LARGEST_MOVE = 5.0
 """Largest move of a coordinate from its guess in one run of the optimiser [dimensionless]."""
 
 
@@ -99,7 +99,7 @@ def maximise(problem: FilterProblem, coordinates: Sequence[Coordinate], iteratio
     begin = np.zeros(len(coordinates))
 
     def rested(intermediate_result: OptimizeResult) -> None:
-        if search.gain(np.asarray(intermediate_result.x)) < AT_REST:
+        if search.gain(np.asarray(intermediate_result.x)) < LEAST_GAIN:
             raise StopIteration
 
     found = minimize(
@@ -109,12 +109,12 @@ def maximise(problem: FilterProblem, coordinates: Sequence[Coordinate], iteratio
         hess=lambda u: search.point(u).curvature,
         method="trust-exact",
         callback=rested,
-        options={"maxiter": iterations, "gtol": 0.0, "initial_trust_radius": 1.0, "max_trust_radius": FARTHEST},
+        options={"maxiter": iterations, "gtol": 0.0, "initial_trust_radius": 1.0, "max_trust_radius": LARGEST_MOVE},
     )
     at = np.asarray(found.x, dtype=np.float64)
     point = search.point(at)
     moved = tuple(replace(c, guess=c.value(float(u))[0]) for c, u in zip(coordinates, at, strict=True))
-    return Maximum(moved, -point.loss, point.curvature, point.sensitivity, search.gain(at) < 10.0 * AT_REST)
+    return Maximum(moved, -point.loss, point.curvature, point.sensitivity, search.gain(at) < 10.0 * LEAST_GAIN)
 
 
 @dataclass(frozen=True, eq=False)

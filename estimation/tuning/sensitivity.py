@@ -24,7 +24,7 @@ from plant.compiled.expression import ZERO, Expression, jacobian, node, ordered,
 from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 
 
 def rewritten(outputs: Outputs, replacement: Mapping[str, Expression]) -> Outputs:
@@ -238,7 +238,7 @@ def _compile(model: ProcessModel, channels: tuple[str, ...]) -> NativeKernel:
     written = {name: f"slopes[{i}, i]" for name, i in carried.items()}
     written |= {f"e{c}": f"moved[{c}, i]" for c in each} | {f"s{c}": f"spread[{c}, i]" for c in each}
     given = "belief, rows, before, after, sample, j"
-    parts = [pasted(run)]
+    parts = [functions_text(run)]
     for name, outputs in (("predict", EKF.predict(model)), ("update", EKF.update(model, channels))):
         fixed, moving = hoisted(directional(outputs, rates), {f"D{name}" for name in rates}, "c")
         places = {name: f"fixed[{i}]" for i, name in enumerate(fixed)}

@@ -45,7 +45,7 @@ PUBLISHED_NOISE: Mapping[str, float] = {
 PUBLISHED_VARIANCES: Mapping[str, float] = {"position_m": 1e-12, "velocity_m_s": 1e-4}
 """R of equation 7.7, by channel [SI squared] (errata E11)."""
 
-SCREENED = ((1e3, 1.0), (1.0, 1.0), (1e-1, 1.0), (1e-2, 1.0), (1e-3, 1.0), (1.0, 1e-2), (1e-3, 1e-2))
+SCREENED_FACTORS = ((1e3, 1.0), (1.0, 1.0), (1e-1, 1.0), (1e-2, 1.0), (1e-3, 1.0), (1.0, 1e-2), (1e-3, 1e-2))
 """Factors on all process noise and on all sensor noise from which the search's start is chosen, in this order."""
 
 SCREENED_SAMPLES = 20_000
@@ -54,7 +54,7 @@ SCREENED_SAMPLES = 20_000
 ROUNDS = 3
 """Largest number of times that the levels are tuned again, each time starting at the constants found."""
 
-MOVED = 1.0
+LARGEST_CONSTANT_MOVE = 1.0
 """Change of a constant from one round to the next above which another round follows [standard deviations]."""
 
 
@@ -118,7 +118,7 @@ def tune(
     channels: tuple[str, ...] | None = None,
     variances: Mapping[str, float] | None = None,
     noise: Mapping[str, float] | None = None,
-    told: Record | None = None,
+    received: Record | None = None,
 ) -> Tuning:
     """Tune a filter's noise levels on a log.
 
@@ -136,7 +136,7 @@ def tune(
         Initial sensor variances, and that of motor speed [SI squared]; by default estimated from the log.
     noise : Mapping[str, float], optional
         Initial process-noise densities that replace the model's [SI squared per second].
-    told : Record, optional
+    received : Record, optional
         The part of the log that the filter receives, as in `estimation.log_checks.told_once`; by default all of it. The
         sensors' resolution is estimated from the log itself.
 
@@ -146,25 +146,25 @@ def tune(
         If the record lacks a drive, or has no channel that the model predicts.
     """
     how: dict[str, Any] = {"channels": channels, "variances": variances, "noise": noise}
-    problem = filter_problem(model, prior, record if told is None else told, parameters, **how)
+    problem = filter_problem(model, prior, record if received is None else received, parameters, **how)
     coordinates = noise_coordinates(problem, record, parameters, (variances or {}).get("motor_speed_rad_s"))
     problem, guesses = _likeliest_start(problem, coordinates)
     found = maximise(problem, guesses)
     for _ in range(ROUNDS):
-        again, moved = _continued(problem, ekf(_tuned(problem, found)))
-        if moved <= MOVED:
+        again, moved = _task_with_found_constants(problem, ekf(_task_with_levels(problem, found)))
+        if moved <= LARGEST_CONSTANT_MOVE:
             break
         problem, found = again, maximise(again, found.coordinates)
-    tuned = _tuned(problem, found)
-    paper = _published(problem)
+    tuned = _task_with_levels(problem, found)
+    paper = _task_with_published_noise(problem)
     deviations = np.sqrt(np.diag(np.linalg.inv(found.information)))
     shown = {f"q{i}": state.name for i, state in enumerate(model.states)}
     shown |= {f"r{c}": f"sensor {channel}" for c, channel in enumerate(problem.channels)}
     physical, slope = model.to_si(problem.mean)
     return Tuning(
-        tuned=_setting(tuned, found.sensitivity),
-        given=_setting(problem, _filtered(problem)),
-        published=_setting(paper, _filtered(paper)),
+        tuned=_noise_setting(tuned, found.sensitivity),
+        given=_noise_setting(problem, _innovations(problem)),
+        published=_noise_setting(paper, _innovations(paper)),
         spread=MappingProxyType({shown[c.name]: float(std) for c, std in zip(coordinates, deviations, strict=True)}),
         converged=found.converged,
         prior=Gaussian(physical, problem.covariance * np.outer(slope, slope)),
@@ -222,13 +222,13 @@ def speed_noise(record: Record, p: EhaParameters, variance: float | None = None)
     return variance * record.sample_time * (p.pump_displacement * p.bulk_modulus / p.chamber_volume) ** 2
 
 
-def _tuned(problem: FilterProblem, found: Maximum) -> FilterProblem:
+def _task_with_levels(problem: FilterProblem, found: Maximum) -> FilterProblem:
     values = {coordinate.name: coordinate.guess for coordinate in found.coordinates}
     levels = np.array([values.get(f"q{i}", 0.0) for i in range(problem.model.width)])
     return replace(problem, noise=levels, variances=np.array([values[f"r{c}"] for c in range(len(problem.channels))]))
 
 
-def _continued(problem: FilterProblem, trace: Trace) -> tuple[FilterProblem, float]:
+def _task_with_found_constants(problem: FilterProblem, trace: Trace) -> tuple[FilterProblem, float]:
     """Return the task with its constants moved to those that a filter found, and the largest move in deviations."""
     constant = problem.noise == 0.0
     if not constant.any() or not np.all(np.isfinite(trace.mean)):
@@ -244,22 +244,22 @@ def _likeliest_start(
     """Return the task and the coordinates whose guesses, among a few, explain the beginning of the log best."""
     short = replace(problem, measured=problem.measured[:SCREENED_SAMPLES], drives=problem.drives[:SCREENED_SAMPLES])
     best, process, sensor = -np.inf, 1.0, 1.0
-    for on_process, on_sensor in SCREENED:
+    for on_process, on_sensor in SCREENED_FACTORS:
         trace = ekf(replace(short, noise=on_process * problem.noise, variances=on_sensor * problem.variances))
         if trace.log_likelihood > best:
             best, process, sensor = trace.log_likelihood, on_process, on_sensor
-            short, _ = _continued(short, trace)
+            short, _ = _task_with_found_constants(short, trace)
     return replace(problem, mean=short.mean), [
         replace(c, guess=max(c.guess * (process if c.name[0] == "q" else sensor), 1.01 * c.floor)) for c in coordinates
     ]
 
 
-def _filtered(problem: FilterProblem) -> Sensitivity:
+def _innovations(problem: FilterProblem) -> Sensitivity:
     rows = layout(EKF, problem.model, problem.channels).rows
     return innovation_sensitivity(problem, np.zeros((len(rows), 0)))
 
 
-def _published(problem: FilterProblem) -> FilterProblem:
+def _task_with_published_noise(problem: FilterProblem) -> FilterProblem:
     noise = problem.noise.copy()
     for i, state in enumerate(problem.model.states):
         if state.name in PUBLISHED_NOISE and not state.logarithmic:
@@ -268,7 +268,7 @@ def _published(problem: FilterProblem) -> FilterProblem:
     return replace(problem, noise=noise, variances=np.array(sensors))
 
 
-def _setting(problem: FilterProblem, found: Sensitivity) -> NoiseSetting:
+def _noise_setting(problem: FilterProblem, found: Sensitivity) -> NoiseSetting:
     names = [state.name for state in problem.model.states]
     return NoiseSetting(
         noise=MappingProxyType(dict(zip(names, (problem.noise * problem.model.noise_units).tolist(), strict=True))),

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from estimation.engine.kernels import LANES
 from experiments.actuators import DEFAULT, actuator, read_own_rig
 from experiments.batch.logs_listed import listed_logs
-from experiments.batch.other_actuators import simulated_of
+from experiments.batch.other_actuators import simulated_series
 from experiments.batch.series import Group, Log, Series, Simulated, Work
 from experiments.batch.study_file import Method, Runs, Study, StudyError
 from faults.conditions import CONDITIONS, LEVELS
@@ -118,20 +118,20 @@ class Plan:
             Keys of the cases that need not be run.
         """
         seen = set(done)
-        gathered = _Gathered(min(TASK_SECONDS, self.seconds / (2.0 * workers)))
+        gathered = _TaskBuilder(min(TASK_SECONDS, self.seconds / (2.0 * workers)))
         for group in self.groups:
-            left = _left(group, seen)
+            left = _remaining_cases(group, seen)
             if not left.keys:
                 continue
             seen.update(left.keys)
             if gathered.groups and gathered.ends_before(left):
                 yield self._task(gathered)
-                gathered = _Gathered(gathered.budget)
+                gathered = _TaskBuilder(gathered.budget)
             gathered.add(left)
         if gathered.groups:
             yield self._task(gathered)
 
-    def _task(self, gathered: "_Gathered") -> Task:
+    def _task(self, gathered: "_TaskBuilder") -> Task:
         return Task(self.rig, tuple(gathered.groups), self.study.plant, self.rigs)
 
     def rig_of(self, series: Series) -> Rig[Any]:
@@ -143,7 +143,7 @@ def _rig_of(series: Series, rig: Rig[Any], rigs: Mapping[str, Rig[Any]]) -> Rig[
     return rigs.get(series.folder, rig) if isinstance(series, Log) else rig
 
 
-def _left(group: Group, done: Collection[str]) -> Group:
+def _remaining_cases(group: Group, done: Collection[str]) -> Group:
     """Return the cases of a group that are not done."""
     left = [place for place, key in enumerate(group.keys) if key not in done]
     if len(left) == len(group.keys):
@@ -152,7 +152,7 @@ def _left(group: Group, done: Collection[str]) -> Group:
 
 
 @dataclass(eq=False)
-class _Gathered:
+class _TaskBuilder:
     """Cases gathered for a task of about a given duration; the task ends where a cut costs least.
 
     A cut costs least when the lanes of the filters are full, or between two simulated motions, so that none is
@@ -195,7 +195,7 @@ def plan_study(study: Study, folder: Path) -> Plan:
     kind = actuator(study.plant)
     rig = kind.read_rig(folder / study.rig if study.rig else None)
     rigs = {name: read_own_rig(folder / file, kind) for name, file in study.rigs.items()}
-    listed = _simulated if kind.name == DEFAULT else partial(simulated_of, kind)
+    listed = _simulated_series if kind.name == DEFAULT else partial(simulated_series, kind)
     logs = [listed_logs(one, place, folder, rigs) for place, one in enumerate(study.logs)]
     series = [*map(listed, study.runs), *(one.logs for one in logs)]
     works = [_works(one.methods, one.starts_pa) for one in (*study.runs, *study.logs)]
@@ -233,7 +233,7 @@ def config_hash(study: Study, rig: Rig[Any], rigs: Mapping[str, Rig[Any]]) -> st
     return _hash([told, _numbers(rig), *map(_numbers, rigs.values())]).hexdigest()[:32]
 
 
-def _simulated(runs: Runs) -> Iterator[Simulated]:
+def _simulated_series(runs: Runs) -> Iterator[Simulated]:
     """Yield the series with seeds in the innermost loop, so that what seeds share is computed once."""
     names = runs.conditions if runs.conditions is not None else (() if runs.severities else tuple(CONDITIONS))
     found = [CONDITIONS[name] for name in names]

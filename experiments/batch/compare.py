@@ -7,10 +7,10 @@ import pandas as pd
 
 from plant.errors import HydrostateError
 
-SERIES = ["plant", "file", "drive", "sensors", "condition", "seed", "duration_s", "sample_time_s"]
+SERIES_COLUMNS = ["plant", "file", "drive", "sensors", "condition", "seed", "duration_s", "sample_time_s"]
 """Columns that identify a series. Cases of one series share its noise, so the bootstrap draws whole series."""
 
-DOING = ["form", "method", "pressure", "told", "start_pa", "start_std_pa"]
+METHOD_COLUMNS = ["form", "method", "pressure", "told", "start_pa", "start_std_pa"]
 
 RESAMPLES = 2000
 """Bootstrap draws of series for an interval [count]: fifty of them lie beyond each end of a 95 % interval."""
@@ -53,7 +53,7 @@ def compare_studies(first: pd.DataFrame, second: pd.DataFrame, seed: int = 2024)
     rng = np.random.default_rng(seed)
     rows: list[dict[str, object]] = []
     for verb in dict.fromkeys(first["verb"]):
-        pairs, changed = _paired(first[first["verb"] == verb], second[second["verb"] == verb])
+        pairs, changed = _paired_cases(first[first["verb"] == verb], second[second["verb"] == verb])
         groups = [("all", pairs), *((str(name), group) for name, group in pairs.groupby("condition", sort=False))]
         for words, unit, column, better in MEASURES:
             for condition, group in groups if len(pairs) else ():
@@ -68,11 +68,11 @@ def compare_studies(first: pd.DataFrame, second: pd.DataFrame, seed: int = 2024)
     return pd.DataFrame(rows)
 
 
-def _paired(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, str]:
+def _paired_cases(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, str]:
     """Return cases side by side, and a description of what changed between the studies."""
     changed: list[str] = []
-    on = list(SERIES)
-    for name in (*DOING, *SERIES[:1], "drive", "sensors"):
+    on = list(SERIES_COLUMNS)
+    for name in (*METHOD_COLUMNS, *SERIES_COLUMNS[:1], "drive", "sensors"):
         here, there = (list(frame[name].map(str).unique()) for frame in (first, second))
         if len(here) == len(there) == 1 and here != there:
             changed.append(f"{name}: {here[0] or 'none'} to {there[0] or 'none'}")
@@ -80,17 +80,17 @@ def _paired(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, st
         elif name not in on:
             on.append(name)
     columns = [column for _, _, column, _ in MEASURES]
-    left, right = (_matchable(_measured(frame)[[*on, *columns]], on) for frame in (first, second))
+    left, right = (_with_gaps_filled(_with_measures(frame)[[*on, *columns]], on) for frame in (first, second))
     return left.merge(right, on=on, suffixes=("_a", "_b")), "; ".join(changed)
 
 
-def _matchable(frame: pd.DataFrame, on: list[str]) -> pd.DataFrame:
+def _with_gaps_filled(frame: pd.DataFrame, on: list[str]) -> pd.DataFrame:
     """Return cases with gaps filled in the matching columns, so that an entry missing from both counts as equal."""
     filled = {name: frame[name].astype(object).where(frame[name].notna(), "") for name in on}
     return frame.assign(**filled).drop_duplicates(on)
 
 
-def _measured(frame: pd.DataFrame) -> pd.DataFrame:
+def _with_measures(frame: pd.DataFrame) -> pd.DataFrame:
     right = (frame["found_condition"] == frame["condition"]).astype(float)
     known = (frame["verb"] == "diagnose") & (frame["condition"] != "unknown")
     return frame.assign(
@@ -102,7 +102,7 @@ def _measured(frame: pd.DataFrame) -> pd.DataFrame:
 
 def _difference(pairs: pd.DataFrame, column: str, better: float, rng: np.random.Generator) -> dict[str, object]:
     first, second = (pairs[f"{column}_{side}"] for side in "ab")
-    drawn = [name for name in SERIES if name in pairs]
+    drawn = [name for name in SERIES_COLUMNS if name in pairs]
     groups = (second - first).groupby([pairs[name] for name in drawn], sort=False)
     low, high = _interval(groups.sum().to_numpy(), groups.size().to_numpy(), rng)
     verdict = "no difference shown"

@@ -11,17 +11,17 @@ from estimation.log_checks.clean import CleanLog
 from estimation.notes import ChannelCode, SensorCode
 from experiments.eha.plain_verdict import WRONG_INPUT
 from experiments.log_pages.entries import quantity_entry
-from experiments.page.condition_names import in_words
+from experiments.page.condition_names import condition_in_words
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.rig import Rig
 from plant.errors import LogWarning
 from plant.log.record import Record
 
-TOLD_APART = 1.001
+DISTINCT_RATIO = 1.001
 """Minimum ratio of the best class's probability to the runner-up's at which a class is named [dimensionless]."""
 
-WHY_NONE = {
+NO_CLASS_CODES = {
     ClassCode.CHANNEL_ZERO,
     ClassCode.MODELS_ALIKE,
     ClassCode.MODELS_DIVERGED,
@@ -31,7 +31,9 @@ WHY_NONE = {
 }
 
 
-def diagnosed(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEstimate] | None = None) -> dict[str, Any]:
+def diagnose_to_row(
+    record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEstimate] | None = None
+) -> dict[str, Any]:
     """Diagnose which of the nine conditions a log was taken in, or that it fits none; see `diagnose_log`.
 
     Returns
@@ -63,18 +65,18 @@ def class_row(found: Finding) -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        As `diagnosed` returns them.
+        As `diagnose_to_row` returns them.
     """
     if not found.probabilities:
         return _without_class(found)
     (best, first), (second, other) = sorted(found.probabilities.items(), key=lambda item: -item[1])[:2]
     margin, severities = first / max(other, 1e-300), {"quantities": json.dumps(_severities(found))}
     if found.unknown:
-        said = f"{_why_unknown(found)}; the nearest of the nine conditions is {in_words(best)}"
+        said = f"{_why_unknown(found)}; the nearest of the nine conditions is {condition_in_words(best)}"
         against = json.dumps([{"code": str(one.code), "data": dict(one.data)} for one in found.against])
         return {"outcome": "mismatch", "reason": said, "trusted": False, "against": against, **severities}
-    if margin < TOLD_APART:
-        both = f"{in_words(best)} and {in_words(second)}"
+    if margin < DISTINCT_RATIO:
+        both = f"{condition_in_words(best)} and {condition_in_words(second)}"
         said = f"no class: under this drive {both} look alike; drive the actuator with steps"
         return {"outcome": "not_observable", "reason": said, "margin": margin}
     row = {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin, "trusted": True}
@@ -100,6 +102,6 @@ def _severities(found: Finding) -> dict[str, Any]:
 
 def _without_class(found: Finding) -> dict[str, Any]:
     """Return the entries of a log that has no probabilities, because it holds too little or no circuit fits."""
-    said = "; ".join(str(note) for note in (*found.notes, *found.against) if note.code in WHY_NONE)
+    said = "; ".join(str(note) for note in (*found.notes, *found.against) if note.code in NO_CLASS_CODES)
     outcome = Outcome.FAILED if found.outcome is Outcome.OK else found.outcome
     return {"outcome": outcome.value, "reason": said, "trusted": False}

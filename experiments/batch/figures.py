@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from experiments.nine_conditions.classification import draw_confusion
-from experiments.page.drawing import named_rows, say
+from experiments.page.drawing import label_point, named_rows
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.page.style import (
@@ -24,9 +24,9 @@ from experiments.page.style import (
     Margins,
     condition_levels,
     panels,
-    spread_out,
+    spread_offsets,
 )
-from experiments.page.words import in_words
+from experiments.page.words import condition_in_words
 
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY)
 
@@ -37,7 +37,7 @@ FARTHEST_PERCENT = 30.0
 """Errors beyond this are drawn at the edge [%], so that a method that fails does not hide the others."""
 
 
-def way_in_words(row: Mapping[Any, Any]) -> str:
+def method_in_words(row: Mapping[Any, Any]) -> str:
     """Return the name of a method with plant and drive.
 
     Parameters
@@ -47,7 +47,7 @@ def way_in_words(row: Mapping[Any, Any]) -> str:
 
     Examples
     --------
-    >>> way_in_words({"plant": "lumped", "drive": "sine", "verb": "filter", "form": "pressure", "method": "ekf",
+    >>> method_in_words({"plant": "lumped", "drive": "sine", "verb": "filter", "form": "pressure", "method": "ekf",
     ...               "pressure": True})
     'lumped, sine: pressure form, ekf'
     """
@@ -64,14 +64,14 @@ def _draw_errors(table: pd.DataFrame) -> Figure:
     """
     shown = table[table["median_percent"].notna()]
     count = shown["condition"].nunique()
-    ways = [way_in_words(row) for row in shown.to_dict("records")]
+    ways = [method_in_words(row) for row in shown.to_dict("records")]
     names = list(dict.fromkeys(ways))
     height = 1.3 + max(ROW_INCHES, 0.13 * len(names)) * count + 0.2 * len(names)
     margins = Margins(left=2.3, top=0.45, bottom=0.7 + 0.2 * len(names))
     title = "Error of bulk modulus by condition: median, and 5 to 95 % of cases"
     figure, (axis,) = panels(title, 1, 1, height, margins)
     levels = condition_levels(axis, shown["condition"])
-    offsets = spread_out(len(names), 0.6)
+    offsets = spread_offsets(len(names), 0.6)
     edge = min(FARTHEST_PERCENT, 1.1 * max(0.1, float(shown[["low_percent", "high_percent"]].abs().max().max())))
     axis.axvline(0.0, color=GREY, linewidth=0.8)
     spread = shown[["low_percent", "median_percent", "high_percent"]].astype(float).clip(-edge, edge).to_numpy()
@@ -91,12 +91,12 @@ def draw_classes(table: pd.DataFrame) -> Figure:
     margins = Margins(left=2.3, top=0.45)
     figure, (axis,) = panels("Logs by the class that was found", 1, 1, 1.0 + ROW_INCHES * len(table), margins)
     shown = table.iloc[::-1]
-    level = named_rows(axis, [in_words(name) for name in shown["class"]])
+    level = named_rows(axis, [condition_in_words(name) for name in shown["class"]])
     axis.barh(level, shown["logs"], color=BLUE, height=0.6)
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.set(xlabel="logs")
     for place, count in zip(level, shown["logs"], strict=True):
-        say(axis, str(count), (count, place), (4, 0), va="center", fontsize=8.5)
+        label_point(axis, str(count), (count, place), (4, 0), va="center", fontsize=8.5)
     return figure
 
 

@@ -11,11 +11,11 @@ from estimation.filters.batch import FEWEST_IN_LANES, filter_batch
 from estimation.models.eha_forms import BULK_MODULUS
 from experiments.batch.rows import NIS, Rows, error_percent
 
-SETTLED = 0.2
+SETTLED_SHARE = 0.2
 """Share of a run that counts as its end [fraction], as in `estimation.filters.run.Estimate.settled`."""
 
 
-class Waiting(NamedTuple):
+class WaitingFilter(NamedTuple):
     """A filter to be run.
 
     Parameters
@@ -34,9 +34,9 @@ class Lanes:
 
     def __init__(self, rows: Rows) -> None:
         self._rows = rows
-        self._waiting: dict[tuple[object, ...], list[Waiting]] = {}
+        self._waiting: dict[tuple[object, ...], list[WaitingFilter]] = {}
 
-    def add(self, one: Waiting) -> None:
+    def add(self, one: WaitingFilter) -> None:
         """Add a filter to those that wait; run them when they fill the lanes of a kernel."""
         problem = one.problem
         alike = (id(problem.model), problem.channels, problem.sample_time, problem.measured.shape)
@@ -51,7 +51,7 @@ class Lanes:
             self._run(waiting)
         self._waiting.clear()
 
-    def _run(self, waiting: list[Waiting]) -> None:
+    def _run(self, waiting: list[WaitingFilter]) -> None:
         problems = [one.problem for one in waiting]
         padded = problems + problems[-1:] * max(0, FEWEST_IN_LANES - len(problems))
         try:
@@ -60,7 +60,7 @@ class Lanes:
             self._rows.fail([one.place for one in waiting], error)
 
 
-def write_filtered(rows: Rows, ran: Sequence[Waiting], traces: Sequence[Trace]) -> None:
+def write_filtered(rows: Rows, ran: Sequence[WaitingFilter], traces: Sequence[Trace]) -> None:
     """Write the results of filters that share one model and length.
 
     Parameters
@@ -70,7 +70,7 @@ def write_filtered(rows: Rows, ran: Sequence[Waiting], traces: Sequence[Trace]) 
     """
     problem = ran[0].problem
     model, state = problem.model, problem.model.index(BULK_MODULUS)
-    first = int(np.floor(len(traces[0].track) * (1.0 - SETTLED)))
+    first = int(np.floor(len(traces[0].track) * (1.0 - SETTLED_SHARE)))
     with np.errstate(all="ignore"):  # the row of a diverged filter says so
         ends, _ = model.to_si(np.array([trace.track[first:] for trace in traces]))
         values = ends[..., state].mean(axis=1)

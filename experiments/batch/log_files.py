@@ -7,7 +7,7 @@ from pathlib import Path
 from experiments.batch.part_store import CASES, PARTS
 
 
-def matching(pattern: str) -> list[str]:
+def matching_files(pattern: str) -> list[str]:
     """Return the files that a pattern matches, in order of their names.
 
     Parameters
@@ -24,7 +24,7 @@ def matching(pattern: str) -> list[str]:
 
     Examples
     --------
-    >>> matching("/nowhere/**/*.csv")
+    >>> matching_files("/nowhere/**/*.csv")
     []
     """
     return sorted(path for path in set(_matches(pattern)) if Path(path).is_file())

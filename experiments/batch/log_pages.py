@@ -2,17 +2,17 @@
 
 from collections.abc import Collection
 
-from experiments.actuators import kind_of_rig, offered
+from experiments.actuators import kind_of_rig, verb_of_kind
 from experiments.batch.cases import Plan
 from experiments.batch.folder import Folder
 from experiments.batch.logs_listed import read_listed
 from experiments.batch.part_store import PartStore
 from experiments.batch.series import Log
-from experiments.batch.standing import READ, standing_of
+from experiments.batch.standing import STANDING_COLUMNS, logs_by_standing
 from experiments.command.log_verb import page_of
-from experiments.command.logs import caught
+from experiments.command.logs import catch_log_warnings
 from experiments.fleet.log_pages import file_name
-from experiments.running.refusal import refused
+from experiments.running.refusal import os_errors_as
 from plant.errors import HydrostateError
 
 PAGES = "pages"
@@ -42,22 +42,22 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
         for work in one.works
         if isinstance(one.series, Log) and work.verb == "diagnose"
     }
-    rows = standing_of(store.rows(list(READ)))
+    rows = logs_by_standing(store.rows(list(STANDING_COLUMNS)))
     worst = [one for one in rows if one.file in logs and one.state != "failed"]
     unwritten: list[str] = []
     for one in worst[:most]:
         series, work = logs[one.file]
         rig = plan.rig_of(series)
         kind = kind_of_rig(rig, plan.study.plant)
-        chosen = offered(kind, "diagnose")
+        chosen = verb_of_kind(kind, "diagnose")
         options = {**chosen.options, "seed": 0} | ({} if work.pressure else {"no_pressure": True})
         try:
-            with caught():
+            with catch_log_warnings():
                 record = read_listed(series, rig, kind.required)
                 found = chosen.run(record, *chosen.prepare(rig, options))
             result = {**chosen.blank, "file": one.file, "rig": rig.name, **chosen.entries(found)}
             page = page_of(chosen, result, found, record).encode()
-            with refused(f"page of {one.file} cannot be written"):
+            with os_errors_as(f"page of {one.file} cannot be written"):
                 store.folder.write(f"{PAGES}/{file_name(one.file)}", page)
         except HydrostateError as error:
             unwritten.append(str(error))

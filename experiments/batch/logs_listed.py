@@ -6,16 +6,16 @@ from glob import escape, has_magic
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from experiments.batch.log_files import matching
+from experiments.batch.log_files import matching_files
 from experiments.batch.series import Log, content_of
 from experiments.batch.study_file import Logs, StudyError
 from experiments.command.logs import read_log
-from experiments.command.visible_text import spelt
+from experiments.command.visible_text import valid_text
 from plant.eha.rig import Rig
 from plant.log.record import Record
 
 
-class Listed(NamedTuple):
+class ListedLogs(NamedTuple):
     """Logs of one `[[logs]]` of a study.
 
     Parameters
@@ -28,7 +28,7 @@ class Listed(NamedTuple):
     links: Mapping[str, str]
 
 
-def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any]]) -> Listed:
+def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any]]) -> ListedLogs:
     """List the logs that a pattern finds, and hash them.
 
     Parameters
@@ -52,7 +52,7 @@ def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any
         If no file is found.
     """
     pattern = os.path.join(escape(str(folder)), logs.glob)  # noqa: PTH118 -- which keeps a pattern that is absolute
-    found = matching(pattern)
+    found = matching_files(pattern)
     if not found:
         said = "no file matches" if has_magic(logs.glob) else "there is no such file as"
         raise StudyError(
@@ -67,12 +67,12 @@ def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any
         first = counted.setdefault((_identity(one.path), one.content, one.folder), one)
         if first is not one:
             links[one.file] = first.file
-    return Listed(tuple(sorted(counted.values(), key=lambda one: one.file)), links)
+    return ListedLogs(tuple(sorted(counted.values(), key=lambda one: one.file)), links)
 
 
 def _log(path: Path, folder: Path, logs: Logs, rigs: Mapping[str, Rig[Any]]) -> Log:
     relative = path.relative_to(folder) if path.is_relative_to(folder) else path
-    file, itself = spelt(relative.as_posix()), path.resolve()
+    file, itself = valid_text(relative.as_posix()), path.resolve()
     try:
         size = itself.stat().st_size
     except OSError:  # the file was just deleted, so its case will fail

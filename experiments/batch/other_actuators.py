@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from estimation.finding import Finding
 from experiments.actuator_kind import ActuatorKind, LogVerb
-from experiments.actuators import offered
+from experiments.actuators import verb_of_kind
 from experiments.batch.rows import Row
 from experiments.batch.series import Simulated
 from experiments.batch.study_file import Runs
@@ -15,7 +15,7 @@ from plant.log.record import Record
 from plant.notes import distinct
 
 
-def simulated_of(kind: ActuatorKind, runs: Runs) -> Iterator[Simulated]:
+def simulated_series(kind: ActuatorKind, runs: Runs) -> Iterator[Simulated]:
     """Yield the series of runs, every condition with every seed.
 
     Yields
@@ -23,7 +23,7 @@ def simulated_of(kind: ActuatorKind, runs: Runs) -> Iterator[Simulated]:
     Simulated
         Without a drive and severities, which are the gear-pump actuator's.
     """
-    options = offered(kind, "simulate").options
+    options = verb_of_kind(kind, "simulate").options
     given = {
         name: getattr(runs, f"{name}_s") for name in ("duration", "sample_time") if f"{name}_s" in runs.model_fields_set
     }
@@ -42,9 +42,9 @@ def simulated_run(kind: ActuatorKind, series: Simulated, rig: Rig) -> Record:
     Parameters
     ----------
     series : Simulated
-        A series from `simulated_of`.
+        A series from `simulated_series`.
     """
-    simulation = offered(kind, "simulate")
+    simulation = verb_of_kind(kind, "simulate")
     asked = {
         "condition": series.condition,
         "sensors": series.sensors,
@@ -55,7 +55,7 @@ def simulated_run(kind: ActuatorKind, series: Simulated, rig: Rig) -> Record:
     return simulation.run(rig, {**options, "seed": series.seed, "plant": None}).record
 
 
-def found_of(kind: ActuatorKind, verb: str, record: Record, rig: Rig) -> Row:
+def analyse_to_row(kind: ActuatorKind, verb: str, record: Record, rig: Rig) -> Row:
     """Estimate or diagnose a log, and return the findings as entries of a row.
 
     Returns
@@ -63,17 +63,17 @@ def found_of(kind: ActuatorKind, verb: str, record: Record, rig: Rig) -> Row:
     Row
         Outcome, reason, the condition if one is named, and every quantity.
     """
-    asked: LogVerb = offered(kind, verb)
-    return row_of(asked.run(record, *asked.prepare(rig, {**asked.options, "seed": 0})))
+    asked: LogVerb = verb_of_kind(kind, verb)
+    return finding_row(asked.run(record, *asked.prepare(rig, {**asked.options, "seed": 0})))
 
 
-def row_of(found: Finding) -> Row:
+def finding_row(found: Finding) -> Row:
     """Return a finding as entries of a row.
 
     Returns
     -------
     Row
-        As `found_of` returns them.
+        As `analyse_to_row` returns them.
     """
     reasons = [str(note) for note in distinct((*found.against, *found.gate.reasons, *found.notes))]
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])

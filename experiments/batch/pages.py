@@ -11,16 +11,16 @@ import pandas as pd
 from markupsafe import Markup
 
 from experiments.batch.compare import in_sentences
-from experiments.batch.figures import way_in_words
+from experiments.batch.figures import method_in_words
 from experiments.batch.standing import standing_in_words, with_standing
 from experiments.batch.summary import MOST_LISTED, NEAR_PERCENT
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.frames import Tables
-from experiments.page.names_shown import SHOWN
+from experiments.page.names_shown import QUANTITY_NAMES
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, pretty_unit, shop_unit
 from experiments.page.render import render_page
-from experiments.page.tables import Cell, Column, Row, decimals, right, spaced
-from experiments.page.words import in_words
+from experiments.page.tables import Cell, Column, Row, decimals, name_in_words, right_aligned
+from experiments.page.words import condition_in_words
 
 MOST_TIMES = 1000.0
 """Ratio of two probabilities beyond which its digits are meaningless [dimensionless]."""
@@ -35,7 +35,7 @@ def _quantities(text: Any) -> str:
     if pd.isna(text):
         return MISSING
     told = {name: one for name, one in json.loads(text).items() if one["value"] is not None}
-    return "; ".join(f"{SHOWN.get(name, name.replace('_', ' '))} {_amount(one)}" for name, one in told.items())
+    return "; ".join(f"{QUANTITY_NAMES.get(name, name.replace('_', ' '))} {_amount(one)}" for name, one in told.items())
 
 
 def _amount(one: Mapping[str, Any]) -> str:
@@ -61,14 +61,14 @@ def _state(name: Any) -> Cell:
 def _times(margin: float | None) -> Cell:
     """Return a ratio of probabilities in digits, up to `MOST_TIMES`."""
     if margin is None or not margin > MOST_TIMES:
-        return right(number(margin, 3))
-    return right(f"over {MOST_TIMES:.0f}")
+        return right_aligned(number(margin, 3))
+    return right_aligned(f"over {MOST_TIMES:.0f}")
 
 
 _text = partial(Column, words=_or_dash)
-_condition = partial(Column, words=lambda value: in_words(_or_dash(value)))
+_condition = partial(Column, words=lambda value: condition_in_words(_or_dash(value)))
 _percent = partial(Column, unit="%", words=decimals(2))
-_whole = partial(Column, unit="%", words=decimals(0))
+_percent_column = partial(Column, unit="%", words=decimals(0))
 
 COLUMNS: Mapping[str, Sequence[Column]] = {
     "outcomes": (
@@ -83,14 +83,14 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         _percent("median_percent", "median error"),
         _percent("high_percent", "95 %"),
         _percent("rms_percent", "RMS error"),
-        _whole("near_percent", f"within {NEAR_PERCENT:g} %"),
-        _whole("covered_percent", "interval covers"),
+        _percent_column("near_percent", f"within {NEAR_PERCENT:g} %"),
+        _percent_column("covered_percent", "interval covers"),
     ),
     "diagnosis": (
         _text("way", "how"),
         _condition("condition", "true class"),
         Column("cases"),
-        _whole("right_percent", "right"),
+        _percent_column("right_percent", "right"),
         Column("median_margin", "times as probable as runner-up, median", digits=3),
     ),
     "classes": (_condition("class"), Column("logs"), Column("percent", "of logs", "%", words=decimals(1))),
@@ -99,7 +99,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         Column("state", words=_state),
         _text("worst"),
         _text("verb", "asked"),
-        Column("outcome", words=lambda value: spaced(_or_dash(value))),
+        Column("outcome", words=lambda value: name_in_words(_or_dash(value))),
         _condition("found_condition", "class"),
         _condition("runner_up", "runner-up"),
         Column("margin", "times as probable as runner-up", words=_times),
@@ -143,7 +143,7 @@ def render_batch_report(
     pages : Mapping[str, str]
         Path of each log's own page, relative to the report.
     worst : sequence of LogRow
-        Diagnosed logs, the worst first, from `experiments.batch.standing.standing_of`.
+        Diagnosed logs, the worst first, from `experiments.batch.standing.logs_by_standing`.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def render_batch_report(
     listed = {name: one_row_a_log(table) if name in LISTED else table for name, table in tables.items()}
     if "logs" in listed:
         listed["logs"] = with_standing(listed["logs"], worst)
-    shown = {name: _shown(listed[name], pages) for name in COLUMNS if name in listed}
+    shown = {name: _listed_rows(listed[name], pages) for name in COLUMNS if name in listed}
     logs_alone = "logs" in shown and manifest["cases"] == len(tables["logs"]) == done
     if logs_alone:
         shown["logs"] = _without_repetition(shown["logs"])
@@ -189,7 +189,9 @@ def _without_repetition(logs: pd.DataFrame) -> pd.DataFrame:
 def _classes_in_words(classes: pd.DataFrame) -> str:
     """Return the number of logs per class, in one line."""
     counts = zip(classes["class"], classes["logs"], strict=True)
-    return ", ".join(f"{'no class' if name == 'none' else in_words(name)} in {count}" for name, count in counts)
+    return ", ".join(
+        f"{'no class' if name == 'none' else condition_in_words(name)} in {count}" for name, count in counts
+    )
 
 
 def one_row_a_log(table: pd.DataFrame) -> pd.DataFrame:
@@ -212,16 +214,16 @@ def one_row_a_log(table: pd.DataFrame) -> pd.DataFrame:
     for _, group in table.groupby(table["file"].fillna(table.index.to_series().astype(str)), sort=False):
         each = group.to_dict("records")
         once = len(each) > 1 and len({one["verb"] for one in each}) == len(each)
-        merged = {name: _told_once(str(name), each) for name in table} if once else {}
-        rows += [merged] if once and not any(isinstance(one, _Several) for one in merged.values()) else each
+        merged = {name: _merged_cell(str(name), each) for name in table} if once else {}
+        rows += [merged] if once and not any(isinstance(one, _DifferingNumbers) for one in merged.values()) else each
     return pd.DataFrame(rows, columns=table.columns)
 
 
-class _Several:
+class _DifferingNumbers:
     """Marks numbers that differ between verbs and so do not fit in one cell."""
 
 
-def _told_once(name: str, rows: Sequence[Mapping[Any, Any]]) -> Any:
+def _merged_cell(name: str, rows: Sequence[Mapping[Any, Any]]) -> Any:
     """Return the text of a column: once, or for each verb if verbs differ."""
     told = {row["verb"]: row[name] for row in rows if not pd.isna(row[name])}
     distinct = list(dict.fromkeys(told.values()))
@@ -232,17 +234,17 @@ def _told_once(name: str, rows: Sequence[Mapping[Any, Any]]) -> Any:
     if name in ("key", "trusted"):
         return None
     if not all(isinstance(one, str) for one in distinct):
-        return _Several()
+        return _DifferingNumbers()
     return "; ".join(f"{verb}: {one}" for verb, one in told.items())
 
 
-def _shown(table: pd.DataFrame, pages: Mapping[str, str]) -> pd.DataFrame:
+def _listed_rows(table: pd.DataFrame, pages: Mapping[str, str]) -> pd.DataFrame:
     """Return the rows listed on the page, with the method in words and the path of each log's page."""
     head = table.head(MOST_LISTED)
     if "file" in head:
         files = head["file"].tolist()
         head = head.assign(file=below_one_folder(files), page=[pages.get(file, "") for file in files])
-    return head.assign(way=[way_in_words(row) for row in head.to_dict("records")]) if "pressure" in head else head
+    return head.assign(way=[method_in_words(row) for row in head.to_dict("records")]) if "pressure" in head else head
 
 
 def below_one_folder(files: Sequence[Any]) -> list[Any]:

@@ -23,7 +23,7 @@ import pyarrow.parquet as pq
 from experiments.batch.folder import LOCK, TEMPORARY, Folder, open_folder
 from experiments.batch.rows import SCHEMA
 from experiments.page.folder import DESKTOP_FILES
-from experiments.running.refusal import reason_of, refused
+from experiments.running.refusal import os_errors_as, reason_of
 from plant.errors import HydrostateError
 
 FORMAT = 1
@@ -52,7 +52,7 @@ class PartStore:
         HydrostateError
             If the folder holds what no batch wrote, cannot be written, or another process is writing.
         """
-        with refused(f"store {self.name} cannot be written"):
+        with os_errors_as(f"store {self.name} cannot be written"):
             self._check()
             with self.folder.writer():
                 self._tidy()
@@ -60,7 +60,7 @@ class PartStore:
 
     def clear(self) -> None:
         """Remove every part."""
-        with refused(f"store {self.name} cannot be written"):
+        with os_errors_as(f"store {self.name} cannot be written"):
             for name in self._parts():
                 self.folder.remove(f"{PARTS}/{name}")
 
@@ -87,7 +87,7 @@ class PartStore:
         HydrostateError
             If it cannot be written.
         """
-        with refused(f"store {self.name} cannot be written"):
+        with os_errors_as(f"store {self.name} cannot be written"):
             self.folder.write(CASES, _parquet(pa.table({"key": pa.array(keys, pa.string())})))
             text = json.dumps({"format": FORMAT, **manifest}, indent=2, allow_nan=False) + "\n"
             self.folder.write(MANIFEST, text.encode())
@@ -101,7 +101,7 @@ class PartStore:
             If it cannot be written.
         """
         digest = hashlib.sha256("".join(keys).encode()).hexdigest()[:24]
-        with refused(f"store {self.name} cannot be written"):
+        with os_errors_as(f"store {self.name} cannot be written"):
             self.folder.write(f"{PARTS}/{digest}.parquet", part)
 
     def manifest(self) -> Mapping[str, Any] | None:
@@ -147,13 +147,13 @@ class PartStore:
             except FileNotFoundError:
                 continue
             except (pa.ArrowException, OSError, KeyError):
-                with refused(f"store {self.name} cannot be written"):
+                with os_errors_as(f"store {self.name} cannot be written"):
                     self.folder.move(f"{PARTS}/{name}", f"{SET_ASIDE}/{name}")
                 broken.append(name)
                 continue
             if again:
                 table = table.filter(pc.invert(_failed(table)))
-            keys.update(_listed(table, "key"))
+            keys.update(_column_values(table, "key"))
         return keys, broken
 
     def rows(self, columns: Sequence[str] | None = None) -> pa.Table:
@@ -177,18 +177,18 @@ class PartStore:
         wanted = list(SCHEMA.names if columns is None else columns)
         read = list(dict.fromkeys([*wanted, "key", "outcome"]))
         try:
-            order = _listed(_table(self.folder.read(CASES)), "key")
+            order = _column_values(_table(self.folder.read(CASES)), "key")
         except (OSError, pa.ArrowException) as error:
             raise HydrostateError(f"store {self.name}: there is no batch study there, or it cannot be read") from error
         place = {key: number for number, key in enumerate(order)}
-        tables = [_placed(table, place) for table in self._whole(read)]
+        tables = [_with_places(table, place) for table in self._readable_parts(read)]
         if not tables:
             return SCHEMA.empty_table().select(wanted)
         table = pa.concat_tables(tables).sort_by([("place", "ascending"), ("failed", "ascending")])
-        kept = _firsts(_listed(table, "place"))
+        kept = _first_places(_column_values(table, "place"))
         return table.take(kept).select(wanted).combine_chunks()
 
-    def _whole(self, columns: list[str]) -> Iterable[pa.Table]:
+    def _readable_parts(self, columns: list[str]) -> Iterable[pa.Table]:
         for name in self._parts():
             try:
                 yield self._read(name, columns)
@@ -240,9 +240,9 @@ def _parquet(table: pa.Table) -> bytes:
     return buffer.getvalue()
 
 
-def _placed(table: pa.Table, place: Mapping[str, int]) -> pa.Table:
+def _with_places(table: pa.Table, place: Mapping[str, int]) -> pa.Table:
     """Return the rows of a part that belong to the study, with their place in it."""
-    places = pa.array([place.get(key) for key in _listed(table, "key")], pa.int64())
+    places = pa.array([place.get(key) for key in _column_values(table, "key")], pa.int64())
     table = table.append_column("place", places).append_column("failed", _failed(table))
     return table.filter(pc.is_valid(table["place"]))
 
@@ -252,7 +252,7 @@ def _table(content: bytes, **how: Any) -> pa.Table:
     return pq.read_table(BytesIO(content), use_threads=False, **how)
 
 
-def _listed(table: pa.Table, column: str) -> list[Any]:
+def _column_values(table: pa.Table, column: str) -> list[Any]:
     return table[column].to_pylist()
 
 
@@ -260,6 +260,6 @@ def _failed(table: pa.Table) -> "pa.ChunkedArray[Any]":
     return pc.equal(table["outcome"], pa.scalar("failed"))  # pyright: ignore -- its stubs know no scalar
 
 
-def _firsts(places: Sequence[int]) -> list[int]:
+def _first_places(places: Sequence[int]) -> list[int]:
     """Return the first place of each number in a sorted list."""
     return [i for i, place in enumerate(places) if i == 0 or place != places[i - 1]]

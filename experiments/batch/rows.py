@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 import pyarrow as pa
 
 from experiments.batch.series import Group, Log, Series, Simulated, Work
-from experiments.command.visible_text import spelt
+from experiments.command.visible_text import valid_text
 from plant.errors import HydrostateError
 
 TEXT, NUMBER = pa.string(), pa.float64()
@@ -57,7 +57,7 @@ other kinds of actuator than the gear-pump one, ``plant`` is the kind, and ``qua
 
 Row: TypeAlias = dict[str, Any]
 
-FOUND = tuple(name for name in SCHEMA.names[SCHEMA.names.index("outcome") :] if name != TRUTH)
+RESULT_COLUMNS = tuple(name for name in SCHEMA.names[SCHEMA.names.index("outcome") :] if name != TRUTH)
 """Columns of a case's result; the columns before them, and the truth, describe the case."""
 
 
@@ -83,7 +83,7 @@ class Rows:
         self._works = [work for group in groups for work in group.works]
         self._series_of = [number for number, group in enumerate(groups) for _ in group.keys]
         self._series = [_series_entries(group.series) for group in groups]
-        self._found: dict[str, list[Any]] = {name: [None] * len(self._keys) for name in FOUND}
+        self._found: dict[str, list[Any]] = {name: [None] * len(self._keys) for name in RESULT_COLUMNS}
 
     def describe(self, series: int, entries: Mapping[str, Any]) -> None:
         """Record what was learnt about a series when it was read.
@@ -101,7 +101,7 @@ class Rows:
         Parameters
         ----------
         columns : Mapping[str, sequence]
-            A value for each case, by column of `FOUND`.
+            A value for each case, by column of `RESULT_COLUMNS`.
         """
         for name, values in columns.items():
             column = self._found[name]
@@ -110,7 +110,7 @@ class Rows:
 
     def fail(self, places: Sequence[int], reason: str | Exception) -> None:
         """Record that cases could not be run."""
-        told = spelt(" ".join(_said(reason).split()))
+        told = valid_text(" ".join(_reason_text(reason).split()))
         self.put(places, {"outcome": ["failed"] * len(places), "reason": [told] * len(places)})
 
     def failures(self) -> tuple[Failure, ...]:
@@ -170,7 +170,7 @@ def error_percent(value: float | None, truth: float | None) -> float | None:
     return None if value is None or truth is None else 100.0 * (value / truth - 1.0)
 
 
-def _said(reason: str | Exception) -> str:
+def _reason_text(reason: str | Exception) -> str:
     if isinstance(reason, str | HydrostateError):
         return str(reason)
     return f"an internal error, {type(reason).__name__}: {str(reason)[:300]}"

@@ -24,7 +24,7 @@ QUIET_SECONDS = 30.0
 MOST_NAMED = 20
 """Number of failed cases that are named as they occur; the store and the report name all."""
 
-ENDINGS = (signal.SIGINT, signal.SIGTERM)
+END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """Signals that ask a batch to end: Ctrl-C, and the signal that the system sends when it shuts down."""
 
 
@@ -73,7 +73,7 @@ def run_plan(plan: "Plan", store: "PartStore", source: str, settings: RunSetting
 
     manifest = manifest_of(plan, source)
     if settings.resume:
-        _say_differences(store.manifest(), manifest)
+        _warn_of_differences(store.manifest(), manifest)
     else:
         store.clear()
     if plan.links:
@@ -89,14 +89,14 @@ def run_plan(plan: "Plan", store: "PartStore", source: str, settings: RunSetting
     before = len(done.intersection(wanted))
     if before:
         note(f"{before} of {len(wanted)} cases are in {store.name} already")
-    with _shown(len(wanted), before) as advance, _interruptible() as stop:
+    with _show_progress(len(wanted), before) as advance, _interruptible() as stop:
         opener = partial(open_executor, settings.workers, settings.cluster)
         most = settings.max_failures
         tally = run_batch(plan, store, done, opener, stop=stop, on_part=advance, max_failures=most)
     return tally, before
 
 
-def _say_differences(old: Any, new: Any) -> None:
+def _warn_of_differences(old: Any, new: Any) -> None:
     """Warn if kept rows were made by different software than the new rows."""
     from experiments.batch.runner import METHODS
 
@@ -120,11 +120,11 @@ def _interruptible() -> Generator[Event]:
     def wish(number: int, frame: object) -> None:
         del number, frame
         stop.set()
-        for one in ENDINGS:
+        for one in END_SIGNALS:
             signal.signal(one, signal.default_int_handler)
         note("interrupted: finishing the running cases; press Ctrl-C again to stop at once")
 
-    before = {one: signal.signal(one, wish) for one in ENDINGS}
+    before = {one: signal.signal(one, wish) for one in END_SIGNALS}
     try:
         yield stop
     finally:
@@ -133,7 +133,7 @@ def _interruptible() -> Generator[Event]:
 
 
 @contextmanager
-def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
+def _show_progress(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
     """Show the number of finished cases, their rate and the time left; name failures as they occur."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn

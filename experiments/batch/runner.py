@@ -61,7 +61,7 @@ class _Batch:
             return None
         return self.suspects.popleft() if self.suspects else next(self.tasks, None)
 
-    def left(self) -> bool:
+    def has_tasks_left(self) -> bool:
         """Return whether a task was not started; an interruption after the last task stops nothing."""
         return bool(self.suspects) or next(self.tasks, None) is not None
 
@@ -123,14 +123,14 @@ def run_batch(
         with opener() as (executor, width):
             if batch is None:
                 batch = _Batch(store, plan.tasks(done, width), stop, on_part, max_failures)
-            if not _drained(batch, executor, width):
+            if not _run_all_tasks(batch, executor, width):
                 continue
-        if stop.is_set() and not batch.tally.stopped and batch.left():
+        if stop.is_set() and not batch.tally.stopped and batch.has_tasks_left():
             batch.tally.stopped = "interrupted"
         return batch.tally
 
 
-def _drained(batch: _Batch, executor: Executor, width: int) -> bool:
+def _run_all_tasks(batch: _Batch, executor: Executor, width: int) -> bool:
     """Run tasks until none is left; return False if the executor broke and must be reopened."""
     flying: dict[Future[Part], Task] = {}
     while True:

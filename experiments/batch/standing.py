@@ -8,13 +8,13 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from experiments.fleet.page import worst_in
+from experiments.fleet.page import worst_severity_text
 from experiments.fleet.rows import LogRow, log_rows
 
-READ = ("file", "verb", "outcome", "found_condition", "reason", "quantities", "against")
+STANDING_COLUMNS = ("file", "verb", "outcome", "found_condition", "reason", "quantities", "against")
 """Columns of a store that show how bad a log is."""
 
-SICK = ("over", "likely")
+SICK_STATES = ("over", "likely")
 """States of a log whose actuator needs maintenance."""
 
 OTHERS: Mapping[str, str] = {
@@ -30,7 +30,7 @@ MOST_NAMED = 5
 """Maximum number of logs to name [count]."""
 
 
-def standing_of(rows: pa.Table) -> list[LogRow]:
+def logs_by_standing(rows: pa.Table) -> list[LogRow]:
     """Return the diagnosed logs, the worst first; a log that was diagnosed twice counts with its worse row.
 
     Parameters
@@ -38,7 +38,7 @@ def standing_of(rows: pa.Table) -> list[LogRow]:
     rows : pyarrow.Table
         Rows of a batch store.
     """
-    found = sorted(log_rows(rows.select(list(READ)).to_pylist(), {}, {}), key=lambda one: one.order)
+    found = sorted(log_rows(rows.select(list(STANDING_COLUMNS)).to_pylist(), {}, {}), key=lambda one: one.order)
     first: dict[str, LogRow] = {}
     for one in found:
         first.setdefault(one.file, one)
@@ -53,7 +53,7 @@ def standing_in_words(logs: Sequence[LogRow]) -> tuple[str, str]:
     others = [words.format(counts[name]) for name, words in OTHERS.items() if counts[name]]
     said = f"{counts['over'] or 'None'} of {len(logs)} logs {'is' if counts['over'] < 2 else 'are'} past a limit"
     told = f"{said}; {', '.join(others)}." if others else f"{said}."
-    sick = [basename(one.file) for one in logs if one.state in SICK][:MOST_NAMED]
+    sick = [basename(one.file) for one in logs if one.state in SICK_STATES][:MOST_NAMED]
     return told, f"Start with {', '.join(sick)}." if sick else ""
 
 
@@ -65,7 +65,7 @@ def with_standing(table: pd.DataFrame, logs: Sequence[LogRow]) -> pd.DataFrame:
     table : pandas.DataFrame
         Table with ``file``.
     logs : sequence of LogRow
-        Logs from `standing_of`.
+        Logs from `logs_by_standing`.
 
     Returns
     -------
@@ -86,6 +86,6 @@ def with_standing(table: pd.DataFrame, logs: Sequence[LogRow]) -> pd.DataFrame:
 
 def _worst(log: LogRow | None) -> str:
     """Return the severity nearest to or farthest beyond its limit, and its percentage of the limit."""
-    if log is None or log.worst is None or not log.told:
+    if log is None or log.worst is None or not log.has_verdict:
         return ""
-    return f"{worst_in(log)}, {100.0 * log.worst.share:.0f} % of the limit"
+    return f"{worst_severity_text(log)}, {100.0 * log.worst.share:.0f} % of the limit"

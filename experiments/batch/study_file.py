@@ -13,15 +13,15 @@ from estimation.filters.methods import METHODS
 from estimation.log_checks.first_belief import START_STD
 from estimation.models.eha_forms import FORMS
 from experiments.actuator_kind import ActuatorKind
-from experiments.actuators import DEFAULT, actuator, offered
+from experiments.actuators import DEFAULT, actuator, verb_of_kind
 from faults.conditions import CONDITIONS, HIGHEST_SEVERITY
 from plant.eha.drives import DRIVES
 from plant.eha.simulate import PLANTS
 from plant.errors import HydrostateError
 from plant.sensors.sensors import SENSORS
-from plant.small_file import SHOWN, shown, small_toml
+from plant.small_file import MOST_SHOWN, entry_text, small_toml
 
-SHIPPED = "experiments.batch.studies"
+STUDIES_PACKAGE = "experiments.batch.studies"
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -50,7 +50,7 @@ def _other_kind(info: ValidationInfo) -> ActuatorKind | None:
     return None if kind is None or kind.name == DEFAULT else kind
 
 
-def _known(names: Sequence[str], known: Sequence[str]) -> None:
+def _require_known_names(names: Sequence[str], known: Sequence[str]) -> None:
     for name in names:
         if name not in known:
             near = get_close_matches(name, known, n=1)
@@ -91,7 +91,7 @@ class Method(_Table):
         known = list(FORMS if info.field_name == "form" else METHODS)
         if info.data.get("verb") != "filter":
             known = ["auto", *(("flow", "motion") if info.field_name == "form" else ("least-squares", *NAMED)), *known]
-        _known([name], known)
+        _require_known_names([name], known)
         return name
 
 
@@ -130,10 +130,10 @@ class Runs(_Table):
     def _names(cls, names: tuple[str, ...] | None, info: ValidationInfo) -> tuple[str, ...] | None:
         kind = _other_kind(info)
         if kind is not None:
-            _known(names or (), kind.conditions if info.field_name == "conditions" else names or ())
+            _require_known_names(names or (), kind.conditions if info.field_name == "conditions" else names or ())
             return names
         known = {"plants": PLANTS, "drives": DRIVES, "sensors": SENSORS, "conditions": CONDITIONS}[str(info.field_name)]
-        _known(names or (), list(known))
+        _require_known_names(names or (), list(known))
         if not names and info.field_name != "conditions":
             raise ValueError(f"one or more of {', '.join(known)}, got none")
         return names
@@ -199,15 +199,15 @@ class Study(_Table):
     logs: tuple[Logs, ...] = ()
 
     @model_validator(mode="after")
-    def _something(self, info: ValidationInfo) -> "Study":
+    def _require_cases(self, info: ValidationInfo) -> "Study":
         if not (self.runs or self.logs):
             raise ValueError("at least one [[runs]] or [[logs]], got none")
         kind = _other_kind(info)
         if kind is not None:
             if self.runs:
-                offered(kind, "simulate")
+                verb_of_kind(kind, "simulate")
             verbs = [one for one in ("estimate", "diagnose") if getattr(kind, one) is not None]
-            _known([method.verb for some in (*self.runs, *self.logs) for method in some.methods], verbs)
+            _require_known_names([method.verb for some in (*self.runs, *self.logs) for method in some.methods], verbs)
         return self
 
 
@@ -267,7 +267,7 @@ def study_path(path: str | Path) -> Path:
     path : str or Path
         A file, or a name such as ``eha-paper``.
     """
-    shipped = files(SHIPPED).joinpath(f"{path}.toml")
+    shipped = files(STUDIES_PACKAGE).joinpath(f"{path}.toml")
     if Path(path).exists() or not shipped.is_file():
         return Path(path)
     return Path(str(shipped))
@@ -281,7 +281,7 @@ def shipped_studies() -> tuple[str, ...]:
     >>> shipped_studies()
     ('eha-paper', 'fleet-archive')
     """
-    names = (one.name for one in files(SHIPPED).iterdir())
+    names = (one.name for one in files(STUDIES_PACKAGE).iterdir())
     return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
 
@@ -292,7 +292,7 @@ def _sentence(error: Any) -> str:
         if isinstance(part, int):
             where += f"[{part}]"
         elif part not in ("constrained-int", "int", "tuple[constrained-int, ...]", "tuple[int, ...]"):
-            name = part if part.isprintable() and len(part) <= SHOWN else shown(part)
+            name = part if part.isprintable() and len(part) <= MOST_SHOWN else entry_text(part)
             where += f".{name}" if where else name
     match error["type"]:
         case "extra_forbidden":
@@ -304,7 +304,7 @@ def _sentence(error: Any) -> str:
             return f"{where or 'the file'} must {'have' if wanted.startswith('at least one [[') else 'be'} {wanted}"
         case _:
             wanted = str(error["msg"]).removeprefix("Input should be ").removeprefix("Value should ")
-            return f"{where} must be {wanted}, got {shown(error['input'])}"
+            return f"{where} must be {wanted}, got {entry_text(error['input'])}"
 
 
 def _nearest(place: Sequence[str | int]) -> str:

@@ -79,7 +79,7 @@ def _outcome_table(frame: pd.DataFrame) -> pd.DataFrame:
         counts = group["outcome"].value_counts()
         return {"cases": len(group), **{name: int(counts.get(name, 0)) for name in OUTCOME_NAMES}}
 
-    return _each(frame, METHOD, entries)
+    return _row_per_group(frame, METHOD, entries)
 
 
 def bulk_modulus_table(frame: pd.DataFrame) -> pd.DataFrame:
@@ -92,10 +92,10 @@ def bulk_modulus_table(frame: pd.DataFrame) -> pd.DataFrame:
         and share of 95 % intervals that cover the truth [%].
     """
     known = frame[frame["verb"].isin(["filter", "estimate"]) & frame["true_bulk_modulus_pa"].notna()]
-    return _each(known, [*METHOD, "condition"], _errors)
+    return _row_per_group(known, [*METHOD, "condition"], _error_entries)
 
 
-def _errors(group: pd.DataFrame) -> dict[str, object]:
+def _error_entries(group: pd.DataFrame) -> dict[str, object]:
     found = group[group["error_percent"].notna()]
     error = found["error_percent"].to_numpy()
     miss = (found["bulk_modulus_pa"] - found["true_bulk_modulus_pa"]).abs()
@@ -109,7 +109,9 @@ def _errors(group: pd.DataFrame) -> dict[str, object]:
     return {**counts, **dict(zip(names, map(float, values), strict=True))}
 
 
-def _each(frame: pd.DataFrame, by: list[str], entries: Callable[[pd.DataFrame], dict[str, object]]) -> pd.DataFrame:
+def _row_per_group(
+    frame: pd.DataFrame, by: list[str], entries: Callable[[pd.DataFrame], dict[str, object]]
+) -> pd.DataFrame:
     """Return one row for each group, with each method in one block, in the order of first appearance."""
     groups = frame.groupby(by, sort=False)
     rows = [{**dict(zip(by, cast(tuple[object, ...], keys), strict=True)), **entries(group)} for keys, group in groups]
@@ -129,7 +131,7 @@ def _diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
         shares = {"right": int(right.sum()), "right_percent": 100.0 * float(right.mean())}
         return {"cases": len(group), **shares, "median_margin": float(group["margin"].median())}
 
-    return _each(_classified(frame), [*METHOD, "condition"], entries)
+    return _row_per_group(_classified_cases(frame), [*METHOD, "condition"], entries)
 
 
 def _confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
@@ -137,7 +139,7 @@ def _confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
 
     One row for each true condition, one column for each found condition [count]; empty if no true class is known.
     """
-    known = _classified(frame)
+    known = _classified_cases(frame)
     known = known[known["found_condition"].notna()]
     if not len(known):
         return pd.DataFrame()
@@ -146,7 +148,7 @@ def _confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
     return confusion_matrix(true, found, CONDITIONS if set(names) <= set(CONDITIONS) else names)
 
 
-def _classified(frame: pd.DataFrame) -> pd.DataFrame:
+def _classified_cases(frame: pd.DataFrame) -> pd.DataFrame:
     return frame[(frame["verb"] == "diagnose") & frame["known"]]
 
 

@@ -18,8 +18,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import pyarrow.parquet as pq
 
-from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, EstimateOptions, estimate_clean, left_out
-from estimation.eha.estimate import estimated, finding_of
+from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, EstimateOptions, estimate_clean, left_out_notes
+from estimation.eha.estimate import checked_estimate, finding_of
 from estimation.eha.result import BulkModulusEstimate
 from estimation.engine.contract import FilterProblem
 from estimation.filters.methods import METHODS
@@ -31,14 +31,14 @@ from estimation.models.eha_forms import BULK_MODULUS, FORMS
 from experiments.actuator_kind import ActuatorKind
 from experiments.actuators import DEFAULT, kind_of_rig
 from experiments.batch.cases import Task
-from experiments.batch.diagnosis import diagnosed
-from experiments.batch.lanes import Lanes, Waiting, write_filtered
+from experiments.batch.diagnosis import diagnose_to_row
+from experiments.batch.lanes import Lanes, WaitingFilter, write_filtered
 from experiments.batch.logs_listed import read_listed
-from experiments.batch.other_actuators import found_of, simulated_run
+from experiments.batch.other_actuators import analyse_to_row, simulated_run
 from experiments.batch.rows import NIS, TRUTH, Failure, Row, Rows, error_percent
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
-from experiments.command.logs import caught
-from experiments.command.visible_text import spelt
+from experiments.command.logs import catch_log_warnings
+from experiments.command.visible_text import valid_text
 from experiments.eha.entries import estimate_message
 from experiments.running.random_streams import stream
 from faults.conditions import severity
@@ -52,7 +52,7 @@ from plant.sensors.sensors import SENSORS, measure, noise_variances
 
 PRESSURE = "differential_pressure_pa"
 
-DRAWN_ONCE = ("sine", "chirp")
+DETERMINISTIC_DRIVES = ("sine", "chirp")
 """Drives without randomness: seeds share the simulated motion, and differ only in the sensor noise."""
 
 TRACK_ROWS = 200
@@ -95,25 +95,25 @@ def run_task(task: Task) -> Part:
     for number, (series, keys, works) in enumerate(task.groups):
         places = range(after, after := after + len(keys))
         try:
-            prepared = replace(_prepared(series, task), usual=sum(map(_is_usual, works)))
+            prepared = replace(_prepare_series(series, task), usual=sum(map(_is_usual, works)))
         except Exception as error:  # an error in one series must not lose the results of the others
-            rows.fail(places, _told_of(series, error))
+            rows.fail(places, _failure_reason(series, error))
             continue
         rows.describe(number, prepared.entries)
         if prepared.warnings:
             rows.put(places, {"warnings": [prepared.warnings] * len(places)})
         for place, work in zip(places, works, strict=True):
             try:
-                _run(place, prepared, work, rows, lanes)
+                _run_case(place, prepared, work, rows, lanes)
             except Exception as error:  # as above
-                rows.fail([place], _told_of(series, error))
+                rows.fail([place], _failure_reason(series, error))
     lanes.finish()
     part = _as_part(rows)
     _freeze_loaded()
     return part
 
 
-def _told_of(series: Series, error: Exception) -> str | Exception:
+def _failure_reason(series: Series, error: Exception) -> str | Exception:
     """Return why a series failed, without the path of its log, which the row already has."""
     if isinstance(series, Log) and isinstance(error, HydrostateError) and error.source == series.path:
         return error.message
@@ -142,7 +142,7 @@ def _as_part(rows: Rows) -> Part:
 
 
 @dataclass(frozen=True, eq=False)
-class _Prepared:
+class _PreparedSeries:
     """A series with the data that a method may use, and the entries that it adds to its cases' rows."""
 
     record: Record
@@ -162,27 +162,27 @@ class _Prepared:
         return self.entries.get(TRUTH)
 
     @cached_property
-    def _found(self) -> tuple[CleanLog, BulkModulusEstimate, tuple[LogWarning, ...]]:
-        with caught() as said:
-            found = estimated(clean_log(self.record, self.rig.parameters), self.rig, DEFAULT_OPTIONS)
+    def _default_estimate(self) -> tuple[CleanLog, BulkModulusEstimate, tuple[LogWarning, ...]]:
+        with catch_log_warnings() as said:
+            found = checked_estimate(clean_log(self.record, self.rig.parameters), self.rig, DEFAULT_OPTIONS)
         return *found, tuple(said)
 
-    def shared(self, record: Record, parameters: EhaParameters, work: Work) -> Seen | None:
+    def shared_estimate(self, record: Record, parameters: EhaParameters, work: Work) -> Seen | None:
         """Return the estimate that cases share and repeat its warnings; None if only one case needs it."""
         if self.usual < 2 or not _is_usual(work) or record is not self.record or parameters != self.rig.parameters:
             return None
-        log, found, said = self._found
+        log, found, said = self._default_estimate
         for one in said:
             warnings.warn(one, stacklevel=2)
         return log, found
 
 
-def _prepared(series: Series, task: Task) -> _Prepared:
+def _prepare_series(series: Series, task: Task) -> _PreparedSeries:
     rig = task.rig_of(series)
     kind = kind_of_rig(rig, task.plant)
     other = None if kind.name == DEFAULT else kind
     if isinstance(series, Log):
-        with _one_at_a_time, caught() as said:
+        with _one_at_a_time, catch_log_warnings() as said:
             record = read_listed(series, rig, kind.required)
         if content_of(Path(series.path)) != series.content:
             raise LogError(f"{series.path}: was changed after the study began; run the same command again")
@@ -190,12 +190,12 @@ def _prepared(series: Series, task: Task) -> _Prepared:
         entries: Row = {"duration_s": record.duration, "sample_time_s": record.sample_time}
         entries |= {"condition": known} if isinstance(known, str) else {}
         entries |= {} if other is None else {"plant": kind.name}
-        return _Prepared(record, rig, rig.parameters, None, entries, _sentences(said), other)
+        return _PreparedSeries(record, rig, rig.parameters, None, entries, _sentences(said), other)
     if other is not None:
-        return _Prepared(simulated_run(other, series, rig), rig, rig.parameters, series.sensors, {}, None, other)
+        return _PreparedSeries(simulated_run(other, series, rig), rig, rig.parameters, series.sensors, {}, None, other)
     truth, parameters = _truth(series, rig.parameters)
     record = measure(truth, SENSORS[series.sensors], _stream(series, "sensors"))
-    return _Prepared(record, rig, parameters, series.sensors, {TRUTH: parameters.bulk_modulus})
+    return _PreparedSeries(record, rig, parameters, series.sensors, {TRUTH: parameters.bulk_modulus})
 
 
 def _stream(series: Simulated, what: str) -> np.random.Generator:
@@ -204,7 +204,7 @@ def _stream(series: Simulated, what: str) -> np.random.Generator:
 
 
 def _truth(series: Simulated, healthy: EhaParameters) -> tuple[Record, EhaParameters]:
-    seed = 0 if series.drive in DRAWN_ONCE else series.seed
+    seed = 0 if series.drive in DETERMINISTIC_DRIVES else series.seed
     return _motion(replace(series, seed=seed, condition=None, sensors=""), healthy)
 
 
@@ -216,41 +216,43 @@ def _motion(series: Simulated, healthy: EhaParameters) -> tuple[Record, EhaParam
     return simulate(PLANTS[series.plant], speed, series.sample_time_s, parameters), parameters
 
 
-def _run(place: int, prepared: _Prepared, work: Work, rows: Rows, lanes: Lanes) -> None:
+def _run_case(place: int, prepared: _PreparedSeries, work: Work, rows: Rows, lanes: Lanes) -> None:
     """Write the result of a case to its place, or queue the case until its lanes are full."""
-    record, parameters = _told(prepared, work)
+    record, parameters = _method_inputs(prepared, work)
     if work.verb == "filter":
         problem = _problem(record, parameters, work, prepared)
-        waiting = Waiting(place, problem, prepared.truth)
+        waiting = WaitingFilter(place, problem, prepared.truth)
         if work.method == "ekf":
             lanes.add(waiting)
         else:
             write_filtered(rows, [waiting], [METHODS[work.method](problem)])
         return
-    with _one_at_a_time, caught() as said:
+    with _one_at_a_time, catch_log_warnings() as said:
         if prepared.other is not None:
-            found = found_of(prepared.other, work.verb, prepared.record, prepared.rig)
+            found = analyse_to_row(prepared.other, work.verb, prepared.record, prepared.rig)
         elif work.verb == "diagnose":
-            found = diagnosed(record, prepared.rig, prepared.shared(record, prepared.rig.parameters, work))
+            found = diagnose_to_row(
+                record, prepared.rig, prepared.shared_estimate(record, prepared.rig.parameters, work)
+            )
         else:
-            found = _estimated(record, parameters, work, prepared)
+            found = _estimate_row(record, parameters, work, prepared)
     found["warnings"] = _sentences([prepared.warnings, *said] if prepared.warnings else said)
     rows.put([place], {name: [value] for name, value in found.items()})
 
 
-def _told(prepared: _Prepared, work: Work) -> tuple[Record, EhaParameters]:
+def _method_inputs(prepared: _PreparedSeries, work: Work) -> tuple[Record, EhaParameters]:
     record = prepared.record
     if not work.pressure and PRESSURE in record:
         record = record.replace(**{PRESSURE: None})
     return record, prepared.parameters if work.told == "condition" else prepared.rig.parameters
 
 
-def _estimated(record: Record, parameters: EhaParameters, work: Work, prepared: _Prepared) -> Row:
-    seen = prepared.shared(record, parameters, work)
+def _estimate_row(record: Record, parameters: EhaParameters, work: Work, prepared: _PreparedSeries) -> Row:
+    seen = prepared.shared_estimate(record, parameters, work)
     if seen is None:
         log = clean_log(record, parameters)
         seen = log, estimate_clean(log, parameters, _options(work))
-    for note in left_out(*seen):
+    for note in left_out_notes(*seen):
         warnings.warn(LogWarning(note), stacklevel=2)
     log, found = seen
     reasons = [str(note) for note in found.gate.reasons]
@@ -273,7 +275,7 @@ def _options(work: Work) -> EstimateOptions:
     return EstimateOptions(form=work.form, method=work.method, start=work.start_pa, start_std=work.start_std_pa)
 
 
-def _problem(record: Record, parameters: EhaParameters, work: Work, prepared: _Prepared) -> FilterProblem:
+def _problem(record: Record, parameters: EhaParameters, work: Work, prepared: _PreparedSeries) -> FilterProblem:
     """Return the filtering task; data shared by its first guesses are computed once for each series."""
     place = FORMS[work.form].index(BULK_MODULUS)
     alike = (work.form, work.pressure, work.told, work.start_std_pa)
@@ -290,7 +292,7 @@ def _problem(record: Record, parameters: EhaParameters, work: Work, prepared: _P
 def _first_problem(record: Record, parameters: EhaParameters, work: Work, sensors: str | None) -> FilterProblem:
     """Return the task for the rig's own guess; for a simulated run the filter knows the sensor noise."""
     model = FORMS[work.form]
-    channels = tuple(channel for channel in _predicted(work.form) if channel in record)
+    channels = tuple(channel for channel in _predicted_channels(work.form) if channel in record)
     if sensors is None:
         variances = measurement_variances(record, channels)
     else:
@@ -310,11 +312,11 @@ def _first_problem(record: Record, parameters: EhaParameters, work: Work, sensor
 
 def _sentences(said: Iterable[object]) -> str | None:
     """Return the notes on a log as one text, each sentence once."""
-    return spelt("; ".join(dict.fromkeys(map(str, said)))) or None
+    return valid_text("; ".join(dict.fromkeys(map(str, said)))) or None
 
 
 @cache
-def _predicted(form: str) -> tuple[str, ...]:
+def _predicted_channels(form: str) -> tuple[str, ...]:
     return predicted_channels(FORMS[form])
 
 

@@ -17,7 +17,7 @@ from experiments.circuit.passes import CHANNELS, SAMPLE_TIME, Passes, in_conditi
 from experiments.nine_conditions.bulk_modulus import Experiment, estimate_entries
 from experiments.nine_conditions.settings import StudySettings
 from experiments.nine_conditions.transfer_functions import measured_response, order_table
-from experiments.running.executors import side_by_side
+from experiments.running.executors import map_in_parallel
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS
 from plant.eha.circuit_parameters import CircuitParameters
@@ -118,7 +118,7 @@ def frequency_responses(
         found = measured_response(test, round(LAG_TIME / SAMPLE_TIME), LOWEST_FREQUENCY, HIGHEST_FREQUENCY)
         return pd.DataFrame({"mean_v": mean, "amplitude_v": amplitude, **found})
 
-    return pd.concat(side_by_side(respond, inputs), ignore_index=True)
+    return pd.concat(map_in_parallel(respond, inputs), ignore_index=True)
 
 
 def low_frequency_gains(responses: pd.DataFrame, by: str) -> pd.Series:
@@ -186,7 +186,7 @@ def bulk_modulus_on_circuit(
         experiment, name = case
         p = in_condition(rig, name)
         record = experiment.record(p, settings, stream(settings.seed, "circuit bulk modulus", experiment.drive, name))
-        known = _believed(rig if experiment.form == "flow" else p)
+        known = _lumped_actuator(rig if experiment.form == "flow" else p)
         head = {**experiment._asdict(), "condition": name}
         finds = (
             (
@@ -197,12 +197,12 @@ def bulk_modulus_on_circuit(
         )
         return [{**head, "start_pa": start, **estimate_entries(found, truth)} for start, found in finds]
 
-    rows = [row for rows in side_by_side(estimate, product(CIRCUIT_FORMS, conditions)) for row in rows]
+    rows = [row for rows in map_in_parallel(estimate, product(CIRCUIT_FORMS, conditions)) for row in rows]
     frame = pd.DataFrame(rows).assign(truth_pa=truth)
     covered = (frame["ci95_low_pa"].astype(float) <= truth) & (truth <= frame["ci95_high_pa"].astype(float))
     return frame.assign(covered=covered)[list(ESTIMATE_COLUMNS)]
 
 
-def _believed(p: CircuitParameters) -> EhaParameters:
+def _lumped_actuator(p: CircuitParameters) -> EhaParameters:
     """Return the lumped actuator that the forms use for the circuit."""
     return EhaParameters(**{field.name: getattr(p, field.name) for field in fields(EhaParameters)})

@@ -19,7 +19,7 @@ from experiments.page.style import (
     condition_rows,
     panels,
 )
-from experiments.page.words import in_words
+from experiments.page.words import condition_in_words
 
 FORM_COLOURS = {"flow": BLUE, "pressure": ORANGE, "acceleration": VERMILION}
 
@@ -60,7 +60,7 @@ def _estimates_of(axis: Axes, rows: pd.DataFrame, heights: Mapping[str, float], 
         height = heights[str(condition)]
         values = found.dropna(subset=["value_pa"])
         if values.empty:
-            words, place = in_words(str(found["outcome"].iloc[0])), ("axes fraction", "data")
+            words, place = condition_in_words(str(found["outcome"].iloc[0])), ("axes fraction", "data")
             told = axis.annotate(words, (0.5, height), xycoords=place, ha="center", va="center", color=GREY, fontsize=8)
             told.set_bbox(
                 {"facecolor": "white", "edgecolor": "none", "pad": 1.5}

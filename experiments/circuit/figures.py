@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from experiments.circuit.estimates_figure import draw_bulk_modulus
 from experiments.nine_conditions.identification import LEAST_COHERENCE, LEVEL_COLOURS, LEVEL_WORDS, draw_order
-from experiments.page.drawing import diamonds, say, shaded
+from experiments.page.drawing import draw_published, label_point, with_colours
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.page.style import BLACK, BLUE, GREY, Margins, panels
@@ -32,11 +32,11 @@ def _draw_throttles(tables: Tables) -> Figure:
     title = "What settles at 4 V: velocity against throttle A, pressure against throttle B"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.7, top=0.65, across=0.8))
     pressure = tables["figure 4 pressure against friction throttle"]
-    _settled(left, tables["figure 3 velocity against leakage throttle"], "throttle_a_v")
-    _settled(right, pressure, "throttle_b_v")
+    _draw_settled(left, tables["figure 3 velocity against leakage throttle"], "throttle_a_v")
+    _draw_settled(right, pressure, "throttle_b_v")
     relief = pressure["percent_of_normal"].iloc[-1]
     right.axhline(relief, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
-    say(right, "relief valve, 500 psi", (0.0, relief), (4, -4), va="top", color=GREY)
+    label_point(right, "relief valve, 500 psi", (0.0, relief), (4, -4), va="top", color=GREY)
     left.set(title="Figure 3", xlabel="throttle A: leakage, fully open at 0 V [V]", ylabel="velocity [% of normal]")
     right.set(title="Figure 4", xlabel="throttle B: load, shut towards 10 V [V]")
     right.set(ylabel="differential pressure [% of normal]", ylim=(0.0, 1.1 * relief))
@@ -45,10 +45,10 @@ def _draw_throttles(tables: Tables) -> Figure:
     return figure
 
 
-def _settled(axis: Axes, curve: pd.DataFrame, volts: str) -> None:
+def _draw_settled(axis: Axes, curve: pd.DataFrame, volts: str) -> None:
     curve = curve.sort_values(volts)
     axis.plot(curve[volts], curve["percent_of_normal"], "o-", color=BLUE, markersize=4, label="circuit plant")
-    diamonds(axis, curve[volts], curve["published_percent"], "published definition")
+    draw_published(axis, curve[volts], curve["published_percent"], "published definition")
 
 
 def _draw_responses(tables: Tables) -> Figure:
@@ -64,7 +64,7 @@ def _draw_responses(tables: Tables) -> Figure:
     )
     for column, (name, by, words) in enumerate(sweeps):
         gain, phase = axes[column], axes[column + 2]
-        for volts, rows, colour in shaded(tables[name].groupby(by)):
+        for volts, rows, colour in with_colours(tables[name].groupby(by)):
             sure = rows["coherence"] >= LEAST_COHERENCE
             gain.plot(rows["frequency_hz"], MILLI * rows["gain"], color=colour, label=f"{volts:g} V")
             phase.plot(rows["frequency_hz"], rows["phase_deg"].where(sure), color=colour)
@@ -75,7 +75,7 @@ def _draw_responses(tables: Tables) -> Figure:
         for axis in (gain, phase):
             axis.axvline(bandwidth, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
         foot, look = ("data", "axes fraction"), {"ha": "right", "va": "bottom", "color": GREY}
-        say(gain, "published bandwidth", (bandwidth, 0.0), (-4, 4), xycoords=foot, **look)
+        label_point(gain, "published bandwidth", (bandwidth, 0.0), (-4, 4), xycoords=foot, **look)
     axes[0].set(xscale="log", yscale="log", ylabel="gain [mm/s per rad/s]")
     axes[2].set_xticks([1.0, 2.0, 5.0, 10.0, 20.0, 40.0], ["1", "2", "5", "10", "20", "40"])
     axes[2].xaxis.minorticks_off()
@@ -101,8 +101,8 @@ def _draw_refits(tables: Tables) -> Figure:
     def friction_law(laws: pd.Series) -> np.ndarray:
         return laws["friction_quadratic"] * speed**2 + laws["friction_linear"] * speed + laws["friction_coulomb"]
 
-    _law(left, tables["figure 8 leakage flow refitted"], MEGA * pressure, flow_law)
-    _law(right, tables["figure 9 friction refitted"], speed, friction_law)
+    _draw_law(left, tables["figure 8 leakage flow refitted"], MEGA * pressure, flow_law)
+    _draw_law(right, tables["figure 9 friction refitted"], speed, friction_law)
     for level, marker in MARKERS.items():
         points, forces = (table[table["level"] == level] for table in (leakage, friction))
         flow = LITRES_A_MINUTE * points["lost_flow_m3_s"]
@@ -123,7 +123,7 @@ def _draw_refits(tables: Tables) -> Figure:
     return figure
 
 
-def _law(axis: Axes, refit: pd.DataFrame, across: np.ndarray, law: Callable[[pd.Series], np.ndarray]) -> None:
+def _draw_law(axis: Axes, refit: pd.DataFrame, across: np.ndarray, law: Callable[[pd.Series], np.ndarray]) -> None:
     for level, rows in refit.groupby("level", sort=False):
         by_name = rows.set_index("coefficient")
         axis.plot(across, law(by_name["refitted"]), color=LEVEL_COLOURS[str(level)])

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from experiments.circuit.doubted_breaks import doubted_breaks
+from experiments.circuit.doubted_breaks import break_frequency_limits
 from experiments.circuit.dynamic_experiments import (
     AMPLITUDE_INPUTS,
     MEAN_INPUTS,
@@ -15,7 +15,7 @@ from experiments.circuit.dynamic_experiments import (
 )
 from experiments.circuit.passes import in_condition
 from experiments.circuit.steady_experiments import steady_runs
-from experiments.page.frames import Rows, tabled
+from experiments.page.frames import Rows, as_table
 from experiments.published import SCALARS
 from experiments.running.random_streams import stream
 from plant.eha.circuit_parameters import CircuitParameters
@@ -30,19 +30,19 @@ LEVELS_V = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 BREAK_MEANS_V = (2.0, 4.0, 7.0)
 """Input means at which the break frequency is determined [V]."""
 
-WITHIN_DOUBTS = "break frequency within the parameters' uncertainty"
-"""Name of the two rows from `doubted_breaks`."""
+UNCERTAIN_BREAK_ROWS = "break frequency within the parameters' uncertainty"
+"""Name of the two rows from `break_frequency_limits`."""
 
 ROOMY_STROKE = 2.0
 """Stroke long enough for the piston to settle at 8 V [m]; `experiments.circuit.steady_experiments` has that for 4 V."""
 
 _COUNTS = 5.0
-_MOVED = 5.0
+_MOTION_THRESHOLD = 5.0
 _VOLT_RESOLUTION = 0.005
 _STEP_SAMPLE_TIME = 1e-4
 
 
-@tabled
+@as_table
 def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = LEVELS_V) -> Rows:
     """Return section 4's first tests: dead time, steady gain, break frequency, linearity, dead zone.
 
@@ -76,9 +76,9 @@ def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = L
     for mean in BREAK_MEANS_V:
         found = break_frequency(means[means["mean_v"] == mean])
         yield _row("break frequency", f"mean {mean:g} V", found, "Hz", published=SCALARS["bandwidth"].si_value)
-    highest, least = doubted_breaks(rig, BREAK_MEANS_V[0], BREAK_MEANS_V[-1])
-    yield _row(WITHIN_DOUBTS, "mean 7 V, highest", highest, "Hz", published=SCALARS["bandwidth"].si_value)
-    yield _row(WITHIN_DOUBTS, "mean 2 V over mean 7 V, least", least, "1")
+    highest, least = break_frequency_limits(rig, BREAK_MEANS_V[0], BREAK_MEANS_V[-1])
+    yield _row(UNCERTAIN_BREAK_ROWS, "mean 7 V, highest", highest, "Hz", published=SCALARS["bandwidth"].si_value)
+    yield _row(UNCERTAIN_BREAK_ROWS, "mean 2 V over mean 7 V, least", least, "1")
     gains = low_frequency_gains(means, "mean_v")
     yield _row("gain spread", "means from 2 V", _spread(gains[gains.index >= 2.0]), "1")
     gains = low_frequency_gains(frequency_responses(rig, seed, AMPLITUDE_INPUTS), "amplitude_v")
@@ -138,7 +138,7 @@ def dead_zone(p: CircuitParameters, rng: np.random.Generator, highest_v: float =
 
     def moves(volts: float) -> bool:
         (run,) = steady_runs([p], volts * p.motor_speed_per_volt, BENCH, rng)
-        return bool(np.max(run["position_m"]) > _MOVED * p.presliding_displacement)
+        return bool(np.max(run["position_m"]) > _MOTION_THRESHOLD * p.presliding_displacement)
 
     if not moves(highest_v):
         raise HydrostateError(f"highest_v must move the piston, got {highest_v:g} V, which does not")

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from experiments.circuit.passes import in_condition
-from experiments.page.frames import Rows, tabled
-from experiments.running.executors import side_by_side
+from experiments.page.frames import Rows, as_table
+from experiments.running.executors import map_in_parallel
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS
 from plant.eha.circuit_parameters import CircuitParameters
@@ -18,7 +18,7 @@ SAMPLE_TIME = 1e-3
 """Sample time of the logs [s]."""
 
 
-@tabled
+@as_table
 def modelled_chambers(
     rig: CircuitParameters, seed: int, duration: float, conditions: Sequence[str] = tuple(CONDITIONS)
 ) -> Rows:
@@ -54,4 +54,4 @@ def modelled_chambers(
             "gate_passed": estimate.gate.passed,
         }
 
-    yield from side_by_side(found, conditions)
+    yield from map_in_parallel(found, conditions)

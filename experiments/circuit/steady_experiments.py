@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 
 from estimation.fits.steady_state_fit import SteadyFit, SteadyPoints, fit_friction, fit_leakage, steady_points
-from experiments.page.frames import Frames, Rows, cell, stacked, tabled
+from experiments.page.frames import Frames, Rows, as_stacked_table, as_table, cell
 from experiments.published import SCALARS, load
 from faults.conditions import LEVELS, Level
-from faults.eha.physical import VOLTS_A, VOLTS_B, throttled
+from faults.eha.physical import VOLTS_A, VOLTS_B, with_throttles
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.simulate import CIRCUIT, simulate_each
 from plant.log.record import Record
@@ -82,7 +82,7 @@ class Sweep:
     defined: Mapping[float, float]
 
 
-def _defined(volts: Sequence[float], scalars: Sequence[str]) -> Mapping[float, float]:
+def _published_percents(volts: Sequence[float], scalars: Sequence[str]) -> Mapping[float, float]:
     shares = [1.0, *(SCALARS[name].si_value for name in scalars)]
     return {v: 100.0 * share for v, share in zip(volts, shares, strict=True)}
 
@@ -91,8 +91,8 @@ LEAKAGE_SWEEP = Sweep(
     "throttle_a_v",
     "velocity_m_s",
     (10.0, 6.0, 4.0, 3.0, 2.5, 2.2, 2.0, 1.9, 1.75, 1.6, 1.5),
-    lambda rig, volts: throttled(rig, volts, 0.0),
-    _defined(VOLTS_A, ("minor_leakage_velocity", "major_leakage_velocity")),
+    lambda rig, volts: with_throttles(rig, volts, 0.0),
+    _published_percents(VOLTS_A, ("minor_leakage_velocity", "major_leakage_velocity")),
 )
 """Figure 3: velocity against throttle A, throttle B open."""
 
@@ -100,8 +100,8 @@ FRICTION_SWEEP = Sweep(
     "throttle_b_v",
     "differential_pressure_pa",
     (0.0, 1.0, 1.5, 2.0, 2.2, 2.3, 2.4, 2.5, 2.6, 2.8, 3.0),
-    lambda rig, volts: throttled(rig, 10.0, volts),
-    _defined(VOLTS_B, ("minor_friction_pressure", "major_friction_pressure")),
+    lambda rig, volts: with_throttles(rig, 10.0, volts),
+    _published_percents(VOLTS_B, ("minor_friction_pressure", "major_friction_pressure")),
 )
 """Figure 4: differential pressure against throttle B, throttle A shut; it saturates at the relief setting."""
 
@@ -139,7 +139,9 @@ def leakage_points(rig: CircuitParameters, level: Level, rng: np.random.Generato
         Leakage level, set by throttle A.
     """
     a_volts = VOLTS_A[LEVELS.index(level)]
-    return steady_points(steady_runs([throttled(rig, a_volts, v) for v in FIGURE_8_VOLTS], rig.rated_speed, BENCH, rng))
+    return steady_points(
+        steady_runs([with_throttles(rig, a_volts, v) for v in FIGURE_8_VOLTS], rig.rated_speed, BENCH, rng)
+    )
 
 
 def friction_points(rig: CircuitParameters, level: Level, rng: np.random.Generator) -> SteadyPoints:
@@ -150,12 +152,12 @@ def friction_points(rig: CircuitParameters, level: Level, rng: np.random.Generat
     level : {"none", "minor", "major"}
         Friction level, set by throttle B.
     """
-    p = throttled(rig, 10.0, VOLTS_B[LEVELS.index(level)])
+    p = with_throttles(rig, 10.0, VOLTS_B[LEVELS.index(level)])
     runs = (steady_runs([p], v * rig.motor_speed_per_volt, BENCH, rng) for v in FIGURE_9_VOLTS)
     return steady_points(run for found in runs for run in found)
 
 
-@stacked
+@as_stacked_table
 def points_table(
     rig: CircuitParameters,
     rng: np.random.Generator,
@@ -187,7 +189,7 @@ def points_table(
         }
 
 
-@tabled
+@as_table
 def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
     """Return Table 3 refitted from steady points by equations 5.7 and 5.8, beside the plant's and the published values.
 
@@ -195,7 +197,7 @@ def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
     """
     published = load("leakage").set_index("leakage")
     for level in LEVELS:
-        p = throttled(rig, VOLTS_A[LEVELS.index(level)], 0.0)
+        p = with_throttles(rig, VOLTS_A[LEVELS.index(level)], 0.0)
         went_in = {"leakage_coefficient": p.settled_leakage, "flow_bias": p.flow_bias}
         printed = {
             "leakage_coefficient": cell(published, level, "leakage_coefficient_m3_per_s_pa"),
@@ -204,14 +206,14 @@ def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
         yield from _refit_rows(level, fit_leakage(leakage_points(rig, level, rng), p), went_in, printed)
 
 
-@tabled
+@as_table
 def friction_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
     """Return Table 4 refitted from steady points by equation 5.11, beside the plant's and the published values."""
     published = load("friction").set_index("friction")
     names = ("friction_quadratic", "friction_linear", "friction_coulomb")
     columns = [column for column in published.columns if column.startswith("a")]
     for level in LEVELS:
-        p = throttled(rig, 10.0, VOLTS_B[LEVELS.index(level)])
+        p = with_throttles(rig, 10.0, VOLTS_B[LEVELS.index(level)])
         went_in = {name: float(getattr(p, name)) for name in names}
         printed = {name: cell(published, level, column) for name, column in zip(names, columns, strict=True)}
         yield from _refit_rows(level, fit_friction(friction_points(rig, level, rng), p), went_in, printed)

@@ -27,11 +27,11 @@ from experiments.circuit.steady_experiments import (
     throttle_curve,
 )
 from experiments.nine_conditions.settings import StudySettings
-from experiments.page.tables import Column, Columns, interval, spaced
+from experiments.page.tables import Column, Columns, interval, name_in_words
 from experiments.page.words import CONDITION
 from experiments.running.progress import Track
 from experiments.running.random_streams import stream
-from experiments.running.study import Found, Study
+from experiments.running.study import Study, StudyResult
 from plant.eha.circuit_parameters import CircuitParameters
 
 
@@ -68,20 +68,20 @@ def circuit_studies(
     }
 
 
-def _find(settings: StudySettings, track: Track) -> Found:
+def _find(settings: StudySettings, track: Track) -> StudyResult:
     studies = circuit_studies(RIG, settings.seed, settings)
-    return Found({name: run() for name, run in track(studies.items(), description="experiments on the circuit")})
+    return StudyResult({name: run() for name, run in track(studies.items(), description="experiments on the circuit")})
 
 
 RIG = CircuitParameters()
 
-_SHARES = (
+_PERCENT_COLUMNS = (
     Column("percent_of_normal", "circuit", "% of normal", digits=3),
     Column("published_percent", "published", "% of normal", digits=3),
 )
-_REFIT = (
+_REFIT_COLUMNS = (
     "level",
-    Column("coefficient", words=spaced),
+    Column("coefficient", words=name_in_words),
     "published",
     Column("went_in", "simulated with"),
     "refitted",
@@ -100,7 +100,7 @@ _IN_FULL: Mapping[str, str] = {
 
 
 def _in_full(name: str) -> str:
-    return _IN_FULL.get(name, spaced(name))
+    return _IN_FULL.get(name, name_in_words(name))
 
 
 COLUMNS: Mapping[str, Columns] = {
@@ -115,15 +115,15 @@ COLUMNS: Mapping[str, Columns] = {
     "figure 3 velocity against leakage throttle": (
         Column("throttle_a_v", "throttle A"),
         Column("velocity_m_s", "settles at"),
-        *_SHARES,
+        *_PERCENT_COLUMNS,
     ),
     "figure 4 pressure against friction throttle": (
         Column("throttle_b_v", "throttle B"),
         Column("differential_pressure_pa", "settles at"),
-        *_SHARES,
+        *_PERCENT_COLUMNS,
     ),
-    "figure 8 leakage flow refitted": _REFIT,
-    "figure 9 friction refitted": _REFIT,
+    "figure 8 leakage flow refitted": _REFIT_COLUMNS,
+    "figure 9 friction refitted": _REFIT_COLUMNS,
     "figure 11 modelled chambers": (
         CONDITION,
         Column("value_pa", "bulk modulus", "MPa", 1e-6, 5),

@@ -14,8 +14,8 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from experiments.command.output_paths import OF_FILES, require_no_log
-from experiments.running.refusal import refused
+from experiments.command.output_paths import FILE_ENDINGS, require_no_log
+from experiments.running.refusal import os_errors_as
 from plant.atomic import replacing
 from plant.errors import HydrostateError
 
@@ -121,10 +121,10 @@ def prepare_output(out: Path | None, logs: Iterable[Path] = ()) -> None:
     """
     if out is None:
         return
-    if out.suffix.lower() in OF_FILES and not out.is_dir():
+    if out.suffix.lower() in FILE_ENDINGS and not out.is_dir():
         raise HydrostateError(f"--out must be a folder, or a file that ends in .json, got {str(out)!r}")
     folder = _folder(out)
-    with refused(f"--out {out}: the folder cannot be made"):
+    with os_errors_as(f"--out {out}: the folder cannot be made"):
         folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise HydrostateError(f"--out {out}: there is no permission to write there")
@@ -162,7 +162,7 @@ def write_whole(path: Path, text: str, option: str = "", *, parents: bool = Fals
     HydrostateError
         If it cannot be written.
     """
-    with refused(f"{option} {path}: cannot be written".lstrip()):
+    with os_errors_as(f"{option} {path}: cannot be written".lstrip()):
         if parents:
             path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
-from experiments.actuators import DEFAULT, kind_meant
+from experiments.actuators import DEFAULT, infer_kind
 from experiments.command.json_output import Result, prepare_output
-from experiments.command.logs import finish, overheard, read_log, run_logs, with_remarks
-from experiments.command.options import load_actuator, load_columns, require_positive, understood
-from experiments.command.output_paths import own_paths, page_place, require_place
+from experiments.command.logs import catch_and_repeat_warnings, finish, read_log, run_logs, with_remarks
+from experiments.command.options import load_actuator, load_columns, options_of_kind, require_positive
+from experiments.command.output_paths import page_place, paths_by_owner, require_place
 from experiments.command.pages import Pages
 from experiments.command.terminal import clauses, note
 from plant.errors import HydrostateError, NoChannelError, require_known
@@ -25,14 +25,16 @@ if TYPE_CHECKING:
     from plant.eha.rig import Rig
     from plant.log.record import Record
 
-COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", "as_json", "sample_time", "beside"})
+COMMON_OPTIONS = frozenset(
+    {"logs", "plant", "rig", "columns", "report", "out", "seed", "as_json", "sample_time", "beside"}
+)
 """Options that apply to every kind of actuator."""
 
-ASSUMED = (
+DEFAULT_RIG_ADVICE = (
     "no --rig: the paper's actuator is assumed; if yours is another one, `hydrostate rig init rig.toml{plant}` writes "
     "a file to fill in"
 )
-UNFILLED = "{rig}: its parameters are those of the paper's actuator; if yours is another one, enter them"
+UNFILLED_RIG_ADVICE = "{rig}: its parameters are those of the paper's actuator; if yours is another one, enter them"
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class _Question:
         """Return the verb for a kind of actuator; raises a HydrostateError if an option does not apply to it."""
         diagnosing = verb == "diagnose"
         kind, bench = load_actuator(plant, asked["rig"])
-        options = understood(context, asked, kind, verb, COMMON | ({"condition"} if diagnosing else set()))
+        options = options_of_kind(context, asked, kind, verb, COMMON_OPTIONS | ({"condition"} if diagnosing else set()))
         require_place("--figure", options.get("figure"), ".png")
         expected: str | None = asked["condition"] if diagnosing else None
         if expected is not None:
@@ -97,17 +99,17 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         raise HydrostateError("--with goes with one log, got several")
     report = page_place(asked.get("report"))
     prepare_output(asked["out"], logs)
-    figures, pages = own_paths(question.options.get("figure"), logs), Pages(own_paths(report, logs))
+    figures, pages = paths_by_owner(question.options.get("figure"), logs), Pages(paths_by_owner(report, logs))
     questions = {question.about["plant"]: question}
 
     def read(log: Path) -> "tuple[_Question, Record]":
-        from plant.log.files import opened_log
+        from plant.log.files import open_log
 
-        tables = opened_log(log)
+        tables = open_log(log)
         try:
             return question, question.read(tables, beside=beside)
         except NoChannelError as error:
-            name = kind_meant(error, asked["plant"], asked["rig"])
+            name = infer_kind(error, asked["plant"], asked["rig"])
             if name != question.about["plant"]:
                 note(f"{log}: read as a log of the kind {name}, by its columns; --plant names another kind")
             if name not in questions:
@@ -115,7 +117,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
             return questions[name], questions[name].read(tables, beside=beside)
 
     def work(log: Path) -> Result:
-        with overheard() as said:
+        with catch_and_repeat_warnings() as said:
             of, record = read(log)
         found = of.chosen.run(record, of.rig, of.prepared)
         result: dict[str, Any] = {**of.chosen.blank, **of.about, **of.chosen.entries(found)}
@@ -134,7 +136,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     batch = run_logs(logs, work, {**question.chosen.blank, **question.about}, doing)
     for one, results in of_each_kind(batch.results):
         if one.of_the_paper and any(result["outcome"] != "failed" for result in results):
-            note(_untold(asked["rig"], one.about["plant"]))
+            note(_rig_advice(asked["rig"], one.about["plant"]))
         for remark in one.chosen.remarks(results):
             note(remark)
     pages.tell()
@@ -146,11 +148,11 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     finish(batch, screen, as_json=asked["as_json"], out=asked["out"], lost=bool(pages.unwritten))
 
 
-def _untold(rig: "Path | None", plant: str) -> str:
+def _rig_advice(rig: "Path | None", plant: str) -> str:
     """Return advice for a log without a rig file."""
     if rig is not None:
-        return UNFILLED.format(rig=rig)
-    return ASSUMED.format(plant="" if plant == DEFAULT else f" --plant {plant}")
+        return UNFILLED_RIG_ADVICE.format(rig=rig)
+    return DEFAULT_RIG_ADVICE.format(plant="" if plant == DEFAULT else f" --plant {plant}")
 
 
 def _agreement(result: Result, found: "Finding") -> list[str]:

@@ -14,7 +14,7 @@ import typer
 
 from experiments.command.json_output import Result, json_text, write_results
 from experiments.command.progress_bar import progress
-from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note, rendered, unexpected
+from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, error_sentence, note, render_text
 from plant.errors import HydrostateError, LogWarning, MissingColumnError
 from plant.log.notes import LogCode
 from plant.notes import distinct
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-OURS = re.compile(re.escape(str(Path(__file__).parents[2])) + r"[/\\](plant|experiments|hydrostate\.py)")
+OWN_SOURCES = re.compile(re.escape(str(Path(__file__).parents[2])) + r"[/\\](plant|experiments|hydrostate\.py)")
 """Files of this project in the call stack between the log reader and the caller."""
 
 CONTEXTS = contextlib.__file__
@@ -72,7 +72,7 @@ def run_logs(logs: Sequence[Path], work: Work, blank: Result, what: str) -> Batc
     try:
         with progress(len(logs), what) as advance:
             for log in logs:
-                results.append(_worked(log, work, blank))
+                results.append(_process_log(log, work, blank))
                 advance()
     except KeyboardInterrupt:
         note(f"interrupted after {len(results)} of {len(logs)} logs")
@@ -80,7 +80,7 @@ def run_logs(logs: Sequence[Path], work: Work, blank: Result, what: str) -> Batc
 
 
 @contextmanager
-def caught() -> Generator[list[LogWarning]]:
+def catch_log_warnings() -> Generator[list[LogWarning]]:
     """Catch warnings about a log; the list contains them after the block has ended."""
     said: list[LogWarning] = []
     with warnings.catch_warnings(record=True) as raised:
@@ -93,28 +93,28 @@ def caught() -> Generator[list[LogWarning]]:
 
 
 @contextmanager
-def overheard() -> Generator[list[LogWarning]]:
-    """Catch warnings about a log as `caught` does, and issue them again for listeners outside."""
+def catch_and_repeat_warnings() -> Generator[list[LogWarning]]:
+    """Catch warnings about a log as `catch_log_warnings` does, and issue them again for listeners outside."""
     said: list[LogWarning] = []
     try:
-        with caught() as said:
+        with catch_log_warnings() as said:
             yield said
     finally:
         for one in said:
-            warnings.warn(one, stacklevel=_level_of_the_reader())
+            warnings.warn(one, stacklevel=_reader_stack_level())
 
 
-def _level_of_the_reader() -> int:
+def _reader_stack_level() -> int:
     """Return the stack level from a warning here to the line of code that read the log."""
     frame, level = inspect.currentframe(), 0
-    while frame is not None and (OURS.match(frame.f_code.co_filename) or frame.f_code.co_filename == CONTEXTS):
+    while frame is not None and (OWN_SOURCES.match(frame.f_code.co_filename) or frame.f_code.co_filename == CONTEXTS):
         frame, level = frame.f_back, level + 1
     return level
 
 
-def noted(source: str, read: Callable[[], T]) -> T:
+def read_and_warn(source: str, read: Callable[[], T]) -> T:
     """Return the log that is read; remarks on it go to standard error."""
-    with caught() as said:
+    with catch_log_warnings() as said:
         found = read()
     for one in distinct(warning.note for warning in said):
         note(f"{source}: warning: {one}")
@@ -136,16 +136,16 @@ def with_remarks(result: Result, said: Iterable[LogWarning]) -> dict[str, Any]:
     return {**result, "warnings": told, "notes": [*(one.to_dict() for one in raised), *result.get("notes", ())]}
 
 
-def _worked(log: Path, work: Work, blank: Result) -> Result:
+def _process_log(log: Path, work: Work, blank: Result) -> Result:
     names_a_file = False
-    with caught() as said_of_it:
+    with catch_log_warnings() as said_of_it:
         try:
             result = dict(work(log))
         except HydrostateError as error:
             names_a_file = error.source not in {None, str(log)}
             result = _failure(blank, str(error) if names_a_file else error.message)
         except Exception as error:  # an error in one log must not lose the results of the others
-            result = _failure(blank, unexpected(error))
+            result = _failure(blank, error_sentence(error))
     result = with_remarks(result, said_of_it)
     for sentence in result["warnings"]:
         note(f"{log}: warning: {sentence}")
@@ -176,7 +176,7 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None, los
     if as_json:
         emit(json_text(batch.results))
     elif batch.done:
-        emit(rendered(*screen(batch.done)))
+        emit(render_text(*screen(batch.done)))
     code = batch.exit_code or (SOME_FAILED if lost else 0)
     if out is not None and batch.results:  # if interrupted before the first log, keep the earlier results
         try:

@@ -12,7 +12,7 @@ FRAME = 3
 """Width that a column needs in addition to its cells: a space on each side and the border [characters]."""
 
 
-def narrowed(shown: "Table", width: int) -> "Table | None":
+def fit_to_width(shown: "Table", width: int) -> "Table | None":
     """Return a table that fits the width of the terminal; headings of number columns are folded if necessary.
 
     Parameters
@@ -30,7 +30,7 @@ def narrowed(shown: "Table", width: int) -> "Table | None":
     if not _fits(shown, width):
         for column, (cells, whole) in zip(shown.columns, _columns(shown), strict=True):
             if whole:
-                column.header = _in_lines(cells[0], max(map(_width, cells[1:]), default=0))
+                column.header = _folded_heading(cells[0], max(map(_width, cells[1:]), default=0))
     return shown if _fits(shown, width) else None
 
 
@@ -65,7 +65,7 @@ def as_lines(shown: "Table") -> str:
 
 
 def _fits(shown: "Table", width: int) -> bool:
-    return sum(_least(*column) for column in _columns(shown)) + FRAME * len(shown.columns) + 1 <= width
+    return sum(_least_width(*column) for column in _columns(shown)) + FRAME * len(shown.columns) + 1 <= width
 
 
 def _columns(shown: "Table") -> list[tuple[list[str], bool]]:
@@ -73,7 +73,7 @@ def _columns(shown: "Table") -> list[tuple[list[str], bool]]:
     return [([str(column.header), *map(str, column.cells)], column.no_wrap) for column in shown.columns]
 
 
-def _least(cells: list[str], whole: bool) -> int:
+def _least_width(cells: list[str], whole: bool) -> int:
     """Return the smallest width of a column [characters]."""
     if whole:
         return max(map(_width, cells))
@@ -86,7 +86,7 @@ def _width(text: str) -> int:
     return max(map(cell_len, text.split("\n")))
 
 
-def _in_lines(heading: str, width: int) -> str:
+def _folded_heading(heading: str, width: int) -> str:
     """Return a heading folded to the width of the cells below it, or of its longest word."""
     import textwrap
 

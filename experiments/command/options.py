@@ -184,7 +184,7 @@ def load_columns(texts: Sequence[str] | None) -> dict[str, str]:
     return parse_columns([part for text in texts or () for part in re.split(r",(?=\s*[A-Za-z]\w*=)", text)])
 
 
-def listed(*texts: str) -> tuple[str, ...]:
+def split_names(*texts: str) -> tuple[str, ...]:
     """Return the names in comma-separated texts.
 
     Parameters
@@ -194,7 +194,7 @@ def listed(*texts: str) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> listed("leakage, friction", "air")
+    >>> split_names("leakage, friction", "air")
     ('leakage', 'friction', 'air')
     """
     return tuple(part.strip() for text in texts for part in text.split(",") if part.strip())
@@ -219,7 +219,7 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
         raise HydrostateError(f"{option} must be positive and finite, got {value:g} {unit}")
 
 
-def refuse_given(options: Mapping[str, object], why: str) -> None:
+def refuse_ineffective_options(options: Mapping[str, object], why: str) -> None:
     """Raise an error for options that would have no effect, rather than ignore them.
 
     Parameters
@@ -265,7 +265,7 @@ def load_actuator(plant: str | None, path: Path | None) -> "tuple[ActuatorKind, 
     return kind, kind.read_rig(path)
 
 
-def understood(
+def options_of_kind(
     context: typer.Context, asked: Mapping[str, Any], kind: "ActuatorKind", verb: str, common: Collection[str]
 ) -> dict[str, Any]:
     """Return the command line options that apply to a kind of actuator, with defaults for those not given.
@@ -282,9 +282,9 @@ def understood(
     HydrostateError
         If an option does not apply to the kind, or the kind lacks the verb.
     """
-    from experiments.actuators import actuators, offered
+    from experiments.actuators import actuators, verb_of_kind
 
-    defaults: Mapping[str, Any] = offered(kind, verb).options
+    defaults: Mapping[str, Any] = verb_of_kind(kind, verb).options
     flags = {str(one.name): one.opts[0] for one in context.command.params}
     sources = {name: str(context.get_parameter_source(name)) for name in flags if name not in common}
     given = {name: asked[name] for name, source in sources.items() if source == "ParameterSource.COMMANDLINE"}

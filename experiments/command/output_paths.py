@@ -10,13 +10,27 @@ from plant.errors import HydrostateError
 PAGES = (".html", ".htm", "")
 """Allowed endings of a page's file name."""
 
-OF_FILES = (".csv", ".txt", ".xml", ".xlsx", ".html", ".htm", ".png", ".pdf", ".toml", ".parquet", ".mat", ".c", ".h")
+FILE_ENDINGS = (
+    ".csv",
+    ".txt",
+    ".xml",
+    ".xlsx",
+    ".html",
+    ".htm",
+    ".png",
+    ".pdf",
+    ".toml",
+    ".parquet",
+    ".mat",
+    ".c",
+    ".h",
+)
 """Endings of files: a folder with such a name would be a mistake."""
 
 Owner = TypeVar("Owner", Path, str)
 
 
-def own_paths(target: Path | None, owners: Sequence[Owner]) -> dict[Owner, Path]:
+def paths_by_owner(target: Path | None, owners: Sequence[Owner]) -> dict[Owner, Path]:
     """Return the file for each log or output; if there are several, each file name contains the name of its owner.
 
     Parameters
@@ -34,7 +48,7 @@ def own_paths(target: Path | None, owners: Sequence[Owner]) -> dict[Owner, Path]
 
     Examples
     --------
-    >>> own_paths(Path("fit.png"), [Path("a/run.csv"), Path("b/run.csv")])[Path("b/run.csv")]
+    >>> paths_by_owner(Path("fit.png"), [Path("a/run.csv"), Path("b/run.csv")])[Path("b/run.csv")]
     PosixPath('fit-b-run.png')
     """
     if target is None:
@@ -119,7 +133,7 @@ def require_folder(folder: Path | None) -> None:
         return
     if folder.exists():
         raise HydrostateError(f"--out must be a folder, got the file {str(folder)!r}")
-    if folder.suffix.lower() in (*OF_FILES, ".json"):
+    if folder.suffix.lower() in (*FILE_ENDINGS, ".json"):
         raise HydrostateError(f"--out must be a folder, got {str(folder)!r}, which looks like the name of a file")
 
 

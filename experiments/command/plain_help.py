@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 
-def read_plainly(command: Any) -> None:
+def use_plain_help(command: Any) -> None:
     """Change a command so that its help is plain lines without Python types; a group keeps its panel of commands."""
     if not hasattr(command, "commands"):
         command.rich_markup_mode = None

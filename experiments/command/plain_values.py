@@ -12,17 +12,17 @@ from typing import Any, get_args, get_origin
 NO_PLAIN = object()
 """Returned for a value that needs a validator."""
 
-UNPARSED = "unable to parse string as a"
+NOT_A_NUMBER = "unable to parse string as a"
 """Part of pydantic's message about text that is not a number, without the text."""
 
-OUTSIDE = "Input should be "
+OUT_OF_RANGE = "Input should be "
 """Start of pydantic's message about a number out of range, without the number."""
 
-ITS_PLACE = "_runtime_param"
+CONVERTER_ATTRIBUTE = "_runtime_param"
 """Attribute of a Typer parameter that holds its value converter; None until it is first used."""
 
 
-def take_plainly(parameters: Iterable[Any]) -> None:
+def accept_plain_values(parameters: Iterable[Any]) -> None:
     """Let parameters of a command accept plain values directly, and use pydantic only for other values.
 
     Parameters
@@ -35,11 +35,11 @@ def take_plainly(parameters: Iterable[Any]) -> None:
         from typer._param_types import coerce_cli_path  # pyright: ignore[reportPrivateUsage]
 
         for parameter in parameters:
-            if getattr(parameter, ITS_PLACE, NO_PLAIN) is None:
-                setattr(parameter, ITS_PLACE, _Taken(build_runtime_param, coerce_cli_path))
+            if getattr(parameter, CONVERTER_ATTRIBUTE, NO_PLAIN) is None:
+                setattr(parameter, CONVERTER_ATTRIBUTE, _PlainConverter(build_runtime_param, coerce_cli_path))
 
 
-class _Taken:
+class _PlainConverter:
     """Converts a parameter's values for a command, as Typer's own converter does."""
 
     def __init__(self, checked: Any, path: Any) -> None:
@@ -57,11 +57,11 @@ class _Taken:
             return self._checked(about).coerce(value, param=param, ctx=ctx)
         except Exception as error:
             said = str(getattr(error, "message", ""))
-            if isinstance(value, str) and UNPARSED in said:
+            if isinstance(value, str) and NOT_A_NUMBER in said:
                 kind = "whole number" if "integer" in said else "number"
                 vars(error)["message"] = f"a {kind} is needed, got {value!r}"
-            elif isinstance(value, str) and said.startswith(OUTSIDE):
-                vars(error)["message"] = f"must be {said.removeprefix(OUTSIDE)}, got {value!r}"
+            elif isinstance(value, str) and said.startswith(OUT_OF_RANGE):
+                vars(error)["message"] = f"must be {said.removeprefix(OUT_OF_RANGE)}, got {value!r}"
             raise
 
     def _plain(self, value: Any, annotation: Any, param: Any, ctx: Any) -> Any:
@@ -78,8 +78,8 @@ class _Taken:
             return self._path(Path(value), asked, path_type=Path, param=param, ctx=ctx)
         if type(value) is not annotation or annotation not in (str, int, float, bool):
             return NO_PLAIN
-        return value if annotation in (str, bool) or _within(value, asked.min, asked.max) else NO_PLAIN
+        return value if annotation in (str, bool) or _is_within(value, asked.min, asked.max) else NO_PLAIN
 
 
-def _within(value: Any, least: float | None, most: float | None) -> bool:
+def _is_within(value: Any, least: float | None, most: float | None) -> bool:
     return (least is None or value >= least) and (most is None or value <= most)

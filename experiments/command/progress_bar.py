@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from estimation.progress import listening
+from estimation.progress import reporting_to
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def progress(total: int, what: str) -> Generator[Callable[[], None]]:
     """Show a bar on standard error, if that is a terminal: for pieces of work, and for what one of them is trying.
 
-    A piece reports what it tries by `estimation.progress.tell`. A single piece has no bar before it reports.
+    A piece reports what it tries by `estimation.progress.report_progress`. A single piece has no bar before it reports.
 
     Yields
     ------
@@ -29,7 +29,7 @@ def progress(total: int, what: str) -> Generator[Callable[[], None]]:
     if total > 1:
         bar.start()
     try:
-        with listening(bar.tried):
+        with reporting_to(bar.tried):
             yield bar.advance
     finally:
         bar.stop()

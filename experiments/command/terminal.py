@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 import typer
 from typer.core import TyperGroup
 
-from experiments.command.plain_help import hide_bool, read_plainly
-from experiments.command.plain_values import take_plainly
+from experiments.command.plain_help import hide_bool, use_plain_help
+from experiments.command.plain_values import accept_plain_values
 from experiments.command.visible_text import visible, visible_name
 from plant.errors import HydrostateError
 
@@ -74,7 +74,7 @@ def emit(text: str, *, err: bool = False) -> None:
         stream.write(text + "\n")
         stream.flush()
     except BrokenPipeError:
-        _to_nowhere(stream)
+        _redirect_to_null(stream)
 
 
 def note(sentence: str) -> None:
@@ -103,7 +103,7 @@ def clauses(parts: Iterable[str]) -> str:
     return "; ".join(part.rstrip(".") for part in parts)
 
 
-def _to_nowhere(stream: TextIO) -> None:
+def _redirect_to_null(stream: TextIO) -> None:
     with suppress(OSError):  # a stream in memory has no file descriptor
         number, nowhere = stream.fileno(), os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, number)
@@ -148,7 +148,7 @@ def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
     return names if len(set(names)) == len(set(files)) else files
 
 
-def folded(text: str, width: int) -> str:
+def folded_text(text: str, width: int) -> str:
     """Return a text folded between words; folded parts are aligned with the first words, or with those after a name.
 
     Parameters
@@ -160,7 +160,7 @@ def folded(text: str, width: int) -> str:
 
     Examples
     --------
-    >>> print(folded("  oil   bulk modulus 207.0 MPa", 24))
+    >>> print(folded_text("  oil   bulk modulus 207.0 MPa", 24))
       oil   bulk modulus
             207.0 MPa
     """
@@ -176,7 +176,7 @@ def folded(text: str, width: int) -> str:
     return "\n".join(lines)
 
 
-def rendered(*parts: "RenderableType") -> str:
+def render_text(*parts: "RenderableType") -> str:
     """Return tables and sentences as text for standard output, with colours only on a terminal.
 
     Parameters
@@ -192,7 +192,7 @@ def rendered(*parts: "RenderableType") -> str:
     from rich.console import Console
     from rich.table import Table
 
-    from experiments.command.narrow import as_lines, narrowed
+    from experiments.command.narrow import as_lines, fit_to_width
 
     terminal = sys.stdout.isatty()
     width = None if terminal else PIPE_WIDTH
@@ -200,9 +200,9 @@ def rendered(*parts: "RenderableType") -> str:
     console = Console(file=io.StringIO(), force_terminal=terminal, width=width, **as_is)
     with console.capture() as captured:
         for part in parts:
-            shown = narrowed(part, console.width) or f"\n{as_lines(part)}\n" if isinstance(part, Table) else part
+            shown = fit_to_width(part, console.width) or f"\n{as_lines(part)}\n" if isinstance(part, Table) else part
             told = visible(shown) if isinstance(shown, str) else shown
-            told = folded(told, console.width) if terminal and isinstance(told, str) else told
+            told = folded_text(told, console.width) if terminal and isinstance(told, str) else told
             console.print(told, soft_wrap=isinstance(told, str))
     return "\n".join(line.rstrip() for line in captured.get().strip("\n").splitlines())
 
@@ -237,7 +237,7 @@ def _kernel_notices() -> Generator[None]:
         logger.propagate = propagate
 
 
-def unexpected(error: BaseException) -> str:
+def error_sentence(error: BaseException) -> str:
     """Return the sentence for an unforeseen error; with ``HYDROSTATE_DEBUG=1`` also print where it occurred."""
     if os.environ.get("HYDROSTATE_DEBUG", "") not in {"", "0"}:
         emit("".join(traceback.format_exception(error)).rstrip(), err=True)
@@ -248,7 +248,7 @@ def unexpected(error: BaseException) -> str:
     return f"an internal error ({what}), please report it; HYDROSTATE_DEBUG=1 prints the traceback"
 
 
-def guarded(run: Callable[[], object]) -> int:
+def run_guarded(run: Callable[[], object]) -> int:
     """Run the command line; any error becomes one sentence and an exit code.
 
     Parameters
@@ -270,14 +270,14 @@ def guarded(run: Callable[[], object]) -> int:
         note(f"hydrostate: {error}")
         return USAGE
     except OSError as error:
-        _to_nowhere(sys.stdout)
+        _redirect_to_null(sys.stdout)
         place = f"{error.filename}: " if error.filename else ""  # errors of stdout and of connections have none
         note(f"hydrostate: {place}{error.strerror or error}")
         return SOME_FAILED
     except Exception as error:
         said = _usage_sentence(error)
         if said is None:
-            note(f"hydrostate: {unexpected(error)}")
+            note(f"hydrostate: {error_sentence(error)}")
             return SOME_FAILED
         if said:
             note(said)
@@ -290,7 +290,7 @@ def emit_nothing_more() -> None:
     try:
         sys.stdout.flush()
     except BrokenPipeError:
-        _to_nowhere(sys.stdout)
+        _redirect_to_null(sys.stdout)
 
 
 def _usage_sentence(error: Exception) -> str | None:
@@ -320,7 +320,7 @@ class HydrostateGroup(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments before the command; plain values need no import of a validator."""
-        take_plainly(self.get_params(ctx))
+        accept_plain_values(self.get_params(ctx))
         hide_bool(self.get_params(ctx))
         return super().parse_args(ctx, _help_last(args))
 
@@ -328,8 +328,8 @@ class HydrostateGroup(TyperGroup):
         """Return a command by its name; its plain values need no import of a validator either."""
         command = super().get_command(ctx, cmd_name)
         if command is not None:
-            take_plainly(command.get_params(ctx))
-            read_plainly(command)
+            accept_plain_values(command.get_params(ctx))
+            use_plain_help(command)
         return command
 
     def invoke(self, ctx: Any) -> Any:
@@ -343,4 +343,4 @@ class HydrostateGroup(TyperGroup):
     def main(self, *args: Any, **kwargs: Any) -> NoReturn:
         """Run the command line and exit."""
         kwargs["standalone_mode"] = False
-        sys.exit(guarded(lambda: super(HydrostateGroup, self).main(*args, **kwargs)))
+        sys.exit(run_guarded(lambda: super(HydrostateGroup, self).main(*args, **kwargs)))

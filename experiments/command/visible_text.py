@@ -19,7 +19,7 @@ _CONTROLS = {
 _UNPRINTED = re.compile(f"[{re.escape(''.join(chr(code) for code in _CONTROLS if code not in (9, 10, 13)))}]")
 
 
-def spelt(text: str) -> str:
+def valid_text(text: str) -> str:
     """Return a text or a path as text valid in every format: bytes that are not UTF-8 are escaped.
 
     Parameters
@@ -29,7 +29,7 @@ def spelt(text: str) -> str:
 
     Examples
     --------
-    >>> len(spelt("l" + chr(0xDCF6) + "g.csv"))
+    >>> len(valid_text("l" + chr(0xDCF6) + "g.csv"))
     10
     """
     return text.translate(_NO_TEXT)

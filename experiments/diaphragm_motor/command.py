@@ -17,6 +17,6 @@ def diaphragm_motor(out: Folder = Path("results/diaphragm-motor"), seed: Seed = 
     Takes about ten seconds. The last line of standard output is the path of the report.
     """
     from experiments.diaphragm_motor.study import DIAPHRAGM_MOTOR
-    from experiments.running.study import Seeded
+    from experiments.running.study import SeedSettings
 
-    finish_study(DIAPHRAGM_MOTOR, Seeded(seed), out, as_json=as_json)
+    finish_study(DIAPHRAGM_MOTOR, SeedSettings(seed), out, as_json=as_json)

@@ -12,7 +12,7 @@ from estimation.diaphragm_motor.maps import AVERAGE_STEP, average_run, motor_map
 from experiments.diaphragm_motor.sweeps import PEAK
 from plant.diaphragm_motor.model import POSITION
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
-from plant.diaphragm_motor.run import RAMP, SAMPLE_TIME, Schedule, run_motor
+from plant.diaphragm_motor.run import RAMP_TIME, SAMPLE_TIME, Schedule, run_motor
 
 LEAK = 2e-12
 """Leakage past the piston that self-sensing does not detect [m^3/(s Pa)]."""
@@ -27,7 +27,7 @@ SLOW, FAST = 2e-3, 3.5e-3
 """Demanded velocities [m/s]."""
 
 
-def _wanted(time: float) -> float:
+def _reference_velocity(time: float) -> float:
     return SLOW if time < RISE else FAST
 
 
@@ -46,7 +46,9 @@ def control_runs(p: DiaphragmMotorParameters, seed: int) -> tuple[pd.DataFrame, 
     for name, (motor, sensing) in RUNS.items():
         base = leaking if motor else p
         schedule: Schedule = [(0.0, replace(base, load_force=LIGHT)), (BURDEN, replace(base, load_force=HEAVY))]
-        run = controlled_run(schedule, _wanted, END, PEAK, maps, np.random.default_rng(seed), sensing=sensing)
+        run = controlled_run(
+            schedule, _reference_velocity, END, PEAK, maps, np.random.default_rng(seed), sensing=sensing
+        )
         columns = {"time_s": run.time, "wanted_m_s": run.wanted, "measured_m_s": run.measured}
         columns |= {"velocity_m_s": run.velocity, "voltage_v": run.swing}
         courses.append(pd.DataFrame({"run": name, **columns}))
@@ -74,7 +76,7 @@ def averaged_course(p: DiaphragmMotorParameters) -> pd.DataFrame:
     """
     loaded = replace(p, load_force=LIGHT)
     time = SAMPLE_TIME * np.arange(round(0.3 / SAMPLE_TIME) + 1)
-    swing = np.where(time < 0.1, 150.0, np.where(time < 0.2, 250.0, 200.0)) * np.minimum(time / RAMP, 1.0)
+    swing = np.where(time < 0.1, 150.0, np.where(time < 0.2, 250.0, 200.0)) * np.minimum(time / RAMP_TIME, 1.0)
     drive = 0.5 * swing * np.sin(2.0 * np.pi * PEAK * time)
     position = run_motor(loaded, drive, SAMPLE_TIME)[:, POSITION]
     sparse = round(AVERAGE_STEP / SAMPLE_TIME)

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.page.drawing import Course, courses, diamonds, shaded
+from experiments.page.drawing import Course, draw_courses, draw_published, with_colours
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.page.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Margins, panels
@@ -42,7 +42,7 @@ CYCLE: Sequence[Course] = (
 )
 
 
-def _swept(flow: Axes, sensing: Axes, sweep: pd.DataFrame, across: str, label: str, **marks: Any) -> None:
+def _draw_sweep(flow: Axes, sensing: Axes, sweep: pd.DataFrame, across: str, label: str, **marks: Any) -> None:
     flow.plot(sweep[across], ML_MIN * sweep["flow_m3_s"], color=BLUE, **marks)
     for column, (colour, line) in ELECTRODES.items():
         sensing.plot(sweep[across], sweep[column], color=colour, linestyle=line, label=column[:2].upper())
@@ -55,8 +55,8 @@ def _draw_frequency(tables: Tables) -> Figure:
     """Draw flow and sensing over frequency, as in section 7.1. Flow on the left, electrodes on the right."""
     title = "Pump alone at 200 V peak to peak: flow and sensing peak together"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, across=0.7))
-    _swept(left, right, tables["frequency sweep"], "frequency_hz", "frequency [Hz]")
-    diamonds(left, 480.0, 110.11, "quoted by the paper")
+    _draw_sweep(left, right, tables["frequency sweep"], "frequency_hz", "frequency [Hz]")
+    draw_published(left, 480.0, 110.11, "quoted by the paper")
     left.set(ylim=(0.0, None))
     left.legend(loc="upper left")
     return figure
@@ -66,7 +66,9 @@ def _draw_voltage(tables: Tables) -> Figure:
     """Draw flow and sensing over voltage, as in section 7.1. Flow on the left, electrodes on the right."""
     title = "Pump alone at 480 Hz: flow and sensing rise with voltage"
     figure, (left, right) = panels(title, 1, 2, 3.6, Margins(left=0.65, across=0.7))
-    _swept(left, right, tables["voltage sweep"], "voltage_v", "voltage, peak to peak [V]", marker="o", markersize=3.5)
+    _draw_sweep(
+        left, right, tables["voltage sweep"], "voltage_v", "voltage, peak to peak [V]", marker="o", markersize=3.5
+    )
     left.set(ylim=(0.0, None))
     return figure
 
@@ -81,7 +83,7 @@ def _draw_load(tables: Tables) -> Figure:
     for colour, (swing, rows) in zip((GREEN, BLUE, VERMILION), tables["load sweep"].groupby("voltage_v"), strict=False):
         label = f"{float(str(swing)):g} V"
         left.plot(rows["load_n"], MILLI * rows["velocity_m_s"], "o-", color=colour, markersize=3.5, label=label)
-    for load, rows, colour in shaded(tables["load and frequency"].groupby("load_n"), 0.85):
+    for load, rows, colour in with_colours(tables["load and frequency"].groupby("load_n"), 0.85):
         right.plot(rows["frequency_hz"], MILLI * rows["velocity_m_s"], color=colour, label=f"{load:g} N")
         top = rows.iloc[int(rows["velocity_m_s"].argmax())]
         right.plot([top["frequency_hz"]], [MILLI * top["velocity_m_s"]], "o", color=colour, markersize=6)
@@ -102,7 +104,7 @@ def _draw_cycle(tables: Tables) -> Figure:
     cycle = tables["pump cycle"]
     title = "Two cycles at 480 Hz and 200 V: neighbours push against each other, the valves follow late"
     figure, axes = panels(title, 3, 1, 6.0, Margins(left=0.75), sharex=True)
-    courses(axes, MILLI * cycle["time_s"], cycle, CYCLE, room=0.3)
+    draw_courses(axes, MILLI * cycle["time_s"], cycle, CYCLE, room=0.3)
     return figure
 
 

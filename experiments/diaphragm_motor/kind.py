@@ -44,10 +44,10 @@ class MotorRunCode(Code):
     ROD_AT_END_STOP = "the rod reaches its end stop within {duration_s:g} s"
 
 
-def _simulated(rig: Rig[Any], options: Options) -> Run:
+def _simulate(rig: Rig[Any], options: Options) -> Run:
     require_known("--sensors", options["sensors"], list(MOTOR_SENSORS))
     frequency, swing, between = (options[name] for name in ("frequency", "voltage", "sample_time"))
-    healthy = _loaded(rig, options).parameters
+    healthy = _with_load(rig, options).parameters
     motor = _with_fault(healthy, options["fault"])
     drive = motor_drive(frequency, swing, options["duration"], between)
     rng, sensors = np.random.default_rng(options["seed"]), MOTOR_SENSORS[options["sensors"]]
@@ -78,7 +78,7 @@ def _with_fault(motor: DiaphragmMotorParameters, fault: str | None) -> Diaphragm
         ) from None
 
 
-def _loaded(rig: Rig[Any], options: Options) -> Rig[Any]:
+def _with_load(rig: Rig[Any], options: Options) -> Rig[Any]:
     """Return the rig with the load of its runs."""
     load = options["load"]
     if load is not None and not isfinite(load):
@@ -86,22 +86,22 @@ def _loaded(rig: Rig[Any], options: Options) -> Rig[Any]:
     return rig if load is None else replace(rig, parameters=replace(rig.parameters, load_force=load))
 
 
-def _prepared(rig: Rig[Any], options: Options) -> tuple[Rig[Any], Signature | None]:
+def _prepare(rig: Rig[Any], options: Options) -> tuple[Rig[Any], Signature | None]:
     """Return the motor under its load, and the signature of a healthy run, if there is one."""
     healthy = options["healthy"]
-    return _loaded(rig, options), None if healthy is None else logged_signature(healthy)
+    return _with_load(rig, options), None if healthy is None else logged_signature(healthy)
 
 
-def _looked_at(rig: Rig[Any], options: Options) -> list[Finding]:
-    return [motor_prospect(_loaded(rig, options).parameters, options["frequency"], options["voltage"])]
+def _prospects(rig: Rig[Any], options: Options) -> list[Finding]:
+    return [motor_prospect(_with_load(rig, options).parameters, options["frequency"], options["voltage"])]
 
 
-OWN: Result = {"misfit": {}, "candidates": [], "lookalikes": []}
+OWN_ENTRIES: Result = {"misfit": {}, "candidates": [], "lookalikes": []}
 """Entries that other kinds do not have."""
 
 
 def _estimate_entries(found: Finding) -> dict[str, Any]:
-    return {**OWN, **finding_entries(found), "misfit": {"electrodes": found.evidence.pattern}}
+    return {**OWN_ENTRIES, **finding_entries(found), "misfit": {"electrodes": found.evidence.pattern}}
 
 
 def _fault_entries(found: Finding) -> dict[str, Any]:
@@ -109,12 +109,12 @@ def _fault_entries(found: Finding) -> dict[str, Any]:
     return {
         **finding_entries(found),
         "misfit": {"signature": diagnosis.best.chi_square / diagnosis.freedom},
-        "candidates": [_candidate(match) for match in diagnosis.group],
+        "candidates": [_candidate_entry(match) for match in diagnosis.group],
         "lookalikes": list(diagnosis.lookalikes),
     }
 
 
-def _candidate(match: Match) -> dict[str, Any]:
+def _candidate_entry(match: Match) -> dict[str, Any]:
     severity = None if match.name == HEALTHY else quantity_entry(severity_of(match))
     return {"fault": match.name, "probability": match.probability, "severity": severity}
 
@@ -138,7 +138,11 @@ def _faults_shown(results: Sequence[Result], options: Options) -> "Iterable[Rend
     yield from messages_shown(results)
 
 
-OF_A_LOG: Any = {"prepare": _prepared, "options": {"load": None, "healthy": None}, "blank": {**BLANK, **OWN}}
+LOG_VERB_FIELDS: Any = {
+    "prepare": _prepare,
+    "options": {"load": None, "healthy": None},
+    "blank": {**BLANK, **OWN_ENTRIES},
+}
 
 DIAPHRAGM_MOTOR = ActuatorKind(
     name=NAME,
@@ -148,17 +152,17 @@ DIAPHRAGM_MOTOR = ActuatorKind(
     required=(DRIVE,),
     conditions=(HEALTHY, *MOTOR_FAULTS),
     rig_name=UNNAMED,
-    simulate=Simulation(run=_simulated, options=SINE | BENCH | {"load": None, "fault": None}),
+    simulate=Simulation(run=_simulate, options=SINE | BENCH | {"load": None, "fault": None}),
     estimate=LogVerb(
         run=lambda record, rig, calibration: motor_finding(record, rig.parameters, calibration=calibration),
         entries=_estimate_entries,
-        **OF_A_LOG,
+        **LOG_VERB_FIELDS,
     ),
     diagnose=LogVerb(
         run=lambda record, rig, calibration: motor_fault_finding(record, rig.parameters, calibration=calibration),
         entries=_fault_entries,
         screen=_faults_shown,
-        **OF_A_LOG,
+        **LOG_VERB_FIELDS,
     ),
-    identifiability=Experiment(run=_looked_at, options=SINE | {"load": None}),
+    identifiability=Experiment(run=_prospects, options=SINE | {"load": None}),
 )

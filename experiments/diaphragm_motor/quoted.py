@@ -103,7 +103,7 @@ def root_efficiency(p: DiaphragmMotorParameters, sweep: pd.DataFrame) -> pd.Data
     return pd.DataFrame({"frequency_hz": at, "efficiency": np.interp(at, frequencies, eta)})
 
 
-def reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def claims_reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Return the claims of sections 7.1 to 7.3 that the plant can reproduce, with our results.
 
     Returns
@@ -133,8 +133,8 @@ def reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
          ", ".join(f"{value:.4f}" for value in lines.values()), min(lines.values()) > 0.999),
         ("4", "the same to 0.95 of blocking, where valves leak and friction smooths", "straight",
          ", ".join(f"{value:.4f}" for value in whole), min(whole) > 0.99),
-        ("5.1", "the 4/3 valve reverses the piston", "yes", _turned(tables["reversal"]),
-         _turned(tables["reversal"]) == "yes"),
+        ("5.1", "the 4/3 valve reverses the piston", "yes", _yes_if_reversed(tables["reversal"]),
+         _yes_if_reversed(tables["reversal"]) == "yes"),
         ("5.1", "velocity settles under PI, encoder and self-sensing [s]", "no figure",
          ", ".join(f"{runs.loc[name, 'rise_s']:.2f}" for name in ("encoder", "self-sensing")),
          bool((runs.loc[["encoder", "self-sensing"], ["settling_s", "rise_s"]] < 0.5).to_numpy().all())),
@@ -142,12 +142,12 @@ def reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _turned(course: pd.DataFrame) -> str:
+def _yes_if_reversed(course: pd.DataFrame) -> str:
     moved = course.groupby("spool")["position_m"].agg(lambda x: x.iloc[-1] - x.iloc[0])
     return "yes" if moved[1.0] > 0.0 > moved[-1.0] else "no"
 
 
-def not_reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def claims_not_reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Return the claims that the plant does not support, with its own results (errata M17, M25, M26, M31).
 
     Returns

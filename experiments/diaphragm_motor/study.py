@@ -8,12 +8,12 @@ import pandas as pd
 from experiments.diaphragm_motor import sweeps
 from experiments.diaphragm_motor.control import averaged_course, control_runs
 from experiments.diaphragm_motor.figures import MOTOR_FIGURES
-from experiments.diaphragm_motor.quoted import claimed_speeds, not_reproduced, reproduced, root_efficiency
+from experiments.diaphragm_motor.quoted import claimed_speeds, claims_not_reproduced, claims_reproduced, root_efficiency
 from experiments.page.frames import parameter_table
-from experiments.page.numbers import MINUS, as_set, pretty_unit
-from experiments.page.tables import Column, Columns, spaced
+from experiments.page.numbers import MINUS, exact_if_short, pretty_unit
+from experiments.page.tables import Column, Columns, name_in_words
 from experiments.running.progress import Track
-from experiments.running.study import Found, Seeded, Study
+from experiments.running.study import SeedSettings, Study, StudyResult
 from plant.diaphragm_motor.parameters import ROWS, DiaphragmMotorParameters
 
 CLAIMED: Mapping[str, Callable[[DiaphragmMotorParameters], pd.DataFrame]] = {
@@ -55,22 +55,22 @@ def claim_tables(
     tables = {name: sweep(rig) for name, sweep in track(made_by.items(), description="studies")}
     tables["control courses"], tables["control"] = control_runs(rig, seed)
     tables["dry modes"] = sweeps.dry_modes()
-    tables["reproduced"] = reproduced(tables)
+    tables["reproduced"] = claims_reproduced(tables)
     tables["claimed speeds"] = claimed_speeds(rig)
     tables["efficiency by the root of 7"] = root_efficiency(rig, tables["frequency sweep"])
-    tables["not reproduced"] = not_reproduced(tables)
+    tables["not reproduced"] = claims_not_reproduced(tables)
     return tables
 
 
-def _find(settings: Seeded, track: Track) -> Found:
-    return Found(claim_tables(RIG, settings.seed, track, SWEEPS))
+def _find(settings: SeedSettings, track: Track) -> StudyResult:
+    return StudyResult(claim_tables(RIG, settings.seed, track, SWEEPS))
 
 
 def _seconds(value: float) -> str:
     return "never" if value == float("inf") else f"{value:.2f}"
 
 
-def _change(value: float) -> str:
+def _signed_number(value: float) -> str:
     return f"{value:+.1f}".replace("-", MINUS)
 
 
@@ -78,7 +78,7 @@ def _parameters() -> pd.DataFrame:
     """Return the parameters as text; values given for each chamber or valve are the same for all."""
     table = parameter_table(RIG)
     values = [
-        f"{as_set(value[0])}, each of {ROWS[name]}" if isinstance(value, tuple) else as_set(value)
+        f"{exact_if_short(value[0])}, each of {ROWS[name]}" if isinstance(value, tuple) else exact_if_short(value)
         for name, value in zip(table["parameter"], table["value"], strict=True)
     ]
     return table.assign(value=values)
@@ -103,8 +103,8 @@ COLUMNS: Mapping[str, Columns] = {
     ),
     "sensitivity": (
         *("part", "change"),
-        Column("frequency_hz", "best frequency moves", words=_change),
-        Column("flow_percent", "flow changes", words=_change),
+        Column("frequency_hz", "best frequency moves", words=_signed_number),
+        Column("flow_percent", "flow changes", words=_signed_number),
     ),
     "dry modes": (
         Column("diameters", "nodal diameters"),
@@ -119,7 +119,7 @@ COLUMNS: Mapping[str, Columns] = {
         Column("blocking_n", "blocking force at 480 Hz", digits=3),
     ),
     "rig": (
-        Column("parameter", "name", words=spaced),
+        Column("parameter", "name", words=name_in_words),
         "value",
         Column("unit", words=pretty_unit),
         *("meaning", "source"),
@@ -127,7 +127,7 @@ COLUMNS: Mapping[str, Columns] = {
 }
 
 
-def _facts(tables: Mapping[str, pd.DataFrame], _: Seeded) -> Mapping[str, pd.DataFrame]:
+def _facts(tables: Mapping[str, pd.DataFrame], _: SeedSettings) -> Mapping[str, pd.DataFrame]:
     loads = tables["load sweep"]
     return {"rig": _parameters(), "blocking": loads[loads["load_n"] == 0.0]}
 

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from experiments.page.frames import Rows, tabled
+from experiments.page.frames import Rows, as_table
 from plant.diaphragm_motor.composite_plate import (
     PlateParameters,
     mode_shape,
@@ -109,7 +109,7 @@ def blocking_force(p: DiaphragmMotorParameters, frequency: float, swing: float) 
     return 0.5 * (low + high)
 
 
-@tabled
+@as_table
 def sweep_load(p: DiaphragmMotorParameters) -> Rows:
     """Return velocity and A4's amplitude over load at the best frequency (equation 18).
 
@@ -125,7 +125,7 @@ def sweep_load(p: DiaphragmMotorParameters) -> Rows:
             yield {"voltage_v": swing, "blocking_n": blocked, "load_n": float(load), **_point_row(point)}
 
 
-@tabled
+@as_table
 def best_frequencies(p: DiaphragmMotorParameters) -> Rows:
     """Return velocity over frequency under several loads; by section 7.2 the best frequency rises (errata M31)."""
     for load in LOADS:
@@ -172,7 +172,7 @@ def reversal(p: DiaphragmMotorParameters) -> pd.DataFrame:
     return pd.DataFrame({"time_s": time, "position_m": record["position_m"], "spool": spool}).iloc[::10]
 
 
-@tabled
+@as_table
 def sensitivities(p: DiaphragmMotorParameters) -> Rows:
     """Return the sensitivity of peak flow and its frequency to each part, and to gas (errata M22).
 
@@ -210,7 +210,7 @@ def _peak(p: DiaphragmMotorParameters) -> tuple[float, float]:
     return float(frequencies[k] + shift), float(flows[1] + 0.5 * b * shift)
 
 
-@tabled
+@as_table
 def other_sets(p: DiaphragmMotorParameters) -> Rows:
     """Return three sets of parameters that give the published peak, each with a different plate (errata M22).
 
@@ -289,7 +289,7 @@ def bent_plate() -> pd.DataFrame:
     return pd.DataFrame({"radius_m": radii, "at_100_v_m": volts, "at_10_kpa_m": pressure})
 
 
-@tabled
+@as_table
 def mode_shapes() -> Rows:
     """Return the shapes of the dry diaphragm's first six modes, in place of Figure 43.
 

@@ -8,14 +8,20 @@ import numpy as np
 
 from experiments.eha.plain_verdict import (
     causes,
+    confidence_cost_onset,
     is_doubted,
-    of_another_size,
-    reasons_apart,
-    sureness,
+    is_of_another_size,
+    separate_reasons,
     verdict,
     what_to_do,
 )
-from experiments.eha.verdict_words import SHOWN, amount, library_sentence, ranked_shares, refused_oil
+from experiments.eha.verdict_words import (
+    SEVERITY_NAMES,
+    bulk_modulus_doubts,
+    library_sentence,
+    ranked_shares,
+    severity_text,
+)
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.charts import Charts
 from experiments.page.numbers import MINUS, percent_text
@@ -23,7 +29,7 @@ from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
 from experiments.page.sentences import sentence
 from experiments.page.severity_rows import severity_rows
-from experiments.page.words import in_words
+from experiments.page.words import condition_in_words
 from faults.diagnosis.circuits.blocks import blocks_of
 from plant.eha.rig import UNNAMED
 
@@ -34,7 +40,7 @@ if TYPE_CHECKING:
 CHANNELS = (("velocity", "mm/s", 1e3), ("pressure", "bar", 1e-5))
 """Channels that a circuit is fitted to: name, unit shown and factor from SI."""
 
-DESCRIBE = "Describe your actuator in a rig file: without one, these numbers are for the paper's actuator."
+RIG_ADVICE = "Describe your actuator in a rig file: without one, these numbers are for the paper's actuator."
 """Advice if there is no rig file for the log."""
 
 LEAST_SHARE = 0.0005
@@ -56,23 +62,25 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "file": name,
         "title": verdict(result),
         "to_do": what_to_do(result),
-        "describe": DESCRIBE if result["rig"] == UNNAMED else "",
-        "sureness": sureness(result),
-        "reasons": reasons_apart(result),
-        "another_size": of_another_size(result),
+        "describe": RIG_ADVICE if result["rig"] == UNNAMED else "",
+        "sureness": confidence_cost_onset(result),
+        "reasons": separate_reasons(result),
+        "another_size": is_of_another_size(result),
         "library": library_sentence(result),
         "not_told": []
         if is_doubted(result)
-        else [sentence(said) for said in (*refused_oil(result), *result["not_told"])],
-        "warnings": [sentence(said) for said in _beside(result)],
+        else [sentence(said) for said in (*bulk_modulus_doubts(result), *result["not_told"])],
+        "warnings": [sentence(said) for said in _chart_notes(result)],
         "shares": [
-            (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)
+            (condition_in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)
             for condition, share in shares
         ],
-        "rows": severity_rows(found.severities, found.healthy, found.evidence.diagnosis.limits, SHOWN),
-        "amounts": {name: amount(one).replace("-", MINUS) for name, one in result["severity"].items()},
+        "rows": severity_rows(found.severities, found.healthy, found.evidence.diagnosis.limits, SEVERITY_NAMES),
+        "amounts": {name: severity_text(one).replace("-", MINUS) for name, one in result["severity"].items()},
         "not_determined": [
-            SHOWN[name].removesuffix(", at most") for name, one in found.severities.items() if one.value is None
+            SEVERITY_NAMES[name].removesuffix(", at most")
+            for name, one in found.severities.items()
+            if one.value is None
         ],
         "changed": found.since is not None,
         "charts": {
@@ -83,7 +91,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
     return render_page("eha/diagnosis.html", facts, {}, {})
 
 
-def _beside(result: Mapping[str, Any]) -> list[str]:
+def _chart_notes(result: Mapping[str, Any]) -> list[str]:
     """Return the notes below the charts, which the opening does not contain."""
     warned = list(result.get("warnings", []))
     if not result["unknown"]:

@@ -42,12 +42,12 @@ NO_DIAGNOSIS: Mapping[str, Any] = {
     "notes": [],
 }
 
-COSTS = frozenset(
+COST_CODES = frozenset(
     {"pressure_absent", "pressure_unused", "pressure_absent_class", "known_as_the_rig", "healthy_of_the_paper"}
 )
 """Codes for the cost of an absent channel or an uncertain rig; the same for all logs, so reported once."""
 
-NO_CLASS = frozenset({"channel_zero", "models_alike", "models_diverged"})
+NO_CLASS_CODES = frozenset({"channel_zero", "models_alike", "models_diverged"})
 """Codes for why a log is in no class; they are reported in its message and not repeated beside it."""
 
 
@@ -101,12 +101,12 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
     """
     from estimation.finding import Outcome
     from experiments.eha.verdict_words import headline, models_sentence
-    from faults.diagnosis.models_verdict import margin, ranked
+    from faults.diagnosis.models_verdict import error_margin, ranked_conditions
 
     evidence: EhaEvidence = found.evidence
-    judged, ratio, others = bool(found.probabilities), margin(evidence.scores), evidence.transfer_functions
+    judged, ratio, others = bool(found.probabilities), error_margin(evidence.scores), evidence.transfer_functions
     order = sorted(found.probabilities, key=lambda name: -found.probabilities[name]) if judged else None
-    order = order or [name for name, _ in ranked(evidence.scores)]
+    order = order or [name for name, _ in ranked_conditions(evidence.scores)]
     entries: dict[str, Any] = {
         "outcome": found.outcome.value,
         "condition": found.condition,
@@ -153,7 +153,7 @@ def _severity(one: "Quantity") -> dict[str, Any]:
 def _notes(found: "Finding") -> dict[str, Any]:
     return {
         "notes": [note.to_dict() for note in found.all_notes],
-        "warnings": [str(note) for note in found.notes if note.code not in COSTS | NO_CLASS],
+        "warnings": [str(note) for note in found.notes if note.code not in COST_CODES | NO_CLASS_CODES],
     }
 
 
@@ -163,7 +163,7 @@ def _no_class_message(found: "Finding") -> str:
     from estimation.notes import SensorCode
 
     accused = [note for note in found.gate.reasons if isinstance(note.code, (SensorCode, LoggerCode))]
-    return clauses(str(note) for note in (*accused, *(one for one in found.notes if one.code in NO_CLASS)))
+    return clauses(str(note) for note in (*accused, *(one for one in found.notes if one.code in NO_CLASS_CODES)))
 
 
 def estimate_message(found: "Finding") -> str:
@@ -230,7 +230,7 @@ def costs(results: Iterable[Mapping[str, Any]]) -> list[str]:
     """
     results = list(results)
     said: dict[tuple[str, str | None], list[str]] = {}
-    for note in (one for result in results for one in result["notes"] if one["code"] in COSTS):
+    for note in (one for result in results for one in result["notes"] if one["code"] in COST_CODES):
         said.setdefault((note["code"], note["data"].get("entry")), []).append(note["text"])
     shares = (f"{len(texts)} of {len(results)} logs" if len(results) > 1 else "note" for texts in said.values())
     return [f"{share}: {texts[0]}" for share, texts in zip(shares, said.values(), strict=True)]

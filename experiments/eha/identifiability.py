@@ -68,7 +68,7 @@ def cards_of(rig: "Rig[Any]", options: Mapping[str, Any]) -> "list[Finding]":
     parameters = parameters_for(chosen, rig.parameters)
     about = {"condition": chosen.name, "rig": rig.name, "sensors": list(channels), "noise": options["noise"]}
     about |= {"seconds": options["seconds"], "rate_hz": options["rate"], "seed": options["seed"]}
-    cards = within_limits(options, lambda name: _card(name, parameters, rig, channels, about))
+    cards = results_by_drive(options, lambda name: _card(name, parameters, rig, channels, about))
     units = notes(type(parameters))
     return [
         Finding(
@@ -113,7 +113,7 @@ def checked_experiment(options: Mapping[str, Any]) -> dict[str, str]:
     return channels
 
 
-def within_limits(options: Mapping[str, Any], look: Callable[[str], T]) -> dict[str, T]:
+def results_by_drive(options: Mapping[str, Any], look: Callable[[str], T]) -> dict[str, T]:
     """Return the result of `look` for one drive, or for each drive within the actuator's limits.
 
     Parameters
@@ -174,12 +174,12 @@ def _card(
 ) -> "Card":
     from estimation.trust.identifiability import identifiability_card
 
-    speed, sample_time, sensors = driven(drive, parameters, about)
+    speed, sample_time, sensors = experiment_inputs(drive, parameters, about)
     measured, known = tuple(channels.values()), rig.uncertainties
     return identifiability_card(parameters, speed, sample_time, measured, sensors=sensors, uncertainties=known)
 
 
-def driven(
+def experiment_inputs(
     drive: str, parameters: "EhaParameters", about: Mapping[str, Any]
 ) -> "tuple[NDArray[np.float64], float, Sensors]":
     """Return motor speed [rad/s], shape (n,), the sample time [s], and the sensors of an experiment."""

@@ -9,8 +9,8 @@ from typing import Any
 
 from estimation.log_checks.notes import LoggerCode
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
-from experiments.page.condition_names import in_words, level_in_words
-from experiments.page.sentences import in_a_row, left_unread, sentence
+from experiments.page.condition_names import condition_in_words, level_in_words
+from experiments.page.sentences import joined_names, sentence, unused_column_advice
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode
 
@@ -20,10 +20,10 @@ SURE, LIKELY = 0.99, 0.8
 MAJOR = 2.0
 """Size of a fault from which it is treated as major, where 1 is minor [dimensionless]."""
 
-TOLD = 0.5
+LEAST_DOUBT_UNSTATED = 0.5
 """A level of leakage or friction is not stated if all else has at least this probability [probability]."""
 
-FLATLY = 0.9
+PROBABLE_BELOW = 0.9
 """Probability below which a stated level is called only probable [probability]; chosen by judgement."""
 
 LEAKS: Mapping[str, str] = {
@@ -64,8 +64,8 @@ HINDRANCES: Mapping[frozenset[str], str] = {
 WRONG_INPUT = WRONG_SENSORS.union(ChannelCode, LoggerCode)
 """Codes of wrong sensors and columns, which may cause the other reasons against a verdict."""
 
-BESIDE = str(AgainstCode.OUTSIDE_CONDITIONS)
-SIZED = (BESIDE, str(AgainstCode.BETWEEN_CONDITIONS))
+OUTSIDE_CODE = str(AgainstCode.OUTSIDE_CONDITIONS)
+OTHER_SIZE_CODES = (OUTSIDE_CODE, str(AgainstCode.BETWEEN_CONDITIONS))
 """Codes of logs that a circuit explains, but with leakage and friction that match none of the nine conditions."""
 
 OUTSIDE: Mapping[str, str] = {
@@ -94,10 +94,12 @@ def verdict(result: Mapping[str, Any]) -> str:
     'The actuator is healthy: leakage and friction are normal.'
     """
     if result["unknown"]:
-        return " ".join(_named(result)) or f"No verdict: {_hindered(result)}."
+        return " ".join(_named_fault(result)) or f"No verdict: {_hindrance(result)}."
     levels = _levels(result)
     faults = {"leakage": LEAKS.get(levels["leakage"] or ""), "friction": RUBS.get(levels["friction"] or "")}
-    doubt = {name: "" if _share(result, name, level) >= FLATLY else "probably " for name, level in levels.items()}
+    doubt = {
+        name: "" if _share(result, name, level) >= PROBABLE_BELOW else "probably " for name, level in levels.items()
+    }
     wrong = " and ".join(f"{doubt[name]}{one}" for name, one in faults.items() if one)
     others = [
         f"{name} is {doubt[name]}normal" if levels[name] else f"{name} cannot be told from this log"
@@ -116,13 +118,13 @@ def verdict(result: Mapping[str, Any]) -> str:
     return "The actuator is healthy: leakage and friction are normal."
 
 
-def _hindered(result: Mapping[str, Any]) -> str:
+def _hindrance(result: Mapping[str, Any]) -> str:
     """Return why there is no verdict, in one clause."""
     for accused, words in HINDRANCES.items():
         notes = [one for one in result["notes"] if one["code"] in accused and one["text"] in result["reasons"]]
         if notes:
             named = dict.fromkeys(one["data"].get("channel", "velocity_m_s or position_m") for one in notes)
-            return words.format(in_a_row(list(named)))
+            return words.format(joined_names(list(named)))
     codes = {one["code"] for one in result["notes"]}
     if AgainstCode.STUCK_OR_LEAKS in codes:
         return "the piston stands still, and without pressure the log does not tell why"
@@ -133,7 +135,7 @@ def _hindered(result: Mapping[str, Any]) -> str:
 
 def size_in_words(result: Mapping[str, Any]) -> str:
     """Return the size of a fault that lies between the nine conditions: 'leakage between none and minor'."""
-    return "; ".join(level_in_words(name, size) for name, size in _raised(result).items())
+    return "; ".join(level_in_words(name, size) for name, size in _fault_sizes(result).items())
 
 
 def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:
@@ -143,7 +145,10 @@ def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:
     """
     best = CONDITIONS[result["condition"]]
     levels = {name: getattr(best, name) for name in ("leakage", "friction")}
-    return {name: level if _share(result, name, level) > 1.0 - TOLD else None for name, level in levels.items()}
+    return {
+        name: level if _share(result, name, level) > 1.0 - LEAST_DOUBT_UNSTATED else None
+        for name, level in levels.items()
+    }
 
 
 def _share(result: Mapping[str, Any], name: str, level: str | None) -> float:
@@ -158,58 +163,63 @@ def _soft_oil(result: Mapping[str, Any]) -> bool:
     return any(one["code"] == str(AdviceCode.BLEED) for one in result["notes"])
 
 
-def _outside(result: Mapping[str, Any]) -> list[str]:
+def _outside_faults(result: Mapping[str, Any]) -> list[str]:
     """Return the named faults that are none of the nine conditions."""
     return [OUTSIDE[one["code"]] for one in result["notes"] if one["code"] in OUTSIDE]
 
 
-def _named(result: Mapping[str, Any]) -> list[str]:
+def _named_fault(result: Mapping[str, Any]) -> list[str]:
     """Return the fault outside the nine conditions by name, or else as a size between theirs."""
-    found = _outside(result)
+    found = _outside_faults(result)
     words = {"leakage": "leaks more inside", "friction": "has more friction"}
-    raised = [words[name] for name in _raised(result)] if not found else []
+    raised = [words[name] for name in _fault_sizes(result)] if not found else []
     if raised:
         found.append(f"The actuator {' and '.join(raised)} than a healthy one, or the rig file or a sensor is wrong.")
     return found
 
 
-def _raised(result: Mapping[str, Any]) -> dict[str, float]:
+def _fault_sizes(result: Mapping[str, Any]) -> dict[str, float]:
     """Return the loss whose size is neither minor nor major: 1 is minor, 2 is major [dimensionless]."""
-    sizes = [one["data"] for one in result["notes"] if one["code"] in SIZED]
+    sizes = [one["data"] for one in result["notes"] if one["code"] in OTHER_SIZE_CODES]
     return {name: data[name] for data in sizes for name in ("leakage", "friction") if data[name] > 0.0}
 
 
 def is_doubted(result: Mapping[str, Any]) -> bool:
     """Return whether no number of a diagnosis can be relied on, because its model does not fit the log."""
-    return bool(result["unknown"]) and not of_another_size(result)
+    return bool(result["unknown"]) and not is_of_another_size(result)
 
 
-def of_another_size(result: Mapping[str, Any]) -> bool:
+def is_of_another_size(result: Mapping[str, Any]) -> bool:
     """Return whether a circuit fits the log and only the size of its faults differs from the nine conditions."""
-    return result["unknown"] and len(result["reasons"]) == 1 and not _outside(result) and bool(_raised(result))
+    return (
+        result["unknown"] and len(result["reasons"]) == 1 and not _outside_faults(result) and bool(_fault_sizes(result))
+    )
 
 
-def sureness(result: Mapping[str, Any]) -> str:
+def confidence_cost_onset(result: Mapping[str, Any]) -> str:
     """Return the confidence of the verdict, the cost of the fault, and its onset."""
     if result["unknown"]:
         told = causes(result)
         reasons = f": {told[0]}." if len(told) == 1 else ":" if told else "."
-        if of_another_size(result) and any(one["code"] == BESIDE for one in result["notes"]):
+        if is_of_another_size(result) and any(one["code"] == OUTSIDE_CODE for one in result["notes"]):
             return sentence(causes(result)[0])
-        if of_another_size(result):
-            sizes = " and ".join(f"{name} {size:g}" for name, size in _raised(result).items())
+        if is_of_another_size(result):
+            sizes = " and ".join(f"{name} {size:g}" for name, size in _fault_sizes(result).items())
             return (
                 "The size is none of those of the nine conditions: to the nearest quarter, it is "
                 f"{sizes}, where 1 is minor and 2 is major."
             )
-        if _named(result):
+        if _named_fault(result):
             return f"This is none of the nine conditions, so do not rely on the numbers below{reasons}"
         return f"Do not rely on anything on this page{reasons}"
-    return " ".join(one for one in (how_sure(result), _cost(result), _since(result)) if one)
+    return " ".join(one for one in (confidence_sentence(result), _cost(result), _onset(result)) if one)
 
 
-def reasons_apart(result: Mapping[str, Any]) -> list[str]:
-    """Return the reasons against a verdict as sentences if there are several; a single reason is in `sureness`."""
+def separate_reasons(result: Mapping[str, Any]) -> list[str]:
+    """Return the reasons against a verdict as sentences if there are several.
+
+    A single reason is in `confidence_cost_onset`.
+    """
     told = causes(result) if is_doubted(result) else []
     return [sentence(one) for one in told] if len(told) > 1 else []
 
@@ -220,12 +230,13 @@ def causes(result: Mapping[str, Any]) -> list[str]:
     return first or list(result["reasons"])
 
 
-def how_sure(result: Mapping[str, Any]) -> str:
+def confidence_sentence(result: Mapping[str, Any]) -> str:
     """Return the confidence of the verdict, in one sentence.
 
     Examples
     --------
-    >>> how_sure({"condition": "normal", "notes": [], "probabilities": {"normal": 0.9, "minor_leakage": 0.1}})
+    >>> shares = {"normal": 0.9, "minor_leakage": 0.1}
+    >>> confidence_sentence({"condition": "normal", "notes": [], "probabilities": shares})
     'This is probable (90 %).'
     """
     told = {name: level for name, level in _levels(result).items() if level is not None}
@@ -250,10 +261,10 @@ def _cost(result: Mapping[str, Any]) -> str:
     return f"The actuator is {lost:.0f} % slower than a healthy one at rated speed."
 
 
-def _since(result: Mapping[str, Any]) -> str:
+def _onset(result: Mapping[str, Any]) -> str:
     if result["since_s"] is not None:
         low, high = result["since_ci95_s"]
-        before = in_words(result["condition_before"])
+        before = condition_in_words(result["condition_before"])
         since = f"{result['since_s']:.2f} s into the log ({low:.2f} to {high:.2f} s)"
         return f"The condition changed {since}; until then it was {before}."
     named = set(_levels(result).values()) & {*LEAKS, *RUBS}
@@ -270,12 +281,12 @@ def what_to_do(result: Mapping[str, Any]) -> list[str]:
         give the same result, work on the actuator last.
     """
     advice = [sentence(one) for one in result["advice"]]
-    if of_another_size(result):  # a wrong sensor or rig file would look the same, so check for it first
-        return [*left_unread(result), *advice, *work_on(result)]
-    return [*work_on(result), *left_unread(result), *advice]
+    if is_of_another_size(result):  # a wrong sensor or rig file would look the same, so check for it first
+        return [*unused_column_advice(result), *advice, *checks_on_actuator(result)]
+    return [*checks_on_actuator(result), *unused_column_advice(result), *advice]
 
 
-def work_on(result: Mapping[str, Any]) -> list[str]:
+def checks_on_actuator(result: Mapping[str, Any]) -> list[str]:
     """Return what to check on the actuator itself, as sentences.
 
     Returns
@@ -283,9 +294,9 @@ def work_on(result: Mapping[str, Any]) -> list[str]:
     list[str]
         Empty if the verdict is unknown or leaves leakage or friction open, or if only the oil is soft.
     """
-    if of_another_size(result):
+    if is_of_another_size(result):
         works = {"leakage": WORK_ON_LEAKAGE, "friction": WORK_ON_FRICTION}
-        work = [works[name]["minor" if size < MAJOR else "major"] for name, size in _raised(result).items()]
+        work = [works[name]["minor" if size < MAJOR else "major"] for name, size in _fault_sizes(result).items()]
         return [f"If rig file and sensors are right: {one[:1].lower()}{one[1:]}" for one in work]
     if result["unknown"]:
         return []

@@ -10,8 +10,8 @@ from experiments.command.terminal import short_names, table
 from experiments.command.visible_text import visible_name
 from experiments.eha.entries import costs
 from experiments.eha.verdict_words import equally_likely, verdict_lines
-from experiments.log_pages.screens import told_in_lines
-from experiments.page.condition_names import in_words
+from experiments.log_pages.screens import message_in_lines
+from experiments.page.condition_names import condition_in_words
 from experiments.page.numbers import decimals_of, percent_text
 
 if TYPE_CHECKING:
@@ -44,17 +44,17 @@ def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
     del options
     shown = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "with rig error [MPa]", "bound [%]", "verdict")
     for name, result in zip(short_names(results), results, strict=True):
-        shown.add_row(name, *_cells(result))
+        shown.add_row(name, *_bulk_modulus_cells(result))
     yield shown
     doubtful = [result for result in results if not result["gate"]["passed"]]
     if len(results) <= MOST_MESSAGES:
-        yield from (told_in_lines(result, visible_name(result["file"])) for result in doubtful)
+        yield from (message_in_lines(result, visible_name(result["file"])) for result in doubtful)
     elif doubtful:
         yield f"{len(doubtful)} of {len(results)} logs gave no reliable value; --json and --out give the reasons"
     yield from costs(results)
 
 
-def _cells(result: Result) -> list[str]:
+def _bulk_modulus_cells(result: Result) -> list[str]:
     modulus = result["bulk_modulus_pa"]
     verdict = result["outcome"].replace("_", " ")
     bound = f"{result['bound_percent']:.2g}" if math.isfinite(result["bound_percent"] or math.inf) else "-"
@@ -64,10 +64,16 @@ def _cells(result: Result) -> list[str]:
     ends = (value, value) if given is None else (1e-6 * given[0], 1e-6 * given[1])
     decimals = decimals_of(*ends)
     trusted = verdict if result["gate"]["passed"] else "doubtful"
-    return [f"{value:.{decimals}f}", _span(given, decimals), _span(modulus["ci95_total"], 0), bound, trusted]
+    return [
+        f"{value:.{decimals}f}",
+        _interval_text(given, decimals),
+        _interval_text(modulus["ci95_total"], 0),
+        bound,
+        trusted,
+    ]
 
 
-def _span(ends: Sequence[float] | None, decimals: int) -> str:
+def _interval_text(ends: Sequence[float] | None, decimals: int) -> str:
     return "-" if ends is None else f"{1e-6 * ends[0]:.{decimals}f} to {1e-6 * ends[1]:.{decimals}f}"
 
 
@@ -94,7 +100,7 @@ def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
         if detailed and judged and result["outcome"] == "ok" and result["expected"] is not None:
             yield f"  {_agreement(result)}"
         elif not judged or result["outcome"] != "ok" or result["expected"] is not None:
-            yield told_in_lines(result, visible_name(result["file"]))
+            yield message_in_lines(result, visible_name(result["file"]))
     notes = list(costs(results))
     yield from ["", *notes] if notes and detailed else notes
 
@@ -102,7 +108,7 @@ def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
 def _agreement(result: Result) -> str:
     """Return whether the condition is the expected one; the lines above name it."""
     agreed = not result["unknown"] and result["condition"] == result["expected"]
-    return f"expected  {in_words(result['expected'])}: {'agrees' if agreed else 'does not agree'}"
+    return f"expected  {condition_in_words(result['expected'])}: {'agrees' if agreed else 'does not agree'}"
 
 
 def _summary(results: Sequence[Result]) -> "RenderableType":

@@ -25,7 +25,7 @@ class RunCode(Code):
     PRESSURE_NOT_LOGGED = "{channel} is not logged by these sensors: estimate and diagnose will be less certain"
 
 
-def simulated(rig: "Rig[Any]", options: Options) -> Run:
+def simulate_log(rig: "Rig[Any]", options: Options) -> Run:
     """Run a plant under a drive, in a condition, and return the sensors' log.
 
     Returns
@@ -46,17 +46,17 @@ def simulated(rig: "Rig[Any]", options: Options) -> Run:
     drive, sensors, seed = options["drive"], options["sensors"], options["seed"]
     require_known("--drive", drive, list(DRIVES))
     require_known("--sensors", sensors, list(NOISE))
-    parameters, made_of = _faulty(rig.parameters, options)
+    parameters, made_of = _faulty_actuator(rig.parameters, options)
     drive_rng, sensor_rng = np.random.default_rng(seed).spawn(2)
     speed = make_drive(drive, options["duration"], options["sample_time"], parameters, drive_rng)
-    run = _native if options["fmu"] is None else _foreign
+    run = _run_plant if options["fmu"] is None else _run_fmu
     plant, record = run(rig.parameters, parameters, options, speed, sensor_rng)
     record = record.annotate(**made_of, drive=drive, rig=rig.name, seed=seed)
     said = {"plant": plant, **made_of, "drive": drive, "sensors": sensors, "seed": seed}
     return Run(record, said, () if PRESSURE in record else (RunCode.PRESSURE_NOT_LOGGED.note(channel=PRESSURE),))
 
 
-def _native(
+def _run_plant(
     sound: EhaParameters, faulty: EhaParameters, options: Options, speed: "Array", rng: "np.random.Generator"
 ) -> "tuple[str, Record]":
     from plant.eha.simulate import PLANTS, simulate
@@ -71,7 +71,7 @@ def _native(
     return plant, simulate(PLANTS[plant], speed, options["sample_time"], faulty, sensors=sensors, rng=rng)
 
 
-def _foreign(
+def _run_fmu(
     sound: EhaParameters, faulty: EhaParameters, options: Options, speed: "Array", rng: "np.random.Generator"
 ) -> "tuple[str, Record]":
     """Run an FMU; parameters that a condition changes are set if the FMU has a variable of that name."""
@@ -136,7 +136,7 @@ def start_values(texts: Sequence[str] | None) -> dict[str, float]:
     return found
 
 
-def _faulty(rig: EhaParameters, options: Options) -> tuple[EhaParameters, dict[str, Any]]:
+def _faulty_actuator(rig: EhaParameters, options: Options) -> tuple[EhaParameters, dict[str, Any]]:
     """Return the faulty actuator, and the fault that was set."""
     name, leakage, friction = (options[key] for key in ("condition", "leakage_severity", "friction_severity"))
     if leakage is None and friction is None:

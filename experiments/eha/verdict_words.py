@@ -6,12 +6,12 @@ from typing import Any
 
 from experiments.command.visible_text import visible_name
 from experiments.log_pages.screens import NEXT_LINE
-from experiments.page.condition_names import in_words
+from experiments.page.condition_names import condition_in_words
 from experiments.page.numbers import decimals_of, percent_text, shop_unit
 from experiments.page.sentences import sentence
-from faults.diagnosis.beyond_nine.left_open import WORTH_SAYING
+from faults.diagnosis.beyond_nine.left_open import LEAST_REPORTED
 
-SHOWN = {
+SEVERITY_NAMES = {
     "leakage_flow": "leakage at rated pressure",
     "velocity_lost": "velocity lost",
     "added_friction": "friction added at rated speed",
@@ -30,14 +30,14 @@ LEVELS_IN_WORDS = {"none": "normal", "minor": "minor", "major": "major"}
 MOST_DECIMALS = 3
 """Maximum number of decimals of a severity [count]."""
 
-ALIKE = 0.99
+EQUALLY_LIKELY_RATIO = 0.99
 """Minimum ratio of a condition's probability to the likeliest's at which both count as equally likely [fraction]: the
 log has no information that separates them, and calibrated probabilities are not known more precisely."""
 
-NEAREST = "UNKNOWN: none of the nine conditions fits; the nearest is "
+NEAREST_WORDS = "UNKNOWN: none of the nine conditions fits; the nearest is "
 """Beginning of a verdict with evidence against it."""
 
-OUTSIDE = "none of the nine conditions"
+OUTSIDE_WORDS = "none of the nine conditions"
 """Label of the probability left over by all nine conditions, for a fault that the log does not exclude."""
 
 
@@ -61,10 +61,10 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
             if is_doubted(result)
             else []
         ),
-        f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",
-        f"  friction  {amounts(result, ('added_friction', 'pressure_rise'))}",
-        f"  oil       {amounts(result, ('bulk_modulus',))}",
-        f"  reliable  {believed(result)}",
+        f"  leakage   {severities_text(result, ('leakage_flow', 'velocity_lost'))}",
+        f"  friction  {severities_text(result, ('added_friction', 'pressure_rise'))}",
+        f"  oil       {severities_text(result, ('bulk_modulus',))}",
+        f"  reliable  {reliability_text(result)}",
         f"  next      {next_step(result)}",
         *([f"  {library}"] if library else []),
     ]
@@ -88,18 +88,20 @@ def headline(result: Mapping[str, Any]) -> str:
     """
     (best, first), (second, other) = ranked_shares(result["probabilities"], unknown=result["unknown"])[:2]
     if result["unknown"]:
-        nearest = f"{in_words(best)} ({percent_text(first)} % if it had to be one of them)"
-        return f"{NEAREST}{nearest}, then {in_words(second)} ({percent_text(other)} %)"
+        nearest = f"{condition_in_words(best)} ({percent_text(first)} % if it had to be one of them)"
+        return f"{NEAREST_WORDS}{nearest}, then {condition_in_words(second)} ({percent_text(other)} %)"
     if len(as_likely := equally_likely(result)) > 1:
-        told = _what_is_told(as_likely, result["probabilities"])
+        told = _shared_fault(as_likely, result["probabilities"])
         faulty = result["since_s"] is not None or not told[0].startswith(f"{LEVELS_IN_WORDS['none']} ")
-        parts = [*told, since(result) if faulty else ""]
+        parts = [*told, onset_clause(result) if faulty else ""]
         return "; ".join(part for part in parts if part)
     outside = 1.0 - sum(result["probabilities"].values())
-    runner_up, other = (OUTSIDE, outside) if outside > max(other, WORTH_SAYING) else (in_words(second), other)
+    runner_up, other = (
+        (OUTSIDE_WORDS, outside) if outside > max(other, LEAST_REPORTED) else (condition_in_words(second), other)
+    )
     parts = [
-        f"{in_words(best)}, probability {percent_text(first)} %",
-        since(result),
+        f"{condition_in_words(best)}, probability {percent_text(first)} %",
+        onset_clause(result),
         f"second most likely {runner_up}, {percent_text(other)} %",
     ]
     return "; ".join(part for part in parts if part)
@@ -135,32 +137,32 @@ def equally_likely(result: Mapping[str, Any]) -> list[str]:
     from faults.conditions import CONDITIONS  # here, since estimates do not need it
 
     shares = result["probabilities"]
-    least = ALIKE * max(shares.values())
+    least = EQUALLY_LIKELY_RATIO * max(shares.values())
     return [name for name in CONDITIONS if shares.get(name, 0.0) >= least]
 
 
-def _what_is_told(conditions: Sequence[str], shares: Mapping[str, float]) -> list[str]:
+def _shared_fault(conditions: Sequence[str], shares: Mapping[str, float]) -> list[str]:
     """Return the fault that equally likely conditions share, its probability, and the open part."""
     from faults.conditions import CONDITIONS  # here, since estimates do not need it
 
     levels = {axis: [getattr(CONDITIONS[one], axis) for one in conditions] for axis in ("leakage", "friction")}
     told = {axis: LEVELS_IN_WORDS[found[0]] for axis, found in levels.items() if len(set(found)) == 1}
     if not told:
-        among = _or([in_words(one) for one in conditions])
+        among = _joined_by_or([condition_in_words(one) for one in conditions])
         return [f"leakage and friction cannot be told: {among} equally likely"]
     ((axis, level),) = told.items()
     (other,) = set(levels) - {axis}
-    among = _or([LEVELS_IN_WORDS[one] for one in levels[other]])
+    among = _joined_by_or([LEVELS_IN_WORDS[one] for one in levels[other]])
     wanted = getattr(CONDITIONS[conditions[0]], axis)
     percent = percent_text(sum(share for one, share in shares.items() if getattr(CONDITIONS[one], axis) == wanted))
     return [f"{level} {axis}, probability {percent} %", f"{other} cannot be told: {among} {other} equally likely"]
 
 
-def _or(words: Sequence[str]) -> str:
+def _joined_by_or(words: Sequence[str]) -> str:
     return " or ".join([*([", ".join(words[:-1])] if len(words) > 1 else []), words[-1]])
 
 
-def since(result: Mapping[str, Any]) -> str:
+def onset_clause(result: Mapping[str, Any]) -> str:
     """Return since when the actuator has been in its condition.
 
     Returns
@@ -170,17 +172,17 @@ def since(result: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> since({"condition": "minor_leakage", "since_s": None})
+    >>> onset_clause({"condition": "minor_leakage", "since_s": None})
     'present since before the log began'
     """
     if result["since_s"] is not None:
         low, high = result["since_ci95_s"]
-        before = in_words(result["condition_before"])
+        before = condition_in_words(result["condition_before"])
         return f"since {result['since_s']:.2f} s ({low:.2f} to {high:.2f} s), {before} before"
     return "" if result["condition"] == "normal" else "present since before the log began"
 
 
-def amounts(result: Mapping[str, Any], names: Sequence[str]) -> str:
+def severities_text(result: Mapping[str, Any], names: Sequence[str]) -> str:
     """Return severities with their intervals.
 
     Returns
@@ -188,10 +190,10 @@ def amounts(result: Mapping[str, Any], names: Sequence[str]) -> str:
     str
         Text in workshop units.
     """
-    return "; ".join(f"{SHOWN[name]} {amount(result['severity'][name])}" for name in names)
+    return "; ".join(f"{SEVERITY_NAMES[name]} {severity_text(result['severity'][name])}" for name in names)
 
 
-def amount(one: Mapping[str, Any]) -> str:
+def severity_text(one: Mapping[str, Any]) -> str:
     """Return one severity with its interval.
 
     Parameters
@@ -201,15 +203,15 @@ def amount(one: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8]})
+    >>> severity_text({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8]})
     '207.0 MPa (205.0 to 209.0)'
-    >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8], "ci95_total": [1.5e8, 2.8e8]})
+    >>> severity_text({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8], "ci95_total": [1.5e8, 2.8e8]})
     '207.0 MPa (205.0 to 209.0; with rig error 150 to 280)'
-    >>> amount({"value": 28.578, "unit": "%", "ci95": [28.5776, 28.5784], "ci95_total": [24.0, 34.0]})
+    >>> severity_text({"value": 28.578, "unit": "%", "ci95": [28.5776, 28.5784], "ci95_total": [24.0, 34.0]})
     '28.58 % (with rig error 24 to 34)'
-    >>> amount({"value": -0.01, "unit": "N", "ci95": [-3.0, 4.0]})
+    >>> severity_text({"value": -0.01, "unit": "N", "ci95": [-3.0, 4.0]})
     '0.0 N (-3.0 to 4.0)'
-    >>> amount({"value": 1e-7, "unit": "%", "ci95": [0.0, 2e-7], "ci95_total": [0.0, 0.15]})
+    >>> severity_text({"value": 1e-7, "unit": "%", "ci95": [0.0, 2e-7], "ci95_total": [0.0, 0.15]})
     'under 0.001 % (with rig error 0.00 to 0.15)'
     """
     if any(number is None or not math.isfinite(number) for number in (one["value"], *one["ci95"])):
@@ -232,7 +234,7 @@ def _interval(low: float, high: float) -> str:
     return f"{low:z.{decimals}f} to {high:z.{decimals}f}"
 
 
-def believed(result: Mapping[str, Any]) -> str:
+def reliability_text(result: Mapping[str, Any]) -> str:
     """Return whether the verdict may be trusted."""
     from experiments.eha.plain_verdict import causes
 
@@ -242,13 +244,13 @@ def believed(result: Mapping[str, Any]) -> str:
         return f"no: {NEXT_LINE.join(told)}{f'; {more} more in --json, which may follow from this' if more else ''}"
     told = [
         "yes: a circuit in one of the nine conditions reproduces the log",
-        *refused_oil(result),
+        *bulk_modulus_doubts(result),
         *result["not_told"],
     ]
     return NEXT_LINE.join(told)
 
 
-def refused_oil(result: Mapping[str, Any]) -> list[str]:
+def bulk_modulus_doubts(result: Mapping[str, Any]) -> list[str]:
     """Return why not to rely on a bulk modulus that is shown beside a class although its check failed."""
     gate, estimated = result["gate"], result["bulk_modulus_pa"]
     if result["unknown"] or gate is None or gate["passed"] or estimated is None or estimated["value"] is None:
@@ -260,10 +262,10 @@ def refused_oil(result: Mapping[str, Any]) -> list[str]:
 
 def next_step(result: Mapping[str, Any]) -> str:
     """Return what to do next, one sentence per line, the most important first."""
-    from experiments.eha.plain_verdict import of_another_size, work_on
+    from experiments.eha.plain_verdict import checks_on_actuator, is_of_another_size
 
-    work, advice = work_on(result), [sentence(one) for one in result["advice"]]
-    return NEXT_LINE.join([*advice, *work] if of_another_size(result) else [*work, *advice])
+    work, advice = checks_on_actuator(result), [sentence(one) for one in result["advice"]]
+    return NEXT_LINE.join([*advice, *work] if is_of_another_size(result) else [*work, *advice])
 
 
 def library_sentence(result: Mapping[str, Any]) -> str:
@@ -293,12 +295,12 @@ leakage, has 1.90 mm/s.'
     shown = {name: f"{1e3 * errors[name]:.2f} mm/s" for name in (first, second, ours)}
     if first == ours:
         return (
-            f"The library of transfer functions agrees: {in_words(first)} has the smallest error in velocity, "
-            f"{shown[first]}; the next, {in_words(second)}, has {shown[second]}."
+            f"The library of transfer functions agrees: {condition_in_words(first)} has the smallest error in "
+            f"velocity, {shown[first]}; the next, {condition_in_words(second)}, has {shown[second]}."
         )
     return (
-        f"The library of transfer functions names {in_words(first)} instead: its error in velocity is {shown[first]}, "
-        f"that of {in_words(ours)} is {shown[ours]}. The verdict above does not use it."
+        f"The library of transfer functions names {condition_in_words(first)} instead: its error in velocity is "
+        f"{shown[first]}, that of {condition_in_words(ours)} is {shown[ours]}. The verdict above does not use it."
     )
 
 
@@ -330,4 +332,4 @@ def models_sentence(result: Mapping[str, Any]) -> str:
     else:
         error = f"{100.0 * (margin - 1.0):.0f} % larger" if margin < 2.0 else f"{margin:.1f} times as large"
         named = f"{best}, by a {margin_word(margin)} margin: the error of {second} is {error}"
-    return f"{NEAREST}{named}" if result["unknown"] else named
+    return f"{NEAREST_WORDS}{named}" if result["unknown"] else named

@@ -12,14 +12,14 @@ from markupsafe import Markup, escape
 from estimation.finding import interval_95
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.outlook import REACHED, Outlook, outlook_of
-from experiments.fleet.page import IF_RIGHT, found_in, untold_since, worst_in
+from experiments.fleet.page import IF_RIG_RIGHT, finding_text, no_verdict_since, worst_severity_text
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.charts import Charts
-from experiments.page.names_shown import SHOWN
+from experiments.page.names_shown import QUANTITY_NAMES
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, shop_unit
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
-from experiments.page.sentences import in_a_row, whole_dates
+from experiments.page.sentences import joined_names, whole_dates
 from experiments.page.tables import Cell, Column
 from faults.trend.kalman import moments, predict, settings
 from faults.trend.trend import FEWEST, trends
@@ -75,7 +75,9 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
         Path of the page of all actuators.
     """
     worst = row.outlook
-    every = (worst if worst and worst.name == name else outlook_of(row.logs, name, row.maintained) for name in SHOWN)
+    every = (
+        worst if worst and worst.name == name else outlook_of(row.logs, name, row.maintained) for name in QUANTITY_NAMES
+    )
     outlooks = [one for one in every if one is not None]
     outlooks.sort(key=lambda one: worst is None or one.name != worst.name)  # the deciding severity comes first
     counted = max((len(one.logs) for one in outlooks), default=0)
@@ -83,11 +85,11 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
     last = [*row.logs][-MOST_LOGS:][::-1]
     facts = {
         "name": row.name,
-        "title": f"{row.name}: {STATES[row.state]}{f' ({found_in(row.last)})' if row.last.between else ''}.",
-        "outlook": _sentence(worst) if worst is not None and row.last.told else _untold(row),
+        "title": f"{row.name}: {STATES[row.state]}{f' ({finding_text(row.last)})' if row.last.between else ''}.",
+        "outlook": _sentence(worst) if worst is not None and row.last.has_verdict else _no_verdict_text(row),
         "log": pages.get(row.last.file),
         "fleet": fleet,
-        "apart": _apart(outlooks),
+        "apart": _log_spacing(outlooks),
         "forecasts": pd.DataFrame([_forecast(one, row.last) for one in outlooks]),
         "logs": pd.DataFrame(
             [
@@ -95,8 +97,8 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
                     one.file.rsplit("/", 1)[-1],
                     one.named.shown,
                     one.state,
-                    found_in(one),
-                    worst_in(one) if one.shown else "",
+                    finding_text(one),
+                    worst_severity_text(one) if one.shows_severities else "",
                     pages.get(one.file, ""),
                 )
                 for one in last
@@ -124,15 +126,15 @@ def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[
         log, before = which[0].logs[begin].named, which[0].logs[begin - 1].named
         repaired = any((before.place or 0.0) < one <= (log.place or 0.0) for one in maintained)
         why = "after a repair" if repaired else "after a lasting change"
-        names = [SHOWN[one.name] for one in which]
-        subject = "Every severity" if len(names) == len(outlooks) else in_a_row(names).capitalize()
+        names = [QUANTITY_NAMES[one.name] for one in which]
+        subject = "Every severity" if len(names) == len(outlooks) else joined_names(names).capitalize()
         verb = "is" if len(names) in (1, len(outlooks)) else "are"
         said.append(f"{subject} {verb} followed from the log of {log.shown or begin + 1} on, {why}.")
     return said
 
 
 def _sentence(one: Outlook) -> str:
-    name, count = SHOWN.get(one.name, one.name).capitalize(), len(one.logs) - one.trend.begin
+    name, count = QUANTITY_NAMES.get(one.name, one.name).capitalize(), len(one.logs) - one.trend.begin
     if count >= FEWEST:
         return f"{name}{one.in_full}"
     past = f"{one.past}; " if one.past else ""
@@ -140,15 +142,15 @@ def _sentence(one: Outlook) -> str:
     return f"{name}: {past}no forecast yet, since it needs {FEWEST} logs, and {there}"
 
 
-def _untold(row: ActuatorRow) -> str:
+def _no_verdict_text(row: ActuatorRow) -> str:
     """Return since when there is no verdict, and what the last log shows if the rig file is right."""
-    since = untold_since(row)
-    worst = f"{worst_in(row.last)} now{IF_RIGHT}" if row.last.shown and row.last.worst else ""
+    since = no_verdict_since(row)
+    worst = f"{worst_severity_text(row.last)} now{IF_RIG_RIGHT}" if row.last.shows_severities and row.last.worst else ""
     said = "; ".join(one for one in (f"no verdict {since}" if since else "", worst) if one)
     return said[:1].upper() + said[1:]
 
 
-def _apart(outlooks: Sequence[Outlook]) -> str:
+def _log_spacing(outlooks: Sequence[Outlook]) -> str:
     """Return the usual time between logs, in words; empty if dates are missing."""
     days = next((one.days_apart for one in outlooks if one.days_apart is not None), None)
     if days is None:
@@ -168,7 +170,7 @@ def _forecast(one: Outlook, newest: LogRow) -> dict[str, str]:
     growth = growth if abs(growth) > ROUNDING * growth_std else 0.0
     places = decimals_of(0.0, 5.0 * growth_std, 6)  # one digit of the deviation, or two if the first is 1
     return {
-        "severity": SHOWN[one.name],
+        "severity": QUANTITY_NAMES[one.name],
         "level": f"{shown} {unit} ({low} to {high}){_as_of(one, newest)}",
         "limit": f"{number(scale * one.series.limit, 3)} {unit}",
         "growth": f"{fixed(growth, places)}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{fixed(growth_std, places)} {unit}",
@@ -183,7 +185,7 @@ def _as_of(one: Outlook, newest: LogRow) -> str:
     return "" if last is newest else f", as of {last.named.shown or 'an earlier log'}"
 
 
-def _ahead(outlooks: Sequence[Outlook]) -> int:
+def _forecast_length(outlooks: Sequence[Outlook]) -> int:
     """Return for how many future logs trends are drawn: until a limit may be reached, if that is within the horizon."""
     ends = [end for one in outlooks for end in one.quantiles or () if end <= AHEAD]
     few = max((len(one.logs) // 4 for one in outlooks), default=0)
@@ -192,7 +194,7 @@ def _ahead(outlooks: Sequence[Outlook]) -> int:
 
 def _charts(outlooks: Sequence[Outlook], name: str) -> list[tuple[str, Charts]]:
     """Return charts of the severities' trends, each with its caption; severities over the same logs share a figure."""
-    ahead = _ahead(outlooks)
+    ahead = _forecast_length(outlooks)
     together: dict[tuple[float, ...], list[Outlook]] = {}
     for one in outlooks:
         together.setdefault(tuple(one.series.times), []).append(one)
@@ -201,7 +203,7 @@ def _charts(outlooks: Sequence[Outlook], name: str) -> list[tuple[str, Charts]]:
         x, label = _abscissa(which[0], ahead)
         panels = [_panel(one, x, ahead) for one in which]
         file = name if len(which) == len(outlooks) else "-".join([name, *(one.name for one in which)])
-        caption = in_a_row([SHOWN[one.name] for one in which]).capitalize()
+        caption = joined_names([QUANTITY_NAMES[one.name] for one in which]).capitalize()
         found.append((caption, Charts(x, label, panels, file, label, dates=label == DATE)))
     return found
 
@@ -223,7 +225,7 @@ def _panel(one: Outlook, x: Array, ahead: int) -> Panel:
     ends = scale * np.array([*one.series.values, one.series.healthy, one.series.limit])
     room = ROOM * float(np.ptp(ends))  # the axis cuts off forecasts beyond this, which would squeeze the logs
     told = (float(ends.min()) - room, float(ends.max()) + room)
-    return Panel(SHOWN[one.name], unit, curves, marks, [(2, 3)], told)
+    return Panel(QUANTITY_NAMES[one.name], unit, curves, marks, [(2, 3)], told)
 
 
 def _abscissa(one: Outlook, ahead: int) -> tuple[Array, str]:
@@ -242,14 +244,14 @@ def _link(name: str, page: str) -> Markup:
 def _course(one: Outlook, ahead: int) -> tuple[Array, Array]:
     """Return level and standard deviation after each log and in the forecast, shape (logs + ahead,) each."""
     grid, series = settings(), one.series
-    past = followed(one)
+    past = segment_levels(one)
     coming = [moments(predict(one.trend.belief, float(step), grid), grid) for step in range(1, ahead + 1)]
     future = [(series.healthy + series.size * mean, abs(series.size) * std) for mean, std in coming]
     level, std = np.array([*past, *future]).T
     return level, std
 
 
-def followed(one: Outlook) -> list[tuple[float, float]]:
+def segment_levels(one: Outlook) -> list[tuple[float, float]]:
     """Return level and standard deviation after each log, from the logs of its own segment [the severity's unit].
 
     A lasting change can be told from an outlier only some logs later; until then, the trend follows the earlier level.

@@ -44,7 +44,7 @@ class ActuatorRow:
     @cached_property
     def state(self) -> str:
         """The state of the last log, or an alarm if it is within its limits but is not expected to stay there."""
-        growing = self.last.told and self.outlook is not None and self.outlook.alarm
+        growing = self.last.has_verdict and self.outlook is not None and self.outlook.alarm
         return "alarm" if growing and self.last.state in ("open", "within", "unknown") else self.last.state
 
     @property

@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.fleet.naming import Named
+    from experiments.fleet.naming import ActuatorAndDate
 
 DAY_FIRST = re.compile(
     r"(?<![0-9])(?P<day>0[1-9]|[12]\d|3[01])\.(?P<month>0[1-9]|1[0-2])\.(?P<year>(?:19|20)\d\d)(?![0-9])"
@@ -23,10 +23,10 @@ MONTHS = (
     *("July", "August", "September", "October", "November", "December"),
 )
 
-APART = 1000.0
+LONGEST_GAP_DAYS = 1000.0
 """Longest time between two logs of a fleet [day]. If a gap is longer, the smaller group of logs has a wrong date."""
 
-FEW = 0.1
+LARGEST_WRONG_SHARE = 0.1
 """Largest share of logs that may have a wrong date [fraction]. If more lie apart, the fleet has a gap, not a wrong
 clock."""
 
@@ -36,7 +36,7 @@ HOURS, DAYS, PARTS = 2.0, 45.0, 730.0
 OUT_OF_SIGHT = "not within sight"
 """Forecast text if no prediction reaches the limit."""
 
-LAST = datetime(9999, 1, 1, tzinfo=UTC)
+LAST_DATE = datetime(9999, 1, 1, tzinfo=UTC)
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -51,7 +51,7 @@ def year_first(text: str) -> str:
     return DAY_FIRST.sub(r"\g<year>-\g<month>-\g<day>", text)
 
 
-def without_wrong_clocks(named: "Mapping[str, Named]") -> "dict[str, Named]":
+def without_wrong_clocks(named: "Mapping[str, ActuatorAndDate]") -> "dict[str, ActuatorAndDate]":
     """Remove the date of the few logs whose date lies years before or after those of all others.
 
     A logger whose clock was never set writes 1970 or 2000. Such a log would be the first or the last of its actuator.
@@ -66,15 +66,15 @@ def without_wrong_clocks(named: "Mapping[str, Named]") -> "dict[str, Named]":
     dict[str, Named]
         By file; a log with a wrong date has a ``problem`` in place of an actuator and a date.
     """
-    dated = sorted((one.place, file) for file, one in named.items() if one.in_days and one.place is not None)
+    dated = sorted((one.place, file) for file, one in named.items() if one.has_calendar_date and one.place is not None)
     groups: list[list[str]] = [[dated[0][1]]] if dated else []
     for (before, _), (place, file) in pairwise(dated):
-        if place - before > APART:
+        if place - before > LONGEST_GAP_DAYS:
             groups.append([])
         groups[-1].append(file)
     most = max(groups, key=len, default=[])
     far = [file for group in groups if group is not most for file in group]
-    if len(far) > FEW * len(dated):
+    if len(far) > LARGEST_WRONG_SHARE * len(dated):
         return dict(named)
     said = "its date {} is years away from those of all other logs: is the logger's clock set?"
     wrong = {file: said.format(named[file].day) for file in far}
@@ -84,7 +84,7 @@ def without_wrong_clocks(named: "Mapping[str, Named]") -> "dict[str, Named]":
     }
 
 
-def told_date(place: float, ahead: float) -> str:
+def date_text(place: float, ahead: float) -> str:
     """Return a date as text, as precise as the forecast justifies.
 
     Parameters
@@ -96,12 +96,12 @@ def told_date(place: float, ahead: float) -> str:
 
     Examples
     --------
-    >>> told_date(20530.0, 9.0), told_date(20530.0, 100.0), told_date(20530.0, 900.0)
+    >>> date_text(20530.0, 9.0), date_text(20530.0, 100.0), date_text(20530.0, 900.0)
     ('18 March 2026', 'mid March 2026', '2026')
-    >>> told_date(20530.6, 1.0)
+    >>> date_text(20530.6, 1.0)
     '2026-03-18 14:00'
     """
-    date = min(EPOCH + timedelta(days=min(place, 2.9e6)), LAST)
+    date = min(EPOCH + timedelta(days=min(place, 2.9e6)), LAST_DATE)
     if ahead < HOURS:
         return f"{date:%Y-%m-%d %H:00}"
     month = f"{MONTHS[date.month - 1]} {date.year}"
@@ -110,7 +110,7 @@ def told_date(place: float, ahead: float) -> str:
     return f"{('early', 'mid', 'late')[min((date.day - 1) // 10, 2)]} {month}" if ahead < PARTS else str(date.year)
 
 
-def told_dates(places: Iterable[float], ahead: Iterable[float]) -> str:
+def date_interval_text(places: Iterable[float], ahead: Iterable[float]) -> str:
     """Return the interval of a future date in words.
 
     Parameters
@@ -122,18 +122,19 @@ def told_dates(places: Iterable[float], ahead: Iterable[float]) -> str:
 
     Examples
     --------
-    >>> told_dates([20490.0, 20560.0], [60.0, 130.0]), told_dates([20490.0, float("inf")], [60.0, float("inf")])
+    >>> far = float("inf")
+    >>> date_interval_text([20490.0, 20560.0], [60.0, 130.0]), date_interval_text([20490.0, far], [60.0, far])
     ('early February to mid April 2026', 'not before early February 2026')
-    >>> told_dates([20490.0, 20491.0], [60.0, 61.0]), told_dates([20530.6, 20535.0], [1.0, 5.4])
+    >>> date_interval_text([20490.0, 20491.0], [60.0, 61.0]), date_interval_text([20530.6, 20535.0], [1.0, 5.4])
     ('early February 2026', '18 to 23 March 2026')
     """
     (low, high), (first, last) = places, ahead
     if low == float("inf"):
         return OUT_OF_SIGHT
-    begin = told_date(low, max(first, min(last, HOURS)))  # no hour if the end of the interval has none
+    begin = date_text(low, max(first, min(last, HOURS)))  # no hour if the end of the interval has none
     if high == float("inf"):
         return f"not before {begin}"
-    end = told_date(high, last)
+    end = date_text(high, last)
     short = begin
     for same in (end[-4:], end.rpartition(" ")[0].rpartition(" ")[2]):  # the year, then the month, if both ends have it
         short = short.removesuffix(f" {same}") if end != begin and last >= HOURS else short

@@ -30,7 +30,7 @@ MATCHING = 0.8
 
 
 @dataclass(frozen=True)
-class Named:
+class ActuatorAndDate:
     """The actuator and the date of a log.
 
     Parameters
@@ -65,12 +65,12 @@ class Named:
         return self.shown.split(" ")[0] if STAMP.fullmatch(self.date) else self.date
 
     @property
-    def in_days(self) -> bool:
+    def has_calendar_date(self) -> bool:
         """Whether the place counts days, not running hours or the like."""
         return self.place is not None and re.fullmatch(CALENDAR, self.date) is not None
 
 
-UNNAMED = Named("", "", None)
+UNNAMED = ActuatorAndDate("", "", None)
 
 
 def place_of(date: str, source: str) -> float:
@@ -119,7 +119,7 @@ def place_of(date: str, source: str) -> float:
         ) from error
 
 
-def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
+def by_pattern(files: Iterable[str], pattern: str) -> dict[str, ActuatorAndDate]:
     """Read the actuator and date of each log from its file name.
 
     Parameters
@@ -153,10 +153,10 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
             f"--pattern must hold {{actuator}} once, {{date}} once at most and no other name, got {pattern!r}"
         )
     stamped, wanted = (
-        re.compile("(?:^|.*/)" + "".join(_text(part, fields) for part in parts) + "$")
+        re.compile("(?:^|.*/)" + "".join(_pattern_regex(part, fields) for part in parts) + "$")
         for fields in ({**FIELDS, "date": f"(?P<date>{STAMP.pattern})"}, FIELDS)
     )
-    found: dict[str, Named] = {}
+    found: dict[str, ActuatorAndDate] = {}
     for file in files:
         path = file.replace("\\", "/")
         match = stamped.match(path) or wanted.match(path)
@@ -164,18 +164,18 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
             found[file] = UNNAMED
             continue
         date = match.groupdict().get("date") or ""
-        found[file] = _named(match["actuator"].split("/")[-1], date, "its name")
+        found[file] = _actuator_and_date(match["actuator"].split("/")[-1], date, "its name")
     return without_wrong_clocks(_require_a_date(found))
 
 
-def _text(part: str, fields: Mapping[str, str]) -> str:
+def _pattern_regex(part: str, fields: Mapping[str, str]) -> str:
     """Return the regular expression for one part of a pattern."""
     if part.startswith("{"):
         return fields[part[1:-1]]
     return ".*" if part == "*" else re.escape(part)
 
 
-def by_dates(files: Iterable[str], folder: str = "") -> dict[str, Named]:
+def by_dates(files: Iterable[str], folder: str = "") -> dict[str, ActuatorAndDate]:
     """Read actuator and date from file names that hold one date each, such as P-12_20261122_143000.csv.
 
     The actuator is the rest of the name without the date. If the rest is empty, or a word such as "log", the actuator
@@ -241,7 +241,7 @@ def _stem(name: str) -> str:
     return re.sub(r"\.[A-Za-z][A-Za-z0-9]*(?:\.(?:gz|zst))?$", "", name)
 
 
-def _by_date(path: str) -> Named:
+def _by_date(path: str) -> ActuatorAndDate:
     """Return actuator and date from the names of a file and its folder."""
     *_, folder, name = path.split("/")
     stem = year_first(_stem(name))
@@ -253,10 +253,10 @@ def _by_date(path: str) -> Named:
     actuator = "_".join(part for part in rest if part)
     if re.sub(r"[^a-z]", "", actuator.lower()) in {"", *NO_ACTUATOR} and not re.search(r"\d", actuator):
         actuator = folder
-    return _named(actuator, date[0], "its name") if actuator else UNNAMED
+    return _actuator_and_date(actuator, date[0], "its name") if actuator else UNNAMED
 
 
-def _require_a_date(found: dict[str, Named]) -> dict[str, Named]:
+def _require_a_date(found: dict[str, ActuatorAndDate]) -> dict[str, ActuatorAndDate]:
     """Raise an error if no name has a readable date: then the pattern or the date format is wrong, not a log."""
     wrong = [file for file, one in found.items() if one.problem]
     if wrong and not any(one.actuator for one in found.values()):
@@ -264,15 +264,15 @@ def _require_a_date(found: dict[str, Named]) -> dict[str, Named]:
     return found
 
 
-def _named(actuator: str, date: str, source: str) -> Named:
+def _actuator_and_date(actuator: str, date: str, source: str) -> ActuatorAndDate:
     """Return actuator and date of a log; one bad date must not stop the page of the whole fleet."""
     try:
-        return Named(actuator, year_first(date), place_of(date, source) if date else None)
+        return ActuatorAndDate(actuator, year_first(date), place_of(date, source) if date else None)
     except HydrostateError as error:
-        return Named("", "", None, str(error))
+        return ActuatorAndDate("", "", None, str(error))
 
 
-def by_table(files: Iterable[str], table: Path) -> dict[str, Named]:
+def by_table(files: Iterable[str], table: Path) -> dict[str, ActuatorAndDate]:
     """Read actuator and date of logs from a table.
 
     Parameters
@@ -295,7 +295,9 @@ def by_table(files: Iterable[str], table: Path) -> dict[str, Named]:
     """
     rows = table_rows(table, ("file", "actuator"))
     said = without_wrong_clocks(
-        _require_a_date({row["file"]: _named(row["actuator"], row.get("date") or "", table.name) for row in rows})
+        _require_a_date(
+            {row["file"]: _actuator_and_date(row["actuator"], row.get("date") or "", table.name) for row in rows}
+        )
     )
     return {file: said.get(file) or said.get(Path(file).name) or UNNAMED for file in files}
 

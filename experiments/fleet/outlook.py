@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.fleet.dates import HOURS, OUT_OF_SIGHT, told_date, told_dates
+from experiments.fleet.dates import HOURS, OUT_OF_SIGHT, date_interval_text, date_text
 from experiments.fleet.naming import place_of, table_rows
 from experiments.fleet.rows import LogRow
 from faults.trend.crossing import HORIZON
@@ -61,7 +61,9 @@ class Outlook:
     @property
     def days_apart(self) -> float | None:
         """Usual time between two logs [day]; None if they have no calendar dates."""
-        return self.series.step if len(self.logs) > 1 and all(one.named.in_days for one in self.logs) else None
+        return (
+            self.series.step if len(self.logs) > 1 and all(one.named.has_calendar_date for one in self.logs) else None
+        )
 
     @property
     def past(self) -> str:
@@ -106,9 +108,9 @@ class Outlook:
         ahead = [max(self.days_apart * end, 0.0 if hours else HOURS) for end in ends]  # no hour if file names have none
         places = [(self.logs[-1].named.place or 0.0) + self.days_apart * end for end in ends]
         if low != high:
-            return told_dates(places, ahead)
+            return date_interval_text(places, ahead)
         farthest = self.days_apart * float(self.trend.crossing.quantiles[-1])
-        return told_date(places[0], max(ahead[0], min(farthest, HOURS)))  # no hour if the interval is one of days
+        return date_text(places[0], max(ahead[0], min(farthest, HOURS)))  # no hour if the interval is one of days
 
     @property
     def words(self) -> str:
@@ -177,7 +179,7 @@ def outlook_of(logs: Sequence[LogRow], name: str, maintained: Sequence[float] = 
     Outlook or None
         None if no log has both a verdict and a value of the severity.
     """
-    told = tuple(one for one in logs if name in one.amounts and one.told)
+    told = tuple(one for one in logs if name in one.amounts and one.has_verdict)
     if not told:
         return None
     amounts = [one.amounts[name] for one in told]

@@ -8,13 +8,13 @@ import pandas as pd
 
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.rows import STATES, LogRow
-from experiments.page.condition_names import in_words, level_in_words
-from experiments.page.names_shown import SHOWN
-from experiments.page.numbers import MISSING, alike_in_digits, fixed, number, shop_unit
+from experiments.page.condition_names import condition_in_words, level_in_words
+from experiments.page.names_shown import QUANTITY_NAMES
+from experiments.page.numbers import MISSING, fixed, number, shop_unit, with_equal_decimals
 from experiments.page.render import render_page
 from experiments.page.scripting import data_block
 from experiments.page.sentences import whole_dates
-from experiments.page.tables import Cell, Column, right
+from experiments.page.tables import Cell, Column, right_aligned
 
 MOST_STILL = 100
 """Rows of a table when scripts do not run [count]."""
@@ -23,10 +23,10 @@ MOST_OPEN, MOST_LISTED = 25, 10
 """Rows shown on paper [count]: actuators that are not sound (more if more are sick), and logs that could not be read or
 have no date. With the key to the states they fill two sheets. `fleet.html` hides the remaining logs."""
 
-UNREAD = ("log", "actuator", "why")
+UNREAD_COLUMNS = ("log", "actuator", "why")
 """Columns of the table of logs that could not be read."""
 
-IF_RIGHT = ", if the rig file is right"
+IF_RIG_RIGHT = ", if the rig file is right"
 """Suffix for the leakage and friction levels of a circuit that lies outside the nine conditions."""
 
 MOST_NAMED = 5
@@ -35,10 +35,10 @@ MOST_NAMED = 5
 LEAST_OPEN, SHARE_OPEN = 3, 0.2
 """Actuators without a verdict from which a wrong rig file is suspected [count, fraction of all]."""
 
-SICK = ("over", "likely")
+SICK_STATES = ("over", "likely")
 """States of actuators that need work."""
 
-SOUND = "within"
+SOUND_STATE = "within"
 """State of actuators that need no work."""
 
 COLUMNS: Sequence[Mapping[str, Any]] = (
@@ -73,7 +73,7 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     cells = [row_cells(row) for row in rows]
     every = [one for row in rows for one in row.logs]
     unread = [
-        (one.file.rsplit("/", 1)[-1], one.named.actuator or MISSING, found_in(one))
+        (one.file.rsplit("/", 1)[-1], one.named.actuator or MISSING, finding_text(one))
         for one in every
         if one.state == "failed"
     ]
@@ -92,29 +92,29 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
         "pages": len(links),
         "rows": len(rows),
         "unread_count": len(unread),
-        "unread": pd.DataFrame(unread[:MOST_STILL], columns=list(UNREAD)),
+        "unread": pd.DataFrame(unread[:MOST_STILL], columns=list(UNREAD_COLUMNS)),
         "undated_count": len(undated),
         "undated": pd.DataFrame(undated[:MOST_STILL], columns=["log", "why"]),
         "listed": MOST_LISTED,
-        **_still(rows, cells),
+        **_still_rows(rows, cells),
     }
     columns = [
         Column("state", words=lambda name: Cell(STATES[name], f"fleet-{name}")),
-        Column("of the limit", unit="%", words=lambda share: right(fixed(share, 1))),
-        Column("logs left", words=lambda left: right(number(left, 2))),
+        Column("of the limit", unit="%", words=lambda share: right_aligned(fixed(share, 1))),
+        Column("logs left", words=lambda left: right_aligned(number(left, 2))),
         Column("outlook", words=whole_dates),
         Column("last log", words=lambda day: Cell(day, "name")),
     ]
     shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
-    named = (Column("log", words=lambda name: Cell(name, "name")), *UNREAD[1:])
+    named = (Column("log", words=lambda name: Cell(name, "name")), *UNREAD_COLUMNS[1:])
     tables = {"still": shown, "others": shown, "unread": named, "undated": (named[0], "why")}
     return render_page("fleet/fleet.html", facts, tables, {})
 
 
-def _still(rows: Sequence[ActuatorRow], cells: Sequence[Sequence[Any]]) -> dict[str, Any]:
+def _still_rows(rows: Sequence[ActuatorRow], cells: Sequence[Sequence[Any]]) -> dict[str, Any]:
     """Return the rows shown on paper, further rows shown when scripts do not run, and the counts of the others."""
-    sick = sum(row.state in (*SICK, "alarm") for row in rows)
-    ailing = [i for i, row in enumerate(rows) if row.state != SOUND][: max(MOST_OPEN, min(sick, MOST_STILL))]
+    sick = sum(row.state in (*SICK_STATES, "alarm") for row in rows)
+    ailing = [i for i, row in enumerate(rows) if row.state != SOUND_STATE][: max(MOST_OPEN, min(sick, MOST_STILL))]
     others = sorted(set(range(len(rows))).difference(ailing))
     left = Counter(rows[i].state for i in others)
     labels = [column["label"] for column in COLUMNS]
@@ -135,13 +135,13 @@ def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:
     rows : sequence of ActuatorRow
         The sickest first.
     """
-    sick = [row.name for row in rows if row.state in SICK]
+    sick = [row.name for row in rows if row.state in SICK_STATES]
     if not rig_hint(rows):  # a few outside the nine conditions are faulty; many mean that the rig file is wrong
-        sick += [row.name for row in rows if row.state == "unknown" and row.last.beside and _past(row.last)]
+        sick += [row.name for row in rows if row.state == "unknown" and row.last.beside and _is_past_limit(row.last)]
     return (sick or [row.name for row in rows if row.state == "alarm"])[:MOST_NAMED]
 
 
-def _past(log: LogRow) -> bool:
+def _is_past_limit(log: LogRow) -> bool:
     return log.worst is not None and log.worst.share > 1.0
 
 
@@ -152,8 +152,8 @@ def title_of(rows: Sequence[ActuatorRow]) -> str:
         known, alone = list(rows), []
     counts = Counter(row.state for row in known)
     total = len(known) - counts["failed"]
-    sick, certain = sum(counts[name] for name in SICK), counts["over"]
-    stray = sum(row.state in SICK for row in alone)
+    sick, certain = sum(counts[name] for name in SICK_STATES), counts["over"]
+    stray = sum(row.state in SICK_STATES for row in alone)
     if not total:
         return "No log could be read."
     if total == 1 and not stray:
@@ -207,7 +207,7 @@ def row_cells(row: ActuatorRow) -> list[Any]:
         Text, numbers, or None if unknown.
     """
     last = row.last
-    told = last.told  # if no model fits, the severities are not the actuator's
+    told = last.has_verdict  # if no model fits, the severities are not the actuator's
     share = round(100.0 * last.worst.share, 1) if last.worst is not None and told else None
     outlook = row.outlook
     left = None if outlook is None or outlook.left is None or not told else round(outlook.left[1], 1)
@@ -215,17 +215,17 @@ def row_cells(row: ActuatorRow) -> list[Any]:
     return [
         row.name,
         row.state,
-        found_in(last),
-        worst_in(last) if last.shown else "",
+        finding_text(last),
+        worst_severity_text(last) if last.shows_severities else "",
         share,
-        words if told else f"no verdict {untold_since(row)}".strip(),
+        words if told else f"no verdict {no_verdict_since(row)}".strip(),
         left,
         last.named.day,
         len(row.logs),
     ]
 
 
-def untold_since(row: ActuatorRow) -> str:
+def no_verdict_since(row: ActuatorRow) -> str:
     """Return since when there is no verdict; empty if there never was one, or if logs have no dates."""
     read = [one for one in row.logs if one.state != "failed"]
     known = [place for place, one in enumerate(read) if one.state != "unknown"]
@@ -233,25 +233,25 @@ def untold_since(row: ActuatorRow) -> str:
     return f"since {day}" if day else ""
 
 
-def found_in(log: LogRow) -> str:
+def finding_text(log: LogRow) -> str:
     """Return the finding of a log, or the reason why there is none, without the log's folder."""
     levels = [level_in_words(name, size) for name, size in log.between.items() if size > 0.0]
     if levels:
-        return "; ".join(levels) + (IF_RIGHT if log.beside else "")
-    return in_words(log.condition) if log.condition else log.reason.split(f"{log.file}: ", 1)[-1]
+        return "; ".join(levels) + (IF_RIG_RIGHT if log.beside else "")
+    return condition_in_words(log.condition) if log.condition else log.reason.split(f"{log.file}: ", 1)[-1]
 
 
-def worst_in(log: LogRow) -> str:
+def worst_severity_text(log: LogRow) -> str:
     """Return the severity that is closest to its limit, or farthest beyond it, with its name."""
     name = log.worst.name if log.worst else ""
-    return f"{SHOWN.get(name, name.replace('_', ' '))} {amount_in(log, name)}" if name else ""
+    return f"{QUANTITY_NAMES.get(name, name.replace('_', ' '))} {severity_text(log, name)}" if name else ""
 
 
-def amount_in(log: LogRow, name: str) -> str:
+def severity_text(log: LogRow, name: str) -> str:
     """Return a severity with its unit; empty if the log does not determine it."""
     one = log.amounts.get(name)
     if one is None:
         return ""
     scale, unit = shop_unit(one.unit)
-    shown, *_ = alike_in_digits(scale * one.value, [scale * one.low, scale * one.high], unit)
+    shown, *_ = with_equal_decimals(scale * one.value, [scale * one.low, scale * one.high], unit)
     return f"{shown} {unit}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from estimation.finding import NORMAL_95
-from experiments.fleet.naming import UNNAMED, Named
+from experiments.fleet.naming import UNNAMED, ActuatorAndDate
 from faults.notes import AgainstCode
 
 STATES: Mapping[str, str] = {
@@ -21,7 +21,7 @@ STATES: Mapping[str, str] = {
 }
 """States of a log or an actuator with their descriptions, the most urgent first."""
 
-BETWEEN, BESIDE = str(AgainstCode.BETWEEN_CONDITIONS), str(AgainstCode.OUTSIDE_CONDITIONS)
+BETWEEN_CODE, OUTSIDE_CODE = str(AgainstCode.BETWEEN_CONDITIONS), str(AgainstCode.OUTSIDE_CONDITIONS)
 """Codes of logs that fit one circuit, although they fit none of the nine conditions."""
 
 RANKS: Mapping[str, int] = {name: place for place, name in enumerate(STATES)}
@@ -91,7 +91,7 @@ class LogRow:
     """
 
     file: str
-    named: Named
+    named: ActuatorAndDate
     state: str
     condition: str
     reason: str
@@ -100,14 +100,14 @@ class LogRow:
     beside: bool = False
 
     @property
-    def told(self) -> bool:
+    def has_verdict(self) -> bool:
         """Whether the severities are valid: a model explains the log, be it one of the nine conditions or not."""
         return self.state not in ("unknown", "failed")
 
     @property
-    def shown(self) -> bool:
+    def shows_severities(self) -> bool:
         """Whether severities are shown: they are valid, or would be valid if the rig file is right."""
-        return self.told or self.beside
+        return self.has_verdict or self.beside
 
     @property
     def worst(self) -> Amount | None:
@@ -121,7 +121,7 @@ class LogRow:
 
 
 def log_rows(
-    rows: Iterable[Mapping[str, Any]], names: Mapping[str, Named], limits: Mapping[str, float]
+    rows: Iterable[Mapping[str, Any]], names: Mapping[str, ActuatorAndDate], limits: Mapping[str, float]
 ) -> list[LogRow]:
     """Return one row for each log that was diagnosed.
 
@@ -140,22 +140,22 @@ def log_rows(
     ]
 
 
-def _row(row: Mapping[str, Any], named: Named, limits: Mapping[str, float]) -> LogRow:
+def _row(row: Mapping[str, Any], named: ActuatorAndDate, limits: Mapping[str, float]) -> LogRow:
     amounts = _amounts(row["quantities"], limits)
-    code, between = _placed(row.get("against"))
+    code, between = _levels_between(row.get("against"))
     state = _state(row, amounts)
-    if state == "unknown" and code == BETWEEN:  # never certain: a sensor with a wrong gain would look the same
+    if state == "unknown" and code == BETWEEN_CODE:  # never certain: a sensor with a wrong gain would look the same
         state = "likely" if any(one.share > 1.0 for one in amounts.values()) else "open"
-    beside = code == BESIDE
+    beside = code == OUTSIDE_CODE
     return LogRow(
         row["file"], named, state, row["found_condition"] or "", row["reason"] or "", amounts, between, beside
     )
 
 
-def _placed(text: str | None) -> tuple[str, dict[str, float]]:
+def _levels_between(text: str | None) -> tuple[str, dict[str, float]]:
     """Return code, leakage and friction of a log that is unknown only because its levels are those of no condition."""
     against = json.loads(text or "[]")
-    if len(against) != 1 or against[0]["code"] not in (BETWEEN, BESIDE) or not against[0]["data"]:
+    if len(against) != 1 or against[0]["code"] not in (BETWEEN_CODE, OUTSIDE_CODE) or not against[0]["data"]:
         return "", {}
     return against[0]["code"], {name: against[0]["data"][name] for name in ("leakage", "friction")}
 

@@ -78,7 +78,7 @@ def with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
 
 def column_entries(found: "Identified") -> dict[str, Any]:
     """Return a model between columns under the names of the JSON contract."""
-    from estimation.identification.notes import AGAINST, WARNED
+    from estimation.identification.notes import RAISED_AS_WARNINGS, UNRELIABLE
     from estimation.identification.state_space.dynamics import StateSpaceDynamics
 
     model, linear = found.model, found.model.linear
@@ -94,7 +94,7 @@ def column_entries(found: "Identified") -> dict[str, Any]:
         "held_back_percent": found.held_back_percent,
         "candidates": list(found.candidates),
         "model": model.to_dict(),
-        "notes": [note.to_dict() for note in found.notes if note.code not in WARNED],
+        "notes": [note.to_dict() for note in found.notes if note.code not in RAISED_AS_WARNINGS],
     }
     if linear is not None:
         result = {**linear_entries(linear), **result, "order": linear.denominator.size - 1, "offset": model.offset}
@@ -104,7 +104,7 @@ def column_entries(found: "Identified") -> dict[str, Any]:
     elif isinstance(model.dynamics, StateSpaceDynamics):
         result |= _state_space_entries(model, model.dynamics)
     result["nonlinearity"] = model.nonlinearity
-    quality, why = found.quality, sorted(found.notes, key=lambda note: note.code not in AGAINST)
+    quality, why = found.quality, sorted(found.notes, key=lambda note: note.code not in UNRELIABLE)
     result["message"] = clauses(
         [
             f"{model.structure} with {model.n_values} values: fit {quality.fit_percent:.1f} % running free, "

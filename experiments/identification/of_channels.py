@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from estimation.identification.structure_names import STRUCTURE_NAMES
 from experiments.command.json_output import Result, prepare_output
-from experiments.command.logs import finish, overheard, read_log, run_logs, with_remarks
+from experiments.command.logs import catch_and_repeat_warnings, finish, read_log, run_logs, with_remarks
 from experiments.command.options import require_positive
-from experiments.command.output_paths import own_paths, page_place
+from experiments.command.output_paths import page_place, paths_by_owner
 from experiments.command.pages import Pages
 from experiments.command.terminal import note, short_names, table
 from experiments.identification.entries import FORMAT_VERSION, gains_shown, linear_entries
@@ -94,7 +94,7 @@ def identify_channels(
     require_positive("--sample-time", fit.sample_time, "s")
     require_positive("--filter-hz", fit.filter_hz, "Hz")
     prepare_output(out, logs)
-    figures, pages = own_paths(fit.figure, logs), Pages(own_paths(page_place(fit.report), logs))
+    figures, pages = paths_by_owner(fit.figure, logs), Pages(paths_by_owner(page_place(fit.report), logs))
     chosen = {"input": fit.input, "output": fit.output, "rig": rig.name, "seed": fit.seed}
 
     def work(log: Path) -> Result:
@@ -105,10 +105,10 @@ def identify_channels(
             raise NoChannelError(f"{error.message}; {hint}", error.source) from error
         taken: dict[str, Any] = {"output": fit.output, "input": fit.input, "filter_cutoff_hz": fit.filter_hz}
         taken["sample_time"] = max(TABLE_6_TIME, record.sample_time) if fit.sample_time is None else fit.sample_time
-        with overheard() as said:
+        with catch_and_repeat_warnings() as said:
             model = identify_record(record, **taken, **form)
         u, y = record_signals(record, **taken)
-        result = {**chosen, **linear_entries(model), **_judged(model, u, y, log, figures.get(log))}
+        result = {**chosen, **linear_entries(model), **_validation_entries(model, u, y, log, figures.get(log))}
         if log in pages.places:
             pages.write(log, _page(with_remarks({"file": str(log), **result}, said), model, u, y))
         return result
@@ -129,7 +129,7 @@ def _page(result: Result, model: "LinearModel", u: "Array", y: "Array") -> str:
     )
 
 
-def judged_page(model: "LinearModel", u: "Array", y: "Array", title: str) -> str:
+def page_of_new_model(model: "LinearModel", u: "Array", y: "Array", title: str) -> str:
     """Return the page of a model that no command has validated yet.
 
     Parameters
@@ -141,7 +141,10 @@ def judged_page(model: "LinearModel", u: "Array", y: "Array", title: str) -> str
     """
     ends = {"input": model.input_name, "output": model.output_name}
     return _page(
-        {"file": title, **ends, **linear_entries(model), **_judged(model, u, y, Path(title), None)}, model, u, y
+        {"file": title, **ends, **linear_entries(model), **_validation_entries(model, u, y, Path(title), None)},
+        model,
+        u,
+        y,
     )
 
 
@@ -161,7 +164,7 @@ def _form(fit: ChannelFit) -> dict[str, Any]:
     }
 
 
-def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Path | None) -> dict[str, Any]:
+def _validation_entries(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Path | None) -> dict[str, Any]:
     """Return the residual tests of the model and the gain's interval; draw both if requested."""
     from estimation.finding import interval_95
     from estimation.identification.fit.profile_interval import dc_gain_interval
@@ -192,7 +195,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     shown = table("log", "fit [%]", f"gain [{unit}]", "bandwidth [Hz]", "coefficients, q^0 q^-1 ...")
     for name, result in zip(short_names(results), results, strict=True):
         bandwidth = "-" if result["bandwidth_hz"] is None else f"{result['bandwidth_hz']:.3g}"
-        coefficients = f"b {_spaced(result['numerator'])}\nf {_spaced(result['denominator'])}"
+        coefficients = f"b {_spaced_numbers(result['numerator'])}\nf {_spaced_numbers(result['denominator'])}"
         said = (f"{result['fit_percent']:.2f}", gains_shown(result), bandwidth)
         shown.add_row(name, *said, coefficients)
     yield shown
@@ -200,5 +203,5 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     yield f"{ends}, ± one standard deviation; sample times are in --json and --out."
 
 
-def _spaced(values: Sequence[float]) -> str:
+def _spaced_numbers(values: Sequence[float]) -> str:
     return "  ".join(f"{value:.5g}" for value in values)

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from experiments.command.json_output import Result, prepare_output
-from experiments.command.logs import Batch, finish, overheard, run_logs, with_remarks
+from experiments.command.logs import Batch, catch_and_repeat_warnings, finish, run_logs, with_remarks
 from experiments.command.options import require_positive
-from experiments.command.output_paths import own_paths, page_place
+from experiments.command.output_paths import page_place, paths_by_owner
 from experiments.command.pages import Pages
 from experiments.command.terminal import table
 from experiments.identification.entries import column_entries, gains_shown
@@ -52,7 +52,7 @@ class ColumnFit:
     response: Path | None = None
 
 
-AT_OUTPUT = ("absolute-value", "cut-off", "stops")
+OUTPUT_NONLINEARITIES = ("absolute-value", "cut-off", "stops")
 """Kinds of nonlinearity at the output, such as friction; all others are at the input."""
 
 BLANK: Result = {
@@ -99,10 +99,10 @@ def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out
             read.append([record_of(log, wanted, fit.sample_time) for log in fit.validate])
         together = fit.structure == STATE_SPACE or (fit.structure == "auto" and len(fit.outputs) > 1)
         if together and not shared:
-            shared.update(_together(read[0], fit, fit.outputs))
-        with overheard() as said:
-            found = shared.get(output) or _together(read[0], fit, (output,))[output]
-            result = _answer(found, read, output, fit, logs)
+            shared.update(_identify_outputs(read[0], fit, fit.outputs))
+        with catch_and_repeat_warnings() as said:
+            found = shared.get(output) or _identify_outputs(read[0], fit, (output,))[output]
+            result = _output_result(found, read, output, fit, logs)
         if output in pages.places:
             about = with_remarks({"file": ", ".join(map(str, logs)), **result}, said)
             data = found.at_one_offset(channels_of(read[0], fit.inputs, output, fit.resampled))
@@ -110,7 +110,7 @@ def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out
         return result
 
     columns = {Path(output): output for output in fit.outputs}  # Path shortens some names, such as "x/."
-    pages = Pages(own_paths(page_place(fit.report), fit.outputs))
+    pages = Pages(paths_by_owner(page_place(fit.report), fit.outputs))
     batch = run_logs(list(columns), work, BLANK, "identifying")
     named = ", ".join(str(log) for log in logs)
     results = tuple({**result, "file": named} for result in batch.results)
@@ -125,7 +125,7 @@ def _page(result: Result, found: "Identified", data: "Channels") -> str:
     return identified_page(view_of_columns(result, found.model, data))
 
 
-def _together(records: "Sequence[Record]", fit: ColumnFit, outputs: Sequence[str]) -> "dict[str, Identified]":
+def _identify_outputs(records: "Sequence[Record]", fit: ColumnFit, outputs: Sequence[str]) -> "dict[str, Identified]":
     """Return the identified models of some outputs, by name."""
     from estimation.identification.two_stage import identify_columns as fit_columns
 
@@ -135,7 +135,7 @@ def _together(records: "Sequence[Record]", fit: ColumnFit, outputs: Sequence[str
     return dict(zip(outputs, found, strict=True))
 
 
-def _answer(
+def _output_result(
     found: "Identified", read: "Sequence[Sequence[Record]]", output: str, fit: ColumnFit, logs: Sequence[Path]
 ) -> Result:
     from estimation.identification.free_run.from_records import channels_of
@@ -152,15 +152,15 @@ def _answer(
     if not (fit.figure or fit.simulated or fit.response):
         return {**BLANK, **column_entries(found), "test": test, "frequency_response": None}
     data = found.at_one_offset(channels_of(records, fit.inputs, output, fit.resampled))
-    figure = own_paths(fit.figure, fit.outputs).get(output)
+    figure = paths_by_owner(fit.figure, fit.outputs).get(output)
     if figure is not None:
         from experiments.log_pages.free_run_figure import write_free_run
 
         write_free_run(found.model, data, logs[0].name, figure)
-    simulated = own_paths(fit.simulated, fit.outputs).get(output)
+    simulated = paths_by_owner(fit.simulated, fit.outputs).get(output)
     if simulated is not None:
         write_simulated(found.model, data, simulated)
-    response = own_paths(fit.response, fit.outputs).get(output)
+    response = paths_by_owner(fit.response, fit.outputs).get(output)
     answer = None if response is None else _response(data, logs[0].name, response)
     return {**BLANK, **column_entries(found), "test": test, "frequency_response": answer}
 
@@ -203,7 +203,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
                 for name, one in bend.items()
                 if name != "kind"
             )
-            place = "output" if "friction" in bend["kind"] or bend["kind"] in AT_OUTPUT else "input"
+            place = "output" if "friction" in bend["kind"] or bend["kind"] in OUTPUT_NONLINEARITIES else "input"
             yield f"{result['output']}: {bend['kind'].replace('-', ' ')} at {result[place]}, {values}"
     for result in results:
         if result["outcome"] == "mismatch":

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, run_logs
 from experiments.command.options import require_positive
-from experiments.command.output_paths import own_paths
+from experiments.command.output_paths import paths_by_owner
 from experiments.command.terminal import clauses, table
 from plant.errors import HydrostateError, LogWarning
 
@@ -36,7 +36,7 @@ def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_jso
     models = _models_of(load_models(path), fit.outputs)
     prepare_output(out, logs)
     require_positive("--sample-time", fit.sample_time, "s")
-    simulated = own_paths(fit.simulated, logs)
+    simulated = paths_by_owner(fit.simulated, logs)
 
     def work(log: Path) -> Result:
         results: list[Result] = []
@@ -54,15 +54,15 @@ def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_jso
             quality = quality_of(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))
             results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
             if log in simulated:
-                write_simulated(model, data, own_paths(simulated[log], outputs)[outputs[index]])
-        message = clauses([_said(one["output"], one["fit_percent"]) for one in results])
+                write_simulated(model, data, paths_by_owner(simulated[log], outputs)[outputs[index]])
+        message = clauses([_fit_text(one["output"], one["fit_percent"]) for one in results])
         return {"outcome": "ok", **results[0], "outputs": results, "model_file": str(path), "message": message}
 
     blank: Result = {**dict.fromkeys(("inputs", "output", "structure", "fit_percent", "rmse")), "outputs": []}
     finish(run_logs(logs, work, blank, "simulating"), _simulated_screen, as_json=as_json, out=out)
 
 
-def _said(output: str, fit: float) -> str:
+def _fit_text(output: str, fit: float) -> str:
     return f"{output}: no fit" if isnan(fit) else f"{output}: fit {fit:.1f} % running free"
 
 
@@ -109,12 +109,12 @@ def record_of(log: Path, wanted: Sequence[str], sample_time: float | None, *, as
     LogWarning
         If rows were left out because the logger wrote them a second time.
     """
-    from estimation.identification.free_run.from_records import sent_once
+    from estimation.identification.free_run.from_records import without_repeated_rows
     from plant.log.any_columns import read_any
     from plant.log.clock.uniform import MOST_MISSING_TO_RELATE
 
     record = read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE, assumed=assumed)
-    return sent_once(record, wanted)
+    return without_repeated_rows(record, wanted)
 
 
 def quality_of(model: "FreeRunModel", data: "Channels", named: str = "the log") -> dict[str, Any]:

@@ -39,9 +39,9 @@ def library(
     if file is not None:
         raise HydrostateError(f"a library is shown or built, got both {file} and --out {out}")
     from experiments.library.study import LIBRARY
-    from experiments.running.study import Seeded
+    from experiments.running.study import SeedSettings
 
-    finish_study(LIBRARY, Seeded(seed), out, as_json=as_json)
+    finish_study(LIBRARY, SeedSettings(seed), out, as_json=as_json)
 
 
 def _show(file: Path | None, seed: int, as_json: bool) -> None:

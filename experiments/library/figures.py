@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from experiments.page.drawing import shaded
+from experiments.page.drawing import with_colours
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.page.style import (
@@ -19,9 +19,9 @@ from experiments.page.style import (
     Margins,
     condition_levels,
     panels,
-    spread_out,
+    spread_offsets,
 )
-from experiments.page.words import in_words
+from experiments.page.words import condition_in_words
 
 MILLI = 1e3
 
@@ -32,7 +32,7 @@ STRUCTURE_MARKS = {
     "Box-Jenkins": (PURPLE, "D"),
 }
 
-COMPARED = {
+COMPARED_COLUMNS = {
     "fit_percent": ("running free", "fit [%]"),
     "one_step_percent": ("one step ahead", "fit [%]"),
     "weight_above_percent": ("criterion's weight above 25 Hz", "share [%]"),
@@ -51,9 +51,9 @@ def _draw_structures(tables: Tables) -> Figure:
     found = tables["structures"]
     margins = Margins(left=BESIDE_CONDITIONS.left, top=0.65)
     figure, axes = panels("Four structures on passes held back", 1, 3, 4.8, margins, sharey=True)
-    for axis, (column, (title, label)) in zip(axes, COMPARED.items(), strict=True):
+    for axis, (column, (title, label)) in zip(axes, COMPARED_COLUMNS.items(), strict=True):
         level = condition_levels(axis, found["condition"])
-        for offset, (name, (colour, mark)) in zip(spread_out(4, 0.5), STRUCTURE_MARKS.items(), strict=True):
+        for offset, (name, (colour, mark)) in zip(spread_offsets(4, 0.5), STRUCTURE_MARKS.items(), strict=True):
             mine = found["structure"] == name
             axis.plot(found[column][mine], level[mine] + offset, mark, color=colour, markersize=4.5, label=name)
         axis.set(xlim=(0.0, 100.0), title=title, xlabel=label)
@@ -71,7 +71,7 @@ def _draw_library(tables: Tables) -> Figure:
         low, high = MILLI * rows["gain_low"], MILLI * rows["gain_high"]
         axis.fill_between(rows["frequency_hz"], low, high, color=BLUE, alpha=0.3, lw=0)
         axis.plot(rows["frequency_hz"], MILLI * rows["gain"], color=BLUE, label="library, with 95 % band")
-        axis.set(title=in_words(str(condition)))
+        axis.set(title=condition_in_words(str(condition)))
     axes[0].set(xscale="log", yscale="log", ylim=(3e-3, 1.0))
     axes[3].set(ylabel="gain [mm/s per rad/s]")
     axes[7].set(xlabel="frequency [Hz]")
@@ -114,7 +114,7 @@ def _draw_clocks(tables: Tables) -> Figure:
     columns = [name for name in clocks.columns if name.startswith("at_")]
     frequencies = [float(name.split("_")[1]) for name in columns]
     figure, (axis,) = panels("Predicted deviation of the gain after one test", 1, 1, 3.6, Margins(left=0.9, right=2.2))
-    shades = [colour for _, _, colour in shaded(enumerate(switched["input"]))]
+    shades = [colour for _, _, colour in with_colours(enumerate(switched["input"]))]
     looks = [*((colour, "-") for colour in shades), *((BLACK, ":") for _ in range(len(clocks) - len(shades)))]
     for row, (colour, line), mark in zip(clocks.to_dict("records"), looks, CLOCK_MARKS, strict=False):
         gain = [100.0 * row[name] for name in columns]

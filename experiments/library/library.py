@@ -15,7 +15,7 @@ import numpy as np
 from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.model.linear_model import LinearModel
 from experiments.circuit.passes import CHANNELS, SAMPLE_TIME, Passes, in_condition, run_passes
-from experiments.nine_conditions.printed_transfer_functions import known, pair, pairs, printed_model
+from experiments.nine_conditions.printed_transfer_functions import finite_or_none, pair, pairs, printed_model
 from experiments.published.library import FORMAT, VERSION
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS
@@ -42,7 +42,7 @@ PASS_TIME, SETTLING = 4.0, 1.5
 HIGHEST_ORDER = 2
 """Highest order in the comparison."""
 
-VAGUE = 0.1
+LARGEST_GAIN_STD = 0.1
 """Relative standard deviation above which a gain counts as not determined."""
 
 
@@ -87,7 +87,7 @@ def build_library(seed: int) -> dict[str, Any]:
         speeds, velocities = circuit_passes(rig, name, stream(seed, "library", name))
         around = _determined_model(speeds, velocities)
         models = {"model": bank[name].to_dict(), "around_mean": around.to_dict()}
-        return {**models, **described(bank[name]), "table_6": printed_model(name)}
+        return {**models, **model_entries(bank[name]), "table_6": printed_model(name)}
 
     # not in threads: warning filters belong to the process, so threads would undo each other's
     entries = {name: described_entry(name) for name in CONDITIONS}
@@ -126,14 +126,14 @@ def _determined_model(speeds: list[Array], velocities: list[Array]) -> LinearMod
             form: Any = {"n_numerator": order + 1, "n_denominator": order, **names}
             model = fit_output_error(speeds, velocities, SAMPLE_TIME, covariance="coloured", **form)
         slowest = -SAMPLE_TIME / float(np.log(np.abs(model.poles[0])))
-        known = model.dc_gain_std < VAGUE * abs(model.dc_gain) and slowest < PASS_TIME - SETTLING
+        known = model.dc_gain_std < LARGEST_GAIN_STD * abs(model.dc_gain) and slowest < PASS_TIME - SETTLING
         if order == 1 or (known and not model.cancellations):
             p = 2 * order + 1 + order * len(speeds)
             found.append((model.n_samples * float(np.log(model.rmse**2)) + p * float(np.log(model.n_samples)), model))
     return min(found, key=lambda one: one[0])[1]
 
 
-def described(model: LinearModel) -> dict[str, Any]:
+def model_entries(model: LinearModel) -> dict[str, Any]:
     """Return poles, zeros, gain and bandwidth of a model, each with its standard deviation.
 
     Returns
@@ -146,7 +146,7 @@ def described(model: LinearModel) -> dict[str, Any]:
         "pole_std": pairs(model.pole_std),
         "zeros": pairs(model.zeros),
         "zero_std": pairs(model.zero_std),
-        "dc_gain": {"value": model.dc_gain, "std": known(model.dc_gain_std)},
+        "dc_gain": {"value": model.dc_gain, "std": finite_or_none(model.dc_gain_std)},
         "bandwidth_hz": {"value": model.bandwidth_hz, "std": model.bandwidth_std_hz},
         "cancellations": [[pair(one.pole), pair(one.zero), one.deviations] for one in model.cancellations],
     }

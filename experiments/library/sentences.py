@@ -59,7 +59,7 @@ def order_sentences(found: pd.DataFrame) -> tuple[str, str]:
     tuple of str
         One sentence on the order, one on the bandwidth.
     """
-    by_values, by_bic, kept = (_either(found[f"order_{how}"]) for how in ("by_values", "by_bic", "of_library"))
+    by_values, by_bic, kept = (_orders_text(found[f"order_{how}"]) for how in ("by_values", "by_bic", "of_library"))
     second, gained = found["value_2_over_floor"], found["fit_2_percent"] - found["fit_1_percent"]
     rubbing = found["condition"].str.contains("friction")
     free, stiff = found["bandwidth_hz"][~rubbing], found["bandwidth_hz"][rubbing]
@@ -94,5 +94,5 @@ def clock_sentences(found: pd.DataFrame) -> tuple[str]:
     )
 
 
-def _either(orders: pd.Series) -> str:
+def _orders_text(orders: pd.Series) -> str:
     return " or ".join(str(order) for order in sorted({int(order) for order in orders}))

@@ -14,7 +14,7 @@ from estimation.identification.fit.validate import fit_percent, validate
 from estimation.identification.model.linear_model import LinearModel
 from experiments.circuit.passes import SAMPLE_TIME
 from experiments.library.library import DURATION, Array, circuit_passes
-from experiments.page.frames import Rows, tabled
+from experiments.page.frames import Rows, as_table
 from experiments.running.random_streams import stream
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.sensors.sensors import BENCH
@@ -25,17 +25,17 @@ PAPER_ORDER, EARLIER_ORDER = 2, 3
 PAPER_BANDWIDTH = 25.0
 """Bandwidth stated in section 7 [Hz]."""
 
-HOLDS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
+CLOCKS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 """Clocks compared [s]; 0.2 s is "5 Hz" read literally."""
 
-AT_FREQUENCIES = (1.0, 10.0, 25.0, 40.0)
+COMPARED_FREQUENCIES = (1.0, 10.0, 25.0, 40.0)
 """Frequencies at which the clocks are compared [Hz]."""
 
 MADE_FOR, ONE_TEST = "binary, made for 25 Hz", "multisine, 0.5 to 50 Hz"
 """Names of the tests without a plain clock."""
 
 
-@tabled
+@as_table
 def structure_table(
     rig: CircuitParameters, models: Mapping[str, LinearModel], seed: int, duration: float = DURATION
 ) -> Rows:
@@ -63,7 +63,7 @@ def structure_table(
         order = model.denominator.size - 1
         form = {"n_numerator": order + 1, "n_denominator": order}
         found = {one: fit_structure(one, *fitted, SAMPLE_TIME, form) for one in STRUCTURES}
-        runs = {one: _held_back(model, kept) for one, model in found.items()}
+        runs = {one: _held_back_fits(model, kept) for one, model in found.items()}
         best = max(runs, key=lambda one: runs[one][0].mean())
         for one, (free, ahead) in runs.items():
             yield {
@@ -80,7 +80,7 @@ def structure_table(
             }
 
 
-def _held_back(model: LinearModel, kept: tuple[list[Array], list[Array]]) -> tuple[Array, Array]:
+def _held_back_fits(model: LinearModel, kept: tuple[list[Array], list[Array]]) -> tuple[Array, Array]:
     """Return the fit of the free run and of the one-step prediction for each pass [%]."""
     pairs = list(zip(*kept, strict=True))
     free = [validate(model, u, y).fit_percent for u, y in pairs]
@@ -121,7 +121,7 @@ def weight_above(model: LinearModel, inputs: Sequence[Array], frequency_hz: floa
     return float(weight[f > frequency_hz].sum() / weight.sum())
 
 
-@tabled
+@as_table
 def order_and_bandwidth(
     rig: CircuitParameters, models: Mapping[str, LinearModel], seed: int, duration: float = 20.0
 ) -> Rows:
@@ -167,7 +167,7 @@ def clock_table(model: LinearModel, limits: Limits, seed: int, *, duration: floa
     Returns
     -------
     pandas.DataFrame
-        Table from `rank_inputs`: binary tests of the clocks `HOLDS`, one made for 25 Hz, and a multisine.
+        Table from `rank_inputs`: binary tests of the clocks `CLOCKS`, one made for 25 Hz, and a multisine.
     """
     rng = stream(seed, "clock")
     T, n = model.sample_time, round(duration / model.sample_time)
@@ -175,8 +175,8 @@ def clock_table(model: LinearModel, limits: Limits, seed: int, *, duration: floa
         MADE_FOR: prbs_for(PAPER_BANDWIDTH, T, limits, slowest=0.1, duration=duration),
         ONE_TEST: multisine_for(np.arange(0.5, 50.5, 0.5), T, limits, duration=duration),
     }
-    for hold in HOLDS:
+    for hold in CLOCKS:
         samples = round(hold / T)
         signs = np.repeat(rng.choice([-1.0, 1.0], n // samples + 1), samples)[:n]
         candidates[f"{1e3 * hold:g} ms"] = limits.speed * signs
-    return rank_inputs(model, candidates, BENCH.velocity_noise, np.array(AT_FREQUENCIES), limits)
+    return rank_inputs(model, candidates, BENCH.velocity_noise, np.array(COMPARED_FREQUENCIES), limits)

@@ -13,20 +13,20 @@ from experiments.library.library import build_library, library_text
 from experiments.library.sentences import clock_sentences, order_sentences, structure_sentences
 from experiments.library.structures import clock_table, order_and_bandwidth, structure_table
 from experiments.library.tables import library_table, response_table, root_table
-from experiments.page.frames import Rows, Tables, tabled
+from experiments.page.frames import Rows, Tables, as_table
 from experiments.page.numbers import decimals_of, fixed
-from experiments.page.tables import Cell, Column, Columns, Row, right
+from experiments.page.tables import Cell, Column, Columns, Row, right_aligned
 from experiments.page.words import CONDITION
 from experiments.published.library import library_models
-from experiments.running.progress import Track, in_one_piece
-from experiments.running.study import Found, Seeded, Study
+from experiments.running.progress import Track, run_as_one_piece
+from experiments.running.study import SeedSettings, Study, StudyResult
 from plant.eha.circuit_parameters import CircuitParameters
 
 RIG = CircuitParameters()
 
 
-def _find(settings: Seeded, track: Track) -> Found:
-    built = in_one_piece(track, "identifying nine conditions", lambda: build_library(settings.seed))
+def _find(settings: SeedSettings, track: Track) -> StudyResult:
+    built = run_as_one_piece(track, "identifying nine conditions", lambda: build_library(settings.seed))
     models, around = library_models(built), library_models(built, "around_mean")
     limits = Limits(RIG.rated_speed, stroke=RIG.stroke)
     makers = {
@@ -38,10 +38,10 @@ def _find(settings: Seeded, track: Track) -> Found:
         "clocks": lambda: clock_table(around["major_leakage"], limits, settings.seed).reset_index(),
     }
     tables = {name: make() for name, make in track(makers.items(), description="looking at it")}
-    return Found(tables, files={"library.json": library_text(built).encode()})
+    return StudyResult(tables, files={"library.json": library_text(built).encode()})
 
 
-def _facts(tables: Tables, _: Seeded) -> Mapping[str, Any]:
+def _facts(tables: Tables, _: SeedSettings) -> Mapping[str, Any]:
     """Return the report's sentences, and the roots with one row for each condition."""
     ours = tables["structures"].query("structure == 'output-error'")
     return {
@@ -54,7 +54,7 @@ def _facts(tables: Tables, _: Seeded) -> Mapping[str, Any]:
     }
 
 
-@tabled
+@as_table
 def _roots(frame: pd.DataFrame) -> Rows:
     for condition, of_one in frame.groupby("condition", sort=False):
         row = {"condition": str(condition)}
@@ -78,17 +78,17 @@ def _with_spread(value: float, spread: float) -> str:
 
 
 def _gain(row: Row) -> Cell:
-    return right(f"{fixed(1e3 * row['dc_gain'], 4)} ± {fixed(1e3 * NORMAL_95 * row['dc_gain_std'], 4)}")
+    return right_aligned(f"{fixed(1e3 * row['dc_gain'], 4)} ± {fixed(1e3 * NORMAL_95 * row['dc_gain_std'], 4)}")
 
 
 def _printed_gain(row: Row) -> Cell:
-    return right(f"{fixed(1e3 * row['published_gain_low'], 3)} to {fixed(1e3 * row['published_gain_high'], 3)}")
+    return right_aligned(f"{fixed(1e3 * row['published_gain_low'], 3)} to {fixed(1e3 * row['published_gain_high'], 3)}")
 
 
-def _behind(row: Row) -> Cell:
+def _shortfall_cell(row: Row) -> Cell:
     if row["best"]:
         return Cell("best", "good")
-    return right(f"{fixed(row['behind_percent'], 2)} ± {fixed(row['behind_std_percent'], 2)}")
+    return right_aligned(f"{fixed(row['behind_percent'], 2)} ± {fixed(row['behind_std_percent'], 2)}")
 
 
 def _at_frequency(name: str) -> Column | None:
@@ -111,7 +111,7 @@ COLUMNS: Mapping[str, Columns] = {
     "roots by condition": (CONDITION, "poles, library", "poles, Table 6", "zeros, library", "zeros, Table 6"),
     "structures": (
         *(CONDITION, "order", "structure", Column("fit_percent", "free run")),
-        Column("behind_percent", "behind the best", "points ± standard error", of_row=_behind),
+        Column("behind_percent", "behind the best", "points ± standard error", of_row=_shortfall_cell),
         Column("one_step_percent", "one step ahead"),
         Column("weight_above_percent", "weight above 25 Hz", digits=2),
         Column("dc_gain", "steady gain", "mm/s per rad/s", 1e3),

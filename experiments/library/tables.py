@@ -9,7 +9,7 @@ from estimation.identification.model.linear_model import LinearModel
 from experiments.circuit.passes import CHANNELS, SAMPLE_TIME
 from experiments.nine_conditions.printed_transfer_functions import printed_model
 from experiments.nine_conditions.transfer_functions import jump_ratio
-from experiments.page.frames import Frames, Rows, stacked, tabled
+from experiments.page.frames import Frames, Rows, as_stacked_table, as_table
 
 FREQUENCIES = np.geomspace(0.5, 100.0, 60)
 """Frequencies of the responses [Hz]."""
@@ -27,7 +27,7 @@ def published_model(condition: str) -> LinearModel:
     return LinearModel(np.array(printed["numerator"]), np.array(printed["denominator"]), SAMPLE_TIME, *CHANNELS)
 
 
-@tabled
+@as_table
 def library_table(models: Mapping[str, LinearModel]) -> Rows:
     """Return the library beside Table 6, condition by condition.
 
@@ -79,7 +79,7 @@ def root_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=names)
 
 
-@stacked
+@as_stacked_table
 def response_table(models: Mapping[str, LinearModel]) -> Frames:
     """Return the gain of the library's models over frequency, with 95 % bands, beside Table 6's.
 

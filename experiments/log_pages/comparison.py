@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from estimation.finding import NORMAL_95
-from experiments.page.names_shown import SHOWN
-from experiments.page.numbers import MISSING, alike_in_digits, percent_text, pretty_unit, shop_unit
-from experiments.page.sentences import in_a_row, sentence
-from experiments.page.words import in_words
+from experiments.page.names_shown import QUANTITY_NAMES
+from experiments.page.numbers import MISSING, percent_text, pretty_unit, shop_unit, with_equal_decimals
+from experiments.page.sentences import joined_names, sentence
+from experiments.page.words import condition_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +33,7 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
     from experiments.page.render import render_page
     from experiments.page.tables import Column
 
-    rows = compared(first, second)
+    rows = comparison_rows(first, second)
     title, *changes = headings(first, second, rows)
     logs = [
         {
@@ -73,7 +73,7 @@ def quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
 
     shown = [
         {
-            **_in_a_readers_unit(row),
+            **_in_reader_unit(row),
             "says": "changed" if row["changed"] else "no certain change" if row["interval"] else "not in both logs",
         }
         for row in rows
@@ -96,13 +96,13 @@ def _probabilities_shown(first: Mapping[str, float] | None, second: Mapping[str,
     )
     return pd.DataFrame(
         [
-            {"condition": in_words(name), "first": told(both[0], a), "second": told(both[1], b)}
+            {"condition": condition_in_words(name), "first": told(both[0], a), "second": told(both[1], b)}
             for name, (a, b) in likely
         ]
     )
 
 
-def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[str, Any]]:
+def comparison_rows(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the quantities of two logs with their differences.
 
     Returns
@@ -121,7 +121,7 @@ def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[s
         row |= {"first": pair[0], "second": pair[1], "difference": None, "interval": None, "changed": False}
         if len(known) == 2:
             row["difference"] = known[1]["value"] - known[0]["value"]
-            halves = [one for one in map(_halves_of, known) if one is not None]
+            halves = [one for one in map(_half_widths, known) if one is not None]
             if len(halves) == 2:  # add in quadrature the ends that move the difference the same way
                 (below_first, above_first), (below, above) = halves
                 low = row["difference"] - math.hypot(below, above_first)
@@ -150,7 +150,7 @@ def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> "pd.Data
             **dict(zip(("low", "high"), row["interval"] or (None, None), strict=True)),
             "changed": row["changed"],
         }
-        for row in compared(first, second)
+        for row in comparison_rows(first, second)
     ]
     return pd.DataFrame(rows).set_index("quantity")
 
@@ -174,7 +174,7 @@ def quantities_of(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _halves_of(one: Mapping[str, Any]) -> tuple[float, float] | None:
+def _half_widths(one: Mapping[str, Any]) -> tuple[float, float] | None:
     """Return how far the 95 % interval of a quantity extends below and above its value; None if it has no interval."""
     value, std, ends = one["value"], one.get("std"), one.get("ci95")
     if ends and None not in ends:
@@ -182,21 +182,21 @@ def _halves_of(one: Mapping[str, Any]) -> tuple[float, float] | None:
     return None if std is None else (NORMAL_95 * std, NORMAL_95 * std)
 
 
-def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
+def _in_reader_unit(row: Mapping[str, Any]) -> dict[str, str]:
     scale, unit = shop_unit(row["unit"])
-    named = SHOWN.get(row["quantity"], row["quantity"].replace("_", " "))
+    named = QUANTITY_NAMES.get(row["quantity"], row["quantity"].replace("_", " "))
 
     def amount(one: Mapping[str, Any] | None) -> str:
         if one is None or one.get("value") is None:
             return MISSING
         known = [scale * end for end in one.get("ci95") or () if end is not None]
         told = known if len(known) == 2 else None
-        value, *ends = alike_in_digits(scale * one["value"], told, unit)
+        value, *ends = with_equal_decimals(scale * one["value"], told, unit)
         return f"{value} ({' to '.join(ends)})" if ends else value
 
     difference, interval = row["difference"], row["interval"]
     told = None if interval is None else [scale * end for end in interval]
-    shown, *ends = alike_in_digits(None if difference is None else scale * difference, told, unit)
+    shown, *ends = with_equal_decimals(None if difference is None else scale * difference, told, unit)
     return {
         "first": amount(row["first"]),
         "second": amount(row["second"]),
@@ -208,13 +208,13 @@ def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
 
 def plain_words(result: Mapping[str, Any]) -> str:
     """Return the verdict of a diagnosis as on its page; empty for any other result."""
-    from experiments.eha.plain_verdict import how_sure, verdict
+    from experiments.eha.plain_verdict import confidence_sentence, verdict
     from faults.conditions import CONDITIONS
 
     if result.get("condition") not in CONDITIONS or not result.get("probabilities"):
         return ""
     said = verdict(result)
-    return said if result["unknown"] else f"{said} {how_sure(result)}"
+    return said if result["unknown"] else f"{said} {confidence_sentence(result)}"
 
 
 def headings(first: Mapping[str, Any], second: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -225,7 +225,7 @@ def headings(first: Mapping[str, Any], second: Mapping[str, Any], rows: Sequence
     first, second : Mapping
         Entries of the logs in the JSON contract.
     rows : sequence of Mapping
-        From `compared`.
+        From `comparison_rows`.
     """
     return [one for one in (_conditions_of(first, second), title_of(rows)) if one]
 
@@ -234,16 +234,16 @@ def _conditions_of(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
     """Return the conditions of two logs in the order of the logs; empty if one of them was not diagnosed."""
     if not all(one.get("condition") and one.get("probabilities") for one in (first, second)):
         return ""
-    one, other = (_found(each) for each in (first, second))
+    one, other = (_verdict_words(each) for each in (first, second))
     return f"From {one} to {other}." if one != other else sentence(f"{one} in both logs")
 
 
-def _found(result: Mapping[str, Any]) -> str:
-    from experiments.eha.plain_verdict import of_another_size, size_in_words
+def _verdict_words(result: Mapping[str, Any]) -> str:
+    from experiments.eha.plain_verdict import is_of_another_size, size_in_words
 
     if not result.get("unknown"):
-        return in_words(result["condition"])
-    return size_in_words(result) if of_another_size(result) else "no verdict"
+        return condition_in_words(result["condition"])
+    return size_in_words(result) if is_of_another_size(result) else "no verdict"
 
 
 def title_of(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -256,11 +256,11 @@ def title_of(rows: Sequence[Mapping[str, Any]]) -> str:
     found: list[str] = []
     for words, sign in (("higher", 1.0), ("lower", -1.0)):
         named = [
-            SHOWN.get(one["quantity"], one["quantity"].replace("_", " "))
+            QUANTITY_NAMES.get(one["quantity"], one["quantity"].replace("_", " "))
             for one in changed[:MOST_NAMED]
             if sign * one["difference"] > 0.0
         ]
         if named:
-            found.append(f"{in_a_row(named)} {'are' if len(named) > 1 else 'is'} {words}")
+            found.append(f"{joined_names(named)} {'are' if len(named) > 1 else 'is'} {words}")
     more = "; more has changed" if len(changed) > MOST_NAMED else ""
     return f"In the second log, {'; '.join(found)}{more}."

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.terminal import clauses
-from experiments.page.condition_names import in_words
+from experiments.page.condition_names import condition_in_words
 
 if TYPE_CHECKING:
     from estimation.finding import Finding, Gate, Quantity
@@ -24,7 +24,7 @@ BLANK: dict[str, Any] = {
     "notes": [],
 }
 
-ALL_TOLD = "every quantity is determined, and the model describes the log"
+ALL_DETERMINED = "every quantity is determined, and the model describes the log"
 
 
 def finding_entries(found: "Finding") -> dict[str, Any]:
@@ -79,24 +79,24 @@ SOUND: Mapping[str, str] = {"normal": "leakage and friction are normal", "health
 """Conditions of a sound actuator, in words."""
 
 
-def either(named: Sequence[str]) -> str:
+def joined_conditions(named: Sequence[str]) -> str:
     """Return the condition, and all conditions that cannot be told apart from it, as part of a sentence.
 
     Examples
     --------
-    >>> either(["minor_leakage_minor_friction", "normal"])
+    >>> joined_conditions(["minor_leakage_minor_friction", "normal"])
     'minor leakage + minor friction or normal'
     """
-    return " or ".join(map(in_words, named))
+    return " or ".join(map(condition_in_words, named))
 
 
-def _named(found: "Finding") -> Iterator[str]:
+def _faults_found(found: "Finding") -> Iterator[str]:
     """Yield all that is wrong. Faults come before a sound condition, but after any other condition."""
     faults = [str(note) for note in found.faults]
     if len(found.named) == 1 and found.named[0] in SOUND:
         yield from (*faults, SOUND[found.named[0]])
     else:
-        told = either(found.named)
+        told = joined_conditions(found.named)
         yield from () if any(fault.startswith(f"{told}:") for fault in faults) else (told,)
         yield from faults
 
@@ -113,8 +113,8 @@ def message_of(found: "Finding") -> str:
 
     doubts = [str(note) for note in distinct((*found.against, *found.gate.reasons))]
     named = found.condition is not None and not found.unknown
-    said = [*_named(found)] if named else [*doubts, *(() if found.unknown else map(str, found.faults))]
+    said = [*_faults_found(found)] if named else [*doubts, *(() if found.unknown else map(str, found.faults))]
     said += map(str, found.not_told)
     if named and not found.gate.passed:
         said.append(f"not to be relied on: {clauses(doubts)}")
-    return clauses(said or [ALL_TOLD])
+    return clauses(said or [ALL_DETERMINED])

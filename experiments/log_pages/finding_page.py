@@ -10,12 +10,12 @@ from estimation.finding import Outcome
 from estimation.notes import ChannelCode, EstimateCode
 from experiments.command.terminal import clauses
 from experiments.log_pages.channel_charts import channel_charts
-from experiments.log_pages.entries import SOUND, either
-from experiments.page.condition_names import in_words
+from experiments.log_pages.entries import SOUND, joined_conditions
+from experiments.page.condition_names import condition_in_words
 from experiments.page.names_shown import quantity_name
-from experiments.page.numbers import MISSING, alike_in_digits, number, percent_text, pretty_unit, reader_unit
+from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, reader_unit, with_equal_decimals
 from experiments.page.render import render_page
-from experiments.page.sentences import left_unread, sentence
+from experiments.page.sentences import sentence, unused_column_advice
 from experiments.page.tables import Column
 
 if TYPE_CHECKING:
@@ -61,11 +61,11 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
     file = Path(result["file"]).name
     unlike = [note for note in found.notes if note.code in OTHER_OIL]
-    to_do = [*left_unread(result), *(sentence(str(note)) for note in (*found.advice, *unlike))]
+    to_do = [*unused_column_advice(result), *(sentence(str(note)) for note in (*found.advice, *unlike))]
     noted = [sentence(one["text"]) for one in result["notes"]]
     against = list(dict.fromkeys(map(str, (*found.against, *found.gate.reasons))))
     title = _title(found)
-    message = _beyond(title, _shortened(result["message"], against))
+    message = _message_rest(title, _with_first_reason(result["message"], against))
     opening = (title, sentence(message)) if message else (title,)
     rows = [_row(name, one) for name, one in shown.items()]
     facts = {
@@ -90,7 +90,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         ],
         "quantities": pd.DataFrame(rows),
         "probabilities": pd.DataFrame(
-            [(in_words(name), percent_text(share)) for name, share in shares if share >= LEAST_SHARE],
+            [(condition_in_words(name), percent_text(share)) for name, share in shares if share >= LEAST_SHARE],
             columns=["condition", "percent"],
         ),
         "charts": {"measured": channel_charts(record, found, Path(file).stem)},
@@ -100,13 +100,13 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     return render_page("log_pages/finding.html", facts, columns, {})
 
 
-def _beyond(title: str, message: str) -> str:
+def _message_rest(title: str, message: str) -> str:
     """Return the part of a message that the title does not repeat."""
     rest = message.removeprefix(f"{title[:1].lower()}{title[1:].rstrip('.')}; ")
     return "" if sentence(rest) == title else rest
 
 
-def _shortened(message: str, against: Sequence[str]) -> str:
+def _with_first_reason(message: str, against: Sequence[str]) -> str:
     """Return the message with only the first of several reasons, since the page lists all of them below."""
     more = len(against) - 1
     if more < 1:
@@ -127,7 +127,7 @@ def _title(found: "Finding") -> str:
     if len(found.named) == 1 and found.named[0] in SOUND:
         return sentence(str(found.faults[0]) if found.faults else SOUND[found.named[0]])
     if found.named:
-        return f"Found: {either(found.named)}."
+        return f"Found: {joined_conditions(found.named)}."
     oil = found.quantities.get("bulk_modulus")
     if oil is not None and oil.value is not None and found.gate.passed:
         return f"Bulk modulus is {number(1e-6 * oil.value, 3)} MPa; the consistency check passed."
@@ -144,7 +144,7 @@ def _row(name: str, one: "Quantity") -> dict[str, str]:
     value, *ends = _in_digits(one.value, one.ci95, one.unit)
     _, *total = _in_digits(one.value, one.ci95_total, one.unit)
     return {
-        "quantity": f"{quantity_name(name)} [{_whole(pretty_unit(unit))}]",
+        "quantity": f"{quantity_name(name)} [{_unbreakable(pretty_unit(unit))}]",
         "value": value,
         "interval": " to ".join(ends) or MISSING,
         "total": " to ".join(total) or MISSING,
@@ -154,9 +154,9 @@ def _row(name: str, one: "Quantity") -> dict[str, str]:
 def _in_digits(value: float | None, interval: tuple[float, float] | None, si_unit: str) -> list[str]:
     scale, unit = reader_unit(si_unit)
     ends = None if interval is None else [scale * end for end in interval]
-    return [_whole(one) for one in alike_in_digits(None if value is None else scale * value, ends, unit)]
+    return [_unbreakable(one) for one in with_equal_decimals(None if value is None else scale * value, ends, unit)]
 
 
-def _whole(shown: str) -> str:
+def _unbreakable(shown: str) -> str:
     """Return a number or a unit without places for a line break."""
     return shown.replace(" ", NO_BREAK)

@@ -33,7 +33,7 @@ A_DECADE, MOST_DECADES = 60, 5.0
 PER_DECADE = 10
 """Intervals per decade in which the measured response is judged [count]."""
 
-KNOWN = 0.5
+LARGEST_KNOWN_RADIUS = 0.5
 """Largest ratio of the 95 % circle's radius to the gain at which an interval counts as known [fraction], judged."""
 
 COLOURS = ("blue", "vermilion", "green", "purple", "orange", "grey")
@@ -72,7 +72,9 @@ class MeasuredCurve:
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             relative = self.radius / np.abs(self.response)
-        return np.array([np.median(one) <= KNOWN for one in np.split(relative, self.begins[1:])], dtype=np.bool_)
+        return np.array(
+            [np.median(one) <= LARGEST_KNOWN_RADIUS for one in np.split(relative, self.begins[1:])], dtype=np.bool_
+        )
 
 
 def measured_curve(view: IdentifiedView) -> MeasuredCurve | None:
@@ -153,7 +155,7 @@ def step_charts(view: IdentifiedView, stem: str) -> Charts:
     curves: list[Curve] = []
     bands: list[tuple[int, int]] = []
     for k, one in enumerate(view.inputs):
-        height = step_of(view.u[:, k])
+        height = step_height(view.u[:, k])
         label = f"{one.name} {one.amount('+' + number(one.scale * height, 2))}"
         scale = view.output.scale
         if view.linear is not None:
@@ -164,13 +166,13 @@ def step_charts(view: IdentifiedView, stem: str) -> Charts:
                 curves += [Curve("95 % from", low, COLOURS[0], "edge"), Curve("95 % to", high, COLOURS[0], "edge")]
                 bands.append((2, 1))
             continue
-        curves.append(Curve(label, scale * _stepped(view, k, height, count), COLOURS[k % len(COLOURS)]))
+        curves.append(Curve(label, scale * _step_response(view, k, height, count), COLOURS[k % len(COLOURS)]))
     ends = _ends(np.concatenate([one.values for one in curves]), 0.0, 0.0)
     panel = Panel(f"change of {view.output.name}", view.output.unit, curves, bands=bands, ends=ends)
     return Charts(time, "time after the step [s]", [panel], f"{stem}-step", "step")
 
 
-def step_of(values: Array) -> float:
+def step_height(values: Array) -> float:
     """Return half the range of an input, rounded to one digit.
 
     Parameters
@@ -185,7 +187,7 @@ def step_of(values: Array) -> float:
 
     Examples
     --------
-    >>> step_of(np.array([-209.4, 209.4])), step_of(np.array([0.0, 5.0]))
+    >>> step_height(np.array([-209.4, 209.4])), step_height(np.array([0.0, 5.0]))
     (200.0, 2.0)
     """
     half = 0.5 * float(np.ptp(values))
@@ -201,7 +203,7 @@ def _count(view: IdentifiedView) -> int:
     return int(min(max(lasting + 2 * delays, LEAST_STEPS), max(view.y.size // 2, LEAST_STEPS)))
 
 
-def _stepped(view: IdentifiedView, which: int, height: float, count: int) -> Array:
+def _step_response(view: IdentifiedView, which: int, height: float, count: int) -> Array:
     """Return the change of the output after a step from the inputs' means, which are first held for the same time."""
     inputs = np.tile(view.u.mean(axis=0), (2 * count, 1))
     inputs[count:, which] += height
@@ -224,7 +226,7 @@ def bode_charts(view: IdentifiedView, measured: MeasuredCurve | None, stem: str)
     """
     if not view.is_linear and measured is None:
         return None
-    shown = None if measured is None else _thinned(measured)
+    shown = None if measured is None else _thinned_curve(measured)
     frequency = _grid(view) if shown is None else np.unique(np.concatenate([_grid(view), shown.frequency]))
     gains: list[Curve] = []
     phases: list[Curve] = []
@@ -268,7 +270,7 @@ def _grid(view: IdentifiedView) -> Array:
     return highest * np.logspace(-decades, 0.0, max(int(A_DECADE * decades), 2))
 
 
-def _thinned(measured: MeasuredCurve) -> MeasuredCurve:
+def _thinned_curve(measured: MeasuredCurve) -> MeasuredCurve:
     """Return the lines of the intervals in which the response is known, at most `A_DECADE` per decade."""
     there = np.flatnonzero(np.repeat(measured.known, np.diff(np.append(measured.begins, measured.frequency.size))))
     cells = np.floor(A_DECADE * np.log10(measured.frequency[there])).astype(int)

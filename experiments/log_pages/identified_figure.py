@@ -13,7 +13,7 @@ from estimation.identification.fit.validate import Validation
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.signals.automatic_window import automatic_response
 from experiments.log_pages.free_run_figure import SHOWN_SAMPLES
-from experiments.log_pages.identified_words import chance
+from experiments.log_pages.identified_words import p_value_text
 from experiments.page.figure_files import write_png
 from experiments.page.style import BLUE, GREY, ORANGE, VERMILION, Margins, panels
 from plant.log.record import CHANNELS
@@ -33,9 +33,9 @@ def _draw_identified(model: LinearModel, u: Array, y: Array, found: Validation, 
     _over_time(axes[2], model, {"residual": (VERMILION, residual)})
     axes[2].set_title("measured less simulated", loc="left")
     _correlations(axes[1], residual, residual, np.arange(1, DEFAULT_LAGS + 1))
-    axes[1].set_title(f"residual with itself: white with {chance(found.whiteness.p_value)}", loc="left")
+    axes[1].set_title(f"residual with itself: white with {p_value_text(found.whiteness.p_value)}", loc="left")
     _correlations(axes[3], residual, u, np.arange(-DEFAULT_LAGS, DEFAULT_LAGS + 1))
-    axes[3].set_title(f"residual with the input: none with {chance(found.cross_correlation.p_value)}", loc="left")
+    axes[3].set_title(f"residual with the input: none with {p_value_text(found.cross_correlation.p_value)}", loc="left")
     _response(axes[4], axes[5], model, u, y)
     return figure
 

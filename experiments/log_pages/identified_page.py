@@ -21,9 +21,9 @@ from experiments.log_pages.identified_charts import (
 )
 from experiments.log_pages.identified_view import AS_LOGGED, IdentifiedView
 from experiments.log_pages.identified_words import answer_of, has_limits, notes_of, tests_of, title_of, uses_of
-from experiments.page.numbers import MISSING, alike_in_digits, number
+from experiments.page.numbers import MISSING, number, with_equal_decimals
 from experiments.page.render import render_page
-from experiments.page.tables import Column, right
+from experiments.page.tables import Column, right_aligned
 
 
 def identified_page(view: IdentifiedView) -> str:
@@ -41,14 +41,18 @@ def identified_page(view: IdentifiedView) -> str:
     )
     rows = list(_roots(view))
     shown = {
-        "values": ("quantity", Column("value", words=right), Column("interval", "95 % interval", words=right)),
+        "values": (
+            "quantity",
+            Column("value", words=right_aligned),
+            Column("interval", "95 % interval", words=right_aligned),
+        ),
         "roots": (
             "root",
-            Column("place", place, words=right),
-            Column("deviation", "standard deviation", words=right),
-            Column("frequency", "natural frequency", "Hz", words=right),
-            Column("damping", words=right),
-            Column("lasts", "time constant", "s", words=right),
+            Column("place", place, words=right_aligned),
+            Column("deviation", "standard deviation", words=right_aligned),
+            Column("frequency", "natural frequency", "Hz", words=right_aligned),
+            Column("damping", words=right_aligned),
+            Column("lasts", "time constant", "s", words=right_aligned),
         ),
     }
     facts = {
@@ -107,10 +111,10 @@ def _values(view: IdentifiedView) -> Iterator[tuple[str, str, str]]:
     bandwidth, std = result.get("bandwidth_hz"), result.get("bandwidth_std_hz")
     if bandwidth is not None:
         ends = None if std is None else [bandwidth - NORMAL_95 * std, bandwidth + NORMAL_95 * std]
-        yield ("bandwidth (-3 dB) [Hz]", *_with_ends(bandwidth, ends))
+        yield ("bandwidth (-3 dB) [Hz]", *_value_and_interval(bandwidth, ends))
     for name, one in (result.get("nonlinearity") or {}).items():
         if isinstance(one, Mapping):
-            yield (name.removesuffix("_s").replace("_", " "), *_with_ends(one["value"], one.get("ci95")))
+            yield (name.removesuffix("_s").replace("_", " "), *_value_and_interval(one["value"], one.get("ci95")))
     delay = result.get("delay") or {}
     if delay.get("seconds") is not None:
         late = delay["seconds"] if isinstance(delay["seconds"], list) else [delay["seconds"]]
@@ -130,12 +134,15 @@ def _gains(view: IdentifiedView) -> Iterator[tuple[str, str, str]]:
         which = "" if len(values) == 1 else f" from {view.inputs[k].name}"
         scale, unit = view.gain_unit(k)
         told = None if ends is None else [scale * end for end in ends]
-        yield (f"steady gain{which}{'' if unit == AS_LOGGED else f' [{unit}]'}", *_with_ends(scale * value, told))
+        yield (
+            f"steady gain{which}{'' if unit == AS_LOGGED else f' [{unit}]'}",
+            *_value_and_interval(scale * value, told),
+        )
 
 
-def _with_ends(value: float, ends: Sequence[float] | None) -> tuple[str, str]:
+def _value_and_interval(value: float, ends: Sequence[float] | None) -> tuple[str, str]:
     told = None if ends is None or not all(map(math.isfinite, ends)) else ends
-    shown, *both = alike_in_digits(value, told, "")
+    shown, *both = with_equal_decimals(value, told, "")
     return shown, " to ".join(both) or MISSING
 
 
@@ -156,10 +163,15 @@ def _roots(view: IdentifiedView) -> Iterator[tuple[str, ...]]:
             known = all(std is not None and math.isfinite(std) for std in stds)
             spread = (number(stds[0], 2) + (f", {number(stds[1], 2)} j" if pair else "")) if known else MISSING
             z = complex(one["real"], one["imag"])
-            yield (f"{name} pair" if pair else name, place, spread, *_in_time(z, view.sample_time, continuous))
+            yield (
+                f"{name} pair" if pair else name,
+                place,
+                spread,
+                *_time_characteristics(z, view.sample_time, continuous),
+            )
 
 
-def _in_time(root: complex, sample_time: float, continuous: bool) -> tuple[str, str, str]:
+def _time_characteristics(root: complex, sample_time: float, continuous: bool) -> tuple[str, str, str]:
     """Return natural frequency [Hz], damping and time constant [s] of a root, as far as they are defined."""
     if not continuous and root == 0.0:
         return MISSING, MISSING, MISSING
@@ -201,10 +213,10 @@ def control_text(view: IdentifiedView) -> str:
         f"# Identified by Hydrostate from {view.result['file']!r}.\n{late}{told}"
         "import control\n\n"
         "model = control.TransferFunction(\n"
-        f"    [{_listed(numerators)}],\n    [{_listed(denominators)}],\n    {clock},\n"
+        f"    [{_coefficients_text(numerators)}],\n    [{_coefficients_text(denominators)}],\n    {clock},\n"
         f"    inputs={list(names)!r},\n    outputs={[view.result['output']]!r},\n)\n"
     )
 
 
-def _listed(rows: Sequence[Array]) -> str:
+def _coefficients_text(rows: Sequence[Array]) -> str:
     return f"[{', '.join(repr(row.tolist()) for row in rows)}]"

@@ -225,13 +225,13 @@ def _without_folders(result: Mapping[str, Any]) -> dict[str, Any]:
     """Return the entries with folders removed from file names, because pages are passed on to others."""
     names = ", ".join(Path(one).name for one in str(result["file"]).split(", "))
     test = result.get("test")
-    return {**result, "file": names, **({"test": _test(test)} if test else {})}
+    return {**result, "file": names, **({"test": _test_without_folders(test)} if test else {})}
 
 
 def _bracketed(unit: str) -> str:
     return f"({unit})" if "/" in unit else unit
 
 
-def _test(test: Mapping[str, Any]) -> dict[str, Any]:
+def _test_without_folders(test: Mapping[str, Any]) -> dict[str, Any]:
     files: Sequence[str] = test["files"]
     return {**test, "files": [Path(one).name for one in files]}

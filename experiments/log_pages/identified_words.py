@@ -26,16 +26,16 @@ KINDS = {
 }
 """Model structures in words."""
 
-ROUGH = 50.0
+ROUGH_FIT_PERCENT = 50.0
 """Fit on held-back data below which a simulation is called rough: over half of the deviation remains [%]."""
 
-AGREES = 0.3
+AGREEMENT_LIMIT = 0.3
 """Largest median distance from the measured response, relative to its gain, at which a controller may be designed
 [fraction]. Judged: margins of 6 dB and 40 degrees can absorb it."""
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
-LEVEL = 0.05
+SIGNIFICANCE_LEVEL = 0.05
 """Significance level of the residual tests [probability]."""
 
 REASONS = {
@@ -53,11 +53,11 @@ def is_usable(view: IdentifiedView) -> bool:
     If the output wanders by itself, the fit of a free run says nothing about the model.
     """
     held, own = view.result["held_back_percent"], view.result["fit_percent"]
-    better = wanders(view) or (own is not None and own > 0.0 and (held is None or held > 0.0))
+    better = has_random_walk(view) or (own is not None and own > 0.0 and (held is None or held > 0.0))
     return better and view.result["outcome"] == "ok" and bool(np.isfinite(view.simulated).all())
 
 
-def wanders(view: IdentifiedView) -> bool:
+def has_random_walk(view: IdentifiedView) -> bool:
     """Return whether the output wanders by itself, so that the model was fitted to its changes."""
     return IdentificationCode.RANDOM_WALK in {one["code"] for one in view.result.get("notes", ())}
 
@@ -71,18 +71,18 @@ def title_of(view: IdentifiedView) -> str:
     """Return the verdict in one sentence."""
     held, own = view.result["held_back_percent"], view.result["fit_percent"]
     if not is_usable(view):
-        return f"Do not use this model of {view.output.name}: {_why_not(view)}."
+        return f"Do not use this model of {view.output.name}: {_why_unusable(view)}."
     order = view.result.get("order") or (None if view.linear is None else view.linear.denominator.size - 1)
     kind = "linear with limits" if has_limits(view) else KINDS.get(view.result["structure"], view.result["structure"])
     said = f"Model of {view.output.name} ({kind}{f', order {order}' if order else ''})"
-    if wanders(view):
+    if has_random_walk(view):
         return f"{said}, fitted to changes: the output also wanders by itself."
     if held is None:
         return f"{said}: fit {own:.1f} % on the data of the fit; the log is too short to hold data back."
     return f"{said}: fit {held:.1f} % on data held back from the fit."
 
 
-def _why_not(view: IdentifiedView) -> str:
+def _why_unusable(view: IdentifiedView) -> str:
     if view.linear is not None and not view.linear.is_stable:
         return "it is unstable"
     held, own = view.result["held_back_percent"], view.result["fit_percent"]
@@ -105,7 +105,7 @@ def answer_of(view: IdentifiedView) -> str:
     said = f"The model is simulated from {inputs} alone: it never sees the measured output. "
     error = _held_back_error(view)
     size = "" if error is None else f"{view.output.amount(number(error, 2))}{_unit_of(view.output)} (rms)"
-    if wanders(view):
+    if has_random_walk(view):
         return f"{said}The error is about {size}, with what the output does by itself." if size else said.rstrip()
     said += "A fit of 100 % is perfect; 0 % is no better than the mean. "
     return f"{said}The error is about {size}." if size else said.rstrip()
@@ -125,7 +125,7 @@ def _held_back_error(view: IdentifiedView) -> float | None:
     return view.output.scale * (1.0 - held / 100.0) * float(np.nanstd(view.y))
 
 
-def told_band(measured: MeasuredCurve | None) -> tuple[float, float] | None:
+def determined_band(measured: MeasuredCurve | None) -> tuple[float, float] | None:
     """Return the longest range of frequencies in which the log determines the response [Hz]; None if there is none."""
     if measured is None or not measured.frequency.size:
         return None
@@ -174,20 +174,24 @@ def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[
     if usable:
         ranges = " and ".join(f"{one.name} from {_range(one, view.u[:, k])}" for k, one in enumerate(view.inputs))
         held, own = view.result["held_back_percent"], view.result["fit_percent"]
-        rough = "Rough simulation" if (own if held is None else held) < ROUGH else "Simulation"
-        what = f"Simulation of changes of {view.output.name}" if wanders(view) else f"{rough} of {view.output.name}"
+        rough = "Rough simulation" if (own if held is None else held) < ROUGH_FIT_PERCENT else "Simulation"
+        what = (
+            f"Simulation of changes of {view.output.name}"
+            if has_random_walk(view)
+            else f"{rough} of {view.output.name}"
+        )
         good.append(f"{what} by {ranges}.")
         bad.append("Inputs beyond that range: the log says nothing about them.")
-        if wanders(view):
+        if has_random_walk(view):
             bad.append(f"The level of {view.output.name}: it also moves by itself.")
     # the measured response includes samples at limits, but the transfer function describes the plant without them
     compared = usable and view.is_linear and not has_limits(view)
-    band = told_band(measured) if compared else None
+    band = determined_band(measured) if compared else None
     if band is not None and measured is not None:
         apart = distance(view, measured, band)
         said = f"{number(band[0], 2)} to {number(band[1], 2)} Hz"
         told = f"there, it differs from the measured response by {100.0 * apart:.0f} % (median)"
-        if apart <= AGREES:
+        if apart <= AGREEMENT_LIMIT:
             good.append(f"Controller design from {said}: {told}.")
             bad.append(f"Frequencies beyond {said}: the log does not tell the response there.")
         else:
@@ -199,7 +203,7 @@ def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[
         bad.append("Controller design: the log tells the response at no frequency well enough to check the model.")
     if usable and has_limits(view):
         bad.append("Controller design without a check: the measured response holds samples at the limits.")
-    bad += [*_of_gain(view), *_of_residual(view)]
+    bad += [*_gain_warnings(view), *_residual_warnings(view)]
     if (view.result["input"], view.result["output"]) == (INPUT, OUTPUT):
         bad.append("Diagnosis: the model does not tell leakage, friction and oil apart. Use hydrostate diagnose.")
     return good, bad
@@ -210,7 +214,7 @@ def _range(one: Signal, values: np.ndarray) -> str:
     return f"{low} to {one.amount(high)}"
 
 
-def _of_gain(view: IdentifiedView) -> list[str]:
+def _gain_warnings(view: IdentifiedView) -> list[str]:
     """Return why the steady gain must not be used; empty if it may be used."""
     codes = {one["code"] for one in view.result.get("notes", ())}
     gain = view.result.get("dc_gain")
@@ -224,14 +228,14 @@ def _of_gain(view: IdentifiedView) -> list[str]:
     return []
 
 
-def _of_residual(view: IdentifiedView) -> list[str]:
+def _residual_warnings(view: IdentifiedView) -> list[str]:
     """Return the warning against conclusions about the plant's structure, if the residual correlates with an input."""
     cross = view.cross_correlation_p
-    if cross is None or cross >= LEVEL:
+    if cross is None or cross >= SIGNIFICANCE_LEVEL:
         return []
     return [
-        f"Conclusions about order and poles of the plant: the residual still follows the input ({chance(cross)}), so "
-        "the model lacks something, such as friction or a dead time."
+        f"Conclusions about order and poles of the plant: the residual still follows the input "
+        f"({p_value_text(cross)}), so the model lacks something, such as friction or a dead time."
     ]
 
 
@@ -239,20 +243,22 @@ def tests_of(view: IdentifiedView) -> str:
     """Return the results of the residual tests, as sentences; empty if none was made."""
     white, cross = view.whiteness_p, view.cross_correlation_p
     said: list[str] = []
-    if white is not None and white < LEVEL:
+    if white is not None and white < SIGNIFICANCE_LEVEL:
         linear = view.linear
         allowed = linear is not None and np.array_equal(linear.covariance, linear.covariance_robust)
         told = "; the intervals allow for that" if allowed else ""
-        said.append(f"The residual is not white noise ({chance(white)}): an error lasts over several samples{told}.")
+        said.append(
+            f"The residual is not white noise ({p_value_text(white)}): an error lasts over several samples{told}."
+        )
     elif white is not None:
-        said.append(f"The residual may be white noise ({chance(white)}).")
+        said.append(f"The residual may be white noise ({p_value_text(white)}).")
     if cross is not None:
-        left = "It still follows the input" if cross < LEVEL else "Nothing of the input is left in it"
-        said.append(f"{left} ({chance(cross)}).")
+        left = "It still follows the input" if cross < SIGNIFICANCE_LEVEL else "Nothing of the input is left in it"
+        said.append(f"{left} ({p_value_text(cross)}).")
     return " ".join(said)
 
 
-def chance(probability: float) -> str:
+def p_value_text(probability: float) -> str:
     """Return a p-value as text without line breaks; a tiny p-value is shown as an upper bound, never as 0.
 
     Parameters
@@ -262,7 +268,7 @@ def chance(probability: float) -> str:
 
     Examples
     --------
-    >>> [chance(one).replace(NO_BREAK, " ") for one in (0.0, 0.02)]
+    >>> [p_value_text(one).replace(NO_BREAK, " ") for one in (0.0, 0.02)]
     ['p < 0.001', 'p = 0.02']
     """
     return ("p < 0.001" if probability < 0.001 else f"p = {probability:.2g}").replace(" ", NO_BREAK)

@@ -11,7 +11,7 @@ from experiments.page.figure_files import svg_of
 from experiments.page.numbers import MISSING, number
 from experiments.page.render import render_page
 from experiments.page.sentences import sentence
-from experiments.page.style import BLUE, Margins, panels, styled
+from experiments.page.style import BLUE, Margins, panels, project_style
 from experiments.page.tables import Column
 from plant.arrays import Array
 from plant.log.clock.stamps import seconds_from_first
@@ -26,7 +26,7 @@ MOST_COLUMNS, MOST_POINTS = 24, 2000
 
 def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> str:
     """Return the page on the contents of a log."""
-    from experiments.log_pages.inspected import block_of, clock_sentence, without_unit
+    from experiments.log_pages.inspected import clock_sentence, columns_block, guessed_units
 
     rows = [row for one in result["tables"] for row in one["columns"]]
     told = [row for row in rows if row["channel"] == TIME]
@@ -37,16 +37,16 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
         for one in facts.columns
         if len(one.present) > 1 and (time is None or one is not time.column)
     ]
-    with styled():
+    with project_style():
         figure = _draw(drawn[:MOST_COLUMNS])
     units = ["unit"] if any(row["unit"] for row in rows) else []
-    guessed = without_unit(result["tables"])
+    guessed = guessed_units(result["tables"])
     unsure = "; check the units that were guessed" if guessed else ""
     facts = {
         "result": result,
         "title": f"This log can be diagnosed{unsure}." if result["reads"] else "This log cannot be diagnosed yet.",
         "message": f"{result['message'][:1].upper()}{result['message'][1:]}.",
-        "block": block_of(result["columns"], guessed),
+        "block": columns_block(result["columns"], guessed),
         "guessed": [name for _, name in guessed],
         "clocks": [sentence(clock_sentence(one)) for one in result["tables"]],
         "most": MOST_COLUMNS,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.actuators import DEFAULT, actuator, kinds_by_columns
 from experiments.command.json_output import Result
-from experiments.command.logs import caught, read_log
+from experiments.command.logs import catch_log_warnings, read_log
 from experiments.command.terminal import sparkline
 from plant.errors import HydrostateError
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 BLANK: Result = dict.fromkeys(("plant", "tables", "columns", "options", "reads"))
 
-PLOTTED = 24
+SPARKLINE_WIDTH = 24
 """Width of a plot on the terminal [characters]."""
 
-GUESSED = "  # the file gives no unit: check this one"
+GUESSED_UNIT_COMMENT = "  # the file gives no unit: check this one"
 """Comment after a guessed unit in a rig file."""
 
 
-def looked_into(
+def inspect_log(
     log: Path, plant: str | None, sample_time: float | None = None, beside: Sequence[Path] = ()
 ) -> "tuple[dict[str, Any], list[TableFacts]]":
     """Return the contents of a log as entries of the JSON contract, and its tables.
@@ -44,29 +44,29 @@ def looked_into(
     HydrostateError
         If a file cannot be opened, or there is no such kind.
     """
-    from plant.log.checks import lacking
+    from plant.log.checks import missing_required
     from plant.log.formats.detect import open_tables
-    from plant.log.guess import in_order
+    from plant.log.guess import in_usual_order
     from plant.log.inspection import inspect_table
 
     tables = [inspect_table(one) for path in [log, *beside] for one in open_tables(path)]
     kind = actuator(plant or DEFAULT)
-    guesses = _guessed(tables, kind)
-    if plant is None and lacking(kind.required, {one.guess.channel for one in guesses}):
+    guesses = _channel_guesses(tables, kind)
+    if plant is None and missing_required(kind.required, {one.guess.channel for one in guesses}):
         names = [column.heading.name for facts in tables for column in facts.columns]
         kinds = kinds_by_columns(names)  # imports all kinds of actuator
         if len(kinds) == 1 and kinds[0] != kind.name:
             kind = actuator(kinds[0])
-            guesses = _guessed(tables, kind)
+            guesses = _channel_guesses(tables, kind)
     sure = {one.guess.channel: one.guess.spec for one in guesses if one.guess.sure >= 0.5}
-    columns = {channel: sure[channel] for channel in in_order(sure)}
-    reads = _reads(log, columns, kind, sample_time, beside)
+    columns = {channel: sure[channel] for channel in in_usual_order(sure)}
+    reads = _read_attempt(log, columns, kind, sample_time, beside)
     found = _entries(tables, guesses, columns) | {"reads": reads["reads"], "message": reads["message"]}
     found["options"] = _options(columns, kind.name, sample_time, beside)
     return {"plant": kind.name, **found}, tables
 
 
-def _guessed(tables: "Sequence[TableFacts]", kind: "ActuatorKind") -> "list[ChannelGuess]":
+def _channel_guesses(tables: "Sequence[TableFacts]", kind: "ActuatorKind") -> "list[ChannelGuess]":
     """Return the most certain guess for each channel over all tables."""
     from estimation.log_checks.channel_guess import guess_channels
     from plant.eha.model import EhaParameters
@@ -84,17 +84,17 @@ def _guessed(tables: "Sequence[TableFacts]", kind: "ActuatorKind") -> "list[Chan
     return list(best.values())
 
 
-def _reads(
+def _read_attempt(
     log: Path, columns: Mapping[str, str], kind: "ActuatorKind", sample_time: float | None, beside: Sequence[Path]
 ) -> dict[str, Any]:
     """Return whether the log can be read with the block of columns, and the message of that attempt."""
     try:
-        with caught() as said:
+        with catch_log_warnings() as said:
             record = read_log(log, {}, columns, kind.required, sample_time=sample_time, beside=beside)
     except HydrostateError as error:
-        from plant.log.guess import INSPECT
+        from plant.log.guess import INSPECT_ADVICE
 
-        why = error.message.replace(f"; {INSPECT}", "")
+        why = error.message.replace(f"; {INSPECT_ADVICE}", "")
         return {"reads": False, "message": f"with these columns the log cannot be read: {why}"}
     notes = "; ".join(dict.fromkeys(str(one.note) for one in said))
     about = f"{record.duration:g} s at {1.0 / record.sample_time:g} Hz, {', '.join(record)}"
@@ -137,7 +137,7 @@ def _column_entries(column: "ColumnFacts", guess: "ChannelGuess | None") -> dict
         "range": column.span,
         "missing": column.missing,
         "kind": "text" if column.values is None else "times" if column.heading.stamped else "numbers",
-        "plot": sparkline(column.present.tolist(), PLOTTED),
+        "plot": sparkline(column.present.tolist(), SPARKLINE_WIDTH),
         "channel": None if guess is None else guess.guess.channel,
         "probability": None if guess is None else guess.guess.sure,
         "why": [] if guess is None else [one.to_dict() for one in guess.why],
@@ -154,7 +154,7 @@ def _options(columns: Mapping[str, str], plant: str, sample_time: float | None, 
     return " ".join(kind + told + ([] if sample_time is None else [f"--sample-time {sample_time:g}"]))
 
 
-def block_of(columns: Mapping[str, str], guessed: Collection[tuple[str, str]] = ()) -> str:
+def columns_block(columns: Mapping[str, str], guessed: Collection[tuple[str, str]] = ()) -> str:
     """Return the ``[columns]`` block of a rig file.
 
     Parameters
@@ -164,19 +164,20 @@ def block_of(columns: Mapping[str, str], guessed: Collection[tuple[str, str]] = 
     guessed : collection of tuple of str
         Channels and columns whose unit is not given in the file.
     """
+    comments = {name: GUESSED_UNIT_COMMENT for name, spec in columns.items() if _is_unit_guessed(name, spec, guessed)}
     lines = [
-        f"{channel} = {json.dumps(spec, ensure_ascii=True)}{GUESSED if _is_one_of(channel, spec, guessed) else ''}"
+        f"{channel} = {json.dumps(spec, ensure_ascii=True)}{comments.get(channel, '')}"
         for channel, spec in columns.items()
     ]
     return "\n".join(["[columns]", *lines])
 
 
-def _is_one_of(channel: str, spec: str, guessed: Collection[tuple[str, str]]) -> bool:
+def _is_unit_guessed(channel: str, spec: str, guessed: Collection[tuple[str, str]]) -> bool:
     """Return whether the unit of a channel's column was guessed."""
     return any(channel == of and name in (spec, spec.rpartition(":")[0]) for of, name in guessed)
 
 
-def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+def guessed_units(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
     """Return channel and column for each guessed unit, which the file does not give."""
     from estimation.log_checks.notes import GuessCode
 

@@ -42,12 +42,12 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
             scale, unit = reader_unit(entry["unit"])
             ends, whole = (_scaled(entry.get(which), scale) for which in ("ci95", "ci95_total"))
             value = "-" if entry["value"] is None else f"{scale * entry['value']:.{_digits(ends)}g}"
-            said = [_ends(ends), *([_ends(whole)] if total else [])]
+            said = [_interval_text(ends), *([_interval_text(whole)] if total else [])]
             shown.add_row(quantity_name(name), value, *said, unit)
         yield shown
         sure = result.get("probabilities", {}).get(result.get("condition"))
         probable = "" if sure is None else f", probability {percent_text(sure)} %"
-        yield told_in_lines(result, about, f"{result['outcome'].replace('_', ' ')}: ", probable)
+        yield message_in_lines(result, about, f"{result['outcome'].replace('_', ' ')}: ", probable)
         yield from (f"{about}: next: {one}" for one in result.get("advice", ()))
 
 
@@ -60,11 +60,11 @@ def messages_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
         One for each log, with ``message`` and ``advice``.
     """
     for result in results:
-        yield told_in_lines(result, visible_name(result["file"]))
+        yield message_in_lines(result, visible_name(result["file"]))
         yield from (f"  next  {sentence(one)}" for one in result["advice"])
 
 
-def told_in_lines(result: Result, about: str, before: str = "", after: str = "") -> str:
+def message_in_lines(result: Result, about: str, before: str = "", after: str = "") -> str:
     """Return the message of a log; if there are several reasons against its result, each gets its own line.
 
     Parameters
@@ -81,7 +81,7 @@ def told_in_lines(result: Result, about: str, before: str = "", after: str = "")
     >>> said = "no value: the model does not describe the log"
     >>> against = ["velocity reads wrong", "pressure lags"]
     >>> log = {"message": f"{said}; velocity reads wrong; pressure lags", "gate": {"reasons": against}}
-    >>> print(told_in_lines(log, "run.csv"))
+    >>> print(message_in_lines(log, "run.csv"))
     run.csv: no value: the model does not describe the log
       reasons   velocity reads wrong
                 pressure lags
@@ -111,7 +111,7 @@ def _scaled(ends: Sequence[float] | None, scale: float) -> list[float] | None:
     return None if ends is None else [scale * end for end in ends]
 
 
-def _ends(ends: Sequence[float] | None) -> str:
+def _interval_text(ends: Sequence[float] | None) -> str:
     if ends is None:
         return "-"
     digits = _digits(ends)

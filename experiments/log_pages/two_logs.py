@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from experiments.actuators import offered
+from experiments.actuators import verb_of_kind
 from experiments.command.json_output import json_text, write_whole
 from experiments.command.logs import read_log, run_logs
 from experiments.command.options import load_actuator, load_columns, require_positive
 from experiments.command.output_paths import require_no_log
-from experiments.command.terminal import emit, note, rendered, short_names, table
+from experiments.command.terminal import emit, note, render_text, short_names, table
 from experiments.log_pages.comparison import (
     compare_view,
-    compared,
+    comparison_rows,
     headings,
     plain_words,
     quantities_shown,
@@ -55,7 +55,7 @@ def compare_logs(
         raise HydrostateError(f"two logs are compared, got {logs[0]} twice")
     require_positive("--sample-time", sample_time, "s")
     kind, bench = load_actuator(plant, rig)
-    chosen = offered(kind, "diagnose")
+    chosen = verb_of_kind(kind, "diagnose")
     actual, prepared = chosen.prepare(bench, {**chosen.options, "seed": seed})
     named = load_columns(columns)
     read = partial(read_log, rig_columns=bench.columns, columns=named, required=kind.required, sample_time=sample_time)
@@ -78,13 +78,13 @@ def compare_logs(
     if as_json:
         files = [str(log) for log in logs]
         entries = {"outcome": "ok", "first": files[0], "second": files[1], "seed": seed}
-        emit(json_text([{**entries, "differences": compared(first, second)}]))
+        emit(json_text([{**entries, "differences": comparison_rows(first, second)}]))
         return
-    emit(rendered(*_shown(first, second)))
+    emit(render_text(*_comparison_screen(first, second)))
 
 
-def _shown(first: Mapping[str, Any], second: Mapping[str, Any]) -> "list[RenderableType]":
-    rows = compared(first, second)
+def _comparison_screen(first: Mapping[str, Any], second: Mapping[str, Any]) -> "list[RenderableType]":
+    rows = comparison_rows(first, second)
     doubt = " Do not rely on its numbers."
     said = [
         f"{one['file']}: {plain_words(one) or one['message']}{doubt if one.get('unknown') else ''}"

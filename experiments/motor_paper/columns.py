@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 
 from experiments.motor_paper.regression_figure import READING_WORDS
-from experiments.page.tables import Column, Columns, as_given, decimals, spaced
+from experiments.page.tables import Column, Columns, decimals, exact_cell, name_in_words
 
 _PAPER: Mapping[str, Columns] = {
-    "table 1": ("item", Column("value", words=as_given), "unit", "remark"),
+    "table 1": ("item", Column("value", words=exact_cell), "unit", "remark"),
     "relations": (
         *("relation", Column("constant", "constant (median)")),
         Column("worst_percent", "furthest off", words=decimals(2)),
@@ -40,15 +40,15 @@ _PAPER: Mapping[str, Columns] = {
     ),
     "table 5": (
         "actuator",
-        Column("voltage_vpp", "voltage", "V", words=as_given),
-        Column("frequency_hz", words=as_given),
-        Column("no_load_velocity_mm_per_s", "velocity without load", "mm/s", words=as_given),
-        Column("blocking_force_n", words=as_given),
+        Column("voltage_vpp", "voltage", "V", words=exact_cell),
+        Column("frequency_hz", words=exact_cell),
+        Column("no_load_velocity_mm_per_s", "velocity without load", "mm/s", words=exact_cell),
+        Column("blocking_force_n", words=exact_cell),
         Column("most_power_w", digits=3),
     ),
     "published motor": (Column("claim", "what follows"), Column("value", digits=3), "unit"),
     "regression": (
-        Column("quantity", words=spaced),
+        Column("quantity", words=name_in_words),
         Column("published", digits=9),
         *(Column(name, words, digits=9) for name, words in READING_WORDS.items()),
         Column("relative_difference", digits=2),
@@ -97,7 +97,7 @@ _LINEAR: Mapping[str, Columns] = {
         Column("stable", "stable, closed"),
     ),
     "tuning": (
-        Column("changed", words=spaced),
+        Column("changed", words=name_in_words),
         Column("factor", "times", digits=2),
         Column("frequency_hz", "first mode"),
         Column("damping_ratio", digits=3),

@@ -18,6 +18,6 @@ def motor_paper(out: Folder = Path("results/motor-paper"), seed: Seed = SEED, as
     The last line of standard output is the path of the report.
     """
     from experiments.motor_paper.study import MOTOR_PAPER
-    from experiments.running.study import Seeded
+    from experiments.running.study import SeedSettings
 
-    finish_study(MOTOR_PAPER, Seeded(seed), out, as_json=as_json)
+    finish_study(MOTOR_PAPER, SeedSettings(seed), out, as_json=as_json)

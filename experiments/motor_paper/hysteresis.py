@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.motor_paper.vibration import response_rows
-from experiments.page.frames import Frames, Rows, stacked, tabled
+from experiments.page.frames import Frames, Rows, as_stacked_table, as_table
 from plant.motor_paper.hysteresis_model import (
     HysteresisParameters,
     describing_function,
@@ -19,7 +19,7 @@ LOOP_FREQUENCIES, LOOP_AMPLITUDE = (1.0, 10.0, 100.0, 480.0), 100.0
 """Frequencies and amplitude of the hysteresis loops [Hz, V]."""
 
 
-@stacked
+@as_stacked_table
 def hysteresis_loops(p: HysteresisParameters) -> Frames:
     """Return the loops of Figures 27 and 34, by the law with rates and as printed (errata M21).
 
@@ -41,7 +41,7 @@ def hysteresis_loops(p: HysteresisParameters) -> Frames:
             yield {"law": law, "frequency_hz": frequency, **columns}
 
 
-@tabled
+@as_table
 def hysteresis_table(loops: pd.DataFrame) -> Rows:
     """Return the characteristics of each loop.
 

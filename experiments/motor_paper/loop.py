@@ -1,7 +1,7 @@
 """The loop of the diaphragm-motor paper's section 5 on its linear model: relay, P, PI and PID with delay and noise.
 
-The displacement x_2 follows a step. The paper gives no gains; ours come from the model (`designed`), and the relay test
-finds the point of oscillation without the model.
+The displacement x_2 follows a step. The paper gives no gains; ours come from the model (`designed_controllers`), and
+the relay test finds the point of oscillation without the model.
 """
 
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from math import pi
 import numpy as np
 import pandas as pd
 
-from experiments.page.frames import Frames, Rows, stacked, tabled
+from experiments.page.frames import Frames, Rows, as_stacked_table, as_table
 from experiments.running.random_streams import stream
 from plant.motor_paper.loop_blocks import (
     LoopRun,
@@ -50,7 +50,7 @@ def _gain_at_rest(p: VibrationParameters) -> float:
     return k2 / (k1 + k2) / reduced_stiffness(p)
 
 
-def designed(p: VibrationParameters) -> Mapping[str, Pid]:
+def designed_controllers(p: VibrationParameters) -> Mapping[str, Pid]:
     """Return a P, a PI and a PID controller for the model, section 5.1.1.
 
     Integral action alone would oscillate at ``2 zeta omega_n`` over the gain at rest; `SAFETY` keeps it below this. The
@@ -74,7 +74,7 @@ def designed(p: VibrationParameters) -> Mapping[str, Pid]:
     }
 
 
-@stacked
+@as_stacked_table
 def loop_runs(p: VibrationParameters, seed: int) -> Frames:
     """Return the step response under each controller, with delay and noise.
 
@@ -86,20 +86,20 @@ def loop_runs(p: VibrationParameters, seed: int) -> Frames:
     count = round(DURATION / SAMPLE_TIME) + 1
     reference = np.where(np.arange(count) * SAMPLE_TIME >= 2e-3, STEP, 0.0)
     noise = band_limited_noise(stream(seed, "loop"), count, SAMPLE_TIME, NOISE_DENSITY)
-    for name, pid in designed(p).items():
-        run = _under(p, pid, reference, noise)
+    for name, pid in designed_controllers(p).items():
+        run = _run_under_pid(p, pid, reference, noise)
         columns = {"time_s": run.time, "reference_m": reference, "output_m": run.output, "command_n": run.command}
         yield {"controller": name, **columns}
 
 
-def _under(p: VibrationParameters, pid: Pid, reference: np.ndarray, noise: np.ndarray) -> LoopRun:
+def _run_under_pid(p: VibrationParameters, pid: Pid, reference: np.ndarray, noise: np.ndarray) -> LoopRun:
     def controller(memory: PidMemory, error: float) -> tuple[float, PidMemory]:
         return pid_step(pid, memory, error, SAMPLE_TIME)
 
     return run_loop(massless_matrices(p), controller, PidMemory(), reference, SAMPLE_TIME, delay=DELAY, noise=noise)
 
 
-@tabled
+@as_table
 def loop_table(runs: pd.DataFrame) -> Rows:
     """Return the characteristics of the step response for each controller.
 
@@ -146,12 +146,12 @@ def relay_table(p: VibrationParameters) -> pd.DataFrame:
     rest = np.zeros(round(DURATION / SAMPLE_TIME) + 1)
     run = run_loop(massless_matrices(p), controller, True, rest, SAMPLE_TIME, delay=DELAY)
     gain, frequency = ultimate_point(run, push)
-    model_gain, model_frequency = _half_turn(p)
+    model_gain, model_frequency = _phase_crossover(p)
     rows = [("ultimate frequency", frequency, model_frequency, "Hz"), ("ultimate gain", gain, model_gain, "N/m")]
     return pd.DataFrame(rows, columns=["quantity", "relay", "model", "unit"])
 
 
-def _half_turn(p: VibrationParameters) -> tuple[float, float]:
+def _phase_crossover(p: VibrationParameters) -> tuple[float, float]:
     """Gain and frequency at which model, delay and hold together have a phase lag of 180 degrees."""
     omega = 2.0 * pi * np.linspace(0.5, 3.0, 100001) * p.natural_frequency
     s = 1j * omega
@@ -163,7 +163,7 @@ def _half_turn(p: VibrationParameters) -> tuple[float, float]:
     return float(1.0 / abs(response[where])), float(omega[where] / (2.0 * pi))
 
 
-@stacked
+@as_stacked_table
 def spectrum_table(runs: pd.DataFrame) -> Frames:
     """Return the amplitude spectra that noise gives the commands at constant reference, Figures 19 and 20.
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from experiments.page.frames import Frames, stacked
+from experiments.page.frames import Frames, as_stacked_table
 from experiments.published import load
 from plant.errors import require_known
 
@@ -140,7 +140,7 @@ def limits_table() -> pd.DataFrame:
     return pd.DataFrame({"quantity": list(values), "value": list(values.values())})
 
 
-@stacked
+@as_stacked_table
 def residual_table() -> Frames:
     """Return the data behind the residual, line-fit and probability plots of Figures 10 to 16, per reading.
 

@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 
 from experiments.motor_paper.regression import fit, inflations, predictive_r_square
-from experiments.page.frames import Frames, Rows, stacked, tabled
+from experiments.page.frames import Frames, Rows, as_stacked_table, as_table
 from experiments.running.random_streams import stream
-from plant.diaphragm_motor.flow import SETTLING, operate
+from plant.diaphragm_motor.flow import SETTLING_TIME, operate
 from plant.diaphragm_motor.model import FLOWS, VELOCITY, deflections
-from plant.diaphragm_motor.parameters import DIAPHRAGMS, DiaphragmMotorParameters, changed
+from plant.diaphragm_motor.parameters import DIAPHRAGMS, DiaphragmMotorParameters, with_changed_value
 from plant.diaphragm_motor.run import ELECTRODES, LONGEST_STEP, motor_drive, run_motor
 from plant.motor_paper.hysteresis_model import harmonics, total_harmonic_distortion
 
@@ -54,7 +54,7 @@ HARMONICS = 9
 """Highest reported multiple of the drive's frequency [dimensionless]."""
 
 
-@tabled
+@as_table
 def operating_points(p: DiaphragmMotorParameters, seed: int) -> Rows:
     """Return velocity and electrodes' amplitudes at thirty drives and loads, with noise.
 
@@ -65,17 +65,17 @@ def operating_points(p: DiaphragmMotorParameters, seed: int) -> Rows:
     """
     rng = stream(seed, "motor sensing")
     for swing, share in product(SWINGS, LOAD_SHARES):
-        yield _at(replace(p, load_force=share * swing), swing, rng)
+        yield _operating_point(replace(p, load_force=share * swing), swing, rng)
 
 
-def _at(p: DiaphragmMotorParameters, swing: float, rng: np.random.Generator) -> dict[str, float]:
+def _operating_point(p: DiaphragmMotorParameters, swing: float, rng: np.random.Generator) -> dict[str, float]:
     point = operate(p, FREQUENCY, swing)
     read = np.abs(point.tones) * (1.0 + RELATIVE_NOISE * rng.standard_normal(DIAPHRAGMS))
     amplitudes = dict(zip(ELECTRODES, read.tolist(), strict=True))
     return {DRIVE: swing, "load_n": p.load_force, "velocity_m_s": point.velocity, **amplitudes}
 
 
-@stacked
+@as_stacked_table
 def sensing_predictions(points: pd.DataFrame) -> Frames:
     """Return the velocity that each regression gives for the points that it was fitted to.
 
@@ -94,7 +94,7 @@ def sensing_predictions(points: pd.DataFrame) -> Frames:
         yield points[[DRIVE, "velocity_m_s"]].assign(regressors=words, fitted_m_s=fitted)
 
 
-@tabled
+@as_table
 def sensing_regressions(points: pd.DataFrame) -> Rows:
     """Return the regressions of velocity on each set of sensing voltages.
 
@@ -123,7 +123,7 @@ def sensing_regressions(points: pd.DataFrame) -> Rows:
         }
 
 
-@tabled
+@as_table
 def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> Rows:
     """Return the predictions of each healthy regression for a faulty motor at 200 V and 10 N, without noise.
 
@@ -142,7 +142,7 @@ def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> Rows:
         faulty = replace(p, load_force=10.0)
         if words in FAULTS:
             name, place, value = FAULTS[words]
-            faulty = replace(faulty, **{name: changed(getattr(faulty, name), place, value)})
+            faulty = replace(faulty, **{name: with_changed_value(getattr(faulty, name), place, value)})
         point = operate(faulty, FREQUENCY, 200.0)
         read = dict(zip(ELECTRODES, np.abs(point.tones).tolist(), strict=True)) | {DRIVE: 200.0}
         said = {
@@ -165,11 +165,11 @@ def motor_spectra(p: DiaphragmMotorParameters) -> pd.DataFrame:
     return pd.concat([_spectra(p, swing) for swing in SWINGS], ignore_index=True)
 
 
-@stacked
+@as_stacked_table
 def _spectra(p: DiaphragmMotorParameters, swing: float) -> Frames:
     a_cycle = ceil(1.0 / (FREQUENCY * LONGEST_STEP) - 1e-9)
     step = 1.0 / (FREQUENCY * a_cycle)
-    settling, cycles = ceil(2.0 * SETTLING * FREQUENCY) * a_cycle, 20
+    settling, cycles = ceil(2.0 * SETTLING_TIME * FREQUENCY) * a_cycle, 20
     drive = motor_drive(FREQUENCY, swing, (settling + cycles * a_cycle) * step, step)
     states = run_motor(p, drive, step)
     bent = deflections(states, drive, p)
@@ -188,7 +188,7 @@ def _spectra(p: DiaphragmMotorParameters, swing: float) -> Frames:
         yield {"signal": name, DRIVE: swing, **columns, **relative}
 
 
-@tabled
+@as_table
 def distortion_table(spectra: pd.DataFrame) -> Rows:
     """Return the total harmonic distortion of each signal, with one column for each drive.
 

@@ -5,7 +5,7 @@ They read the tables of `hydrostate motor-paper`, and compute nothing.
 
 from matplotlib.figure import Figure
 
-from experiments.page.drawing import paired_bars, shaded
+from experiments.page.drawing import draw_paired_bars, with_colours
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.page.style import BLUE, GREY, ORANGE, VERMILION, Margins, panels
@@ -22,7 +22,7 @@ def _draw_velocity(tables: Tables) -> Figure:
     rows = tables["sensing predictions"]
     most = MILLI * float(rows["velocity_m_s"].max())
     for axis, words in zip(axes, SHOWN, strict=True):
-        for swing, part, colour in shaded(rows[rows["regressors"] == words].groupby("peak_to_peak_v")):
+        for swing, part, colour in with_colours(rows[rows["regressors"] == words].groupby("peak_to_peak_v")):
             fitted = MILLI * part["fitted_m_s"]
             axis.plot(MILLI * part["velocity_m_s"], fitted, "o", color=colour, label=f"{swing:g} V")
         axis.plot([0.0, most], [0.0, most], color=GREY, linewidth=0.9)
@@ -38,7 +38,7 @@ def _draw_faults(tables: Tables) -> Figure:
     title = "What a regression fitted to the healthy motor says of a faulty one, less its velocity (200 V, 10 N)"
     figure, (axis,) = panels(title, 1, 1, 3.4, Margins(left=2.3, top=0.45))
     pairs = [(words, MILLI * table[words], colour) for words, colour in zip(SHOWN, (VERMILION, BLUE), strict=True)]
-    paired_bars(axis, table["fault"].tolist(), pairs)
+    draw_paired_bars(axis, table["fault"].tolist(), pairs)
     axis.axvline(MILLI * float(table["velocity_m_s"].iloc[-1]), color=ORANGE, linewidth=1.0, label="velocity itself")
     axis.set(xlabel="error of velocity [mm/s]")
     axis.legend(loc="lower left")

@@ -13,7 +13,7 @@ from experiments.motor_paper.vibration_figure import VIBRATION_FIGURES
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.running.progress import Track
-from experiments.running.study import Found, Seeded, Study
+from experiments.running.study import SeedSettings, Study, StudyResult
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.motor_paper.hysteresis_model import HysteresisParameters
 from plant.motor_paper.vibration_model import VibrationParameters
@@ -56,11 +56,11 @@ TABLES: Mapping[str, Callable[[Tables, int], pd.DataFrame]] = {
 }
 
 
-def _find(settings: Seeded, track: Track) -> Found:
+def _find(settings: SeedSettings, track: Track) -> StudyResult:
     made: dict[str, pd.DataFrame] = {}
     for name, make in track(TABLES.items(), description="computing the paper's numbers anew"):
         made[name] = make(made, settings.seed)
-    return Found(made)
+    return StudyResult(made)
 
 
 MOTOR_PAPER_FIGURES: Drawings = {**REGRESSION_FIGURES, **SENSING_FIGURES, **VIBRATION_FIGURES}

@@ -21,7 +21,7 @@ UNIT_FACTOR = 1000.0
 PUBLISHED_FLOW_ML_MIN, PUBLISHED_VELOCITY_MM_S, PUBLISHED_FORCE_N = 110.11, 168.1, 141.0
 """Section 7.1 and Table 5 [mL/min, mm/s, N]."""
 
-OBEYED_PERCENT = 0.5
+LARGEST_SCATTER_PERCENT = 0.5
 """A relation holds in Table 2 if no row deviates by more than this [percent]."""
 
 
@@ -135,7 +135,7 @@ def relations() -> pd.DataFrame:
         middle = float(rows[column].median())
         off = 100.0 * (rows[column] / middle - 1.0).abs()
         worst = int(off.to_numpy().argmax())
-        found.append((words, middle, float(off.iloc[worst]), worst + 1, bool(off.max() < OBEYED_PERCENT)))
+        found.append((words, middle, float(off.iloc[worst]), worst + 1, bool(off.max() < LARGEST_SCATTER_PERCENT)))
     return pd.DataFrame(found, columns=["relation", "constant", "worst_percent", "worst_row", "holds"])
 
 

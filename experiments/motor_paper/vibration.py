@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from experiments.page.frames import Frames, Rows, stacked, tabled
+from experiments.page.frames import Frames, Rows, as_stacked_table, as_table
 from plant.motor_paper.fractional import grunwald_letnikov
 from plant.motor_paper.hysteresis_model import HysteresisParameters, linearised
 from plant.motor_paper.vibration_model import VibrationParameters, exact_response, first_mode, state_space
@@ -34,7 +34,7 @@ def _vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]"
     }
 
 
-@tabled
+@as_table
 def pole_table(p: VibrationParameters) -> Rows:
     """Return the poles of each model, one for each conjugate pair.
 
@@ -60,7 +60,7 @@ def _all_models(p: VibrationParameters) -> dict[str, Any]:
     return {**_vibration_models(p), "equation 20, small voltages": linearised(HysteresisParameters())}
 
 
-@tabled
+@as_table
 def margin_table(p: VibrationParameters) -> Rows:
     """Return margins of the loops in Figures 22, 23, 31 and 32: each model times a gain, with feedback.
 
@@ -80,7 +80,7 @@ def margin_table(p: VibrationParameters) -> Rows:
         gain, phase, _, crossover = control.margin(loop)
         closed_loop: Any = control.feedback(loop, 1)
         open_poles, closed = np.real(loop.poles()), np.real(closed_loop.poles())
-        omega = _past_poles(np.asarray(loop.poles()))
+        omega = _frequencies_near_poles(np.asarray(loop.poles()))
         turns = control.nyquist_response(loop, omega=omega, warn_encirclements=False).count
         yield {
             "model": name,
@@ -94,7 +94,9 @@ def margin_table(p: VibrationParameters) -> Rows:
         }
 
 
-def _past_poles(poles: "np.ndarray[Any, np.dtype[np.complex128]]") -> "np.ndarray[Any, np.dtype[np.float64]]":
+def _frequencies_near_poles(
+    poles: "np.ndarray[Any, np.dtype[np.complex128]]",
+) -> "np.ndarray[Any, np.dtype[np.float64]]":
     """Angular frequencies fine enough for a resonance with a relative width of 1/10000, which a regular grid misses."""
     near = [abs(pole) + abs(pole.real) * np.linspace(-300.0, 300.0, 2401) for pole in poles if pole.imag > 0.0]
     grid = np.concatenate([np.geomspace(1.0, 1e6, 2001), *near])
@@ -128,7 +130,7 @@ def response_rows(name: str, model: Any) -> pd.DataFrame:
     return pd.DataFrame({"model": name, **columns})
 
 
-@tabled
+@as_table
 def tuning_table(p: VibrationParameters) -> Rows:
     """Return the effect of stiffness and damping on the first mode, as section 5.1.1 tunes them.
 
@@ -157,7 +159,7 @@ def tuning_table(p: VibrationParameters) -> Rows:
             }
 
 
-@stacked
+@as_stacked_table
 def figures_7_to_9() -> Frames:
     """Return fractional integral and derivative of t^2, exactly and sampled, Figures 7 to 9 and equation 6 (errata M6).
 
@@ -185,7 +187,7 @@ def _with_order(p: VibrationParameters, order: float) -> VibrationParameters:
     return replace(p, damping=0.0, fractional_damping=size, fractional_order=order)
 
 
-@stacked
+@as_stacked_table
 def fractional_table(p: VibrationParameters) -> Frames:
     """Return responses with fractional damping, exact and by Oustaloup's approximation.
 

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.page.drawing import say
+from experiments.page.drawing import label_point
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.page.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, Margins, panels
@@ -71,7 +71,7 @@ def _draw_poles(tables: Tables) -> Figure:
     left.set(xlim=(-450.0, 450.0), ylim=(-6.5, 6.5))
     left.legend(loc="center left", fontsize=8.0)
     _nyquist(right, tables["vibration responses"].query("frequency_hz < 2000"))
-    say(right, "-1", (-1.0, 0.0), (4, 4))
+    label_point(right, "-1", (-1.0, 0.0), (4, 4))
     right.set(xlim=(-6.0, 6.0), ylim=(-6.0, 6.0))
     return figure
 

@@ -11,8 +11,8 @@ from estimation.eha.bulk_modulus import BulkModulusEstimate, estimate_bulk_modul
 from estimation.filters.run import Estimate
 from estimation.models.eha_forms import BULK_MODULUS
 from experiments.nine_conditions.settings import StudySettings
-from experiments.running.executors import side_by_side
-from experiments.running.progress import Track, untracked
+from experiments.running.executors import map_in_parallel
+from experiments.running.progress import Track, without_progress
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -42,10 +42,10 @@ class Experiment(NamedTuple):
         return record if self.pressure_logged else record.replace(differential_pressure_pa=None)
 
 
-PUBLISHED_WAY = Experiment("reduced", "acceleration", "sine", False)
+PUBLISHED_METHOD = Experiment("reduced", "acceleration", "sine", False)
 """The published filter on the plant that it assumes."""
 
-PUBLISHED_WAY_STUCK = Experiment("lumped", "acceleration", "sine", False)
+PUBLISHED_METHOD_STICKING = Experiment("lumped", "acceleration", "sine", False)
 """The published filter on a plant that sticks (errata E9)."""
 
 PRESSURE_SINE = Experiment("lumped", "pressure", "sine", True)
@@ -61,8 +61,8 @@ POSITION_SINE = Experiment("lumped", "pressure", "sine", False)
 """Our filter on the paper's sine, with position and velocity only (errata E13)."""
 
 EXPERIMENTS: Mapping[Experiment, str] = {
-    PUBLISHED_WAY: "The published method on the plant that it assumes.",
-    PUBLISHED_WAY_STUCK: "The published method on a plant that sticks (errata E9).",
+    PUBLISHED_METHOD: "The published method on the plant that it assumes.",
+    PUBLISHED_METHOD_STICKING: "The published method on a plant that sticks (errata E9).",
     PRESSURE_SINE: "Our method on the plant that sticks, pressure logged.",
     PRESSURE_STEPS: "Our method on the nine steps, pressure logged.",
     POSITION_STEPS: "Our method on the nine steps, position and velocity alone.",
@@ -77,7 +77,7 @@ TRACK_POINTS = 200
 
 
 def bulk_modulus_study(
-    rig: EhaParameters, settings: StudySettings, track: Track = untracked
+    rig: EhaParameters, settings: StudySettings, track: Track = without_progress
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Estimate bulk modulus in every experiment and condition, from every first guess.
 
@@ -104,7 +104,7 @@ def bulk_modulus_study(
         return results
 
     cases = list(product(EXPERIMENTS, CONDITIONS))
-    done = track(side_by_side(estimate, cases), len(cases), description="estimating bulk modulus")
+    done = track(map_in_parallel(estimate, cases), len(cases), description="estimating bulk modulus")
     rows, curves = zip(*(one for results in done for one in results), strict=True)
     return pd.DataFrame(rows), pd.concat(curves, ignore_index=True)
 

@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 
 from experiments.nine_conditions.findings import bank_in_words
 from experiments.page.style import BLUE, VERMILION, Margins, panels
-from experiments.page.words import in_short, in_words
+from experiments.page.words import condition_in_short, condition_in_words
 
 DARK = 0.25
 """Share of the colour scale below which white text is more legible."""
@@ -86,8 +86,10 @@ def _counts(axis: Axes, counts: np.ndarray) -> None:
 
 def _class_ticks(axis: Axes, names: Sequence[str]) -> None:
     places = range(len(names))
-    axis.set_xticks(places, [in_short(name) for name in names], rotation=55, ha="right", rotation_mode="anchor")
-    axis.set_yticks(places, [in_short(name) for name in names])
+    axis.set_xticks(
+        places, [condition_in_short(name) for name in names], rotation=55, ha="right", rotation_mode="anchor"
+    )
+    axis.set_yticks(places, [condition_in_short(name) for name in names])
     axis.tick_params(length=0)
     axis.grid(visible=False)
     for side in ("top", "right", "bottom", "left"):
@@ -122,8 +124,8 @@ def draw_scores(scores: pd.DataFrame) -> Figure:
         words = f"{value:.{2 if value >= 0.1 else 3}f}"
         axis.text(column, row, words, ha="center", va="center", color=ink, fontweight=weight)
     _class_ticks(axis, list(scores.columns))
-    axis.set_xticks(range(len(scores.columns)), [in_short(name) for name in scores.columns], rotation=30)
-    axis.set_yticks(range(len(scores)), [in_words(str(name)) for name in scores.index])
+    axis.set_xticks(range(len(scores.columns)), [condition_in_short(name) for name in scores.columns], rotation=30)
+    axis.set_yticks(range(len(scores)), [condition_in_words(str(name)) for name in scores.index])
     axis.set(xlabel="model", ylabel="true condition")
     figure.colorbar(image, ax=axis, label="error over the size of the signals [ratio]", pad=0.01, aspect=30)
     return figure

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import pandas as pd
 
 from estimation.identification.model.linear_model import LinearModel
-from experiments.page.frames import Rows, cell, tabled
+from experiments.page.frames import Rows, as_table, cell
 from experiments.published import SCALARS, load
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
 
 
-@tabled
+@as_table
 def condition_table(rig: EhaParameters) -> Rows:
     """Return each condition's parameters and its steady state at 4 V."""
     published = load("conditions").set_index("condition")
@@ -38,7 +38,7 @@ def condition_table(rig: EhaParameters) -> Rows:
         }
 
 
-@tabled
+@as_table
 def scalar_table(conditions: pd.DataFrame, library: Mapping[str, LinearModel], bulk_modulus: float) -> Rows:
     """Return the scalars of the paper's text beside ours.
 

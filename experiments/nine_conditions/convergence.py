@@ -9,10 +9,10 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from experiments.nine_conditions.bulk_modulus import POSITION_STEPS, PRESSURE_STEPS, PUBLISHED_WAY, Experiment
-from experiments.page.drawing import say
+from experiments.nine_conditions.bulk_modulus import POSITION_STEPS, PRESSURE_STEPS, PUBLISHED_METHOD, Experiment
+from experiments.page.drawing import label_point
 from experiments.page.style import BLACK, BLUE, SKY, VERMILION, Margins, panels
-from experiments.page.words import in_words
+from experiments.page.words import condition_in_words
 
 MEGA = 1e6
 """Bulk modulus is drawn in MPa, as in the text and tables; Figure 11 uses units of 1e8 Pa."""
@@ -27,7 +27,7 @@ TOP = 600.0
 TITLES: Mapping[Experiment, str] = {
     PRESSURE_STEPS: "Pressure form, plant that sticks, nine steps, differential pressure logged",
     POSITION_STEPS: "Pressure form, plant that sticks, nine steps, position and velocity alone",
-    PUBLISHED_WAY: "Acceleration form (the published one), plant without sticking, 10 Hz sine",
+    PUBLISHED_METHOD: "Acceleration form (the published one), plant without sticking, 10 Hz sine",
 }
 
 
@@ -56,13 +56,13 @@ def draw_convergence(shown: Experiment, curves: pd.DataFrame, truth_pa: float) -
     last = float(chosen["time_s"].max())
     for axis, (condition, rows) in zip(axes, chosen.groupby("condition", sort=False), strict=False):
         _panel(axis, rows, colours, truth_pa)
-        axis.set(title=in_words(str(condition)))
+        axis.set(title=condition_in_words(str(condition)))
     _time_axis(axes[0], first_tick, last)
     figure.supxlabel(f"time [s], logarithmic after the first {1e3 * first_tick:g} ms", fontsize=9, y=0.01)
     figure.supylabel("effective bulk modulus [MPa]", fontsize=9, x=0.005)
     truth = truth_pa / MEGA
-    say(axes[0], f"truth {truth:.0f}", (last, truth), (0, 4), ha="right")
-    say(axes[0], "first guesses", (0.0, TOP), (6, -6), va="top", fontsize=8)
+    label_point(axes[0], f"truth {truth:.0f}", (last, truth), (0, 4), ha="right")
+    label_point(axes[0], "first guesses", (0.0, TOP), (6, -6), va="top", fontsize=8)
     return figure
 
 

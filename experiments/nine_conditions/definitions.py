@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.page.drawing import diamonds, say
+from experiments.page.drawing import draw_published, label_point
 from experiments.page.style import BESIDE_CONDITIONS, BLUE, condition_levels, panels
 from experiments.published import SCALARS
 
@@ -33,10 +33,10 @@ def draw_definitions(conditions: pd.DataFrame) -> Figure:
         ours = conditions[f"{quantity}_percent_of_normal"]
         axis.barh(level, ours, height=0.62, color=BLUE)
         for height, value in zip(level, ours, strict=True):
-            say(axis, f"{value:.0f}", (0.0, height), (4, 0), va="center", color="white")
+            label_point(axis, f"{value:.0f}", (0.0, height), (4, 0), va="center", color="white")
         for name, scalar in DEFINED[quantity].items():
-            diamonds(axis, 100.0 * SCALARS[scalar].si_value, heights[name])
-        diamonds(axis, [], [], "published definition")
+            draw_published(axis, 100.0 * SCALARS[scalar].si_value, heights[name])
+        draw_published(axis, [], [], "published definition")
         axis.set(xlim=(0.0, 1.05 * float(ours.max())), xlabel=f"{words[quantity]} [% of normal]")
     axes[1].legend(loc="lower right")
     return figure

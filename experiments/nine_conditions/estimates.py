@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from experiments.nine_conditions.convergence import MEGA
 from experiments.nine_conditions.findings import by_experiment, experiment_in_words
-from experiments.page.drawing import say
+from experiments.page.drawing import label_point
 from experiments.page.style import (
     BESIDE_CONDITIONS,
     BLACK,
@@ -18,7 +18,7 @@ from experiments.page.style import (
     Margins,
     condition_rows,
     panels,
-    spread_out,
+    spread_offsets,
 )
 from experiments.page.tables import Row
 
@@ -67,10 +67,12 @@ def _experiment(axis: Axes, rows: pd.DataFrame, heights: Mapping[str, float], tr
         values = found.dropna(subset=["value_pa"])
         inside = values[(values["value_pa"] / MEGA).between(low, high)]
         if len(values) == 0:
-            _say(axis, height, truth, str(found["outcome"].iloc[0]).replace("_", " "))
+            _hatched_note(axis, height, truth, str(found["outcome"].iloc[0]).replace("_", " "))
         elif len(inside) == 0:
             errors = dict.fromkeys(f"{error:.0f} %" for error in sorted(values["error_percent"]))
-            _say(axis, height, truth, f"off the axis: {' to '.join([*errors][:1] + [*errors][1:][-1:])}", VERMILION)
+            _hatched_note(
+                axis, height, truth, f"off the axis: {' to '.join([*errors][:1] + [*errors][1:][-1:])}", VERMILION
+            )
         draw_intervals(axis, inside, height, 2.6, lambda row: BLUE if row["gate_passed"] else VERMILION)
 
 
@@ -88,13 +90,13 @@ def draw_intervals(axis: Axes, rows: pd.DataFrame, height: float, size: float, c
     colour : callable
         Function from an estimate's row to its colour.
     """
-    for offset, row in zip(spread_out(len(rows), 0.5), rows.to_dict("records"), strict=True):
+    for offset, row in zip(spread_offsets(len(rows), 0.5), rows.to_dict("records"), strict=True):
         centre = row["value_pa"] / MEGA
         reach = 0.5 * (row["ci95_high_pa"] - row["ci95_low_pa"]) / MEGA
         axis.errorbar(centre, height + offset, xerr=reach, fmt="o", markersize=size, linewidth=0.9, color=colour(row))
 
 
-def _say(axis: Axes, height: float, centre: float, words: str, colour: str = GREY) -> None:
+def _hatched_note(axis: Axes, height: float, centre: float, words: str, colour: str = GREY) -> None:
     axis.axhspan(height - 0.38, height + 0.38, facecolor="none", edgecolor="#d4d4d4", hatch="////", linewidth=0.0)
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none"}
     axis.text(centre, height, words, ha="center", va="center", fontsize=8, color=colour, bbox=box)
@@ -127,12 +129,12 @@ def draw_forms(estimates: pd.DataFrame, truth_pa: float) -> Figure:
     places = ((0.0, 8, "left"), (truth, -8, "right"))
     for (rows, colour, words), (x, shift, side) in zip(shown, places, strict=True):
         for condition, found in rows.groupby("condition", sort=False):
-            level = [heights[str(condition)] + offset for offset in spread_out(len(found), 0.4)]
+            level = [heights[str(condition)] + offset for offset in spread_offsets(len(found), 0.4)]
             axis.plot(found["filter_settled_at_pa"] / MEGA, level, "o", markersize=4, color=colour, alpha=0.8)
         look = {"color": colour, "ha": side, "fontweight": "bold", "annotation_clip": False}
-        say(axis, words, (x, len(heights) - 0.45), (shift, 0), **look)
+        label_point(axis, words, (x, len(heights) - 0.45), (shift, 0), **look)
     axis.axvline(truth, color=BLACK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
-    say(axis, f"truth {truth:.0f}", (truth, -0.5), (5, 0), va="bottom")
+    label_point(axis, f"truth {truth:.0f}", (truth, -0.5), (5, 0), va="bottom")
     axis.set(ylim=(-0.6, len(heights) - 0.1), xlim=(-0.04, 1.2 * truth))
     axis.set(xlabel="where the filter settles: mean over the last 20 % [MPa]")
     return figure

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.nine_conditions.bulk_modulus import POSITION_STEPS, PRESSURE_STEPS, PUBLISHED_WAY
+from experiments.nine_conditions.bulk_modulus import POSITION_STEPS, PRESSURE_STEPS, PUBLISHED_METHOD
 from experiments.nine_conditions.classification import draw_confusions, draw_scores
 from experiments.nine_conditions.convergence import draw_convergence
 from experiments.nine_conditions.definitions import draw_definitions
@@ -31,7 +31,7 @@ def _confusions(tables: Tables) -> Figure:
 FIGURES: Drawings = {
     "convergence_pressure_form": lambda of: draw_convergence(PRESSURE_STEPS, of["convergence"], truth_of(of)),
     "convergence_without_pressure": lambda of: draw_convergence(POSITION_STEPS, of["convergence"], truth_of(of)),
-    "convergence_acceleration_form": lambda of: draw_convergence(PUBLISHED_WAY, of["convergence"], truth_of(of)),
+    "convergence_acceleration_form": lambda of: draw_convergence(PUBLISHED_METHOD, of["convergence"], truth_of(of)),
     "forms_on_sticking_plant": lambda of: draw_forms(of["bulk_modulus"], truth_of(of)),
     "estimates": lambda of: draw_estimates(of["bulk_modulus"], truth_of(of)),
     "bode": lambda of: draw_bode(of["responses"], of["conditions"]),

@@ -12,22 +12,27 @@ from estimation.filters.run import Estimate, available_channels, run_filter
 from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.eha_forms import BULK_MODULUS, FORMS
-from experiments.nine_conditions.bulk_modulus import PRESSURE_STEPS, PUBLISHED_WAY, PUBLISHED_WAY_STUCK, Experiment
+from experiments.nine_conditions.bulk_modulus import (
+    PRESSURE_STEPS,
+    PUBLISHED_METHOD,
+    PUBLISHED_METHOD_STICKING,
+    Experiment,
+)
 from experiments.nine_conditions.settings import StudySettings
-from experiments.running.executors import side_by_side
-from experiments.running.progress import Track, untracked
+from experiments.running.executors import map_in_parallel
+from experiments.running.progress import Track, without_progress
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.model import EhaParameters
 
-COMPARED = (PUBLISHED_WAY, PUBLISHED_WAY_STUCK, PRESSURE_STEPS)
+COMPARED_EXPERIMENTS = (PUBLISHED_METHOD, PUBLISHED_METHOD_STICKING, PRESSURE_STEPS)
 """The published filter with its printed noise, once on the plant that it assumes and once not; and our filter."""
 
-EQUAL = 1e-6
+EQUALITY_TOLERANCE = 1e-6
 """Largest relative difference between two tracks of bulk modulus that count as equal [dimensionless]."""
 
 
-def filterpy_study(rig: EhaParameters, settings: StudySettings, track: Track = untracked) -> pd.DataFrame:
+def filterpy_study(rig: EhaParameters, settings: StudySettings, track: Track = without_progress) -> pd.DataFrame:
     """Run filterpy's extended Kalman filter and ours on the same logs.
 
     Returns
@@ -54,14 +59,14 @@ def filterpy_study(rig: EhaParameters, settings: StudySettings, track: Track = u
             for way in ("ekf", "filterpy-ekf")
         )
         head = {**experiment._asdict(), "condition": name, "steps": len(record.time) - 1}
-        return {**head, **compared(ours, theirs)}
+        return {**head, **track_comparison(ours, theirs)}
 
-    cases = list(product(COMPARED, CONDITIONS))
-    done = track(side_by_side(compare, cases), len(cases), description="filterpy's filter beside ours")
+    cases = list(product(COMPARED_EXPERIMENTS, CONDITIONS))
+    done = track(map_in_parallel(compare, cases), len(cases), description="filterpy's filter beside ours")
     return pd.DataFrame(list(done))
 
 
-def compared(ours: Estimate, theirs: Estimate) -> Mapping[str, object]:
+def track_comparison(ours: Estimate, theirs: Estimate) -> Mapping[str, object]:
     """Return the comparison of two filters' tracks of bulk modulus.
 
     Returns
@@ -80,7 +85,7 @@ def compared(ours: Estimate, theirs: Estimate) -> Mapping[str, object]:
     elif not np.all(np.isfinite(mine)):
         verdict = "ours fails"
     else:
-        verdict = "equal" if most <= EQUAL else "differs"
+        verdict = "equal" if most <= EQUALITY_TOLERANCE else "differs"
     return {
         "ours_pa": float(mine[-1]),
         "filterpy_pa": float(its[-1]),

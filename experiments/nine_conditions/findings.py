@@ -12,15 +12,15 @@ from experiments.nine_conditions.bulk_modulus import (
     POSITION_STEPS,
     PRESSURE_SINE,
     PRESSURE_STEPS,
-    PUBLISHED_WAY,
+    PUBLISHED_METHOD,
     Experiment,
 )
 from experiments.nine_conditions.validation import WITHOUT_PRESSURE
 from experiments.page.frames import Tables, cell
-from experiments.page.words import in_words
+from experiments.page.words import condition_in_words
 
 WANTED_PERCENT: Mapping[Experiment, float] = {
-    PUBLISHED_WAY: 3.0,
+    PUBLISHED_METHOD: 3.0,
     PRESSURE_SINE: 1.0,
     PRESSURE_STEPS: 1.0,
     POSITION_STEPS: 3.0,
@@ -158,10 +158,10 @@ def _recovery(key: Experiment, rows: pd.DataFrame) -> Recovery:
         worst = float(errors.abs().max())
         outcomes = [str(outcome).replace("_", " ") for outcome in found["outcome"][errors.isna()].unique()]
         if (found["outcome"] == Outcome.NOT_OBSERVABLE.value).all():
-            unobservable.append(in_words(str(name)))
+            unobservable.append(condition_in_words(str(name)))
         elif outcomes or worst > limit:
             why = [*outcomes, *([f"{worst:.3g} % off"] if np.isfinite(worst) else [])]
-            missed.append(f"{in_words(str(name))} ({', '.join(why)})")
+            missed.append(f"{condition_in_words(str(name))} ({', '.join(why)})")
     values = rows["value_pa"].astype(float).dropna()
     return Recovery(
         key=key,
@@ -172,7 +172,7 @@ def _recovery(key: Experiment, rows: pd.DataFrame) -> Recovery:
         unobservable=tuple(unobservable),
         missed=tuple(missed),
         passed=int(rows["gate_passed"].sum()),
-        covered=_covered(rows),
+        covered=_covered_count(rows),
         wanted_percent=wanted,
         mean_pa=float(values.mean()) if len(values) else None,
         worst_error_percent=float(rows["error_percent"].astype(float).abs().max()) if len(values) else None,
@@ -183,7 +183,7 @@ def _recovery(key: Experiment, rows: pd.DataFrame) -> Recovery:
     )
 
 
-def _covered(rows: pd.DataFrame) -> int:
+def _covered_count(rows: pd.DataFrame) -> int:
     """Return the number of intervals that cover the truth, from which the errors are counted."""
     known = rows.dropna(subset=["value_pa", "error_percent"])
     truth = known["value_pa"].astype(float) / (1.0 + known["error_percent"].astype(float) / 100.0)
@@ -206,7 +206,7 @@ def _likeliest_error(confusion: pd.DataFrame) -> str:
     true, found = np.unravel_index(int(wrong.argmax()), wrong.shape)
     if wrong[true, found] == 0:
         return ""
-    names = [in_words(str(name)) for name in confusion.columns]
+    names = [condition_in_words(str(name)) for name in confusion.columns]
     return f"{names[true]} taken for {names[found]}, {wrong[true, found]} of {counts[true].sum()}"
 
 

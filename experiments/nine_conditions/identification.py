@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from estimation.finding import NORMAL_95
-from experiments.page.drawing import say
+from experiments.page.drawing import label_point
 from experiments.page.style import BESIDE_CONDITIONS, BLUE, GREY, ORANGE, VERMILION, Margins, condition_levels, panels
 
 MILLI = 1e3
@@ -77,7 +77,7 @@ def draw_order(order: pd.DataFrame) -> Figure:
         axis.plot(order.loc[~above, "index"], order.loc[~above, name], "o", color=GREY, markerfacecolor="white")
         axis.axhline(floor, color=VERMILION, linewidth=1.2)
         last = float(order["index"].max())
-        say(axis, "noise floor", (last + 0.6, floor), (0, -4), color=VERMILION, ha="right", va="top")
+        label_point(axis, "noise floor", (last + 0.6, floor), (0, -4), color=VERMILION, ha="right", va="top")
         axis.set(yscale="log", ylim=(0.5 * min(floor, float(order[name].min())), None), xlim=(0.4, last + 0.6))
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
         axis.set(title=f"{words}: {int(above.sum())} above the noise", xlabel="index [count]")

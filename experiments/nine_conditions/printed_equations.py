@@ -11,9 +11,9 @@ from estimation.filters.methods import METHODS
 from estimation.filters.run import run_filter
 from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.models.eha_forms import BULK_MODULUS, PRINTED_FORM
-from experiments.nine_conditions.bulk_modulus import PUBLISHED_WAY
+from experiments.nine_conditions.bulk_modulus import PUBLISHED_METHOD
 from experiments.nine_conditions.settings import StudySettings
-from experiments.running.executors import side_by_side
+from experiments.running.executors import map_in_parallel
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.model import EhaParameters
@@ -31,14 +31,14 @@ def printed_equations(rig: EhaParameters, settings: StudySettings) -> pd.DataFra
         Columns condition, start_pa, settled_pa (mean of the last 20 % of the log; NaN where the filter stopped being
         finite) and finite.
     """
-    named = NAMED[PUBLISHED_WAY.method]
+    named = NAMED[PUBLISHED_METHOD.method]
     settings = replace(settings, sample_time=PUBLISHED_TIME, duration=DURATION)
 
     def settle(case: tuple[str, float]) -> dict[str, object]:
         name, start = case
         p = parameters_for(CONDITIONS[name], rig)
-        rng = stream(settings.seed, "bulk modulus", PUBLISHED_WAY.plant, PUBLISHED_WAY.drive, name)
-        record = PUBLISHED_WAY.record(p, settings, rng)
+        rng = stream(settings.seed, "bulk modulus", PUBLISHED_METHOD.plant, PUBLISHED_METHOD.drive, name)
+        record = PUBLISHED_METHOD.record(p, settings, rng)
         prior = first_belief(PRINTED_FORM, record, start, START_STD)
         found = run_filter(
             METHODS[named.method],
@@ -53,4 +53,4 @@ def printed_equations(rig: EhaParameters, settings: StudySettings) -> pd.DataFra
         settled = found.settled(BULK_MODULUS)[0]
         return {"condition": name, "start_pa": start, "settled_pa": settled, "finite": bool(np.isfinite(settled))}
 
-    return pd.DataFrame(list(side_by_side(settle, product(CONDITIONS, settings.starts))))
+    return pd.DataFrame(list(map_in_parallel(settle, product(CONDITIONS, settings.starts))))

@@ -9,11 +9,11 @@ from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.signals.preprocess import zero_phase_filter
 from experiments.nine_conditions.transfer_functions import COEFFICIENTS
-from experiments.page.frames import Rows, tabled
+from experiments.page.frames import Rows, as_table
 from experiments.published import as_printed
 from experiments.published.digits import digits_half
-from experiments.running.executors import side_by_side
-from experiments.running.progress import Track, untracked
+from experiments.running.executors import map_in_parallel
+from experiments.running.progress import Track, without_progress
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from faults.eha.bank import IDENTIFICATION_TIME
@@ -45,8 +45,8 @@ def _printed_test_model(rig: EhaParameters, condition: str, seed: int, duration:
     )
 
 
-@tabled
-def printed_test(rig: EhaParameters, seed: int, duration: float, track: Track = untracked) -> Rows:
+@as_table
+def printed_test(rig: EhaParameters, seed: int, duration: float, track: Track = without_progress) -> Rows:
     """Return the models that section 4's experiment gives for nine circuits, beside Table 6.
 
     Parameters
@@ -61,7 +61,7 @@ def printed_test(rig: EhaParameters, seed: int, duration: float, track: Track = 
         coefficients whose 95 % interval meets the printed value within half a unit of its last digit.
     """
     published = as_printed("transfer_functions").set_index("condition")
-    done = side_by_side(lambda name: _printed_test_model(rig, name, seed, duration), CONDITIONS)
+    done = map_in_parallel(lambda name: _printed_test_model(rig, name, seed, duration), CONDITIONS)
     done = track(done, len(CONDITIONS), description="Table 6 to the letter")
     for name, model in zip(CONDITIONS, done, strict=True):
         values = dict(zip(COEFFICIENTS, [*model.numerator, *model.denominator[1:]], strict=True))

@@ -27,7 +27,7 @@ def printed_model(condition: str) -> dict[str, Any]:
     half = 0.5 * 10.0 ** (np.floor(np.log10(np.abs(values))) - (_DIGITS - 1))
     centre = _roots(values)
     corners = [_roots(values + half * np.array(signs)) for signs in product((-1.0, 1.0), repeat=5)]
-    reach = {name: _reach(centre[name], [corner[name] for corner in corners]) for name in centre}
+    reach = {name: _largest_deviation(centre[name], [corner[name] for corner in corners]) for name in centre}
     low, high = printed_gain_interval(printed)
     gain = float(values[:3].sum() / (1.0 + values[3:].sum()))
     return {
@@ -48,7 +48,7 @@ def _roots(values: np.ndarray) -> dict[str, np.ndarray]:
     return {"poles": ordered(np.concatenate([[1.0], values[3:]])), "zeros": ordered(values[:3])}
 
 
-def _reach(centre: np.ndarray, corners: list[np.ndarray]) -> np.ndarray:
+def _largest_deviation(centre: np.ndarray, corners: list[np.ndarray]) -> np.ndarray:
     apart = np.array(corners) - centre
     return np.abs(np.real(apart)).max(axis=0) + 1j * np.abs(np.imag(apart)).max(axis=0)
 
@@ -77,10 +77,10 @@ def pairs(values: np.ndarray) -> list[list[float | None]]:
     list of list
         Real and imaginary part of each; None for a number that is not finite.
     """
-    return [[known(float(value.real)), known(float(value.imag))] for value in values]
+    return [[finite_or_none(float(value.real)), finite_or_none(float(value.imag))] for value in values]
 
 
-def known(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
     """Return a number, or None if it is not finite.
 
     Parameters

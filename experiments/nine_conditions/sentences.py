@@ -7,7 +7,7 @@ from experiments.nine_conditions.bulk_modulus import (
     POSITION_STEPS,
     PRESSURE_SINE,
     PRESSURE_STEPS,
-    PUBLISHED_WAY_STUCK,
+    PUBLISHED_METHOD_STICKING,
     Experiment,
 )
 from experiments.nine_conditions.findings import ClassAccuracy, Recovery, class_accuracies, recoveries, truth_of
@@ -27,7 +27,7 @@ def verdict(tables: Tables) -> tuple[str, str, str]:
     return (
         _bulk_modulus_sentence(found, truth_of(tables)),
         _class_sentence(class_accuracies(tables)),
-        _limit_sentence(found[POSITION_SINE], found[PUBLISHED_WAY_STUCK]),
+        _limit_sentence(found[POSITION_SINE], found[PUBLISHED_METHOD_STICKING]),
     )
 
 

@@ -12,14 +12,14 @@ from experiments.nine_conditions.bulk_modulus import (
     POSITION_STEPS,
     PRESSURE_SINE,
     PRESSURE_STEPS,
-    PUBLISHED_WAY,
-    PUBLISHED_WAY_STUCK,
+    PUBLISHED_METHOD,
+    PUBLISHED_METHOD_STICKING,
     bulk_modulus_study,
 )
 from experiments.nine_conditions.columns import COLUMNS, report_frames
 from experiments.nine_conditions.conditions import condition_table, scalar_table
 from experiments.nine_conditions.figures import FIGURES
-from experiments.nine_conditions.filterpy_column import EQUAL, filterpy_study, verdict_counts
+from experiments.nine_conditions.filterpy_column import EQUALITY_TOLERANCE, filterpy_study, verdict_counts
 from experiments.nine_conditions.findings import class_accuracies, recoveries, truth_of
 from experiments.nine_conditions.printed_test import printed_test
 from experiments.nine_conditions.sentences import verdict
@@ -35,9 +35,9 @@ from experiments.nine_conditions.validation import classification_study, validat
 from experiments.nine_conditions.validation_on_circuit import validation_on_circuit
 from experiments.page.folder import json_file
 from experiments.page.frames import Tables, parameter_table
-from experiments.running.progress import Track, in_one_piece
+from experiments.running.progress import Track, run_as_one_piece
 from experiments.running.random_streams import stream
-from experiments.running.study import Found, Study
+from experiments.running.study import Study, StudyResult
 from plant.eha.model import EhaParameters
 from plant.errors import LogWarning
 from plant.sensors.sensors import BENCH
@@ -45,16 +45,18 @@ from plant.sensors.sensors import BENCH
 RIG = EhaParameters()
 
 
-def _find(settings: StudySettings, track: Track) -> Found:
+def _find(settings: StudySettings, track: Track) -> StudyResult:
     # the tables state each fit's doubts; ignored here, because threads share the warning filters
     with warnings.catch_warnings(action="ignore", category=LogWarning):
         return _parts(settings, track)
 
 
-def _parts(settings: StudySettings, track: Track) -> Found:
+def _parts(settings: StudySettings, track: Track) -> StudyResult:
     estimates, convergence = bulk_modulus_study(RIG, settings, track)
     library, tests = identification_study(RIG, settings, track)
-    rmse, runs = in_one_piece(track, "validating on the nine steps", lambda: validation_study(RIG, library, settings))
+    rmse, runs = run_as_one_piece(
+        track, "validating on the nine steps", lambda: validation_study(RIG, library, settings)
+    )
     conditions = condition_table(RIG)
     tables = {
         "filterpy": filterpy_study(RIG, settings, track),
@@ -76,7 +78,7 @@ def _parts(settings: StudySettings, track: Track) -> Found:
         "order": order_table(tests["normal"], stream(settings.seed, "order")),
     }
     models = json_file({name: model.to_dict() for name, model in library.items()})
-    return Found(tables, series, {"transfer_functions.json": models})
+    return StudyResult(tables, series, {"transfer_functions.json": models})
 
 
 def _mean_estimate(estimates: pd.DataFrame) -> float:
@@ -92,13 +94,13 @@ def _facts(tables: Tables, settings: StudySettings) -> Mapping[str, Any]:
         **report_frames(tables, settings),
         "verdict": verdict(tables),
         "truth_pa": truth_of(tables),
-        "published_way": found[PUBLISHED_WAY],
-        "published_stuck": found[PUBLISHED_WAY_STUCK],
+        "published_way": found[PUBLISHED_METHOD],
+        "published_stuck": found[PUBLISHED_METHOD_STICKING],
         "ours": (found[PRESSURE_SINE], found[PRESSURE_STEPS]),
         "position_steps": found[POSITION_STEPS],
         "position_sine": found[POSITION_SINE],
         "filterpy_steps": int(tables["filterpy"]["steps"].max()),
-        "filterpy_equal": EQUAL,
+        "filterpy_equal": EQUALITY_TOLERANCE,
         "filterpy_counts": verdict_counts(tables["filterpy"]),
         "classes": class_accuracies(tables),
         "better": int(rmse["mathematical_is_better"].sum()),

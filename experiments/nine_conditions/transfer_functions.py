@@ -12,11 +12,11 @@ from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.signals.etfe import etfe
 from estimation.identification.signals.preprocess import zero_phase_filter
 from experiments.nine_conditions.settings import StudySettings
-from experiments.page.frames import Frames, Rows, cell, stacked, tabled
+from experiments.page.frames import Frames, Rows, as_stacked_table, as_table, cell
 from experiments.published import load
 from experiments.published.library import read_library
-from experiments.running.executors import side_by_side
-from experiments.running.progress import Track, untracked
+from experiments.running.executors import map_in_parallel
+from experiments.running.progress import Track, without_progress
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS
 from faults.eha.bank import IDENTIFICATION_TIME, identification_run
@@ -35,7 +35,7 @@ RESPONSE_FREQUENCIES = np.geomspace(0.5, 100.0, 80)
 
 
 def identification_study(
-    rig: EhaParameters, settings: StudySettings, track: Track = untracked
+    rig: EhaParameters, settings: StudySettings, track: Track = without_progress
 ) -> tuple[Mapping[str, LinearModel], Mapping[str, Record]]:
     """Return the library that ships, and nine runs of section 4's test of the circuit beside it.
 
@@ -49,11 +49,11 @@ def identification_study(
         rng, seconds = stream(settings.seed, "identification", name), settings.identification_duration
         return identification_run(rig, CONDITIONS[name], rng, duration=seconds, plant=CIRCUIT)
 
-    done = track(side_by_side(test, CONDITIONS), len(CONDITIONS), description="testing nine conditions")
+    done = track(map_in_parallel(test, CONDITIONS), len(CONDITIONS), description="testing nine conditions")
     return read_library(), dict(zip(CONDITIONS, done, strict=True))
 
 
-@tabled
+@as_table
 def transfer_function_table(models: Mapping[str, LinearModel]) -> Rows:
     """Return the library beside Table 6.
 
@@ -126,7 +126,7 @@ def printed_gain_interval(printed: list[str]) -> tuple[float, float]:
     return float(min(corners)), float(max(corners))
 
 
-@stacked
+@as_stacked_table
 def response_curves(models: Mapping[str, LinearModel], records: Mapping[str, Record]) -> Frames:
     """Return the models' frequency responses and the empirical ones, in long form.
 
@@ -192,7 +192,7 @@ def order_table(record: Record, rng: np.random.Generator) -> pd.DataFrame:
     )
 
 
-@tabled
+@as_table
 def filtering_table(rng: np.random.Generator, duration: float) -> Rows:
     """Return the effect of zero-phase filtering of only the output on a fit, for a plant with known poles.
 

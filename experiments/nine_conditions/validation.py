@@ -9,13 +9,13 @@ from estimation.identification.model.linear_model import LinearModel
 from experiments.nine_conditions.settings import StudySettings
 from experiments.page.frames import cell
 from experiments.published import load
-from experiments.running.executors import side_by_side
-from experiments.running.progress import Track, untracked
+from experiments.running.executors import map_in_parallel
+from experiments.running.progress import Track, without_progress
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.rmse import Scores, score_mathematical, score_transfer_functions
 from faults.eha.bank import mathematical_bank, predict_run
-from faults.eha.inject import spread
+from faults.eha.inject import varied_actuator
 from faults.scores import accuracy, confusion_matrix
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -78,7 +78,7 @@ def validation_study(
 
 
 def classification_study(
-    rig: EhaParameters, library: Mapping[str, LinearModel], settings: StudySettings, track: Track = untracked
+    rig: EhaParameters, library: Mapping[str, LinearModel], settings: StudySettings, track: Track = without_progress
 ) -> dict[str, pd.DataFrame]:
     """Classify many runs with each bank, at nominal and at spread parameters.
 
@@ -97,10 +97,10 @@ def classification_study(
     for variant in VARIANTS:
 
         def classify(seed: int, variant: str = variant) -> list[dict[str, Scores]]:
-            runs = (_drawn_run(rig, name, variant, settings, seed) for name in CONDITIONS)
+            runs = (_random_run(rig, name, variant, settings, seed) for name in CONDITIONS)
             return [_all_scores(run, bank, library) for run in runs]
 
-        done = side_by_side(classify, range(settings.seeds))
+        done = map_in_parallel(classify, range(settings.seeds))
         done = track(done, settings.seeds, description=f"classifying, {variant} parameters")
         runs = [scores for of_seed in done for scores in of_seed]
         true = list(CONDITIONS) * settings.seeds
@@ -118,10 +118,10 @@ def _score_example(runs: list[dict[str, Scores]]) -> pd.DataFrame:
     return pd.DataFrame.from_dict({name: dict(run[WITH_PRESSURE].by_condition) for name, run in first}, orient="index")
 
 
-def _drawn_run(rig: EhaParameters, condition: str, variant: str, settings: StudySettings, seed: int) -> Record:
+def _random_run(rig: EhaParameters, condition: str, variant: str, settings: StudySettings, seed: int) -> Record:
     rng = stream(settings.seed, "classification", variant, condition, seed)
     p = parameters_for(CONDITIONS[condition], rig)
-    return _nine_steps(spread(p, rng) if variant == "spread" else p, settings, rng)
+    return _nine_steps(varied_actuator(p, rng) if variant == "spread" else p, settings, rng)
 
 
 def _all_scores(

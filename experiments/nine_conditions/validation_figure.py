@@ -5,9 +5,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.page.drawing import say
+from experiments.page.drawing import label_point
 from experiments.page.style import BLACK, BLUE, GREY, VERMILION, Margins, condition_levels, panels
-from experiments.page.words import in_words
+from experiments.page.words import condition_in_words
 
 MILLI = 1e3
 
@@ -33,7 +33,7 @@ def draw_validation_run(runs: pd.DataFrame, condition: str) -> Figure:
     run = runs[runs["condition"] == condition]
     shares = {"width_ratios": [2.1, 1.0], "height_ratios": [1.0, 1.9], "sharex": "col"}
     margins = Margins(left=0.75, across=0.7, down=0.5)
-    figure, axes = panels(f"The nine steps, {in_words(condition)}", 2, 2, 5.2, margins, **shares)
+    figure, axes = panels(f"The nine steps, {condition_in_words(condition)}", 2, 2, 5.2, margins, **shares)
     drive, drive_near, velocity, velocity_near = axes
     reversal = _reversal(run)
     near = run[run["time_s"].between(reversal - BEFORE, reversal + AFTER)]
@@ -65,7 +65,7 @@ def _mark_sticking(axis: Axes, near: pd.DataFrame) -> None:
     still = near[near["mathematical_m_s"] == 0.0]
     if len(still) > 1:
         middle = 0.5 * (float(still["time_s"].min()) + float(still["time_s"].max()))
-        say(axis, "sticks", (middle, 0.0), (28, 24), color=BLUE, arrowprops={"arrowstyle": "->", "color": BLUE})
+        label_point(axis, "sticks", (middle, 0.0), (28, 24), color=BLUE, arrowprops={"arrowstyle": "->", "color": BLUE})
 
 
 def draw_rmse(rmse: pd.DataFrame) -> Figure:

@@ -10,14 +10,14 @@ import numpy as np
 
 from estimation.identification.model.linear_model import LinearModel
 from experiments.nine_conditions.settings import StudySettings
-from experiments.page.frames import Rows, tabled
-from experiments.running.executors import side_by_side
-from experiments.running.progress import Track, untracked
+from experiments.page.frames import Rows, as_table
+from experiments.running.executors import map_in_parallel
+from experiments.running.progress import Track, without_progress
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.rmse import score_mathematical, score_transfer_functions
 from faults.eha.bank import mathematical_bank
-from faults.eha.inject import spread
+from faults.eha.inject import varied_actuator
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
@@ -30,14 +30,14 @@ MOST_CIRCUITS = 5
 
 def _nine_steps(rig: EhaParameters, condition: str, settings: StudySettings, seed: int) -> Record:
     rng, T = stream(settings.seed, "validation on the circuit", condition, seed), settings.classification_sample_time
-    p = spread(parameters_for(CONDITIONS[condition], rig), rng)
+    p = varied_actuator(parameters_for(CONDITIONS[condition], rig), rng)
     drive = make_drive("steps", settings.duration, T, p, rng)
     return simulate(CIRCUIT, drive, T, p, sensors=BENCH, rng=rng)
 
 
-@tabled
+@as_table
 def validation_on_circuit(
-    rig: EhaParameters, library: Mapping[str, LinearModel], settings: StudySettings, track: Track = untracked
+    rig: EhaParameters, library: Mapping[str, LinearModel], settings: StudySettings, track: Track = without_progress
 ) -> Rows:
     """Compare both kinds of model, at the tables' parameters, with circuits spread about them.
 
@@ -62,7 +62,7 @@ def validation_on_circuit(
             for run in runs
         ]
 
-    done = track(side_by_side(errors, CONDITIONS), len(CONDITIONS), description="validating on circuits")
+    done = track(map_in_parallel(errors, CONDITIONS), len(CONDITIONS), description="validating on circuits")
     for name, found in zip(CONDITIONS, done, strict=True):
         row: dict[str, object] = {"condition": name, "circuits": len(found)}
         for words, values in zip(("transfer_function", "mathematical"), np.array(found).T, strict=True):

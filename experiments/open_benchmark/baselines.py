@@ -95,7 +95,7 @@ def forest_on_features(series: Array, y: Names) -> Verdicts:
     return lambda other: np.asarray(forest.predict(simple_features(other)))
 
 
-LEARNT: Mapping[str, Callable[[Array, Names], Verdicts]] = {
+LEARNERS: Mapping[str, Callable[[Array, Names], Verdicts]] = {
     "random forest on simple features": forest_on_features,
     "ridge on simple features": _ridge_on_features,
     "random kernels and ridge (ROCKET's scheme)": rocket,

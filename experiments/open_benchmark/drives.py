@@ -36,7 +36,7 @@ class DriveLimits:
         return round(self.duration / TICK)
 
 
-def _held(room: DriveLimits, move: Callable[[float], tuple[float, float]]) -> Array:
+def _piecewise_speed(room: DriveLimits, move: Callable[[float], tuple[float, float]]) -> Array:
     """Return a piecewise constant speed; `move` takes the estimated position [m] and returns a time [s] and a speed.
 
     A speed that would take the piston too far is reversed.
@@ -62,7 +62,7 @@ def steps(room: DriveLimits, rng: np.random.Generator) -> Array:
             return float(rng.uniform(0.1, 0.4)), 0.0
         return float(rng.uniform(0.3, 1.0) * longest), float(rng.choice((-1, 1)) * rng.uniform(0.3, 1.0) * room.rated)
 
-    return _held(room, move)
+    return _piecewise_speed(room, move)
 
 
 def prbs(room: DriveLimits, rng: np.random.Generator) -> Array:
@@ -76,7 +76,7 @@ def prbs(room: DriveLimits, rng: np.random.Generator) -> Array:
         towards = np.sign(goals[-1] - where)
         return hold, float(amplitude * (towards if rng.random() < 0.7 else -towards))
 
-    return _held(room, move)
+    return _piecewise_speed(room, move)
 
 
 def multisine(room: DriveLimits, rng: np.random.Generator) -> Array:

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.open_benchmark.friction import steady_friction
-from experiments.open_benchmark.kind import MAYBE, UNKNOWN, Draw, Kind
+from experiments.open_benchmark.kind import OWN_OR_UNKNOWN, UNKNOWN, Draw, Kind
 from experiments.open_benchmark.setup import Setup
 from faults.conditions import LEAKAGE_TABLE
 
-OUTSIDE = (UNKNOWN,)
+ONLY_UNKNOWN = (UNKNOWN,)
 """The right verdict on a log that fits none of the nine."""
 
 
-def _machine(**changes: float) -> Draw:
+def _with_machine(**changes: float) -> Draw:
     return lambda setup, _: setup.with_machine(**changes)
 
 
@@ -36,19 +36,19 @@ STARVING = (
 )
 """Conditions whose pressures empty a chamber that has no make-up flow."""
 
-FAULTY = (
+FAULT_KINDS = (
     Kind(
         "worn_pump",
         "worn pump: 80 % of the flow, no more leakage",
-        _machine(efficiency=0.8),
-        OUTSIDE,
+        _with_machine(efficiency=0.8),
+        ONLY_UNKNOWN,
         r"\bpump|efficien|\bworn",
     ),
     Kind(
         "makeup_check_stuck_shut",
         "make-up check of side B stuck shut: it boils",
         lambda setup, _: replace(setup.with_machine(check_b=0.0), forward_first=True),
-        OUTSIDE,
+        ONLY_UNKNOWN,
         r"make-?up|check valve|cavitat|vapou?r",
         conditions=STARVING,
     ),
@@ -56,14 +56,14 @@ FAULTY = (
         "makeup_check_leaks",
         "make-up check of side A leaks",
         _leaking_seat,
-        OUTSIDE,
+        ONLY_UNKNOWN,
         r"make-?up|check valve|one side",
     ),
     Kind(
         "relief_set_low",
         "relief valve opens at the pressure of a slow piston",
         _low_relief,
-        OUTSIDE,
+        ONLY_UNKNOWN,
         r"relief",
     ),
     Kind(
@@ -78,14 +78,14 @@ FAULTY = (
         "entrained_air",
         "0.5 to 3 % of entrained air",
         lambda setup, rng: setup.with_change(air=rng.uniform(0.005, 0.03)),
-        MAYBE,
+        OWN_OR_UNKNOWN,
         r"\bair\b",
     ),
     Kind(
         "air_midway",
         "1 to 4 % of air gets in between 40 and 60 % of the log",
         lambda setup, rng: setup.with_change(late_air=rng.uniform(0.01, 0.04), late_from=rng.uniform(0.4, 0.6)),
-        OUTSIDE,
+        ONLY_UNKNOWN,
         r"\bair\b|soften",
     ),
     Kind(
@@ -118,8 +118,8 @@ FAULTY = (
     Kind(
         "leakage_partly_turbulent",
         "30 % of the leakage is turbulent at 5 bar",
-        _machine(turbulent=0.3),
-        MAYBE,
+        _with_machine(turbulent=0.3),
+        OWN_OR_UNKNOWN,
         severity=False,
     ),
 )

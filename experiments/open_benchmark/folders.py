@@ -29,7 +29,11 @@ def truth_of(made: MadeLog, split: str, index: int) -> dict[str, Any]:
     kind, setup, m, change = made.kind, made.setup, made.setup.machine, made.setup.change
     condition, states = CONDITIONS[setup.condition], made.states
     low, high = made.bulk_modulus
-    accept, named, difference = kind.accepted(setup.condition), kind.named, np.max(np.abs(states[:, 4] - states[:, 5]))
+    accept, named, difference = (
+        kind.right_verdicts(setup.condition),
+        kind.named,
+        np.max(np.abs(states[:, 4] - states[:, 5])),
+    )
     if difference < m.relief < Machine().relief:  # a low-set valve that never opened leaves no trace
         accept, named = tuple(dict.fromkeys((*accept, setup.condition))), ""
     return {
@@ -51,7 +55,7 @@ def truth_of(made: MadeLog, split: str, index: int) -> dict[str, Any]:
         "accept": ";".join(accept),
         "rig": RIG if setup.rig else "",
         "columns": "",
-        "sev": int(kind.severity and setup.condition in kind.accepted(setup.condition)),
+        "sev": int(kind.severity and setup.condition in kind.right_verdicts(setup.condition)),
         "vmax": np.max(np.abs(states[:, 3])),
         "dpmax": difference,
         "xmin": np.min(states[:, 2]),

@@ -16,7 +16,7 @@ MICRO_DAMPING = 0.3
 """Damping of the blocks that stick, as a share of critical damping [dimensionless]."""
 
 
-def stretched(stretch: Array, moved: float, m: Machine, out: Array) -> None:
+def update_stretch(stretch: Array, moved: float, m: Machine, out: Array) -> None:
     """Write the stretch of the springs after the piston moved.
 
     Parameters

@@ -4,16 +4,16 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-OFF = 0.05
+SILENT_ERROR_FRACTION = 0.05
 """Error of bulk modulus above which it can count as a silent error [fraction]."""
 
 WIDTHS = 3.0
 """The error must also exceed this number of half widths of its 95 % interval [dimensionless]."""
 
-SURE = 0.9
+SURE_PROBABILITY = 0.9
 """Probability above which a wrong class is a silent error."""
 
-NO_NUMBER = ("failed", "diverged")
+OUTCOMES_WITHOUT_NUMBER = ("failed", "diverged")
 
 Entries = Mapping[str, Any]
 
@@ -35,7 +35,7 @@ def judge_bulk_modulus(said: Entries, truth: Entries) -> dict[str, Any]:
         ``silent``; ``narrow`` is a silent error of any size.
     """
     gate, quantity = said.get("gate") or {}, said.get("bulk_modulus_pa") or {}
-    flagged = not gate.get("passed", True) or said["outcome"] in NO_NUMBER
+    flagged = not gate.get("passed", True) or said["outcome"] in OUTCOMES_WITHOUT_NUMBER
     value = quantity.get("value")
     row = {"outcome": said["outcome"], "flagged": flagged, "error": None, "covered": None, "covered_total": None}
     if value is None:
@@ -50,7 +50,7 @@ def judge_bulk_modulus(said: Entries, truth: Entries) -> dict[str, Any]:
         "error": value / near - 1.0,
         "covered": given[0] <= high and given[1] >= low,
         "covered_total": total[0] <= high and total[1] >= low,
-        "silent_beta": trusted and abs(value / near - 1.0) > OFF,
+        "silent_beta": trusted and abs(value / near - 1.0) > SILENT_ERROR_FRACTION,
         "narrow": trusted,
     }
 
@@ -73,12 +73,12 @@ def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
         dated within the stated interval; None if nothing changed.
     """
     accept, got = str(truth["accept"]).split(";"), said.get("condition")
-    dated = _dated(said, truth)
+    dated = _onset_judgement(said, truth)
     if got is None:
         verdict = "none" if said["outcome"] == "not_observable" else "failed"
         return {"verdict": verdict, "right": False, "silent_class": False, "false_unknown": False, **dated}
     unknown = bool(said.get("unknown"))
-    sure = (said.get("probabilities") or {}).get(got, 0.0) > SURE
+    sure = (said.get("probabilities") or {}).get(got, 0.0) > SURE_PROBABILITY
     verdict = "unknown" if unknown else "right" if got in accept else "wrong"
     return {
         "verdict": verdict,
@@ -89,7 +89,7 @@ def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
     }
 
 
-def _dated(said: Entries, truth: Entries) -> dict[str, Any]:
+def _onset_judgement(said: Entries, truth: Entries) -> dict[str, Any]:
     """Return whether a stated beginning of a condition is false, and whether it is right."""
     ends, began = said.get("since_ci95_s"), str(truth.get("since_s", ""))
     return {
@@ -98,7 +98,7 @@ def _dated(said: Entries, truth: Entries) -> dict[str, Any]:
     }
 
 
-def named(pattern: str, *said: Entries) -> bool | None:
+def names_cause(pattern: str, *said: Entries) -> bool | None:
     """Return whether the messages about a log name its cause; None if no cause need be named."""
     if not pattern:
         return None

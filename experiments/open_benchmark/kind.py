@@ -9,12 +9,12 @@ from experiments.open_benchmark.drives import OPEN
 from experiments.open_benchmark.setup import Setup
 from faults.conditions import CONDITIONS
 
-OWN = "condition"
+OWN_CONDITION = "condition"
 """Among the right verdicts, stands for the log's own condition."""
 
 UNKNOWN = "unknown"
 
-MAYBE = (OWN, UNKNOWN)
+OWN_OR_UNKNOWN = (OWN_CONDITION, UNKNOWN)
 """Both the condition and unknown are right."""
 
 Draw = Callable[[Setup, np.random.Generator], Setup]
@@ -39,7 +39,7 @@ class Kind:
     draw : callable
         Function from a plain setup to a setup of this kind.
     accept : tuple of str
-        Right verdicts: conditions, `OWN`, `UNKNOWN`.
+        Right verdicts: conditions, `OWN_CONDITION`, `UNKNOWN`.
     named : str
         A regular expression that a tool's messages about a log must match; empty if no message is needed.
     drives : tuple of str
@@ -55,13 +55,13 @@ class Kind:
     name: str
     strange: str
     draw: Draw = unchanged
-    accept: tuple[str, ...] = (OWN,)
+    accept: tuple[str, ...] = (OWN_CONDITION,)
     named: str = ""
     drives: tuple[str, ...] = tuple(OPEN)
     conditions: tuple[str, ...] = tuple(CONDITIONS)
     severity: bool = True
     draws_anew: bool = False
 
-    def accepted(self, condition: str) -> tuple[str, ...]:
+    def right_verdicts(self, condition: str) -> tuple[str, ...]:
         """Return the right verdicts for a log in this condition."""
-        return tuple(condition if verdict == OWN else verdict for verdict in self.accept)
+        return tuple(condition if verdict == OWN_CONDITION else verdict for verdict in self.accept)

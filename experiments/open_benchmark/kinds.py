@@ -10,15 +10,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.open_benchmark.added_kinds import ADDED
+from experiments.open_benchmark.added_kinds import ADDED_KINDS
 from experiments.open_benchmark.draws import course_of, draw_plain
-from experiments.open_benchmark.fault_kinds import FAULTY
+from experiments.open_benchmark.fault_kinds import FAULT_KINDS
 from experiments.open_benchmark.kind import Kind
-from experiments.open_benchmark.logger_kinds import LOGGERS
+from experiments.open_benchmark.logger_kinds import LOGGER_KINDS
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.oil import stiffness
-from experiments.open_benchmark.pairs import BOTH, collide, pair_of
-from experiments.open_benchmark.rig_kinds import RIGS
+from experiments.open_benchmark.pairs import PAIR_SEPARATOR, collide, pair_of
+from experiments.open_benchmark.rig_kinds import RIG_KINDS
 from experiments.open_benchmark.run import run
 from experiments.open_benchmark.setup import Setup
 from plant.errors import HydrostateError, require_known
@@ -29,7 +29,7 @@ VERSION = "1.0"
 SPLITS = ("training", "validation", "test")
 """Splits: for learning, for choosing between methods, and for the final score."""
 
-KINDS: Mapping[str, Kind] = {kind.name: kind for kind in (*LOGGERS, *RIGS, *FAULTY, *ADDED)}
+KINDS: Mapping[str, Kind] = {kind.name: kind for kind in (*LOGGER_KINDS, *RIG_KINDS, *FAULT_KINDS, *ADDED_KINDS)}
 """All kinds, by name."""
 
 STRIDE = 4
@@ -75,7 +75,7 @@ def kind_of(name: str) -> Kind:
     HydrostateError
         If there is no such kind, or the two collide.
     """
-    first, both, second = name.partition(BOTH)
+    first, both, second = name.partition(PAIR_SEPARATOR)
     for one in (first, second) if both else (first,):
         if one not in KINDS:
             near = get_close_matches(one, KINDS, n=1)
@@ -98,10 +98,12 @@ def drawn_pairs(split: str, count: int) -> list[str]:
     """
     require_known("split", split, SPLITS)
     pairs = [(a, b) for a, b in combinations(KINDS.values(), 2) if not collide(a, b)]
-    rng = np.random.default_rng([zlib.crc32(BOTH.encode()), SPLITS.index(split)])
+    rng = np.random.default_rng([zlib.crc32(PAIR_SEPARATOR.encode()), SPLITS.index(split)])
     drawn: list[str] = []
     for later in (False, True):
-        names = [f"{a.name}{BOTH}{b.name}" for a, b in pairs if (a in ADDED or b in ADDED) is later]
+        names = [
+            f"{a.name}{PAIR_SEPARATOR}{b.name}" for a, b in pairs if (a in ADDED_KINDS or b in ADDED_KINDS) is later
+        ]
         drawn += [names[place] for place in rng.permutation(len(names))]
     return drawn[:count]
 

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from experiments.open_benchmark.folders import TRUTH
-from experiments.open_benchmark.logger import DIFFERENCE, PLAIN, PRESSURE_A, PRESSURE_B
+from experiments.open_benchmark.logger import DIFFERENCE, PLAIN_CHANNELS, PRESSURE_A, PRESSURE_B
 from plant.arrays import Array
 from plant.errors import HydrostateError
 
@@ -66,7 +66,7 @@ def read_arrays(
         for truth, log in read_logs(folder):
             if DIFFERENCE not in log and PRESSURE_A in log:
                 log[DIFFERENCE] = log[PRESSURE_A] - log[PRESSURE_B]
-            channels = [log.get(name, pd.Series(np.nan, log.index)) for name in PLAIN]
+            channels = [log.get(name, pd.Series(np.nan, log.index)) for name in PLAIN_CHANNELS]
             series.append(np.concatenate([np.interp(clock, log["time_s"], one) for one in channels]))
             conditions.append(str(truth["condition"]))
             groups.append(folder.name)

@@ -15,7 +15,7 @@ from plant.errors import HydrostateError
 SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
 DIFFERENCE, PRESSURE_A, PRESSURE_B = "differential_pressure_pa", "pressure_a_pa", "pressure_b_pa"
 PRESSURES = (DIFFERENCE, PRESSURE_A, PRESSURE_B)
-PLAIN = (SPEED, POSITION, VELOCITY, DIFFERENCE)
+PLAIN_CHANNELS = (SPEED, POSITION, VELOCITY, DIFFERENCE)
 
 
 @dataclass(frozen=True)
@@ -79,14 +79,14 @@ class Sensor:
         ndarray, shape (n,)
             Logged values [unit of the channel].
         """
-        sensed = _followed(values, self.play) if self.play > 0.0 else values
-        sensed = _lagged(sensed, self.lag / RECORD) if self.lag > 0.0 else sensed
-        sensed = _passed(sensed, self.corner * RECORD) if self.corner > 0.0 else sensed
+        sensed = _backlash(values, self.play) if self.play > 0.0 else values
+        sensed = _first_order_lag(sensed, self.lag / RECORD) if self.lag > 0.0 else sensed
+        sensed = _low_pass(sensed, self.corner * RECORD) if self.corner > 0.0 else sensed
         sampled = np.interp(time - self.delay, fine, sensed)
         offset = self.offset + self.drift * np.linspace(0.0, 1.0, len(time))
         logged = self.gain * sampled + offset + self.noise * rng.standard_normal(len(time))
         logged = logged + self._hum(time) if self.hum > 0.0 else logged
-        logged = _averaged(logged, self.average) if self.average > 1 else logged
+        logged = _moving_average(logged, self.average) if self.average > 1 else logged
         logged = self.quantum * np.round(logged / self.quantum) if self.quantum > 0.0 else logged
         rows = np.arange(len(time))
         return logged[rows - rows % self.hold]
@@ -97,7 +97,7 @@ class Sensor:
         return self.hum * (np.sin(phase + 1.0) + 0.2 * np.sin(3.0 * phase))
 
 
-def _lagged(values: Array, records: float) -> Array:
+def _first_order_lag(values: Array, records: float) -> Array:
     """Return values after a first-order lag whose time constant is given in records."""
     from scipy.signal import lfilter
 
@@ -105,7 +105,7 @@ def _lagged(values: Array, records: float) -> Array:
     return np.asarray(lfilter([1.0 - pole], [1.0, -pole], values - values[0])) + values[0]
 
 
-def _passed(values: Array, corner: float) -> Array:
+def _low_pass(values: Array, corner: float) -> Array:
     """Return values after a second-order Butterworth low-pass, its corner in units of 1/`RECORD`."""
     from scipy.signal import butter, lfilter
 
@@ -113,13 +113,13 @@ def _passed(values: Array, corner: float) -> Array:
     return np.asarray(lfilter(over, under, values - values[0])) + values[0]
 
 
-def _averaged(values: Array, rows: int) -> Array:
+def _moving_average(values: Array, rows: int) -> Array:
     """Return the moving average of the last rows, with the first value extended to before the first row."""
     sums = np.cumsum(np.concatenate([np.full(rows, values[0]), values]))
     return (sums[rows:] - sums[:-rows]) / rows
 
 
-def _followed(values: Array, play: float) -> Array:
+def _backlash(values: Array, play: float) -> Array:
     """Return the output of a play (backlash) that starts in its middle."""
     out, at = np.empty_like(values), float(values[0])
     for k, value in enumerate(values.tolist()):
@@ -160,7 +160,7 @@ class Logger:
     """
 
     sensors: Mapping[str, Sensor] = field(default_factory=_sensors)
-    channels: tuple[str, ...] = PLAIN
+    channels: tuple[str, ...] = PLAIN_CHANNELS
     headings: Mapping[str, str] = field(default_factory=dict[str, str])
     sample_time: float = 1e-3
     jitter: float = 0.0

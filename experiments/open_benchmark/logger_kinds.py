@@ -1,7 +1,7 @@
 """Kinds whose actuator matches the rig file, with a peculiarity of sensors or logger."""
 
 from experiments.open_benchmark.drives import CLOSED
-from experiments.open_benchmark.kind import MAYBE, UNKNOWN, Draw, Kind
+from experiments.open_benchmark.kind import OWN_OR_UNKNOWN, UNKNOWN, Draw, Kind
 from experiments.open_benchmark.logger import (
     DIFFERENCE,
     POSITION,
@@ -28,13 +28,13 @@ def _speed(**changes: float) -> Draw:
 RPM = 30.0 / 3.141592653589793
 """Conversion from radians per second to revolutions per minute."""
 
-LATE = r"\b(?:lags?|late|delay)"
+LATE_WORDS = r"\b(?:lags?|late|delay)"
 """Words for a channel that lags the others."""
 
-REVERSED = r"\bsign\b|reversed|other way|opposite"
+REVERSED_WORDS = r"\bsign\b|reversed|other way|opposite"
 """Words for a channel with reversed sign."""
 
-LOGGERS = (
+LOGGER_KINDS = (
     Kind("plain", "nothing: the paper's actuator, travel up to 200 mm"),
     Kind("closed_loop", "closed position loop, no load", drives=tuple(CLOSED)),
     Kind("no_velocity", "no velocity column", _channels(SPEED, POSITION, DIFFERENCE)),
@@ -65,9 +65,9 @@ LOGGERS = (
         "pressure_lags_2_ms",
         "2 ms first-order lag in differential pressure",
         _pressure(lag=2e-3),
-        named=LATE,
+        named=LATE_WORDS,
     ),
-    Kind("pressure_5_ms_late", "differential pressure 5 ms late", _pressure(delay=5e-3), named=LATE),
+    Kind("pressure_5_ms_late", "differential pressure 5 ms late", _pressure(delay=5e-3), named=LATE_WORDS),
     Kind(
         "pressure_1_bar_off",
         "differential pressure 1 bar high",
@@ -79,7 +79,7 @@ LOGGERS = (
         "pressure_gain_20_percent_high",
         "pressure reads 20 % high",
         _pressure(gain=1.2),
-        MAYBE,
+        OWN_OR_UNKNOWN,
         r"\bgain\b",
         severity=False,
     ),
@@ -93,22 +93,22 @@ LOGGERS = (
         "pressure_averaged",
         "differential pressure is a moving average over 2 to 6 ms",
         lambda setup, rng: setup.with_sensor(PRESSURES, average=int(rng.integers(2, 7))),
-        MAYBE,
+        OWN_OR_UNKNOWN,
         named=r"\bfilter|\baverag",
     ),
     Kind(
         "position_held",
         "position comes every 2 to 5 ms and is repeated in between",
         lambda setup, rng: setup.with_sensor((POSITION, VELOCITY), hold=int(rng.integers(2, 6))),
-        MAYBE,
+        OWN_OR_UNKNOWN,
         named=r"\brepeat|\bheld\b|\bslow",
     ),
     Kind(
         "pressure_behind_30_hz",
         "differential pressure behind a second-order low-pass of 30 Hz",
         _pressure(corner=30.0),
-        MAYBE,
-        named=LATE,
+        OWN_OR_UNKNOWN,
+        named=LATE_WORDS,
     ),
     Kind(
         "pressure_offset_drifts",
@@ -120,7 +120,7 @@ LOGGERS = (
         "position_has_play",
         "play of 20 to 100 um between piston and position sensor",
         lambda setup, rng: setup.with_sensor((POSITION,), play=rng.uniform(2e-5, 1e-4)),
-        MAYBE,
+        OWN_OR_UNKNOWN,
         named=r"\bplay\b|backlash",
         severity=False,
     ),
@@ -135,7 +135,7 @@ LOGGERS = (
         "motor speed counts the other way",
         _speed(gain=-1.0),
         (UNKNOWN,),
-        REVERSED,
+        REVERSED_WORDS,
     ),
     Kind(
         "speed_in_rpm",
@@ -149,7 +149,7 @@ LOGGERS = (
         "differential pressure counts the other way",
         _pressure(gain=-1.0),
         (UNKNOWN,),
-        REVERSED,
+        REVERSED_WORDS,
     ),
     Kind(
         "position_velocity_swapped",

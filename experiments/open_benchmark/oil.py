@@ -7,7 +7,7 @@ vapour pressure acts. So no oil is lost when a chamber boils or fills again.
 
 from experiments.open_benchmark.machine import ATMOSPHERE, Machine
 
-THINNEST = 0.05
+LEAST_STIFFNESS = 0.05
 """Least stiffness of stretched oil relative to that at atmospheric pressure [dimensionless]."""
 
 
@@ -24,7 +24,7 @@ def air_space(pressure: float, air: float, m: Machine) -> float:
     return air * (ATMOSPHERE / pressure) ** (1.0 / m.polytropic) if air > 0.0 else 0.0
 
 
-def stiffened(pressure: float, m: Machine) -> float:
+def relative_stiffness(pressure: float, m: Machine) -> float:
     """Return bulk modulus relative to that at atmospheric pressure, linear in pressure [dimensionless].
 
     Parameters
@@ -32,7 +32,7 @@ def stiffened(pressure: float, m: Machine) -> float:
     pressure : float
         Stretch pressure, absolute [Pa].
     """
-    return max(1.0 + m.stiffening * (pressure - ATMOSPHERE) / m.bulk_modulus, THINNEST)
+    return max(1.0 + m.stiffening * (pressure - ATMOSPHERE) / m.bulk_modulus, LEAST_STIFFNESS)
 
 
 def liquid_space(pressure: float, m: Machine) -> float:
@@ -45,7 +45,7 @@ def liquid_space(pressure: float, m: Machine) -> float:
     m : Machine
         The actuator; with a stiffening of -1 the secant modulus is constant, and volume falls linearly.
     """
-    grown = stiffened(pressure, m)
+    grown = relative_stiffness(pressure, m)
     return grown if m.stiffening == -1.0 else grown ** (-1.0 / m.stiffening)
 
 
@@ -72,7 +72,7 @@ def stiffness(pressure: float, air: float, m: Machine) -> float:
     air : float
         Entrained air at atmospheric pressure, per unit of oil [dimensionless].
     """
-    oil = m.bulk_modulus * stiffened(pressure, m)
+    oil = m.bulk_modulus * relative_stiffness(pressure, m)
     if air <= 0.0:
         return oil
     liquid, bubbles = liquid_space(pressure, m), air_space(max(pressure, m.vapour), air, m)

@@ -9,11 +9,11 @@ import numpy as np
 
 from experiments.open_benchmark.draws import draw_plain
 from experiments.open_benchmark.drives import OPEN
-from experiments.open_benchmark.kind import OWN, UNKNOWN, Kind
+from experiments.open_benchmark.kind import OWN_CONDITION, UNKNOWN, Kind
 from experiments.open_benchmark.setup import Setup
 from plant.errors import HydrostateError
 
-BOTH = "+"
+PAIR_SEPARATOR = "+"
 """Separator between the names of a pair."""
 
 
@@ -37,18 +37,18 @@ def pair_of(first: Kind, second: Kind) -> Kind:
         raise HydrostateError(f"kinds of a pair must not collide, got {first.name} and {second.name}")
     patterns = [f"(?=.*(?:{kind.named}))" for kind in (first, second) if kind.named]
     return Kind(
-        f"{first.name}{BOTH}{second.name}",
+        f"{first.name}{PAIR_SEPARATOR}{second.name}",
         f"{first.strange}; {second.strange}",
-        lambda setup, rng: _both(first, second, setup, rng),
-        _accepted(first.accept, second.accept),
+        lambda setup, rng: _with_both_changes(first, second, setup, rng),
+        _right_verdicts(first.accept, second.accept),
         rf"\A(?s:{''.join(patterns)})" if patterns else "",
         first.drives if first.drives != tuple(OPEN) else second.drives,
-        _shared(first, second),
+        _shared_conditions(first, second),
         first.severity and second.severity,
     )
 
 
-def _both(first: Kind, second: Kind, setup: Setup, rng: np.random.Generator) -> Setup:
+def _with_both_changes(first: Kind, second: Kind, setup: Setup, rng: np.random.Generator) -> Setup:
     """Return a plain log with the changes of both kinds; a kind that draws a new machine comes first."""
     for kind in (second, first) if second.draws_anew else (first, second):
         setup = kind.draw(setup, rng)
@@ -61,25 +61,25 @@ def collide(first: Kind, second: Kind) -> bool:
     They collide if both change the same part of machine, sensor, logger or rig file, if both have drives of their own,
     if they share no condition, or if one of them changes nothing.
     """
-    changes = touched(first), touched(second)
-    return not all(changes) or bool(changes[0] & changes[1]) or not _shared(first, second)
+    changes = changed_parts(first), changed_parts(second)
+    return not all(changes) or bool(changes[0] & changes[1]) or not _shared_conditions(first, second)
 
 
-def _shared(first: Kind, second: Kind) -> tuple[str, ...]:
+def _shared_conditions(first: Kind, second: Kind) -> tuple[str, ...]:
     return tuple(condition for condition in first.conditions if condition in second.conditions)
 
 
-def _accepted(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
+def _right_verdicts(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
     """Return the right verdicts for both; the classes that a kind names itself take precedence over the condition."""
     unknown = (UNKNOWN,) if UNKNOWN in (*first, *second) else ()
     classes = [[verdict for verdict in one if verdict != UNKNOWN] for one in (first, second)]
-    own = [one for one in classes if one != [OWN]]
-    shared = (OWN,) if not own else tuple(verdict for verdict in own[0] if all(verdict in one for one in own))
+    own = [one for one in classes if one != [OWN_CONDITION]]
+    shared = (OWN_CONDITION,) if not own else tuple(verdict for verdict in own[0] if all(verdict in one for one in own))
     return (*shared, *unknown)
 
 
 @cache
-def touched(kind: Kind) -> frozenset[str]:
+def changed_parts(kind: Kind) -> frozenset[str]:
     """Return the parts of a plain log that a kind changes, including its drive."""
     plain = draw_plain(kind.conditions[0], kind.drives[0], np.random.default_rng(0))
     before, after = _parts(plain), _parts(kind.draw(plain, np.random.default_rng(1)))

@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.open_benchmark.draws import draw_plain
 from experiments.open_benchmark.drives import CLOSED
-from experiments.open_benchmark.kind import MAYBE, Draw, Kind
+from experiments.open_benchmark.kind import OWN_OR_UNKNOWN, Draw, Kind
 from experiments.open_benchmark.setup import Setup
 from plant.eha.model import EhaParameters
 
@@ -22,7 +22,7 @@ SINGLE_ROD = 0.7
 """Ratio of the rod-side area to the other."""
 
 
-def _scaled(**factors: float) -> Draw:
+def _scaled_machine(**factors: float) -> Draw:
     """Return the fields of a machine that differ from the rig file."""
     return lambda setup, _: setup.with_machine(**{n: k * getattr(setup.machine, n) for n, k in factors.items()})
 
@@ -32,7 +32,7 @@ def _factor(low: float, high: float, *names: str) -> Draw:
 
     def draw(setup: Setup, rng: np.random.Generator) -> Setup:
         factor = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-        return _scaled(**dict.fromkeys(names, factor))(setup, rng)
+        return _scaled_machine(**dict.fromkeys(names, factor))(setup, rng)
 
     return draw
 
@@ -42,7 +42,7 @@ def _oil(low: float, high: float) -> Draw:
     return lambda setup, rng: setup.with_machine(bulk_modulus=float(np.exp(rng.uniform(np.log(low), np.log(high)))))
 
 
-def _big(setup: Setup, rng: np.random.Generator) -> Setup:
+def _big_actuator(setup: Setup, rng: np.random.Generator) -> Setup:
     base = replace(
         PAPER,
         pump_displacement=4.0 * PAPER.pump_displacement,
@@ -66,27 +66,29 @@ def _single_rod(setup: Setup, _: np.random.Generator) -> Setup:
     return replace(one, rig={"piston_area": mean * PAPER.piston_area, "chamber_volume": mean * PAPER.chamber_volume})
 
 
-RIGS = (
-    Kind("big_actuator", "area, mass, volume x3, pump x4; the rig file says so", _big, draws_anew=True),
+RIG_KINDS = (
+    Kind("big_actuator", "area, mass, volume x3, pump x4; the rig file says so", _big_actuator, draws_anew=True),
     Kind("stiff_oil", "bulk modulus 0.7e9 to 1.5e9, rig file unedited", _oil(0.7e9, 1.5e9)),
-    Kind("soft_oil", "bulk modulus 4e7 to 6e7, rig file unedited", _oil(4e7, 6e7), MAYBE),
+    Kind("soft_oil", "bulk modulus 4e7 to 6e7, rig file unedited", _oil(4e7, 6e7), OWN_OR_UNKNOWN),
     Kind(
         "oil_stiffens",
         "bulk modulus grows by 5 to 12 Pa a pascal, as mineral oil's does",
         lambda setup, rng: setup.with_machine(stiffening=rng.uniform(5.0, 12.0)),
-        MAYBE,
+        OWN_OR_UNKNOWN,
     ),
     Kind(
         "checks_crack_late",
         "make-up checks open 10 to 30 kPa below the accumulator's pressure",
         lambda setup, rng: setup.with_machine(crack_a=rng.uniform(1e4, 3e4), crack_b=rng.uniform(1e4, 3e4)),
-        MAYBE,
+        OWN_OR_UNKNOWN,
     ),
     Kind(
-        "rig_volume_25_percent_low", "dead volume a third above the rig file's", _scaled(volume_a=4 / 3, volume_b=4 / 3)
+        "rig_volume_25_percent_low",
+        "dead volume a third above the rig file's",
+        _scaled_machine(volume_a=4 / 3, volume_b=4 / 3),
     ),
-    Kind("rig_area_4_percent_high", "area 4 % under the rig file's", _scaled(area_a=1 / 1.04, area_b=1 / 1.04)),
-    Kind("rig_mass_half_of_true", "twice the rig file's moving mass", _scaled(mass=2.0)),
+    Kind("rig_area_4_percent_high", "area 4 % under the rig file's", _scaled_machine(area_a=1 / 1.04, area_b=1 / 1.04)),
+    Kind("rig_mass_half_of_true", "twice the rig file's moving mass", _scaled_machine(mass=2.0)),
     Kind("rig_volume_wrong", "dead volume 0.7 to 1.4 of the rig file's", _factor(0.7, 1.4, "volume_a", "volume_b")),
     Kind("rig_area_wrong", "area 0.93 to 1.07 of the rig file's", _factor(0.93, 1.07, "area_a", "area_b")),
     Kind("rig_mass_wrong", "0.5 to 2.5 of the rig file's moving mass", _factor(0.5, 2.5, "mass")),
@@ -100,14 +102,14 @@ RIGS = (
         "single_rod",
         "single rod, area ratio 0.7, pilot-operated checks; rig file: mean area, mean volume",
         _single_rod,
-        MAYBE,
+        OWN_OR_UNKNOWN,
         severity=False,
     ),
     Kind(
         "constant_load",
         "1 to 2.5 kN on the rod, position loop",
         lambda setup, rng: setup.with_machine(load=rng.uniform(1e3, 2.5e3)),
-        MAYBE,
+        OWN_OR_UNKNOWN,
         r"\bload",
         tuple(CLOSED),
         severity=False,
@@ -116,7 +118,7 @@ RIGS = (
         "spring_load",
         "a spring of 5 to 15 N/mm on the rod",
         lambda setup, rng: setup.with_machine(spring=rng.uniform(5e3, 15e3)),
-        MAYBE,
+        OWN_OR_UNKNOWN,
         r"\bspring|\bload",
         tuple(CLOSED),
         severity=False,

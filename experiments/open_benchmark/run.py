@@ -9,13 +9,20 @@ import numpy as np
 
 from experiments.open_benchmark.equations import STATES, clipped, rates, stop_force
 from experiments.open_benchmark.flows import check_flow, filling, leakage_flow, oil_flows, orifice_flow, pump_flow
-from experiments.open_benchmark.friction import MICRO_DAMPING, SLIPS, friction_force, steady_friction, stretched
+from experiments.open_benchmark.friction import MICRO_DAMPING, SLIPS, friction_force, steady_friction, update_stretch
 from experiments.open_benchmark.machine import ATMOSPHERE, LIFT, PRELOAD, Machine
-from experiments.open_benchmark.oil import THINNEST, air_space, liquid_space, specific_volume, stiffened, stiffness
+from experiments.open_benchmark.oil import (
+    LEAST_STIFFNESS,
+    air_space,
+    liquid_space,
+    relative_stiffness,
+    specific_volume,
+    stiffness,
+)
 from plant.arrays import Array
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 
 TICK = 1e-3
 """Time between two rows of a course [s]."""
@@ -46,9 +53,9 @@ def advance(y: Array, stretch: Array, now: Array, demand: float, m: Machine, ste
     rates(y, stretch, now, demand, m, first)
     for i in range(len(y)):
         ahead[i] = y[i] + step * first[i]
-    stretched(stretch, step * y[3], m, pulled)
+    update_stretch(stretch, step * y[3], m, pulled)
     rates(ahead, pulled, now, demand, m, second)
-    stretched(stretch, 0.5 * step * (y[3] + ahead[3]), m, stretch)
+    update_stretch(stretch, 0.5 * step * (y[3] + ahead[3]), m, stretch)
     for i in range(len(y)):
         y[i] += 0.5 * step * (first[i] + second[i])
 
@@ -84,9 +91,9 @@ def trajectory(m: Machine, course: Array, y: Array, stretch: Array, substeps: in
 
 
 PARTS = (
-    *(clipped, air_space, stiffened, liquid_space, specific_volume, stiffness),
+    *(clipped, air_space, relative_stiffness, liquid_space, specific_volume, stiffness),
     *(orifice_flow, check_flow, pump_flow, filling, leakage_flow, oil_flows),
-    *(stretched, steady_friction, friction_force, stop_force, rates, advance, trajectory),
+    *(update_stretch, steady_friction, friction_force, stop_force, rates, advance, trajectory),
 )
 """Functions of the compiled run, each after those that it calls."""
 
@@ -95,8 +102,8 @@ PARTS = (
 def compiled() -> Callable[..., Any]:
     """Return `trajectory`, compiled."""
     constants = {"ATMOSPHERE": ATMOSPHERE, "LIFT": LIFT, "PRELOAD": PRELOAD, "RECORD": RECORD}
-    constants |= {"SLIPS": SLIPS, "MICRO_DAMPING": MICRO_DAMPING, "THINNEST": THINNEST}
-    text = kernel_text("a run of the open benchmark's actuator", pasted(*PARTS, constants=constants))
+    constants |= {"SLIPS": SLIPS, "MICRO_DAMPING": MICRO_DAMPING, "LEAST_STIFFNESS": LEAST_STIFFNESS}
+    text = kernel_text("a run of the open benchmark's actuator", functions_text(*PARTS, constants=constants))
     return load_native("open_benchmark", text, {"trajectory": signature_of(trajectory)}).trajectory
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from estimation.finding import NORMAL_95
-from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
+from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, names_cause
 from experiments.open_benchmark.loaders import read_truth, rows_of
 from experiments.python_user.log import Log
 from faults.diagnosis.circuits.actuator import actuator_of
@@ -19,10 +19,10 @@ from plant.errors import HydrostateError
 
 FAILED: Mapping[str, Any] = {"outcome": "failed"}
 
-OF_PRESSURE = "pressure_"
+PRESSURE_PREFIX = "pressure_"
 """Prefix of the kinds in which only the pressure sensor is peculiar; without pressure they are plain."""
 
-Z = "z_"
+Z_PREFIX = "z_"
 """Prefix of the columns with normalised errors (error over standard deviation)."""
 
 LOSSES = ("leakage_coefficient", "flow_bias")
@@ -58,14 +58,14 @@ def score_set(folder: Path, count: int, *, pressure: bool) -> Iterator[dict[str,
     """
     for told in rows_of(read_truth(folder).head(count)):
         truth, began = told if pressure else without_pressure(told), process_time()
-        estimate, diagnosis, rig = _answers(folder, truth, pressure)
+        estimate, diagnosis, rig = _verb_results(folder, truth, pressure)
         row = {"set": folder.name, "file": truth["file"], "input": truth["input"], "pressure": pressure}
         row |= judge_bulk_modulus(estimate, truth) | judge_class(diagnosis, truth)
-        row["named"] = named(str(truth.get("named", "")), estimate, diagnosis)
-        errors = _errors(estimate, diagnosis, truth, rig) if int(truth["sev"] or 0) else {}
+        row["named"] = names_cause(str(truth.get("named", "")), estimate, diagnosis)
+        errors = _normalised_errors(estimate, diagnosis, truth, rig) if int(truth["sev"] or 0) else {}
         hits = [abs(z) <= NORMAL_95 for name, z in errors.items() if name not in LOSSES]
         row |= {"severities": len(hits), "covered_severities": sum(hits), "seconds": process_time() - began}
-        yield row | {f"{Z}{name}": z for name, z in errors.items()}
+        yield row | {f"{Z_PREFIX}{name}": z for name, z in errors.items()}
 
 
 def without_pressure(truth: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -82,11 +82,11 @@ def without_pressure(truth: Mapping[str, Any]) -> Mapping[str, Any]:
         If only the pressure sensor is peculiar, the row of a plain log: its condition is the only right verdict, and
         nothing need be named. Otherwise the row unchanged.
     """
-    of_pressure = str(truth.get("set", "")).startswith(OF_PRESSURE) and truth.get("condition")
+    of_pressure = str(truth.get("set", "")).startswith(PRESSURE_PREFIX) and truth.get("condition")
     return {**truth, "accept": truth["condition"], "named": ""} if of_pressure else truth
 
 
-def _answers(folder: Path, truth: Mapping[str, Any], pressure: bool) -> tuple[Any, Any, EhaParameters]:
+def _verb_results(folder: Path, truth: Mapping[str, Any], pressure: bool) -> tuple[Any, Any, EhaParameters]:
     """Return the entries of both verbs, and the healthy actuator that they were given."""
     from hydrostate import read
 
@@ -96,17 +96,17 @@ def _answers(folder: Path, truth: Mapping[str, Any], pressure: bool) -> tuple[An
     except HydrostateError as error:
         failed = {**FAILED, "message": str(error)}
         return failed, failed, EhaParameters()
-    return _asked(log, "estimate", pressure), _asked(log, "diagnose", pressure), log.rig.parameters
+    return _verb_result(log, "estimate", pressure), _verb_result(log, "diagnose", pressure), log.rig.parameters
 
 
-def _asked(log: Log, verb: str, pressure: bool) -> Mapping[str, Any]:
+def _verb_result(log: Log, verb: str, pressure: bool) -> Mapping[str, Any]:
     try:
         return getattr(log, verb)(no_pressure=not pressure).to_dict()
     except HydrostateError as error:
         return {**FAILED, "message": str(error)}
 
 
-def _errors(
+def _normalised_errors(
     estimated: Mapping[str, Any], said: Mapping[str, Any], truth: Mapping[str, Any], healthy: EhaParameters
 ) -> dict[str, float]:
     """Return the normalised error of what both verbs give, given the rig, by name: 0 within a range of truths.
@@ -126,10 +126,10 @@ def _errors(
         told |= {name: states[name]["ci95"] for name in LOSSES if name in states}
         ranges |= {name: (getattr(true, name), getattr(true, name)) for name in LOSSES}
     ends = {name: ci for name, ci in told.items() if ci is not None and None not in ci and ci[0] < ci[1]}
-    return {name: _beyond(ci, ranges[name]) for name, ci in ends.items()}
+    return {name: _deviation_from_range(ci, ranges[name]) for name, ci in ends.items()}
 
 
-def _beyond(ci: Sequence[float], truths: tuple[float, float]) -> float:
+def _deviation_from_range(ci: Sequence[float], truths: tuple[float, float]) -> float:
     """Return the distance of an interval's middle from the nearest of a range of truths, in standard deviations."""
     middle = 0.5 * (ci[0] + ci[1])
     return NORMAL_95 * (middle - min(max(middle, truths[0]), truths[1])) / (0.5 * (ci[1] - ci[0]))
@@ -144,12 +144,17 @@ def coverage(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         ``z`` is the root mean square of the normalised error, 1 if intervals are right [dimensionless].
     """
     table, lines = pd.DataFrame(rows), list[dict[str, Any]]()
-    columns = [str(one) for one in table.columns if str(one).startswith(Z)]
+    columns = [str(one) for one in table.columns if str(one).startswith(Z_PREFIX)]
     for (name, pressure), part in table.groupby(["set", "pressure"], sort=False):
         for column in columns:
             z = part[column].dropna().astype(float)
             if len(z):
-                which = {"set": name, "pressure": pressure, "quantity": column.removeprefix(Z), "numbers": len(z)}
+                which = {
+                    "set": name,
+                    "pressure": pressure,
+                    "quantity": column.removeprefix(Z_PREFIX),
+                    "numbers": len(z),
+                }
                 covered = int((z.abs() <= NORMAL_95).sum())
                 size, worst = float((z**2).mean() ** 0.5), float(max(z, key=abs))
                 lines.append(which | {"covered": covered, "z": size, "mean_z": float(z.mean()), "largest": worst})

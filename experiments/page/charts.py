@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from experiments.page.figure_files import image_of
 from experiments.page.numbers import number
-from experiments.page.packed import ends_of_stretches, packed, stretch_length
+from experiments.page.packed import ends_of_stretches, packed_series, stretch_length
 from experiments.page.panels import Curve, Panel
 from experiments.page.scripting import data_block
 from experiments.page.still import DAYS, still_picture
@@ -83,7 +83,7 @@ class Charts:
                     "bands": [list(band) for band in panel.bands],
                     **({"ends": list(panel.ends)} if panel.ends else {}),
                     "curves": [
-                        {"name": one.name, "colour": one.colour, "look": one.look, **_carried(one.values)}
+                        {"name": one.name, "colour": one.colour, "look": one.look, **_packed_curve(one.values)}
                         for one in panel.curves
                     ],
                 }
@@ -123,8 +123,8 @@ def _summary(curve: Curve) -> list[float | None]:
     return [float(one) for one in (there.min(), there.max(), there.mean(), np.sqrt(np.mean(there**2)))]
 
 
-def _carried(values: Array) -> Mapping[str, Any]:
-    return packed(ends_of_stretches(np.asarray(values, dtype=np.float64), MOST_DRAWN))
+def _packed_curve(values: Array) -> Mapping[str, Any]:
+    return packed_series(ends_of_stretches(np.asarray(values, dtype=np.float64), MOST_DRAWN))
 
 
 def _places(x: Array, length: int) -> Mapping[str, Any]:
@@ -135,4 +135,4 @@ def _places(x: Array, length: int) -> Mapping[str, Any]:
         shown = count if length == 1 else 2 * -(-count // length)
         start = float(x[0]) if length == 1 else float(x[0]) + 0.25 * length * step
         return {"start": start, "step": step if length == 1 else 0.5 * length * step, "count": shown}
-    return packed(x)
+    return packed_series(x)

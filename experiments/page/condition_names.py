@@ -4,7 +4,7 @@ LEVELS = ("none", "minor", "major")
 """Levels of leakage and friction, by size."""
 
 
-def in_words(condition: str) -> str:
+def condition_in_words(condition: str) -> str:
     """Return a condition's name for a reader.
 
     Returns
@@ -14,7 +14,7 @@ def in_words(condition: str) -> str:
 
     Examples
     --------
-    >>> in_words("minor_leakage_major_friction")
+    >>> condition_in_words("minor_leakage_major_friction")
     'minor leakage + major friction'
     """
     return condition.replace("leakage_", "leakage + ").replace("_", " ")

@@ -13,7 +13,9 @@ from experiments.page.style import BLACK, ORANGE
 Colour: TypeAlias = str | tuple[float, ...]
 
 
-def say(axis: Axes, words: str, at: tuple[float, float], shift: tuple[float, float] = (0.0, 0.0), **look: Any) -> None:
+def label_point(
+    axis: Axes, words: str, at: tuple[float, float], shift: tuple[float, float] = (0.0, 0.0), **look: Any
+) -> None:
     """Write text beside a point.
 
     Parameters
@@ -28,7 +30,7 @@ def say(axis: Axes, words: str, at: tuple[float, float], shift: tuple[float, flo
     axis.annotate(words, at, shift, textcoords="offset points", **look)
 
 
-def diamonds(axis: Axes, x: Any, y: Any, label: str | None = None) -> None:
+def draw_published(axis: Axes, x: Any, y: Any, label: str | None = None) -> None:
     """Mark published values.
 
     Parameters
@@ -41,7 +43,7 @@ def diamonds(axis: Axes, x: Any, y: Any, label: str | None = None) -> None:
     axis.plot(x, y, "D", color=ORANGE, markeredgecolor=BLACK, markersize=7, label=label)
 
 
-def shaded(groups: Iterable[tuple[Hashable, Any]], last: float = 0.7) -> Iterator[tuple[float, Any, Colour]]:
+def with_colours(groups: Iterable[tuple[Hashable, Any]], last: float = 0.7) -> Iterator[tuple[float, Any, Colour]]:
     """Assign colours to a series of curves, from dark to light.
 
     Parameters
@@ -76,7 +78,7 @@ def named_rows(axis: Axes, names: Sequence[str]) -> "np.ndarray[Any, np.dtype[np
     return places
 
 
-def paired_bars(axis: Axes, names: Sequence[str], pairs: Sequence[tuple[str, pd.Series, Colour]]) -> None:
+def draw_paired_bars(axis: Axes, names: Sequence[str], pairs: Sequence[tuple[str, pd.Series, Colour]]) -> None:
     """Draw two bars for each name, to the right and to the left of zero.
 
     Parameters
@@ -94,7 +96,9 @@ Course: TypeAlias = tuple[tuple[str, float], Sequence[tuple[str, Colour, str]]]
 """One panel over time: axis label and factor to its unit, columns with colour and label."""
 
 
-def courses(axes: Sequence[Axes], time: pd.Series, frame: pd.DataFrame, panels: Sequence[Course], room: float) -> None:
+def draw_courses(
+    axes: Sequence[Axes], time: pd.Series, frame: pd.DataFrame, panels: Sequence[Course], room: float
+) -> None:
     """Draw signals over a common time axis, one panel for each unit, with space for a legend above the curves.
 
     Parameters

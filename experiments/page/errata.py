@@ -18,7 +18,7 @@ _NUMBER = re.compile(r"[EPM]\d{1,2}")
 _LINK = re.compile(r'href="#([EPM]\d{1,2})"')
 
 
-def linked(text: str) -> Markup:
+def link_errata(text: str) -> Markup:
     """Return a text or part of a page in which cited errata are linked to the report's list.
 
     Only a number after the word "errata" or "erratum" counts, since columns and actuators may have names such as P1.
@@ -35,22 +35,22 @@ def linked(text: str) -> Markup:
 
     Examples
     --------
-    >>> linked("P1 sticks (errata E9) & stays")
+    >>> link_errata("P1 sticks (errata E9) & stays")
     Markup('P1 sticks (errata <a href="#E9">E9</a>) &amp; stays')
     """
 
     def cited(found: re.Match[str]) -> str:
-        return found[0] if found[0].startswith("<") else numbers_linked(found[0])
+        return found[0] if found[0].startswith("<") else link_numbers(found[0])
 
     return Markup(_CITED_OR_TAG.sub(cited, str(escape(text))))  # noqa: S704 - escaped just before, or markup
 
 
-def numbers_linked(text: str) -> Markup:
+def link_numbers(text: str) -> Markup:
     """Return a list of errata in which each number of `ERRATA` is a link.
 
     Examples
     --------
-    >>> numbers_linked("E9, E99")
+    >>> link_numbers("E9, E99")
     Markup('<a href="#E9">E9</a>, E99')
     """
 
@@ -67,7 +67,7 @@ def linked_errata(html: str) -> Mapping[str, str]:
     Parameters
     ----------
     html : str
-        A page with links made by `linked`.
+        A page with links made by `link_errata`.
 
     Returns
     -------

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, TypeAlias
 from markupsafe import Markup
 
 from experiments.page.frames import Tables
-from experiments.page.style import styled
-from experiments.running.refusal import refused
+from experiments.page.style import project_style
+from experiments.running.refusal import os_errors_as
 from plant.atomic import replacing
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
         By path within a result folder: ``figures/name.svg``, ``figures/name.png``.
     """
     files: dict[str, bytes] = {}
-    with styled():
+    with project_style():
         for name, draw in drawings.items():
             figure = draw(tables)
             files[f"figures/{name}.svg"] = svg_of(figure)
@@ -50,7 +50,7 @@ def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
 def svg_of(figure: "Figure") -> bytes:
     """Return a figure as an SVG file that is identical in every run."""
     buffer = BytesIO()
-    with styled():
+    with project_style():
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()
 
@@ -90,5 +90,5 @@ def write_png(draw: "Callable[[], Figure]", path: Path) -> None:
     HydrostateError
         If it cannot be written.
     """
-    with refused(f"--figure {path}: cannot be written"), styled(), replacing(path) as file:
+    with os_errors_as(f"--figure {path}: cannot be written"), project_style(), replacing(path) as file:
         draw().savefig(file, format="png", dpi=LOG_DOTS_PER_INCH)

@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.page.frames import Tables
-from experiments.running.refusal import refused
+from experiments.running.refusal import os_errors_as
 from plant.errors import HydrostateError
 
 SERIES_FORMAT = "%.9g"
@@ -72,10 +72,10 @@ def write_tables(
     contents = {**csv_files("tables", tables), **csv_files("series", series, SERIES_FORMAT), **files}
     contents["manifest.json"] = json_file({**manifest, "files": sorted([*contents, "manifest.json"])})
     temporary = target.with_name(f".{target.name}.{token_hex(4)}.tmp")
-    with refused(UNWRITABLE.format(folder)):
+    with os_errors_as(UNWRITABLE.format(folder)):
         try:
             temporary.mkdir(parents=True)
-            with held(temporary):
+            with folder_lock(temporary):
                 for name, content in contents.items():
                     (temporary / name).parent.mkdir(parents=True, exist_ok=True)
                     with (temporary / name).open("wb") as file:
@@ -129,12 +129,12 @@ def check_target(folder: Path) -> Path:
         If it is a file, is or holds the current folder, or holds anything that no study wrote, or if nothing can be
         written there.
     """
-    with refused(UNWRITABLE.format(folder)):
+    with os_errors_as(UNWRITABLE.format(folder)):
         _tidy(folder.resolve())
-        return _checked(folder)
+        return _checked_target(folder)
 
 
-def _checked(folder: Path) -> Path:
+def _checked_target(folder: Path) -> Path:
     target = folder.resolve()
     if Path.cwd().is_relative_to(target):
         raise HydrostateError(
@@ -142,7 +142,7 @@ def _checked(folder: Path) -> Path:
         )
     if target.exists() and not target.is_dir():
         raise HydrostateError(f"result folder must be a folder or not exist yet, got the file {folder}")
-    strangers = sorted(_strangers(target)) if target.exists() else []
+    strangers = sorted(_foreign_files(target)) if target.exists() else []
     if strangers:
         raise HydrostateError(
             f"result folder must be new, empty, or an earlier study's result, got {folder}, "
@@ -154,7 +154,7 @@ def _checked(folder: Path) -> Path:
     return target
 
 
-def _strangers(folder: Path) -> set[str]:
+def _foreign_files(folder: Path) -> set[str]:
     """Return the files in a folder that were not written by a study."""
     present = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
     with suppress(FileNotFoundError, ValueError, TypeError, KeyError):
@@ -164,7 +164,7 @@ def _strangers(folder: Path) -> set[str]:
 
 
 def _swap(temporary: Path, target: Path) -> None:
-    if target.exists() and _exchanged(temporary, target):
+    if target.exists() and _exchange_names(temporary, target):
         shutil.rmtree(temporary, ignore_errors=True)
         return
     old = target.with_name(f".{target.name}.{token_hex(4)}.old")
@@ -187,7 +187,7 @@ def _swap(temporary: Path, target: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
-def _exchanged(first: Path, second: Path) -> bool:
+def _exchange_names(first: Path, second: Path) -> bool:
     """Exchange the names of two folders in one step, so that both names always have a complete folder.
 
     Returns
@@ -214,7 +214,7 @@ def _tidy(target: Path) -> None:
         return
     left = re.compile(rf"\.{re.escape(target.name)}\.[0-9a-f]{{8}}\.(?:tmp|old)")
     for place in sorted(one for one in target.parent.iterdir() if left.fullmatch(one.name) and one.is_dir()):
-        with suppress(OSError), held(place) as free:
+        with suppress(OSError), folder_lock(place) as free:
             if free and place.suffix == ".old" and not target.exists():
                 place.rename(target)
             elif free:
@@ -222,7 +222,7 @@ def _tidy(target: Path) -> None:
 
 
 @contextmanager
-def held(folder: Path) -> Generator[bool]:
+def folder_lock(folder: Path) -> Generator[bool]:
     """Lock a folder for writing until the block or the process ends.
 
     Yields

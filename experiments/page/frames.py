@@ -20,7 +20,7 @@ Frames: TypeAlias = Iterator[Mapping[str, Any] | pd.DataFrame]
 P = ParamSpec("P")
 
 
-def tabled(rows: Callable[P, Rows]) -> Callable[P, pd.DataFrame]:
+def as_table(rows: Callable[P, Rows]) -> Callable[P, pd.DataFrame]:
     """Decorate a function that yields rows, so that it returns them as a table."""
 
     @wraps(rows)
@@ -30,7 +30,7 @@ def tabled(rows: Callable[P, Rows]) -> Callable[P, pd.DataFrame]:
     return made
 
 
-def stacked(parts: Callable[P, Frames]) -> Callable[P, pd.DataFrame]:
+def as_stacked_table(parts: Callable[P, Frames]) -> Callable[P, pd.DataFrame]:
     """Decorate a function that yields parts of a table, so that it returns them stacked into one."""
 
     @wraps(parts)
@@ -61,7 +61,7 @@ def cell(frame: pd.DataFrame, row: object, column: str) -> float:
     return float(cast("SupportsFloat", frame.at[row, column]))
 
 
-@tabled
+@as_table
 def parameter_table(parameters: Any) -> Rows:
     """Return parameters with the notes given in the code.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-SHOWN: Mapping[str, str] = {
+QUANTITY_NAMES: Mapping[str, str] = {
     "leakage_flow": "leakage",
     "velocity_lost": "velocity lost",
     "added_friction": "added friction",

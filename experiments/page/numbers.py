@@ -124,7 +124,7 @@ def decimals_of(low: float, high: float, most: int = 3) -> int:
     return max(min(wanted, meant, most), 0)
 
 
-def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit: str) -> list[str]:
+def with_equal_decimals(value: float | None, interval: Sequence[float] | None, unit: str) -> list[str]:
     """Return a value and its interval as text, with the number of decimals that the interval justifies.
 
     Parameters
@@ -136,11 +136,11 @@ def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit:
 
     Examples
     --------
-    >>> alike_in_digits(1.1e-13, [-2.01, 1.92], "N"), alike_in_digits(2.5e-11, [2.4e-11, 2.6e-11], "m^3/(s Pa)")
+    >>> with_equal_decimals(1.1e-13, [-2.01, 1.92], "N"), with_equal_decimals(2.5e-11, [2.4e-11, 2.6e-11], "m^3/(s Pa)")
     (['0.0', '−2.0', '1.9'], ['25.0 × 10⁻¹²', '24.0 × 10⁻¹²', '26.0 × 10⁻¹²'])
-    >>> alike_in_digits(-4.121e-5, [-3.21e-4, 2.39e-4], "L/(min bar)")
+    >>> with_equal_decimals(-4.121e-5, [-3.21e-4, 2.39e-4], "L/(min bar)")
     ['−41 × 10⁻⁶', '−321 × 10⁻⁶', '239 × 10⁻⁶']
-    >>> alike_in_digits(0.15058, [0.15021, 0.15094], "L/(min bar)")
+    >>> with_equal_decimals(0.15058, [0.15021, 0.15094], "L/(min bar)")
     ['0.1506', '0.1502', '0.1509']
     """
     if value is None or interval is None:
@@ -180,7 +180,7 @@ def exact(value: float) -> str:
     return (shown.rstrip("0").rstrip(".") if "." in shown else shown) + times + power
 
 
-def as_set(value: float) -> str:
+def exact_if_short(value: float) -> str:
     """Write a number exactly if three digits suffice: it was then set, not measured.
 
     Parameters
@@ -190,7 +190,7 @@ def as_set(value: float) -> str:
 
     Examples
     --------
-    >>> as_set(275.0), as_set(2.345678), as_set(1e-6)
+    >>> exact_if_short(275.0), exact_if_short(2.345678), exact_if_short(1e-6)
     ('275', '2.346', '1 × 10⁻⁶')
     """
     return exact(value) if math.isclose(value, float(f"{value:.3g}"), rel_tol=1e-12) else number(value)

@@ -9,14 +9,14 @@ import numpy as np
 
 from plant.arrays import Array
 
-CODES = 32_500
+CODES_PER_SIDE = 32_500
 """Steps on each side of the middle of the value range [count]."""
 
 MISSING = -32_768
 """Code of a missing value."""
 
 
-def packed(values: Array) -> Mapping[str, Any]:
+def packed_series(values: Array) -> Mapping[str, Any]:
     """Return a series in a form for JSON.
 
     Parameters
@@ -32,16 +32,16 @@ def packed(values: Array) -> Mapping[str, Any]:
 
     Examples
     --------
-    >>> one = packed(np.array([0.0, 1.0]))
+    >>> one = packed_series(np.array([0.0, 1.0]))
     >>> one["middle"], one["quantum"] == 1.0 / 65000.0
     (0.5, True)
     """
     there = np.isfinite(values)
     low, high = (float(end) for end in (values[there].min(), values[there].max())) if np.any(there) else (0.0, 0.0)
     middle = low + 0.5 * (high - low)
-    quantum = (high - low) / (2.0 * CODES) or 1.0
+    quantum = (high - low) / (2.0 * CODES_PER_SIDE) or 1.0
     scaled = np.rint((np.where(there, values, middle) - middle) / quantum)
-    codes = np.where(there, np.clip(scaled, -CODES, CODES), MISSING).astype("<i2")
+    codes = np.where(there, np.clip(scaled, -CODES_PER_SIDE, CODES_PER_SIDE), MISSING).astype("<i2")
     with np.errstate(over="ignore"):  # steps overflow; so does their sum in the page, which restores the codes
         steps = np.diff(codes, prepend=np.zeros(1, codes.dtype))
     deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)

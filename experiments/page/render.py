@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from experiments.command.visible_text import visible_page
-from experiments.page.errata import linked, linked_errata
+from experiments.page.errata import link_errata, linked_errata
 from experiments.page.figure_files import image_of, is_tall
 from experiments.page.numbers import exact, number
 from experiments.page.scripting import with_scripts
@@ -17,7 +17,7 @@ from experiments.page.sentences import rig_in_words, whole_dates
 from experiments.page.tables import Columns, folded_tables, html_table
 
 _HEADING = re.compile(r'<section id="([^"]+)"[^>]*>\s*<h2>([^:<]*)')
-_KEPT_TOGETHER = re.compile(
+_UNBREAKABLE_SPACE = re.compile(
     r"(?<=\d) (?=%|\N{MULTIPLICATION SIGN} 10|(?:V|Hz|kHz|mm|ms|psi|MPa|MB|rpm|bar|N|s|L/min)\b)"
     r"|(?<=\d \N{MULTIPLICATION SIGN}) (?=10)"
 )
@@ -69,7 +69,7 @@ def render_page(
     made = {"table": table, "folded": folded, "figure": figure, "chart": chart}
     made |= {"headings_of": _headings_of, "errata_of": linked_errata}
     page = _templates().get_template(template).render({**facts, **made})
-    return with_scripts(_KEPT_TOGETHER.sub("\N{NO-BREAK SPACE}", visible_page(page)))
+    return with_scripts(_UNBREAKABLE_SPACE.sub("\N{NO-BREAK SPACE}", visible_page(page)))
 
 
 @cache
@@ -82,7 +82,7 @@ def _templates() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"linked": linked, "rig_in_words": rig_in_words, "number": number, "exact": exact}
+    environment.filters |= {"linked": link_errata, "rig_in_words": rig_in_words, "number": number, "exact": exact}
     environment.filters["whole_dates"] = whole_dates
     return environment
 

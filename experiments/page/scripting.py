@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 _PLACES = files("experiments.page").joinpath("scripts")
 
-NEEDED = (
+SCRIPTS_BY_MARK = (
     ('class="charts"', "uplot/uPlot.iife.min.js"),
     ('class="charts"', "charts.js"),
     ('class="limit"', "limits.js"),
@@ -23,7 +23,7 @@ NEEDED = (
 )
 """Marks that a page may contain, and the scripts that each requires, in their order."""
 
-OF_A_SERVER = ('class="dropped-logs"', 'class="live-stream"')
+SERVER_MARKS = ('class="dropped-logs"', 'class="live-stream"')
 """Marks of pages that may send requests to their own server, but to no other."""
 
 CHART_STYLE = "uplot/uPlot.min.css"
@@ -45,17 +45,17 @@ def with_scripts(page: str) -> str:
     str
         The page with scripts and styles allowed by their hashes, embedded images, and nothing else.
     """
-    needed = [file for mark, file in NEEDED if mark in page]
+    needed = [file for mark, file in SCRIPTS_BY_MARK if mark in page]
     scripts = [_text(file) for file in needed]
-    style = f"<style>{_text(CHART_STYLE)}</style>\n" if NEEDED[0][1] in needed else ""
+    style = f"<style>{_text(CHART_STYLE)}</style>\n" if SCRIPTS_BY_MARK[0][1] in needed else ""
     page = page.replace(SCRIPTS_HERE, "\n".join(f"<script>{one}</script>" for one in scripts))
     page = page.replace("</head>", f"{style}</head>", 1)
     styles = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
     policy = (
-        f"default-src 'none'; img-src data:; style-src {_allowed(styles)}; script-src {_allowed(scripts)}; "
-        "base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; img-src data:; style-src {_allowed_hashes(styles)}; "
+        f"script-src {_allowed_hashes(scripts)}; base-uri 'none'; form-action 'none'"
     )
-    if any(mark in page for mark in OF_A_SERVER):
+    if any(mark in page for mark in SERVER_MARKS):
         policy += "; connect-src 'self'"
     return page.replace(POLICY_HERE, f'<meta http-equiv="Content-Security-Policy" content="{policy}">', 1)
 
@@ -86,6 +86,6 @@ def _text(file: str) -> str:
     return _PLACES.joinpath(file).read_text(encoding="utf-8")
 
 
-def _allowed(texts: Iterable[str]) -> str:
+def _allowed_hashes(texts: Iterable[str]) -> str:
     hashes = [f"'sha256-{b64encode(sha256(one.encode()).digest()).decode()}'" for one in texts]
     return " ".join(hashes) or "'none'"

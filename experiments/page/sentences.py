@@ -37,12 +37,12 @@ def sentence(said: str) -> str:
     return f"{begin}{said[1:].rstrip('.')}."
 
 
-def in_a_row(names: Sequence[str]) -> str:
+def joined_names(names: Sequence[str]) -> str:
     """Return names as a list within a sentence.
 
     Examples
     --------
-    >>> in_a_row(["leakage"]), in_a_row(["leakage", "friction", "bulk modulus"])
+    >>> joined_names(["leakage"]), joined_names(["leakage", "friction", "bulk modulus"])
     ('leakage', 'leakage, friction and bulk modulus')
     """
     *others, last = names
@@ -60,7 +60,7 @@ def whole_dates(said: str) -> Markup:
     return Markup(_DATE.sub(r'<span class="date">\g<0></span>', str(escape(said))))  # noqa: S704 - it was escaped
 
 
-def left_unread(result: Mapping[str, Any]) -> list[str]:
+def unused_column_advice(result: Mapping[str, Any]) -> list[str]:
     """Return advice on unused columns that may be needed, as sentences.
 
     Parameters

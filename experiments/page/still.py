@@ -18,7 +18,7 @@ MOST_STILL = 1_600
 LEGEND_FROM = 2
 """Number of curves from which a still panel has a legend [count]."""
 
-LOW_FROM = 3
+LOW_ROWS_FROM = 3
 """Number of rows from which each row is lower, so that the picture fills the width of a page [count]."""
 
 ONE_COLUMN = 4
@@ -28,7 +28,7 @@ WIDTH, LEFT, RIGHT, TOP, BOTTOM, ACROSS, DOWN = 720.0, 66.0, 10.0, 20.0, 38.0, 7
 """Width of the picture, its margins, and the distances between panels [point]."""
 
 TALL, LOW = 100.0, 72.0
-"""Height of a panel, and its height if there are at least `LOW_FROM` rows [point]."""
+"""Height of a panel, and its height if there are at least `LOW_ROWS_FROM` rows [point]."""
 
 LETTER = 4.6
 """Mean width of a letter in a legend [point]."""
@@ -36,7 +36,7 @@ LETTER = 4.6
 MOST_ACROSS, MOST_UP = 8, 4
 """Largest number of steps between ticks on the x and y axes [count]."""
 
-ROUND = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 2.5, 5.0, 10.0, 20.0)
+TICK_STEPS = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 2.5, 5.0, 10.0, 20.0)
 """Distances between ticks, times a power of ten [dimensionless]."""
 
 DATE_WIDE = 70.0
@@ -84,7 +84,7 @@ def still_picture(x: Array, label: str, panels: Sequence[Panel], *, log: bool = 
     places = np.log10(x) if log else x
     columns = 1 if len(panels) <= ONE_COLUMN else 2
     rows = -(-len(panels) // columns)
-    high = TALL if rows < LOW_FROM else LOW
+    high = TALL if rows < LOW_ROWS_FROM else LOW
     wide = (WIDTH - LEFT - RIGHT - (columns - 1) * ACROSS) / columns
     height = TOP + rows * high + (rows - 1) * DOWN + BOTTOM
     parts = [
@@ -105,7 +105,7 @@ def _panel(
     x: Array, panel: Panel, size: tuple[float, float], name: str, label: str, *, log: bool, dates: bool
 ) -> Iterator[str]:
     wide, high = size
-    across, up = _range(x, 0.0), panel.ends or _range(_every(panel), ROOM)
+    across, up = _range(x, 0.0), panel.ends or _range(_all_values(panel), ROOM)
     places = (x - across[0]) * (wide / (across[1] - across[0]))
     scale = high / (up[1] - up[0])
 
@@ -181,7 +181,7 @@ def _points(x: Array, y: Array) -> str:
     return " ".join(f"{one:.1f},{other:.1f}" for one, other in zip(x[there].tolist(), y[there].tolist(), strict=True))
 
 
-def _every(panel: Panel) -> Array:
+def _all_values(panel: Panel) -> Array:
     """Return all values of a panel, and the positions of lines across it."""
     lines = [mark.at for mark in panel.marks if mark.axis == "y"]
     return np.concatenate([np.asarray(lines, dtype=np.float64), *(curve.values for curve in panel.curves)])
@@ -190,7 +190,7 @@ def _every(panel: Panel) -> Array:
 PLAIN_TO = 1e5
 """Size below which a number on an axis is written without a power of ten [any unit]."""
 
-LEAST = 1e-290
+LEAST_SIZE = 1e-290
 """Size below which a constant channel is drawn as zero [any unit]."""
 
 
@@ -198,7 +198,7 @@ def _range(values: Array, room: float) -> tuple[float, float]:
     there = values[np.isfinite(values)]
     low, high = (float(there.min()), float(there.max())) if len(there) else (0.0, 1.0)
     if high - low <= 1e-9 * max(abs(low), abs(high), 1e-300):
-        half = 0.05 * abs(low) if abs(low) > LEAST else 0.5
+        half = 0.05 * abs(low) if abs(low) > LEAST_SIZE else 0.5
         return low - half, high + half
     return low - room * (high - low), high + room * (high - low)
 
@@ -206,11 +206,12 @@ def _range(values: Array, room: float) -> tuple[float, float]:
 def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
     """Return round positions within a range, at least two, with their labels.
 
-    Their distance is the smallest in `ROUND` that gives at most this many steps; if fewer than two fit, it is smaller.
+    Their distance is the smallest in `TICK_STEPS` that gives at most this many steps; if fewer than two fit, it is
+    smaller.
     """
     least = (high - low) / most
     decade = 10.0 ** math.floor(math.log10(least))
-    distances = [one * decade for one in ROUND]
+    distances = [one * decade for one in TICK_STEPS]
     step, first, last = least, 0, 0
     for step in distances[bisect_left(distances, least) :: -1]:
         first, last = math.ceil(low / step - EDGE), math.floor(high / step + EDGE)

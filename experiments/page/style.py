@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.page.words import in_words
+from experiments.page.words import condition_in_words
 
 if TYPE_CHECKING:  # imports take half a second, and a page without figures does not need them
     from matplotlib.axes import Axes
@@ -30,7 +30,7 @@ STYLE = Path(__file__).with_name("hydrostate.mplstyle")
 
 
 @contextmanager
-def styled() -> Generator[None]:
+def project_style() -> Generator[None]:
     """Apply the project's style to figures drawn and saved inside this block."""
     from matplotlib import style
 
@@ -111,7 +111,7 @@ def condition_rows(axis: "Axes", conditions: Sequence[str]) -> Mapping[str, floa
         Height of each condition's row [count].
     """
     heights = {name: float(len(conditions) - 1 - place) for place, name in enumerate(conditions)}
-    axis.set_yticks(list(heights.values()), [in_words(name) for name in conditions])
+    axis.set_yticks(list(heights.values()), [condition_in_words(name) for name in conditions])
     axis.set_ylim(-0.6, len(conditions) - 0.4)
     axis.tick_params(axis="y", length=0)
     axis.grid(visible=False, axis="y")
@@ -136,7 +136,7 @@ def condition_levels(axis: "Axes", conditions: Iterable[str]) -> NDArray[np.floa
     return np.array([heights[name] for name in names])
 
 
-def spread_out(count: int, span: float) -> list[float]:
+def spread_offsets(count: int, span: float) -> list[float]:
     """Return offsets that separate the marks of one row.
 
     Parameters
@@ -151,7 +151,7 @@ def spread_out(count: int, span: float) -> list[float]:
 
     Examples
     --------
-    >>> spread_out(3, 0.4)
+    >>> spread_offsets(3, 0.4)
     [0.2, 0.0, -0.2]
     """
     if count == 1:

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import pandas as pd
 from markupsafe import Markup
 
-from experiments.page.numbers import MINUS, as_set, exact, fixed, number
+from experiments.page.numbers import MINUS, exact, exact_if_short, fixed, number
 
 WORDS = 24
 """Length of a cell from which its column counts as text and needs a readable width [count]."""
@@ -95,12 +95,12 @@ def _yes_or_no(good: bool) -> Cell:
     return Cell("yes", "good") if good else Cell("no", "bad")
 
 
-def right(text: str) -> Cell:
+def right_aligned(text: str) -> Cell:
     """Return a cell aligned to the right, like numbers."""
     return Cell(text, "number")
 
 
-def as_given(value: float) -> Cell:
+def exact_cell(value: float) -> Cell:
     """Return a cell with a number exactly as given.
 
     Parameters
@@ -108,7 +108,7 @@ def as_given(value: float) -> Cell:
     value : float
         The number [any unit].
     """
-    return right(exact(float(value)))
+    return right_aligned(exact(float(value)))
 
 
 def decimals(count: int) -> Callable[[float | None], Cell]:
@@ -119,10 +119,10 @@ def decimals(count: int) -> Callable[[float | None], Cell]:
     callable
         From a number to its cell, in the format of `fixed`.
     """
-    return lambda value: right(fixed(value, count))
+    return lambda value: right_aligned(fixed(value, count))
 
 
-def spaced(name: str) -> str:
+def name_in_words(name: str) -> str:
     """Return a name in words."""
     return name.replace("_", " ")
 
@@ -134,7 +134,7 @@ def interval(low: str, high: str, digits: int = 4) -> Callable[[Row], str]:
 
 def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bool = False) -> Markup:
     """Return a data frame as an HTML table in a sideways scrolling box; with cards, a phone shows one card per row."""
-    shown = [column.in_full() for column in _named(frame, columns)]
+    shown = [column.in_full() for column in _columns_of_frame(frame, columns)]
     body = [[_cell(column, row, named=cards) for column in shown] for row in frame.to_dict("records")]
     head = Markup("").join(
         Markup('<th scope="col" class="{}">{}{}</th>').format(
@@ -145,7 +145,7 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bo
         for column, *cells in zip(shown, *body, strict=True)
     )
     wordy = [max((len(cell.striptags()) for cell in cells), default=0) > WORDS for cells in zip(*body, strict=True)]
-    body = [[_worded(cell) if long else cell for cell, long in zip(row, wordy, strict=True)] for row in body]
+    body = [[_words_cell(cell) if long else cell for cell, long in zip(row, wordy, strict=True)] for row in body]
     rows = Markup("\n").join(Markup("<tr>{}</tr>").format(Markup("").join(cells)) for cells in body)
     return Markup(
         '<div class="scroll" tabindex="0" role="region" aria-label="{}"><table{}>\n<caption>{}</caption>\n'
@@ -153,7 +153,7 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bo
     ).format(caption, Markup(' class="cards whole"') if cards else "", caption, head, rows)
 
 
-def _worded(cell: Markup) -> Markup:
+def _words_cell(cell: Markup) -> Markup:
     """Return a cell of a text column, which must not be narrow."""
     text = str(cell)  # a plain string, since Markup would escape the replacements
     if ' class="' in text.split(">", 1)[0]:
@@ -190,7 +190,7 @@ def folded_tables(frame: pd.DataFrame, columns: Columns, by: str, count: str) ->
     return Markup("\n").join(made)
 
 
-def _named(frame: pd.DataFrame, columns: Columns) -> Iterator[Column]:
+def _columns_of_frame(frame: pd.DataFrame, columns: Columns) -> Iterator[Column]:
     told = {entry.source if isinstance(entry, Column) else entry for entry in columns}
     for entry in columns:
         if callable(entry):
@@ -221,8 +221,8 @@ def _by_type(column: Column, value: Any) -> Shown:
     if isinstance(value, bool):
         return _yes_or_no(value)
     if isinstance(value, int) and column.scale == 1.0:
-        return right(str(value).replace("-", MINUS))
+        return right_aligned(str(value).replace("-", MINUS))
     shown = None if value is None else column.scale * float(value)
     if column.digits is None and shown is not None:
-        return right(as_set(shown))
-    return right(number(shown, column.digits or 4))
+        return right_aligned(exact_if_short(shown))
+    return right_aligned(number(shown, column.digits or 4))

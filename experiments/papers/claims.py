@@ -11,17 +11,17 @@ from experiments.diaphragm_motor.figures import MOTOR_FIGURES
 from experiments.motor_paper.study import MOTOR_PAPER_FIGURES
 from experiments.nine_conditions.figures import FIGURES
 from experiments.page.figure_files import Drawings
-from experiments.page.frames import Rows, tabled
-from experiments.page.words import in_words
-from experiments.papers.eha_claims import eha_ours, printed_by_condition, settled_by_condition
+from experiments.page.frames import Rows, as_table
+from experiments.page.words import condition_in_words
+from experiments.papers.eha_claims import eha_results, printed_by_condition, settled_by_condition
 from experiments.papers.eha_tables import eha_table_rows
 from experiments.papers.figures import PAPERS_FIGURES
-from experiments.papers.motor_claims import motor_ours
+from experiments.papers.motor_claims import motor_results
 from experiments.papers.motor_tables import motor_table_rows
 from experiments.papers.parts import Evidence
-from experiments.papers.printed import claimed, read_csv
-from experiments.papers.stack_claims import stack_ours
-from experiments.papers.verdict import MISSED, Row, drawn_as, excluded, verdict_of
+from experiments.papers.printed import claim_row, read_csv
+from experiments.papers.stack_claims import stack_results
+from experiments.papers.verdict import MISSED_VERDICTS, Row, exclusion_sentence, figure_status, verdict_of
 from experiments.piezo_stack.figures import STACK_FIGURES
 from plant.errors import HydrostateError
 
@@ -55,7 +55,7 @@ def all_rows(found: Evidence) -> list[Row]:
     HydrostateError
         If a claim has nothing beside it, or something stands beside no claim.
     """
-    ours = {"002": eha_ours(found), "000": stack_ours(found["piezo-stack"]), "001": motor_ours(found)}
+    ours = {"002": eha_results(found), "000": stack_results(found["piezo-stack"]), "001": motor_results(found)}
     claims = read_csv("claims.csv")
     for paper, of_paper in ours.items():
         asked = {row["key"] for row in claims if row["paper"] == paper}
@@ -65,7 +65,7 @@ def all_rows(found: Evidence) -> list[Row]:
                 f"claims.csv and what stands beside it must have equal keys, got {apart} in one alone"
             )
     rows = [*eha_table_rows(found), *motor_table_rows(found), *_filter_rows(found)]
-    rows += [claimed(row, ours[row["paper"]][row["key"]]) for row in claims]
+    rows += [claim_row(row, ours[row["paper"]][row["key"]]) for row in claims]
     order = list(PAPERS)
     return sorted(rows, key=lambda row: order.index(row.paper))
 
@@ -75,7 +75,7 @@ def _filter_rows(found: Evidence) -> Iterator[Row]:
         yield Row(
             paper="002",
             where="section 7, Figure 11",
-            claim=f"bulk modulus by the published EKF, {in_words(condition)}: where all first guesses settle",
+            claim=f"bulk modulus by the published EKF, {condition_in_words(condition)}: where all first guesses settle",
             printed="2.07e8",
             value=2.07e8,
             unit="Pa",
@@ -90,7 +90,8 @@ def _filter_rows(found: Evidence) -> Iterator[Row]:
         yield Row(
             paper="002",
             where="equations 7.1 to 7.7, Figure 11",
-            claim=f"bulk modulus by the EKF as printed, {in_words(condition)}: largest error of all first guesses",
+            claim=f"bulk modulus by the EKF as printed, {condition_in_words(condition)}: "
+            "largest error of all first guesses",
             printed="2.07e8",
             value=None,
             unit="%",
@@ -103,7 +104,7 @@ def _filter_rows(found: Evidence) -> Iterator[Row]:
         )
 
 
-@tabled
+@as_table
 def row_table(rows: list[Row]) -> Rows:
     """Return the rows as a table, each with its verdict by the rule.
 
@@ -127,11 +128,13 @@ def row_table(rows: list[Row]) -> Rows:
             "errata": row.errata,
             "verdict": verdict_of(row).value,
             "shown_by": row.shown_by,
-            "note": " ".join(part for part in (row.ours.said and f"{row.ours.said}.", excluded(row), row.note) if part),
+            "note": " ".join(
+                part for part in (row.ours.said and f"{row.ours.said}.", exclusion_sentence(row), row.note) if part
+            ),
         }
 
 
-@tabled
+@as_table
 def figure_table(rows: pd.DataFrame) -> Rows:
     """Return every figure of the three papers: drawn, drawn with a difference, or not drawn, with the reason.
 
@@ -150,14 +153,14 @@ def figure_table(rows: pd.DataFrame) -> Rows:
         drawing = figure["drawing"]
         if drawing and drawing not in drawings:
             raise HydrostateError(f"figures.csv: study {figure['study']} draws no {drawing!r}")
-        about = [figure["figure"] in _figures_named(str(where)) for where in rows["where"]]
+        about = [figure["figure"] in _figures_in(str(where)) for where in rows["where"]]
         own = rows[(rows["paper"] == PAPERS[figure["paper"]]) & np.array(about, dtype=bool)]
-        missed = own["verdict"].isin(list(MISSED))
+        missed = own["verdict"].isin(list(MISSED_VERDICTS))
         yield {
             "paper": PAPERS[figure["paper"]],
             "figure": int(figure["figure"]),
             "title": figure["title"],
-            "drawn": drawn_as(bool(drawing), figure["difference"], own["verdict"].tolist()).value,
+            "drawn": figure_status(bool(drawing), figure["difference"], own["verdict"].tolist()).value,
             "difference": figure["difference"],
             "missed": int(missed.sum()),
             "rows": len(own),
@@ -165,12 +168,12 @@ def figure_table(rows: pd.DataFrame) -> Rows:
         }
 
 
-def _figures_named(where: str) -> set[str]:
+def _figures_in(where: str) -> set[str]:
     """Return the figures that a place names; a range includes all its figures.
 
     Examples
     --------
-    >>> sorted(_figures_named("section 5.1.2, Figures 22 to 24"))
+    >>> sorted(_figures_in("section 5.1.2, Figures 22 to 24"))
     ['22', '23', '24']
     """
     named = {str(number) for number in re.findall(r"Figure (\d+)", where)}

@@ -8,10 +8,10 @@ import pandas as pd
 
 from experiments.diaphragm_motor.quoted import ML_MIN
 from experiments.diaphragm_motor.sweeps import SWING
-from experiments.motor_paper.tables import OBEYED_PERCENT
+from experiments.motor_paper.tables import LARGEST_SCATTER_PERCENT
 from experiments.page.frames import Tables, cell
 from experiments.papers.parts import Evidence
-from experiments.papers.verdict import Ours, Row, number_row
+from experiments.papers.verdict import OurResult, Row, number_row
 from experiments.published import as_printed
 from plant.diaphragm_motor.composite_plate import PlateParameters
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
@@ -46,14 +46,14 @@ def _sizes(table: pd.DataFrame) -> Iterator[Row]:
     for row in as_printed("table1_geometry").to_dict("records"):
         item, printed = row["item"], row["value"]
         note = str(remarks[item]) if isinstance(remarks[item], str) else ""
-        ours = Ours(given.get(item))
+        ours = OurResult(given.get(item))
         note = note or ("" if item in given else "No part of a model of ours.")
         yield _row("Table 1", item, printed, row["unit"], "digits", ours, note=note, basis="target")
 
 
 def _relations(ours: pd.DataFrame) -> Iterator[Row]:
     """Yield the columns of Table 2 that follow from equations or other tables, with the rows' median constant."""
-    printed, accept = as_printed("table2"), f"± {OBEYED_PERCENT:g} %"
+    printed, accept = as_printed("table2"), f"± {LARGEST_SCATTER_PERCENT:g} %"
     constants = ours.median()
     relations = (
         ("diaphragm_area_mm2", "area_ratio", "mm²", "(3) area, from the diameter", "M23"),
@@ -82,7 +82,7 @@ def _relations(ours: pd.DataFrame) -> Iterator[Row]:
             # the velocity falls as the piston's area rises; the other constants rise with their column
             value = base * off if ratio == "piston_area_cm2" else base / off
             claim, note = f"{words}, row {k + 1}", notes.get(ratio, "")
-            yield _row("Table 2", claim, text, unit, accept, Ours(float(value)), errata=errata, note=note)
+            yield _row("Table 2", claim, text, unit, accept, OurResult(float(value)), errata=errata, note=note)
     yield from _layers(printed, accept)
     yield from _no_frequency(printed)
 
@@ -100,10 +100,10 @@ def _layers(printed: pd.DataFrame, accept: str) -> Iterator[Row]:
             diameter,
             "mm",
             accept,
-            Ours(2e3 * size.ceramic_radius),
+            OurResult(2e3 * size.ceramic_radius),
             errata="M23",
         )
-        yield _row("Table 2", f"(2) thickness, {here} two layers", thick, "mm", accept, Ours(total), errata="M14")
+        yield _row("Table 2", f"(2) thickness, {here} two layers", thick, "mm", accept, OurResult(total), errata="M14")
 
 
 def _no_frequency(printed: pd.DataFrame) -> Iterator[Row]:
@@ -115,7 +115,7 @@ def _no_frequency(printed: pd.DataFrame) -> Iterator[Row]:
     for column, unit, words, note, errata in columns:
         for k, text in enumerate(printed[column].tolist()):
             claim = f"{words}, row {k + 1}; nothing printed gives it"
-            yield _row("Table 2", claim, text, unit, "digits", Ours(None), errata=errata, note=note)
+            yield _row("Table 2", claim, text, unit, "digits", OurResult(None), errata=errata, note=note)
 
 
 def _figure_12(frame: pd.DataFrame, residuals: pd.DataFrame) -> Iterator[Row]:
@@ -123,18 +123,18 @@ def _figure_12(frame: pd.DataFrame, residuals: pd.DataFrame) -> Iterator[Row]:
     for row in as_printed("fig12_anova").to_dict("records"):
         name, printed = row["quantity"], row["value"]
         claim = name.replace("_", " ")
-        found = Ours(cell(ours, name, "anova"))
+        found = OurResult(cell(ours, name, "anova"))
         yield _row("Figure 12", claim, printed, "", "digits", found, note=note, errata="M24")
         if name != "observations":
             said = "Table 2 as printed."
-            found = Ours(cell(ours, name, "as_printed"))
+            found = OurResult(cell(ours, name, "as_printed"))
             yield _row("Figure 12, from Table 2", claim, printed, "", "digits", found, note=said, errata="M24")
     rows = residuals[residuals["reading"] == "anova"].reset_index(drop=True)
     percentiles = ("8.333333333", "25", "41.66666667", "58.33333333", "75", "91.66666667")
     flows = ("0.0105", "0.0534", "0.0868", "0.1715", "0.175", "0.554")
     for k, (percentile, flow) in enumerate(zip(percentiles, flows, strict=True)):
         words = f"probability output, row {k + 1}"
-        middle, sorted_flow = (Ours(cell(rows, k, name)) for name in ("percentile", "sorted_flow"))
+        middle, sorted_flow = (OurResult(cell(rows, k, name)) for name in ("percentile", "sorted_flow"))
         yield _row("Figure 12", f"{words}, percentile", percentile, "", "digits", middle)
         yield _row("Figure 12", f"{words}, flow", flow, "mmL/s", "digits", sorted_flow, note=note, errata="M24")
 
@@ -151,7 +151,9 @@ def _table_4(ours: pd.DataFrame) -> Iterator[Row]:
             unit = "%" if column == "error_percent" else "mL/min"
             claim = f"{words}, {row['frequency_hz']} Hz, {row['pumping_displacement_mm']} mm"
             note = "Displacement read in µm; the theory of a piston pump, not of this motor (errata M29)."
-            yield _row("Table 4", claim, row[column], unit, accept, Ours(cell(ours, k, name)), errata=errata, note=note)
+            yield _row(
+                "Table 4", claim, row[column], unit, accept, OurResult(cell(ours, k, name)), errata=errata, note=note
+            )
 
 
 def _table_5(motor: Tables, table_2: pd.DataFrame) -> Iterator[Row]:
@@ -166,7 +168,7 @@ def _table_5(motor: Tables, table_2: pd.DataFrame) -> Iterator[Row]:
     for k, row in enumerate(as_printed("table5_actuators").to_dict("records")):
         ours_is_there = row["actuator"] == "the proposed actuator"
         for column, unit, words in columns:
-            own = plant[column] if ours_is_there else Ours(None)
+            own = plant[column] if ours_is_there else OurResult(None)
             errata, note = ("M26", "Our plant, calibrated to 110.11 mL/min.") if ours_is_there else ("", ACTUATORS)
             yield _row(
                 "Table 5",
@@ -181,17 +183,17 @@ def _table_5(motor: Tables, table_2: pd.DataFrame) -> Iterator[Row]:
                 shown_by="hydrostate diaphragm-motor",
             )
         claim = f"maximum blocking force, {row['actuator']}, ten times Table 2's"
-        found = Ours(tenth[k] * float(table_2["force_ratio"].iloc[k]))
+        found = OurResult(tenth[k] * float(table_2["force_ratio"].iloc[k]))
         yield _row("Table 5", claim, row["blocking_force_n"], "N", "digits", found)
 
 
-def _proposed(motor: Tables) -> dict[str, Ours]:
+def _proposed(motor: Tables) -> dict[str, OurResult]:
     flow = motor["frequency_sweep"].set_index("frequency_hz")["flow_m3_s"] / ML_MIN
     loads = motor["load_sweep"]
     most = loads[loads["voltage_v"] == loads["voltage_v"].max()]
     return {
-        "voltage_vpp": Ours(SWING),
-        "frequency_hz": Ours(float(str(flow.idxmax()))),
-        "no_load_velocity_mm_per_s": Ours(1e3 * float(most["velocity_m_s"].max())),
-        "blocking_force_n": Ours(float(most["blocking_n"].max())),
+        "voltage_vpp": OurResult(SWING),
+        "frequency_hz": OurResult(float(str(flow.idxmax()))),
+        "no_load_velocity_mm_per_s": OurResult(1e3 * float(most["velocity_m_s"].max())),
+        "blocking_force_n": OurResult(float(most["blocking_n"].max())),
     }

@@ -32,8 +32,8 @@ from experiments.piezo_stack.hysteresis import hysteresis_table
 from experiments.piezo_stack.left_out import TURNS, figure_12_left_out
 from experiments.piezo_stack.study import RIG as STACK_RIG
 from experiments.published.library import read_library
-from experiments.running.progress import Track, in_one_piece
-from experiments.running.study import Seeded, versions
+from experiments.running.progress import Track, run_as_one_piece
+from experiments.running.study import SeedSettings, versions
 from plant.errors import LogWarning
 
 Evidence: TypeAlias = Mapping[str, Tables]
@@ -67,7 +67,7 @@ def quick_papers(seed: int) -> PapersSettings:
 def _nine(settings: PapersSettings, track: Track) -> Tables:
     found = NINE_CONDITIONS.find(settings, track).frames
     make = partial(printed_equations, NINE_RIG, settings)
-    return {**found, "printed equations": in_one_piece(track, "the published filter as printed", make)}
+    return {**found, "printed equations": run_as_one_piece(track, "the published filter as printed", make)}
 
 
 def _circuit(settings: PapersSettings, track: Track) -> Tables:
@@ -105,7 +105,7 @@ def _motor(settings: PapersSettings, track: Track) -> Tables:
 
 
 def _motor_paper(settings: PapersSettings, track: Track) -> Tables:
-    return MOTOR_PAPER.find(Seeded(settings.seed), track).frames
+    return MOTOR_PAPER.find(SeedSettings(settings.seed), track).frames
 
 
 PARTS: Mapping[str, Callable[[PapersSettings, Track], Tables]] = {
@@ -119,7 +119,7 @@ PARTS: Mapping[str, Callable[[PapersSettings, Track], Tables]] = {
 """Function that makes each part, by the verb that shows it."""
 
 
-def gather(folder: Path, settings: PapersSettings, track: Track) -> Evidence:
+def gather_tables(folder: Path, settings: PapersSettings, track: Track) -> Evidence:
     """Return the tables of every part; unchanged parts of an earlier run are reused.
 
     Each part is written completely when it is finished, so that an interrupted run continues where it stopped.
@@ -138,11 +138,11 @@ def gather(folder: Path, settings: PapersSettings, track: Track) -> Evidence:
     for name, make in PARTS.items():
         # through JSON, so that it equals a stored manifest
         manifest = json.loads(json.dumps(_manifest(name, settings, sources)))
-        if _kept(folder / name) != manifest:
+        if _kept_manifest(folder / name) != manifest:
             check_target(folder / name)
             with warnings.catch_warnings(action="ignore", category=LogWarning):
                 tables = make(settings, track)
-            in_one_piece(track, f"writing {name}", lambda: write_tables(tables, manifest, folder / name))  # noqa: B023 - called at once
+            run_as_one_piece(track, f"writing {name}", lambda: write_tables(tables, manifest, folder / name))  # noqa: B023 - called at once
     return {name: read_tables(folder / name) for name in PARTS}
 
 
@@ -185,7 +185,7 @@ def _manifest(name: str, settings: PapersSettings, sources: str) -> dict[str, An
     }
 
 
-def _kept(folder: Path) -> dict[str, Any]:
+def _kept_manifest(folder: Path) -> dict[str, Any]:
     """Return the manifest of an earlier run without its list of files; empty if there is none."""
     try:
         found = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))

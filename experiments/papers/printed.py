@@ -5,7 +5,7 @@ from importlib.resources import files
 
 import pandas as pd
 
-from experiments.papers.verdict import Basis, Ours, Row
+from experiments.papers.verdict import Basis, OurResult, Row
 
 _BASES: Mapping[str, Basis] = {"computed": "computed", "model": "model", "target": "target"}
 
@@ -23,7 +23,7 @@ def read_csv(name: str) -> list[dict[str, str]]:
     return [{str(key): str(value) for key, value in row.items()} for row in frame.to_dict("records")]
 
 
-def claimed(row: Mapping[str, str], ours: Ours) -> Row:
+def claim_row(row: Mapping[str, str], ours: OurResult) -> Row:
     """Return a claim with our result."""
     text = row["value"]
     value = None if not text else text if row["accept"] == "same" else float(text)

@@ -9,16 +9,16 @@ from typing import Any
 import pandas as pd
 
 from experiments.diaphragm_motor.sweeps import bent_plate, mode_shapes
-from experiments.page.errata import numbers_linked
-from experiments.page.frames import Rows, Tables, tabled
+from experiments.page.errata import link_numbers
+from experiments.page.frames import Rows, Tables, as_table
 from experiments.page.numbers import MINUS, MISSING, SUPERSCRIPTS, TIMES, exact, number
-from experiments.page.tables import Cell, Column, Columns, Row, right
+from experiments.page.tables import Cell, Column, Columns, Row, right_aligned
 from experiments.papers.claims import PAPERS, all_rows, figure_table, row_table
 from experiments.papers.figures import PAPERS_FIGURES
-from experiments.papers.parts import PapersSettings, gather, quick_papers
-from experiments.papers.verdict import MISSED, TONES, Drawn, Verdict
-from experiments.running.progress import Track, in_one_piece
-from experiments.running.study import Found, Study
+from experiments.papers.parts import PapersSettings, gather_tables, quick_papers
+from experiments.papers.verdict import MISSED_VERDICTS, TONES, Drawn, Verdict
+from experiments.running.progress import Track, run_as_one_piece
+from experiments.running.study import Study, StudyResult
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.piezo_stack.parameters import PiezoStackParameters
@@ -36,20 +36,20 @@ def papers_study(parts: Path) -> Study[PapersSettings]:
         The folder of the parts; existing unchanged parts are reused.
     """
 
-    def find(settings: PapersSettings, track: Track) -> Found:
-        found = gather(parts, settings, track)
-        rows = in_one_piece(track, "verdicts", lambda: row_table(all_rows(found)))
+    def find(settings: PapersSettings, track: Track) -> StudyResult:
+        found = gather_tables(parts, settings, track)
+        rows = run_as_one_piece(track, "verdicts", lambda: row_table(all_rows(found)))
         tables = {"rows": rows, "figures": figure_table(rows)}
         tables["verdicts"] = verdict_counts(rows)
         shown = {"table 4": found["motor-paper"]["table_4"], "table 5": found["motor-paper"]["table_5"]}
         drawn = {"poles": found["motor-paper"]["poles"], "dry modes": found["diaphragm-motor"]["dry_modes"]}
         ours = {"bent plate": bent_plate(), "mode shapes": mode_shapes()}
-        return Found({**tables, **shown, **drawn, **ours})
+        return StudyResult({**tables, **shown, **drawn, **ours})
 
     return Study("papers", "papers/report.html", find, PAPERS_FIGURES, COLUMNS, PARAMETERS, _facts)
 
 
-@tabled
+@as_table
 def verdict_counts(rows: pd.DataFrame) -> Rows:
     """Return the number of rows per verdict, for each paper."""
     for paper, of_one in rows.groupby("paper", sort=False):
@@ -69,7 +69,7 @@ def _facts(tables: Tables, settings: PapersSettings) -> Mapping[str, Any]:
         "papers": {paper: (PAPERS[paper], name) for paper, name in SECTIONS.items()},
         "drawn": {kind.value: int((figures["drawn"] == kind.value).sum()) for kind in Drawn},
         "count": len(rows),
-        "agreed": int((~rows["verdict"].isin(MISSED)).sum()),
+        "agreed": int((~rows["verdict"].isin(MISSED_VERDICTS)).sum()),
         "missed": int((rows["verdict"] == Verdict.NOT_REPRODUCED).sum()),
         "errata_count": int((rows["verdict"] == Verdict.ERRATUM).sum()),
         "empty": int(rows["ours"].isna().sum()),
@@ -81,7 +81,7 @@ def _verdict(word: str) -> Cell:
     return Cell(word, TONES[word])
 
 
-def _in_powers(text: str) -> str:
+def _with_powers_of_ten(text: str) -> str:
     """Return a number such as -4.1e-6 with typographic signs and powers of ten; other texts are unchanged."""
     found = re.fullmatch(r"(-?[\d.]+)(?:e(-?\d+))?", text)
     if found is None:
@@ -90,19 +90,19 @@ def _in_powers(text: str) -> str:
     return found[1].replace("-", MINUS) + power
 
 
-def _ours(row: Row) -> Cell:
+def _our_cell(row: Row) -> Cell:
     value = row["ours"]
     if isinstance(value, str):
         return Cell(value)
     if value is None or value != value:
-        return right(MISSING)
+        return right_aligned(MISSING)
     powers = re.fullmatch(r"-?\d\.?(\d*)e(-?\d+)", str(row["printed"]))
     if powers is not None:  # the printed power of ten and one more digit, so that both can be compared
         decimals, exponent = len(powers[1]) + 1, int(powers[2])
-        return right(_in_powers(f"{value / float(f'1e{exponent}'):.{decimals}f}e{exponent}"))
+        return right_aligned(_with_powers_of_ten(f"{value / float(f'1e{exponent}'):.{decimals}f}e{exponent}"))
     # one digit more than printed, so that both can be compared
     digits = max(5, 1 + len(re.sub(r"e.*|\D", "", str(row["printed"])).lstrip("0")))
-    return right(exact(float(f"{value:.{min(digits, 10)}g}")))
+    return right_aligned(exact(float(f"{value:.{min(digits, 10)}g}")))
 
 
 def _limits(row: Row) -> str:
@@ -125,12 +125,12 @@ def _tolerance(accept: str) -> str:
 
 _ROWS: Columns = (
     *("where", "claim"),
-    Column("printed", words=lambda printed: right(_in_powers(printed))),
-    Column("ours", of_row=_ours),
+    Column("printed", words=lambda printed: right_aligned(_with_powers_of_ten(printed))),
+    Column("ours", of_row=_our_cell),
     "unit",
     Column("accept", "tolerance or interval", of_row=_limits),
     Column("verdict", words=_verdict),
-    Column("errata", words=numbers_linked),
+    Column("errata", words=link_numbers),
     Column("shown_by", "command"),
     "note",
 )

@@ -39,7 +39,7 @@ AGREES: dict[Basis, Verdict] = {
 }
 """The verdict on a value that agrees, by the origin of our value."""
 
-MISSED = frozenset({Verdict.NOT_REPRODUCED, Verdict.ERRATUM})
+MISSED_VERDICTS = frozenset({Verdict.NOT_REPRODUCED, Verdict.ERRATUM})
 """The verdicts on values that do not agree."""
 
 
@@ -57,7 +57,7 @@ TONES: Mapping[str, str] = {
 
 
 @dataclass(frozen=True)
-class Ours:
+class OurResult:
     """Our result for a claim.
 
     Parameters
@@ -87,7 +87,7 @@ class Row:
     value : float, str or None
         The printed value as a number [`unit`], or as words that our result must equal.
     accept : str
-        When our result counts as the printed value; see `accepted`.
+        When our result counts as the printed value; see `accepted_range`.
     errata : str
         Numbers of the errata that find the printed value wrong, ambiguous or contradicted by the paper; empty if there
         are none.
@@ -103,7 +103,7 @@ class Row:
     unit: str
     accept: str
     basis: Basis
-    ours: Ours
+    ours: OurResult
     errata: str = ""
     shown_by: str
     note: str = ""
@@ -116,7 +116,7 @@ def number_row(
     printed: str,
     unit: str,
     accept: str,
-    ours: Ours,
+    ours: OurResult,
     *,
     basis: Basis = "computed",
     errata: str = "",
@@ -140,7 +140,7 @@ def number_row(
     )
 
 
-def accepted(row: Row) -> tuple[float, float]:
+def accepted_range(row: Row) -> tuple[float, float]:
     """Return the range in which our result counts as the printed value.
 
     ``same`` is for words, which must be equal. ``digits`` is half a unit of the last printed digit, ``± x`` and ``± x
@@ -158,8 +158,8 @@ def accepted(row: Row) -> tuple[float, float]:
 
     Examples
     --------
-    >>> accepted(Row(paper="", where="", claim="", printed="25 Hz", value=25.0, unit="Hz", accept="± 10 %",
-    ...              basis="model", ours=Ours(None), shown_by=""))
+    >>> accepted_range(Row(paper="", where="", claim="", printed="25 Hz", value=25.0, unit="Hz", accept="± 10 %",
+    ...              basis="model", ours=OurResult(None), shown_by=""))
     (22.5, 27.5)
     """
     words = row.accept.split()
@@ -186,14 +186,14 @@ def agrees(row: Row) -> bool:
     Raises
     ------
     HydrostateError
-        As `accepted`.
+        As `accepted_range`.
     """
     ours = row.ours
     if row.accept == "same":
         return ours.value is not None and ours.value == row.value
     if ours.value is None or isinstance(ours.value, str) or math.isnan(ours.value):
         return False
-    low, high = accepted(row)
+    low, high = accepted_range(row)
     slack = 1e-9 * max(abs(edge) for edge in (low, high, 0.0) if math.isfinite(edge))
     bottom = ours.value if ours.low is None else ours.low
     top = ours.value if ours.high is None else ours.high
@@ -210,7 +210,7 @@ def verdict_of(row: Row) -> Verdict:
     Raises
     ------
     HydrostateError
-        If the row's basis is unknown, or as `accepted`.
+        If the row's basis is unknown, or as `accepted_range`.
     """
     require_known("basis", row.basis, get_args(Basis))
     if agrees(row):
@@ -218,20 +218,21 @@ def verdict_of(row: Row) -> Verdict:
     return Verdict.ERRATUM if row.errata else Verdict.NOT_REPRODUCED
 
 
-def excluded(row: Row) -> str:
+def exclusion_sentence(row: Row) -> str:
     """Return a sentence if our own interval excludes the printed value and its rounding interval; else an empty text.
 
     Examples
     --------
-    >>> excluded(Row(paper="", where="", claim="", printed="1.89", value=1.89, unit="", accept="digits", basis="model",
-    ...              ours=Ours(1.95, 1.93, 1.97), shown_by=""))
+    >>> row = Row(paper="", where="", claim="", printed="1.89", value=1.89, unit="", accept="digits", basis="model",
+    ...           ours=OurResult(1.95, 1.93, 1.97), shown_by="")
+    >>> exclusion_sentence(row)
     'Our 95 % interval excludes it.'
     """
     compared = row.ours.low is not None and not row.accept.startswith(("same", "at "))
     return "Our 95 % interval excludes it." if compared and not agrees(row) else ""
 
 
-def drawn_as(drawing: bool, difference: str, verdicts: Sequence[str]) -> Drawn:
+def figure_status(drawing: bool, difference: str, verdicts: Sequence[str]) -> Drawn:
     """Return the status of a figure of a paper.
 
     Parameters
@@ -245,10 +246,10 @@ def drawn_as(drawing: bool, difference: str, verdicts: Sequence[str]) -> Drawn:
 
     Examples
     --------
-    >>> print(drawn_as(True, "", [Verdict.PREDICTED]), drawn_as(True, "", [Verdict.ERRATUM]), sep=", ")
+    >>> print(figure_status(True, "", [Verdict.PREDICTED]), figure_status(True, "", [Verdict.ERRATUM]), sep=", ")
     drawn, drawn with a difference
     """
     if not drawing:
         return Drawn.NOT
-    missed = not MISSED.isdisjoint(verdicts)
+    missed = not MISSED_VERDICTS.isdisjoint(verdicts)
     return Drawn.DIFFERS if difference or missed else Drawn.ALIKE

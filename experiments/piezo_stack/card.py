@@ -3,7 +3,7 @@
 from estimation.piezo_stack.estimate import stack_bounds
 from estimation.piezo_stack.finding import SMALLEST_FAULT
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS
-from experiments.page.frames import Rows, tabled
+from experiments.page.frames import Rows, as_table
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import SAMPLE_TIME, sine_drive
 
@@ -23,7 +23,7 @@ DURATION = 0.1
 """Duration of the experiment [s]."""
 
 
-@tabled
+@as_table
 def identifiability_card(healthy: PiezoStackParameters) -> Rows:
     """Return Cramér-Rao bounds of every quantity, all unknown together, by sensors and drive.
 

@@ -12,7 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.page.drawing import Course, courses, diamonds, paired_bars, say, shaded
+from experiments.page.drawing import Course, draw_courses, draw_paired_bars, draw_published, label_point, with_colours
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.page.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, Margins, panels
@@ -46,7 +46,7 @@ def _draw_loops(tables: Tables) -> Figure:
     """
     title = "Stack without load, 100 V peak to peak: its loop widens with frequency"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, across=0.8))
-    for frequency, loop, colour in shaded(tables["figure 10 loops"].groupby("frequency_hz")):
+    for frequency, loop, colour in with_colours(tables["figure 10 loops"].groupby("frequency_hz")):
         left.plot(loop["voltage_v"], MICRO * loop["displacement_m"], color=colour, label=f"{frequency:g} Hz")
     widths = tables["figure 10 loop widths"]
     right.plot(widths["frequency_hz"], widths["width_percent"], "o-", color=BLUE, markersize=4)
@@ -64,9 +64,9 @@ def _curves(axis: Axes, table: pd.DataFrame, by: str, words: Mapping[float, str]
     axis.set(ylim=(0.0, None), ylabel="output flow [L/min]")
 
 
-def _quoted(axis: Axes, flow: float) -> None:
+def _draw_quoted_flow(axis: Axes, flow: float) -> None:
     axis.set_ylim(top=max(axis.get_ylim()[1], 1.1 * flow))
-    diamonds(axis, 275.0, flow, "quoted by the paper")
+    draw_published(axis, 275.0, flow, "quoted by the paper")
 
 
 def _draw_no_load(tables: Tables) -> Figure:
@@ -79,7 +79,7 @@ def _draw_no_load(tables: Tables) -> Figure:
     _curves(left, tables["figure 11 flow over bias pressure"], "bias_pressure_pa", {6e5: "0.6 MPa", 1e6: "1.0 MPa"})
     _curves(right, tables["figure 12 flow over voltage"], "voltage_v", {100.0: "100 V", 140.0: "140 V"})
     for axis, words in ((left, "Figure 11: bias pressure, 140 V"), (right, "Figure 12: voltage, 1.0 MPa")):
-        _quoted(axis, 1.6)
+        _draw_quoted_flow(axis, 1.6)
         axis.set(title=words, xlabel="frequency [Hz]")
         axis.legend(loc="lower right")
     return figure
@@ -94,7 +94,7 @@ def _draw_loaded(tables: Tables) -> Figure:
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, top=0.65, across=0.6), sharey=True)
     weights = {0.0: "no load", 10.0: "10 kg", 20.0: "20 kg"}
     _curves(left, tables["figure 13 flow with fixed weight"], "load_kg", weights)
-    _quoted(left, 1.0)
+    _draw_quoted_flow(left, 1.0)
     speeds = {225.0: "225 Hz", 275.0: "275 Hz", 325.0: "325 Hz"}
     _curves(right, tables["figure 14 flow over load"], "frequency_hz", speeds, across="load_kg")
     left.set(title="Figure 13: the quoted point is at 20 kg", xlabel="frequency [Hz]")
@@ -115,7 +115,7 @@ def _draw_cycle(tables: Tables) -> Figure:
     figure, axes = panels(title, 3, 1, 6.2, Margins(left=0.75, top=0.75), sharex=True)
     for axis in axes:
         _stage_bands(axis, time.to_numpy(), cycle["stage"].to_numpy())
-    courses(axes, time, cycle, CYCLE, room=0.25)
+    draw_courses(axes, time, cycle, CYCLE, room=0.25)
     return figure
 
 
@@ -125,7 +125,7 @@ def _stage_bands(axis: Axes, time: np.ndarray, stage: np.ndarray) -> None:
         axis.axvspan(time[first], time[last], color=STAGE_COLOURS[stage[first]], alpha=0.22, linewidth=0.0, zorder=0)
         if axis.get_subplotspec().rowspan.start == 0 and time[last] - time[first] > 0.05 * time[-1]:  # pyright: ignore[reportOptionalMemberAccess] - made by subplots
             above, look = ("data", "axes fraction"), {"ha": "center", "fontsize": 8.0, "color": GREY}
-            say(axis, stage[first], (0.5 * (time[first] + time[last]), 1.0), (0, 3), xycoords=above, **look)
+            label_point(axis, stage[first], (0.5 * (time[first] + time[last]), 1.0), (0, 3), xycoords=above, **look)
 
 
 def _draw_maps(tables: Tables) -> Figure:
@@ -163,7 +163,7 @@ def _draw_limits(tables: Tables) -> Figure:
     title = "What limits the flow at 275 Hz and 10 kg: change for 5 % more and 5 % less of each"
     figure, (axis,) = panels(title, 1, 1, 4.8, Margins(left=1.9, top=0.45))
     pairs = (("5 % more", table["percent_up"], BLUE), ("5 % less", table["percent_down"], ORANGE))
-    paired_bars(axis, table["part"].tolist(), pairs)
+    draw_paired_bars(axis, table["part"].tolist(), pairs)
     axis.set(xlabel="change of output flow [%]")
     axis.legend(loc="lower right")
     return figure

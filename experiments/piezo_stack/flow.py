@@ -10,8 +10,8 @@ from itertools import groupby, product
 import numpy as np
 import pandas as pd
 
-from experiments.page.frames import Frames, Rows, stacked, tabled
-from experiments.running.executors import side_by_side
+from experiments.page.frames import Frames, Rows, as_stacked_table, as_table
+from experiments.running.executors import map_in_parallel
 from plant.errors import HydrostateError
 from plant.piezo_stack.flow import FLOW_TIME, STAGES, line_reynolds_numbers, mean_flow, stages
 from plant.piezo_stack.free import loop_width, stack_loop
@@ -116,7 +116,7 @@ def rows_of(cases: Sequence[tuple[PiezoStackParameters, OperatingPoint]]) -> Ite
     """
     groups = [list(group) for _, group in groupby(cases, key=lambda case: _run_time(case[1].frequency_hz))]
     parts = [group[first : first + LANES] for group in groups for first in range(0, len(group), LANES)]
-    for rows in side_by_side(_rows_together, parts):
+    for rows in map_in_parallel(_rows_together, parts):
         yield from rows
 
 
@@ -178,7 +178,7 @@ def pump_cycle(p: PiezoStackParameters, point: OperatingPoint) -> pd.DataFrame:
     return last.assign(time_s=last["time_s"] - last["time_s"].iloc[0])
 
 
-@stacked
+@as_stacked_table
 def stack_loops(p: PiezoStackParameters) -> Frames:
     """Return loops of voltage and displacement of the free stack: Figure 10."""
     for frequency in LOOP_FREQUENCIES:
@@ -186,7 +186,7 @@ def stack_loops(p: PiezoStackParameters) -> Frames:
         yield {"frequency_hz": frequency, "voltage_v": voltage, "displacement_m": displacement}
 
 
-@tabled
+@as_table
 def loop_widths(loops: pd.DataFrame) -> Rows:
     """Return stroke and width of each loop of `stack_loops`."""
     for frequency, loop in loops.groupby("frequency_hz"):

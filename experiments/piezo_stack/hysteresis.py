@@ -6,16 +6,16 @@ import numpy as np
 
 from estimation.piezo_stack.bouc_wen import LOOP, fit_stack_loop, loop_bounds
 from estimation.piezo_stack.bouc_wen_printed import printed_fit
-from experiments.page.frames import Rows, tabled
+from experiments.page.frames import Rows, as_table
 from experiments.running.random_streams import stream
 from plant.piezo_stack.free import run_free_stack
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import SAMPLE_TIME, sine_drive
 
-SLOW = 0.1
+SLOW_FREQUENCY = 0.1
 """Frequency at which the stack's lag changes its displacement by only a nanometre [Hz]."""
 
-SAMPLES = round(1.0 / (SLOW * SAMPLE_TIME))
+SAMPLES = round(1.0 / (SLOW_FREQUENCY * SAMPLE_TIME))
 """Samples in a cycle, as the bench logs them."""
 
 FEW_SAMPLES = 5000
@@ -31,7 +31,7 @@ SMALL, LARGE = 5.0, 100.0
 """Peak-to-peak voltages of the small and of the large experiment [V]."""
 
 
-@tabled
+@as_table
 def hysteresis_table(p: PiezoStackParameters, seed: int) -> Rows:
     """Return the results of the printed procedure and of the fit for one closed loop of 100 V.
 
@@ -65,7 +65,7 @@ def hysteresis_table(p: PiezoStackParameters, seed: int) -> Rows:
         }
 
 
-@tabled
+@as_table
 def loop_card(p: PiezoStackParameters) -> Rows:
     """Return the Cramér-Rao bounds for a slow loop of 100 V, by its waveform and sample rate.
 
@@ -101,7 +101,7 @@ def slow_loop(p: PiezoStackParameters, swing: float) -> tuple[np.ndarray, np.nda
     tuple of ndarray, shape (n,)
         Voltage [V], displacement [m].
     """
-    voltage = sine_drive(SLOW, swing, CYCLES / SLOW, SAMPLE_TIME)
+    voltage = sine_drive(SLOW_FREQUENCY, swing, CYCLES / SLOW_FREQUENCY, SAMPLE_TIME)
     heavy = replace(p, stack_mass=100.0 * p.stack_mass, stack_damping=10.0 * p.stack_damping)
     displacement = run_free_stack(heavy, voltage, SAMPLE_TIME)
     return voltage[-SAMPLES - 1 :], displacement[-SAMPLES - 1 :]

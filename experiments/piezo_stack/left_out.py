@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from experiments.page.frames import Rows, tabled
+from experiments.page.frames import Rows, as_table
 from experiments.piezo_stack.flow import (
     FREQUENCIES,
     HIGH_BIAS,
@@ -20,7 +20,7 @@ from experiments.piezo_stack.flow import (
     OperatingPoint,
     rows_of,
 )
-from experiments.running.progress import Track, untracked
+from experiments.running.progress import Track, without_progress
 from experiments.running.random_streams import stream
 from plant.arrays import Array
 from plant.piezo_stack.parameters import PiezoStackParameters
@@ -39,7 +39,7 @@ FREED: tuple[tuple[str, ...], ...] = (
 )
 """Parameters that are searched; those in one group change by the same factor."""
 
-APART, LOOSE = 0.1, 0.2
+APART, START_SPREAD = 0.1, 0.2
 """Spread of the starting points, and standard deviation of the prior about its own starting point [logarithm]."""
 
 PEAK_FREQUENCIES = (225.0, 250.0, 275.0, 300.0, 325.0)
@@ -48,18 +48,18 @@ PEAK_FREQUENCIES = (225.0, 250.0, 275.0, 300.0, 325.0)
 PEAK = 275.0
 """Frequency of the maxima in Figure 11 [Hz]."""
 
-WANTED, ALLOWED = np.array([1.6, 1.0, PEAK, PEAK]), np.array([0.05, 0.05, 12.5, 12.5])
+QUOTED_VALUES, ALLOWED_ERRORS = np.array([1.6, 1.0, PEAK, PEAK]), np.array([0.05, 0.05, 12.5, 12.5])
 """Values that the text quotes from Figures 11 and 13, with half a unit of the last digit or half the sweep's step:
 largest flow at 1.0 MPa and flow with 20 kg [L/min], best frequencies at 1.0 and 0.6 MPa [Hz]."""
 
-LIFTED = 20.0
+LIFTED_MASS = 20.0
 """The load of the quoted point of Figure 13 [kg]."""
 
 STEP, TURNS = 0.02, 8
 """Step of the finite differences [logarithm], and maximum number of search steps."""
 
 
-def changed(p: PiezoStackParameters, logs: Array) -> PiezoStackParameters:
+def with_factors(p: PiezoStackParameters, logs: Array) -> PiezoStackParameters:
     """Return parameters whose freed values are multiplied by the exponentials of `logs`.
 
     Parameters
@@ -74,25 +74,25 @@ def changed(p: PiezoStackParameters, logs: Array) -> PiezoStackParameters:
 
 def _points() -> list[OperatingPoint]:
     no_load = [OperatingPoint(f, HIGH_VOLTAGE, bias, 0.0) for bias in (HIGH_BIAS, LOW_BIAS) for f in PEAK_FREQUENCIES]
-    return [*no_load, OperatingPoint(PEAK, HIGH_VOLTAGE, HIGH_BIAS, LIFTED)]
+    return [*no_load, OperatingPoint(PEAK, HIGH_VOLTAGE, HIGH_BIAS, LIFTED_MASS)]
 
 
-def _told(actuators: Sequence[PiezoStackParameters]) -> Array:
+def _quoted_values(actuators: Sequence[PiezoStackParameters]) -> Array:
     """Return largest flow, flow with 20 kg [L/min] and both best frequencies [Hz]: shape (actuators, 4)."""
     points = _points()
     rows = rows_of([(p, point) for p in actuators for point in points])
     flows = np.array([row["flow_m3_s"] for row in rows]).reshape(len(actuators), -1) / LITRE_PER_MINUTE
     count = len(PEAK_FREQUENCIES)
     high, low, lifting = flows[:, :count], flows[:, count : 2 * count], flows[:, -1]
-    return np.column_stack([high.max(axis=1), lifting, _summit(high), _summit(low)])
+    return np.column_stack([high.max(axis=1), lifting, _peak_frequencies(high), _peak_frequencies(low)])
 
 
 def _misfits(actuators: Sequence[PiezoStackParameters]) -> Array:
     """Return the error of each actuator against Figures 11 and 13, over the error allowed, shape (actuators, 4)."""
-    return (_told(actuators) - WANTED) / ALLOWED
+    return (_quoted_values(actuators) - QUOTED_VALUES) / ALLOWED_ERRORS
 
 
-def _summit(curves: Array) -> Array:
+def _peak_frequencies(curves: Array) -> Array:
     """Return the frequency at the top of a parabola through the flows, within the sweep [Hz]."""
     frequencies = np.array(PEAK_FREQUENCIES)
     square, slope, _ = np.polyfit(frequencies - PEAK, curves.T, 2)
@@ -101,7 +101,7 @@ def _summit(curves: Array) -> Array:
     return PEAK + np.clip(top, -reach, reach)
 
 
-def calibrated(start: PiezoStackParameters, turns: int = TURNS) -> PiezoStackParameters:
+def calibrate(start: PiezoStackParameters, turns: int = TURNS) -> PiezoStackParameters:
     """Return the parameters that best match the values that the text quotes from Figures 11 and 13.
 
     The search uses Levenberg-Marquardt steps on the logarithms of the freed values.
@@ -109,7 +109,7 @@ def calibrated(start: PiezoStackParameters, turns: int = TURNS) -> PiezoStackPar
     Parameters
     ----------
     start : PiezoStackParameters
-        The starting point, from which the freed values deviate by about `LOOSE`.
+        The starting point, from which the freed values deviate by about `START_SPREAD`.
     turns : int
         Maximum number of search steps.
     """
@@ -119,25 +119,25 @@ def calibrated(start: PiezoStackParameters, turns: int = TURNS) -> PiezoStackPar
     for _ in range(turns):
         if float(np.abs(misfit).max()) <= 1.0:
             break
-        beside = _misfits([changed(start, logs + STEP * side) for side in np.eye(size)])
+        beside = _misfits([with_factors(start, logs + STEP * side) for side in np.eye(size)])
         slopes = (beside - misfit).T / STEP
-        matrix = slopes.T @ slopes + np.eye(size) / LOOSE**2
-        downhill = slopes.T @ misfit + logs / LOOSE**2
+        matrix = slopes.T @ slopes + np.eye(size) / START_SPREAD**2
+        downhill = slopes.T @ misfit + logs / START_SPREAD**2
         dampings = damping * np.array([0.1, 1.0, 10.0])
         tried = [logs - np.linalg.solve(matrix + one * np.diag(np.diag(matrix)), downhill) for one in dampings]
-        found = _misfits([changed(start, one) for one in tried])
-        costs = np.sum(found**2, axis=1) + np.sum(np.array(tried) ** 2, axis=1) / LOOSE**2
+        found = _misfits([with_factors(start, one) for one in tried])
+        costs = np.sum(found**2, axis=1) + np.sum(np.array(tried) ** 2, axis=1) / START_SPREAD**2
         best = int(np.argmin(costs))
         if costs[best] < cost:
             logs, misfit, cost, damping = tried[best], found[best], float(costs[best]), dampings[best]
         else:
             damping *= 100.0
-    return changed(start, logs)
+    return with_factors(start, logs)
 
 
-@tabled
+@as_table
 def figure_12_left_out(
-    rig: PiezoStackParameters, seed: int, starts: int, turns: int = TURNS, track: Track = untracked
+    rig: PiezoStackParameters, seed: int, starts: int, turns: int = TURNS, track: Track = without_progress
 ) -> Rows:
     """Return the prediction of Figure 12 by parameters that were calibrated without it.
 
@@ -157,9 +157,9 @@ def figure_12_left_out(
         and ratio (flow at 100 V over that at 140 V, both at 275 Hz) and best_weak_hz at 100 V, not used for it.
     """
     rng = stream(seed, "figure 12 left out")
-    beginnings = [changed(rig, APART * rng.standard_normal(len(FREED))) for _ in range(starts)]
+    beginnings = [with_factors(rig, APART * rng.standard_normal(len(FREED))) for _ in range(starts)]
     for number, begun in enumerate(track(beginnings, description="calibrating without Figure 12"), start=1):
-        p = calibrated(begun, turns)
+        p = calibrate(begun, turns)
         strong = OperatingPoint(PEAK, HIGH_VOLTAGE, HIGH_BIAS, 0.0)
         weak = [OperatingPoint(f, LOW_VOLTAGE, HIGH_BIAS, 0.0) for f in FREQUENCIES]
         most, *curve = (row["flow_m3_s"] for row in rows_of([(p, one) for one in (strong, *weak)]))
@@ -167,7 +167,7 @@ def figure_12_left_out(
         names = ("flow_max_l_min", "flow_20kg_l_min", "best_high_hz", "best_low_hz")
         yield {
             "calibration": number,
-            **dict(zip(names, _told([p])[0].tolist(), strict=True)),
+            **dict(zip(names, _quoted_values([p])[0].tolist(), strict=True)),
             "ratio": float(flows.loc[PEAK]) / most,
             "best_weak_hz": float(str(flows.idxmax())),
         }

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from experiments.page.frames import Rows, tabled
-from experiments.papers.printed import claimed, read_csv
-from experiments.papers.stack_claims import figures_ours
+from experiments.page.frames import Rows, as_table
+from experiments.papers.printed import claim_row, read_csv
+from experiments.papers.stack_claims import figure_results
 from experiments.papers.verdict import Basis, verdict_of
 
 ROLES: Mapping[Basis, str] = {
@@ -17,7 +17,7 @@ ROLES: Mapping[Basis, str] = {
 """How the model used a quoted number."""
 
 
-@tabled
+@as_table
 def quoted_numbers(tables: Mapping[str, pd.DataFrame]) -> Rows:
     """Return the numbers that the paper's text quotes from its curves, beside those of the figures' tables.
 
@@ -34,10 +34,10 @@ def quoted_numbers(tables: Mapping[str, pd.DataFrame]) -> Rows:
     pandas.DataFrame
         Columns where, claim, published, ours, unit, role (calibration target or prediction), verdict, note.
     """
-    ours = figures_ours({name.replace(" ", "_"): table for name, table in tables.items()})
+    ours = figure_results({name.replace(" ", "_"): table for name, table in tables.items()})
     for line in read_csv("claims.csv"):
         if line["paper"] == "000" and line["key"] in ours:
-            row = claimed(line, ours[line["key"]])
+            row = claim_row(line, ours[line["key"]])
             yield {
                 "where": row.where,
                 "claim": row.claim,

@@ -8,7 +8,7 @@ import pandas as pd
 
 from experiments.page.frames import Tables, parameter_table
 from experiments.page.numbers import number, pretty_unit
-from experiments.page.tables import Cell, Column, Columns, interval, right, spaced
+from experiments.page.tables import Cell, Column, Columns, interval, name_in_words, right_aligned
 from experiments.papers.verdict import TONES
 from experiments.piezo_stack import flow
 from experiments.piezo_stack.card import identifiability_card
@@ -17,7 +17,7 @@ from experiments.piezo_stack.hysteresis import hysteresis_table, loop_card
 from experiments.piezo_stack.left_out import TURNS, figure_12_left_out
 from experiments.piezo_stack.quoted import quoted_numbers
 from experiments.running.progress import Track
-from experiments.running.study import Found, Study
+from experiments.running.study import Study, StudyResult
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.units import LITRE_PER_MINUTE
 
@@ -42,7 +42,7 @@ class StackSettings:
     power_limit_w: float
 
 
-def _find(settings: StackSettings, track: Track) -> Found:
+def _find(settings: StackSettings, track: Track) -> StudyResult:
     wanted = {**flow.figure_points(), "design map": (flow.QUICK_GRID if settings.quick else flow.DESIGN_GRID).points()}
     points = list(dict.fromkeys(point for some in wanted.values() for point in some))
     rows = dict(zip(points, track(flow.sweep(RIG, points), len(points), description="operating points"), strict=True))
@@ -60,15 +60,15 @@ def _find(settings: StackSettings, track: Track) -> Found:
     tables["quoted numbers"] = quoted_numbers(tables)
     starts, turns = (1, 1) if settings.quick else (3, TURNS)
     tables["figure 12 left out"] = figure_12_left_out(RIG, settings.seed, starts, turns, track)
-    return Found(tables)
+    return StudyResult(tables)
 
 
 def _parameter(name: str) -> str:
-    return spaced(name).replace(" a volt", " per volt")
+    return name_in_words(name).replace(" a volt", " per volt")
 
 
-def _told(percent: float) -> Cell:
-    return right(number(percent, 2)) if np.isfinite(percent) else Cell("not determined", "bad")
+def _percent_cell(percent: float) -> Cell:
+    return right_aligned(number(percent, 2)) if np.isfinite(percent) else Cell("not determined", "bad")
 
 
 RIG = PiezoStackParameters()
@@ -110,7 +110,7 @@ COLUMNS: Mapping[str, Columns] = {
     "what loops tell": (
         "loop",
         Column("samples", "samples a cycle", words=lambda count: f"{count:,}"),
-        lambda name: Column(name, _parameter(name), "%", words=_told),
+        lambda name: Column(name, _parameter(name), "%", words=_percent_cell),
     ),
     "identifiability": (Column("frequency_hz", "drive"), "sensors", lambda name: Column(name, unit="%", digits=2)),
     "rig": (

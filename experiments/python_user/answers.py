@@ -149,10 +149,10 @@ class Answer(Shown):
         return self.finding.all_notes
 
     def __str__(self) -> str:
-        from experiments.command.terminal import rendered
+        from experiments.command.terminal import render_text
 
         about = {"file": self._name, "warnings": [], "expected": None, "rig": "", "condition": None}
-        return rendered(*self._screen([{**about, **self.to_dict()}]))
+        return render_text(*self._screen([{**about, **self.to_dict()}]))
 
     def _repr_html_(self) -> str:
         from html import escape

@@ -282,14 +282,14 @@ class Log(Shown):
                 warnings.warn(LogWarning(said), stacklevel=4)
 
     def _asked(self, verb: str, options: Mapping[str, Any]) -> "Answer":
-        from experiments.actuators import actuator, offered
+        from experiments.actuators import actuator, verb_of_kind
 
         if self.plant == ANY:
             from plant.log.checks import REQUIRED, alternatives
-            from plant.log.guess import SHOWN, guess_by_name
-            from plant.log.headings import cleaned
+            from plant.log.guess import SHOWN_PROBABILITY, guess_by_name
+            from plant.log.headings import headings_of
 
-            sure = [one for one in guess_by_name(cleaned(self.channels)) if one.sure >= SHOWN]
+            sure = [one for one in guess_by_name(headings_of(self.channels)) if one.sure >= SHOWN_PROBABILITY]
             meant = {one.channel: one.spec if one.unit else f"{one.spec}:UNIT" for one in sure}
             if not any(name in meant for one in REQUIRED for name in alternatives(one)):
                 meant = {"motor_speed_rad_s": "N:rpm"}  # only channels that the verb needs are useful examples
@@ -298,7 +298,7 @@ class Log(Shown):
                 f"read(..., columns={meant}), or relate them by "
                 "identify(input=..., output=...)"
             )
-        record, chosen = self.whole(), offered(actuator(self.plant), verb)
+        record, chosen = self.whole(), verb_of_kind(actuator(self.plant), verb)
         asked = {**chosen.options, **known_options(options, chosen.options, verb)}
         if isinstance(asked.get("healthy"), Log):
             asked["healthy"] = asked["healthy"].whole()

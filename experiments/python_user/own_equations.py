@@ -144,10 +144,10 @@ class GreyBox(Shown):
         """
         import pandas as pd
 
-        from estimation.equations.fit import simulated
+        from estimation.equations.fit import simulated_outputs
 
         record = record_of(log)
-        found = simulated(self.equations, record, values or {}, initial or {})
+        found = simulated_outputs(self.equations, record, values or {}, initial or {})
         return pd.DataFrame(dict(found), index=times_of(log, record))
 
 

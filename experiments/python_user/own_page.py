@@ -81,8 +81,8 @@ def page_of_channels(record: "Record", model: "LinearModel", options: Mapping[st
         Name of the log on the page.
     """
     from estimation.identification.from_record import record_signals
-    from experiments.identification.of_channels import judged_page
+    from experiments.identification.of_channels import page_of_new_model
 
     taken = {name: options[name] for name in ("sample_time", "filter_cutoff_hz") if name in options}
     u, y = record_signals(record, output=model.output_name, input=model.input_name, **taken)
-    return judged_page(model, u, y, title)
+    return page_of_new_model(model, u, y, title)

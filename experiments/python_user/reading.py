@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from experiments.command.logs import caught, overheard
+from experiments.command.logs import catch_and_repeat_warnings, catch_log_warnings
 from plant.errors import SparseLogError
 from plant.log.clock.uniform import MOST_MISSING_TO_RELATE
 from plant.log.notes import LogCode
@@ -59,7 +59,7 @@ def read_whole_or_sparse(read: "Callable[..., Record]") -> Reading:
     LogWarning
         Remarks from reading the log.
     """
-    with overheard() as said:
+    with catch_and_repeat_warnings() as said:
         try:
             record = read()
         except SparseLogError as refused:
@@ -70,5 +70,5 @@ def read_whole_or_sparse(read: "Callable[..., Record]") -> Reading:
             return Reading(record, said, refusal=str(refused))
     if not any(one.note.code in (LogCode.CHANNEL_LEFT_OUT, LogCode.CHANNEL_LOGGED_IN_PART) for one in said):
         return Reading(record, said)
-    with caught():
+    with catch_log_warnings():
         return Reading(record, said, sparse=read(most_missing=MOST_MISSING_TO_RELATE))

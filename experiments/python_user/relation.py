@@ -216,12 +216,12 @@ class Relation(Shown):
         HydrostateError
             If a file cannot be written, its name does not end like a page, or the models were loaded without a log.
         """
-        from experiments.command.output_paths import own_paths
+        from experiments.command.output_paths import paths_by_owner
         from experiments.python_user.own_page import page_of_columns, page_path, write_page
 
         if not self._data:
             refuse("models that were loaded have no log to show them on; a page is written where they are identified")
-        places = own_paths(page_path(path), [one.output for one in self.models])
+        places = paths_by_owner(page_path(path), [one.output for one in self.models])
         shown = zip(self.models, self._entries, self._data, strict=True)
         return [
             write_page(places[one.output], page_of_columns(entries, one, data, title)) for one, entries, data in shown
@@ -257,7 +257,7 @@ def _record_of(log: Any, sample_time: float, names: Sequence[str]) -> "Record | 
 
     Rows that were sent twice are left out; they are detected by the named columns that the log contains.
     """
-    from estimation.identification.free_run.from_records import sent_once
+    from estimation.identification.free_run.from_records import without_repeated_rows
     from experiments.python_user.log import Log
     from plant.log.any_columns import read_any
     from plant.log.frames import by_name, frame_table, is_frame
@@ -271,7 +271,7 @@ def _record_of(log: Any, sample_time: float, names: Sequence[str]) -> "Record | 
     else:
         table = log if is_frame(log) else by_name(log)
         record = None if table is None else read_any(frame_table(table), assumed=sample_time)
-    return None if record is None else sent_once(record, [name for name in names if name in record])
+    return None if record is None else without_repeated_rows(record, [name for name in names if name in record])
 
 
 def _warn_of_inputs(
@@ -305,7 +305,7 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
         Options of `identify_outputs`, the model's ``sample_time`` [s], and ``reference``, the channels that drive a
         closed loop.
     """
-    from estimation.identification.free_run.from_records import sent_once
+    from estimation.identification.free_run.from_records import without_repeated_rows
     from estimation.identification.two_stage import identify_columns
     from experiments.identification.entries import column_entries
 
@@ -314,7 +314,7 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     columns = [names_of(name, one) for name, one in given.items()]
     sources, targets, references = columns
     sample_time = asked.pop("sample_time", None)
-    once = [sent_once(one, [*sources, *targets, *references]) for one in records]
+    once = [without_repeated_rows(one, [*sources, *targets, *references]) for one in records]
     found, data = identify_columns(
         once, sources, targets, references=references, sample_time=sample_time, options=asked
     )

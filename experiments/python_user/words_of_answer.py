@@ -39,9 +39,9 @@ class Words:
     said: "Sequence[LogWarning]"
 
     def _chosen(self) -> "LogVerb":
-        from experiments.actuators import actuator, offered
+        from experiments.actuators import actuator, verb_of_kind
 
-        return offered(actuator(self.plant), self.verb)
+        return verb_of_kind(actuator(self.plant), self.verb)
 
     def screen(self, rows: Sequence[Mapping[str, Any]]) -> "Iterable[RenderableType]":
         """Return the terminal output for entries."""

@@ -23,7 +23,7 @@ Case = TypeVar("Case")
 Found = TypeVar("Found")
 
 
-def side_by_side(run: Callable[[Case], Found], cases: Iterable[Case]) -> Iterator[Found]:
+def map_in_parallel(run: Callable[[Case], Found], cases: Iterable[Case]) -> Iterator[Found]:
     """Run every case and yield the results in the order of the cases.
 
     Parameters
@@ -38,7 +38,7 @@ def side_by_side(run: Callable[[Case], Found], cases: Iterable[Case]) -> Iterato
 
     Examples
     --------
-    >>> list(side_by_side(abs, [-2, 3]))
+    >>> list(map_in_parallel(abs, [-2, 3]))
     [2, 3]
     """
     executor = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)

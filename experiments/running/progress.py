@@ -16,7 +16,9 @@ class Track(Protocol):
         ...
 
 
-def untracked(sequence: Iterable[Piece], total: float | None = None, *, description: str = "") -> Iterable[Piece]:
+def without_progress(
+    sequence: Iterable[Piece], total: float | None = None, *, description: str = ""
+) -> Iterable[Piece]:
     """Return the pieces without showing progress.
 
     Parameters
@@ -28,12 +30,12 @@ def untracked(sequence: Iterable[Piece], total: float | None = None, *, descript
     return sequence
 
 
-def in_one_piece(track: Track, description: str, make: Callable[[], Piece]) -> Piece:
+def run_as_one_piece(track: Track, description: str, make: Callable[[], Piece]) -> Piece:
     """Run a single function that shows no progress of its own.
 
     Examples
     --------
-    >>> in_one_piece(untracked, "adding", lambda: 1 + 1)
+    >>> run_as_one_piece(without_progress, "adding", lambda: 1 + 1)
     2
     """
     (done,) = [make() for _ in track([make], description=description)]

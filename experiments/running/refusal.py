@@ -8,7 +8,7 @@ from plant.errors import HydrostateError
 
 
 @contextmanager
-def refused(said: str) -> Generator[None]:
+def os_errors_as(said: str) -> Generator[None]:
     """Turn an operating system error in this block into an error that starts with the given words."""
     try:
         yield

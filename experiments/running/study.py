@@ -16,7 +16,7 @@ from experiments.page.folder import check_target, write_tables
 from experiments.page.frames import Tables
 from experiments.page.render import render_page
 from experiments.page.tables import Columns
-from experiments.running.progress import Track, in_one_piece
+from experiments.running.progress import Track, run_as_one_piece
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -28,14 +28,14 @@ Settings = TypeVar("Settings", bound="DataclassInstance", contravariant=True)
 
 
 @dataclass(frozen=True)
-class Seeded:
+class SeedSettings:
     """Settings of a study that needs only a seed."""
 
     seed: int
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class StudyResult:
     """Result of a study.
 
     Parameters
@@ -84,7 +84,7 @@ class Study(Generic[Settings]):
 
     name: str
     template: str
-    find: Callable[[Settings, Track], Found]
+    find: Callable[[Settings, Track], StudyResult]
     figures: Drawings
     columns: Mapping[str, Columns]
     parameters: Mapping[str, Any]
@@ -114,11 +114,11 @@ def run_study(study: Study[Settings], settings: Settings, out: Path, console: Co
     )
     with Progress(*columns, console=console) as progress:
         found = study.find(settings, progress.track)
-        in_one_piece(progress.track, "drawing and writing", lambda: write_result(study, settings, found, out))
+        run_as_one_piece(progress.track, "drawing and writing", lambda: write_result(study, settings, found, out))
     return out / "report.html"
 
 
-def write_result(study: Study[Settings], settings: Settings, found: Found, out: Path) -> None:
+def write_result(study: Study[Settings], settings: Settings, found: StudyResult, out: Path) -> None:
     """Write the results of a study, with its figures and its report, as one folder.
 
     Parameters

@@ -18,10 +18,10 @@ from starlette.responses import StreamingResponse
 from starlette.routing import Match, Route
 from starlette.types import Scope
 
-from experiments.command.terminal import note, unexpected
-from experiments.log_pages.comparison import compared
+from experiments.command.terminal import error_sentence, note
+from experiments.log_pages.comparison import comparison_rows
 from experiments.serve.answers import Comparison, Health, Log, Logs, Refusal, StreamHistory, StreamState, Verb, log_of
-from experiments.serve.events import MOST_LOOKING, event_stream
+from experiments.serve.events import MOST_STREAM_VIEWS, event_stream
 from experiments.serve.limits import (
     HEADERS,
     MOST_UPLOADS,
@@ -61,7 +61,7 @@ WHY: Mapping[int, str] = {
 _CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2069]")
 
 
-def why(*more: int, page: bool = False) -> dict[int | str, dict[str, Any]]:
+def refusal_responses(*more: int, page: bool = False) -> dict[int | str, dict[str, Any]]:
     """Return the possible refusals of a request, for OpenAPI; refusals are JSON, except for browsers."""
     schema = {"$ref": "#/components/schemas/Refusal"}
     kinds = {"application/json": {"schema": schema}, "text/html": {"schema": {"type": "string"}}}
@@ -113,7 +113,7 @@ def make_app(settings: Settings, refused: Callable[[HydrostateError], None] | No
         docs_url=None,
         redoc_url=None,
         lifespan=life,
-        responses=why(),
+        responses=refusal_responses(),
     )
     app.add_middleware(Guard, settings=settings)
     _answer_errors(app)
@@ -169,7 +169,7 @@ def _answer_errors(app: FastAPI) -> None:
         return answered(request, 422, f"{' '.join((where, *names))}: {found['msg']}")
 
     async def strange(_: Request, error: Exception) -> Response:
-        said = unexpected(error)
+        said = error_sentence(error)
         note(f"serve: {said}")
         # this response bypasses the guard, which normally sets these headers
         every = {name.decode(): value.decode() for name, value in HEADERS.items()}
@@ -186,14 +186,16 @@ def _answer_errors(app: FastAPI) -> None:
 
 
 def _offer_logs(app: FastAPI, service: Service) -> None:
-    @app.post("/api/logs", status_code=202, responses=why(413, 415, 422), openapi_extra=BODY, tags=["logs"])
+    @app.post(
+        "/api/logs", status_code=202, responses=refusal_responses(413, 415, 422), openapi_extra=BODY, tags=["logs"]
+    )
     async def drop(request: Request, response: Response, name: Name, verb: Verb = "diagnose") -> Log:
         """Take a log and put it into the queue; the body is the file itself."""
         kept = await _received(request, service, plain_name(name), verb)
         response.headers["Location"] = f"/api/logs/{kept.id}"
         return log_of(kept, service.jobs)
 
-    @app.get("/api/logs", responses=why(422), tags=["logs"])
+    @app.get("/api/logs", responses=refusal_responses(422), tags=["logs"])
     def logs(
         most: Annotated[int, Query(ge=1, le=500)] = 100, before: Annotated[int | None, Query(ge=0, le=1 << 60)] = None
     ) -> Logs:
@@ -201,17 +203,17 @@ def _offer_logs(app: FastAPI, service: Service) -> None:
         found = service.store.latest(most, before)
         return Logs(logs=[log_of(one, service.jobs) for one in found], counts=service.store.counts())
 
-    @app.get("/api/logs/{id}", responses=why(404, 422), tags=["logs"])
+    @app.get("/api/logs/{id}", responses=refusal_responses(404, 422), tags=["logs"])
     def log(id: Identity) -> Log:  # noqa: A002 - a path's name
         """Return the state of a log."""
-        return log_of(service.known(id), service.jobs)
+        return log_of(service.require_log(id), service.jobs)
 
-    @app.get("/api/logs/{id}/result", responses=why(404, 409, 422), tags=["logs"])
+    @app.get("/api/logs/{id}/result", responses=refusal_responses(404, 409, 422), tags=["logs"])
     def result(id: Identity) -> dict[str, Any]:  # noqa: A002 - a path's name
         """Return the result of a log: the object that `hydrostate VERB --json` prints for it."""
         return service.result(id)
 
-    @app.delete("/api/logs/{id}", status_code=204, responses=why(404, 422), tags=["logs"])
+    @app.delete("/api/logs/{id}", status_code=204, responses=refusal_responses(404, 422), tags=["logs"])
     def delete(id: Identity) -> None:  # noqa: A002 - a path's name
         """Delete a log with its page and result; if it is running, it stops at once."""
         service.delete(id)
@@ -226,7 +228,7 @@ async def _received(request: Request, service: Service, name: str, verb: Verb) -
         raise RefusedError(429, f"{MOST_UPLOADS} logs are coming in, come again")
     service.room.uploads += 1
     try:
-        room, length = service.room.left(), request.headers.get("content-length", "")
+        room, length = service.room.bytes_left(), request.headers.get("content-length", "")
         require_size(int(length) if length.isdecimal() else 0, service.settings.largest, room)
         identity = secrets.token_hex(8)
         part = service.settings.work / f"{identity}.part"
@@ -242,10 +244,10 @@ def _offer_state(app: FastAPI, service: Service) -> None:
         """Return whether the server has capacity for more logs."""
         waiting, most = service.jobs.waiting, service.settings.waiting
         return Health(
-            waiting=waiting, most_waiting=most, room=max(service.room.left(), 0), version=version("hydrostate")
+            waiting=waiting, most_waiting=most, room=max(service.room.bytes_left(), 0), version=version("hydrostate")
         )
 
-    @app.get("/metrics", response_class=PlainTextResponse, responses=why(page=True), tags=["server"])
+    @app.get("/metrics", response_class=PlainTextResponse, responses=refusal_responses(page=True), tags=["server"])
     def metrics() -> PlainTextResponse:
         """Return the metrics in the text format of Prometheus."""
         streams = [(one.state, one.alarms) for one in service.streams.by_name.values()]
@@ -254,12 +256,12 @@ def _offer_state(app: FastAPI, service: Service) -> None:
 
 
 def _offer_comparison(app: FastAPI, service: Service) -> None:
-    @app.get("/api/compare", responses=why(404, 409, 422), tags=["logs"])
+    @app.get("/api/compare", responses=refusal_responses(404, 409, 422), tags=["logs"])
     def compare(first: LogId, second: LogId) -> Comparison:
         """Return the differences between two logs, second minus first."""
         pair = [service.result(one) for one in (first, second)]
-        logs = [log_of(service.known(one), service.jobs) for one in (first, second)]
-        return Comparison.model_validate({"first": logs[0], "second": logs[1], "differences": compared(*pair)})
+        logs = [log_of(service.require_log(one), service.jobs) for one in (first, second)]
+        return Comparison.model_validate({"first": logs[0], "second": logs[1], "differences": comparison_rows(*pair)})
 
 
 def _offer_streams(app: FastAPI, service: Service) -> None:
@@ -268,7 +270,7 @@ def _offer_streams(app: FastAPI, service: Service) -> None:
         """Return the watched streams."""
         return [StreamState.model_validate(one.state) for one in service.streams.by_name.values()]
 
-    @app.get("/api/streams/{name}", responses=why(404, 422), tags=["streams"])
+    @app.get("/api/streams/{name}", responses=refusal_responses(404, 422), tags=["streams"])
     def stream(name: StreamName) -> StreamHistory:
         """Return a stream with the last ten minutes of its gauges, and its events."""
         one = service.stream(name)
@@ -277,7 +279,7 @@ def _offer_streams(app: FastAPI, service: Service) -> None:
     @app.get(
         "/api/streams/{name}/events",
         responses={
-            **why(404, 422, page=True),
+            **refusal_responses(404, 422, page=True),
             200: {"content": {"text/event-stream": {}}, "description": "Server-sent events."},
         },
         response_class=StreamingResponse,
@@ -286,8 +288,8 @@ def _offer_streams(app: FastAPI, service: Service) -> None:
     async def follow(request: Request, name: StreamName) -> StreamingResponse:
         """Return the events of a stream as they come: `history` once, then `gauges`, and `state` with new events."""
         one = service.stream(name)
-        if service.streams.looking >= MOST_LOOKING:
-            raise RefusedError(429, f"{MOST_LOOKING} views are open, close one")
+        if service.streams.looking >= MOST_STREAM_VIEWS:
+            raise RefusedError(429, f"{MOST_STREAM_VIEWS} views are open, close one")
         return StreamingResponse(
             event_stream(one, service.streams, request.is_disconnected), media_type="text/event-stream"
         )
@@ -297,33 +299,41 @@ def _offer_pages(app: FastAPI, service: Service) -> None:
     def shown(page: str) -> HTMLResponse:
         return HTMLResponse(page, headers={"Content-Security-Policy": policy_of(page)})
 
-    @app.get("/", response_class=HTMLResponse, responses=why(page=True), tags=["pages"])
+    @app.get("/", response_class=HTMLResponse, responses=refusal_responses(page=True), tags=["pages"])
     def home() -> HTMLResponse:
         """Return the page for uploading logs."""
         return shown(home_page(service.settings))
 
-    @app.get("/logs/{id}", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
+    @app.get(
+        "/logs/{id}", response_class=HTMLResponse, responses=refusal_responses(404, 409, 422, page=True), tags=["pages"]
+    )
     def page(id: Identity) -> FileResponse:  # noqa: A002 - a path's name
         """Return the page of a log."""
         path = service.page(id)
         return FileResponse(path, media_type="text/html", headers={"Content-Security-Policy": policy_of_file(path)})
 
-    @app.get("/fleet", response_class=HTMLResponse, responses=why(404, 409, page=True), tags=["pages"])
+    @app.get("/fleet", response_class=HTMLResponse, responses=refusal_responses(404, 409, page=True), tags=["pages"])
     async def fleet() -> HTMLResponse:
         """Return the page of the fleet: one row per actuator, the worst on top."""
         return shown(await service.fleet())
 
-    @app.get("/actuator", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
+    @app.get(
+        "/actuator", response_class=HTMLResponse, responses=refusal_responses(404, 409, 422, page=True), tags=["pages"]
+    )
     async def actuator(name: Annotated[str, Query(min_length=1, max_length=400)]) -> HTMLResponse:
         """Return the page of an actuator with several logs: its trends and its last logs."""
         return shown(await service.actuator(name))
 
-    @app.get("/compare", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
+    @app.get(
+        "/compare", response_class=HTMLResponse, responses=refusal_responses(404, 409, 422, page=True), tags=["pages"]
+    )
     async def comparison(first: LogId, second: LogId) -> HTMLResponse:
         """Return the page of two logs side by side."""
         return shown(await service.comparison(first, second))
 
-    @app.get("/live/{name}", response_class=HTMLResponse, responses=why(404, 422, page=True), tags=["pages"])
+    @app.get(
+        "/live/{name}", response_class=HTMLResponse, responses=refusal_responses(404, 422, page=True), tags=["pages"]
+    )
     def live(name: StreamName) -> HTMLResponse:
         """Return the page of a stream."""
         service.stream(name)

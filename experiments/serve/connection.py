@@ -7,18 +7,18 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-HEADERS_IN = 10.0
+HEADERS_TIMEOUT = 10.0
 """Longest time for the headers of a request, or for a body that the server does not read [s]."""
 
-READ_IN = 30.0
+READ_TIMEOUT = 30.0
 """Longest time that a client may leave a response unread [s]."""
 
 MOST_CONNECTIONS = 512
 """Largest number of connections, fewer if the system allows fewer files [count]."""
 
-FULL = b"HTTP/1.1 429 Too Many Requests\r\nretry-after: 5\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
+FULL_RESPONSE = b"HTTP/1.1 429 Too Many Requests\r\nretry-after: 5\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
 
-LATE = b"HTTP/1.1 408 Request Timeout\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
+TIMEOUT_RESPONSE = b"HTTP/1.1 408 Request Timeout\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
 
 
 def most_connections() -> int:
@@ -37,17 +37,17 @@ class PatientProtocol(H11Protocol):
         """Accept a connection, or reply that there are too many."""
         super().connection_made(transport)
         if len(self.connections) > most_connections():
-            transport.write(FULL)
+            transport.write(FULL_RESPONSE)
             transport.close()
             return
-        self._look()
+        self._update_timer()
 
     def data_received(self, data: bytes) -> None:
         """Receive data from the client."""
         if self.transport.is_closing():
             return
         super().data_received(data)
-        self._look()
+        self._update_timer()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""
@@ -59,7 +59,7 @@ class PatientProtocol(H11Protocol):
     def pause_writing(self) -> None:
         """Start to wait for a client that does not read."""
         super().pause_writing()
-        self._reading_due = self.loop.call_later(READ_IN, self.transport.abort)
+        self._reading_due = self.loop.call_later(READ_TIMEOUT, self.transport.abort)
 
     def resume_writing(self) -> None:
         """Stop waiting, because the client reads again."""
@@ -79,20 +79,20 @@ class PatientProtocol(H11Protocol):
             cycle.disconnected = True
             cycle.message_event.set()
 
-    def _look(self) -> None:
+    def _update_timer(self) -> None:
         """Start or stop the timer for headers, or for the rest of a body after the response."""
         unread = self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY
         if self.conn.their_state is h11.IDLE or unread:
             if self._headers_due is None:
-                self._headers_due = self.loop.call_later(HEADERS_IN, self._late)
+                self._headers_due = self.loop.call_later(HEADERS_TIMEOUT, self._close_late)
         elif self._headers_due is not None:
             self._headers_due.cancel()
             self._headers_due = None
 
-    def _late(self) -> None:
+    def _close_late(self) -> None:
         self._headers_due = None
         if self.transport.is_closing():
             return
         if self.conn.our_state is h11.IDLE:
-            self.transport.write(LATE)
+            self.transport.write(TIMEOUT_RESPONSE)
         self.transport.close()

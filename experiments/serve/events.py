@@ -6,13 +6,13 @@ import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
-from experiments.serve.gauges import EVERY
+from experiments.serve.gauges import GAUGE_INTERVAL
 from experiments.serve.live import Stream, Streams
 
-MOST_LOOKING = 64
+MOST_STREAM_VIEWS = 64
 """Largest number of open views of streams [count]."""
 
-ALIVE = 15.0
+KEEP_ALIVE_INTERVAL = 15.0
 """Longest time without a message, even if there is nothing new [s]."""
 
 
@@ -50,7 +50,7 @@ async def event_stream(stream: Stream, streams: Streams, gone: Callable[[], Awai
         yield message("history", {**stream.state, "history": history, "events": events})
         spoke = time.monotonic()
         while not await gone():
-            await asyncio.sleep(EVERY)
+            await asyncio.sleep(GAUGE_INTERVAL)
             latest, changed = stream.revision
             if changed != fresh:
                 fresh = changed
@@ -61,7 +61,7 @@ async def event_stream(stream: Stream, streams: Streams, gone: Callable[[], Awai
                 for one in new:
                     yield message("gauges", one)
                 spoke = time.monotonic()
-            if time.monotonic() - spoke > ALIVE:
+            if time.monotonic() - spoke > KEEP_ALIVE_INTERVAL:
                 yield b": still here\n\n"
                 spoke = time.monotonic()
     finally:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from experiments.command.json_output import plain
 from experiments.command.options import load_rig
-from experiments.command.terminal import unexpected
+from experiments.command.terminal import error_sentence
 from experiments.serve.process import bind_to_server
 from experiments.streams.watch_events import WatchEvents
 from experiments.streams.watching import WatchSettings, watch_network
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from faults.watch.events import Event
 
-EVERY = 0.25
+GAUGE_INTERVAL = 0.25
 """Time between two messages of gauges [s]."""
 
 
@@ -51,11 +51,11 @@ class Gauges(WatchEvents):
         super().events(events)
         self._peaks |= {event.balance: event.score for event in events if isinstance(event, Alarm)}
 
-    def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
-        """Process samples; every `EVERY`, report the range of each channel since the last report."""
+    def process_samples(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
+        """Process samples; every `GAUGE_INTERVAL`, report the range of each channel since the last report."""
         import numpy as np
 
-        super().saw(channels, last, gap)
+        super().process_samples(channels, last, gap)
         missing = 0
         for name, values in channels.items():
             there = values[np.isfinite(values)]
@@ -65,7 +65,7 @@ class Gauges(WatchEvents):
                 self._ends[name] = min(low, float(there.min())), max(high, float(there.max()))
         self._whole += max((len(values) for values in channels.values()), default=0) - missing
         now = time.monotonic()
-        if now - self._sent < EVERY:
+        if now - self._sent < GAUGE_INTERVAL:
             return
         self._sent = now
         self.flush(last, {name: float(values[-1]) for name, values in channels.items()})
@@ -144,7 +144,7 @@ def watch_stream(out: Connection, server: int, task: StreamTask) -> None:
         except HydrostateError as error:
             said = str(error)
         except Exception as error:  # the server goes on, and reports why this stream stopped
-            said = unexpected(error)
+            said = error_sentence(error)
         if told.watch is not None:
             told.flush(told.watch.last, {})
         told.end(outcome, said)

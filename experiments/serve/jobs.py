@@ -11,16 +11,16 @@ from typing import Any, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
-from experiments.command.terminal import note, unexpected
+from experiments.command.terminal import error_sentence, note
 from experiments.serve.settings import MB, Settings
 from experiments.serve.store import DONE, FAILED, INTERRUPTED, Store, StoredLog
-from experiments.serve.work import NO_MEMORY, LogResult, Task, begin_worker, work_on
+from experiments.serve.work import NO_MEMORY, LogResult, Task, begin_worker, process_log
 from plant.errors import HydrostateError
 
 MOST_TRIES = 3
 """Number of servers that may end while processing a log before it is given up [count]."""
 
-FRESH_AFTER = 50
+LOGS_PER_PROCESS = 50
 """Logs after which a process is replaced by a new one [count], which limits memory leaks in libraries."""
 
 VIEW_SECONDS = 60.0
@@ -55,8 +55,8 @@ class Jobs:
         self._closing = False
         context = multiprocessing.get_context("spawn")
         born: Any = {"initializer": begin_worker, "initargs": (os.getpid(), settings.memory), "context": context}
-        self._pool = ProcessPool(max_workers=settings.workers, max_tasks=FRESH_AFTER, **born)
-        self._drawing = ProcessPool(max_workers=1, max_tasks=FRESH_AFTER, **born)
+        self._pool = ProcessPool(max_workers=settings.workers, max_tasks=LOGS_PER_PROCESS, **born)
+        self._drawing = ProcessPool(max_workers=1, max_tasks=LOGS_PER_PROCESS, **born)
 
     @property
     def waiting(self) -> int:
@@ -67,7 +67,7 @@ class Jobs:
         """Resume what an earlier server did not finish; a log is given up if several servers ended during its work."""
         for log in self._store.unfinished():
             if phase_file(self._settings, log.id).exists():
-                self._store.tried(log.id)
+                self._store.count_try(log.id)
                 if log.tries + 1 >= MOST_TRIES:
                     said = f"interrupted: the server ended {MOST_TRIES} times while it worked on this log"
                     self._store.finish(log.id, INTERRUPTED, {"file": log.name, "outcome": "failed", "message": said})
@@ -98,9 +98,9 @@ class Jobs:
             settings.pattern,
         )
         with self._lock:
-            future: Future[Any] = self._pool.schedule(work_on, args=(task,), timeout=settings.seconds)
+            future: Future[Any] = self._pool.schedule(process_log, args=(task,), timeout=settings.seconds)
             self._waiting[log.id] = future
-        future.add_done_callback(lambda done: self._ended(log, done))
+        future.add_done_callback(lambda done: self._on_end(log, done))
 
     def cancel(self, identity: str) -> None:
         """Cancel a log: remove it from the queue, or end the process that works on it."""
@@ -149,29 +149,29 @@ class Jobs:
         for pool in (self._pool, self._drawing):
             pool.join()
 
-    def _ended(self, log: StoredLog, future: "Future[Any]") -> None:
+    def _on_end(self, log: StoredLog, future: "Future[Any]") -> None:
         if self._closing:
             return
         with self._lock:
             taken_back = self._waiting.get(log.id) is not future
         if taken_back:
-            self._forget(log.id)
+            self._delete_files(log.id)
             return
         try:
             worked: LogResult = future.result()
         except CancelledError:
-            worked = self._lost("it was cancelled", log)
+            worked = self._failed_result("it was cancelled", log)
         except TimeoutError:
-            worked = self._lost(f"it took longer than {self._settings.seconds:g} s and was stopped", log)
+            worked = self._failed_result(f"it took longer than {self._settings.seconds:g} s and was stopped", log)
         except ProcessExpired as error:
-            worked = self._lost(_why_expired(error.exitcode, self._settings.memory // MB), log)
+            worked = self._failed_result(_why_expired(error.exitcode, self._settings.memory // MB), log)
         except Exception as error:  # the worker could not report its error
-            worked = self._lost(unexpected(error), log)
+            worked = self._failed_result(error_sentence(error), log)
         try:
             state = FAILED if worked.result["outcome"] == "failed" else DONE
             self._store.finish(log.id, state, worked.result, worked.entries, worked.said)
             if self._store.get(log.id) is None:
-                self._forget(log.id)
+                self._delete_files(log.id)
         except HydrostateError as error:
             note(f"serve: what came of {log.name} is lost, the next start works on it again: {error}")
         finally:
@@ -179,11 +179,11 @@ class Jobs:
             with self._lock:
                 self._waiting.pop(log.id, None)
 
-    def _lost(self, message: str, log: StoredLog) -> LogResult:
+    def _failed_result(self, message: str, log: StoredLog) -> LogResult:
         entries = {"outcome": "failed", "reason": message} if log.verb == "diagnose" else None
         return LogResult({"file": log.name, "outcome": "failed", "message": message}, entries)
 
-    def _forget(self, identity: str) -> None:
+    def _delete_files(self, identity: str) -> None:
         for path in (log_file, page_file, phase_file):
             path(self._settings, identity).unlink(missing_ok=True)
 

@@ -21,16 +21,16 @@ MOST_REQUESTS = 256
 MOST_UPLOADS = 16
 """Logs uploaded at the same time [count]."""
 
-IDLE = 15.0
+IDLE_TIME = 15.0
 """Longest pause within a request body [s]."""
 
 GRACE, SLOWEST = 30.0, 10_000.0
 """Grace period, after which a body must arrive faster than the given average rate [s, bytes/s]."""
 
-DRAINED = 5.0
+DRAIN_TIME = 5.0
 """How long further data are discarded after a refusal, so that the client can read the reason [s]."""
 
-SPARE = 256 * MB
+SPARE_SPACE = 256 * MB
 """Disk space that is left free [bytes]."""
 
 COOKIE = "hydrostate_token"
@@ -96,7 +96,7 @@ class Guard:
         headers = {name.lower(): value for name, value in scope["headers"]}
         try:
             self._busy += 1
-            moved = self._let_in(scope, headers)
+            moved = self._admit(scope, headers)
             if moved is not None:
                 await exchange.answer(303, "", moved)
                 return
@@ -108,7 +108,7 @@ class Guard:
         finally:
             self._busy -= 1
 
-    def _let_in(self, scope: Scope, headers: Mapping[bytes, bytes]) -> list[tuple[bytes, bytes]] | None:
+    def _admit(self, scope: Scope, headers: Mapping[bytes, bytes]) -> list[tuple[bytes, bytes]] | None:
         """Refuse or accept a request; return redirection headers if the address contained the token."""
         if self._busy > MOST_REQUESTS:
             raise RefusedError(429, f"more than {MOST_REQUESTS} requests are being answered, come again")
@@ -124,17 +124,17 @@ class Guard:
             return None
         if scope["path"] == "/" and b"token=" in scope["query_string"]:
             given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
-            if _same(given, self._token):
+            if _is_token(given, self._token):
                 cookie = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
                 return [(b"location", b"/"), (b"set-cookie", cookie.encode())]
-        if not (_same(_bearer(headers), self._token) or _same(_cookie(headers), self._token)):
+        if not (_is_token(_bearer(headers), self._token) or _is_token(_cookie(headers), self._token)):
             raise RefusedError(
                 401, "a token is needed: open the address that the server printed, or send a Bearer token"
             )
         return None
 
 
-def _same(given: str, token: str) -> bool:
+def _is_token(given: str, token: str) -> bool:
     return hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())
 
 
@@ -197,7 +197,7 @@ class _Exchange:
 
     async def _drain(self) -> None:
         try:
-            async with asyncio.timeout(DRAINED):
+            async with asyncio.timeout(DRAIN_TIME):
                 while not (self._whole or self._gone):
                     await self.receive()
         except TimeoutError:
@@ -212,16 +212,16 @@ class FreeSpace:
         self._taken, self._looked = 0, -1e9
         self.uploads = 0
 
-    def left(self) -> int:
+    def bytes_left(self) -> int:
         """Return the number of bytes that may still be received; refreshed every few seconds."""
-        if time.monotonic() - self._looked > IDLE:
+        if time.monotonic() - self._looked > IDLE_TIME:
             folders = (self._settings.logs, self._settings.pages, self._settings.work)
             self._taken = sum(_size(entry) for folder in folders for entry in os.scandir(folder))
             self._looked = time.monotonic()
-        free = shutil.disk_usage(self._settings.folder).free - SPARE
+        free = shutil.disk_usage(self._settings.folder).free - SPARE_SPACE
         return min(self._settings.room - self._taken, free)
 
-    def takes(self, size: int) -> None:
+    def add_received(self, size: int) -> None:
         """Count received data [bytes]."""
         self._taken += size
 
@@ -261,7 +261,7 @@ async def receive_file(chunks: AsyncIterator[bytes], path: Path, most: int, room
     try:
         with path.open("xb") as file:
             while True:
-                async with asyncio.timeout(IDLE):
+                async with asyncio.timeout(IDLE_TIME):
                     chunk = await anext(chunks, None)
                 if chunk is None:
                     break
@@ -277,7 +277,7 @@ async def receive_file(chunks: AsyncIterator[bytes], path: Path, most: int, room
             await asyncio.to_thread(os.fsync, file.fileno())
         whole = True
     except TimeoutError as error:
-        raise RefusedError(408, f"the file stopped coming for {IDLE:g} s") from error
+        raise RefusedError(408, f"the file stopped coming for {IDLE_TIME:g} s") from error
     except OSError as error:
         raise RefusedError(413, f"the server's folder takes no more: {error.strerror or error}") from error
     finally:

@@ -17,10 +17,10 @@ from experiments.serve.store import Store
 from experiments.streams.watch_events import STATES
 from plant.errors import HydrostateError
 
-KEPT = 2400
+MOST_GAUGES = 2400
 """Number of stored gauges [count]: ten minutes at four per second."""
 
-AGAIN_AFTER = 5.0
+RETRY_DELAY = 5.0
 """Delay between the end of a stream and the next attempt [s]."""
 
 SHOWN_EVENTS = 200
@@ -44,7 +44,7 @@ class Stream:
         self.name, self.address = name, address
         self._settings, self._store = settings, store
         self._lock = threading.Lock()
-        self._gauges: deque[dict[str, Any]] = deque(maxlen=KEPT)
+        self._gauges: deque[dict[str, Any]] = deque(maxlen=MOST_GAUGES)
         self._count, self._state, self._said, self._fresh = 0, "connecting", "", 0
         self.alarms = 0
         """Alarms since the server began [count]."""
@@ -63,7 +63,7 @@ class Stream:
             if self._process is not None and self._process.is_alive():
                 self._process.terminate()
         if self._thread.is_alive():
-            self._thread.join(AGAIN_AFTER)
+            self._thread.join(RETRY_DELAY)
 
     @property
     def state(self) -> dict[str, Any]:
@@ -95,7 +95,7 @@ class Stream:
                 self._fail(f"it cannot be watched: {error.strerror or error}")
             except HydrostateError as error:  # its rig file was deleted
                 self._fail(f"it cannot be watched: {error}")
-            self._closed.wait(AGAIN_AFTER)
+            self._closed.wait(RETRY_DELAY)
 
     def _watch_once(self) -> None:
         """Watch the stream in its own process until that ends."""
@@ -113,7 +113,7 @@ class Stream:
                 process.start()
                 self._process = process
             self._listen(ours)
-        self._process.join(AGAIN_AFTER)
+        self._process.join(RETRY_DELAY)
         if self._process.is_alive():
             self._process.kill()
 
@@ -124,9 +124,9 @@ class Stream:
             except (EOFError, OSError):
                 break
             if kind == "gauges":
-                self._put(entries)
+                self._store_gauges(entries)
             else:
-                self._tell(entries)
+                self._store_event(entries)
         if self._state not in ("ended", "failed"):
             self._fail("the process that watched it ended")
 
@@ -135,12 +135,12 @@ class Stream:
             self._state, self._said = "failed", message
             self._fresh += 1
 
-    def _put(self, entries: Mapping[str, Any]) -> None:
+    def _store_gauges(self, entries: Mapping[str, Any]) -> None:
         with self._lock:
             self._count += 1
             self._gauges.append({"number": self._count, "received": time.time(), **entries})
 
-    def _tell(self, entries: Mapping[str, Any]) -> None:
+    def _store_event(self, entries: Mapping[str, Any]) -> None:
         event = entries["event"]
         told = STATES.get(event)
         failed = event == "end" and entries.get("outcome") == "failed"

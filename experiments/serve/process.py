@@ -4,7 +4,7 @@ import os
 import threading
 import time
 
-LOOKED_AFTER = 1.0
+CHECK_INTERVAL = 1.0
 """Time between two checks whether the server still runs [s]."""
 
 
@@ -12,10 +12,10 @@ def bind_to_server(server: int) -> None:
     """Make this process end with its server, before it imports libraries for computing."""
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
-    threading.Thread(target=_end_with, args=(server,), daemon=True).start()
+    threading.Thread(target=_exit_with_server, args=(server,), daemon=True).start()
 
 
-def _end_with(server: int) -> None:
+def _exit_with_server(server: int) -> None:
     while os.getppid() == server:
-        time.sleep(LOOKED_AFTER)
+        time.sleep(CHECK_INTERVAL)
     os._exit(1)

@@ -14,13 +14,13 @@ from experiments.serve.connection import PatientProtocol
 from experiments.serve.settings import Settings
 from plant.errors import HydrostateError
 
-LEFT_TO_END = 3
+SHUTDOWN_WAIT = 3
 """Longest wait at the end for responses in progress [s]."""
 
 LONGEST_HEADERS = 32 << 10
 """Largest size of the headers of a request [bytes]."""
 
-OBJECTS = 10_000
+GARBAGE_THRESHOLD = 10_000
 """Garbage collector threshold, in objects allocated minus freed. It is lower than for a command, as a server must not
 grow."""
 
@@ -45,10 +45,10 @@ def run_server(settings: Settings, say: Callable[[str], None]) -> None:
     """
     logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # the application reports errors
     gc.freeze()
-    gc.set_threshold(OBJECTS)
+    gc.set_threshold(GARBAGE_THRESHOLD)
     refusals: list[HydrostateError] = []
     app = make_app(settings, refusals.append)
-    with _listening(settings) as listener:
+    with _listening_socket(settings) as listener:
         config = uvicorn.Config(
             app,
             http=PatientProtocol,
@@ -60,10 +60,10 @@ def run_server(settings: Settings, say: Callable[[str], None]) -> None:
             proxy_headers=False,
             backlog=BACKLOG,
             timeout_keep_alive=5,
-            timeout_graceful_shutdown=LEFT_TO_END,
+            timeout_graceful_shutdown=SHUTDOWN_WAIT,
             h11_max_incomplete_event_size=LONGEST_HEADERS,
         )
-        server = _Speaking(config, lambda: say(_address(settings, listener)))
+        server = _ReportingServer(config, lambda: say(_address(settings, listener)))
         try:
             server.run(sockets=[listener])
         except SystemExit:
@@ -73,10 +73,10 @@ def run_server(settings: Settings, say: Callable[[str], None]) -> None:
             raise refusals[0]
 
 
-ANYWHERE = ("0.0.0.0", "::")  # noqa: S104 - hosts that another machine cannot open under this name
+ANY_HOST = ("0.0.0.0", "::")  # noqa: S104 - hosts that another machine cannot open under this name
 
 
-class _Speaking(uvicorn.Server):
+class _ReportingServer(uvicorn.Server):
     """A server that reports when it listens."""
 
     def __init__(self, config: uvicorn.Config, say: Callable[[], None]) -> None:
@@ -89,7 +89,7 @@ class _Speaking(uvicorn.Server):
             self._say()
 
 
-def _listening(settings: Settings) -> socket.socket:
+def _listening_socket(settings: Settings) -> socket.socket:
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     try:
@@ -107,7 +107,7 @@ def _listening(settings: Settings) -> socket.socket:
 
 def _address(settings: Settings, listener: socket.socket) -> str:
     port = listener.getsockname()[1]
-    name = socket.gethostname() if settings.host in ANYWHERE else settings.host
+    name = socket.gethostname() if settings.host in ANY_HOST else settings.host
     host = f"[{name}]" if ":" in name else name
     token = f"?token={settings.token}" if settings.token else ""
     sys.stdout.flush()

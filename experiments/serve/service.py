@@ -10,7 +10,7 @@ from typing import Any, TextIO
 from pebble import ProcessExpired
 
 from experiments.log_pages.comparison import compare_view
-from experiments.running.refusal import refused
+from experiments.running.refusal import os_errors_as
 from experiments.serve.fleet_view import Repairs, actuator_view, fleet_view
 from experiments.serve.jobs import BusyError, Jobs, log_file, page_file, phase_file
 from experiments.serve.limits import FreeSpace, RefusedError
@@ -46,7 +46,7 @@ class Service:
         settings = self.settings
         if settings.folder.is_file():
             raise HydrostateError(f"{settings.folder}: a folder is needed, got a file")
-        with refused(f"{settings.folder}: the server's folder cannot be made"):
+        with os_errors_as(f"{settings.folder}: the server's folder cannot be made"):
             for folder in (settings.folder, settings.logs, settings.pages, settings.work):
                 folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             self._lock = (settings.folder / LOCK).open("a+")
@@ -111,11 +111,11 @@ class Service:
         except HydrostateError as error:
             place.unlink(missing_ok=True)
             raise RefusedError(413, f"the server's folder takes no more: {error}") from error
-        self.room.takes(size)
+        self.room.add_received(size)
         self.jobs.submit(kept)
         return kept
 
-    def known(self, identity: str) -> StoredLog:
+    def require_log(self, identity: str) -> StoredLog:
         """Return a log.
 
         Raises
@@ -136,7 +136,7 @@ class Service:
         RefusedError
             If there is no such log, or it is not done.
         """
-        log, found = self.known(identity), self.store.result(identity)
+        log, found = self.require_log(identity), self.store.result(identity)
         if found is None:
             raise RefusedError(409, f"the work on {log.name} is not finished yet")
         return found
@@ -149,7 +149,7 @@ class Service:
         RefusedError
             If there is none, or none yet.
         """
-        log, path = self.known(identity), page_file(self.settings, identity)
+        log, path = self.require_log(identity), page_file(self.settings, identity)
         if log.state == UNFINISHED:
             raise RefusedError(409, f"the work on {log.name} is not finished yet")
         if log.state in (FAILED, INTERRUPTED) or not path.exists():
@@ -199,7 +199,7 @@ class Service:
             if not rows:
                 raise RefusedError(404, "no log was diagnosed yet")
             # another request may have started it meanwhile
-            page = self._page_of(revision) or self._begun(revision, rows, repairs)
+            page = self._page_of(revision) or self._start_fleet_page(revision, rows, repairs)
         try:
             return await asyncio.shield(page)
         except RefusedError:
@@ -211,7 +211,7 @@ class Service:
         known = self._fleet
         return None if known is None or known[0] != revision or known[1].cancelled() else known[1]
 
-    def _begun(
+    def _start_fleet_page(
         self, revision: str, rows: list[tuple[str, str, dict[str, Any]]], repairs: Repairs
     ) -> "asyncio.Future[str]":
         """Start to make the fleet page."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.running.refusal import refused
+from experiments.running.refusal import os_errors_as
 from plant.errors import HydrostateError
 
 VERSION = 1
@@ -90,7 +90,7 @@ class Store:
 
     def __init__(self, path: Path) -> None:
         self._lock = threading.Lock()
-        with refused(f"{path}: the server's database cannot be opened"):
+        with os_errors_as(f"{path}: the server's database cannot be opened"):
             # only the server's own user may read results; SQLite gives its other files the same mode
             os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
         self._connection = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
@@ -120,7 +120,7 @@ class Store:
         size : int
             Size of its file [bytes].
         """
-        with self._writing() as connection:
+        with self._transaction() as connection:
             connection.execute(
                 "INSERT INTO logs (id, name, verb, size, state, received) VALUES (?, ?, ?, ?, ?, ?)",
                 (identity, name, verb, size, UNFINISHED, time.time()),
@@ -132,7 +132,7 @@ class Store:
 
     def get(self, identity: str) -> StoredLog | None:
         """Return a stored log; None if there is none with that identity."""
-        rows = self._asked("SELECT * FROM kept WHERE id = ?", identity)
+        rows = self._query("SELECT * FROM kept WHERE id = ?", identity)
         return StoredLog(*rows[0]) if rows else None
 
     def latest(self, most: int, before: int | None = None) -> list[StoredLog]:
@@ -144,21 +144,21 @@ class Store:
             Return only logs with a smaller number.
         """
         below = before if before is not None else 1 << 62
-        rows = self._asked("SELECT * FROM kept WHERE number < ? ORDER BY number DESC LIMIT ?", below, most)
+        rows = self._query("SELECT * FROM kept WHERE number < ? ORDER BY number DESC LIMIT ?", below, most)
         return [StoredLog(*row) for row in rows]
 
     def unfinished(self) -> list[StoredLog]:
         """Return the logs still to be processed, the oldest first."""
-        rows = self._asked("SELECT * FROM kept WHERE state = ? ORDER BY number", UNFINISHED)
+        rows = self._query("SELECT * FROM kept WHERE state = ? ORDER BY number", UNFINISHED)
         return [StoredLog(*row) for row in rows]
 
     def counts(self) -> dict[str, int]:
         """Return the number of logs in each state."""
-        return {str(state): int(count) for state, count in self._asked("SELECT state, COUNT(*) FROM logs GROUP BY 1")}
+        return {str(state): int(count) for state, count in self._query("SELECT state, COUNT(*) FROM logs GROUP BY 1")}
 
-    def tried(self, identity: str) -> None:
+    def count_try(self, identity: str) -> None:
         """Count that a server ended while processing a log."""
-        with self._writing() as connection:
+        with self._transaction() as connection:
             connection.execute("UPDATE logs SET tries = tries + 1 WHERE id = ?", (identity,))
 
     def finish(
@@ -184,7 +184,7 @@ class Store:
         """
         text = json.dumps(result, allow_nan=False)
         told = None if entries is None else json.dumps(entries, allow_nan=False)
-        with self._writing() as connection:
+        with self._transaction() as connection:
             connection.execute(
                 "UPDATE logs SET state = ?, ended = ?, outcome = ?, message = ?, result = ?, entries = ? WHERE id = ?",
                 (state, time.time(), result["outcome"], said or result["message"], text, told, identity),
@@ -192,17 +192,17 @@ class Store:
 
     def result(self, identity: str) -> dict[str, Any] | None:
         """Return the result of a log as entries of the JSON contract; None if it is not ready."""
-        rows = self._asked("SELECT result FROM logs WHERE id = ?", identity)
+        rows = self._query("SELECT result FROM logs WHERE id = ?", identity)
         return json.loads(rows[0][0]) if rows and rows[0][0] else None
 
     def delete(self, identity: str) -> bool:
         """Delete a log from the store; return whether it existed."""
-        with self._writing() as connection:
+        with self._transaction() as connection:
             return connection.execute("DELETE FROM logs WHERE id = ?", (identity,)).rowcount > 0
 
     def diagnosed(self) -> Iterator[tuple[str, str, dict[str, Any]]]:
         """Yield identity, name and batch row entries of each diagnosed log, the oldest first."""
-        for identity, name, text in self._asked(
+        for identity, name, text in self._query(
             "SELECT id, name, entries FROM logs WHERE entries IS NOT NULL ORDER BY number"
         ):
             yield identity, name, json.loads(text)
@@ -210,11 +210,11 @@ class Store:
     def revision(self) -> str:
         """Return a text that changes whenever the output of `diagnosed` changes."""
         query = "SELECT COUNT(*), COALESCE(MAX(ended), 0), COALESCE(SUM(number), 0) FROM logs WHERE entries IS NOT NULL"
-        return "-".join(str(one) for one in self._asked(query)[0])
+        return "-".join(str(one) for one in self._query(query)[0])
 
     def add_event(self, stream: str, event: Mapping[str, Any]) -> None:
         """Store an event of a watch; the oldest are deleted if there are too many."""
-        with self._writing() as connection:
+        with self._transaction() as connection:
             connection.execute(
                 "INSERT INTO events (stream, received, event) VALUES (?, ?, ?)",
                 (stream, time.time(), json.dumps(event, allow_nan=False)),
@@ -225,17 +225,17 @@ class Store:
 
     def events(self, stream: str, most: int) -> list[dict[str, Any]]:
         """Return the last events of a stream, the latest last, each with ``received`` [s since 1970]."""
-        rows = self._asked(
+        rows = self._query(
             "SELECT number, received, event FROM events WHERE stream = ? ORDER BY number DESC LIMIT ?", stream, most
         )
         return [{"number": number, "received": received, **json.loads(text)} for number, received, text in rows[::-1]]
 
-    def _asked(self, query: str, *values: object) -> list[Any]:
+    def _query(self, query: str, *values: object) -> list[Any]:
         with self._lock:
             return self._connection.execute(query, values).fetchall()
 
     @contextmanager
-    def _writing(self) -> Generator[sqlite3.Connection]:
+    def _transaction(self) -> Generator[sqlite3.Connection]:
         with self._lock:
             try:
                 self._connection.execute("BEGIN IMMEDIATE")

@@ -8,11 +8,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from experiments.actuators import kind_meant
+from experiments.actuators import infer_kind
 from experiments.command.json_output import plain
 from experiments.command.log_verb import page_of
-from experiments.command.logs import caught, overheard, read_log, with_remarks
-from experiments.command.terminal import clauses, unexpected
+from experiments.command.logs import catch_and_repeat_warnings, catch_log_warnings, read_log, with_remarks
+from experiments.command.terminal import clauses, error_sentence
 from experiments.log_pages.comparison import plain_words
 from experiments.page.sentences import sentence
 from experiments.serve.process import bind_to_server
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 READING, WORKING, WRITING = "reading the log", "working it out", "writing the page"
 """Steps of the work on a log."""
 
-OTHER_NAMES = (
+OTHER_NAMES_ADVICE = (
     "if the log has them under other names, choose inspect and drop it again: its page gives the lines that the rig "
     "file on the server must have"
 )
 """Advice for a log rejected because of its columns, for users without a command line."""
 
-GUESSED: Mapping[bool, str] = {
+INSPECTION_MESSAGES: Mapping[bool, str] = {
     True: "The log can be read with the columns that its page names.",
     False: "The columns that could be guessed are too few to read the log; its page shows them.",
 }
@@ -116,7 +116,7 @@ def begin_worker(server: int, memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def work_on(task: Task) -> LogResult:
+def process_log(task: Task) -> LogResult:
     """Analyse a log and write its page.
 
     Returns
@@ -126,34 +126,34 @@ def work_on(task: Task) -> LogResult:
         `NO_MEMORY` instead.
     """
     blank: Mapping[str, Any] = {}
-    with caught() as said:
+    with catch_log_warnings() as said:
         try:
             task.phase.write_text(READING, encoding="utf-8")
-            blank = _blank(task)
-            worked = _inspected(task) if task.verb == "inspect" else _found(task)
+            blank = _blank_entries(task)
+            worked = _inspect(task) if task.verb == "inspect" else _analyse(task)
         except MemoryError:
             os._exit(NO_MEMORY)
         except (MissingColumnError, NoChannelError) as error:
-            worked = _failed(task, blank, f"{error.bare}; {OTHER_NAMES}")
+            worked = _failed(task, blank, f"{error.bare}; {OTHER_NAMES_ADVICE}")
         except HydrostateError as error:
             worked = _failed(task, blank, error.message if error.source == str(task.log) else str(error))
         except Exception as error:  # report any error of a log to its sender
-            worked = _failed(task, blank, unexpected(error))
+            worked = _failed(task, blank, error_sentence(error))
     result = plain({"file": task.name, **with_remarks(worked.result, said)})
     said = worked.said or plain_words(result) or sentence(str(result.get("message") or ""))
     entries = _without_path(plain(worked.entries), task)
     return LogResult(_without_path(result, task), entries, _without_path(said, task))
 
 
-def _found(task: Task) -> LogResult:
+def _analyse(task: Task) -> LogResult:
     own = _rig(task)
-    kind, bench, chosen, rig, prepared = _tools(task, own)
-    with overheard() as said:
+    kind, bench, chosen, rig, prepared = _tools_of(task, own)
+    with catch_and_repeat_warnings() as said:
         try:
             record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
         except NoChannelError as error:
-            meant = kind_meant(error, task.plant, own)
-            kind, bench, chosen, rig, prepared = _prepared(meant, None, None, 0, task.verb)
+            meant = infer_kind(error, task.plant, own)
+            kind, bench, chosen, rig, prepared = _prepared_tools(meant, None, None, 0, task.verb)
             record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
     task.phase.write_text(WORKING, encoding="utf-8")
     found = chosen.run(record, rig, prepared)
@@ -165,49 +165,49 @@ def _found(task: Task) -> LogResult:
     if kind.name == "eha":
         from experiments.batch.diagnosis import class_row as row
     else:
-        from experiments.batch.other_actuators import row_of as row
+        from experiments.batch.other_actuators import finding_row as row
     return LogResult(result, dict(row(found)))
 
 
-def _inspected(task: Task) -> LogResult:
+def _inspect(task: Task) -> LogResult:
     from experiments.log_pages.inspect_page import inspect_page
-    from experiments.log_pages.inspected import looked_into
+    from experiments.log_pages.inspected import inspect_log
 
-    found, tables = looked_into(task.log, task.plant)
+    found, tables = inspect_log(task.log, task.plant)
     task.phase.write_text(WRITING, encoding="utf-8")
     _write(task, inspect_page({"file": task.name, **found}, tables))
-    return LogResult({"outcome": "ok", **found}, None, GUESSED[bool(found["reads"])])
+    return LogResult({"outcome": "ok", **found}, None, INSPECTION_MESSAGES[bool(found["reads"])])
 
 
 def _rig(task: Task) -> Path | None:
     return rig_of(task.name, task.pattern, task.rigs, task.rig)
 
 
-def _tools(task: Task, rig: Path | None) -> "_Tools":
+def _tools_of(task: Task, rig: Path | None) -> "_Tools":
     try:
         changed = 0 if rig is None else rig.stat().st_mtime_ns
     except OSError:  # reading it will report the reason
         changed = 0
-    return _prepared(task.plant, rig, task.rig, changed, task.verb)
+    return _prepared_tools(task.plant, rig, task.rig, changed, task.verb)
 
 
 @lru_cache(maxsize=128)
-def _prepared(plant: str | None, rig: Path | None, others: Path | None, changed: int, verb: str) -> "_Tools":
+def _prepared_tools(plant: str | None, rig: Path | None, others: Path | None, changed: int, verb: str) -> "_Tools":
     """Return the function that processes a log; a rig file is identified by when it was `changed` [ns since 1970]."""
     del changed
-    from experiments.actuators import offered
+    from experiments.actuators import verb_of_kind
 
     kind, bench = load_actuator_of_log(plant, rig, others)
-    chosen = offered(kind, verb)
+    chosen = verb_of_kind(kind, verb)
     return kind, bench, chosen, *chosen.prepare(bench, {**chosen.options, "seed": 0})
 
 
-def _blank(task: Task) -> Mapping[str, Any]:
+def _blank_entries(task: Task) -> Mapping[str, Any]:
     if task.verb == "inspect":
         from experiments.log_pages.inspected import BLANK
 
         return BLANK
-    kind, bench, chosen, *_ = _tools(task, _rig(task))
+    kind, bench, chosen, *_ = _tools_of(task, _rig(task))
     return {**chosen.blank, "plant": kind.name, "rig": bench.name}
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from experiments.command.terminal import note
 from plant.log.stream.source import broker_of, broker_package, connect
 
-PATIENCE = 5.0
+PUBLISH_TIMEOUT = 5.0
 """Longest time for the last messages to a broker [s]."""
 
 MOST_WAITING = 200
@@ -18,7 +18,7 @@ MOST_WAITING = 200
 
 
 @contextmanager
-def published(address: str) -> Generator[Callable[[Mapping[str, Any]], None]]:
+def broker_publisher(address: str) -> Generator[Callable[[Mapping[str, Any]], None]]:
     """Publish every event at a broker, as the same JSON object as on its line.
 
     If the broker goes away, the watch continues; missed events are sent when the broker is back.
@@ -47,7 +47,7 @@ def published(address: str) -> Generator[Callable[[Mapping[str, Any]], None]]:
     try:
         yield publish
     finally:
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + PUBLISH_TIMEOUT
         while any(not one.is_published() for one in waiting) and time.monotonic() < until:
             time.sleep(0.01)
         unsent = sum(not one.is_published() for one in waiting)

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import typer
 
-from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
+from experiments.command.terminal import SOME_FAILED, emit, error_sentence, note
 from plant.errors import HydrostateError
 
 
@@ -22,7 +22,7 @@ class EventSource(Protocol):
 
 
 @contextmanager
-def end_told(told: EventSource) -> Generator[None]:
+def report_end(told: EventSource) -> Generator[None]:
     """Follow a stream; however it ends, the last line reports it.
 
     Raises
@@ -41,7 +41,7 @@ def end_told(told: EventSource) -> Generator[None]:
         told.end("interrupted", "interrupted")
         raise
     except BaseException as error:
-        said = unexpected(error)
+        said = error_sentence(error)
         told.end("failed", said)
         note(said)
         raise typer.Exit(SOME_FAILED) from error

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.terminal import note
-from experiments.streams.rows import STANDARD_INPUT, garbage_told, open_rows, warn_if_cut
-from experiments.streams.state_file import require_same_rate, state_kept
+from experiments.streams.rows import STANDARD_INPUT, open_rows, report_left_out_rows, warn_of_cut_row
+from experiments.streams.state_file import require_same_rate, save_at_intervals
 from plant.errors import LogError
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 LEARNING = 1.0
 """Time at the start of a stream from which noise levels and initial estimate are taken, if no log is named [s]."""
 
-FEWEST = 200
+FEWEST_ROWS = 200
 """Smallest number of rows from which a filter starts."""
 
-TOGETHER = 0.1
+LONGEST_PIECE = 0.1
 """Longest piece of a stream that is filtered at once [s]; results do not depend on it."""
 
 
@@ -73,9 +73,9 @@ class Filtering:
         """
         stream = open_rows(lines, *self.columns, self.source)
         told = stream.start_time
-        with garbage_told(stream, self.source), state_kept(self.state, self._save, told) as save_if_due:
+        with report_left_out_rows(stream, self.source), save_at_intervals(self.state, self._save, told) as save_if_due:
             for last, rows, gap in self._pieces(stream):
-                filtered = self._ready(stream, rows, last, gap)
+                filtered = self._current_filter(stream, rows, last, gap)
                 channels = dict(zip(stream.channels, rows.T, strict=True))
                 self._take(filtered, channels)
                 self.last = last
@@ -85,7 +85,7 @@ class Filtering:
                 save_if_due(last)
         if self.filtered is not None and self.last is not None and self.last > told:
             self._estimate(self.filtered)
-        warn_if_cut(stream, self.source)
+        warn_of_cut_row(stream, self.source)
 
     def end(self, outcome: str, message: str) -> None:
         """Report that the stream has ended, and how."""
@@ -103,14 +103,14 @@ class Filtering:
         import numpy as np
 
         resumes = self.state is not None and self.state.exists()
-        wanted = 0 if resumes else self._wanted(stream)
+        wanted = 0 if resumes else self._rows_to_start(stream)
         first: list[NDArray[np.float64]] = []
         after_gap, last = False, stream.start_time
-        for last, rows, gap in stream.samples(max(1, round(min(self.every, TOGETHER) / stream.sample_time))):
+        for last, rows, gap in stream.samples(max(1, round(min(self.every, LONGEST_PIECE) / stream.sample_time))):
             if gap:
                 if first:
                     note(f"{self.source}: warning: too few rows before a gap at {last:g} s to start the filter")
-                first, after_gap, wanted = [], True, self._wanted(stream)
+                first, after_gap, wanted = [], True, self._rows_to_start(stream)
             first.append(rows)
             if sum(map(len, first)) >= wanted:
                 yield last, np.concatenate(first), after_gap
@@ -118,11 +118,13 @@ class Filtering:
         if first:
             yield last, np.concatenate(first), after_gap
 
-    def _wanted(self, stream: "CsvStream") -> int:
+    def _rows_to_start(self, stream: "CsvStream") -> int:
         """Return the number of rows needed to start a filter."""
-        return 1 if self.like is not None else max(round(LEARNING / stream.sample_time), FEWEST)
+        return 1 if self.like is not None else max(round(LEARNING / stream.sample_time), FEWEST_ROWS)
 
-    def _ready(self, stream: "CsvStream", rows: "NDArray[np.float64]", last: float, gap: bool) -> "OnlineFilter":
+    def _current_filter(
+        self, stream: "CsvStream", rows: "NDArray[np.float64]", last: float, gap: bool
+    ) -> "OnlineFilter":
         """Return the filter, which starts, resumes from its state file, or restarts after a gap."""
         from estimation.eha.online import begin_filter
         from plant.log.record import Record

@@ -9,7 +9,7 @@ from experiments.streams.watch_events import WatchEvents
 
 
 @contextmanager
-def beating(told: WatchEvents, every: float | None) -> Generator[None]:
+def report_alive(told: WatchEvents, every: float | None) -> Generator[None]:
     """Report at intervals during this block that the watch is alive.
 
     Parameters

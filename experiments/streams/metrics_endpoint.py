@@ -39,7 +39,7 @@ def endpoint(text: str) -> tuple[str, int]:
 
 
 @contextmanager
-def metrics_offered(where: str, told: Watched) -> Generator[int]:
+def serve_metrics(where: str, told: Watched) -> Generator[int]:
     """Answer ``GET /metrics`` with the metrics of a watch; yield the port.
 
     Parameters

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from itertools import chain
 from typing import TYPE_CHECKING, TextIO
 
-from experiments.command.logs import noted, with_rig_columns
+from experiments.command.logs import read_and_warn, with_rig_columns
 from experiments.command.terminal import note
 from plant.log.stream.source import BatchCounts, bounded_lines
 
@@ -57,11 +57,11 @@ def open_rows(
     def opened(mapping: Mapping[str, str]) -> CsvStream:
         return CsvStream(chain([header], rest), mapping, source=source)
 
-    return noted(source, lambda: with_rig_columns(opened, rig_columns, columns))
+    return read_and_warn(source, lambda: with_rig_columns(opened, rig_columns, columns))
 
 
 @contextmanager
-def garbage_told(stream: "CsvStream", source: str) -> Generator[None]:
+def report_left_out_rows(stream: "CsvStream", source: str) -> Generator[None]:
     """Report at the end of this block which rows of a stream were left out, however it ends."""
     try:
         yield
@@ -72,13 +72,13 @@ def garbage_told(stream: "CsvStream", source: str) -> Generator[None]:
             note(f"{source}: warning: {counted} garbage, which was left out; {first}{stream.first_left_out}")
 
 
-def warn_if_cut(stream: "CsvStream", source: str) -> None:
+def warn_of_cut_row(stream: "CsvStream", source: str) -> None:
     """Report that the last row was left out, if it was incomplete."""
     if stream.cut:
         note(f"{source}: warning: the last row is incomplete and was left out")
 
 
-def warn_of_lost(address: str, received: BatchCounts) -> None:
+def warn_of_lost_batches(address: str, received: BatchCounts) -> None:
     """Report what happened to the batches of a network stream, if any are missing."""
     for count, fate in (
         (received.lost, "never came"),

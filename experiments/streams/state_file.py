@@ -12,7 +12,9 @@ SAVED_EVERY = 10.0
 
 
 @contextmanager
-def state_kept(path: Path | None, write: Callable[[Path], None], start: float) -> Generator[Callable[[float], None]]:
+def save_at_intervals(
+    path: Path | None, write: Callable[[Path], None], start: float
+) -> Generator[Callable[[float], None]]:
     """Save what a stream has learnt at intervals during this block, and at its end.
 
     If the file cannot be written while the stream runs, this is reported once, and the stream continues.

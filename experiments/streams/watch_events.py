@@ -57,18 +57,18 @@ class WatchEvents:
         about = {"file": source, "rig": rig, "rate_hz": round(1.0 / watch.sample_time, 6)}
         about |= {"balances": list(watch.balances), "false_alarms_per_hour": false_alarms}
         said = f"learning the healthy behaviour: alarms are possible after {watch.unlearnt:.0f} s of motion"
-        if self._armed:
+        if self._is_armed:
             said = "the healthy behaviour was learnt before"
         said += f"; without {PRESSURE}" if "motion" in watch.balances else ""
         self._line("start", self.began, **about, message=said)
-        if self._armed:
-            self._ready(self.began, watch.thresholds)
+        if self._is_armed:
+            self._report_ready(self.began, watch.thresholds)
 
     @property
-    def _armed(self) -> bool:
+    def _is_armed(self) -> bool:
         return self.watch is not None and any(value < float("inf") for value in self.watch.thresholds)
 
-    def _ready(self, time: float, thresholds: Sequence[float]) -> None:
+    def _report_ready(self, time: float, thresholds: Sequence[float]) -> None:
         named = dict(zip(self.watch.balances, thresholds, strict=True)) if self.watch else {}
         self._line("ready", time, thresholds=named, message="learning is over, alarms are possible from now on")
 
@@ -79,7 +79,7 @@ class WatchEvents:
         taken = {"samples": self.rows, "left_out": self.left_out}
         self._line("alive", time_s, **taken, silent_s=silent, alarms=self.alarms, message="alive")
 
-    def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
+    def process_samples(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
         """Process samples that the watch has taken: count them and the gaps before them.
 
         Parameters
@@ -117,10 +117,10 @@ class WatchEvents:
 
         for event in events:
             if isinstance(event, Ready):
-                self._ready(event.time, event.thresholds)
+                self._report_ready(event.time, event.thresholds)
             elif isinstance(event, Alarm):
                 self.alarms += 1
-                self._line("alarm", event.time, **_alarm(event), message=_changed(event))
+                self._line("alarm", event.time, **_alarm(event), message=_alarm_message(event))
             else:
                 lost = dict(zip(("before", "after"), event.lost or (None, None), strict=True))
                 about = {
@@ -143,7 +143,7 @@ class WatchEvents:
             seconds = self.watch.last - self.began
             counted = f"{self.alarms} {'alarm' if self.alarms == 1 else 'alarms'} in {seconds:.1f} s"
             message = f"{message}; {counted}" if outcome == "interrupted" else message or counted
-            if outcome == "ok" and not self._armed:
+            if outcome == "ok" and not self._is_armed:
                 message += "; the stream ended before learning was over, so no alarm was possible"
         time = None if self.watch is None else self.watch.last
         self._line("end", time, outcome=outcome, alarms=self.alarms, left_out=self.left_out, message=message)
@@ -168,10 +168,10 @@ def _alarm(alarm: "Alarm") -> dict[str, Any]:
     }
 
 
-def _changed(event: "Alarm") -> str:
-    from faults.watch.events import SLOW
+def _alarm_message(event: "Alarm") -> str:
+    from faults.watch.events import LOSS_BALANCE
 
-    if event.balance == SLOW:
+    if event.balance == LOSS_BALANCE:
         return f"leakage has grown by more than warm oil explains, since about {event.since:.0f} s of the stream"
     return f"the {event.balance} balance changed at {event.since:.2f} s of the stream: {BALANCES[event.balance]}"
 

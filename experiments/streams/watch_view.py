@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 EVENTS = 8
 """Number of events shown [count]."""
 
-A_SECOND = 4
+REDRAW_RATE = 4
 """Redraw rate of the view [1/s]."""
 
 CALM, NEAR = 0.5, 0.8
@@ -36,7 +36,7 @@ UNITS: Mapping[str, tuple[str, float]] = {
 
 
 @contextmanager
-def viewed(told: Watched, console: "Console | None" = None) -> Generator[None]:
+def show_view(told: Watched, console: "Console | None" = None) -> Generator[None]:
     """Show a watch on standard error during this block.
 
     Parameters
@@ -48,7 +48,7 @@ def viewed(told: Watched, console: "Console | None" = None) -> Generator[None]:
     from rich.live import Live
 
     console = console or Console(stderr=True)
-    with Live(get_renderable=lambda: drawn(told), console=console, refresh_per_second=A_SECOND):
+    with Live(get_renderable=lambda: view_frame(told), console=console, refresh_per_second=REDRAW_RATE):
         yield
 
 
@@ -57,7 +57,7 @@ def lines_wanted(view: bool) -> bool:
     return not (view and sys.stdout.isatty())
 
 
-def drawn(told: Watched) -> "Group":
+def view_frame(told: Watched) -> "Group":
     """Return one frame of the view of a watch."""
     from rich.console import Group
     from rich.table import Table
@@ -65,7 +65,7 @@ def drawn(told: Watched) -> "Group":
 
     state = told.state()
     gauges = state["gauges"]
-    lines: list[Any] = [Text(f"{visible(state['name'])}: {_standing(state, told.alarms)}", style="bold")]
+    lines: list[Any] = [Text(f"{visible(state['name'])}: {_status_line(state, told.alarms)}", style="bold")]
     if gauges is not None:
         balances = Table("balance", "towards an alarm", "[%]", box=None)
         for name, score in gauges["scores"].items():
@@ -93,7 +93,7 @@ def _reading(channel: str, value: float | None) -> tuple[str, str, str]:
     return words, "-" if value is None else f"{factor * value:.4g}", unit
 
 
-def _standing(state: Mapping[str, Any], alarms: int) -> str:
+def _status_line(state: Mapping[str, Any], alarms: int) -> str:
     gauges = state["gauges"]
     counted = f"{alarms} alarm" if alarms == 1 else f"{alarms} alarms"
     if gauges is None:

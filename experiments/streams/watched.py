@@ -30,7 +30,7 @@ class Watched(WatchEvents):
         self._seen: tuple[float, float, dict[str, float]] | None = None
         super().__init__(self._send)
 
-    def to(self, sink: Sink) -> None:
+    def add_output(self, sink: Sink) -> None:
         """Send all future events to one more output, ahead of the earlier outputs."""
         with self._lock:
             self._sinks.insert(0, sink)
@@ -45,9 +45,9 @@ class Watched(WatchEvents):
             for sink in self._sinks:
                 sink(told)
 
-    def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
+    def process_samples(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
         """Process new samples: count them, and keep the last value of each channel."""
-        super().saw(channels, last, gap)
+        super().process_samples(channels, last, gap)
         self._seen = last, time.time(), {name: float(values[-1]) for name, values in channels.items() if len(values)}
 
     def state(self) -> dict[str, Any]:

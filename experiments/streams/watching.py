@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.command.logs import noted, read_log
+from experiments.command.logs import read_and_warn, read_log
 from experiments.command.options import PRESSURE
 from experiments.command.terminal import note
-from experiments.streams.rows import garbage_told, open_rows, warn_if_cut, warn_of_lost
-from experiments.streams.state_file import require_same_rate, state_kept
+from experiments.streams.rows import open_rows, report_left_out_rows, warn_of_cut_row, warn_of_lost_batches
+from experiments.streams.state_file import require_same_rate, save_at_intervals
 from experiments.streams.watch_events import WatchEvents
 from plant.errors import LogError
 from plant.log.stream.source import BatchCounts, stream_lines
@@ -125,7 +125,7 @@ def watch_network(told: WatchEvents, address: str, settings: WatchSettings, stat
     try:
         watch_rows(told, stream_lines(address, received), settings, address, state)
     finally:
-        warn_of_lost(address, received)
+        warn_of_lost_batches(address, received)
 
 
 def watch_rows(
@@ -151,14 +151,14 @@ def watch_rows(
 
     stream = open_rows(lines, settings.rig.columns, settings.columns, source)
     _, pressure = _samples(dict.fromkeys(stream.channels, np.empty(0)), stream.sample_time, source)
-    watch, travelled = _begun(settings, stream.sample_time, pressure, stream.start_time, source, state)
+    watch, travelled = _begin_or_resume(settings, stream.sample_time, pressure, stream.start_time, source, state)
     T = watch.sample_time
     told.start(source, watch, settings.rig.name, settings.false_alarms)
 
     def save(path: Path) -> None:
         save_watch(watch, path, travelled)
 
-    with garbage_told(stream, source), state_kept(state, save, watch.last) as save_if_due:
+    with report_left_out_rows(stream, source), save_at_intervals(state, save, watch.last) as save_if_due:
         for last, rows, gap in stream.samples(watch.block):
             channels = dict(zip(stream.channels, rows.T, strict=True))
             samples, _ = _samples(channels, T, source, travelled)
@@ -170,12 +170,12 @@ def watch_rows(
             watch.clock_reads(last - (len(rows) - 1) * T)
             told.left_out = stream.left_out
             told.events(watch.take(samples))
-            told.saw(channels, last, gap)
+            told.process_samples(channels, last, gap)
             save_if_due(watch.last)
-    warn_if_cut(stream, source)
+    warn_of_cut_row(stream, source)
 
 
-def _begun(
+def _begin_or_resume(
     settings: WatchSettings, sample_time: float, pressure: bool, start: float, source: str, state: Path | None
 ) -> "tuple[Watch, float]":
     """Return a watch, resumed from its state file if there is one, and the piston travel so far [m]."""
@@ -212,4 +212,4 @@ def _samples(
 
 
 def _read(path: Path, settings: WatchSettings) -> "Record":
-    return noted(str(path), lambda: read_log(path, settings.rig.columns, settings.columns))
+    return read_and_warn(str(path), lambda: read_log(path, settings.rig.columns, settings.columns))

@@ -55,7 +55,7 @@ def batch(
     """
     from experiments.batch.cases import plan_study
     from experiments.batch.part_store import open_store
-    from experiments.batch.study_file import SHIPPED, read_study, shipped_studies, study_path
+    from experiments.batch.study_file import STUDIES_PACKAGE, read_study, shipped_studies, study_path
 
     require_folder(None if out is None else Path(out))
     chosen = _with_logs(read_study(study), logs)
@@ -73,7 +73,7 @@ def batch(
         workers=width, cluster=cluster, max_failures=max_failures, resume=resume, retry_failed=retry_failed
     )
     begin = time.perf_counter()
-    source = f"{SHIPPED}/{study}.toml" if shipped else Path(study).name
+    source = f"{STUDIES_PACKAGE}/{study}.toml" if shipped else Path(study).name
     with store.writing():
         tally, before = run_plan(plan, store, source, settings)
         if pages and not tally.stopped:

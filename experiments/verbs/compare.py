@@ -8,7 +8,7 @@ import typer
 from experiments.command.json_output import json_text, write_whole
 from experiments.command.options import SEED, Columns, Json, Plant, RigFile, SampleTime, Seed, argument, option
 from experiments.command.output_paths import with_page_ending
-from experiments.command.terminal import emit, note, rendered, table
+from experiments.command.terminal import emit, note, render_text, table
 
 commands = typer.Typer()
 
@@ -73,4 +73,4 @@ def compare(
     changed = [f"changed: {text}" for text in dict.fromkeys(found["changed"]) if text]
     single = found.loc[found["condition"] != "all", "verdict"]
     better, worse = (int((single == verdict).sum()) for verdict in ("better", "worse"))
-    emit(rendered(*changed, shown, f"by condition: {better} better, {worse} worse, of {len(single)}"))
+    emit(render_text(*changed, shown, f"by condition: {better} better, {worse} worse, of {len(single)}"))

@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from experiments.command.json_output import json_text, prepare_output
-from experiments.command.logs import noted, read_log
+from experiments.command.logs import read_and_warn, read_log
 from experiments.command.options import (
     Columns,
     Json,
     RigFile,
     argument,
     flag,
-    listed,
     load_columns,
     load_rig,
     option,
     require_positive,
+    split_names,
 )
 from experiments.command.output_paths import require_folder, require_place
 from experiments.command.terminal import emit, note
-from experiments.running.refusal import refused
+from experiments.running.refusal import os_errors_as
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def c(
         files, about = _plant(bench, plant, sample_time or SAMPLE_TIME, name, precision)
     else:
         record = _bench_log(log, bench, load_columns(columns), sample_time, no_pressure=no_pressure)
-        files, about = _filter(bench, record, form, method, listed(states), name, precision, tune=tune)
+        files, about = _filter(bench, record, form, method, split_names(states), name, precision, tune=tune)
     written = write_files(out, files)
     found: dict[str, Any] = {"outcome": "ok", "folder": str(out), "files": written, **about}
     emit(json_text([found]) if as_json else f"{out}: {', '.join(written)}")
@@ -135,7 +135,7 @@ def fmu(
         from estimation.export.task import filter_task
 
         record = _bench_log(log, bench, load_columns(columns), sample_time, no_pressure=no_pressure)
-        problem = filter_task(record, bench.parameters, form, states=listed(states), tuned=tune)
+        problem = filter_task(record, bench.parameters, form, states=split_names(states), tuned=tune)
         content = filter_fmu(problem, method, fmi, name=name if name is not None else f"{form}_{method}")
     write_files(out.parent, {out.name: content})
     found = {"outcome": "ok", "file": str(out), "fmi": fmi}
@@ -235,7 +235,7 @@ def _bench_log(
     if log is None:
         record = _simulated_bench(bench, sample_time or SAMPLE_TIME)
     else:
-        record = noted(str(log), lambda: read_log(log, bench.columns, columns, sample_time=sample_time))
+        record = read_and_warn(str(log), lambda: read_log(log, bench.columns, columns, sample_time=sample_time))
     return record.replace(differential_pressure_pa=None) if no_pressure else record
 
 
@@ -261,6 +261,6 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[str]:
     from plant.atomic import replacing
 
     for name, content in files.items():
-        with refused(f"{folder / name}: it cannot be written"), replacing(folder / name) as file:
+        with os_errors_as(f"{folder / name}: it cannot be written"), replacing(folder / name) as file:
             file.write(content if isinstance(content, bytes) else content.encode())
     return list(files)

@@ -9,24 +9,24 @@ from typing import Annotated, Any
 import typer
 
 from experiments.command.json_output import plain
-from experiments.command.logs import noted, read_log
+from experiments.command.logs import read_and_warn, read_log
 from experiments.command.options import (
     Columns,
     RigFile,
     argument,
     flag,
-    listed,
     load_columns,
     load_rig,
     option,
     require_positive,
+    split_names,
 )
 from experiments.command.output_paths import require_place
-from experiments.running.refusal import refused
-from experiments.streams.broker import published
-from experiments.streams.endings import end_told, say_line, stop_at_signals
+from experiments.running.refusal import os_errors_as
+from experiments.streams.broker import broker_publisher
+from experiments.streams.endings import report_end, say_line, stop_at_signals
 from experiments.streams.filtering import Filtering
-from experiments.streams.rows import STANDARD_INPUT, stream_input, warn_of_lost
+from experiments.streams.rows import STANDARD_INPUT, stream_input, warn_of_lost_batches
 from plant.log.stream.source import BatchCounts, bounded_lines, is_stream, stream_lines
 
 commands = typer.Typer()
@@ -94,18 +94,18 @@ def filter_stream(
 
     with ExitStack() as outputs:
         bench, named = load_rig(rig), load_columns(columns)
-        asked = StreamFilterOptions(bench.parameters, form, method, listed(states), tune)
-        log = None if like is None else noted(str(like), lambda: read_log(like, bench.columns, named))
+        asked = StreamFilterOptions(bench.parameters, form, method, split_names(states), tune)
+        log = None if like is None else read_and_warn(str(like), lambda: read_log(like, bench.columns, named))
         source = STANDARD_INPUT if stream == "-" else stream
         told = Filtering(say, asked, (bench.columns, named), every, log, state, source)
         if publish is not None:
-            sinks.append(outputs.enter_context(published(publish)))
+            sinks.append(outputs.enter_context(broker_publisher(publish)))
         received = BatchCounts()
-        with end_told(told):
+        with report_end(told):
             try:
                 told.follow(_lines(stream, received))
             finally:
-                warn_of_lost(stream, received)
+                warn_of_lost_batches(stream, received)
 
 
 def _lines(stream: str, received: BatchCounts) -> Iterator[str]:
@@ -115,7 +115,7 @@ def _lines(stream: str, received: BatchCounts) -> Iterator[str]:
         yield from stream_input(sys.stdin)
     else:
         with (
-            refused(f"{stream}: it cannot be read"),
+            os_errors_as(f"{stream}: it cannot be read"),
             Path(stream).open(encoding="utf-8", errors="replace", newline="\n") as file,
         ):
             yield from bounded_lines(file, stream)

@@ -21,13 +21,13 @@ from experiments.command.options import (
 )
 from experiments.command.output_paths import require_folder
 from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note
-from experiments.command.visible_text import spelt
+from experiments.command.visible_text import valid_text
 from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
     from experiments.batch.part_store import PartStore
     from experiments.fleet.actuators import ActuatorRow
-    from experiments.fleet.naming import Named
+    from experiments.fleet.naming import ActuatorAndDate
 
 PAGE = "index.html"
 
@@ -35,7 +35,7 @@ RIG = "rig.toml"
 """Name of a rig file among logs."""
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".gz", ".zst", ".parquet", ".feather", ".arrow", ".mat", ".h5", ".hdf5")
-OTHERS = (".tdms", ".mf4", ".mdf", ".xlsx")
+PACKAGE_SUFFIXES = (".tdms", ".mf4", ".mdf", ".xlsx")
 """Other file endings that count as logs; these formats need a package."""
 
 commands = typer.Typer()
@@ -95,7 +95,7 @@ def fleet(
     from_logs, rigs, logs = store.manifest() is None, dict[str, Path](), list[Path]()
     if from_logs:
         logs = _logs_in(Path(place))
-        _names([spelt(one.relative_to(place).as_posix()) for one in logs], pattern, names)
+        _names([valid_text(one.relative_to(place).as_posix()) for one in logs], pattern, names)
         rigs = rigs_of_folders(Path(place), logs, rig)
         rig = rigs.pop("", None)
         store = _diagnosed(Path(place), logs, out, plant, rig, rigs, load_columns(columns), sample_time, workers)
@@ -108,7 +108,7 @@ def fleet(
     if not rows:
         raise HydrostateError(f"{place}: must contain logs that were diagnosed (verb diagnose), but there are none")
     base = Path(place) if from_logs else Path()
-    paths = {spelt(one.relative_to(base).as_posix()): one for one in logs}
+    paths = {valid_text(one.relative_to(base).as_posix()): one for one in logs}
     links = write_pages(rows, out, pages, _page_writer(base, paths, plant, rig, rigs, columns, sample_time))
     write_whole(out / PAGE, fleet_page(rows, links, Path(place).resolve().name), "--out", parents=True)
     _warn(rows, repairs, unnamed)
@@ -180,7 +180,7 @@ def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
 
 def _names(
     files: Sequence[str], pattern: str | None, names: Path | None, folder: str = ""
-) -> "tuple[Mapping[str, Named], str]":
+) -> "tuple[Mapping[str, ActuatorAndDate], str]":
     """Return actuator and date of each log, and a message about logs that have none."""
     from experiments.fleet.naming import by_dates, by_pattern, by_table
 
@@ -194,7 +194,7 @@ def _names(
     return found, "do not hold one date" if found else ""
 
 
-def _say_split(named: "Mapping[str, Named]") -> None:
+def _say_split(named: "Mapping[str, ActuatorAndDate]") -> None:
     """Report how file names were split if no option gives the pattern."""
     known = {file: one for file, one in named.items() if one.actuator}
     if not known:
@@ -210,12 +210,12 @@ def _say_split(named: "Mapping[str, Named]") -> None:
 def _logs_in(folder: Path) -> list[Path]:
     from glob import escape
 
-    from experiments.batch.log_files import matching
+    from experiments.batch.log_files import matching_files
 
     if not folder.is_dir():
         raise HydrostateError(f"{folder}: must be a folder with logs or a store, but there is no such folder")
-    known = (*SUFFIXES, *OTHERS)
-    found = [one for one in map(Path, matching(f"{escape(str(folder))}/**/*")) if one.suffix.lower() in known]
+    known = (*SUFFIXES, *PACKAGE_SUFFIXES)
+    found = [one for one in map(Path, matching_files(f"{escape(str(folder))}/**/*")) if one.suffix.lower() in known]
     if not found:
         raise HydrostateError(f"{folder}: must hold logs, files that end in {', '.join(known)}, but there are none")
     return found
@@ -280,7 +280,7 @@ def rigs_of_folders(folder: Path, logs: Sequence[Path], given: Path | None = Non
     """
     above = {one for log in logs for one in log.parents if one == folder or folder in one.parents}
     found = {
-        "" if one == folder else spelt(one.relative_to(folder).as_posix()): one / RIG
+        "" if one == folder else valid_text(one.relative_to(folder).as_posix()): one / RIG
         for one in sorted(above)
         if (one / RIG).is_file()
     }
@@ -300,7 +300,7 @@ def _page_writer(
     sample_time: float | None,
 ) -> Callable[[str, Path], bool]:
     """Return a function that writes the page of a log and returns whether the log still exists."""
-    from experiments.actuators import kind_of_rig, offered, read_own_rig
+    from experiments.actuators import kind_of_rig, read_own_rig, verb_of_kind
     from experiments.batch.logs_listed import nearest_folder
 
     usual, common = load_actuator(plant, rig)
@@ -312,12 +312,12 @@ def _page_writer(
         if not log.exists():
             return False
         from experiments.command.log_verb import page_of  # not needed for pages of a store alone
-        from experiments.command.logs import caught, read_log
+        from experiments.command.logs import catch_log_warnings, read_log
 
         bench = own.get(nearest_folder(file, own), common)
         kind = kind_of_rig(bench, usual.name)
-        chosen = offered(kind, "diagnose")
-        with caught():
+        chosen = verb_of_kind(kind, "diagnose")
+        with catch_log_warnings():
             record = read_log(log, bench.columns, mapping, kind.required, sample_time=sample_time)
             found = chosen.run(record, *chosen.prepare(bench, {**chosen.options, "seed": 0}))
         result = {**chosen.blank, "file": file, "rig": bench.name, **chosen.entries(found)}

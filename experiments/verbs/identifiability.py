@@ -23,13 +23,13 @@ from experiments.command.options import (
     Voltage,
     load_actuator,
     option,
-    understood,
+    options_of_kind,
 )
 
 if TYPE_CHECKING:
     from experiments.actuator_kind import Experiment
 
-COMMON = frozenset({"plant", "rig", "out", "seed", "as_json"})
+COMMON_OPTIONS = frozenset({"plant", "rig", "out", "seed", "as_json"})
 """Options that apply to every kind of actuator."""
 
 commands = typer.Typer()
@@ -75,12 +75,12 @@ def identifiability(
     of chamber volume to bulk modulus matters. For other actuators it prints the same for what their logs determine. The
     seed is that of random drives.
     """
-    from experiments.actuators import offered
+    from experiments.actuators import verb_of_kind
 
     asked = locals()
     kind, bench = load_actuator(plant, rig)
-    options = {**understood(context, asked, kind, "identifiability", COMMON), "seed": seed}
-    experiment: Experiment = offered(kind, "identifiability")
+    options = {**options_of_kind(context, asked, kind, "identifiability", COMMON_OPTIONS), "seed": seed}
+    experiment: Experiment = verb_of_kind(kind, "identifiability")
     prepare_output(out)
     about = {"plant": kind.name, "rig": bench.name, "seed": seed}
     results = tuple({**about, **experiment.entries(one)} for one in experiment.run(bench, options))

@@ -15,10 +15,10 @@ from experiments.command.options import (
     Report,
     RigFile,
     Seed,
-    listed,
     load_columns,
     load_rig,
-    refuse_given,
+    refuse_ineffective_options,
+    split_names,
 )
 from experiments.command.output_paths import require_place
 from experiments.identification.of_channels import INPUT, OUTPUT, ChannelFit, identify_channels
@@ -95,11 +95,13 @@ def identify(
     related = any(one is not None for one in (inputs, outputs, references, simulate))
     if (related and rig is None and not columns) or structure in ONLY_BETWEEN_COLUMNS:
         of_channels = {"--rig": rig, "--columns": columns, "--filter-hz": filter_hz}
-        refuse_given(of_channels, "does not go with --input and --output, which take columns as they stand in the log")
+        refuse_ineffective_options(
+            of_channels, "does not go with --input and --output, which take columns as they stand in the log"
+        )
         between = ColumnFit(
-            listed(*(inputs or ())),
-            listed(*(outputs or ())),
-            listed(*(references or ())),
+            split_names(*(inputs or ())),
+            split_names(*(outputs or ())),
+            split_names(*(references or ())),
             order=whole_or_auto("--order", order or "auto", 1),
             delay=whole_or_auto("--delay", delay or "auto", 0),
             resampled=resample,
@@ -111,7 +113,9 @@ def identify(
         _relate_columns(logs, between, simulate, as_json=as_json, out=out)
     of_columns = {"--reference": references, "--simulate": simulate, "--simulated": simulated, "--validate": validate}
     of_columns |= {"--response": response, "--resample": resample}
-    refuse_given(of_columns, "goes with --input and --output that name columns, without --rig and --columns")
+    refuse_ineffective_options(
+        of_columns, "goes with --input and --output that name columns, without --rig and --columns"
+    )
     from estimation.identification.free_run.data import MOST_ORDER
 
     fit = ChannelFit(
@@ -134,12 +138,12 @@ def _relate_columns(
         identify_columns(logs, fit, as_json=as_json, out=out)
     of_fits: dict[str, object] = {"--validate": fit.validate or None, "--figure": fit.figure, "--report": fit.report}
     of_fits |= {"--response": fit.response, "--resample": fit.resampled}
-    refuse_given(of_fits, "goes with a fit, not with --simulate")
+    refuse_ineffective_options(of_fits, "goes with a fit, not with --simulate")
     simulate_model(logs, model, fit, as_json=as_json, out=out)
 
 
 def _one_channel(option: str, given: list[str] | None, default: str) -> str:
-    channel, *others = listed(*(given or ())) or (default,)
+    channel, *others = split_names(*(given or ())) or (default,)
     if others:
         raise HydrostateError(f"{option} takes one channel with --rig or --columns, got {channel}, {', '.join(others)}")
     return channel

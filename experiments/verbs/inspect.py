@@ -10,11 +10,11 @@ from experiments.actuators import actuator
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, run_logs
 from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, option
-from experiments.command.output_paths import own_paths, page_place, require_place
+from experiments.command.output_paths import page_place, paths_by_owner, require_place
 from experiments.command.pages import Pages
 from experiments.command.terminal import note, table
 from experiments.command.visible_text import visible, visible_name
-from experiments.log_pages.inspected import BLANK, block_of, clock_sentence, looked_into, without_unit
+from experiments.log_pages.inspected import BLANK, clock_sentence, columns_block, guessed_units, inspect_log
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def inspect(
         actuator(plant)
 
     def work(log: Path) -> Result:
-        found, tables = looked_into(log, plant, sample_time, beside or ())
+        found, tables = inspect_log(log, plant, sample_time, beside or ())
         if log in pages.places:
             from experiments.log_pages.inspect_page import inspect_page
 
@@ -73,7 +73,7 @@ def inspect(
 
     if (write is not None or beside) and len(logs) > 1:
         raise HydrostateError("--write and --with go with one file, got several")
-    pages = Pages(own_paths(page_place(report), logs))
+    pages = Pages(paths_by_owner(page_place(report), logs))
     require_place("--write", write, ".toml")
     if write is not None and write.exists():
         raise HydrostateError(f"--write {write}: the file exists already and is not overwritten; give another name")
@@ -87,22 +87,26 @@ def _write_rig(path: Path, found: Mapping[str, Any], kind: "ActuatorKind") -> No
     from plant.eha.rig import rig_template, write_rig_template
 
     text = rig_template(kind.parameters, kind.name, {})
-    write_rig_template(path, text.replace("[columns]", _block(found)))
+    write_rig_template(path, text.replace("[columns]", _columns_block(found)))
 
 
-def _block(found: Mapping[str, Any]) -> str:
-    return block_of(found["columns"], without_unit(found["tables"]))
+def _columns_block(found: Mapping[str, Any]) -> str:
+    return columns_block(found["columns"], guessed_units(found["tables"]))
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     for result in results:
         yield visible_name(result["file"])
         for one in result["tables"]:
-            yield _shown(one)
+            yield _columns_table(one)
             yield clock_sentence(one)
         yield ""
-        yield (visible(_block(result)) if result["columns"] else "no column was recognised; name the columns yourself")
-        if named := without_unit(result["tables"]):
+        yield (
+            visible(_columns_block(result))
+            if result["columns"]
+            else "no column was recognised; name the columns yourself"
+        )
+        if named := guessed_units(result["tables"]):
             yield visible(f"check the unit of {', '.join(name for _, name in named)}: the file gives none")
         yield ""
         if result["options"]:
@@ -110,7 +114,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
         yield visible(str(result["message"]))
 
 
-def _shown(one: Mapping[str, Any]) -> "RenderableType":
+def _columns_table(one: Mapping[str, Any]) -> "RenderableType":
     title = visible(f"{one['label'] or 'columns'}: {one['rows']} rows")
     made = table(
         "no.", "column", "unit", "from", "to", "missing", "plot", "channel?", "sure [%]", "because", title=title

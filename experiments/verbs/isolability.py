@@ -9,7 +9,7 @@ from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish
 from experiments.command.options import SEED, Drive, Json, Noise, Out, Ranked, RigFile, Seed, load_rig, option
 from experiments.command.terminal import table
-from experiments.eha.identifiability import checked_experiment, driven, title_of, within_limits
+from experiments.eha.identifiability import checked_experiment, experiment_inputs, results_by_drive, title_of
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -47,7 +47,7 @@ def isolability(
     prepare_output(out)
     about = {"rig": bench.name, "sensors": list(channels), "noise": noise}
     about |= {"seconds": seconds, "rate_hz": rate, "seed": seed}
-    found = within_limits(options, lambda name: _distances(name, bench, channels, about))
+    found = results_by_drive(options, lambda name: _distances(name, bench, channels, about))
     results = tuple(_results(found, channels, about))
     finish(Batch(results, len(results)), _ranking if ranked else _screen, as_json=as_json, out=out)
 
@@ -55,7 +55,7 @@ def isolability(
 def _distances(drive: str, bench: "Rig", channels: Mapping[str, str], about: Mapping[str, Any]) -> "Distances":
     from faults.eha.isolability import condition_distances
 
-    speed, T, sensors = driven(drive, bench.parameters, about)
+    speed, T, sensors = experiment_inputs(drive, bench.parameters, about)
     return condition_distances(bench.parameters, speed, T, tuple(channels.values()), sensors)
 
 

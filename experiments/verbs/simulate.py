@@ -21,17 +21,17 @@ from experiments.command.options import (
     Voltage,
     load_actuator,
     option,
+    options_of_kind,
     require_positive,
-    understood,
 )
 from experiments.command.terminal import emit, note
-from experiments.running.refusal import refused
+from experiments.running.refusal import os_errors_as
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
     from experiments.actuator_kind import Run, Simulation
 
-COMMON = frozenset({"plant", "rig", "out", "seed", "as_json"})
+COMMON_OPTIONS = frozenset({"plant", "rig", "out", "seed", "as_json"})
 """Options that apply to every kind of actuator."""
 
 commands = typer.Typer()
@@ -104,15 +104,15 @@ def simulate(
     variables, and a condition sets the variables that are named like its parameters. An FMU is a program: do not run
     one that you do not trust.
     """
-    from experiments.actuators import offered
+    from experiments.actuators import verb_of_kind
     from plant.log.files import write_record
 
     asked = locals()
     require_positive("--duration", duration, "s")
     require_positive("--sample-time", sample_time, "s")
     kind, bench = load_actuator(plant, rig)
-    options = {**understood(context, asked, kind, "simulate", COMMON), "seed": seed, "plant": plant}
-    simulation: Simulation = offered(kind, "simulate")
+    options = {**options_of_kind(context, asked, kind, "simulate", COMMON_OPTIONS), "seed": seed, "plant": plant}
+    simulation: Simulation = verb_of_kind(kind, "simulate")
     _prepare(out)
     run = simulation.run(bench, options)
     for one in run.notes:
@@ -127,7 +127,7 @@ def _prepare(out: Path) -> None:
 
     if out.suffix.lower() not in SUFFIXES:
         raise HydrostateError(f"--out must end in {', '.join(SUFFIXES)}, got {str(out)!r}")
-    with refused(f"--out {out}: the folder cannot be made"):
+    with os_errors_as(f"--out {out}: the folder cannot be made"):
         out.parent.mkdir(parents=True, exist_ok=True)
     if out.is_dir():
         raise HydrostateError(f"--out {out}: a file is needed, got a folder")

@@ -18,12 +18,12 @@ from experiments.command.options import (
     require_positive,
 )
 from experiments.command.output_paths import require_place
-from experiments.streams.broker import published
-from experiments.streams.endings import end_told, say_line, stop_at_signals
-from experiments.streams.heartbeat import beating
-from experiments.streams.metrics_endpoint import metrics_offered
+from experiments.streams.broker import broker_publisher
+from experiments.streams.endings import report_end, say_line, stop_at_signals
+from experiments.streams.heartbeat import report_alive
+from experiments.streams.metrics_endpoint import serve_metrics
 from experiments.streams.rows import STANDARD_INPUT, stream_input
-from experiments.streams.watch_view import lines_wanted, viewed
+from experiments.streams.watch_view import lines_wanted, show_view
 from experiments.streams.watched import Watched
 from experiments.streams.watching import LEARNING, WatchSettings, watch_file, watch_network, watch_rows
 from plant.errors import HydrostateError
@@ -87,13 +87,13 @@ def watch(
         raise HydrostateError(f"--state goes with a stream, '-' or tcp://HOST:PORT, got the file {log!r:.80}")
     told = Watched(STANDARD_INPUT if log == "-" else log)
     if lines_wanted(view):
-        told.to(say_line)
+        told.add_output(say_line)
     stop_at_signals()
 
-    with ExitStack() as outputs, end_told(told):  # outputs receive the end before they are closed
-        _opened(told, outputs, publish, metrics, view)
+    with ExitStack() as outputs, report_end(told):  # outputs receive the end before they are closed
+        _open_outputs(told, outputs, publish, metrics, view)
         settings = WatchSettings(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
-        with beating(told, heartbeat):
+        with report_alive(told, heartbeat):
             if log == "-":
                 watch_rows(told, stream_input(sys.stdin), settings, STANDARD_INPUT, state)
             elif is_stream(log):
@@ -102,11 +102,11 @@ def watch(
                 watch_file(told, Path(log), settings)
 
 
-def _opened(told: Watched, outputs: ExitStack, publish: str | None, metrics: str | None, view: bool) -> None:
+def _open_outputs(told: Watched, outputs: ExitStack, publish: str | None, metrics: str | None, view: bool) -> None:
     """Open the requested outputs."""
     if publish is not None:
-        told.to(outputs.enter_context(published(publish)))
+        told.add_output(outputs.enter_context(broker_publisher(publish)))
     if metrics is not None:
-        outputs.enter_context(metrics_offered(metrics, told))
+        outputs.enter_context(serve_metrics(metrics, told))
     if view:
-        outputs.enter_context(viewed(told))
+        outputs.enter_context(show_view(told))

@@ -19,7 +19,7 @@ SURE = 0.9
 LONG_ENOUGH = 10.0
 """Length of a log from which a longer one does not help [s]."""
 
-SLOW = 0.01
+SLOW_SAMPLE_TIME = 0.01
 """Time between samples from which many sound actuators have no verdict [s]; at half of it, intervals are wider only."""
 
 STRETCH, FEWEST = 0.05, 4
@@ -31,14 +31,14 @@ LEVEL = 0.05
 DRIFT = 0.005
 """Speed is constant if its means over the halves of a stretch differ by less, as a share of the largest [fraction]."""
 
-WIDE = 0.2
+WIDEST_GROUP = 0.2
 """Neighbouring speeds that span more than this share of the largest are more than one [fraction]."""
 
-HELD = 0.02
+LEAST_SHARE_HELD = 0.02
 """A speed counts if it lasts for this share of the log [fraction]."""
 
 
-def speeds_held(record: Record) -> int:
+def held_speed_count(record: Record) -> int:
     """Return the number of different motor speeds in a log, regardless of direction.
 
     Returns
@@ -50,7 +50,7 @@ def speeds_held(record: Record) -> int:
     Examples
     --------
     >>> steps = np.repeat([0.0, 50.0, -50.0, 100.0], 100)
-    >>> speeds_held(Record(1e-3, {"motor_speed_rad_s": steps}))
+    >>> held_speed_count(Record(1e-3, {"motor_speed_rad_s": steps}))
     2
     """
     speed = record["motor_speed_rad_s"]
@@ -65,7 +65,9 @@ def speeds_held(record: Record) -> int:
     mean, spread = np.mean(stretches, axis=1) / largest, np.std(stretches, axis=1) / largest
     held = np.sort(mean[(drift < DRIFT) & (spread < LEVEL) & (mean > LEVEL)])
     groups = np.split(held, np.flatnonzero(np.diff(held) > LEVEL) + 1)
-    return sum(2 if np.ptp(group) > WIDE else 1 for group in groups if len(group) > HELD * len(stretches))
+    return sum(
+        2 if np.ptp(group) > WIDEST_GROUP else 1 for group in groups if len(group) > LEAST_SHARE_HELD * len(stretches)
+    )
 
 
 def advice_for(
@@ -97,9 +99,11 @@ def advice_for(
     """
     not_told = tuple(not_told)
     doubts, unclear = list(against), {note.code for note in not_told}
-    slow = [AdviceCode.LOG_FASTER.note(step_ms=1e3 * record.sample_time)] if record.sample_time >= SLOW else []
+    slow = (
+        [AdviceCode.LOG_FASTER.note(step_ms=1e3 * record.sample_time)] if record.sample_time >= SLOW_SAMPLE_TIME else []
+    )
     if doubts:
-        return _mended(doubts, slow)
+        return _repair_advice(doubts, slow)
     found: list[Note] = []
     if PRESSURE not in channels:
         found.append(AdviceCode.LOG_PRESSURE.note())
@@ -109,7 +113,7 @@ def advice_for(
     found.extend(AdviceCode.DRAW_OIL.note(side=note.data["side"]) for note in unseen)
     alike = ClassCode.LEAKAGE_AND_BIAS_ALIKE in unclear
     if alike or ClassCode.WEAR_NOT_TOLD in unclear:
-        speeds = speeds_held(record)
+        speeds = held_speed_count(record)
         if speeds < 2 or alike:
             found.append((AdviceCode.MORE_SPEEDS if speeds < 2 else AdviceCode.CLOSER_SPEEDS).note(speeds=speeds))
     if probabilities and max(probabilities.values()) < SURE * sum(probabilities.values()):
@@ -188,7 +192,7 @@ def rig_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaPara
     return ()
 
 
-def _mended(doubts: list[Note], slow: Iterable[Note]) -> tuple[Note, ...]:
+def _repair_advice(doubts: list[Note], slow: Iterable[Note]) -> tuple[Note, ...]:
     """Return what to repair before the next log: the suspected sensors, otherwise rig file and units."""
     if any(note.code == ChannelCode.NOTHING_CHANGES for note in doubts):
         return (AdviceCode.CHECK_LOGGER.note(),)
@@ -197,12 +201,14 @@ def _mended(doubts: list[Note], slow: Iterable[Note]) -> tuple[Note, ...]:
         return (AdviceCode.MEND_COLUMNS.note(channels=" and ".join(named)),)
     if sparse := [str(note.data["channel"]) for note in doubts if isinstance(note.code, LoggerCode)]:
         return (AdviceCode.LOG_EVERY_ROW.note(channels=" and ".join(sparse)),)
-    accused = dict.fromkeys(str(note.data["channel"]) for note in doubts if "channel" in note.data and _of_sensor(note))
+    accused = dict.fromkeys(
+        str(note.data["channel"]) for note in doubts if "channel" in note.data and _is_sensor_note(note)
+    )
     if any(note.code == SensorCode.SENSORS_DISAGREE for note in doubts):
         accused |= {"position_m": None, "velocity_m_s": None}
     if accused:
         return (AdviceCode.CHECK_SENSOR.note(channels=" and ".join(accused)),)
-    if work := tuple(one for one in map(_work_on, doubts) if one is not None):
+    if work := tuple(one for one in map(_repair_of_fault, doubts) if one is not None):
         return work
     if any(note.code == EstimateCode.RIG_CONTRADICTED for note in doubts):
         return (AdviceCode.CHECK_RIG.note(),)
@@ -211,7 +217,7 @@ def _mended(doubts: list[Note], slow: Iterable[Note]) -> tuple[Note, ...]:
     return (AdviceCode.CHECK_RIG.note(),)
 
 
-def _work_on(fault: Note) -> Note | None:
+def _repair_of_fault(fault: Note) -> Note | None:
     """Return the repair of a fault that is none of the nine conditions."""
     match fault.code:
         case RigCode.LEAKAGE_GROWS:
@@ -244,5 +250,5 @@ def _work_on(fault: Note) -> Note | None:
             return None
 
 
-def _of_sensor(note: Note) -> bool:
+def _is_sensor_note(note: Note) -> bool:
     return isinstance(note.code, SensorCode)

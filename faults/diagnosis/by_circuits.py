@@ -4,16 +4,16 @@ from functools import partial
 
 from estimation.log_checks.clean import CleanLog
 from faults.diagnosis.beyond_nine.sound_circuit import another_sound_circuit
-from faults.diagnosis.beyond_nine.wear import whatever_fault
+from faults.diagnosis.beyond_nine.wear import with_other_faults
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
-from faults.diagnosis.circuits.class_regions import how_near
+from faults.diagnosis.circuits.class_regions import nearest_score
 from faults.diagnosis.circuits.open_classes import circuits_left_open
 from faults.diagnosis.circuits.out_of_model import reasons_against
-from faults.diagnosis.circuits.two_sensors import sensors_disagree
-from faults.diagnosis.evidence import weigh
-from faults.diagnosis.not_told import what_is_not_told
+from faults.diagnosis.circuits.two_sensors import sensor_disagreements
+from faults.diagnosis.evidence import weigh_evidence
+from faults.diagnosis.not_told import not_told_notes
 from faults.diagnosis.severity import healthy_severities, limits_of, severities
 
 
@@ -40,22 +40,22 @@ def diagnose_clean(log: CleanLog, actuator: Actuator, calibration: Calibration |
         If the log has neither position nor velocity, or is too short.
     """
     numbers = shipped_calibration() if calibration is None else calibration
-    found = _around(log, actuator, numbers)
-    if found.followed:
+    found = _diagnose_around(log, actuator, numbers)
+    if found.circuit_follows:
         return found
     other = another_sound_circuit(found.scoreboard.blocks, found.scoreboard.fits, actuator)
-    return found if other is None else _around(log, other, numbers)
+    return found if other is None else _diagnose_around(log, other, numbers)
 
 
-def _around(log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosis:
+def _diagnose_around(log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosis:
     """Return the diagnosis of a log around one healthy circuit."""
-    board = weigh(log.record, actuator)
+    board = weigh_evidence(log.record, actuator)
     pressure = board.blocks.pressure is not None
-    region = how_near(board.fits, board.blocks, actuator)
+    region = nearest_score(board.fits, board.blocks, actuator)
     against = (
         *log.objections,
         *board.against,
-        *sensors_disagree(board.window, board.blocks),
+        *sensor_disagreements(board.window, board.blocks),
         *reasons_against(board.blocks, board.fits, region, actuator),
     )
     probabilities = board.probabilities(numbers)
@@ -68,10 +68,10 @@ def _around(log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosi
         severity,
         dict(healthy_severities(actuator)),
         dict(limits_of(actuator)),
-        tuple(what_is_not_told(board.fits, severity, pressure=pressure)),
+        tuple(not_told_notes(board.fits, severity, pressure=pressure)),
         board,
         told_by,
     )
-    # if leakage drifts, `over_drift` diagnoses the log again, and weighs other faults then
-    drifts = board.drift is not None or board.blocks.course is not None
-    return found if drifts else whatever_fault(found, actuator, numbers)
+    # if leakage drifts, `averaged_over_drift` diagnoses the log again, and weighs other faults then
+    drifts = board.drift is not None or board.blocks.leakage_course is not None
+    return found if drifts else with_other_faults(found, actuator, numbers)

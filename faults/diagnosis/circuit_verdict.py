@@ -30,8 +30,9 @@ class Diagnosis:
         What the log does not determine.
     scoreboard : Scoreboard
         The evidences, and the circuit that was fitted.
-    told_by : callable, optional
-        ``told_by(losses, rubbing)``: its severities if leakage and flow bias, or friction, are known from elsewhere.
+    severities_given : callable, optional
+        ``severities_given(losses, rubbing)``: its severities if leakage and flow bias, or friction, are known from
+        elsewhere.
     """
 
     probabilities: Mapping[str, float]
@@ -41,7 +42,7 @@ class Diagnosis:
     limits: Mapping[str, float]
     not_told: tuple[Note, ...]
     scoreboard: Scoreboard
-    told_by: Callable[[KnownLosses | None, KnownFriction | None], Mapping[str, Quantity]] | None = None
+    severities_given: Callable[[KnownLosses | None, KnownFriction | None], Mapping[str, Quantity]] | None = None
 
     @property
     def condition(self) -> str:
@@ -49,7 +50,7 @@ class Diagnosis:
         return max(self.probabilities, key=lambda name: self.probabilities[name])
 
     @property
-    def followed(self) -> bool:
+    def circuit_follows(self) -> bool:
         """Whether the circuit follows the log closely enough."""
         return all(note.code is not AgainstCode.UNEXPLAINED for note in self.against)
 

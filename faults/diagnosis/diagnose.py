@@ -12,35 +12,35 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.eha.another_rod import of_another_rod
+from estimation.eha.another_rod import is_of_another_rod
 from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.entrained_air import amount_of_air, with_air
-from estimation.eha.estimate import estimated, explained, finding_of, refused
-from estimation.eha.explanation_notes import OUTSIDE, at_pump_speed, rig_set_right, set_right
+from estimation.eha.estimate import checked_estimate, explanation_and_remarks, finding_of, rejection_notes
+from estimation.eha.explanation_notes import FAULTS_BEYOND_CONDITIONS, corrected_log, corrected_rig, log_at_pump_speed
 from estimation.eha.result import BulkModulusEstimate
-from estimation.eha.rig_share import SOFT, scaled_responses, with_total
+from estimation.eha.rig_share import SOFT_OIL_RATIO, scaled_responses, with_total
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import ChannelCode, RigCode
 from faults.diagnosis.advice import advice_for, oil_advice, rig_advice, sensor_advice
-from faults.diagnosis.beyond_nine.accumulator import whatever_accumulator
-from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
+from faults.diagnosis.beyond_nine.accumulator import with_fitted_accumulator
+from faults.diagnosis.beyond_nine.another_oil import with_stiffer_oil
 from faults.diagnosis.beyond_nine.balance_refused import class_without_balance
-from faults.diagnosis.beyond_nine.drift import over_drift
-from faults.diagnosis.beyond_nine.left_open import beside_unseen_valve, likelier_fault
-from faults.diagnosis.beyond_nine.load import Loaded, under_load
-from faults.diagnosis.beyond_nine.near_enough import BESIDE
-from faults.diagnosis.beyond_nine.wear import whatever_the_pump_delivers
+from faults.diagnosis.beyond_nine.drift import averaged_over_drift
+from faults.diagnosis.beyond_nine.left_open import likelier_fault_notes, with_unseen_valve
+from faults.diagnosis.beyond_nine.load import LoadedDiagnosis, with_rod_load
+from faults.diagnosis.beyond_nine.near_enough import OUTSIDE_CODES
+from faults.diagnosis.beyond_nine.wear import with_pump_delivery
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import LONGEST
 from faults.diagnosis.doubtful_entries import doubtful_entries
-from faults.diagnosis.failed_search import doubts_after
-from faults.diagnosis.known_losses import by_the_balance
-from faults.diagnosis.models_verdict import models_verdict, ranked
-from faults.diagnosis.not_told import stands_still, without_undetermined
+from faults.diagnosis.failed_search import doubts_after_fit
+from faults.diagnosis.known_losses import with_balance_severities
+from faults.diagnosis.models_verdict import models_verdict, ranked_conditions
+from faults.diagnosis.not_told import standstill_notes, without_undetermined
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import healthy_severities, limits_of, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
@@ -52,7 +52,7 @@ from plant.eha.rig import Rig
 from plant.errors import LogError, RigError
 from plant.log.record import Record
 from plant.notes import Note, distinct
-from plant.spare_processors import begun
+from plant.spare_processors import start_if_idle
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     rig : Rig
         The healthy actuator.
     seen : tuple of CleanLog and BulkModulusEstimate, optional
-        Result of `estimation.eha.estimate.estimated` for this log with default options; computed if not given.
+        Result of `estimation.eha.estimate.checked_estimate` for this log with default options; computed if not given.
 
     Returns
     -------
@@ -102,14 +102,14 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     """
     log = clean_log(record, rig.parameters) if seen is None else seen[0]
     asked = seen is None and not log.mistakes  # otherwise not needed, or the mistake is known
-    plain = _begun(log, rig.parameters) if asked else _Plain(log, rig.parameters, None, None)
-    estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
-    found, case = finding_of(log, estimate, rig), _set_right(log, rig, estimate)
+    plain = _begin_plain(log, rig.parameters) if asked else _Plain(log, rig.parameters, None, None)
+    estimate = checked_estimate(log, rig, EstimateOptions())[1] if seen is None else seen[1]
+    found, case = finding_of(log, estimate, rig), _corrected_case(log, rig, estimate)
     again, cleaned = partial(diagnose_log, record, rig), log
     if (sound := without_wrong_velocity(cleaned, (), estimate, case.strange)) is not None:  # it froze or reads 0
         return again((sound, estimate))
     log, rig = case.log, case.rig
-    scores = plain.scores_of(log, case.as_a_whole)
+    scores = plain.scores_of(log, case.with_whole_oil)
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
     unsure = (*doubtful_entries(plain.parameters), *estimate.rig_notes)
@@ -123,28 +123,28 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     if verdict.outcome is not Outcome.OK:
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     try:
-        judged = partial(_judged, parameters=rig.parameters, case=case, plain=plain)
-        diagnosis, around, named = over_drift(judged, log, case.strange)
+        judged = partial(_diagnose_with_delivery, parameters=rig.parameters, case=case, plain=plain)
+        diagnosis, around, named = averaged_over_drift(judged, log, case.strange)
     except (RigError, LogError) as error:
         without = _without_class(found, log, scores, distinct((*case.doubts, *verdict.against)))
         said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
         return replace(without, notes=(*found.notes, said.note(reason=error.message)))
     if (sound := without_wrong_velocity(cleaned, diagnosis.against, estimate, case.strange)) is not None:
         return again((sound, estimate))
-    diagnosis = by_the_balance(_from_the_rigs_oil(diagnosis, case.healthy), estimate, log.record, case.healthy)
+    diagnosis = with_balance_severities(_with_rig_oil(diagnosis, case.healthy), estimate, log.record, case.healthy)
     found = replace(found, notes=(*found.notes, *named), evidence=EhaEvidence(estimate, scores, diagnosis))
-    left = doubts_after(case.doubts, estimate, log, around, diagnosis.scoreboard)
+    left = doubts_after_fit(case.doubts, estimate, log, around, diagnosis.scoreboard)
     stands = class_without_balance(left, diagnosis, estimate, actuator_of(around))
     if stands is not None:
         left, found = (), replace(found, notes=(*found.notes, stands))
-    still = stands_still(log.record, case.healthy, diagnosis.not_told)
+    still = standstill_notes(log.record, case.healthy, diagnosis.not_told)
     # a piston that stands still shows no friction, so friction cannot be outside the nine conditions
-    follow = tuple(note for note in diagnosis.against if not (still and note.code in BESIDE))
+    follow = tuple(note for note in diagnosis.against if not (still and note.code in OUTSIDE_CODES))
     against = distinct((*still, *left, *follow))
     # other oil also makes the nominal models misfit, so their misfit is no objection by itself, but it supports others
     if against and not still:
         against = distinct((*against, *verdict.against))
-    likelier = likelier_fault(diagnosis.probabilities, diagnosis.not_told)
+    likelier = likelier_fault_notes(diagnosis.probabilities, diagnosis.not_told)
     return _with_class(found, case, diagnosis, distinct((*against, *likelier)))
 
 
@@ -164,7 +164,7 @@ class _Case(NamedTuple):
     strange: tuple[Note, ...]
 
     @property
-    def as_a_whole(self) -> EhaParameters:
+    def with_whole_oil(self) -> EhaParameters:
         """The actuator with the bulk modulus of its oil, air included."""
         if self.healthy.bulk_modulus == self.rig.parameters.bulk_modulus or self.estimate.value is None:
             return self.healthy
@@ -173,21 +173,21 @@ class _Case(NamedTuple):
     @property
     def doubts(self) -> tuple[Note, ...]:
         """Reasons against all nine conditions before a circuit is fitted."""
-        outside = (note for note in self.strange if note.code in OUTSIDE or of_another_rod(note))
-        return (*refused(self.estimate), *outside, *self.log.objections)
+        outside = (note for note in self.strange if note.code in FAULTS_BEYOND_CONDITIONS or is_of_another_rod(note))
+        return (*rejection_notes(self.estimate), *outside, *self.log.objections)
 
 
-def _set_right(log: CleanLog, rig: Rig, estimate: BulkModulusEstimate) -> _Case:
+def _corrected_case(log: CleanLog, rig: Rig, estimate: BulkModulusEstimate) -> _Case:
     written = rig.parameters
-    strange = explained(estimate, written)
-    log = at_pump_speed(log, estimate.turning)
+    strange = explanation_and_remarks(estimate, written)
+    log = log_at_pump_speed(log, estimate.turning)
     if estimate.explanation is not None:
-        log = set_right(log, estimate.explanation)
-        rig = replace(rig, parameters=rig_set_right(rig.parameters, estimate.explanation))
+        log = corrected_log(log, estimate.explanation)
+        rig = replace(rig, parameters=corrected_rig(rig.parameters, estimate.explanation))
     healthy = rig.parameters
     around = with_air(healthy, estimate.explanation)
     of_oil = around.bulk_modulus if around is not healthy else estimate.value
-    if (other := _another_oil(of_oil, estimate, healthy)) is not None:
+    if (other := _other_oil_note(of_oil, estimate, healthy)) is not None:
         strange = (*strange, other)
         around = replace(around, bulk_modulus=of_oil)
     return _Case(log, replace(rig, parameters=around), healthy, written, estimate, strange)
@@ -201,7 +201,7 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
     pressure = PRESSURE in found.channels
     severity = _severities(diagnosis, case.estimate, case.healthy, case.rig, pressure=pressure)
     not_told = (*diagnosis.not_told, *found.not_told)
-    if severity["bulk_modulus"].value is not None and not _oil_is_the_circuits(case.estimate, pressure=pressure):
+    if severity["bulk_modulus"].value is not None and not _is_oil_from_circuit(case.estimate, pressure=pressure):
         not_told = tuple(note for note in not_told if note.code is not ClassCode.BULK_MODULUS_NOT_VISIBLE)
     severity = without_undetermined(severity, [note.code for note in not_told])
     known = case.estimate.gate.passed and not against
@@ -209,7 +209,7 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
     entries = rig_advice(case.strange, case.healthy, case.written)
     unclear = (*diagnosis.not_told, *found.not_told)
     further = advice_for(case.log.record, diagnosis.probabilities, against, unclear, found.channels)
-    probabilities, stuck = beside_unseen_valve(diagnosis.probabilities, found.not_told)
+    probabilities, stuck = with_unseen_valve(diagnosis.probabilities, found.not_told)
     return replace(
         found,
         notes=notes,
@@ -225,7 +225,7 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
     )
 
 
-def _from_the_rigs_oil(diagnosis: Diagnosis, healthy: EhaParameters) -> Diagnosis:
+def _with_rig_oil(diagnosis: Diagnosis, healthy: EhaParameters) -> Diagnosis:
     """Return a diagnosis whose bulk modulus is compared with the rig's oil, even if circuits are fitted around another.
 
     Otherwise oil half as stiff as the rig's would be compared with itself, and be within its limit.
@@ -253,7 +253,7 @@ class _Plain(NamedTuple):
     def of(self, log: CleanLog, parameters: EhaParameters) -> Diagnosis:
         if self.result is not None and self._has(log, parameters):
             return self.result()
-        return _of_clean(log, parameters)
+        return _diagnose_clean_log(log, parameters)
 
     def scores_of(self, log: CleanLog, parameters: EhaParameters) -> Scores:
         if self.scores is not None and self._has(log, parameters):
@@ -264,9 +264,9 @@ class _Plain(NamedTuple):
         return log is self.log and parameters == self.parameters
 
 
-def _begun(log: CleanLog, parameters: EhaParameters) -> _Plain:
-    works = partial(_of_clean, log, parameters), partial(_scores_of, log, parameters)
-    return _Plain(log, parameters, begun(works[0]), begun(works[1]))
+def _begin_plain(log: CleanLog, parameters: EhaParameters) -> _Plain:
+    works = partial(_diagnose_clean_log, log, parameters), partial(_scores_of, log, parameters)
+    return _Plain(log, parameters, start_if_idle(works[0]), start_if_idle(works[1]))
 
 
 def _scores_of(log: CleanLog, parameters: EhaParameters) -> Scores:
@@ -275,19 +275,21 @@ def _scores_of(log: CleanLog, parameters: EhaParameters) -> Scores:
     return score_mathematical(record, mathematical_bank(parameters))
 
 
-def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
+def _diagnose_clean_log(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
     return diagnose_clean(log, actuator_of(parameters))
 
 
-def _judged(log: CleanLog, parameters: EhaParameters, case: _Case, plain: _Plain) -> Loaded:
+def _diagnose_with_delivery(log: CleanLog, parameters: EhaParameters, case: _Case, plain: _Plain) -> LoadedDiagnosis:
     """Return a diagnosis with the pump delivery from the flow balance."""
-    around = partial(_diagnosed, log, estimate=case.estimate, plain=plain)
-    found = whatever_accumulator(around(parameters), around)
-    told = whatever_the_pump_delivers(found.diagnosis, actuator_of(found.parameters), case.estimate, case.strange)
+    around = partial(_diagnose_around, log, estimate=case.estimate, plain=plain)
+    found = with_fitted_accumulator(around(parameters), around)
+    told = with_pump_delivery(found.diagnosis, actuator_of(found.parameters), case.estimate, case.strange)
     return found._replace(diagnosis=told)
 
 
-def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
+def _diagnose_around(
+    log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain
+) -> LoadedDiagnosis:
     """Return a diagnosis; under a load if the flow balance holds and the force balance shows one; in stiff oil."""
 
     def of(tried: EhaParameters, doubt: float) -> Diagnosis:
@@ -296,13 +298,13 @@ def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEs
         return plain.of(log, tried)
 
     if estimate.form == "motion":
-        return whatever_the_oil(of, parameters)
+        return with_stiffer_oil(of, parameters)
     if estimate.form != "flow" or not estimate.gate.passed:
-        return Loaded(of(parameters, 0.0), parameters)
-    return under_load(of, parameters, estimate)
+        return LoadedDiagnosis(of(parameters, 0.0), parameters)
+    return with_rod_load(of, parameters, estimate)
 
 
-def _another_oil(value: float | None, estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note | None:
+def _other_oil_note(value: float | None, estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note | None:
     """Return a note if the oil, without its air, is unlike the rig's: the circuit is fitted around the measured oil.
 
     Stiff oil is no fault. Soft oil shows in its severity, the air that would make it so soft.
@@ -310,7 +312,7 @@ def _another_oil(value: float | None, estimate: BulkModulusEstimate, healthy: Eh
     if not estimate.gate.passed or value is None:
         return None
     ratio = value / healthy.bulk_modulus
-    if SOFT <= ratio <= 1.0 / SOFT:
+    if SOFT_OIL_RATIO <= ratio <= 1.0 / SOFT_OIL_RATIO:
         return None
     return (RigCode.OIL_SOFTER if ratio < 1.0 else RigCode.OIL_STIFFER).note(ratio=ratio)
 
@@ -320,7 +322,7 @@ def _severities(
 ) -> Mapping[str, Quantity]:
     """Return the severities, with the estimated bulk modulus and the uncertainty of the rig."""
     oil = estimate.quantity
-    if _oil_is_the_circuits(estimate, pressure=pressure):
+    if _is_oil_from_circuit(estimate, pressure=pressure):
         laws = scaled_responses(healthy, {}, pressure=pressure)["bulk_modulus"]
         oil = with_total(diagnosis.severity["bulk_modulus"], laws, estimate.spreads)
     found = with_bulk_modulus(diagnosis.severity, oil, actuator_of(healthy))
@@ -335,7 +337,7 @@ def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple
     """Return the verdict without a fitted circuit: the nearest model's name, and the reasons against it."""
     return replace(
         found,
-        condition=ranked(scores)[0][0],
+        condition=ranked_conditions(scores)[0][0],
         unknown=bool(against),
         against=against,
         advice=advice_for(log.record, {}, against, (), scores.channels),
@@ -343,6 +345,6 @@ def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple
     )
 
 
-def _oil_is_the_circuits(estimate: BulkModulusEstimate, *, pressure: bool) -> bool:
+def _is_oil_from_circuit(estimate: BulkModulusEstimate, *, pressure: bool) -> bool:
     """Return whether bulk modulus is the circuit's: a filter, or a fit of motion without pressure, was rejected."""
     return not estimate.gate.passed and not (pressure and estimate.form == "flow")

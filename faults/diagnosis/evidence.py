@@ -27,7 +27,7 @@ EVIDENCES = ("transfer_functions", "models", "innovations", "parameters")
 FARTHEST = 30.0
 """Largest log-odds of an evidence [dimensionless]: no model is more certain than that."""
 
-YIELDS = 1.2
+BREAKAWAY_RATIO = 1.2
 """Ratio by which the breakaway force may differ between actuators of one kind [dimensionless]."""
 
 SAMPLES = 20.0
@@ -94,7 +94,7 @@ class Scoreboard:
         return dict(zip(CONDITIONS, (float(share) for share in shares / np.sum(shares)), strict=True))
 
 
-def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel] | None = None) -> Scoreboard:
+def weigh_evidence(record: Record, actuator: Actuator, library: Mapping[str, LinearModel] | None = None) -> Scoreboard:
     """Return the scores of the evidences for the condition at the end of a log.
 
     Parameters
@@ -121,11 +121,13 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     if library is not None:
         table = score_transfer_functions(record, library).by_condition
         found["transfer_functions"] = -SAMPLES * np.log([table[name] for name in CONDITIONS])
-    apart = fits.apart(actuator)
-    found = {name: scores if name == "parameters" else within_reach(scores, apart) for name, scores in found.items()}
+    apart = fits.separations(actuator)
+    found = {
+        name: scores if name == "parameters" else limited_by_separation(scores, apart) for name, scores in found.items()
+    }
     if is_stuck(blocks, actuator):
         found = {name: friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
-    odds = {name: bounded(found[name]) for name in EVIDENCES if name in found}
+    odds = {name: bounded_log_odds(found[name]) for name in EVIDENCES if name in found}
     return Scoreboard(odds, blocks, fits, part.window, part.onset, part.against, part.drift)
 
 
@@ -140,7 +142,7 @@ def models_scores(fits: ClassFits) -> Array:
     return np.asarray(-SAMPLES * np.sum(np.log(fits.nominal_scales), axis=1), dtype=np.float64)
 
 
-def within_reach(scores: Array, apart: Array) -> Array:
+def limited_by_separation(scores: Array, apart: Array) -> Array:
     """Return the scores of nominal circuits, limited by how far the log separates the conditions.
 
     Nominal circuits differ from the actuator in all other fitted parameters as well. If the log says nothing about
@@ -151,7 +153,7 @@ def within_reach(scores: Array, apart: Array) -> Array:
     scores : ndarray, shape (9,)
         Log-likelihoods of the conditions [dimensionless].
     apart : ndarray, shape (9, 9)
-        How far the log separates the conditions, see `faults.diagnosis.circuits.region_scores.told_apart`.
+        How far the log separates the conditions, see `faults.diagnosis.circuits.region_scores.separations`.
 
     Returns
     -------
@@ -160,7 +162,7 @@ def within_reach(scores: Array, apart: Array) -> Array:
 
     Examples
     --------
-    >>> within_reach(np.array([0.0, -20.0]), np.array([[0.0, 3.0], [3.0, 0.0]])).tolist()
+    >>> limited_by_separation(np.array([0.0, -20.0]), np.array([[0.0, 3.0], [3.0, 0.0]])).tolist()
     [0.0, -3.0]
     """
     return np.asarray(np.max(scores[:, None] - apart, axis=0), dtype=np.float64)
@@ -186,13 +188,13 @@ def friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Arr
     reached = (
         0.0 if blocks.pressure is None else actuator.circuit.piston_area * float(np.nanmax(np.abs(blocks.pressure)))
     )
-    holding = np.exp(actuator.conditions[:, COORDINATES.index("friction_rest")]) * YIELDS > reached
+    holding = np.exp(actuator.conditions[:, COORDINATES.index("friction_rest")]) * BREAKAWAY_RATIO > reached
     leakage = np.array([condition.leakage for condition in CONDITIONS.values()])
     alike = [np.max(scores[holding & (leakage == level)], initial=-np.inf) for level in leakage]
     return np.where(holding, alike, scores)
 
 
-def bounded(scores: Array) -> Array:
+def bounded_log_odds(scores: Array) -> Array:
     """Return log-odds to the best, compressed so that none falls below ``-FARTHEST``.
 
     Parameters
@@ -207,7 +209,7 @@ def bounded(scores: Array) -> Array:
 
     Examples
     --------
-    >>> bounded(np.array([1.0, 0.0, -np.inf])).round(2).tolist()
+    >>> bounded_log_odds(np.array([1.0, 0.0, -np.inf])).round(2).tolist()
     [0.0, -0.98, -30.0]
     """
     scores = np.where(np.isnan(scores), -np.inf, scores)

@@ -7,7 +7,7 @@ objection if the piston hardly moves: no model describes exactly how its seals y
 
 from collections.abc import Mapping, Sequence
 
-from estimation.eha.estimate import NOT_THE_LOGS
+from estimation.eha.estimate import BULK_MODULUS_REASONS
 from estimation.eha.result import BulkModulusEstimate
 from estimation.fits.motion.values import share_at
 from estimation.log_checks.clean import CleanLog
@@ -15,17 +15,17 @@ from estimation.notes import EstimateCode
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows
 from faults.diagnosis.circuits.class_fit import PointFit
-from faults.diagnosis.circuits.rivals import doubts_left
+from faults.diagnosis.circuits.rivals import remaining_doubts
 from faults.diagnosis.circuits.yielding import UNEXPLAINED, yields_on_seals
 from faults.diagnosis.evidence import Scoreboard
 from plant.eha.model import EhaParameters
 from plant.notes import Note
 
-LESS = 0.5
+FAILED_RATIO = 0.5
 """Residual at the circuit's values over that of the search, up to which the search failed [fraction]; otherwise the
 ratio is 0.9 to 1.1."""
 
-ALIKE = (
+SHARED_PARAMETERS = (
     "bulk_modulus",
     "leakage_coefficient",
     "flow_bias",
@@ -40,7 +40,7 @@ LEAST_DRAIN = 1e-3
 """Least share of the leakage that drains to the inner circuit [fraction]: no logarithm starts at zero."""
 
 
-def doubts_after(
+def doubts_after_fit(
     doubts: Sequence[Note], estimate: BulkModulusEstimate, log: CleanLog, healthy: EhaParameters, board: Scoreboard
 ) -> tuple[Note, ...]:
     """Return the objections to a log that remain after a circuit is fitted.
@@ -61,23 +61,23 @@ def doubts_after(
     Returns
     -------
     tuple of Note
-        Those of `faults.diagnosis.circuits.rivals.doubts_left`. Objections of a fit of motion are removed if its search
-        failed and the motion form fits as well at the circuit's values, or if the piston hardly moves and the circuit
-        follows it within what seals yield.
+        Those of `faults.diagnosis.circuits.rivals.remaining_doubts`. Objections of a fit of motion are removed if its
+        search failed and the motion form fits as well at the circuit's values, or if the piston hardly moves and the
+        circuit follows it within what seals yield.
     """
-    left = doubts_left(doubts, board.blocks, board.fits.best)
+    left = remaining_doubts(doubts, board.blocks, board.fits.best)
     large = next((note for note in left if note.code is EstimateCode.POSITION_RESIDUALS_LARGE), None)
     if large is None or estimate.form != "motion":
         return left
     actuator, best = actuator_of(healthy), board.fits.best
     if not yields_on_seals(board.blocks, best, actuator):
-        share = share_at(log.record, healthy, values_of(best, actuator), log.variances["motor_speed_rad_s"])
-        if not share <= min(UNEXPLAINED[0], LESS * float(large.data["motion_percent"]) / 100.0):
+        share = share_at(log.record, healthy, motion_form_values(best, actuator), log.variances["motor_speed_rad_s"])
+        if not share <= min(UNEXPLAINED[0], FAILED_RATIO * float(large.data["motion_percent"]) / 100.0):
             return left
-    return tuple(note for note in left if note.code not in NOT_THE_LOGS)
+    return tuple(note for note in left if note.code not in BULK_MODULUS_REASONS)
 
 
-def values_of(fit: PointFit, actuator: Actuator) -> Mapping[str, float]:
+def motion_form_values(fit: PointFit, actuator: Actuator) -> Mapping[str, float]:
     """Return the motion form's unknowns with the values of a fitted circuit.
 
     Parameters
@@ -96,4 +96,4 @@ def values_of(fit: PointFit, actuator: Actuator) -> Mapping[str, float]:
     circuit = {name: float(row[column]) for name, column in COLUMN.items()}
     drain = max(circuit["pump_case_leakage"], LEAST_DRAIN * circuit["leakage_coefficient"])
     stiffness = circuit["friction_coulomb"] / circuit["presliding_displacement"]
-    return {name: circuit[name] for name in ALIKE} | {"case_leakage": drain, "bristle_stiffness": stiffness}
+    return {name: circuit[name] for name in SHARED_PARAMETERS} | {"case_leakage": drain, "bristle_stiffness": stiffness}

@@ -14,7 +14,7 @@ import numpy as np
 from estimation.arrays import IntArray
 from estimation.log_checks.channel_names import POSITION, PRESSURE
 from estimation.log_checks.measurement_noise import is_coarse, measurement_variances, position_variance
-from faults.diagnosis.circuits.friction_shape import BEND, FADES
+from faults.diagnosis.circuits.friction_shape import BEND_SPREAD, FADE_VELOCITIES
 from faults.diagnosis.circuits.model_doubt import SELDOM_KNOWN
 from faults.diagnosis.severity import KnownFriction
 from plant.arrays import Array
@@ -26,7 +26,7 @@ WINDOW = 0.02
 """Time over which forces are averaged [s]: short enough for nearly constant velocity, long enough to average the
 noise."""
 
-RESOLVED = 10
+LEAST_SAMPLES = 10
 """Least number of samples in a window: slower logs do not show how pressure and velocity change within it. At 100 Hz,
 friction under binary drives was six deviations off."""
 
@@ -34,7 +34,7 @@ REACH = 2e-3
 """Half of the time over which velocity is read off positions, as the slope of a cubic [s]. A straight line of half its
 length lost 2 % of what rings at 55 Hz, which is friction that goes with the square of velocity."""
 
-SLIDES = 25.0
+SLIDING_TRAVEL = 25.0
 """Travel since a reversal from which a piston slides, over the rig's presliding displacement [dimensionless], judged:
 0.5 mm on the paper's actuator, ten times the yield of seals of 0.05 mm."""
 
@@ -44,7 +44,7 @@ SLOWEST = 1e-3
 FEWEST = 30
 """Least number of windows for the three parts of friction."""
 
-LASTS = 5
+LASTING_WINDOWS = 5
 """Windows over which residuals are averaged to detect a lasting error: a tenth of a second."""
 
 NOISE_ONLY = 2.0
@@ -54,7 +54,7 @@ NOISE_ONLY = 2.0
 CLIPPED, ROUNDS = 3.0, 6
 """Deviations from which a residual counts linearly [dimensionless], and iterations of the weights."""
 
-MOST_ALIKE = 1e12
+LARGEST_CONDITION_NUMBER = 1e12
 """Largest condition number of the normal equations [dimensionless]: above it, a log does not separate the parts."""
 
 
@@ -82,7 +82,7 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     position, pressure = (np.asarray(record[name], dtype=np.float64) for name in (POSITION, PRESSURE))
     step = record.sample_time
     reach, length = max(2, round(REACH / step)), round(WINDOW / step)
-    if length < RESOLVED or len(position) < 4 * reach + length:
+    if length < LEAST_SAMPLES or len(position) < 4 * reach + length:
         return None
     noise_x, noise_p = position_variance(position), measurement_variances(record, (PRESSURE,))[PRESSURE]
     if is_coarse(pressure, noise_p):
@@ -95,20 +95,20 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     way = np.where(known & (np.abs(velocity) >= SLOWEST), np.sign(velocity), 0.0)
     way[:reach], way[-reach:] = 0.0, 0.0
     yields = circuit_of(p).presliding_displacement
-    first = _windows(position, way, SLIDES * yields, length)
+    first = _windows(position, way, SLIDING_TRAVEL * yields, length)
     if len(first) < FEWEST:
         return None
     last, time = first + length, length * step
-    pushed = _mean(np.nan_to_num(pressure), first, length) * p.piston_area
-    pushed = pushed - load_on_rod(_mean(position, first, length), p)
+    pushed = _window_means(np.nan_to_num(pressure), first, length) * p.piston_area
+    pushed = pushed - load_on_rod(_window_means(position, first, length), p)
     inertia = p.moving_mass * (velocity[last] - velocity[first]) / time
     direction = way[first]
-    speed = _mean(np.abs(velocity), first, length) / rated
-    square = (_mean(velocity**2, first, length) - noise_v) / rated**2
+    speed = _window_means(np.abs(velocity), first, length) / rated
+    square = (_window_means(velocity**2, first, length) - noise_v) / rated**2
     columns = np.stack([1.0 - speed, square - speed, speed, direction, direction * inertia], axis=1)
     least = p.piston_area**2 * noise_p / length + 2.0 * (p.moving_mass / time) ** 2 * noise_v
-    bends = BEND * np.exp(-speed[:, None] / np.array(FADES))
-    return _told(columns, direction * (pushed - inertia), least, bends)
+    bends = BEND_SPREAD * np.exp(-speed[:, None] / np.array(FADE_VELOCITIES))
+    return _regress_forces(columns, direction * (pushed - inertia), least, bends)
 
 
 def _windows(position: Array, way: Array, slides: float, length: int) -> IntArray:
@@ -122,13 +122,13 @@ def _windows(position: Array, way: Array, slides: float, length: int) -> IntArra
     return np.concatenate(found)
 
 
-def _mean(values: Array, first: IntArray, length: int) -> Array:
+def _window_means(values: Array, first: IntArray, length: int) -> Array:
     """Return means over windows by trapezoids."""
     sums = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))])
     return np.asarray((sums[first + length] - sums[first]) / length, dtype=np.float64)
 
 
-def _told(columns: Array, forces: Array, least: float, bends: Array) -> KnownFriction | None:
+def _regress_forces(columns: Array, forces: Array, least: float, bends: Array) -> KnownFriction | None:
     """Return the regression of forces with a least noise variance [N^2]; bends are shares of friction at rest."""
     count, unknowns = columns.shape
     prior = np.zeros((unknowns, unknowns))
@@ -139,7 +139,7 @@ def _told(columns: Array, forces: Array, least: float, bends: Array) -> KnownFri
         weights = 1.0 / np.maximum(1.0, np.abs(left) / (CLIPPED * math.sqrt(power)))
         weighed = columns.T * weights
         normal = weighed @ columns + prior * power
-        if not np.linalg.cond(normal[:-1, :-1]) < MOST_ALIKE:
+        if not np.linalg.cond(normal[:-1, :-1]) < LARGEST_CONDITION_NUMBER:
             return None
         inverse = np.linalg.inv(normal)
         found = inverse @ (weighed @ forces)
@@ -147,8 +147,8 @@ def _told(columns: Array, forces: Array, least: float, bends: Array) -> KnownFri
         power = max(least, float(weights @ left**2) / max(1.0, float(np.sum(weights)) - unknowns))
     if power > NOISE_ONLY**2 * least:
         return None
-    together = left[: count // LASTS * LASTS].reshape(-1, LASTS).sum(axis=1)
-    lasting = float(np.mean(together**2)) / LASTS / power * count / (count - unknowns)
+    together = left[: count // LASTING_WINDOWS * LASTING_WINDOWS].reshape(-1, LASTING_WINDOWS).sum(axis=1)
+    lasting = float(np.mean(together**2)) / LASTING_WINDOWS / power * count / (count - unknowns)
     covariance = np.asarray((inverse * power * max(1.0, lasting))[:3, :3], dtype=np.float64)
     bent = (inverse @ weighed @ bends)[:3] * found[0]
     return KnownFriction(found[:3], covariance, np.asarray(covariance + bent @ bent.T, dtype=np.float64))

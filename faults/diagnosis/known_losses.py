@@ -1,4 +1,4 @@
-"""`by_the_balance(diagnosis, estimate, record, p)`: severities from the balances of flow and force.
+"""`with_balance_severities(diagnosis, estimate, record, p)`: severities from the balances of flow and force.
 
 A fitted circuit determines leakage from the whole motion: if real seals yield in another way than its own, leakage
 absorbs the difference. The flow balance uses pump, piston and pressure, and no friction. If it explains a log, it
@@ -12,22 +12,24 @@ from math import isfinite
 
 import numpy as np
 
-from estimation.eha.explanation_notes import lateness
+from estimation.eha.explanation_notes import total_delay
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Outcome, Quantity
 from estimation.log_checks.channel_names import POSITION, PRESSURE
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.known_friction import friction_by_forces
-from faults.diagnosis.not_told import extent, what_is_not_told
-from faults.diagnosis.severity import OF_FRICTION, KnownLosses
+from faults.diagnosis.not_told import interval_width, not_told_notes
+from faults.diagnosis.severity import FRICTION_SEVERITIES, KnownLosses
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
 LOSSES = ("leakage_coefficient", "flow_bias")
 
 
-def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: Record, p: EhaParameters) -> Diagnosis:
+def with_balance_severities(
+    diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: Record, p: EhaParameters
+) -> Diagnosis:
     """Return a diagnosis with severities from the balances of flow and force.
 
     Parameters
@@ -50,42 +52,53 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: 
         changes.
     """
     blocks, circuits = diagnosis.scoreboard.blocks, diagnosis.severity
-    changes = blocks.course is not None or blocks.earlier is not None or diagnosis.scoreboard.onset is not None
-    if not _balances(estimate) or changes or diagnosis.scoreboard.drift is not None or diagnosis.told_by is None:
+    changes = (
+        blocks.leakage_course is not None
+        or blocks.earlier_circuit is not None
+        or diagnosis.scoreboard.onset is not None
+    )
+    if (
+        not _is_balance_accepted(estimate)
+        or changes
+        or diagnosis.scoreboard.drift is not None
+        or diagnosis.severities_given is None
+    ):
         return diagnosis
     losses, severity = known_losses(estimate), circuits
     if losses is not None:
-        severity = diagnosis.told_by(losses, None)
-        if extent(severity["leakage_flow"]) >= extent(circuits["leakage_flow"]):
+        severity = diagnosis.severities_given(losses, None)
+        if interval_width(severity["leakage_flow"]) >= interval_width(circuits["leakage_flow"]):
             losses, severity = None, circuits
-    rubbing = None if _was_late(estimate) else friction_by_forces(record, p, actuator_of(p).rated)
+    rubbing = None if _has_late_channel(estimate) else friction_by_forces(record, p, actuator_of(p).rated)
     if rubbing is not None:
-        rubbed = diagnosis.told_by(losses, rubbing)
-        if _told_better(rubbed, severity):
+        rubbed = diagnosis.severities_given(losses, rubbing)
+        if _is_friction_narrower(rubbed, severity):
             severity = rubbed
     if severity is circuits:
         return diagnosis
     fits = diagnosis.scoreboard.fits
-    by_circuit, told = (what_is_not_told(fits, one, pressure=True) for one in (circuits, severity))
+    by_circuit, told = (not_told_notes(fits, one, pressure=True) for one in (circuits, severity))
     others = [note for note in diagnosis.not_told if note not in by_circuit]
     return replace(diagnosis, severity=severity, not_told=(*told, *others))
 
 
-def _told_better(rubbed: Mapping[str, Quantity], severity: Mapping[str, Quantity]) -> bool:
+def _is_friction_narrower(rubbed: Mapping[str, Quantity], severity: Mapping[str, Quantity]) -> bool:
     """Return whether friction, with all that depends on it, is determined better: a law may have no steady state."""
-    narrower = (extent(rubbed[name]) < extent(severity[name]) for name in ("added_friction", "pressure_rise"))
-    return all(narrower) and all(isfinite(extent(rubbed[name])) for name in OF_FRICTION)
+    narrower = (
+        interval_width(rubbed[name]) < interval_width(severity[name]) for name in ("added_friction", "pressure_rise")
+    )
+    return all(narrower) and all(isfinite(interval_width(rubbed[name])) for name in FRICTION_SEVERITIES)
 
 
-def _balances(estimate: BulkModulusEstimate) -> bool:
+def _is_balance_accepted(estimate: BulkModulusEstimate) -> bool:
     """Return whether the flow balance, further causes included, explains a log."""
     return estimate.form == "flow" and estimate.outcome is Outcome.OK and estimate.gate.passed
 
 
-def _was_late(estimate: BulkModulusEstimate) -> bool:
+def _has_late_channel(estimate: BulkModulusEstimate) -> bool:
     """Return whether pressure or position was late: a lag corrected as a delay leaves errors at reversals."""
     found = estimate.explanation
-    return found is not None and any(lateness(found, channel) != 0.0 for channel in (PRESSURE, POSITION))
+    return found is not None and any(total_delay(found, channel) != 0.0 for channel in (PRESSURE, POSITION))
 
 
 def known_losses(estimate: BulkModulusEstimate) -> KnownLosses | None:
@@ -96,7 +109,11 @@ def known_losses(estimate: BulkModulusEstimate) -> KnownLosses | None:
     KnownLosses or None
         None if the balance was not fitted, is rejected, or needs a further cause to explain the log.
     """
-    if not _balances(estimate) or estimate.explanation is not None or not set(LOSSES) <= set(estimate.others):
+    if (
+        not _is_balance_accepted(estimate)
+        or estimate.explanation is not None
+        or not set(LOSSES) <= set(estimate.others)
+    ):
         return None
     values, deviations = np.array([estimate.others[name] for name in LOSSES]).T
     relative = deviations / values

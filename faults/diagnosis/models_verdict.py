@@ -13,7 +13,7 @@ from faults.notes import AgainstCode, ClassCode
 from plant.log.record import Record
 from plant.notes import Note
 
-TOLD_APART = 1.001
+LEAST_MARGIN = 1.001
 """Least ratio of the runner-up's score to the best for a class to be named [dimensionless]."""
 
 POOR_FIT = 0.5
@@ -38,7 +38,7 @@ class ModelsVerdict(NamedTuple):
     against: tuple[Note, ...]
 
 
-def ranked(scores: Scores) -> list[tuple[str, float]]:
+def ranked_conditions(scores: Scores) -> list[tuple[str, float]]:
     """Return the conditions, the least error first.
 
     Parameters
@@ -54,7 +54,7 @@ def ranked(scores: Scores) -> list[tuple[str, float]]:
     return sorted(scores.by_condition.items(), key=lambda item: item[1] if math.isfinite(item[1]) else math.inf)
 
 
-def margin(scores: Scores) -> float:
+def error_margin(scores: Scores) -> float:
     """Return the ratio of the runner-up's error to the best.
 
     Parameters
@@ -67,7 +67,7 @@ def margin(scores: Scores) -> float:
     float
         The ratio [dimensionless]; 1 if both are zero, NaN if all models diverged.
     """
-    (_, least), (_, next_least) = ranked(scores)[:2]
+    (_, least), (_, next_least) = ranked_conditions(scores)[:2]
     if not math.isfinite(least):
         return math.nan
     return next_least / least if least > 0.0 else (math.inf if next_least > 0.0 else 1.0)
@@ -81,9 +81,9 @@ def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
     ModelsVerdict
         The outcome, and why.
     """
-    if unmeasured := _zero_throughout(scores.channels, record):
+    if unmeasured := _zero_channels(scores.channels, record):
         return ModelsVerdict(Outcome.NOT_OBSERVABLE, (ClassCode.CHANNEL_ZERO.note(channels=unmeasured),), ())
-    ratio = margin(scores)
+    ratio = error_margin(scores)
     if math.isnan(ratio):
         return ModelsVerdict(Outcome.DIVERGED, (ClassCode.MODELS_DIVERGED.note(),), ())
     unexplained = min(scores.by_condition.values())
@@ -94,12 +94,12 @@ def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
     if poor:  # if no model is near the log, two different ones may have equal errors
         finite = [score for score in scores.by_condition.values() if math.isfinite(score)]
         ratio = max(finite) / min(finite)
-    if ratio < TOLD_APART:
+    if ratio < LEAST_MARGIN:
         return ModelsVerdict(Outcome.NOT_OBSERVABLE, (ClassCode.MODELS_ALIKE.note(),), ())
     return ModelsVerdict(Outcome.OK, (), (AgainstCode.NONE_FITS.note(percent=100.0 * unexplained),) if poor else ())
 
 
-def _zero_throughout(channels: Sequence[str], record: Record) -> str:
+def _zero_channels(channels: Sequence[str], record: Record) -> str:
     """Return the channels that are 0 in every sample, in words; empty if there are none."""
     values = {name: measured_velocity(record) if name == VELOCITY else record[name] for name in channels}
     silent = [name for name, one in values.items() if not np.any(np.nan_to_num(one))]

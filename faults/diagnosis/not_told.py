@@ -12,22 +12,22 @@ from estimation.log_checks.channel_physics import MIDDLE
 from estimation.log_checks.standstill import travels
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.class_regions import ClassFits
-from faults.diagnosis.circuits.not_shown import FRICTION_LAW, not_shown
-from faults.diagnosis.severity import OF_FRICTION, OF_OIL
+from faults.diagnosis.circuits.not_shown import FRICTION_LAW, undetermined_coordinates
+from faults.diagnosis.severity import FRICTION_SEVERITIES, OIL_SEVERITIES
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
 
-HELD, BLOCKED = 95.0, 2.0
+HELD_PERCENTILE, BLOCKED_RATIO = 95.0, 2.0
 """Percentile of pressure that a piston at rest withstands [%], and multiple of the breakaway pressure under major
 friction from which it is blocked [dimensionless]; judged: friction at rest may be 1.5 times that of sliding."""
 
-VAGUE = 3.0
+VAGUE_RATIO = 3.0
 """Ratio of relative widths from which a combination is known and its parts are not [dimensionless]."""
 
 
-def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure: bool) -> list[Note]:
+def not_told_notes(fits: ClassFits, found: Mapping[str, Quantity], *, pressure: bool) -> list[Note]:
     """Return a note for each thing that the log does not determine.
 
     Parameters
@@ -44,22 +44,22 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
     list[Note]
         Empty for a log that determines everything.
     """
-    blind, said = not_shown(fits), list[Note]()
+    blind, said = undetermined_coordinates(fits), list[Note]()
     unseen = blind >= FRICTION_LAW
     if unseen:
         said.append(ClassCode.FRICTION_NOT_VISIBLE.note())
     if "bulk_modulus" in blind:
         said.append(ClassCode.BULK_MODULUS_NOT_VISIBLE.note())
     flow, speed = found["leakage_flow"], found["velocity_lost"]
-    lost = [] if unseen else _velocity_lost(speed)  # it depends on friction too
+    lost = [] if unseen else _velocity_lost_notes(speed)  # it depends on friction too
     if not pressure:
         said += [ClassCode.ONE_SCALE.note(), *lost]
-    elif _width(flow) > VAGUE * extent(speed) / 100.0 and _width(flow) > 0.3:
+    elif _relative_width(flow) > VAGUE_RATIO * interval_width(speed) / 100.0 and _relative_width(flow) > 0.3:
         said += [ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(), *lost]
     return said
 
 
-def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -> tuple[Note, ...]:
+def standstill_notes(record: Record, p: EhaParameters, not_told: Collection[Note]) -> tuple[Note, ...]:
     """Return the reason against all nine conditions if none of them holds the piston still, or if it may be blocked.
 
     In the nine, friction gives way at relief pressure, so only leakage keeps the piston still. A blocked rod does so as
@@ -89,15 +89,15 @@ def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -
     pressure = channel_blocks(record, p, MIDDLE).pressure
     if pressure is None or not len(pressure) or p.single_rod:
         return ()
-    held = float(np.percentile(np.abs(pressure), HELD))
+    held = float(np.percentile(np.abs(pressure), HELD_PERCENTILE))
     rubs = parameters_for(CONDITIONS["major_friction"], p).friction_coulomb + abs(p.load_force)
     yields = rubs / p.piston_area
-    if not held >= BLOCKED * yields:  # also true for NaN, which gaps leave
+    if not held >= BLOCKED_RATIO * yields:  # also true for NaN, which gaps leave
         return ()
     return (AgainstCode.ROD_BLOCKED.note(moved_m=gone.piston, held_pa=held, yields_pa=yields),)
 
 
-def not_determined(codes: Collection[object]) -> frozenset[str]:
+def undetermined_severities(codes: Collection[object]) -> frozenset[str]:
     """Return the severities that a log does not determine; their values are those of the prior.
 
     Parameters
@@ -112,14 +112,14 @@ def not_determined(codes: Collection[object]) -> frozenset[str]:
 
     Examples
     --------
-    >>> sorted(not_determined(["friction_not_visible"])), sorted(not_determined(["bulk_modulus_not_visible"]))
-    (['added_friction', 'pressure_rise', 'velocity_lost'], ['bulk_modulus', 'entrained_air'])
+    >>> [sorted(undetermined_severities([code])) for code in ("friction_not_visible", "bulk_modulus_not_visible")]
+    [['added_friction', 'pressure_rise', 'velocity_lost'], ['bulk_modulus', 'entrained_air']]
     """
     said = set(map(str, codes))
     friction = str(ClassCode.FRICTION_NOT_VISIBLE) in said
     # without pressure, a piston that yields on its seals shows only the ratio of bulk modulus to friction
     oil = str(ClassCode.BULK_MODULUS_NOT_VISIBLE) in said or (friction and str(ClassCode.ONE_SCALE) in said)
-    return (OF_FRICTION if friction else frozenset()) | (OF_OIL if oil else frozenset())
+    return (FRICTION_SEVERITIES if friction else frozenset()) | (OIL_SEVERITIES if oil else frozenset())
 
 
 def without_undetermined(found: Mapping[str, Quantity], codes: Collection[object]) -> Mapping[str, Quantity]:
@@ -132,22 +132,22 @@ def without_undetermined(found: Mapping[str, Quantity], codes: Collection[object
     codes : collection of Code or str
         Codes of what the log does not determine.
     """
-    unseen = not_determined(codes)
+    unseen = undetermined_severities(codes)
     return {name: Quantity(None, one.unit) if name in unseen else one for name, one in found.items()}
 
 
-def _velocity_lost(speed: Quantity) -> list[Note]:
+def _velocity_lost_notes(speed: Quantity) -> list[Note]:
     if speed.value is None or speed.ci95 is None:
         return []
     return [ClassCode.VELOCITY_LOST_TOLD.note(percent=speed.value, low=speed.ci95[0], high=speed.ci95[1])]
 
 
-def extent(one: Quantity) -> float:
+def interval_width(one: Quantity) -> float:
     """Return the width of a severity's interval [its unit]; infinite if it has none."""
     return inf if one.ci95 is None else one.ci95[1] - one.ci95[0]
 
 
-def _width(one: Quantity) -> float:
+def _relative_width(one: Quantity) -> float:
     if one.ci95 is None:
         return nan
-    return extent(one) / abs(one.value) if one.value else inf
+    return interval_width(one) / abs(one.value) if one.value else inf

@@ -106,7 +106,7 @@ def score_mathematical(record: Record, bank: Mapping[str, EhaParameters], *, pre
         name: {channel: rmse(measured[channel], predicted[channel]) for channel in measured}
         for name, predicted in predict_runs(record, bank).items()
     }
-    return _scored(rows, measured)
+    return _scores_of_rows(rows, measured)
 
 
 def score_transfer_functions(record: Record, bank: Mapping[str, LinearModel]) -> Scores:
@@ -139,7 +139,7 @@ def score_transfer_functions(record: Record, bank: Mapping[str, LinearModel]) ->
     for name, model in bank.items():
         u, y = at[model.sample_time]
         rows[name] = {"velocity_m_s": rmse(y, model.simulate(u))}
-    return _scored(rows, {"velocity_m_s": velocity})
+    return _scores_of_rows(rows, {"velocity_m_s": velocity})
 
 
 def measured_velocity(record: Record) -> Array:
@@ -200,7 +200,7 @@ def _root_mean_square(values: Array) -> float:
     return math.sqrt(float(np.nanmean(squares)) if math.isnan(mean) else mean)
 
 
-def _scored(rows: Mapping[str, Mapping[str, float]], measured: Mapping[str, Array]) -> Scores:
+def _scores_of_rows(rows: Mapping[str, Mapping[str, float]], measured: Mapping[str, Array]) -> Scores:
     errors = {channel: {name: row[channel] for name, row in rows.items()} for channel in measured}
     if len(measured) == 1:
         return Scores(next(iter(errors.values())), errors)

@@ -14,7 +14,7 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.circuit_runs import fitted_parameters, friction_parts
 from faults.diagnosis.circuits.class_regions import ClassFits
-from faults.diagnosis.circuits.friction_shape import FORCES
+from faults.diagnosis.circuits.friction_shape import FORCE_PLACES
 from faults.diagnosis.circuits.open_classes import OpenCircuit
 from plant.arrays import Array
 from plant.components.friction import quadratic_friction
@@ -25,14 +25,14 @@ from plant.eha.steady_state import steady_state
 DRAWS = 2_000
 """Random circuits for the intervals: their ends are right to 3 %."""
 
-OF_KIND = 0.2
+KIND_SPREAD = 0.2
 """Relative difference of bulk modulus between sound actuators of one kind [dimensionless]: lower values may mean
 air."""
 
-OF_FRICTION = frozenset({"velocity_lost", "added_friction", "pressure_rise"})
+FRICTION_SEVERITIES = frozenset({"velocity_lost", "added_friction", "pressure_rise"})
 """Severities that depend on friction."""
 
-OF_OIL = frozenset({"bulk_modulus", "entrained_air"})
+OIL_SEVERITIES = frozenset({"bulk_modulus", "entrained_air"})
 """Severities that depend on bulk modulus."""
 
 UNITS: Mapping[str, str] = {
@@ -72,13 +72,13 @@ class KnownFriction(NamedTuple):
         Friction at rest, its quadratic part at rated velocity, and all of it there [N].
     covariance : ndarray, shape (3, 3)
         Covariance of their errors [N^2].
-    bent : ndarray, shape (3, 3)
+    bent_covariance : ndarray, shape (3, 3)
         The same if the friction law may have another shape [N^2].
     """
 
     forces: Array
     covariance: Array
-    bent: Array
+    bent_covariance: Array
 
 
 def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
@@ -96,10 +96,10 @@ def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
     Mapping[str, float]
         In the units of `UNITS`.
     """
-    return {name: float(values[0]) for name, values in _of_circuits(point[None], actuator).items()}
+    return {name: float(values[0]) for name, values in _circuit_severities(point[None], actuator).items()}
 
 
-def _of_circuits(points: Array, actuator: Actuator, forces: Array | None = None) -> Mapping[str, Array]:
+def _circuit_severities(points: Array, actuator: Actuator, forces: Array | None = None) -> Mapping[str, Array]:
     """Return the severities of many circuits, each of shape (n,); ``forces``, shape (n, 3), are other friction."""
     healthy = actuator.circuit
     values = fitted_parameters(points, healthy, actuator.rated)
@@ -110,7 +110,7 @@ def _of_circuits(points: Array, actuator: Actuator, forces: Array | None = None)
         values["friction_quadratic"] = bent / actuator.rated**2
     p = SimpleNamespace(**{**vars(healthy), **values})  # only a few of the parameters are read
     velocity, pressure = steady_state(healthy.rated_speed, p)
-    sound_velocity, sound_pressure = _settled(healthy)
+    sound_velocity, sound_pressure = _rated_state(healthy)
     rubbing, sound = (
         quadratic_friction(actuator.rated, 1.0, q.friction_quadratic, q.friction_linear, q.friction_coulomb)
         for q in (p, healthy)
@@ -121,12 +121,12 @@ def _of_circuits(points: Array, actuator: Actuator, forces: Array | None = None)
         "added_friction": rubbing - sound,
         "pressure_rise": 100.0 * (pressure / sound_pressure - 1.0) if sound_pressure > 0.0 else np.zeros(len(points)),
         "bulk_modulus": p.bulk_modulus,
-        "entrained_air": _air(p.bulk_modulus, actuator),
+        "entrained_air": _air_percent(p.bulk_modulus, actuator),
     }
 
 
 @lru_cache(maxsize=16)
-def _settled(circuit: CircuitParameters) -> tuple[float, float]:
+def _rated_state(circuit: CircuitParameters) -> tuple[float, float]:
     """Return velocity and pressure of a circuit at rated speed [m/s, Pa], kept for the next log."""
     return steady_state(circuit.rated_speed, circuit)
 
@@ -168,14 +168,16 @@ def severities(
     if known is not None:
         among = [one._replace(coordinates=np.append(known.logarithms, one.coordinates[2:])) for one in among]
     straight, curved = (None, None) if rubbing is None else ((rubbing.forces, one) for one in rubbing[1:])
-    found = _under(_with_losses(fits.spread, known), among, actuator, widths or {}, straight)
-    if not np.any(fits.moved):
+    found = _drawn_severities(_with_known_losses(fits.spread, known), among, actuator, widths or {}, straight)
+    if not np.any(fits.bend_shifts):
         return found
-    bent = _under(_with_losses(fits.bent_spread, known), among, actuator, widths or {}, curved, OF_FRICTION)
-    return found | {name: replace(found[name], ci95_total=bent[name].ci95) for name in OF_FRICTION}
+    bent = _drawn_severities(
+        _with_known_losses(fits.bent_spread, known), among, actuator, widths or {}, curved, FRICTION_SEVERITIES
+    )
+    return found | {name: replace(found[name], ci95_total=bent[name].ci95) for name in FRICTION_SEVERITIES}
 
 
-def _with_losses(spread: Array, known: KnownLosses | None) -> Array:
+def _with_known_losses(spread: Array, known: KnownLosses | None) -> Array:
     """Return a covariance of coordinates in which the losses are known from another source."""
     if known is None:
         return spread
@@ -185,7 +187,7 @@ def _with_losses(spread: Array, known: KnownLosses | None) -> Array:
     return out
 
 
-def _under(
+def _drawn_severities(
     spread: Array,
     among: Sequence[OpenCircuit],
     actuator: Actuator,
@@ -200,14 +202,14 @@ def _under(
     """
     centre = max(among, key=lambda one: one.probability).coordinates
     draws = _normal_draws(len(centre))
-    circuits, forces = np.vstack([_centres(among) + draws @ np.linalg.cholesky(spread).T, centre]), None
+    circuits, forces = np.vstack([_draw_centres(among) + draws @ np.linalg.cholesky(spread).T, centre]), None
     if rubbing is not None:
         known, covariance = rubbing
-        forces = np.vstack([known + draws[:, FORCES] @ np.linalg.cholesky(covariance).T, known])
+        forces = np.vstack([known + draws[:, FORCE_PLACES] @ np.linalg.cholesky(covariance).T, known])
     with np.errstate(all="ignore"):  # NaN if friction falls so fast that no steady state exists
-        table = _of_circuits(circuits, actuator, forces)
+        table = _circuit_severities(circuits, actuator, forces)
     found: dict[str, Quantity] = {}
-    unresolved = _unresolved(actuator)
+    unresolved = _unresolved_friction(actuator)
     for name, values in table.items():
         if name not in asked:
             continue
@@ -217,7 +219,7 @@ def _under(
             continue
         finite = drawn[~np.isnan(drawn)]
         low, high = percentiles(finite, (2.5, 97.5)) if len(finite) else (np.nan, np.nan)
-        of_forces = rubbing is not None and name in OF_FRICTION  # the factors are for errors of circuits only
+        of_forces = rubbing is not None and name in FRICTION_SEVERITIES  # the factors are for errors of circuits only
         stretch = 1.0 if of_forces else widths.get(name, 1.0)
         least = unresolved.get(name, 0.0)
         ends = value - stretch * (value - low) - least, value + stretch * (high - value) + least
@@ -226,7 +228,7 @@ def _under(
         found[name] = Quantity(value, UNITS[name], ends)
     if "entrained_air" not in asked:
         return found
-    return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
+    return found | {"entrained_air": _with_air_interval(found["entrained_air"], found["bulk_modulus"], actuator)}
 
 
 @cache
@@ -235,7 +237,7 @@ def _normal_draws(coordinates: int) -> Array:
     return np.random.default_rng(0).standard_normal((DRAWS, coordinates))
 
 
-def _unresolved(actuator: Actuator) -> Mapping[str, float]:
+def _unresolved_friction(actuator: Actuator) -> Mapping[str, float]:
     """Return the friction below the resolution of a fit, by severity: no logarithm starts at zero (`LEAST_FORCE`).
 
     It is zero if the healthy friction exceeds that at rest, at rated velocity and in the part between.
@@ -244,12 +246,12 @@ def _unresolved(actuator: Actuator) -> Mapping[str, float]:
     parts, least = friction_parts(p, actuator.rated)
     if min(parts) >= least:
         return {}
-    pressure = _settled(p)[1]
+    pressure = _rated_state(p)[1]
     rise = 100.0 * least / (p.piston_area * pressure) if pressure > 0.0 else 0.0
     return {"added_friction": least, "pressure_rise": rise}
 
 
-def _centres(circuits: Sequence[OpenCircuit]) -> Array:
+def _draw_centres(circuits: Sequence[OpenCircuit]) -> Array:
     """Return the circuit about which each draw lies, in proportion to its probability, shape (`DRAWS` or 1, 7)."""
     shares = np.cumsum([one.probability for one in circuits])
     if len(circuits) == 1:
@@ -294,7 +296,7 @@ def limits_of(actuator: Actuator) -> Mapping[str, float]:
         **{name: rubbing[name] for name in ("added_friction", "pressure_rise")},
     }
     halfway = {name: float(0.5 * (sound[name] + value)) for name, value in faulty.items()}
-    return halfway | {"bulk_modulus": float((1.0 - OF_KIND) * sound["bulk_modulus"])}
+    return halfway | {"bulk_modulus": float((1.0 - KIND_SPREAD) * sound["bulk_modulus"])}
 
 
 def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuator: Actuator) -> Mapping[str, Quantity]:
@@ -317,23 +319,25 @@ def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuat
     if estimated.value is None or estimated.ci95 is None:
         return {**found, "bulk_modulus": estimated, "entrained_air": Quantity(None, UNITS["entrained_air"])}
     ends, total = (
-        None if ci is None else (float(_air(max(ci[1], 1.0), actuator)), float(_air(max(ci[0], 1.0), actuator)))
+        None
+        if ci is None
+        else (float(_air_percent(max(ci[1], 1.0), actuator)), float(_air_percent(max(ci[0], 1.0), actuator)))
         for ci in (estimated.ci95, estimated.ci95_total)
     )
-    air = Quantity(float(_air(estimated.value, actuator)), UNITS["entrained_air"], ends, ci95_total=total)
-    return {**found, "bulk_modulus": estimated, "entrained_air": _with_air(air, estimated, actuator)}
+    air = Quantity(float(_air_percent(estimated.value, actuator)), UNITS["entrained_air"], ends, ci95_total=total)
+    return {**found, "bulk_modulus": estimated, "entrained_air": _with_air_interval(air, estimated, actuator)}
 
 
-def _air(bulk_modulus: Any, actuator: Actuator) -> Any:
+def _air_percent(bulk_modulus: Any, actuator: Actuator) -> Any:
     """Return the air at atmospheric pressure that would make the oil so soft [%], for one modulus or many."""
     healthy = actuator.circuit
     softness = 1.0 / bulk_modulus - 1.0 / healthy.bulk_modulus
     return 100.0 * np.maximum(0.0, softness * healthy.accumulator_pressure**2 / ATMOSPHERE)
 
 
-def _with_air(air: Quantity, modulus: Quantity, actuator: Actuator) -> Quantity:
+def _with_air_interval(air: Quantity, modulus: Quantity, actuator: Actuator) -> Quantity:
     """Return the air with an interval that begins at zero if bulk modulus may be that of a sound actuator."""
-    unlike = actuator.circuit.bulk_modulus * (1.0 - OF_KIND)
+    unlike = actuator.circuit.bulk_modulus * (1.0 - KIND_SPREAD)
 
     ends, total = (
         None if one is None or stiff is None else (max(0.0, one[0]) if stiff[1] < unlike else 0.0, one[1])

@@ -61,23 +61,23 @@ def with_totals(
     lost = found["velocity_lost"].value
     if lost is None:
         return found
-    laws, whole = _laws(lost, actuator, pressure=pressure), _whole(found, actuator)
+    laws, whole = _rig_responses(lost, actuator, pressure=pressure), _whole_quantities(found, actuator)
     beyond = 1.0 - min(1.0, reached / actuator.circuit.relief_pressure) ** 0.5
     laws = {**laws, "leakage_flow": {**laws["leakage_flow"], _TURBULENT: beyond}}
     spreads = {**spreads, _TURBULENT: TURBULENT}
     totals = {name: with_total(found[name], law, spreads, whole.get(name)) for name, law in laws.items()}
-    return {**found, **{name: _holding(found[name].ci95_total, one) for name, one in totals.items()}}
+    return {**found, **{name: _total_including(found[name].ci95_total, one) for name, one in totals.items()}}
 
 
-def _holding(ends: tuple[float, float] | None, one: Quantity) -> Quantity:
+def _total_including(ends: tuple[float, float] | None, one: Quantity) -> Quantity:
     """Return a quantity whose total interval includes another."""
     if ends is None or one.ci95_total is None:
         return one
     return replace(one, ci95_total=(min(ends[0], one.ci95_total[0]), max(ends[1], one.ci95_total[1])))
 
 
-def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Responses]:
-    """Return the response of severities to errors of the rig file, as a share of the whole (`_whole`) or of itself."""
+def _rig_responses(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Responses]:
+    """Return the response of severities to errors of the rig file, over the whole (`_whole_quantities`) or itself."""
     healthy = actuator.circuit
     swept = healthy.piston_area * actuator.rated * (1.0 - lost / 100.0)
     pumped = healthy.rated_flow
@@ -92,7 +92,7 @@ def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Re
     }
 
 
-def _whole(found: Mapping[str, Quantity], actuator: Actuator) -> Mapping[str, float]:
+def _whole_quantities(found: Mapping[str, Quantity], actuator: Actuator) -> Mapping[str, float]:
     """Return the whole from which each severity is a difference, in the severity's unit."""
     p = actuator.circuit
     sound = float(quadratic_friction(actuator.rated, 1.0, p.friction_quadratic, p.friction_linear, p.friction_coulomb))

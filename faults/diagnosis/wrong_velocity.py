@@ -6,12 +6,12 @@ from dataclasses import replace
 from estimation.eha.result import BulkModulusEstimate
 from estimation.log_checks.channel_names import POSITION, VELOCITY
 from estimation.log_checks.clean import CleanLog
-from estimation.log_checks.late_velocity import velocity_apart, wrong_gain_explains
+from estimation.log_checks.late_velocity import velocity_difference, wrong_gain_explains
 from estimation.notes import RigCode, SensorCode
 from faults.notes import ClassCode
 from plant.notes import Note
 
-BY_GAIN = 0.5
+GAIN_SHARE = 0.5
 """Share of the difference between position and integrated velocity from which it is due to a wrong gain [fraction];
 judged."""
 
@@ -47,9 +47,9 @@ def without_wrong_velocity(
     if not froze and all(note.code is not SensorCode.SENSORS_DISAGREE for note in against):
         return None
     worn = any(note.code is RigCode.WEAR_NOT_EXCLUDED for note in strange)
-    if worn and wrong_gain_explains(record) > BY_GAIN:
+    if worn and wrong_gain_explains(record) > GAIN_SHARE:
         return None
-    said = ClassCode.VELOCITY_CONTRADICTED.note(channel=VELOCITY, difference_m_s=velocity_apart(record))
+    said = ClassCode.VELOCITY_CONTRADICTED.note(channel=VELOCITY, difference_m_s=velocity_difference(record))
     return replace(
         log,
         record=record.replace(**{VELOCITY: None}),

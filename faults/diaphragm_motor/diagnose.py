@@ -33,10 +33,10 @@ NAMED_TOGETHER = 0.05
 PRIOR_HEALTHY = 0.5
 """Prior probability of a healthy motor; kinds of fault share the rest equally."""
 
-TOLD_APART = 3.0
+LEAST_SEPARATION = 3.0
 """Standard deviations from which two faults count as told apart."""
 
-LOOKS_ALIKE = 0.99
+LEAST_COSINE = 0.99
 """Cosine between the changes of the electrodes' fundamentals by two faults from which these look alike
 [dimensionless]."""
 
@@ -56,9 +56,9 @@ _GRID = 201
 """Severities at which a fault's curve is evaluated before its nearest point is sought [count]."""
 
 _KINDS = [fault.kind for fault in MOTOR_FAULTS.values()]
-_A_KIND = (1.0 - PRIOR_HEALTHY) / len(set(_KINDS))
+_KIND_PRIOR = (1.0 - PRIOR_HEALTHY) / len(set(_KINDS))
 
-_PRIORS = {name: _A_KIND / _KINDS.count(fault.kind) for name, fault in MOTOR_FAULTS.items()}
+_PRIORS = {name: _KIND_PRIOR / _KINDS.count(fault.kind) for name, fault in MOTOR_FAULTS.items()}
 """Prior probability of each fault: the faults of a kind share the probability of the kind [fraction]."""
 
 
@@ -157,7 +157,9 @@ class _Curve:
 
 
 @lru_cache(maxsize=4)
-def _simulated(healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Mapping[str, Floats]:
+def _simulated_signatures(
+    healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak: float
+) -> Mapping[str, Floats]:
     """Return every fault's signatures at its severities, and the healthy signature, from the model."""
 
     def shown(name: str, severity: float) -> Floats:
@@ -188,13 +190,13 @@ def diagnose_motor(
         If the log cannot be used, or the calibration is of another drive.
     """
     seen = logged_signature(record)
-    return diagnose_signature(seen if calibration is None else _calibrated(seen, calibration, healthy), healthy)
+    return diagnose_signature(seen if calibration is None else _converted_to_model(seen, calibration, healthy), healthy)
 
 
 def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters) -> MotorDiagnosis:
     """Compare a signature with every fault's curve (`diagnose_motor`)."""
     point = _operating_point(seen)
-    simulated = _simulated(healthy, *point)
+    simulated = _simulated_signatures(healthy, *point)
     whitening = _whitening(tolerance(healthy, *point) + seen.covariance)
     white = whitening @ seen.values
     found = [(HEALTHY, 0.0, 0.0, float(np.sum((white - whitening @ simulated[HEALTHY]) ** 2)), log(PRIOR_HEALTHY))]
@@ -219,7 +221,7 @@ def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters) -> Mo
 def separations(
     healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak: float, sizes: Mapping[str, float]
 ) -> Mapping[str, Mapping[str, float]]:
-    """Return the distance of faults to the nearest point of every other curve: below `TOLD_APART` they look alike.
+    """Return the distance of faults to the nearest point of any other curve: below `LEAST_SEPARATION` they look alike.
 
     Parameters
     ----------
@@ -233,7 +235,7 @@ def separations(
     Mapping[str, Mapping[str, float]]
         Distance in standard deviations, by fault and by other fault.
     """
-    simulated = _simulated(healthy, frequency, peak_to_peak)
+    simulated = _simulated_signatures(healthy, frequency, peak_to_peak)
     whitening = _whitening(tolerance(healthy, frequency, peak_to_peak))
     curves = [_Curve(fault, simulated[name], whitening) for name, fault in MOTOR_FAULTS.items()]
     apart: dict[str, dict[str, float]] = {}
@@ -254,7 +256,7 @@ def _lookalikes(best: Match, healthy: DiaphragmMotorParameters, point: tuple[flo
     """Return the faults that change the fundamentals in the same direction as the best one, the nearest first."""
     if best.name == HEALTHY:
         return ()
-    simulated = _simulated(healthy, *point)
+    simulated = _simulated_signatures(healthy, *point)
 
     def bent(values: Floats) -> Floats:
         change = (values - simulated[HEALTHY])[..., :_FUNDAMENTALS]
@@ -263,7 +265,7 @@ def _lookalikes(best: Match, healthy: DiaphragmMotorParameters, point: tuple[flo
     curve = PchipInterpolator(MOTOR_FAULTS[best.name].severities, simulated[best.name], axis=0)
     own = bent(np.asarray(curve(best.severity)))
     cosines = {name: float(np.max(bent(simulated[name]) @ own)) for name in MOTOR_FAULTS if name != best.name}
-    return tuple(name for name in sorted(cosines, key=lambda one: -cosines[one]) if cosines[name] >= LOOKS_ALIKE)
+    return tuple(name for name in sorted(cosines, key=lambda one: -cosines[one]) if cosines[name] >= LEAST_COSINE)
 
 
 def _operating_point(seen: Signature) -> tuple[float, float]:
@@ -271,7 +273,7 @@ def _operating_point(seen: Signature) -> tuple[float, float]:
     return round(seen.drive.frequency, 2), round(seen.drive.peak_to_peak, 1)
 
 
-def _calibrated(seen: Signature, calibration: Signature, healthy: DiaphragmMotorParameters) -> Signature:
+def _converted_to_model(seen: Signature, calibration: Signature, healthy: DiaphragmMotorParameters) -> Signature:
     """Return a log converted to the model's own motor: fundamentals by ratio, all else by difference."""
     was, drive = calibration.drive, seen.drive
     if (

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from operator import add
 from typing import Any, TypeAlias
 
-from plant.diaphragm_motor.parameters import ROWS, DiaphragmMotorParameters, changed
+from plant.diaphragm_motor.parameters import ROWS, DiaphragmMotorParameters, with_changed_value
 from plant.errors import HydrostateError, require_known
 
 HEALTHY = "healthy"
@@ -58,7 +58,7 @@ class MotorFault:
         """
         value = getattr(healthy, self.parameter)
         if self.place:
-            faulty = changed(value, self.place, self.change(value[self.place - 1], severity))
+            faulty = with_changed_value(value, self.place, self.change(value[self.place - 1], severity))
         elif self.parameter in ROWS:
             faulty = tuple(self.change(one, severity) for one in value)
         else:
@@ -66,57 +66,62 @@ class MotorFault:
         return replace(healthy, **{self.parameter: faulty})
 
 
-def _opened(value: float, severity: float) -> float:
+def _open_partly(value: float, severity: float) -> float:
     return value * (1.0 - severity) + severity
 
 
-def _reduced(value: float, severity: float) -> float:
+def _reduce_by_share(value: float, severity: float) -> float:
     return (1.0 - severity) * value
 
 
-def _enlarged(value: float, severity: float) -> float:
+def _enlarge_by_share(value: float, severity: float) -> float:
     return (1.0 + severity) * value
 
 
-def _at_each_place(part: str, kind: str, parameter: str, *rest: Any) -> Iterator[MotorFault]:
+def _faults_at_each_place(part: str, kind: str, parameter: str, *rest: Any) -> Iterator[MotorFault]:
     """Yield one kind of fault at each place; `rest` is as in `MotorFault`."""
     for place in range(1, ROWS[parameter] + 1):
         yield MotorFault(f"{part}_{place}_{kind.removeprefix(f'{part}_')}", kind, parameter, *rest, place=place)
 
 
-def _of_the_whole(name: str, *rest: Any) -> MotorFault:
+def _whole_motor_fault(name: str, *rest: Any) -> MotorFault:
     return MotorFault(name, name, *rest)
 
 
 _ALL = (
-    *_at_each_place(
+    *_faults_at_each_place(
         "valve",
         "valve_leak",
         "valve_leak",
-        _opened,
+        _open_partly,
         "opening of the shut valve; 100 % is stuck open",
         (0.0, 0.01, 0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0),
     ),
-    *_at_each_place(
+    *_faults_at_each_place(
         "valve",
         "valve_blocked",
         "valve_lift",
-        _reduced,
+        _reduce_by_share,
         "share of its opening that the valve has lost",
         (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9),
     ),
-    *_at_each_place(
+    *_faults_at_each_place(
         "diaphragm",
         "depolarised",
         "polarisation",
-        _reduced,
+        _reduce_by_share,
         "share of its drive that the diaphragm has lost; 100 % is dead",
         (0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0),
     ),
-    *_at_each_place(
-        "electrode", "gain", "sensor_gain", _enlarged, "relative change of the electrode's gain", (-1.0, 0.0, 1.0)
+    *_faults_at_each_place(
+        "electrode",
+        "gain",
+        "sensor_gain",
+        _enlarge_by_share,
+        "relative change of the electrode's gain",
+        (-1.0, 0.0, 1.0),
     ),
-    *_at_each_place(
+    *_faults_at_each_place(
         "chamber",
         "gas",
         "gas_fraction",
@@ -124,21 +129,21 @@ _ALL = (
         "gas in the chamber above the healthy share, over its volume",
         (0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.07, 0.1),
     ),
-    _of_the_whole(
+    _whole_motor_fault(
         "gas_everywhere",
         "gas_fraction",
         add,
         "gas in every chamber above the healthy share, over its volume",
         (0.0, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05),
     ),
-    _of_the_whole(
+    _whole_motor_fault(
         "soft_clamp",
         "diaphragm_compliance",
-        _enlarged,
+        _enlarge_by_share,
         "relative rise of the diaphragms' compliance",
         (0.0, 0.05, 0.1, 0.2, 0.3, 0.45),
     ),
-    _of_the_whole(
+    _whole_motor_fault(
         "cylinder_leakage",
         "crossport_leakage",
         add,
@@ -146,7 +151,7 @@ _ALL = (
         (0.0, 2e-12, 5e-12, 1e-11, 1.5e-11, 2e-11),
         "m^3/(s Pa)",
     ),
-    _of_the_whole(
+    _whole_motor_fault(
         "friction",
         "coulomb_friction",
         add,
@@ -154,7 +159,7 @@ _ALL = (
         (0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0),
         "N",
     ),
-    _of_the_whole(
+    _whole_motor_fault(
         "load",
         "load_force",
         add,
@@ -162,17 +167,17 @@ _ALL = (
         (-15.0, -12.0, -9.0, -6.0, -3.0, 0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0),
         "N",
     ),
-    _of_the_whole(
+    _whole_motor_fault(
         "clogged_ports",
         "port_area",
-        _reduced,
+        _reduce_by_share,
         "share of their area that all ports have lost",
         (0.0, 0.1, 0.2, 0.3, 0.4, 0.5),
     ),
-    _of_the_whole(
+    _whole_motor_fault(
         "slow_valves",
         "valve_lag",
-        _enlarged,
+        _enlarge_by_share,
         "relative rise of the valves' time constant",
         (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0),
     ),

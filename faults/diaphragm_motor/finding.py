@@ -10,7 +10,7 @@ from plant.diaphragm_motor.run import ELECTRODES, NAME
 from plant.log.record import Record
 from plant.notes import Code, Note
 
-STANDING = 1e-4
+STANDSTILL_VELOCITY = 1e-4
 """Velocity below which the rod counts as standing [m/s]."""
 
 
@@ -67,7 +67,7 @@ def motor_fault_finding(
         If the log cannot be used, or the calibration is of another drive.
     """
     found = diagnose_motor(record, healthy, calibration=calibration)
-    reasons = _against(found)
+    reasons = _objections(found)
     named = [match.name for match in found.group]
     others = [name for name in found.lookalikes if name not in named]
     nameless = found.unknown or found.best.name == HEALTHY
@@ -82,7 +82,7 @@ def motor_fault_finding(
         probabilities={match.name: match.probability for match in found.matches},
         unknown=found.unknown,
         against=(MotorFaultCode.NO_FAULT_FITS.note(),) if found.unknown else (),
-        faults=tuple(_fault(match) for match in found.group if match.name != HEALTHY and not found.unknown),
+        faults=tuple(_fault_note(match) for match in found.group if match.name != HEALTHY and not found.unknown),
         advice=() if found.unknown else tuple(_remedy(match) for match in found.group if match.name != HEALTHY),
         not_told=(MotorFaultCode.LOOKS_LIKE.note(faults=" or ".join(others).replace("_", " ")),)
         if others and not found.unknown
@@ -107,14 +107,14 @@ def severity_of(match: Match) -> Quantity:
     return Quantity.normal(match.severity, match.deviation, MOTOR_FAULTS[match.name].unit)
 
 
-def _against(found: MotorDiagnosis) -> tuple[Note, ...]:
+def _objections(found: MotorDiagnosis) -> tuple[Note, ...]:
     reasons: list[Note] = []
     if found.unknown:
         best = found.best
         reasons.append(
             MotorFaultCode.NEAREST_MISSES.note(fault=best.name, chi_square=best.chi_square, freedom=found.freedom)
         )
-    if abs(found.signature.velocity) < STANDING:
+    if abs(found.signature.velocity) < STANDSTILL_VELOCITY:
         reasons.append(MotorFaultCode.ROD_STANDS.note(velocity_mm_s=1e3 * found.signature.velocity))
     return tuple(reasons)
 
@@ -148,7 +148,7 @@ def _remedy(match: Match) -> Note:
             return MotorAdviceCode.LOOK_AT_VALVES.note()
 
 
-def _fault(match: Match) -> Note:
+def _fault_note(match: Match) -> Note:
     fault = MOTOR_FAULTS[match.name]
     scale = 100.0 if fault.unit == "1" else 1.0
     low, high = (scale * end for end in match.interval)

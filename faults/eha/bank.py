@@ -85,12 +85,12 @@ def predict_runs(record: Record, bank: Mapping[str, EhaParameters]) -> Mapping[s
     for first in range(0, len(together), LANES):
         some = together[first : first + LANES]
         rows = np.array([parameter_row(bank[name]) for name in some])
-        states = _side_by_side(record, rows)
+        states = _states_by_lanes(record, rows)
         found |= {name: LUMPED.channels(states[..., i], rows[i : i + 1]) for i, name in enumerate(some)}
     return {name: found[name] for name in names}
 
 
-def _side_by_side(record: Record, rows: Array) -> Array:
+def _states_by_lanes(record: Record, rows: Array) -> Array:
     """Return the states of `LANES` lumped models at the samples, shape (n, states, lanes)."""
     width, speed = len(LUMPED.states), bridged(record["motor_speed_rad_s"])
     run = compile_fixed_step(LUMPED.name, LUMPED.step, width, LUMPED.parameter_class, LANES)

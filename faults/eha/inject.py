@@ -10,7 +10,7 @@ from plant.eha.parameter_path import ParameterPath
 from plant.errors import HydrostateError
 
 
-def abrupt(base: EhaParameters, faulty: EhaParameters, at: float) -> ParameterPath:
+def abrupt_fault(base: EhaParameters, faulty: EhaParameters, at: float) -> ParameterPath:
     """Return parameters that jump from the base to the faulty ones.
 
     Parameters
@@ -31,7 +31,7 @@ def abrupt(base: EhaParameters, faulty: EhaParameters, at: float) -> ParameterPa
     Examples
     --------
     >>> from faults.conditions import CONDITIONS, parameters_for
-    >>> path = abrupt(EhaParameters(), parameters_for(CONDITIONS["minor_leakage"]), at=5.0)
+    >>> path = abrupt_fault(EhaParameters(), parameters_for(CONDITIONS["minor_leakage"]), at=5.0)
     >>> path.sample([4.0, 5.0])[:, 5].tolist()
     [4.784e-12, 2.523e-11]
     """
@@ -40,7 +40,7 @@ def abrupt(base: EhaParameters, faulty: EhaParameters, at: float) -> ParameterPa
     return ParameterPath((0.0, at), (base, faulty), "step")
 
 
-def growing(base: EhaParameters, faulty: EhaParameters, start: float, end: float) -> ParameterPath:
+def growing_fault(base: EhaParameters, faulty: EhaParameters, start: float, end: float) -> ParameterPath:
     """Return parameters that change linearly from the base to the faulty ones.
 
     Parameters
@@ -63,7 +63,7 @@ def growing(base: EhaParameters, faulty: EhaParameters, start: float, end: float
     return ParameterPath((start, end), (base, faulty), "linear")
 
 
-def spread(
+def varied_actuator(
     parameters: EhaParameters,
     rng: np.random.Generator,
     leakage: float = 0.1,

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.special import ndtr
 
-from estimation.trust.identifiability import SENSED
+from estimation.trust.identifiability import CARD_CHANNELS
 from faults.conditions import FRICTION_COEFFICIENTS, LEAKAGE_COEFFICIENTS
 from faults.eha.bank import mathematical_bank, predict_run
 from plant.arrays import Array
@@ -86,18 +86,22 @@ def structural_isolability(channels: Sequence[str]) -> Mapping[str, tuple[str, .
     sensors = {"motor_speed_rad_s", *channels}
     present = {name for name in EQUATIONS if name in sensors or not name.endswith(("_s", "_m", "_pa"))}
     faults = {fault: broken for fault, broken in FAULTS.items() if broken in present}
-    whole = overdetermined(present)
+    whole = overdetermined_equations(present)
     found: dict[str, tuple[str, ...] | None] = {}
     for fault, broken in faults.items():
         if broken not in whole:
             found[fault] = None
             continue
-        rivals = ((other, overdetermined(present - {removed})) for other, removed in faults.items() if other != fault)
+        rivals = (
+            (other, overdetermined_equations(present - {removed}))
+            for other, removed in faults.items()
+            if other != fault
+        )
         found[fault] = tuple(other for other, rest in rivals if broken not in rest)
     return MappingProxyType(found)
 
 
-def overdetermined(equations: set[str]) -> set[str]:
+def overdetermined_equations(equations: set[str]) -> set[str]:
     """Return the equations that can be checked against others: the overdetermined part.
 
     Parameters
@@ -188,7 +192,7 @@ def condition_distances(
     parameters: EhaParameters,
     speed: Array,
     sample_time: float,
-    channels: Sequence[str] = SENSED,
+    channels: Sequence[str] = CARD_CHANNELS,
     sensors: Sensors = BENCH,
 ) -> Distances:
     """Return the distances between the nine conditions under a drive, each condition being a class of actuators.
@@ -213,12 +217,14 @@ def condition_distances(
     Raises
     ------
     HydrostateError
-        If a channel is not one of `estimation.trust.identifiability.SENSED`, or has no noise.
+        If a channel is not one of `estimation.trust.identifiability.CARD_CHANNELS`, or has no noise.
     """
     noise = noise_variances(sensors)
     for channel in channels:
-        if channel not in SENSED or not noise.get(channel, 0.0) > 0.0:
-            raise HydrostateError(f"a channel must be one of {', '.join(SENSED)} and have noise, got {channel!r}")
+        if channel not in CARD_CHANNELS or not noise.get(channel, 0.0) > 0.0:
+            raise HydrostateError(
+                f"a channel must be one of {', '.join(CARD_CHANNELS)} and have noise, got {channel!r}"
+            )
     drive = Record(sample_time, {"motor_speed_rad_s": speed})
     healthy = predict_run(drive, parameters)
     lasting = MODEL_ERROR**2 * max(1.0, LASTING / sample_time)

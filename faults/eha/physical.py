@@ -1,7 +1,7 @@
 """Faults as physical changes of the circuit: throttle voltages, air in the oil, a worn pump, a drifting relief valve.
 
-Each function returns changed parameters; `faults.eha.inject.abrupt` and `faults.eha.inject.growing` apply them over
-time.
+Each function returns changed parameters; `faults.eha.inject.abrupt_fault` and `faults.eha.inject.growing_fault` apply
+them over time.
 """
 
 from dataclasses import replace
@@ -56,7 +56,7 @@ THROTTLE_B = _paper_throttle_b()
 """Throttle B of the paper's rig."""
 
 
-def throttled(base: CircuitParameters, a_volts: float, b_volts: float) -> CircuitParameters:
+def with_throttles(base: CircuitParameters, a_volts: float, b_volts: float) -> CircuitParameters:
     """Return the circuit with its throttles at other voltages; the given circuit is healthy, with A shut and B open.
 
     At Table 1's voltages the paper's rig becomes Tables 3 and 4. Throttle A adds a leakage path and its bias; B adds an
@@ -78,7 +78,7 @@ def throttled(base: CircuitParameters, a_volts: float, b_volts: float) -> Circui
 
     Examples
     --------
-    >>> round(throttled(CircuitParameters(), 2.0, 2.5).friction_quadratic)
+    >>> round(with_throttles(CircuitParameters(), 2.0, 2.5).friction_quadratic)
     4462000
     """
     require_volts("throttle B", b_volts)
@@ -86,7 +86,7 @@ def throttled(base: CircuitParameters, a_volts: float, b_volts: float) -> Circui
     load, open_load = (
         orifice_friction(OIL_DENSITY, PAPER_RIG.piston_area, THROTTLE_B.at(volts)) for volts in (b_volts, 0.0)
     )
-    linear, coulomb = _seals(load - open_load)
+    linear, coulomb = _seal_friction_ratios(load - open_load)
     return replace(
         base,
         leakage_coefficient=base.leakage_coefficient + (leakage - PAPER_RIG.leakage_coefficient),
@@ -114,7 +114,7 @@ def aerated(base: CircuitParameters, air_fraction: float) -> CircuitParameters:
     return replace(base, air_fraction=air_fraction)
 
 
-def drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
+def with_drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
     """Return the circuit with another set-point of its relief valve.
 
     Parameters
@@ -129,7 +129,7 @@ def drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
 
     Examples
     --------
-    >>> drifted_relief(CircuitParameters(), 0.5).relief_pressure
+    >>> with_drifted_relief(CircuitParameters(), 0.5).relief_pressure
     1723750.0
     """
     if factor == 0.0:
@@ -138,7 +138,7 @@ def drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
     return replace(base, relief_pressure=factor * base.relief_pressure)
 
 
-def _seals(load: float) -> tuple[float, float]:
+def _seal_friction_ratios(load: float) -> tuple[float, float]:
     """Return a_2 and a_3 relative to their healthy values for a load of throttle B, between Table 4's rows."""
     levels = [FRICTION_TABLE[level] for level in LEVELS]
     loads = [level.friction_quadratic - levels[0].friction_quadratic for level in levels]

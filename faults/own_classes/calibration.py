@@ -80,7 +80,7 @@ def log_loss(probabilities: Array, true: IntArray) -> float:
     return -float(np.mean(np.log(np.maximum(given, 1e-300))))
 
 
-def calibrated(scores: Array, merged: IntArray, true: IntArray) -> Calibration:
+def fit_calibration(scores: Array, merged: IntArray, true: IntArray) -> Calibration:
     """Return the calibration that makes held-back runs most probable.
 
     Parameters

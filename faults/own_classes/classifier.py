@@ -10,22 +10,22 @@ from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted, column_or_1d, validate_data
 
 from estimation.arrays import Array, IntArray
-from faults.own_classes.calibration import Calibration, calibrated, log_loss
+from faults.own_classes.calibration import Calibration, fit_calibration, log_loss
 from faults.own_classes.discriminant import Discriminant, learn
 from faults.own_classes.groups import folds
 from faults.own_classes.verdicts import Verdicts
 from plant.errors import HydrostateError
 
-INNER = 5
+INNER_FOLDS = 5
 """Number of folds with which a fit calibrates its probabilities."""
 
 SHRINKAGES = (1.0, 0.1, 0.01)
 """Shares of Ledoit and Wolf's shrinkage that are tried [fraction]."""
 
-CLEARLY = 0.05
+LEAST_IMPROVEMENT = 0.05
 """Relative improvement of the log loss on held-back runs that less shrinkage must bring [fraction]."""
 
-MOST = 0.5
+MOST_HELD_BACK = 0.5
 """Largest share of a class that may be held back at once when a fit calibrates its probabilities [fraction]."""
 
 UNKNOWN = "unknown"
@@ -100,10 +100,10 @@ class Classifier(ClassifierMixin, BaseEstimator):
         x, labels = checked
         check_classification_targets(labels)
         self.learnt_classes_, places = np.unique(labels, return_inverse=True)
-        self.classes_, self._merged = _merged(self.learnt_classes_, self.merge)
+        self.classes_, self._merged = _merged_classes(self.learnt_classes_, self.merge)
         if len(self.classes_) < 2:
             raise HydrostateError(f"two classes at least are needed, got one class: {self.classes_[0]}")
-        self.shrinkage_, self.calibration_, self._far = _held_back(x, places, self._merged, groups)
+        self.shrinkage_, self.calibration_, self._far = _fit_on_held_back(x, places, self._merged, groups)
         self._learnt: Discriminant = learn(x, places, len(self.learnt_classes_), [self.shrinkage_])[0]
         return self
 
@@ -219,7 +219,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
                 f"features {x.shape}, {len(labels)} labels, {blocks} blocks"
             )
         learnt, places = np.unique(labels, return_inverse=True)
-        classes, merged = _merged(learnt, self.merge)
+        classes, merged = _merged_classes(learnt, self.merge)
         true, group = merged[places], None if groups is None else np.asarray(groups)
         probabilities, likeness = np.zeros((len(x), len(classes))), np.zeros(len(x))
         for held in folds(true if groups is None else places, group, blocks):
@@ -243,7 +243,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return self.classes_[self._merged[known[0]]] if known.size else label
 
 
-def _merged(learnt: NDArray[Any], merge: Merge) -> tuple[NDArray[Any], IntArray]:
+def _merged_classes(learnt: NDArray[Any], merge: Merge) -> tuple[NDArray[Any], IntArray]:
     """Return the reported classes, and the index of each learnt class among them."""
     if merge is None:
         return learnt, np.arange(len(learnt))
@@ -259,14 +259,14 @@ def _merged(learnt: NDArray[Any], merge: Merge) -> tuple[NDArray[Any], IntArray]
     return classes, merged.astype(np.int64)
 
 
-def _held_back(
+def _fit_on_held_back(
     x: Array, places: IntArray, merged: IntArray, groups: Sequence[Any] | NDArray[Any] | None
 ) -> tuple[float, Calibration, Array]:
     """Return the shrinkage and calibration that make held-back runs most probable, and the distances of these runs."""
     scores, far = [list[Array]() for _ in SHRINKAGES], [list[Array]() for _ in SHRINKAGES]
     true = list[IntArray]()
     try:
-        parts = folds(places, groups, INNER, MOST)
+        parts = folds(places, groups, INNER_FOLDS, MOST_HELD_BACK)
     except HydrostateError:
         parts = list[IntArray]()
     for held in parts:
@@ -281,10 +281,10 @@ def _held_back(
     if not true:
         return SHRINKAGES[0], Calibration(), np.zeros((0, 2))
     labels, best, loss = np.concatenate(true), 0, np.inf
-    found = [calibrated(np.concatenate(one), merged, labels) for one in scores]
+    found = [fit_calibration(np.concatenate(one), merged, labels) for one in scores]
     for k, one in enumerate(found):
         now = log_loss(one.probabilities(np.concatenate(scores[k]), merged), labels)
-        if now < (1.0 - CLEARLY) * loss:
+        if now < (1.0 - LEAST_IMPROVEMENT) * loss:
             best, loss = k, now
     return SHRINKAGES[best], found[best], np.sort(np.concatenate(far[best]), axis=0)
 

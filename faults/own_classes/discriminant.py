@@ -65,20 +65,20 @@ class Discriminant:
             Distances [standard deviations].
         """
         known = np.isfinite(self.log_priors)
-        white = _solved(self.factor, ((x - self.mean) / self.scale).T)
-        centres = _solved(self.factor, self.centres[known].T)
+        white = _whitened(self.factor, ((x - self.mean) / self.scale).T)
+        centres = _whitened(self.factor, self.centres[known].T)
         basis, size, _ = np.linalg.svd(centres - centres.mean(axis=1, keepdims=True), full_matrices=False)
         basis = basis[:, size > 1e-9 * size[0]]
-        along = _nearest(basis.T @ white, basis.T @ centres)
-        return np.column_stack([along, _nearest(white, centres)])
+        along = _nearest_distance(basis.T @ white, basis.T @ centres)
+        return np.column_stack([along, _nearest_distance(white, centres)])
 
 
-def _nearest(columns: Array, centres: Array) -> Array:
+def _nearest_distance(columns: Array, centres: Array) -> Array:
     squares = [np.einsum("ij,ij->j", left, left) for left in (columns - one[:, None] for one in centres.T)]
     return np.sqrt(np.min(squares, axis=0))
 
 
-def _solved(factor: Array, columns: Array) -> Array:
+def _whitened(factor: Array, columns: Array) -> Array:
     return np.asarray(solve_triangular(factor, columns, lower=True), dtype=np.float64)
 
 
@@ -101,12 +101,12 @@ def learn(x: Array, places: IntArray, count: int, shares: Sequence[float] = (1.0
     """
     from sklearn.covariance import ledoit_wolf_shrinkage
 
-    mean, scale = x.mean(axis=0), _positive(x.std(axis=0))
+    mean, scale = x.mean(axis=0), _positive_deviation(x.std(axis=0))
     z = (x - mean) / scale
     runs = np.bincount(places, minlength=count)
     centres = np.stack([z[places == k].mean(axis=0) if runs[k] else np.zeros(z.shape[1]) for k in range(count)])
     within = z - centres[places]
-    spread = _positive(within.std(axis=0))
+    spread = _positive_deviation(within.std(axis=0))
     within /= spread
     rule = float(ledoit_wolf_shrinkage(within, assume_centered=True))
     covariance = within.T @ within / len(within)
@@ -127,6 +127,6 @@ def _factor(covariance: Array, shrinkage: float) -> Array:
     return np.tril(np.asarray(cho_factor(shrunk, lower=True)[0], dtype=np.float64))
 
 
-def _positive(deviation: Array) -> Array:
+def _positive_deviation(deviation: Array) -> Array:
     """Return deviations, with 1 for features that do not vary."""
     return np.where(deviation > 1e-12 * (1.0 + deviation.max(initial=0.0)), deviation, 1.0)

@@ -100,7 +100,7 @@ def _bands(recipe: Recipe, shortest: int, sample_time: float) -> list[tuple[floa
         edges = edges[::-1]
     lines = np.arange(shortest // 2 + 1) / (shortest * sample_time)
     bands = list(pairwise(edges))
-    empty = [band for band in bands if not _inside(lines, band).any()]
+    empty = [band for band in bands if not _is_inside_band(lines, band).any()]
     if empty and recipe.edges:
         low, high = empty[0]
         raise HydrostateError(
@@ -110,7 +110,7 @@ def _bands(recipe: Recipe, shortest: int, sample_time: float) -> list[tuple[floa
     return [band for band in bands if band not in empty]
 
 
-def _inside(lines: Array, band: tuple[float, float]) -> BoolArray:
+def _is_inside_band(lines: Array, band: tuple[float, float]) -> BoolArray:
     return (lines > band[0]) & (lines <= band[1] * (1.0 + 1e-9))
 
 
@@ -133,7 +133,8 @@ def _row(run: Array, sample_time: float, parts: int, bands: Sequence[tuple[float
     power = np.abs(np.fft.rfft(unit * np.hanning(run.shape[1]), axis=1)) ** 2 / run.shape[1]
     share = (floor / size) ** 2
     spectrum = [
-        np.log(power[:, _inside(lines, band)].mean(axis=1) + share + 1e-12) + 2.0 * np.log(size) for band in bands
+        np.log(power[:, _is_inside_band(lines, band)].mean(axis=1) + share + 1e-12) + 2.0 * np.log(size)
+        for band in bands
     ]
     columns = [means, deviations, *(one[:, None] for one in (*shape, *spectrum))]
     return np.concatenate(columns, axis=1).ravel()

@@ -6,7 +6,7 @@ from math import log
 
 from estimation.finding import Finding, Gate, Outcome
 from estimation.piezo_stack.estimate import StackEstimate, estimate_stack
-from estimation.piezo_stack.finding import channel_disagrees, missed, stack_quantities
+from estimation.piezo_stack.finding import channel_disagrees, stack_quantities, undescribed_channels
 from estimation.piezo_stack.runs import STACK_CHANNELS
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS
 from faults.conditions import CONDITIONS
@@ -19,7 +19,7 @@ from plant.piezo_stack.trajectory import NAME
 
 GAPS = ("outlet_reed_gap", "inlet_reed_gap")
 
-SELDOM: tuple[tuple[tuple[str, ...], tuple[Mapping[str, float], ...]], ...] = (
+SELDOM_UNKNOWNS: tuple[tuple[tuple[str, ...], tuple[Mapping[str, float], ...]], ...] = (
     (GAPS, ({}, *({name: gap} for gap in (0.3, 1.5) for name in GAPS))),
     (("bias_pressure",), tuple({"bias_pressure": log(share)} for share in (0.8, 0.6, 0.4, 1.5))),
 )
@@ -117,13 +117,14 @@ def diagnose_stack(
         If the log cannot be used.
     """
     found = estimate_stack(record, healthy, channels=channels)
-    for seldom, guesses in SELDOM:
-        if missed(found):
+    for seldom, guesses in SELDOM_UNKNOWNS:
+        if undescribed_channels(found):
             unknowns, starts = (*DEFAULT_UNKNOWNS, *seldom), (*STARTS, *guesses)
             wider = estimate_stack(record, healthy, unknowns=unknowns, channels=channels, starts=starts)
             found = min(found, wider, key=lambda one: max(one.misfit.values()))
     against = tuple(
-        StackFaultCode.ANOTHER_ACTUATOR.note(channel=name, ratio=ratio) for name, ratio in missed(found).items()
+        StackFaultCode.ANOTHER_ACTUATOR.note(channel=name, ratio=ratio)
+        for name, ratio in undescribed_channels(found).items()
     )
     if against:
         against += channel_disagrees(record, healthy, tuple(found.misfit))
@@ -132,7 +133,7 @@ def diagnose_stack(
     condition = next((n for n, c in CONDITIONS.items() if (c.leakage, c.friction) == (leakage, friction)), None)
     reasons = against if condition is not None else (*against, StackFaultCode.LEAKAGE_AND_FRICTION.note())
     told = Outcome.NOT_OBSERVABLE if condition is None else Outcome.OK
-    faults = () if reasons else tuple(n for n in (_fault(name, found, healthy) for name in found.values) if n)
+    faults = () if reasons else tuple(n for n in (_fault_note(name, found, healthy) for name in found.values) if n)
     return Finding(
         actuator=NAME,
         outcome=Outcome.MISMATCH if against else told,
@@ -183,7 +184,7 @@ def _level(found: StackEstimate, name: str, healthy: float, levels: Mapping[str,
     return min(levels, key=lambda level: abs(above - levels[level]))
 
 
-def _fault(name: str, found: StackEstimate, healthy: PiezoStackParameters) -> Note | None:
+def _fault_note(name: str, found: StackEstimate, healthy: PiezoStackParameters) -> Note | None:
     """Return the fault that a quantity shows; None if there is none, or it is uncertain."""
     value, sure = found.values[name], SURE * found.deviations[name]
     base = 1.0 if name == "polarisation" else float(getattr(healthy, name))

@@ -19,19 +19,19 @@ ADDED_FRICTION: Mapping[str, float] = {"none": 0.0, "minor": 100.0, "major": 250
 """Coulomb friction added to the healthy one at each level [N]: about 23 and 56 % of that flow, judged."""
 
 
-def _air(factor: float) -> StackFault:
+def _with_air(factor: float) -> StackFault:
     return lambda p: replace(p, air_fraction=factor * p.air_fraction)
 
 
-def _depolarised(share: float) -> StackFault:
+def _with_depolarised_stack(share: float) -> StackFault:
     return lambda p: replace(
         p, free_stroke_a_volt=(1.0 - share) * p.free_stroke_a_volt, hysteresis=(1.0 - share) * p.hysteresis
     )
 
 
 STACK_FAULTS: Mapping[str, StackFault] = {
-    "air_doubled": _air(2.0),
-    "air_fourfold": _air(4.0),
+    "air_doubled": _with_air(2.0),
+    "air_fourfold": _with_air(4.0),
     "chamber_leakage_minor": lambda p: replace(p, chamber_leakage=5e-12),
     "chamber_leakage_major": lambda p: replace(p, chamber_leakage=2e-11),
     "outlet_reed_soft": lambda p: replace(p, outlet_reed_stiffness=0.5 * p.outlet_reed_stiffness),
@@ -40,8 +40,8 @@ STACK_FAULTS: Mapping[str, StackFault] = {
     "inlet_reed_gap": lambda p: replace(p, inlet_reed_gap=3e-5),
     "outlet_reed_stuck_open": lambda p: replace(p, outlet_reed_gap=1.5e-4),
     "inlet_reed_jammed": lambda p: replace(p, inlet_reed_stiffness=100.0 * p.inlet_reed_stiffness),
-    "depolarised_10_percent": _depolarised(0.10),
-    "depolarised_25_percent": _depolarised(0.25),
+    "depolarised_10_percent": _with_depolarised_stack(0.10),
+    "depolarised_25_percent": _with_depolarised_stack(0.25),
     "bias_lost": lambda p: replace(p, bias_pressure=0.6 * p.bias_pressure),
 }
 """Faults other than the nine conditions, by name."""

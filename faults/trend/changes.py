@@ -14,7 +14,7 @@ FEWEST, LATEST = 3, 6
 JUMP = 4.0
 """Jump of the medians, in standard deviations of a log, at which a change is tried [dimensionless]."""
 
-RARE = 1.0 / 200.0
+JUMP_PRIOR = 1.0 / 200.0
 """Expected number of jumps per log [probability]."""
 
 
@@ -48,7 +48,7 @@ def stretches(
                 continue
             later = slice(begin, place + 1)
             fresh = beliefs(times[later], values[later], stds[later], grid)[-1]
-            apart = evidence_of(run[begin - start], grid) + evidence_of(fresh, grid) + np.log(RARE)
+            apart = evidence_of(run[begin - start], grid) + evidence_of(fresh, grid) + np.log(JUMP_PRIOR)
             if apart > evidence_of(run[place + 1 - start], grid):
                 start, run = begin, beliefs(times[begin:], values[begin:], stds[begin:], grid)
                 break

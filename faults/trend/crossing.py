@@ -75,10 +75,10 @@ def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: fl
         From `DRAWS` futures; between two steps the crossing is interpolated linearly.
     """
     chosen = rng.choice(len(grid.slope), DRAWS, p=belief.weights(grid))
-    level, slope, curvature = _drawn(belief, chosen, rng)
+    level, slope, curvature = _drawn_states(belief, chosen, rng)
     gone = np.where(level >= limit, 0.0, np.inf)
     bend, wander, jerk = grid.bend[chosen], grid.wander[chosen], grid.jerk[chosen]
-    paces = {stride: _paced(stride, grid, chosen) for stride in set(STRIDES.tolist())}
+    paces = {stride: _pace_transitions(stride, grid, chosen) for stride in set(STRIDES.tolist())}
     begin = 0.0
     for stride in STRIDES.tolist():
         turn, half, drift, jolt = rng.standard_normal((4, DRAWS))
@@ -94,7 +94,7 @@ def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: fl
     return Crossing(np.sort(gone))
 
 
-def _paced(stride: float, grid: Settings, chosen: Index) -> tuple[Array, Array]:
+def _pace_transitions(stride: float, grid: Settings, chosen: Index) -> tuple[Array, Array]:
     """Return the transition of slopes, shape (2, draws), and the factor of their noise, shape (3, draws)."""
     moves, noises = np.empty((len(grid.pace), 2)), np.empty((len(grid.pace), 3))
     for pace, own in grid.by_pace:
@@ -105,7 +105,7 @@ def _paced(stride: float, grid: Settings, chosen: Index) -> tuple[Array, Array]:
     return moves[chosen].T, noises[chosen].T
 
 
-def _drawn(belief: Belief, chosen: Index, rng: np.random.Generator) -> Array:
+def _drawn_states(belief: Belief, chosen: Index, rng: np.random.Generator) -> Array:
     """Return levels, slopes and curvatures, shape (3, draws), under the settings that were drawn."""
     sizes, axes = np.linalg.eigh(belief.covariance)
     roots = axes * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]

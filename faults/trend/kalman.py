@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from faults.trend.kalman_loops import GridRows, Index, Steps, fill_predicted, follow
+from faults.trend.kalman_loops import GridRows, Index, Steps, fill_beliefs, fill_predicted
 from plant.arrays import Array
 
 BENDS = (0.0, 1e-3, 3e-3, 1e-2)
@@ -49,7 +49,7 @@ SMALLEST_GROWTH = 1e-4
 LEVEL = 1.0
 """Standard deviation of the level before the first log [dimensionless]."""
 
-GROSS = 3.5
+CLIP_DEVIATIONS = 3.5
 """Limit at which an innovation is clipped, in standard deviations [dimensionless]: one wrong log is not a trend."""
 
 
@@ -90,14 +90,14 @@ class Settings:
         return tuple(pace for pace, _ in self.by_pace)
 
     @cached_property
-    def paced(self) -> Index:
+    def pace_places(self) -> Index:
         """Index of each setting's pace, shape (g,)."""
         return np.repeat(np.arange(len(self.by_pace)), [own.stop - own.start for _, own in self.by_pace])
 
     @property
     def rows(self) -> GridRows:
         """The settings in the form that the loops take."""
-        return GridRows(self.paced, self.bend, self.jerk, self.scatter)
+        return GridRows(self.pace_places, self.bend, self.jerk, self.scatter)
 
     @cached_property
     def log_prior(self) -> Array:
@@ -183,7 +183,7 @@ def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> list[Be
     made = [_step(step, grid.paces) for step in steps.tolist()]
     moves, bent, jerked = (np.array(one) for one in zip(*made, strict=True))
     before = Steps(moves, bent, jerked, steps[:, None] * grid.wander**2)
-    follow(values, stds, GROSS, grid.rows, before, mean, covariance, evidence)
+    fill_beliefs(values, stds, CLIP_DEVIATIONS, grid.rows, before, mean, covariance, evidence)
     return [Belief(mean[k], covariance[k], evidence[k]) for k in range(rows)]
 
 
@@ -206,7 +206,7 @@ def predict(now: Belief, step: float, grid: Settings) -> Belief:
 def _step(step: float, paces: tuple[float, ...]) -> tuple[Array, Array, Array]:
     """Return transitions of the mean, and covariances that unit noise on slope (each per pace) and curvature adds."""
     moves = np.tile([[1.0, step, 0.5 * step**2], [0.0, 1.0, step], [0.0, 0.0, 1.0]], (len(paces), 1, 1))
-    bent, jerked = np.tile(_gained(step, 2), (len(paces), 1, 1)), _gained(step, 3)
+    bent, jerked = np.tile(_noise_covariance(step, 2), (len(paces), 1, 1)), _noise_covariance(step, 3)
     for move, turned, pace in zip(moves, bent, paces, strict=True):
         if pace:  # settings with a pace have no curvature
             move[:2, 1], turned[:2, :2] = exponential_growth(step, pace)
@@ -233,14 +233,14 @@ def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
         Covariance of level and slope.
     """
     if pace * step < SMALLEST_GROWTH:  # the limit for small growth; the formulas below would lose all digits
-        return np.array([step, 1.0]), _gained(step, 2)[:2, :2]
+        return np.array([step, 1.0]), _noise_covariance(step, 2)[:2, :2]
     once, twice = np.expm1(pace * step) / pace, np.expm1(2.0 * pace * step) / (2.0 * pace)
     # integrals from 0 to the step of expm1(pace t) / pace and exp(pace t): of their squares and of their product
     level, both = (twice - 2.0 * once + step) / pace**2, (twice - once) / pace
     return np.array([once, 1.0 + pace * once]), np.array([[level, both], [both, twice]])
 
 
-def _gained(step: float, states: int) -> Array:
+def _noise_covariance(step: float, states: int) -> Array:
     """Return the covariance, shape (3, 3), that unit white noise on the last of some states adds over a time."""
     place = np.arange(states - 1, -1, -1)
     power = place[:, None] + place + 1

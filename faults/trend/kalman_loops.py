@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.arrays import Array
-from plant.compiled.native.loops import natively
+from plant.compiled.native.loops import natively_compiled
 
 Index: TypeAlias = NDArray[np.int64]
 """Indices."""
@@ -18,7 +18,7 @@ class GridRows(NamedTuple):
 
     Parameters
     ----------
-    paced : ndarray of int, shape (g,)
+    pace_places : ndarray of int, shape (g,)
         Index of each setting's pace.
     bend, jerk : ndarray, shape (g,)
         Standard deviation that slope and curvature gain in a unit of time [1/log, 1/log^2].
@@ -26,7 +26,7 @@ class GridRows(NamedTuple):
         Standard deviation from log to log beyond each log's own [dimensionless].
     """
 
-    paced: Index
+    pace_places: Index
     bend: Array
     jerk: Array
     scatter: Array
@@ -37,21 +37,21 @@ class Steps(NamedTuple):
 
     Parameters
     ----------
-    moves, bent : ndarray, shape (n, paces, 3, 3)
+    transitions, slope_noise : ndarray, shape (n, paces, 3, 3)
         Transition of level, slope and curvature for each pace, and the covariance from unit white noise on the slope.
-    jerked : ndarray, shape (n, 3, 3)
+    curvature_noise : ndarray, shape (n, 3, 3)
         Covariance from unit white noise on the curvature.
-    wandered : ndarray, shape (n, g)
+    level_noise : ndarray, shape (n, g)
         Variance that the level gains [dimensionless].
     """
 
-    moves: Array
-    bent: Array
-    jerked: Array
-    wandered: Array
+    transitions: Array
+    slope_noise: Array
+    curvature_noise: Array
+    level_noise: Array
 
 
-@natively()
+@natively_compiled()
 def fill_predicted(
     mean: Array,
     covariance: Array,
@@ -76,9 +76,14 @@ def fill_predicted(
     next_covariance : ndarray, shape (g, 3, 3)
         Output for the covariances.
     """
-    moves, bent, jerked, wandered = steps.moves[place], steps.bent[place], steps.jerked[place], steps.wandered[place]
+    moves, bent, jerked, wandered = (
+        steps.transitions[place],
+        steps.slope_noise[place],
+        steps.curvature_noise[place],
+        steps.level_noise[place],
+    )
     for k in range(mean.shape[0]):
-        move, noise = moves[grid.paced[k]], bent[grid.paced[k]]
+        move, noise = moves[grid.pace_places[k]], bent[grid.pace_places[k]]
         slopes, jolts = grid.bend[k] * grid.bend[k], grid.jerk[k] * grid.jerk[k]
         rise, bow, growth, turn = move[0, 1], move[0, 2], move[1, 1], move[1, 2]
         level, slope, curvature = mean[k, 0], mean[k, 1], mean[k, 2]
@@ -103,8 +108,8 @@ def fill_predicted(
                 next_covariance[k, j, i] = next_covariance[k, i, j]
 
 
-@natively()
-def take_in(
+@natively_compiled()
+def update_belief(
     mean: Array, covariance: Array, evidence: Array, value: float, std: float, gross: float, scatter: Array
 ) -> None:
     """Update the belief with a log.
@@ -140,8 +145,8 @@ def take_in(
             covariance[k, i, 2] -= gain * curvature
 
 
-@natively()
-def follow(
+@natively_compiled()
+def fill_beliefs(
     values: Array,
     stds: Array,
     gross: float,
@@ -158,7 +163,7 @@ def follow(
     values, stds : ndarray, shape (n,)
         Value of each log, and its own standard deviation [dimensionless].
     gross : float
-        See `take_in` [dimensionless].
+        See `update_belief` [dimensionless].
     mean : ndarray, shape (rows, g, 3)
         Means; one more row than there are logs.
     covariance : ndarray, shape (rows, g, 3, 3)
@@ -170,4 +175,4 @@ def follow(
         fill_predicted(mean[k], covariance[k], grid, steps, k, mean[k + 1], covariance[k + 1])
         for i in range(evidence.shape[1]):
             evidence[k + 1, i] = evidence[k, i]
-        take_in(mean[k + 1], covariance[k + 1], evidence[k + 1], values[k], stds[k], gross, grid.scatter)
+        update_belief(mean[k + 1], covariance[k + 1], evidence[k + 1], values[k], stds[k], gross, grid.scatter)

@@ -14,7 +14,7 @@ from plant.arrays import Array
 FALSE_ALARMS = 0.01
 """Probability that a stretch without growth ever raises an alarm, whatever its length [probability]."""
 
-AHEAD = 25.0
+ALARM_HORIZON = 25.0
 """Number of steps ahead: an alarm is raised if a crossing within them is more probable than not [count]."""
 
 SURE = 0.95
@@ -127,11 +127,11 @@ class Trend:
 
     @property
     def alarm(self) -> bool:
-        """Whether it certainly grows and will probably reach its limit within `AHEAD`, or has passed it with `SURE`."""
+        """Whether it certainly grows and probably reaches its limit within `ALARM_HORIZON`, or passed it (`SURE`)."""
         mean, std = moments(self.belief, settings())
         if self._short or (not self.certain and mean + 3.0 * std < 1.0):
             return False  # before futures are drawn, which is slow
-        return self._future.within(0.0) >= SURE or (self.certain and self._future.within(AHEAD) >= 0.5)
+        return self._future.within(0.0) >= SURE or (self.certain and self._future.within(ALARM_HORIZON) >= 0.5)
 
 
 def trends(series: Series) -> Iterator[Trend]:

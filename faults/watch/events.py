@@ -6,10 +6,10 @@ import numpy as np
 
 from plant.arrays import Array
 
-SLOW = "loss"
+LOSS_BALANCE = "loss"
 """Name in an alarm for a loss of flow that has grown slowly; the other names are those of balances."""
 
-LIKELY = 1.92
+INTERVAL_DROP = 1.92
 """Drop of the log-likelihood at the ends of a 95 % interval: half the quantile of chi-square with one degree."""
 
 
@@ -102,5 +102,5 @@ def change_time(scores: Array) -> tuple[int, tuple[int, int]]:
     """
     length = np.arange(1, len(scores) + 1)
     ratio = 0.5 * np.maximum(np.cumsum(scores), 0.0) ** 2 / length
-    likely = np.flatnonzero(ratio >= ratio.max() - LIKELY) + 1
+    likely = np.flatnonzero(ratio >= ratio.max() - INTERVAL_DROP) + 1
     return int(ratio.argmax()) + 1, (int(likely[0]), int(likely[-1]))

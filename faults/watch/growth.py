@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from faults.watch.events import LIKELY
+from faults.watch.events import INTERVAL_DROP
 from plant.arrays import Array
 
 FEWEST = 4
@@ -11,11 +11,11 @@ FEWEST = 4
 MOST_ALIKE = 0.95
 """Upper limit of the correlation of neighbouring levels [fraction]: so few levels do not determine it better."""
 
-OIL_MOVES = 0.1
+LARGEST_OIL_SHIFT = 0.1
 """Largest shift of a rise's beginning by simultaneous drift of the oil, relative to the rise's duration [fraction]
 (judged)."""
 
-WIDER = 2
+WIDENED_SPANS = 2
 """Number of spans by which the interval is widened at both ends: the first spans of a rise contain little of it."""
 
 
@@ -44,21 +44,21 @@ def growth_time(levels: Array, ends: Array) -> tuple[float, tuple[float, float]]
         return float(ends[0]), (float(ends[0]), float(ends[-1]))
     slopes = np.maximum(ends[None, :] - ends[:-2, None], 0.0)
     shapes = np.concatenate([slopes, (slopes > 0.0).astype(np.float64)])
-    missed = _missed(shapes, levels).reshape(2, -1)
+    missed = _squared_residuals(shapes, levels).reshape(2, -1)
     best = shapes[missed.argmin()] - shapes[missed.argmin()].mean()
     left = levels - levels.mean() - best * float(best @ levels) / float(best @ best)
     missed = missed.min(axis=0)
     variance = max(float(missed.min()) / (len(levels) - FEWEST + 1), 1e-30)
     alike = min(max(float(left[1:] @ left[:-1]) / max(float(left @ left), 1e-30), 0.0), MOST_ALIKE)
-    apart = 2.0 * LIKELY * variance * (1.0 + alike) / (1.0 - alike)
+    apart = 2.0 * INTERVAL_DROP * variance * (1.0 + alike) / (1.0 - alike)
     likely = np.flatnonzero(missed <= missed.min() + apart)
-    first, last = max(int(likely[0]) - WIDER, 0), min(int(likely[-1]) + WIDER, len(ends) - 1)
+    first, last = max(int(likely[0]) - WIDENED_SPANS, 0), min(int(likely[-1]) + WIDENED_SPANS, len(ends) - 1)
     since = float(ends[missed.argmin()])
-    moved = OIL_MOVES * (float(ends[-1]) - since)
+    moved = LARGEST_OIL_SHIFT * (float(ends[-1]) - since)
     return since, (float(ends[first]) - moved, min(float(ends[last]) + moved, float(ends[-1])))
 
 
-def _missed(shapes: Array, levels: Array) -> Array:
+def _squared_residuals(shapes: Array, levels: Array) -> Array:
     """Return the sums of squared residuals of a constant and of each shape, shape (shapes,)."""
     centred = shapes - shapes.mean(axis=1, keepdims=True)
     away = levels - levels.mean()

@@ -20,7 +20,7 @@ from faults.watch.loss import (
     LEAST_LEARNT,
     SPAN,
     SPAN_RESISTANCE,
-    SPAN_TELLS,
+    SPAN_RESULTS,
     SPANS,
     WANTED,
     count_lag,
@@ -30,7 +30,7 @@ from faults.watch.loss import (
     learn_loss_again,
     measure_lag,
     measure_work,
-    oil_allows,
+    oil_allowance,
 )
 from faults.watch.memory import (
     ALL,
@@ -53,7 +53,7 @@ from faults.watch.memory import (
 from plant.arrays import Array
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 
 ALLOWANCE = 1.0
 """Score of a block above which the CUSUM rises [standard deviations]: drift of the oil moves it by less."""
@@ -216,7 +216,7 @@ def renew_thresholds(setting: WatchSetting, memory: Memory) -> None:
 
 def end_span(memory: Memory) -> bool:
     """Judge the loss in a whole span; return whether it exceeds what warming oil explains."""
-    told, known = np.empty(SPAN_TELLS), memory.known
+    told, known = np.empty(SPAN_RESULTS), memory.known
     if memory.score.shape[0] == 2:
         measure_work(memory.work, told)
     else:
@@ -263,14 +263,14 @@ def watch_kernel() -> NativeKernel:
         count_lag,
         measure_work,
         measure_lag,
-        oil_allows,
+        oil_allowance,
         learn_loss_again,
         drive_is_alike,
         judge_loss,
     )
     of_blocks = (drop_span, end_span, renew_thresholds, score_balances, end_block)
-    small = pasted(*of_balances, *of_loss, *of_blocks, constants=constants, inlined=True)
+    small = functions_text(*of_balances, *of_loss, *of_blocks, constants=constants, inlined=True)
     entries = threshold, advance, begin_again
-    large = pasted(*entries)
+    large = functions_text(*entries)
     text = kernel_text("the watch over flow and force balances", small, large)
     return load_native("watch", text, {one.__name__: signature_of(one) for one in entries})

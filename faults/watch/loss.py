@@ -28,10 +28,10 @@ WORK = 5
 WORK_QP, WORK_WP, WORK_PP, WORK_PV, WORK_VV = range(WORK)
 """Indices of these: q p, the magnitude of w p, p p, p v and v v."""
 
-SPAN_TELLS = 6
+SPAN_RESULTS = 6
 """Results of a span."""
 
-SPAN_SHARE, SPAN_OTHER_SHARE, SPAN_RATIO, SPAN_RESISTANCE, SPAN_FAST, SPAN_LIVELY = range(SPAN_TELLS)
+SPAN_SHARE, SPAN_OTHER_SHARE, SPAN_RATIO, SPAN_RESISTANCE, SPAN_FAST, SPAN_LIVELY = range(SPAN_RESULTS)
 """Indices of these: two lost shares, the ratio that makes them comparable, pressure at a velocity (0 for a span without
 a result), and how fast and how lively the drive is."""
 
@@ -41,7 +41,7 @@ OIL = 2.0
 LEAST_LOSS = 0.05
 """Least loss for comparison [fraction]: a rig's entries may be wrong by that much (judged)."""
 
-LEAST_TOLD = 0.02
+LEAST_UNEXPLAINED = 0.02
 """Least share of the speed that its previous changes must leave unexplained [fraction], so that lost speed and lag can
 be separated."""
 
@@ -152,7 +152,7 @@ def measure_lag(lag: Array, lost: Array, told: Array) -> None:
     found, factor, first = np.empty(last), np.empty((last, last)), np.zeros(last)
     first[0] = 1.0
     solve(lag[:last, :last], first, found, factor)
-    told[SPAN_RESISTANCE] = 1.0 if found[0] * lag[0, 0] * LEAST_TOLD < 1.0 else 0.0
+    told[SPAN_RESISTANCE] = 1.0 if found[0] * lag[0, 0] * LEAST_UNEXPLAINED < 1.0 else 0.0
     solve(lag[:last, :last], lost[:last], found, factor)
     told[SPAN_SHARE] = found[0]
     told[SPAN_FAST], told[SPAN_LIVELY] = lag[0, 0] / lag[last, last], lag[1, 1] / lag[0, 0]
@@ -208,13 +208,13 @@ def judge_loss(told: Array, now: float, loss: Array, levels: Array) -> bool:
     loss[SEEN] += 1.0
     if loss[SPANS] < loss[WANTED]:
         return False
-    allowed = oil_allows(loss[SHARE])
+    allowed = oil_allowance(loss[SHARE])
     deviation = max(math.sqrt(loss[SPREAD]) * (1.0 + 2.0 / math.sqrt(loss[KNOWN] + 1.0)), NARROWEST * allowed)
     loss[RISEN] = max(0.0, loss[RISEN] + min((level - loss[SHARE] - allowed) / deviation, LARGEST) - ALLOWED)
     return loss[RISEN] > loss[LIMIT]
 
 
-def oil_allows(usual: float) -> float:
+def oil_allowance(usual: float) -> float:
     """Return how much the loss may exceed the usual one before it is a leak [fraction]."""
     return (OIL - 1.0) * max(usual, LEAST_LOSS)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError
-from plant.log.chamber_pressures import PRESSURE, with_difference
+from plant.log.chamber_pressures import PRESSURE, with_pressure_difference
 
 
 def watched_samples(channels: Mapping[str, Array], sample_time: float, travelled: float = 0.0) -> tuple[Array, bool]:
@@ -37,7 +37,7 @@ def watched_samples(channels: Mapping[str, Array], sample_time: float, travelled
     if missing:
         raise LogError(missing)
     speed = channels["motor_speed_rad_s"]
-    difference = with_difference(channels).get(PRESSURE)
+    difference = with_pressure_difference(channels).get(PRESSURE)
     if "position_m" in channels:
         position = channels["position_m"]
     else:

@@ -19,7 +19,7 @@ import numpy as np
 
 from faults.watch.balances import GAIN_PP, GAIN_PV, GAIN_QP, GAIN_VV, GAIN_WP
 from faults.watch.cusum import SUM, THRESHOLD
-from faults.watch.events import SLOW, Alarm, Change, Event, Ready, change_time
+from faults.watch.events import LOSS_BALANCE, Alarm, Change, Event, Ready, change_time
 from faults.watch.growth import growth_time
 from faults.watch.kernel import INTERVALS, LOSS, READY, watch_kernel
 from faults.watch.loss import (
@@ -34,7 +34,7 @@ from faults.watch.loss import (
     WANTED,
     learn_loss_again,
     loss_threshold,
-    oil_allows,
+    oil_allowance,
 )
 from faults.watch.memory import (
     ALL,
@@ -128,7 +128,7 @@ class Watch:
         if not (isfinite(learning) and learning >= LEAST_LEARNING):
             raise HydrostateError(f"learning must take at least {LEAST_LEARNING:g} s, got {learning:g} s")
         balances = BALANCES if pressure else ("motion",)
-        self.pressure, self.balances = pressure, (*balances, SLOW)
+        self.pressure, self.balances = pressure, (*balances, LOSS_BALANCE)
         self.sample_time, self.start = sample_time, start
         samples = max(1, round(INTERVAL / sample_time))
         self.block = samples * INTERVALS
@@ -198,11 +198,11 @@ class Watch:
             if news == READY:
                 events.append(Ready(self.time, self.thresholds))
             elif news == LOSS:
-                events += self._lost()
+                events += self._loss_events()
             elif news >= 0:
-                events.append(self._raise(news))
+                events.append(self._raise_alarm(news))
             if self._open is not None and self._clock[ALL] >= self._open[2]:
-                events += self._told()
+                events += self._change_events()
         return events
 
     def clock_reads(self, time: float) -> None:
@@ -273,7 +273,7 @@ class Watch:
         intervals = int(self._clock[ALL]) * INTERVALS + int(self._partial[WHOLE])
         return intervals * (self.block // INTERVALS) + int(self._partial[SAMPLES])
 
-    def _raise(self, which: int) -> Alarm:
+    def _raise_alarm(self, which: int) -> Alarm:
         found, likely = change_time(self._recent_scores(which))
         duration = self.block * self.sample_time
         alarm = Alarm(
@@ -289,13 +289,13 @@ class Watch:
         watch_kernel().begin_again(self._memory)
         return alarm
 
-    def _lost(self) -> list[Event]:
+    def _loss_events(self) -> list[Event]:
         """Return the alarm for slow growth of the loss, with the changes since the usual loss was learnt."""
         known, seen = self._known, int(self._known[SEEN])
         kept = np.arange(max(0, seen - KEPT_SPANS), seen) % KEPT_SPANS
         levels, ends = self._memory.levels[kept].T
         since, interval = growth_time(levels, self.start + ends * self.block * self.sample_time)
-        alarm = Alarm(self.time, SLOW, since, interval, float(known[RISEN]), float(known[LIMIT]))
+        alarm = Alarm(self.time, LOSS_BALANCE, since, interval, float(known[RISEN]), float(known[LIMIT]))
         lost = (float(known[SHARE]), float(known[LAST])) if self.pressure else None
         resisted = float(known[LAST_RESISTANCE] / known[RESISTANCE] - 1.0) if self.pressure else None
         learn_loss_again(known)
@@ -307,7 +307,7 @@ class Watch:
         now, usable = int(clock[ALL]), min(int(clock[USABLE] - clock[LEARNT_FROM]), RECENT // 2)
         return np.nan_to_num(self._memory.scores[which, (now - 1 - np.arange(usable)) % RECENT])
 
-    def _told(self) -> list[Event]:
+    def _change_events(self) -> list[Event]:
         if self._open is None:
             return []
         (alarm, changed, now), self._open = self._open, None
@@ -321,7 +321,7 @@ class Watch:
         resistance = before[GAIN_PV] / before[GAIN_VV], after[GAIN_PV] / after[GAIN_VV]
         resisted = float(resistance[1] / resistance[0] - 1.0)
         over_pressure = after[GAIN_QP] / after[GAIN_PP] * before[GAIN_PP] / before[GAIN_WP]  # as under the earlier load
-        if min(lost[1], over_pressure) - lost[0] > oil_allows(lost[0]):  # so that the slow alarm does not repeat it
+        if min(lost[1], over_pressure) - lost[0] > oil_allowance(lost[0]):  # so that the slow alarm does not repeat it
             learn_loss_again(self._known)
         return [Change(self.time, alarm, lost, resisted)]
 

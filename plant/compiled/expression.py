@@ -111,14 +111,14 @@ class Expression:
     __hash__ = object.__hash__
 
     def __array_ufunc__(self, function: Any, method: str, *arguments: Any, **options: Any) -> "Expression":
-        from plant.compiled.numpy_calls import called
+        from plant.compiled.numpy_calls import elementwise_call
 
-        return called(function, method, arguments, options)
+        return elementwise_call(function, method, arguments, options)
 
     def __array_function__(self, function: Any, types: Any, arguments: Any, options: Any) -> "Expression":
-        from plant.compiled.numpy_calls import chosen
+        from plant.compiled.numpy_calls import function_call
 
-        return chosen(function, arguments, options)
+        return function_call(function, arguments, options)
 
     def __bool__(self) -> bool:
         raise ModelError("a model must choose with where(condition, a, b), not with if: its values are symbols here")

@@ -18,7 +18,7 @@ class _Product:
     seldom: Expression
     often: Expression
 
-    def whole(self) -> Expression:
+    def as_node(self) -> Expression:
         """Return the product as one node."""
         if self.number == 0:
             return ZERO
@@ -32,7 +32,7 @@ class _Product:
         return replace(self, number=number * self.number)
 
 
-def gathered(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[str, Expression]:
+def gather_factors(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[str, Expression]:
     """Gather numbers and slowly changing factors in front of products, and make one node of ``a * b`` and ``b * a``.
 
     Numbers are multiplied exactly, so a scale and its inverse cancel. A product with several uses is one node, with its
@@ -44,7 +44,7 @@ def gathered(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[
     >>> from plant.compiled.expression import symbol
     >>> from plant.compiled.source import lines_source
     >>> x, y, k = symbol("x"), symbol("y"), symbol("k")
-    >>> print(lines_source("lines", gathered({"a": 0.01 * x * k / 0.001, "b": k * (y - 0.1 * x) / 10.0}, {"k"})))
+    >>> print(lines_source("lines", gather_factors({"a": 0.01 * x * k / 0.001, "b": k * (y - 0.1 * x) / 10.0}, {"k"})))
     def lines(k, x, y):
         t0_ = 10.0 * k
         t1_ = t0_ * x
@@ -70,16 +70,16 @@ class _Gathering:
         users = Counter(argument for item in self._order for argument in {id(one) for one in item.arguments})
         ends = {id(output) for output in self._given.values()}
         for item in self._order:
-            found = self._gathered(item)
+            found = self._product_of(item)
             if id(item) in self._seldom:
                 found = _Product(found.number, found.seldom * found.often, ONE)
             elif users[id(item)] > 1 and found.number != 0:
                 number = found.number if id(item) in ends else Fraction(1)
-                found = _Product(number, ONE, found.times(1 / number).whole())
+                found = _Product(number, ONE, found.times(1 / number).as_node())
             self._products[id(item)] = found
-        return {name: self._products[id(output)].whole() for name, output in self._given.items()}
+        return {name: self._products[id(output)].as_node() for name, output in self._given.items()}
 
-    def _gathered(self, item: Expression) -> _Product:
+    def _product_of(self, item: Expression) -> _Product:
         given = [self._products[id(argument)] for argument in item.arguments]
         match item.operation:
             case "constant" if isfinite(float(item.value)):
@@ -98,9 +98,9 @@ class _Gathering:
                 return self._choice(*given)
             case "abs":
                 inner = given[0].times(1 / given[0].number) if given[0].number else given[0]
-                return _plain(unary("abs", inner.whole())).times(abs(given[0].number))
+                return _single_factor(unary("abs", inner.as_node())).times(abs(given[0].number))
             case _:
-                return _plain(node(item.operation, *(one.whole() for one in given), value=item.value))
+                return _single_factor(node(item.operation, *(one.as_node() for one in given), value=item.value))
 
     def _times(self, a: Expression, b: Expression) -> Expression:
         return a * b if a is ONE or b is ONE else self._twin("*", a, b, a * b)
@@ -120,19 +120,19 @@ class _Gathering:
         if a.seldom is b.seldom and a.number == -b.number:
             return replace(a, often=a.often - b.often)
         if b.number < 0:
-            return _plain(a.whole() - b.times(Fraction(-1)).whole())
+            return _single_factor(a.as_node() - b.times(Fraction(-1)).as_node())
         if a.number < 0:
-            return _plain(b.whole() - a.times(Fraction(-1)).whole())
-        return _plain(self._twin("+", a.whole(), b.whole(), a.whole() + b.whole()))
+            return _single_factor(b.as_node() - a.times(Fraction(-1)).as_node())
+        return _single_factor(self._twin("+", a.as_node(), b.as_node(), a.as_node() + b.as_node()))
 
     def _choice(self, condition: _Product, a: _Product, b: _Product) -> _Product:
         """Factor out a number that both branches share; zero shares every number."""
         number = a.number or b.number
         if number and a.number in (0, number) and b.number in (0, number):
-            inner = [one.times(1 / number).whole() for one in (a, b)]
-            return _plain(select(condition.whole(), *inner)).times(number)
-        return _plain(select(condition.whole(), a.whole(), b.whole()))
+            inner = [one.times(1 / number).as_node() for one in (a, b)]
+            return _single_factor(select(condition.as_node(), *inner)).times(number)
+        return _single_factor(select(condition.as_node(), a.as_node(), b.as_node()))
 
 
-def _plain(item: Expression) -> _Product:
+def _single_factor(item: Expression) -> _Product:
     return _Product(Fraction(1), ONE, item)

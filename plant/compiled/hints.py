@@ -20,10 +20,10 @@ def frozen(x: Scalar) -> Scalar:
     float, ndarray or Expression
         The number.
     """
-    return _sloped(x, (ZERO, ZERO))
+    return _with_slopes(x, (ZERO, ZERO))
 
 
-def following(x: Scalar, *slopes: tuple[Scalar, Scalar]) -> Scalar:
+def with_derivatives(x: Scalar, *slopes: tuple[Scalar, Scalar]) -> Scalar:
     """Return the same number with known derivatives: an equation's solution changes as the equation's balance does.
 
     Parameters
@@ -46,13 +46,13 @@ def following(x: Scalar, *slopes: tuple[Scalar, Scalar]) -> Scalar:
     >>> from plant.compiled.expression import jacobian, symbol, unary
     >>> a = symbol("a")
     >>> x = unary("sqrt", a)
-    >>> [[slope]] = jacobian([following(x, (a - frozen(x) * frozen(x), 0.5 / x))], [a])
+    >>> [[slope]] = jacobian([with_derivatives(x, (a - frozen(x) * frozen(x), 0.5 / x))], [a])
     >>> slope.operation, slope.arguments[0].value
     ('/', 0.5)
     """
     if not isinstance(x, Expression):
         return x
-    return _sloped(x, *((as_expression(one), as_expression(slope)) for one, slope in slopes))
+    return _with_slopes(x, *((as_expression(one), as_expression(slope)) for one, slope in slopes))
 
 
 def waypoint(x: Scalar) -> Scalar:
@@ -68,7 +68,7 @@ def waypoint(x: Scalar) -> Scalar:
     float, ndarray or Expression
         The number.
     """
-    return _sloped(x, (x, ONE))
+    return _with_slopes(x, (x, ONE))
 
 
 def is_waypoint(item: Expression) -> bool:
@@ -79,11 +79,11 @@ def is_waypoint(item: Expression) -> bool:
     return itself.operation == item.operation and list(map(id, itself.arguments)) == list(map(id, item.arguments))
 
 
-def _sloped(x: Scalar, *slopes: tuple[Expression, Expression]) -> Scalar:
+def _with_slopes(x: Scalar, *slopes: tuple[Expression, Expression]) -> Scalar:
     return node(x.operation, *x.arguments, value=x.value, slopes=slopes) if isinstance(x, Expression) else x
 
 
-def late_in(y: Scalar, x: Scalar) -> Scalar:
+def affine_form(y: Scalar, x: Scalar) -> Scalar:
     """Return y, which is affine in x, as a sum of a part that does not wait for x and a multiple of x.
 
     Parameters
@@ -108,7 +108,7 @@ def late_in(y: Scalar, x: Scalar) -> Scalar:
     >>> from plant.compiled.expression import symbol
     >>> from plant.compiled.source import lines_source
     >>> x, a, b = symbol("x"), symbol("a"), symbol("b")
-    >>> print(lines_source("lines", {"y": late_in((x - a) * b + x, x)}))
+    >>> print(lines_source("lines", {"y": affine_form((x - a) * b + x, x)}))
     def lines(a, b, x):
         t0_ = 0.0 - a
         t1_ = t0_ * b

@@ -12,9 +12,9 @@ from plant.compiled.expression import ZERO, Expression, node, ordered
 from plant.compiled.hoist import COMPARISONS
 
 LATENCY: Mapping[str, float] = {"+": 3.0, "-": 3.0, "*": 4.0, "/": 14.0, "sqrt": 18.0, "abs": 1.0, "where": 0.0}
-"""Latency of a result [cycles]: x86-64 processors of 2021 to 2024, choices predicted correctly; others as `CALL`."""
+"""Latency of a result [cycles]: x86-64 processors of 2021 to 2024, choices predicted; others as `CALL_LATENCY`."""
 
-CALL = 40.0
+CALL_LATENCY = 40.0
 """Latency of a call of exp, log or the like [cycles]: judged."""
 
 SUMS = ("+", "-")
@@ -65,28 +65,32 @@ class _LateLast:
         """Process all nodes, operands first."""
         for item in self._order:
             if id(item) not in self._inner:
-                self._new[id(item)] = self._made(item)
+                self._new[id(item)] = self._reordered(item)
         made = {name: self._new[id(output)] for name, output in self._given.items()}
         return made, {name: self._time(item) for name, item in made.items()}
 
     def _time(self, item: Expression) -> float:
         return self._times.get(id(item), -inf)
 
-    def _put(self, item: Expression, time: float) -> Expression:
+    def _with_time(self, item: Expression, time: float) -> Expression:
         self._times[id(item)] = time
         return item
 
-    def _made(self, item: Expression) -> Expression:
+    def _reordered(self, item: Expression) -> Expression:
         if item.operation == "*":
             return self._product(self._leaves(item))
         if item.operation in SUMS:
             return self._sum(self._terms(item, 1))
         if not item.arguments:
-            return self._put(item, self._arrival.get(str(item.value), -inf) if item.operation == "symbol" else -inf)
+            return self._with_time(
+                item, self._arrival.get(str(item.value), -inf) if item.operation == "symbol" else -inf
+            )
         operands = [self._new[id(one)] for one in item.arguments]
         waits = [] if item.operation in COMPARISONS else operands[1:] if item.operation == "where" else operands
         made = node(item.operation, *operands, value=item.value)
-        return self._put(made, max(map(self._time, waits), default=-inf) + LATENCY.get(item.operation, CALL))
+        return self._with_time(
+            made, max(map(self._time, waits), default=-inf) + LATENCY.get(item.operation, CALL_LATENCY)
+        )
 
     def _leaves(self, item: Expression) -> list[Expression]:
         """Return the factors of a product."""
@@ -96,7 +100,7 @@ class _LateLast:
     def _product(self, factors: list[Expression]) -> Expression:
         first, *others = sorted(factors, key=self._time)
         for one in others:
-            first = self._put(node("*", first, one), max(self._time(first), self._time(one)) + LATENCY["*"])
+            first = self._with_time(node("*", first, one), max(self._time(first), self._time(one)) + LATENCY["*"])
         return first
 
     def _terms(self, item: Expression, sign: int) -> list[tuple[int, Expression]]:
@@ -125,11 +129,11 @@ class _LateLast:
         for begins, its, one, latency in others:
             time = max(begins, self._time(total)) + latency
             if its == sign:
-                total = self._put(node("+", one, total), time)
+                total = self._with_time(node("+", one, total), time)
             else:
-                total = self._put(node("-", *((total, one) if sign > 0 else (one, total))), time)
+                total = self._with_time(node("-", *((total, one) if sign > 0 else (one, total))), time)
                 sign = 1
-        return total if sign > 0 else self._put(-total, self._time(total) + LATENCY["-"])
+        return total if sign > 0 else self._with_time(-total, self._time(total) + LATENCY["-"])
 
 
 def _kind(item: Expression) -> str:

@@ -72,11 +72,11 @@ UFUNCS: Mapping[Any, Function] = {
 CHOICES: Mapping[Any, Function] = {np.where: functions.where, np.clip: _clip}
 """Likewise, for functions that are not element-wise ufuncs."""
 
-KNOWN = "abs, sign, sqrt, square, exp, log, sin, cos, tan, arctan, sinh, cosh, tanh, minimum, maximum, clip, where"
+SUPPORTED = "abs, sign, sqrt, square, exp, log, sin, cos, tan, arctan, sinh, cosh, tanh, minimum, maximum, clip, where"
 """Names of the functions that a model may call, besides arithmetic and comparisons."""
 
 
-def called(function: Any, method: str, arguments: Sequence[Any], options: Mapping[str, Any]) -> Expression:
+def elementwise_call(function: Any, method: str, arguments: Sequence[Any], options: Mapping[str, Any]) -> Expression:
     """Return an element-wise function of NumPy on symbols.
 
     Parameters
@@ -91,7 +91,7 @@ def called(function: Any, method: str, arguments: Sequence[Any], options: Mappin
     Raises
     ------
     ModelError
-        If it is not one of `KNOWN`.
+        If it is not one of `SUPPORTED`.
 
     Examples
     --------
@@ -101,10 +101,10 @@ def called(function: Any, method: str, arguments: Sequence[Any], options: Mappin
     """
     if function not in UFUNCS or method != "__call__" or options:
         raise ModelError(_refusal(function))
-    return UFUNCS[function](*map(_single, arguments))
+    return UFUNCS[function](*map(_plain_number, arguments))
 
 
-def chosen(function: Any, arguments: Sequence[Any], options: Mapping[str, Any]) -> Expression:
+def function_call(function: Any, arguments: Sequence[Any], options: Mapping[str, Any]) -> Expression:
     """Return another function of NumPy on symbols.
 
     Parameters
@@ -117,14 +117,14 @@ def chosen(function: Any, arguments: Sequence[Any], options: Mapping[str, Any]) 
     Raises
     ------
     ModelError
-        If it is not one of `KNOWN`.
+        If it is not one of `SUPPORTED`.
     """
     if function not in CHOICES or options:
         raise ModelError(_refusal(function))
-    return CHOICES[function](*map(_single, arguments))
+    return CHOICES[function](*map(_plain_number, arguments))
 
 
-def _single(argument: Any) -> Any:
+def _plain_number(argument: Any) -> Any:
     """Return a plain number in place of NumPy's own scalar."""
     if isinstance(argument, np.ndarray):
         if argument.ndim:
@@ -135,4 +135,4 @@ def _single(argument: Any) -> Any:
 
 def _refusal(function: Any) -> str:
     name = getattr(function, "__name__", str(function))
-    return f"np.{name} cannot be traced; a model may call {KNOWN}, one number at a time"
+    return f"np.{name} cannot be traced; a model may call {SUPPORTED}, one number at a time"

@@ -7,7 +7,7 @@ roots per step. Runs side by side fill the vectors without this.
 from collections.abc import Mapping
 
 from plant.compiled.expression import Expression, ordered
-from plant.compiled.source import function_source, leaf, spelt
+from plant.compiled.source import function_source, leaf, operation_text
 
 PACKED: Mapping[str, str] = {"/": "ratios", "sqrt": "roots"}
 """Operations that are packed, and the functions of `plant.compiled.native.lines` that compute them."""
@@ -53,7 +53,7 @@ def packed_source(name: str, outputs: Mapping[str, Expression]) -> str:
                 names[id(item)] = f"t{count}_"
                 count += 1
             if len(group) == 1:
-                lines.append(f"{names[id(group[0])]} = {spelt(group[0], names)}")
+                lines.append(f"{names[id(group[0])]} = {operation_text(group[0], names)}")
             elif group:
                 columns = zip(*([names[id(a)] for a in item.arguments] for item in group), strict=True)
                 given = ", ".join(f"({', '.join(column)})" for column in columns)
@@ -64,5 +64,5 @@ def packed_source(name: str, outputs: Mapping[str, Expression]) -> str:
             elif item.operation not in PACKED:
                 names[id(item)] = f"t{count}_"
                 count += 1
-                lines.append(f"{names[id(item)]} = {spelt(item, names)}")
+                lines.append(f"{names[id(item)]} = {operation_text(item, names)}")
     return function_source(name, outputs, lines, names)

@@ -18,7 +18,7 @@ INLINED = "@inlined\n"
 """Decorator line above a function that is inlined in its callers."""
 
 
-def pasted(
+def functions_text(
     *functions: Callable[..., object],
     constants: Mapping[str, object] | None = None,
     inlined: bool = False,
@@ -43,7 +43,7 @@ def pasted(
     --------
     >>> def grown(size: float) -> float:
     ...     return SHARE * size
-    >>> print(pasted(grown, constants={"SHARE": 0.5}, inlined=True))
+    >>> print(functions_text(grown, constants={"SHARE": 0.5}, inlined=True))
     SHARE = 0.5
     <BLANKLINE>
     <BLANKLINE>
@@ -118,10 +118,10 @@ def bare_text(function: Callable[..., object]) -> str:
     for node in ast.walk(definition):
         if isinstance(node, ast.Call):
             node.keywords = [keyword for keyword in node.keywords if keyword.arg not in bound]
-    return ast.unparse(_OfTheFile().visit(definition))
+    return ast.unparse(_KernelRemover().visit(definition))
 
 
-class _OfTheFile(ast.NodeTransformer):
+class _KernelRemover(ast.NodeTransformer):
     """Turns attributes of a kernel into names, and no longer passes a kernel on."""
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:

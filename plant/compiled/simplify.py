@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Mapping
 from typing import TypeAlias
 
 from plant.compiled.expression import ONE, Expression, node, ordered
-from plant.compiled.gather import gathered
+from plant.compiled.gather import gather_factors
 from plant.compiled.hoist import settled_nodes
 
 Nodes: TypeAlias = Mapping[int, Expression]
@@ -22,7 +22,7 @@ FUSED = ("fma", "fnma", "fms")
 
 def simplified(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[str, Expression]:
     """Gather factors, then share reciprocals."""
-    return share_reciprocals(gathered(outputs, fixed), fixed)
+    return share_reciprocals(gather_factors(outputs, fixed), fixed)
 
 
 def share_reciprocals(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[str, Expression]:

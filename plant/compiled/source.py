@@ -11,12 +11,26 @@ Slot: TypeAlias = int | tuple[int, int]
 ROWS = 8
 """Number of logs whose samples `plant.compiled.native.operations.transpose` transposes at a time."""
 
-CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "sin", "cos", "atan", "ratios", "roots", "where", "fma")
+CALLED_OPERATIONS = (
+    "present",
+    "sign",
+    "sqrt",
+    "exp",
+    "log",
+    "tanh",
+    "sin",
+    "cos",
+    "atan",
+    "ratios",
+    "roots",
+    "where",
+    "fma",
+)
 """Functions that lines call (`plant.compiled.native.lines`): no symbol may have their names."""
 
 _CALLS: Mapping[str, str] = {
     **{sign: f"{{0}} {sign} {{1}}" for sign in ("+", "-", "*", "/", "<", "<=", ">", ">=")},
-    **{name: f"{name}({{0}})" for name in ("abs", *CALLED[:-4])},
+    **{name: f"{name}({{0}})" for name in ("abs", *CALLED_OPERATIONS[:-4])},
     "where": "where({0}, {1}, {2})",
     "fma": "fma({0}, {1}, {2})",
     "fnma": "fma(-{0}, {1}, {2})",
@@ -53,7 +67,7 @@ def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
     for item in ordered(outputs.values()):
         if item.arguments:
             target = f"t{len(lines)}_"
-            lines.append(f"{target} = {spelt(item, names)}")
+            lines.append(f"{target} = {operation_text(item, names)}")
             names[id(item)] = target
         else:
             names[id(item)] = leaf(item)
@@ -103,7 +117,7 @@ def leaf(item: Expression) -> str:
     return str(item.value) if item.operation == "symbol" else repr(item.value)
 
 
-def spelt(item: Expression, names: Mapping[int, str]) -> str:
+def operation_text(item: Expression, names: Mapping[int, str]) -> str:
     """Return the source text of an operation.
 
     Parameters

@@ -3,7 +3,7 @@
 from plant.compiled.functions import Scalar, absolute, sign, sqrt, where
 from plant.components.friction import velocity_under_friction
 
-SHUT = 1e-5
+SHUT_OPENING = 1e-5
 """Fraction of a land's opening that remains when the land is covered, because a spool leaks [dimensionless]."""
 
 
@@ -41,14 +41,14 @@ def tank_openings(spool: Scalar) -> tuple[Scalar, Scalar]:
     Returns
     -------
     tuple of float or Expression
-        Two openings [dimensionless], `SHUT` or 1.
+        Two openings [dimensionless], `SHUT_OPENING` or 1.
 
     Examples
     --------
     >>> [float(x) for x in tank_openings(1.0)]
     [1e-05, 1.0]
     """
-    return where(spool < 0.0, 1.0, SHUT), where(spool > 0.0, 1.0, SHUT)
+    return where(spool < 0.0, 1.0, SHUT_OPENING), where(spool > 0.0, 1.0, SHUT_OPENING)
 
 
 def return_flow(pressure: Scalar, conductance: Scalar) -> Scalar:

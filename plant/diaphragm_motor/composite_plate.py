@@ -129,7 +129,7 @@ def _regions(p: PlateParameters) -> tuple[_Region, _Region]:
     return covered, bare
 
 
-def _shares(region: _Region, nu: float, r: float, pressure: float) -> tuple[Array, Array, Array]:
+def _solution_terms(region: _Region, nu: float, r: float, pressure: float) -> tuple[Array, Array, Array]:
     """Return (u, slope, N, M) at a radius for the constants (c r, c/r, d r, d/r), for pressure, and for one volt.
 
     Slope is -w'. Pressure adds the slope ``-p r^3 / (16 D*)`` and the stretch that the coupling requires.
@@ -150,7 +150,7 @@ def _shares(region: _Region, nu: float, r: float, pressure: float) -> tuple[Arra
     return constants, loaded, np.array([0.0, 0.0, -region.force, -region.moment])
 
 
-class _Bent(NamedTuple):
+class _BendingConstants(NamedTuple):
     """Constants of the closed form in the two regions: terms that grow with r, that fall with r, and of pressure."""
 
     inner: float
@@ -160,13 +160,13 @@ class _Bent(NamedTuple):
     turned_outer: float
 
 
-def _bent(p: PlateParameters, pressure: float, volts: float) -> _Bent:
+def _bending_constants(p: PlateParameters, pressure: float, volts: float) -> _BendingConstants:
     """Return the bending of the plate under a voltage and a pressure on the ceramic's side."""
     covered, bare = _regions(p)
     nu, b, a = p.poisson_ratio, p.ceramic_radius, p.clamp_radius
-    inner, inner_load, inner_volt = _shares(covered, nu, b, pressure)
-    outer, outer_load, _ = _shares(bare, nu, b, pressure)
-    rim, rim_load, _ = _shares(bare, nu, a, pressure)
+    inner, inner_load, inner_volt = _solution_terms(covered, nu, b, pressure)
+    outer, outer_load, _ = _solution_terms(bare, nu, b, pressure)
+    rim, rim_load, _ = _solution_terms(bare, nu, a, pressure)
     matrix, right = np.zeros((6, 6)), np.zeros(6)
     matrix[:4, :2], matrix[:4, 2:] = inner[:, [0, 2]], -outer
     right[:4] = outer_load - inner_load - volts * inner_volt
@@ -175,10 +175,10 @@ def _bent(p: PlateParameters, pressure: float, volts: float) -> _Bent:
     columns = np.abs(matrix / scale[:, None]).max(axis=0)
     c_in, _, c, c_inverse, _, _ = np.linalg.solve(matrix / scale[:, None] / columns, right / scale) / columns
     turned_in, turned_out = (-pressure / (16.0 * (x.bend - x.couple**2 / x.stretch)) for x in (covered, bare))
-    return _Bent(float(c_in), float(c), float(c_inverse), turned_in, turned_out)
+    return _BendingConstants(float(c_in), float(c), float(c_inverse), turned_in, turned_out)
 
 
-def _volume(p: PlateParameters, bent: _Bent) -> float:
+def _volume(p: PlateParameters, bent: _BendingConstants) -> float:
     """Return the displaced volume [m^3]: pi times the integral of slope r^2."""
     b, a = p.ceramic_radius, p.clamp_radius
     outer = 0.25 * bent.outer * (a**4 - b**4) + 0.5 * bent.outer_inverse * (a**2 - b**2)
@@ -209,7 +209,7 @@ def plate_deflection(p: PlateParameters, pressure: float, volts: float, radii: A
     >>> np.abs(np.round(1e9 * profile, 1)).tolist()
     [83.8, 60.3, 0.0]
     """
-    bent, b, a = _bent(p, pressure, volts), p.ceramic_radius, p.clamp_radius
+    bent, b, a = _bending_constants(p, pressure, volts), p.ceramic_radius, p.clamp_radius
     # the slope, integrated from the rim inwards
     r = np.maximum(radii, b)
     outer = 0.5 * bent.outer * (a**2 - r**2) + bent.outer_inverse * np.log(a / r)
@@ -232,7 +232,7 @@ def plate_coefficients(p: PlateParameters) -> PlateCoefficients:
     >>> [float(f"{value:.3g}") for value in found]
     [1.17e-13, 2.31e-11, 5.19e-10, 8.38e-08]
     """
-    volume, pumped = (_volume(p, _bent(p, *load)) for load in ((1.0, 0.0), (0.0, 1.0)))
+    volume, pumped = (_volume(p, _bending_constants(p, *load)) for load in ((1.0, 0.0), (0.0, 1.0)))
     rise, lifted = (float(plate_deflection(p, *load, np.zeros(1))[0]) for load in ((1.0, 0.0), (0.0, 1.0)))
     return PlateCoefficients(abs(volume), abs(pumped), abs(rise), abs(lifted))
 

@@ -10,16 +10,16 @@ from plant.diaphragm_motor.model import FLOWS, SIDE_A, SIDE_B, VELOCITY, deflect
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import LONGEST_STEP, motor_drive, run_motor
 
-SETTLING = 0.08
+SETTLING_TIME = 0.08
 """Settling time of a run, rounded up to whole cycles [s]."""
 
-MEASURED = 0.04
+AVERAGING_TIME = 0.04
 """Averaging time after settling, rounded up to whole cycles [s]."""
 
 FEWEST_CYCLES = 10
 """Minimum number of cycles in an average."""
 
-OPEN_PORT = 1e-3
+OPEN_PORT_CONDUCTANCE = 1e-3
 """Conductance of a valve land with negligible pressure drop [m^3/(s Pa^0.5)]."""
 
 
@@ -58,7 +58,7 @@ def pump_alone(parameters: DiaphragmMotorParameters) -> DiaphragmMotorParameters
     DiaphragmMotorParameters
         The same motor with a centred directional valve that causes no pressure drop.
     """
-    return replace(parameters, spool=0.0, land_conductance=OPEN_PORT)
+    return replace(parameters, spool=0.0, land_conductance=OPEN_PORT_CONDUCTANCE)
 
 
 def tone(values: Array, sample_time: float, frequency: float, start: float = 0.0) -> Tones:
@@ -132,8 +132,8 @@ def operate(
     p = parameters
     a_cycle = ceil(1.0 / (frequency * longest_step) - 1e-9)
     between = 1.0 / (frequency * a_cycle)
-    settling = ceil(SETTLING * frequency) * a_cycle
-    measured = max(FEWEST_CYCLES, ceil(MEASURED * frequency)) * a_cycle
+    settling = ceil(SETTLING_TIME * frequency) * a_cycle
+    measured = max(FEWEST_CYCLES, ceil(AVERAGING_TIME * frequency)) * a_cycle
     drive = motor_drive(frequency, peak_to_peak, (settling + measured) * between, between)
     states = run_motor(p, drive, between, longest_step=longest_step, start=start)[settling:-1]
     began = settling * between

@@ -69,7 +69,7 @@ def motor_row(p: DiaphragmMotorParameters) -> Array:
     return np.concatenate([np.atleast_1d(np.asarray(getattr(p, field.name), np.float64)) for field in fields(p)])
 
 
-def gathered(flat: Any) -> SimpleNamespace:
+def reassemble_rows(flat: Any) -> SimpleNamespace:
     """Return the parameters with their rows reassembled from names such as ``valve_leak_3`` (Table 1).
 
     Parameters
@@ -206,7 +206,7 @@ def motor_step(state: State, voltages: tuple[Scalar, Scalar], flat: Any, h: Scal
     tuple of Expression
         The next state.
     """
-    p = gathered(flat)
+    p = reassemble_rows(flat)
     pressures, flows, openings = state[PRESSURES], state[FLOWS], state[OPENINGS]
     hysteresis = state[HYSTERESIS]
     side_a, side_b, velocity, position = state[SIDE_A:]

@@ -117,7 +117,7 @@ ROWS = {
 """Parameters with one value for each valve or diaphragm, and the number of values."""
 
 
-def changed(row: tuple[float, ...], place: int, value: float) -> tuple[float, ...]:
+def with_changed_value(row: tuple[float, ...], place: int, value: float) -> tuple[float, ...]:
     """Return a row of values with one of them changed, which represents a fault of one valve or diaphragm.
 
     Parameters
@@ -141,7 +141,7 @@ def changed(row: tuple[float, ...], place: int, value: float) -> tuple[float, ..
 
     Examples
     --------
-    >>> changed((1.0, 1.0, 1.0), 2, 0.8)
+    >>> with_changed_value((1.0, 1.0, 1.0), 2, 0.8)
     (1.0, 0.8, 1.0)
     """
     if not 1 <= place <= len(row):

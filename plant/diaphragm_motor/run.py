@@ -40,7 +40,7 @@ SAMPLE_TIME = 2e-5
 FEWEST_SAMPLES = 20
 """Minimum samples in a cycle: linear interpolation between them then errs by 1 % for a sine."""
 
-RAMP = 0.01
+RAMP_TIME = 0.01
 """Time over which a drive rises to its full amplitude [s]."""
 
 ELECTRODES = tuple(f"electrode_{i}_v" for i in range(1, DIAPHRAGMS + 1))
@@ -82,7 +82,7 @@ MOTOR_SENSORS: Mapping[str, MotorSensors] = {"bench": BENCH_SENSORS, "ideal": ID
 
 
 def motor_drive(frequency: float, peak_to_peak: float, duration: float, sample_time: float) -> Array:
-    """Return an unbiased sine that rises to its amplitude over `RAMP` (section 2; volts peak to peak, errata M27).
+    """Return an unbiased sine that rises to its amplitude over `RAMP_TIME` (section 2; volts peak to peak, errata M27).
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def motor_drive(frequency: float, peak_to_peak: float, duration: float, sample_t
             f"got {sample_time:g} s"
         )
     time = sample_time * np.arange(count)
-    swing = 0.5 * peak_to_peak * np.minimum(time / RAMP, 1.0)
+    swing = 0.5 * peak_to_peak * np.minimum(time / RAMP_TIME, 1.0)
     return _checked_drive(swing * np.sin(2.0 * pi * frequency * time))
 
 

@@ -21,7 +21,7 @@ class AeratedParameters(EhaParameters):
     air_fraction: float = si(0.0, "1", "entrained air at atmospheric pressure", "a log")
 
 
-def aerated(p: EhaParameters, air_fraction: float, bulk_modulus: float) -> AeratedParameters:
+def with_air_in_oil(p: EhaParameters, air_fraction: float, bulk_modulus: float) -> AeratedParameters:
     """Return an actuator with air in its oil.
 
     Parameters

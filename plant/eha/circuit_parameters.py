@@ -123,7 +123,7 @@ class CircuitParameters(EhaParameters):
 MOST_AIR = 0.5
 """Largest air fraction at which the mixture is oil with bubbles rather than a foam."""
 
-_FULLEST = 0.95
+_LARGEST_SWEPT_SHARE = 0.95
 """Largest fraction of a chamber that the piston may sweep, so that volume remains beyond the end stop."""
 
 _ROUNDING = 1e-9
@@ -165,7 +165,7 @@ def longest_stroke(p: EhaParameters | SimpleNamespace) -> Any:
     """
     area_a, area_b = piston_areas(p)
     side_a, side_b = (1.0 + p.volume_difference) / area_a, (1.0 - p.volume_difference) / area_b
-    return 4.0 * _FULLEST * p.chamber_volume * np.minimum(side_a, side_b)
+    return 4.0 * _LARGEST_SWEPT_SHARE * p.chamber_volume * np.minimum(side_a, side_b)
 
 
 def circuit_of(p: EhaParameters) -> CircuitParameters:
@@ -205,7 +205,7 @@ def circuit_of(p: EhaParameters) -> CircuitParameters:
     )
 
 
-_PLACES = {field.name: place for place, field in enumerate(fields(CircuitParameters))}
+_COLUMNS = {field.name: place for place, field in enumerate(fields(CircuitParameters))}
 
 
 class CircuitRows:
@@ -221,9 +221,9 @@ class CircuitRows:
         self._rows = rows
 
     def __getattr__(self, name: str) -> Any:
-        if name not in _PLACES:
+        if name not in _COLUMNS:
             raise AttributeError(f"a circuit has no parameter {name!r}")
-        return self._rows[..., _PLACES[name]]
+        return self._rows[..., _COLUMNS[name]]
 
 
 def circuit_values(rows: Array) -> Any:

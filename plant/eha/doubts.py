@@ -43,7 +43,7 @@ class Spread(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Doubt:
+class DefaultUncertainty:
     """Default uncertainty of an entry without one in the rig file.
 
     Parameters
@@ -59,44 +59,44 @@ class Doubt:
     reason: str
 
 
-DOUBTS: Mapping[str, Doubt] = {
-    "pump_displacement": Doubt(
+DEFAULT_UNCERTAINTIES: Mapping[str, DefaultUncertainty] = {
+    "pump_displacement": DefaultUncertainty(
         Spread.of(0.03),
         Spread.of(0.01),
         "judged: a catalogue gives geometric displacement, a few per cent more than the pump delivers; measured as "
         "ISO 4409 class B, flow within 1.5 %",
     ),
-    "piston_area": Doubt(
+    "piston_area": DefaultUncertainty(
         Spread.of(0.02),
         Spread.of(0.003),
         "judged: tolerances of bore and rod (ISO 286 H8, 0.1 %) matter less than a wrong rod or a wrong mean of two "
         "areas; measured with a calliper",
     ),
-    "chamber_volume": Doubt(
+    "chamber_volume": DefaultUncertainty(
         Spread.of(0.15),
         Spread.of(0.05),
         "judged: the drawing of the cylinder leaves out ports, hoses and manifold, and mid-stroke is known only "
         "roughly; measured by filling, without the air that stays inside",
     ),
-    "moving_mass": Doubt(
+    "moving_mass": DefaultUncertainty(
         Spread(0.1, 0.4),
         Spread(0.05, 0.05),
         "judged: a catalogue's piston and rod leave out the load, and oil in a line counts by the square of piston "
         "area over line area (0.3 m of 12 mm line add 5 kg on 15 cm^2); measured by weighing with the load",
     ),
-    "accumulator_pressure": Doubt(
+    "accumulator_pressure": DefaultUncertainty(
         Spread.of(0.2),
         Spread.of(0.05),
         "judged: gas is charged at another temperature (20 K are 7 %) and seeps away over years; measured with a "
         "gauge on the inner circuit",
     ),
-    "accumulator_gas": Doubt(
+    "accumulator_gas": DefaultUncertainty(
         Spread.of(0.3),
         Spread.of(0.1),
         "judged, where it is given: a catalogue gives the shell, and the gas is what charge and filling leave of it; "
         "measured by filling and pressure",
     ),
-    PRESSURE_GAIN: Doubt(
+    PRESSURE_GAIN: DefaultUncertainty(
         Spread.of(0.015),
         Spread.of(0.003),
         "judged: an industrial transmitter stays within ISO 4409 class C, 2.5 % of pressure, over years and "
@@ -107,7 +107,9 @@ DOUBTS: Mapping[str, Doubt] = {
 uncertainty."""
 
 
-def spreads_of(doubts: Mapping[str, Doubt], given: Mapping[str, float], measured: Collection[str]) -> dict[str, Spread]:
+def spreads_of(
+    doubts: Mapping[str, DefaultUncertainty], given: Mapping[str, float], measured: Collection[str]
+) -> dict[str, Spread]:
     """Return the uncertainty of each entry.
 
     Parameters
@@ -126,14 +128,14 @@ def spreads_of(doubts: Mapping[str, Doubt], given: Mapping[str, float], measured
 
     Examples
     --------
-    >>> spreads_of(DOUBTS, {"moving_mass": 0.02}, ["chamber_volume"])["chamber_volume"]
+    >>> spreads_of(DEFAULT_UNCERTAINTIES, {"moving_mass": 0.02}, ["chamber_volume"])["chamber_volume"]
     Spread(down=0.05, up=0.05)
     """
     usual = {name: one.measured if name in measured else one.usual for name, one in doubts.items()}
     return usual | {name: Spread.of(std) for name, std in given.items()}
 
 
-def doubts_of(parameters: Any) -> Mapping[str, Doubt]:
+def default_uncertainties(parameters: Any) -> Mapping[str, DefaultUncertainty]:
     """Return the default uncertainties of an actuator's entries; none for kinds other than the gear-pump one.
 
     Parameters
@@ -144,4 +146,4 @@ def doubts_of(parameters: Any) -> Mapping[str, Doubt]:
     from plant.eha.model import EhaParameters
 
     kind = parameters if isinstance(parameters, type) else type(parameters)
-    return DOUBTS if issubclass(kind, EhaParameters) else MappingProxyType({})
+    return DEFAULT_UNCERTAINTIES if issubclass(kind, EhaParameters) else MappingProxyType({})

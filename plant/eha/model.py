@@ -11,7 +11,7 @@ from types import SimpleNamespace
 from typing import NamedTuple, TypeAlias
 
 from plant.compiled.functions import Scalar, absolute, sign, where
-from plant.compiled.hints import following, frozen, late_in, waypoint
+from plant.compiled.hints import affine_form, frozen, waypoint, with_derivatives
 from plant.components.friction import quadratic_friction, sliding
 from plant.components.valves import pumped_flow, relief_flow
 from plant.errors import RigError
@@ -257,7 +257,7 @@ def lumped_step(
     return _implicit_stage((*base[:2], waypoint(base[2])), end, p, h, first)
 
 
-class _Solved(NamedTuple):
+class _StageSolution(NamedTuple):
     """A stage with its valve shut or open; ``held`` and ``filled`` describe the pressure.
 
     Without motion of the piston the pressure would be ``filled / held``.
@@ -278,19 +278,19 @@ def _implicit_stage(
     """
     A, L, C = p.piston_area, p.leakage_coefficient, p.relief_conductance
     pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
-    shut = _solved(base, L, pumped, p, h, late)
+    shut = _solve_stage(base, L, pumped, p, h, late)
     pressure = shut.filled - h * p.bulk_modulus / p.chamber_volume * A * shut.velocity
     opens = absolute(pressure) > p.relief_pressure * shut.held
     offset = C * p.relief_pressure
     relieving = pumped + where(pressure > 0.0, offset, -offset)
-    opened = _solved(base, L + C, relieving, p, h, late)
-    chosen = _Solved(*(where(opens, a, b) for a, b in zip(opened, shut, strict=True)))
+    opened = _solve_stage(base, L + C, relieving, p, h, late)
+    chosen = _StageSolution(*(where(opens, a, b) for a, b in zip(opened, shut, strict=True)))
     return _with_slopes(base, chosen, where(opens, L + C, L), where(opens, relieving, pumped), p, h)
 
 
-def _solved(
+def _solve_stage(
     base: tuple[Scalar, Scalar, Scalar], leaking: Scalar, delivered: Scalar, p: EhaValues, h: Scalar, late: Scalar
-) -> _Solved:
+) -> _StageSolution:
     """Solve the stage with a flow ``delivered - leaking * dp`` into the chambers.
 
     The force balance is multiplied by ``held``, so that no division waits for another.
@@ -300,13 +300,20 @@ def _solved(
     compliance = h * p.bulk_modulus / p.chamber_volume
     held = 1.0 + compliance * leaking
     filled = dp + compliance * delivered
-    push = late_in((M / h * v - load_on_rod(x, p)) * held + A * filled, late)
+    push = affine_form((M / h * v - load_on_rod(x, p)) * held + A * filled, late)
     resistance = (M / h + p.friction_linear + h * p.load_stiffness) * held + compliance * A * A
-    return _Solved(held, filled, *sliding(push, resistance, p.friction_quadratic * held, p.friction_coulomb * held))
+    return _StageSolution(
+        held, filled, *sliding(push, resistance, p.friction_quadratic * held, p.friction_coulomb * held)
+    )
 
 
 def _with_slopes(
-    base: tuple[Scalar, Scalar, Scalar], solved: _Solved, leaking: Scalar, delivered: Scalar, p: EhaValues, h: Scalar
+    base: tuple[Scalar, Scalar, Scalar],
+    solved: _StageSolution,
+    leaking: Scalar,
+    delivered: Scalar,
+    p: EhaValues,
+    h: Scalar,
 ) -> tuple[Scalar, Scalar, Scalar]:
     """Return the stage's state, with derivatives from its balances of force and flow."""
     x, v, dp = base
@@ -317,11 +324,11 @@ def _with_slopes(
     u, area = frozen(new_v), frozen(A)
     pressure = frozen((filled - compliance * A * u) / held)
     flow = (delivered - leaking * dp - A * u) / held
-    stored = compliance * following(flow, (delivered - leaking * pressure - A * u, 1.0))
+    stored = compliance * with_derivatives(flow, (delivered - leaking * pressure - A * u, 1.0))
     force = M / h * (v - u) + A * pressure - load_on_rod(x + h * u, p) - quadratic_friction(u, sign(u), a1, a2, a3)
     balance = waypoint(waypoint(0.5 * (frozen(held) * force + area * dp)) + 0.5 * area * stored)
-    new_v = waypoint(following(new_v, (balance, where(absolute(u) <= 0.0, 0.0, 1.0 / root))))
+    new_v = waypoint(with_derivatives(new_v, (balance, where(absolute(u) <= 0.0, 0.0, 1.0 / root))))
 
-    flow = following(flow, (delivered - leaking * pressure - A * new_v, 1.0))
-    new_dp = following((filled - compliance * A * new_v) / held, (dp + compliance * flow, 1.0 / held))
+    flow = with_derivatives(flow, (delivered - leaking * pressure - A * new_v, 1.0))
+    new_dp = with_derivatives((filled - compliance * A * new_v) / held, (dp + compliance * flow, 1.0 / held))
     return x + h * new_v, new_v, new_dp

@@ -48,7 +48,7 @@ class OneSidedParameters(CircuitParameters):
                 raise RigError(f"{name} must be at most 1, got {getattr(self, name)!r}")
 
 
-def one_sided(p: CircuitParameters, **faults: float) -> OneSidedParameters:
+def with_make_up_faults(p: CircuitParameters, **faults: float) -> OneSidedParameters:
     """Return a circuit with faults of its make-up valves.
 
     Parameters
@@ -112,7 +112,7 @@ def circuit_plant(width: int) -> Plant:
     return ONE_SIDED if width == _WIDTH else CIRCUIT
 
 
-def as_wide(row: Array, width: int) -> Array:
+def padded_row(row: Array, width: int) -> Array:
     """Return a parameter row extended to another circuit's width; the added fault parameters are zero.
 
     Parameters

@@ -13,7 +13,7 @@ from typing import Any, Generic
 from typing_extensions import TypeVar
 
 from plant.atomic import replacing
-from plant.eha.doubts import Spread, doubts_of, spreads_of
+from plant.eha.doubts import Spread, default_uncertainties, spreads_of
 from plant.eha.model import PAIRS, SIZED_BY_PUMP, EhaParameters
 from plant.errors import RigError
 from plant.log.columns import check_columns
@@ -65,7 +65,7 @@ class Rig(Generic[P]):
         they are sized by its pump; given here, they are not changed (`plant.eha.scales.with_valves_sized`).
     uncertainties : Mapping[str, float]
         Relative standard deviation by parameter, a fraction, 0.3 for 30 %, or of the `pressure_gain`; the default is
-        that of `plant.eha.doubts.DOUBTS`.
+        that of `plant.eha.doubts.DEFAULT_UNCERTAINTIES`.
     columns : Mapping[str, str]
         Foreign log columns by channel: ``{"position_m": "POS_MM:mm"}``.
     measured : tuple of str
@@ -94,9 +94,9 @@ class Rig(Generic[P]):
     plant: str | None = None
 
     def __post_init__(self) -> None:
-        doubted = doubts_of(self.parameters)
-        _known(self.uncertainties, dict.fromkeys((*_names(type(self.parameters)), *doubted)), "uncertainty")
-        _known(self.measured, doubted, "measured")
+        doubted = default_uncertainties(self.parameters)
+        _require_known(self.uncertainties, dict.fromkeys((*_names(type(self.parameters)), *doubted)), "uncertainty")
+        _require_known(self.measured, doubted, "measured")
         for name in (*self.measured, *self.uncertainties):
             if getattr(self.parameters, name, 1.0) is None:
                 raise RigError(f"{name} is said to be known, and has no value: give it below [parameters]")
@@ -118,7 +118,7 @@ class Rig(Generic[P]):
     @property
     def spreads(self) -> Mapping[str, Spread]:
         """Uncertainty of each entry: that of the rig file, else the default."""
-        return spreads_of(doubts_of(self.parameters), self.uncertainties, self.measured)
+        return spreads_of(default_uncertainties(self.parameters), self.uncertainties, self.measured)
 
 
 def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant: str = EHA) -> Rig[Any]:
@@ -139,11 +139,11 @@ def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant
         If the file cannot be read or is not TOML, is of another kind of actuator, or an entry is unknown, of the wrong
         type, out of range, or of a size that no actuator has in SI.
     """
-    from plant.eha.rig_entries import wrong_kinds
+    from plant.eha.rig_entries import type_errors_as_rig_errors
 
-    content = _content(Path(path))
+    content = _read_content(Path(path))
     try:
-        with wrong_kinds():
+        with type_errors_as_rig_errors():
             found = _rig(content, parameter_class, plant)
         own = found.name == UNNAMED and found.parameters != parameter_class()
         return replace(found, name=Path(path).stem) if own else found
@@ -164,11 +164,11 @@ def plant_of(path: str | Path) -> str | None:
     RigError
         If the file cannot be read or is not TOML.
     """
-    plant = _content(Path(path)).get("plant")
+    plant = _read_content(Path(path)).get("plant")
     return plant if isinstance(plant, str) else None
 
 
-def _content(path: Path) -> dict[str, Any]:
+def _read_content(path: Path) -> dict[str, Any]:
     try:
         return small_toml(path)
     except OSError as error:
@@ -186,13 +186,13 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
     if misplaced := [name for name in content if name in _names(parameter_class)]:
         raise RigError(f"{misplaced[0]} must stand below a line [parameters]")
     _require_on_top(content)
-    _known(content, RigEntries.model_fields, "")
+    _require_known(content, RigEntries.model_fields, "")
     file = RigEntries.model_validate(content)
     if file.plant not in (None, plant):
         raise RigError(f"a rig of plant {plant!r} is needed here, got one of {file.plant!r}")
-    _known(file.parameters, _names(parameter_class), "parameters")
+    _require_known(file.parameters, _names(parameter_class), "parameters")
     given = numbers_with_units(file.parameters, {name: one.unit for name, one in notes(parameter_class).items()})
-    values = numbers_of(_unpaired(given, _pairs_of(parameter_class)), parameter_class)
+    values = numbers_of(_without_pairs(given, _pairs_of(parameter_class)), parameter_class)
     parameters = parameter_class(**values)
     if isinstance(parameters, EhaParameters):
         parameters = with_valves_sized(parameters, values)
@@ -213,7 +213,7 @@ def _pairs_of(parameter_class: type[Any]) -> Mapping[str, str]:
     return PAIRS if issubclass(parameter_class, EhaParameters) else {}
 
 
-def _unpaired(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[str, Any]:
+def _without_pairs(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[str, Any]:
     """Return a file's values; pairs for sides A and B become their mean and relative difference."""
     values = dict(given)
     for name, difference in pairs.items():
@@ -237,7 +237,7 @@ def _names(parameter_class: type[Any]) -> list[str]:
     return [one.name for one in fields(parameter_class)]
 
 
-def _known(given: Iterable[str], known: Iterable[str], section: str) -> None:
+def _require_known(given: Iterable[str], known: Iterable[str], section: str) -> None:
     names = list(known)
     for name in given:
         if name not in names:
@@ -284,7 +284,7 @@ def rig_template(
                 "# Parameters that you measured on the bench; they get the smaller uncertainty that is given below.",
                 "# measured = []",
             ]
-            if doubts_of(parameter_class)
+            if default_uncertainties(parameter_class)
             else []
         ),
         "",
@@ -312,7 +312,7 @@ def rig_template(
 
 def _uncertainty_lines(parameter_class: type[Any]) -> list[str]:
     """Return the section of the uncertainties: defaults as comments, each with its reason."""
-    doubts = doubts_of(parameter_class)
+    doubts = default_uncertainties(parameter_class)
     said = "has the default shown here" if doubts else "is taken as exact"
     lines = [
         "[uncertainty]",

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from plant.errors import RigError
-from plant.small_file import shown
+from plant.small_file import entry_text
 
 Strict = Annotated[float, Field(strict=True)]
 
@@ -61,7 +61,7 @@ def numbers_of(given: Mapping[str, Any], parameter_class: type[Any]) -> dict[str
 
 
 @contextmanager
-def wrong_kinds() -> Generator[None]:
+def type_errors_as_rig_errors() -> Generator[None]:
     """Raise our error if an entry of a rig file has the wrong type.
 
     Raises
@@ -76,4 +76,4 @@ def wrong_kinds() -> Generator[None]:
         where = ".".join(str(part) for part in first["loc"])
         wanted = first["msg"].removeprefix("Input should be ").replace("a valid tuple", "a list in square brackets")
         wanted += " (a fraction: 0.15 is 15 %)" if first["loc"][0] == "uncertainty" and len(first["loc"]) > 1 else ""
-        raise RigError(f"{where} must be {wanted}, got {shown(first['input'])}") from error
+        raise RigError(f"{where} must be {wanted}, got {entry_text(first['input'])}") from error

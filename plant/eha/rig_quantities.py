@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from plant.errors import RigError
-from plant.log.formats.cell_texts import NUMBER, parted
+from plant.log.formats.cell_texts import NUMBER, split_unit
 from plant.log.formats.cells import number
-from plant.small_file import shown
+from plant.small_file import entry_text
 from plant.unit_text import GAUGE
 from plant.units import conversion_to
 
-PLAIN = "write a decimal point, and nothing between thousands"
+NUMBER_ADVICE = "write a decimal point, and nothing between thousands"
 
 
 def numbers_with_units(given: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
@@ -49,22 +49,22 @@ def _in_si(name: str, value: Any, unit: str) -> Any:
     if not isinstance(value, str):
         return value
     whole = value.strip()
-    text, given = (whole, "") if NUMBER.fullmatch(whole) else parted(whole)
+    text, given = (whole, "") if NUMBER.fullmatch(whole) else split_unit(whole)
     wanted = "a number without quotes" if unit == "1" else f"a number in {unit}, or a number and its unit in quotes"
-    wrong = f"parameters.{name} must be {wanted}, got {shown(value)}"
+    wrong = f"parameters.{name} must be {wanted}, got {entry_text(value)}"
     if not given:
-        raise RigError(f"{wrong}: {PLAIN}" if unit == "1" and "," in text else wrong)
+        raise RigError(f"{wrong}: {NUMBER_ADVICE}" if unit == "1" and "," in text else wrong)
     try:
         amount = number(text)
     except ValueError as error:
-        raise RigError(f"{wrong}: {PLAIN}") from error
+        raise RigError(f"{wrong}: {NUMBER_ADVICE}") from error
     try:
         factor, offset = conversion_to(given, unit)
     except ValueError as error:
         raise RigError(f"{wrong}: {error}") from error
     if given in GAUGE:  # some parameters are absolute pressures
         raise RigError(
-            f"parameters.{name} must be in bar or {unit}, got {shown(value)}, a pressure above the atmosphere: "
+            f"parameters.{name} must be in bar or {unit}, got {entry_text(value)}, a pressure above the atmosphere: "
             "add 1.013 bar if the parameter is absolute"
         )
     return amount * factor + offset

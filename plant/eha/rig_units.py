@@ -53,7 +53,7 @@ MOST_GAS = 100.0
 make it a thousand times too large."""
 
 
-def _quoted(example: str) -> str:
+def _unit_advice(example: str) -> str:
     return f'write another unit in quotes, as in "{example}"'
 
 
@@ -80,16 +80,16 @@ def require_si(p: EhaParameters) -> None:
         value = getattr(p, name)
         if value is not None and not one.least <= value <= one.most:
             limits = f"from {one.least:g} to {one.most:g} {one.unit}"
-            raise RigError(f"parameters.{name} must be {limits}, got {value:g}; {_quoted(one.example)}")
+            raise RigError(f"parameters.{name} must be {limits}, got {value:g}; {_unit_advice(one.example)}")
     length = p.chamber_volume / p.piston_area
     if not LENGTHS[0] <= length <= LENGTHS[1]:
         raise RigError(
             f"parameters.chamber_volume must be {LENGTHS[0]:g} to {LENGTHS[1]:g} m of the piston's area, got "
             f"{p.chamber_volume:g} m^3, which is {length:.3g} m of {p.piston_area:g} m^2; "
-            f'{_quoted("0.6 L")}, and piston_area as in "31.2 cm^2"'
+            f'{_unit_advice("0.6 L")}, and piston_area as in "31.2 cm^2"'
         )
     if p.accumulator_gas is not None and p.accumulator_gas > MOST_GAS * p.chamber_volume:
         raise RigError(
             f"parameters.accumulator_gas must be at most {MOST_GAS:g} times chamber_volume ({p.chamber_volume:g} m^3), "
-            f"got {p.accumulator_gas:g} m^3; {_quoted('0.3 L')}"
+            f"got {p.accumulator_gas:g} m^3; {_unit_advice('0.3 L')}"
         )

@@ -33,19 +33,19 @@ from plant.solvers.steps import StepFunction, parameter_names, parameter_row, ro
 from plant.solvers.trajectory import compile_trajectory
 
 
-def _as_is(parameters: EhaParameters) -> EhaParameters:
+def _unchanged(parameters: EhaParameters) -> EhaParameters:
     return parameters
 
 
-def _from_zero(_row: Array) -> Array:
+def _zero_state(_row: Array) -> Array:
     return np.zeros(3)
 
 
-def _any_rate(_rows: Array) -> float:
+def _no_rate_limit(_rows: Array) -> float:
     return 0.0
 
 
-def _never(_states: Array) -> Mapping[str, NDArray[np.bool_]]:
+def _no_breaches(_states: Array) -> Mapping[str, NDArray[np.bool_]]:
     return {}
 
 
@@ -86,10 +86,10 @@ class Plant:
     observe: Callable[[Any, Any], Mapping[str, Scalar]]
     substeps: int
     parameter_class: type[EhaParameters] = EhaParameters
-    complete: Callable[[EhaParameters], EhaParameters] = _as_is
-    start: Callable[[Array], Array] = _from_zero
-    step_rate: Callable[[Array], float] = _any_rate
-    breaches: Callable[[Array], Mapping[str, NDArray[np.bool_]]] = _never
+    complete: Callable[[EhaParameters], EhaParameters] = _unchanged
+    start: Callable[[Array], Array] = _zero_state
+    step_rate: Callable[[Array], float] = _no_rate_limit
+    breaches: Callable[[Array], Mapping[str, NDArray[np.bool_]]] = _no_breaches
     control: ErrorControl | None = None
 
     def channels(self, states: Array, rows: Array) -> Mapping[str, Array]:
@@ -275,7 +275,7 @@ def run_plant(plant: Plant, speed: Array, sample_time: float, rows: Array) -> Ar
     return np.array([run(start, speed, row, sample_time, substeps) for start, row in zip(starts, each, strict=True)])
 
 
-def _require_sound(plant: Plant, states: Array, sample_time: float) -> None:
+def _require_valid_run(plant: Plant, states: Array, sample_time: float) -> None:
     require_finite(states, sample_time, plant.name)
     for reason, broken in plant.breaches(states).items():
         if np.any(broken):
@@ -295,7 +295,7 @@ def _record(
     keep_truth: bool,
 ) -> Record:
     """Return the sensors' log of a run."""
-    _require_sound(plant, states, sample_time)
+    _require_valid_run(plant, states, sample_time)
     metadata = {"plant": plant.name, "parameters": asdict(parameters)}
     channels = {"motor_speed_rad_s": speed, **plant.channels(states, rows)}
     if len(channels) > len(LOGGED):
@@ -306,14 +306,14 @@ def _record(
     if rng is None:
         raise HydrostateError("simulate() needs rng for sensors with noise, got None")
     record = measure(truth, sensors, rng, keep_truth=keep_truth)
-    return record.replace(**_measured_beside(truth, sensors, rng))
+    return record.replace(**_further_channels(truth, sensors, rng))
 
 
 LOGGED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
 """Channels that every plant has, and that `plant.sensors.sensors.measure` measures."""
 
 
-def _measured_beside(truth: Record, sensors: Sensors, rng: np.random.Generator) -> Mapping[str, Array]:
+def _further_channels(truth: Record, sensors: Sensors, rng: np.random.Generator) -> Mapping[str, Array]:
     """Return the channels beyond `LOGGED`: the commanded voltage, and each chamber's pressure transducer."""
     beside = {name: truth[name] for name in truth if name == "motor_voltage_v"}
     chambers = [name for name in truth if name in ("pressure_a_pa", "pressure_b_pa")]

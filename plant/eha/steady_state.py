@@ -35,15 +35,15 @@ def steady_state(speed: float, p: EhaValues) -> tuple[Any, Any]:
     (0.0431, 4.28)
     """
     pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
-    closed = _settled(pumped, p.leakage_coefficient, p)
+    closed = _steady_balance(pumped, p.leakage_coefficient, p)
     held = p.relief_conductance * p.relief_pressure * np.where(closed[1] > 0.0, 1.0, -1.0)
-    relieved = _settled(pumped + held, p.leakage_coefficient + p.relief_conductance, p)
+    relieved = _steady_balance(pumped + held, p.leakage_coefficient + p.relief_conductance, p)
     below = np.abs(closed[1]) <= p.relief_pressure
     velocity, pressure = (np.where(below, one, other) for one, other in zip(closed, relieved, strict=True))
     return (velocity, pressure) if velocity.ndim else (float(velocity), float(pressure))
 
 
-def _settled(flow: Any, conductance: Any, p: EhaValues) -> tuple[Any, Any]:
+def _steady_balance(flow: Any, conductance: Any, p: EhaValues) -> tuple[Any, Any]:
     """Return the velocity and pressure at which this flow passes through piston and leakage paths."""
     area, quadratic, coulomb = p.piston_area, p.friction_quadratic, p.friction_coulomb
     tight = np.asarray(conductance == 0.0)  # all of the flow moves the piston, whatever the pressure

@@ -12,12 +12,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from plant.compiled.c99.files import checked_name, filled
+from plant.compiled.c99.files import checked_name, fill_template
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import Plant
 from plant.errors import HydrostateError, require_known
 from plant.export.c_plant import plant_graphs, plant_in_c, substeps_of
-from plant.export.fmu_description import VERSIONS, Described, Variable, build_description, described, sources
+from plant.export.fmu_description import (
+    VERSIONS,
+    ModelDescription,
+    Variable,
+    build_description,
+    model_description,
+    sources,
+)
 from plant.log.record import CHANNELS
 from plant.solvers.steps import parameter_names, parameter_row
 from plant.units import notes
@@ -74,7 +81,7 @@ def plant_fmu(plant: Plant, parameters: EhaParameters, sample_time: float, fmi: 
     variables.append(Variable("motor_speed_rad_s", "rad/s", "motor speed, or what is asked of it", "input", 0.0))
     variables += [Variable(one, CHANNELS[one], f"{one} of the plant", "output") for one in plant_graphs(plant).outputs]
     told = f"{plant.name} plant of the electro-hydrostatic actuator"
-    model = Described(name, told, "", variables, sample_time, interpolates=True)
+    model = ModelDescription(name, told, "", variables, sample_time, interpolates=True)
     return archive(model, files, ("plant", "export/templates", "fmu_plant.c", "plant"), fmi)
 
 
@@ -84,7 +91,7 @@ def _unit(state: str) -> str:
     return "m^3"
 
 
-def archive(model: Described, files: Mapping[str, str], glue: tuple[str, str, str, str], fmi: str) -> bytes:
+def archive(model: ModelDescription, files: Mapping[str, str], glue: tuple[str, str, str, str], fmi: str) -> bytes:
     """Return an FMU.
 
     Parameters
@@ -128,10 +135,10 @@ def archive(model: Described, files: Mapping[str, str], glue: tuple[str, str, st
     shared = {"model.h": "fmu_model.h", f"fmi{fmi[0]}.c": f"fmu{fmi[0]}.c"}
     written = {
         **inside,
-        **{file: filled("plant", "export/templates", one, facts) for file, one in shared.items()},
-        "model.c": filled(package, folder, template, facts),
+        **{file: fill_template("plant", "export/templates", one, facts) for file, one in shared.items()},
+        "model.c": fill_template(package, folder, template, facts),
     }
-    description = described(model, fmi)
+    description = model_description(model, fmi)
     entries: dict[str, bytes] = {"modelDescription.xml": description.encode()}
     entries |= {f"sources/{file}": text.encode() for file, text in sorted(written.items())}
     if fmi == "3.0":

@@ -12,7 +12,7 @@ from plant.units import unit_registry
 VERSIONS = ("2.0", "3.0")
 """Versions of the interface that FMUs are written for."""
 
-UNKNOWN = 1e300
+INFINITY = 1e300
 """Number that represents infinity, which XML's numbers do not have [any unit]."""
 
 _BASE = {"kilogram": "kg", "meter": "m", "second": "s", "ampere": "A", "kelvin": "K", "mole": "mol", "radian": "rad"}
@@ -49,7 +49,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Described:
+class ModelDescription:
     """Contents of a model description.
 
     Parameters
@@ -72,7 +72,7 @@ class Described:
     interpolates: bool
 
 
-def described(model: Described, fmi: str) -> str:
+def model_description(model: ModelDescription, fmi: str) -> str:
     """Return ``modelDescription.xml``.
 
     Parameters
@@ -133,7 +133,7 @@ def _units(root: ET.Element, variables: Sequence[Variable]) -> None:
         ET.SubElement(ET.SubElement(units, "Unit", name=unit), "BaseUnit", powers)
 
 
-def _common(one: Variable, reference: int) -> dict[str, str]:
+def _common_attributes(one: Variable, reference: int) -> dict[str, str]:
     kind = {"parameter": "fixed", "input": "continuous", "output": "continuous"}[one.causality]
     return {
         "name": one.name,
@@ -146,27 +146,27 @@ def _common(one: Variable, reference: int) -> dict[str, str]:
 
 def _real(one: Variable) -> dict[str, str]:
     told = {"unit": one.shown_unit} if one.shown_unit else {}
-    return told | ({} if one.start is None else {"start": repr(min(one.start, UNKNOWN))})
+    return told | ({} if one.start is None else {"start": repr(min(one.start, INFINITY))})
 
 
-def _variables_2(root: ET.Element, model: Described) -> list[str]:
+def _variables_2(root: ET.Element, model: ModelDescription) -> list[str]:
     """Write variables; return the indices of outputs."""
     listed = ET.SubElement(root, "ModelVariables")
     for reference, one in enumerate(model.variables, start=1):
-        given = _common(one, reference)
+        given = _common_attributes(one, reference)
         if one.causality == "output":
             given["initial"] = "calculated"
         ET.SubElement(ET.SubElement(listed, "ScalarVariable", given), "Real", _real(one))
     return [str(i) for i, one in enumerate(model.variables, start=1) if one.causality == "output"]
 
 
-def _variables_3(root: ET.Element, model: Described) -> list[str]:
+def _variables_3(root: ET.Element, model: ModelDescription) -> list[str]:
     """Write variables; return the references of outputs."""
     listed = ET.SubElement(root, "ModelVariables")
     time = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous", "unit": "s"}
     ET.SubElement(listed, "Float64", time)
     for reference, one in enumerate(model.variables, start=1):
-        ET.SubElement(listed, "Float64", _common(one, reference) | _real(one))
+        ET.SubElement(listed, "Float64", _common_attributes(one, reference) | _real(one))
     return [str(i) for i, one in enumerate(model.variables, start=1) if one.causality == "output"]
 
 

@@ -11,15 +11,15 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError, LogWarning
-from plant.log.checks import Clock, trusted
+from plant.log.checks import Clock, checked_log
 from plant.log.clock.stamps import seconds_from_first
 from plant.log.clock.uniform import MOST_MISSING
-from plant.log.columns import TIME, UNITS, Column, listed, resolve_columns
+from plant.log.columns import TIME, UNITS, Column, list_in_words, resolve_columns
 from plant.log.formats.detect import open_tables
-from plant.log.headings import Heading, cleaned
+from plant.log.headings import Heading, headings_of
 from plant.log.lost_values import without_lost
 from plant.log.notes import LogCode
-from plant.log.plausibility import implausible
+from plant.log.plausibility import implausibility_notes
 from plant.log.record import Record
 from plant.log.table import Table
 
@@ -79,9 +79,11 @@ def read_any(
     """
     source, opened = (path.source, (path,)) if isinstance(path, Table) else (str(path), open_tables(Path(path)))
     table = _table(opened, names)
-    headings = cleaned(table.headings)
+    headings = headings_of(table.headings)
     time = None if sample_time is not None else _time_column(headings)
-    columns = _every(table, headings, time) if names is None else _wanted(table, headings, time, names, source)
+    columns = (
+        _all_columns(table, headings, time) if names is None else _wanted_columns(table, headings, time, names, source)
+    )
     if not set(columns) - {TIME}:
         raise LogError("a column of numbers is needed; the log has none", source)
     for name in columns.keys() - {TIME}:
@@ -95,9 +97,9 @@ def read_any(
             warnings.warn(LogWarning(LogCode.CLOCK_ASSUMED.note(sample_time_s=assumed), source), stacklevel=2)
         clock = Clock(assumed if step is None else step, 0.0)
         columns[TIME] = clock.sample_time * np.arange(len(next(iter(columns.values()))), dtype=np.float64)
-    checked = trusted(columns, source=source, required=tuple(names or ()), clock=clock, most_missing=most_missing)
+    checked = checked_log(columns, source=source, required=tuple(names or ()), clock=clock, most_missing=most_missing)
     # the meaning of these columns is unknown, so notes on implausible units are left out
-    amiss = implausible(checked.sample_time, checked.channels)
+    amiss = implausibility_notes(checked.sample_time, checked.channels)
     for note in (one for one in checked.notes if one not in amiss):
         warnings.warn(LogWarning(note, source), stacklevel=2)
     kept = {name: checked.channels[name] for name in names or checked.channels}
@@ -108,13 +110,13 @@ def _table(tables: Sequence[Table], names: Sequence[str] | None) -> Table:
     """Return the table that holds most of the wanted columns, or the most columns."""
 
     def rank(table: Table) -> tuple[int, int]:
-        own = {one.name.lower() for one in cleaned(table.headings)}
+        own = {one.name.lower() for one in headings_of(table.headings)}
         return sum(name.lower() in own for name in names or ()), len(own)
 
     return max(tables, key=rank)
 
 
-def _every(table: Table, headings: Sequence[Heading], time: Column | None) -> dict[str, Array]:
+def _all_columns(table: Table, headings: Sequence[Heading], time: Column | None) -> dict[str, Array]:
     """Return every numeric column that has its own name, and the time [s]."""
     numbers = table.numbers(time)
     found: dict[str, Array] = {} if time is None else {TIME: _seconds(numbers[time.position], time)}
@@ -125,11 +127,11 @@ def _every(table: Table, headings: Sequence[Heading], time: Column | None) -> di
     return found
 
 
-def _wanted(
+def _wanted_columns(
     table: Table, headings: Sequence[Heading], time: Column | None, names: Sequence[str], source: str
 ) -> dict[str, Array]:
     """Return the wanted columns and the time [s], read together: a row that is skipped in one is skipped in all."""
-    chosen = [_named(headings, name, source) for name in dict.fromkeys(names)]
+    chosen = [_column_named(headings, name, source) for name in dict.fromkeys(names)]
     raw = table.read(chosen if time is None else [time, *chosen])
     found: dict[str, Array] = {} if time is None else {TIME: _seconds(raw[time], time)}
     for column in chosen:
@@ -140,7 +142,7 @@ def _wanted(
     return found
 
 
-def _named(headings: Sequence[Heading], name: str, source: str) -> Column:
+def _column_named(headings: Sequence[Heading], name: str, source: str) -> Column:
     known = [one.name for one in headings]
     positions = [k for k, other in enumerate(known) if other == name]
     positions = positions or [k for k, other in enumerate(known) if other.lower() == name.lower()]
@@ -155,7 +157,7 @@ def _named(headings: Sequence[Heading], name: str, source: str) -> Column:
                 return column
     near = get_close_matches(name, known, n=1) or [one for one in known if name.lower() in one.lower()][:1]
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise LogError(f"column {name!r} is needed; the log has {listed(known)}{hint}", source)
+    raise LogError(f"column {name!r} is needed; the log has {list_in_words(known)}{hint}", source)
 
 
 def _is_time(heading: Heading) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.errors import HydrostateError, LogError, MissingColumnError, RigError
-from plant.log.headings import Heading, cleaned
+from plant.log.headings import Heading, headings_of
 from plant.log.scale import conversion_of
 from plant.units import converts
 
@@ -33,10 +33,10 @@ CHANNELS: Mapping[str, str] = {
 TIME = "time_s"
 """The column that says when; it becomes the record's clock."""
 
-TIMES = ("t", "time", "times", "timestamp", "timestamps", "time_stamp", "zeit", "temps", "elapsed_time", "x_value")
+TIME_NAMES = ("t", "time", "times", "timestamp", "timestamps", "time_stamp", "zeit", "temps", "elapsed_time", "x_value")
 """What a time column is called where its unit stands beside the name."""
 
-TRUTH = "true_"
+TRUTH_PREFIX = "true_"
 """Columns that begin so hold simulated truth, and are kept as they are."""
 
 _units: dict[str, str] = {}
@@ -129,9 +129,9 @@ def resolve_columns(
     >>> [column.channel for column in resolve_columns(["time_ms", "note", "position_mm"], None, "a.csv")]
     ['time_s', 'position_m']
     """
-    clean = cleaned(names)
-    dated = _dated(clean)
-    found = {channel: _foreign(clean, channel, spec, source) for channel, spec in (mapping or {}).items()}
+    clean = headings_of(names)
+    dated = _date_column(clean)
+    found = {channel: _foreign_column(clean, channel, spec, source) for channel, spec in (mapping or {}).items()}
     taken = {column.position for column in found.values()}
     strange: list[tuple[str, LogError]] = []
     for position, heading in enumerate(clean):
@@ -139,7 +139,7 @@ def resolve_columns(
         if channel is None or channel in (mapping or {}):
             continue
         try:
-            column = _own(position, heading, channel, source)
+            column = _own_column(position, heading, channel, source)
         except LogError as error:
             strange.append((channel, error))
             continue
@@ -155,7 +155,7 @@ def resolve_columns(
     return tuple(found.values())
 
 
-def _dated(headings: Sequence[Heading]) -> int | None:
+def _date_column(headings: Sequence[Heading]) -> int | None:
     """Return the only column of dates if it is the time: no other is, and it is not mapped to a channel."""
     stamped = [position for position, heading in enumerate(headings) if heading.stamped]
     if len(stamped) != 1 or _channel_of(headings[stamped[0]]) is not None:
@@ -169,26 +169,26 @@ _PART = re.compile(r"[.\s]")
 
 def _channel_of(heading: Heading) -> str | None:
     name = heading.name
-    if name in UNITS or (name.startswith(TRUTH) and name != TRUTH):
+    if name in UNITS or (name.startswith(TRUTH_PREFIX) and name != TRUTH_PREFIX):
         return name
     if heading.unit is not None and (known := STEMS.get(heading.stem + "_")):
         return known
-    if heading.stem in TIMES and heading.unit is not None and converts(heading.unit, "s"):
+    if heading.stem in TIME_NAMES and heading.unit is not None and converts(heading.unit, "s"):
         return TIME
     stems = [stem for stem in STEMS if name.startswith(stem) and not _PART.search(name)]
     return STEMS[max(stems, key=len)] if stems and heading.name == heading.bare else None
 
 
-def _own(position: int, heading: Heading, channel: str, source: str) -> Column:
+def _own_column(position: int, heading: Heading, channel: str, source: str) -> Column:
     """Return the column with a channel's own name, converted from the unit in that name."""
     name = heading.name
-    if channel.startswith(TRUTH):
+    if channel.startswith(TRUTH_PREFIX):
         return Column(position, name, channel)
     if heading.stamped:
         return Column(position, name, channel)
     stem = next(stem for stem, owner in STEMS.items() if owner == channel)
     unit, named = heading.unit, Heading(name).unit
-    if name != channel and heading.stem + "_" != stem and not (channel == TIME and heading.stem in TIMES):
+    if name != channel and heading.stem + "_" != stem and not (channel == TIME and heading.stem in TIME_NAMES):
         suffix = name.removeprefix(stem)
         unit = re.sub(r"([A-Za-z])([234])(?![0-9])", r"\1^\2", suffix.replace("_per_", "/").replace("_", "/"))
         named = unit
@@ -205,7 +205,7 @@ def _own(position: int, heading: Heading, channel: str, source: str) -> Column:
     return Column(position, name, channel, factor, offset)
 
 
-def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) -> Column:
+def _foreign_column(headings: Sequence[Heading], channel: str, spec: str, source: str) -> Column:
     for one in (channel, spec):
         if not isinstance(one, str):  # pyright: ignore[reportUnnecessaryIsInstance] -- Python's users give what they like
             raise LogError(f"columns must be names by channel, such as 'POS_MM:mm', got {one!r:.80}", source)
@@ -217,7 +217,7 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
     positions = [position for position, other in enumerate(names) if other == name]
     positions = positions or [position for position, other in enumerate(bares) if other == name]
     if not positions:
-        raise MissingColumnError(channel, name, listed(names), source)
+        raise MissingColumnError(channel, name, list_in_words(names), source)
     if len(positions) > 1:
         several = f"the log has it {len(positions)} times; rename the others"
         raise LogError(f"column {name[:80]!r} is needed once for {channel}, {several}", source)
@@ -225,7 +225,7 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
     if unit is None:
         _require_one_unit(heading, Heading(heading.name).unit, channel, source)
     logged, unit = (None, heading.unit) if unit is None else (heading.unit, unit)
-    if unit is None or channel.startswith(TRUTH):
+    if unit is None or channel.startswith(TRUTH_PREFIX):
         return Column(positions[0], heading.name, channel)
     return Column(positions[0], heading.name, channel, *_conversion(unit, channel, heading.name, source, logged))
 
@@ -256,14 +256,14 @@ def _conversion(unit: str, channel: str, name: str, source: str, logged: str | N
 
 
 def _known_channel(channel: str, error: Callable[[str], HydrostateError]) -> None:
-    if channel in UNITS or channel.startswith(TRUTH):
+    if channel in UNITS or channel.startswith(TRUTH_PREFIX):
         return
     near = get_close_matches(channel, UNITS, n=1)
     hint = f"did you mean {near[0]!r}?" if near else f"wanted one of {', '.join(UNITS)}"
     raise error(f"channel {channel!r} is unknown, {hint}")
 
 
-def listed(names: Collection[str], limit: int = 12) -> str:
+def list_in_words(names: Collection[str], limit: int = 12) -> str:
     """Return names as a list in words; of many names only the first few."""
     shown = ", ".join(repr(name[:40]) for name in list(names)[:limit])
     return (shown or "no columns") + (f" and {len(names) - limit} more" if len(names) > limit else "")

@@ -12,7 +12,7 @@ import numpy as np
 
 from plant.atomic import replacing
 from plant.errors import ClockError, LogError, LogWarning
-from plant.log.checks import REQUIRED, Clock, trusted
+from plant.log.checks import REQUIRED, Clock, checked_log
 from plant.log.clock.uniform import MOST_MISSING
 from plant.log.columns import TIME
 from plant.log.formats.csv import write_csv
@@ -20,7 +20,7 @@ from plant.log.formats.detect import open_tables
 from plant.log.notes import LogCode
 from plant.log.record import Record
 from plant.log.table import Table
-from plant.log.tables import gathered
+from plant.log.tables import gather_channels
 from plant.notes import Note
 
 SUFFIXES = {".csv": "csv", ".txt": "csv", ".gz": "csv", ".parquet": "parquet", ".mat": "mat"}
@@ -43,7 +43,7 @@ def read_record(
     path : str, Path, Table or tuple of Table
         Text with cells apart by commas, semicolons, tabs or blanks (also packed by gzip or zstd), Parquet, Feather or
         MAT; with the extra ``bench`` also XLSX, TDMS, MDF, HDF5 and MAT 7.3. The content says which, not the name.
-        Or one that is open, as `opened_log` or `plant.log.frames.frame_table` gives it.
+        Or one that is open, as `open_log` or `plant.log.frames.frame_table` gives it.
     columns : Mapping[str, str], optional
         Foreign columns by channel, with a unit where the file gives none and it is not SI:
         ``{"position_m": "POS_MM:mm"}``.
@@ -78,11 +78,11 @@ def read_record(
     source = source_of(path)
     if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
         raise LogError(f"sample_time must be positive and finite, got {sample_time!r}", source)
-    tables = [table for one in (path, *beside) for table in opened_log(one)]
-    found = gathered(tables, columns, required, source, sample_time)
+    tables = [table for one in (path, *beside) for table in open_log(one)]
+    found = gather_channels(tables, columns, required, source, sample_time)
     document, notes = _document(next((one.metadata for one in tables if one.metadata), None))
     clock = None if beside else _clock(document)
-    trust = partial(trusted, source=source, required=required, most_missing=most_missing)
+    trust = partial(checked_log, source=source, required=required, most_missing=most_missing)
     try:
         checked = trust(found.columns, clock=clock)
     except ClockError:
@@ -106,7 +106,7 @@ def source_of(log: str | Path | Table | tuple[Table, ...]) -> str:
     return first.source if isinstance(first, Table) else str(first)
 
 
-def opened_log(log: str | Path | Table | tuple[Table, ...]) -> tuple[Table, ...]:
+def open_log(log: str | Path | Table | tuple[Table, ...]) -> tuple[Table, ...]:
     """Open a log that may be read more than once.
 
     Parameters
@@ -121,7 +121,7 @@ def opened_log(log: str | Path | Table | tuple[Table, ...]) -> tuple[Table, ...]
     """
     if isinstance(log, tuple):
         return log
-    return (log,) if isinstance(log, Table) else open_tables(Path(log), _beside(Path(log)))
+    return (log,) if isinstance(log, Table) else open_tables(Path(log), _sidecar_text(Path(log)))
 
 
 def write_record(record: Record, path: str | Path) -> None:
@@ -140,8 +140,8 @@ def write_record(record: Record, path: str | Path) -> None:
         If the suffix is unknown, the metadata are not JSON values, or the file cannot be written.
     """
     path = Path(path)
-    kind = _kind(path)
-    document = _encoded(record, path)
+    kind = _written_format(path)
+    document = _document_text(record, path)
     table = {TIME: record.time, **record.channels}
     try:
         if kind == "csv":
@@ -173,14 +173,14 @@ def sidecar(path: Path) -> Path:
     return path.parent / f"{path.name}.json"
 
 
-def _kind(path: Path) -> str:
+def _written_format(path: Path) -> str:
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None:
         raise LogError(f"a log is written as {', '.join(SUFFIXES)}, got {path.suffix or 'no suffix'}", str(path))
     return kind
 
 
-def _beside(path: Path) -> str | None:
+def _sidecar_text(path: Path) -> str | None:
     """Return the metadata of a CSV; None if it has no metadata file."""
     notes = sidecar(path)
     try:
@@ -189,7 +189,7 @@ def _beside(path: Path) -> str | None:
         return None
 
 
-def _encoded(record: Record, path: Path) -> str:
+def _document_text(record: Record, path: Path) -> str:
     document = {
         "hydrostate_record": 1,
         "sample_time_s": record.sample_time,
@@ -197,12 +197,12 @@ def _encoded(record: Record, path: Path) -> str:
         "metadata": dict(record.metadata),
     }
     try:
-        return json.dumps(document, allow_nan=False, default=_plain)
+        return json.dumps(document, allow_nan=False, default=_json_value)
     except (TypeError, ValueError) as error:
         raise LogError(f"metadata must be JSON values: {error}", str(path)) from error
 
 
-def _plain(value: object) -> object:
+def _json_value(value: object) -> object:
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     if isinstance(value, Mapping):

@@ -7,7 +7,7 @@ import numpy as np
 
 from plant.errors import LogError
 from plant.log.any_columns import TIME_STEM
-from plant.log.columns import TIME, TRUTH, UNITS, resolve_columns
+from plant.log.columns import TIME, TRUTH_PREFIX, UNITS, resolve_columns
 from plant.log.formats.cells import values_of
 from plant.log.table import Table, table_of
 
@@ -127,7 +127,7 @@ def _of_quantity(name: str, quantity: Any) -> tuple[Any, str | None]:
     """Return the numbers of a quantity with units, in the unit of its name or else in its own unit."""
     named = resolve_columns([name], None, SOURCE)
     try:
-        if named and not named[0].channel.startswith(TRUTH):
+        if named and not named[0].channel.startswith(TRUTH_PREFIX):
             column = named[0]
             return (quantity.to(UNITS[column.channel]).magnitude - column.offset) / column.factor, None
     except TypeError as error:  # raised by pint for units that do not convert

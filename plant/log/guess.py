@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant.errors import NoChannelError
-from plant.log.chamber_pressures import CHAMBERS, PRESSURE, tells_difference
-from plant.log.columns import CHANNELS, TIME, UNITS, listed, unit_ending
+from plant.log.chamber_pressures import CHAMBERS, PRESSURE, has_pressure_difference
+from plant.log.columns import CHANNELS, TIME, UNITS, list_in_words, unit_ending
 from plant.log.headings import Heading
 from plant.log.notes import LogCode
 from plant.notes import Note
@@ -54,7 +54,7 @@ NAMES: Mapping[str, tuple[tuple[str, float], ...]] = {
 }
 """What each channel is called on benches, and how much such a name says [log-odds]; judged."""
 
-OTHERWISE = re.compile(
+OTHER_QUANTITIES = re.compile(
     r"(^|_)(soll\w*|set\w*|sp|ref\w*|cmd|command\w*|demand|target|desired|err\w*|max|min|limit|std|temp\w*|status|flag|"
     r"count\w*|index|filter\w*)(_|$)"
 )
@@ -63,16 +63,16 @@ OTHERWISE = re.compile(
 NOT_IT, UNIT_FITS, NONE_OF_THEM = -4.0, 3.0, 2.0
 """What such a word says, what a unit says, and that none of the columns may be the channel [log-odds]; judged."""
 
-VALVES = re.compile(r"spool|valve|ventil|schieber")
+VALVE_NAMES = re.compile(r"spool|valve|ventil|schieber")
 """Names of the columns of an actuator that a valve controls."""
 
-VALVE = (
+VALVE_REMARK = (
     "; an actuator that a valve controls cannot be diagnosed, but `hydrostate identify FILE --input COLUMN "
     "--output COLUMN` fits a model"
 )
 """What is said of a log without motor speed that has such a column."""
 
-SHOWN = 0.5
+SHOWN_PROBABILITY = 0.5
 """Probability from which an error names a guess."""
 
 
@@ -144,7 +144,7 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
     else:
         words = own.split("_")
         said = 4.0 * sum(word in name.split("_") for word in words) / len(words)
-    if OTHERWISE.search(name) and name != own:
+    if OTHER_QUANTITIES.search(name) and name != own:
         said += NOT_IT
     return said + (UNIT_FITS if fits else 0.0)
 
@@ -169,7 +169,7 @@ def unit_of(heading: Heading) -> str | None:
     return LOWER_CASE.get(unit, unit) or None
 
 
-def guessed(points: Mapping[str, Mapping[int, float]], headings: Sequence[Heading]) -> tuple[Guess, ...]:
+def best_guesses(points: Mapping[str, Mapping[int, float]], headings: Sequence[Heading]) -> tuple[Guess, ...]:
     """Return the most probable column of each channel, each column once, the surest channel first.
 
     Parameters
@@ -227,7 +227,7 @@ def guess_by_name(headings: Sequence[Heading], channels: Collection[str] = (TIME
     for channel in channels:
         said = {place: points_by_name(heading, channel) for place, heading in enumerate(headings)}
         points[channel] = {place: worth for place, worth in said.items() if worth is not None and worth > 0.0}
-    return guessed(points, headings)
+    return best_guesses(points, headings)
 
 
 def missing_channels(
@@ -246,17 +246,17 @@ def missing_channels(
     """
     names = tuple(one.name for one in headings)
     asked = [name for one in wanted for name in one.split(" or ")]
-    more = [name for name in _gained_by(found) if name not in asked]
+    more = [name for name in _useful_channels(found) if name not in asked]
     hint = hint_of(asked, headings, more)
-    return NoChannelError(f"{absent(wanted)}; the log has {listed(names)}", source, hint, names)
+    return NoChannelError(f"{missing_columns_clause(wanted)}; the log has {list_in_words(names)}", source, hint, names)
 
 
-def absent(wanted: Sequence[str]) -> str:
+def missing_columns_clause(wanted: Sequence[str]) -> str:
     """Return the clause that names missing columns.
 
     Examples
     --------
-    >>> absent(["time_s"]), absent(["time_s", "position_m or velocity_m_s"])
+    >>> missing_columns_clause(["time_s"]), missing_columns_clause(["time_s", "position_m or velocity_m_s"])
     ('column time_s is missing', 'columns time_s, and position_m or velocity_m_s are missing')
     """
     if len(wanted) == 1:
@@ -264,7 +264,7 @@ def absent(wanted: Sequence[str]) -> str:
     return f"columns {', '.join(wanted[:-1])}, and {wanted[-1]} are missing"
 
 
-def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Note, ...]:
+def unused_column_notes(headings: Sequence[Heading], found: Collection[str]) -> tuple[Note, ...]:
     """Return notes on unused columns that may improve an estimate most: pressure, or a second measurement of motion.
 
     Parameters
@@ -276,16 +276,16 @@ def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Not
     """
     return tuple(
         LogCode.COLUMN_OVERLOOKED.note(column=one.name[:60], channel=one.channel, option=option)
-        for one, option in _shown(headings, _gained_by(found))
+        for one, option in _certain_guesses(headings, _useful_channels(found))
     )
 
 
-def _gained_by(found: Collection[str]) -> list[str]:
-    pressures = () if tells_difference(found) else (PRESSURE, *CHAMBERS)
+def _useful_channels(found: Collection[str]) -> list[str]:
+    pressures = () if has_pressure_difference(found) else (PRESSURE, *CHAMBERS)
     return [one for one in (*pressures, "position_m", "velocity_m_s") if one not in found]
 
 
-INSPECT = (
+INSPECT_ADVICE = (
     "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit, for --rig rig.toml"
 )
 """The command that shows more; it leaves this out where it speaks itself."""
@@ -303,11 +303,11 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
     more : sequence of str
         Channels that could do without, but are better named with the others.
     """
-    shown = {one.channel: option for one, option in _shown(headings, [*channels, *more])}
+    shown = {one.channel: option for one, option in _certain_guesses(headings, [*channels, *more])}
     # one chamber pressure is of no use without the other
     if set(CHAMBERS) <= {*channels, *more} and len(set(CHAMBERS) & set(shown)) == 1:
         shown = {name: option for name, option in shown.items() if name not in CHAMBERS}
-    options = [shown[name] for name in in_order(shown)] if set(shown) & set(channels) else []
+    options = [shown[name] for name in in_usual_order(shown)] if set(shown) & set(channels) else []
     may = f"; perhaps --columns '{','.join(options)}'" if options else ""
     put = ", with the unit of each for UNIT" if any(one.endswith(":UNIT") for one in options) else ""
     timeless = "; to read a log without time, give --sample-time" if TIME in channels and TIME not in shown else ""
@@ -318,27 +318,29 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
     )
     other = "" if options or TIME in channels else "; if a second logger's file has it, add --with FILE"
     valve = (
-        VALVE if "motor_speed_rad_s" in channels and any(VALVES.search(one.name.lower()) for one in headings) else ""
+        VALVE_REMARK
+        if "motor_speed_rad_s" in channels and any(VALVE_NAMES.search(one.name.lower()) for one in headings)
+        else ""
     )
-    return f"{may}{put}; {INSPECT}{scale}{other}{timeless}{valve}"
+    return f"{may}{put}; {INSPECT_ADVICE}{scale}{other}{timeless}{valve}"
 
 
-def in_order(channels: Iterable[str]) -> list[str]:
+def in_usual_order(channels: Iterable[str]) -> list[str]:
     """Return channels in the usual order: time, motor speed, motion, pressures.
 
     Examples
     --------
-    >>> in_order(["velocity_m_s", "time_s", "position_m"])
+    >>> in_usual_order(["velocity_m_s", "time_s", "position_m"])
     ['time_s', 'position_m', 'velocity_m_s']
     """
     usual = (TIME, *CHANNELS)
     return sorted(channels, key=lambda one: usual.index(one) if one in usual else len(usual))
 
 
-def _shown(headings: Sequence[Heading], channels: Sequence[str]) -> Iterator[tuple[Guess, str]]:
+def _certain_guesses(headings: Sequence[Heading], channels: Sequence[str]) -> Iterator[tuple[Guess, str]]:
     """Yield the guesses that are certain enough to show, each with the option that uses it."""
     for one in guess_by_name(headings, [name for name in channels if name in UNITS]):
-        if one.sure >= SHOWN and one.spec.isprintable():
+        if one.sure >= SHOWN_PROBABILITY and one.spec.isprintable():
             told = one.unit is not None or one.channel == TIME or one.name == one.channel
             unit = "" if told else ":UNIT"
             yield one, f"{one.channel}={one.spec[:60]}{unit}"

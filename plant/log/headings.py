@@ -8,7 +8,7 @@ from functools import cached_property
 from plant.unit_text import plain_unit
 
 _BRACKETED = re.compile(r"^(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]{0,40})\]|\((?P<round>[^()]{0,40})\))$")
-_AFTER = re.compile(r"^(?P<name>.*\S)(?:\s+/\s*|\s*,\s+|\s+in\s+)(?P<unit>\S{1,20})$")
+_UNIT_AFTER_NAME = re.compile(r"^(?P<name>.*\S)(?:\s+/\s*|\s*,\s+|\s+in\s+)(?P<unit>\S{1,20})$")
 _UNITS_FOLLOW = ("unit", "units", "unit:", "units:", "einheit", "einheiten")
 _NO_UNIT = ("", "-", "--", "[-]", "[]", "1", "n/a", "none")
 
@@ -34,12 +34,12 @@ class Heading:
     @cached_property
     def unit(self) -> str | None:
         """Unit of the column as the file gives it, or None."""
-        return self.said if self.said is not None else _split(self.name)[1]
+        return self.said if self.said is not None else _split_unit(self.name)[1]
 
     @cached_property
     def bare(self) -> str:
         """The name without its unit."""
-        return _split(self.name)[0]
+        return _split_unit(self.name)[0]
 
     @cached_property
     def stem(self) -> str:
@@ -48,12 +48,12 @@ class Heading:
         return re.sub(r"[\W_]+", "_", parted.lower()).strip("_")
 
 
-def _split(name: str) -> tuple[str, str | None]:
+def _split_unit(name: str) -> tuple[str, str | None]:
     if found := _BRACKETED.match(name):
         inside = found["square"] if found["square"] is not None else found["round"]
         if found["square"] is not None or is_unit(inside):
             return found["name"].strip(), unit_or_none(inside)
-    if (found := _AFTER.match(name)) and is_unit(found["unit"]):
+    if (found := _UNIT_AFTER_NAME.match(name)) and is_unit(found["unit"]):
         return found["name"].strip(), found["unit"]
     return name.strip(), None
 
@@ -92,7 +92,7 @@ _KNOWN = _SCALED | frozenset(
 )
 
 
-def cleaned(names: Sequence["str | Heading"]) -> list[Heading]:
+def headings_of(names: Sequence["str | Heading"]) -> list[Heading]:
     """Return names as headings, without surrounding blanks and quotes.
 
     Parameters

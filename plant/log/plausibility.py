@@ -7,7 +7,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError
-from plant.log.columns import TRUTH
+from plant.log.columns import TRUTH_PREFIX
 from plant.log.notes import LogCode
 from plant.notes import Note
 
@@ -45,19 +45,19 @@ LIMITS: Mapping[str, Plausible] = {
 }
 """Each channel that has a usual magnitude; judged: a thousandfold slip of common rigs crosses a limit."""
 
-MOTION = ("motor_speed_rad_s", "position_m", "velocity_m_s")
+MOTION_CHANNELS = ("motor_speed_rad_s", "position_m", "velocity_m_s")
 """Channels that show one motion: where one is out of range, comparing it with the others says nothing more."""
 
-SAMPLE_TIME = (5e-6, 0.5)
+SAMPLE_TIME_RANGE = (5e-6, 0.5)
 """Sample times [s] between which hydraulics is logged."""
 
-SLIP = 30.0
+DISPLACEMENT_RATIO = 30.0
 """Ratio of displacement to integrated velocity that no calibration error explains."""
 
 ALIKE, ALIKE_SUMS = 0.5, 0.9
 """Correlations from which two rates, or two running sums (which drift), are taken to show one motion."""
 
-TRAVEL = (1e-6, 0.1)
+TRAVEL_RANGE = (1e-6, 0.1)
 """Piston travel a radian of pump [m], pump displacement over piston area: 3.7e-4 for the paper's rig."""
 
 
@@ -87,7 +87,7 @@ def require_measurable(channels: Mapping[str, Array], source: str) -> None:
     plant.errors.LogError: a.csv: position_m reaches 1e+200, no sensor gives more than 1e+15 (SI); check its column
     """
     for name, values in channels.items():
-        size = 0.0 if name.startswith(TRUTH) or np.isnan(values).all() else float(np.nanmax(np.abs(values)))
+        size = 0.0 if name.startswith(TRUTH_PREFIX) or np.isnan(values).all() else float(np.nanmax(np.abs(values)))
         if size > LARGEST:
             said = f"reaches {size:.3g}, no sensor gives more than {LARGEST:g} (SI)"
             raise LogError(f"{name} {said}; check its column", source)
@@ -96,7 +96,7 @@ def require_measurable(channels: Mapping[str, Array], source: str) -> None:
             raise LogError(f"{name} {said}; check its column", source)
 
 
-def implausible(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
+def implausibility_notes(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
     """Return a note for each suspected error of units, and if nothing moves.
 
     Parameters
@@ -109,20 +109,20 @@ def implausible(sample_time: float, channels: Mapping[str, Array]) -> list[Note]
     Examples
     --------
     >>> speed = 100.0 * np.sin(np.arange(100.0))
-    >>> print(implausible(1e-3, {"motor_speed_rad_s": 1e3 * speed})[0])
+    >>> print(implausibility_notes(1e-3, {"motor_speed_rad_s": 1e3 * speed})[0])
     motor_speed_rad_s reaches 100000 rad/s, but at most 2000 rad/s is usual: check the unit (mrad/s read as rad/s?)
     """
-    still = _still(channels)
+    still = _stillness_note(channels)
     slips: list[Note] = []
-    if sample_time < SAMPLE_TIME[0]:
+    if sample_time < SAMPLE_TIME_RANGE[0]:
         slips.append(LogCode.SAMPLE_TIME_SHORT.note(sample_time_s=sample_time))
-    if sample_time > SAMPLE_TIME[1]:
+    if sample_time > SAMPLE_TIME_RANGE[1]:
         slips.append(LogCode.SAMPLE_TIME_LONG.note(sample_time_s=sample_time))
-    for name in MOTION:
-        slips += _out_of_range(name, channels)
-    slips = slips or _displaced(sample_time, channels) or _pumped(sample_time, channels)
-    for name in sorted(LIMITS.keys() - MOTION):
-        slips += _out_of_range(name, channels)
+    for name in MOTION_CHANNELS:
+        slips += _range_notes(name, channels)
+    slips = slips or _displacement_notes(sample_time, channels) or _travel_notes(sample_time, channels)
+    for name in sorted(LIMITS.keys() - MOTION_CHANNELS):
+        slips += _range_notes(name, channels)
     return slips if still is None else [still, *slips]
 
 
@@ -130,7 +130,7 @@ def _span(values: Array) -> float:
     return float(np.nanmax(values) - np.nanmin(values))
 
 
-def _still(channels: Mapping[str, Array]) -> Note | None:
+def _stillness_note(channels: Mapping[str, Array]) -> Note | None:
     if channels and all(_span(values) == 0.0 for values in channels.values()):
         return LogCode.NOTHING_MEASURED.note()
     if "motor_speed_rad_s" in channels and _span(channels["motor_speed_rad_s"]) == 0.0:
@@ -141,7 +141,7 @@ def _still(channels: Mapping[str, Array]) -> Note | None:
     return None
 
 
-def _out_of_range(name: str, channels: Mapping[str, Array]) -> list[Note]:
+def _range_notes(name: str, channels: Mapping[str, Array]) -> list[Note]:
     if name not in channels:
         return []
     values, limits = channels[name], LIMITS[name]
@@ -165,18 +165,22 @@ def _above_noise(values: Array) -> bool:
     return float(np.var(scaled)) > 4.0 * noise
 
 
-def _displaced(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
+def _displacement_notes(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
     """Compare the position with the integral of the velocity."""
     if "position_m" not in channels or "velocity_m_s" not in channels:
         return []
     ratio = _gain(channels["position_m"], _integrated(sample_time, channels["velocity_m_s"]), ALIKE_SUMS)
-    if ratio is None or 1.0 / SLIP < ratio < SLIP or not _above_noise(channels["velocity_m_s"]):
+    if (
+        ratio is None
+        or 1.0 / DISPLACEMENT_RATIO < ratio < DISPLACEMENT_RATIO
+        or not _above_noise(channels["velocity_m_s"])
+    ):
         return []
     slip = "mm read as m, or s read as ms" if ratio > 1.0 else "mm/s read as m/s, or ms read as s"
     return [LogCode.POSITION_AND_VELOCITY_UNITS.note(ratio=ratio, slip=slip)]
 
 
-def _pumped(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
+def _travel_notes(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
     """Compare the piston's motion with the pump's."""
     if "motor_speed_rad_s" not in channels:
         return []
@@ -188,9 +192,9 @@ def _pumped(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
         name, travel = "position_m", _gain(channels["position_m"], turned, ALIKE_SUMS)
     else:
         return []
-    if travel is None or TRAVEL[0] < travel < TRAVEL[1]:
+    if travel is None or TRAVEL_RANGE[0] < travel < TRAVEL_RANGE[1]:
         return []
-    return [LogCode.TRAVEL_UNITS.note(travel_m=travel, least=TRAVEL[0], most=TRAVEL[1], channel=name)]
+    return [LogCode.TRAVEL_UNITS.note(travel_m=travel, least=TRAVEL_RANGE[0], most=TRAVEL_RANGE[1], channel=name)]
 
 
 def _integrated(sample_time: float, rate: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError, NoMemoryError
-from plant.log.columns import TRUTH, Column
+from plant.log.columns import TRUTH_PREFIX, Column
 from plant.log.headings import Heading
 
 Read: TypeAlias = Callable[[Sequence[Column]], dict[Column, Array]]
@@ -19,7 +19,7 @@ Read: TypeAlias = Callable[[Sequence[Column]], dict[Column, Array]]
 MOST_VALUES = 120_000_000
 """Values that are held of all columns of a table at once: 1 GB [count]."""
 
-FEW = 8
+ALWAYS_HELD = 8
 """Columns that are held whatever their length: files are bounded [count]."""
 
 
@@ -76,7 +76,7 @@ class Table:
         LogError
             If the column of time cannot be read.
         """
-        columns = [Column(place, one.name, f"{TRUTH}{place}") for place, one in enumerate(self.headings)]
+        columns = [Column(place, one.name, f"{TRUTH_PREFIX}{place}") for place, one in enumerate(self.headings)]
         if time is not None:
             columns[time.position] = time
         self._require_room(columns)
@@ -98,9 +98,9 @@ class Table:
 
     def _require_room(self, columns: Sequence[Column]) -> None:
         """Refuse a table that is too large for memory, before its columns are read."""
-        if len(columns) <= FEW:
+        if len(columns) <= ALWAYS_HELD:
             return
-        first = next((values for column in columns if (values := self._tried(column)) is not None), None)
+        first = next((values for column in columns if (values := self._read_if_numbers(column)) is not None), None)
         if first is not None and len(first) * len(columns) > MOST_VALUES:
             raise NoMemoryError(
                 f"all {len(columns)} columns of {len(first):,} rows are more than is looked at at once "
@@ -108,7 +108,7 @@ class Table:
                 self.source,
             )
 
-    def _tried(self, column: Column) -> Array | None:
+    def _read_if_numbers(self, column: Column) -> Array | None:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # warnings are given when all columns are read
@@ -133,18 +133,18 @@ def table_of(
     **more
         As `Table` takes them.
     """
-    from plant.log.formats.cells import each_read, numbers
-    from plant.log.formats.times import is_time, moments
+    from plant.log.formats.cells import numbers, read_each
+    from plant.log.formats.times import is_time, universal_times
 
     names = list(named)
 
     def read_one(column: Column) -> Array:
         values = named[names[column.position]]
         got = np.atleast_1d(np.asarray(values() if callable(values) else values))
-        return moments(got, column.name, source) if is_time(got) else numbers(got, column.name, source)
+        return universal_times(got, column.name, source) if is_time(got) else numbers(got, column.name, source)
 
     headings = tuple(
         Heading(name, (units or {}).get(name), not callable(values) and is_time(np.asarray(values)))
         for name, values in named.items()
     )
-    return Table(source, headings, lambda columns: each_read(columns, read_one), **more)
+    return Table(source, headings, lambda columns: read_each(columns, read_one), **more)

@@ -9,13 +9,13 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError, MissingColumnError, TextColumnError
-from plant.log.checks import alternatives, lacking
-from plant.log.clock.merging import Timed, merged
+from plant.log.checks import alternatives, missing_required
+from plant.log.clock.merging import LoggerChannels, merge_loggers
 from plant.log.clock.stamps import seconds_from_first
 from plant.log.clock.time_unit import likely_unit, unit_of_dates
-from plant.log.columns import TIME, TRUTH, Column, converted, listed, resolve_columns
-from plant.log.guess import SHOWN, guess_by_name, hint_of, missing_channels, overlooked
-from plant.log.headings import Heading, cleaned
+from plant.log.columns import TIME, TRUTH_PREFIX, Column, converted, list_in_words, resolve_columns
+from plant.log.guess import SHOWN_PROBABILITY, guess_by_name, hint_of, missing_channels, unused_column_notes
+from plant.log.headings import Heading, headings_of
 from plant.log.lost_values import without_lost
 from plant.log.notes import LogCode
 from plant.log.table import Table
@@ -43,7 +43,7 @@ class LogTables:
     notes: tuple[Note, ...] = ()
 
 
-def gathered(
+def gather_channels(
     tables: Sequence[Table],
     mapping: Mapping[str, str] | None,
     required: Collection[str],
@@ -59,7 +59,7 @@ def gathered(
     mapping : Mapping[str, str] or None
         Foreign columns by channel; ``GROUP/NAME`` where two groups have one of that name.
     required : collection of str
-        Channels that must be there, see `plant.log.checks.trusted`.
+        Channels that must be there, see `plant.log.checks.checked_log`.
     source : str
         What messages call the log.
     sample_time : float, optional
@@ -82,12 +82,12 @@ def gathered(
         hint = hint_of([error.channel], headings)
         raise MissingColumnError(error.channel, error.column, error.known, source, hint) from error
     found = [column.channel for _, columns in chosen for column in columns]
-    missing = lacking(required, found)
+    missing = missing_required(required, found)
     timeless = TIME not in found and sample_time is None and not any(table.step for table, _ in chosen)
     if timeless and (time := _time_without_unit(tables)) is not None:
         place, heading, dates = time
         if dates is not None and not missing:
-            dated = gathered(tables, {**(mapping or {}), TIME: f"{heading.name}:{dates[0]}"}, required, source)
+            dated = gather_channels(tables, {**(mapping or {}), TIME: f"{heading.name}:{dates[0]}"}, required, source)
             note = LogCode.TIME_IS_DATES.note(column=heading.name[:80], unit=dates[0], began=dates[1])
             return replace(dated, notes=(note, *dated.notes))
         headings[place] = heading
@@ -99,10 +99,10 @@ def gathered(
     with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused or noted later
         notes: list[Note] = []
         parts = [(table, _without_text(table, columns, found, required, notes)) for table, columns in chosen]
-    timed = [_timed(table, values, parts, sample_time, source) for table, values in parts]
-    together = merged(timed, source)
-    columns, began = _from_start(together.channels)
-    return LogTables(columns, began, (*_overlooked(chosen, tables), *notes, *together.notes))
+    timed = [_with_time(table, values, parts, sample_time, source) for table, values in parts]
+    together = merge_loggers(timed, source)
+    columns, began = _seconds_from_start(together.channels)
+    return LogTables(columns, began, (*_unused_column_notes(chosen, tables), *notes, *together.notes))
 
 
 def _time_without_unit(tables: Sequence[Table]) -> tuple[int, Heading, tuple[str, str] | None] | None:
@@ -110,7 +110,7 @@ def _time_without_unit(tables: Sequence[Table]) -> tuple[int, Heading, tuple[str
     owners = [(table, place) for table in tables for place in range(len(table.headings))]
     headings = [table.headings[place] for table, place in owners]
     (guess,) = guess_by_name(headings, [TIME])[:1] or (None,)
-    if guess is None or guess.sure < SHOWN or guess.unit is not None or headings[guess.place].stamped:
+    if guess is None or guess.sure < SHOWN_PROBABILITY or guess.unit is not None or headings[guess.place].stamped:
         return None
     table, place = owners[guess.place]
     column = Column(place, guess.name, TIME)
@@ -146,7 +146,7 @@ def _without_text(
         return _without_text(table, [one for one in columns if one is not text], found, required, notes)
 
 
-def _overlooked(chosen: Chosen, tables: Sequence[Table]) -> tuple[Note, ...]:
+def _unused_column_notes(chosen: Chosen, tables: Sequence[Table]) -> tuple[Note, ...]:
     """Return a note for each unused column that may be a channel that the log seems to lack."""
     read = {id(table): {column.position for column in columns} for table, columns in chosen}
     left = [
@@ -155,7 +155,7 @@ def _overlooked(chosen: Chosen, tables: Sequence[Table]) -> tuple[Note, ...]:
         for place, heading in enumerate(table.headings)
         if place not in read.get(id(table), ())
     ]
-    return overlooked(left, [column.channel for _, columns in chosen for column in columns])
+    return unused_column_notes(left, [column.channel for _, columns in chosen for column in columns])
 
 
 def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, source: str) -> Chosen:
@@ -177,13 +177,13 @@ def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, s
     """
     mapping = dict(mapping or {})
     if len(tables) == 1:
-        return [(tables[0], resolve_columns(_labelled(tables[0], mapping), mapping, source))]
+        return [(tables[0], resolve_columns(_with_group_names(tables[0], mapping), mapping, source))]
     chosen: list[tuple[Table, tuple[Column, ...]]] = []
     clocks: list[tuple[Table, tuple[Column, ...]]] = []
     taken: set[str] = set()
     for table in tables:
-        headings = _labelled(table, mapping)
-        own = {channel: spec for channel, spec in mapping.items() if _has(headings, channel, spec)}
+        headings = _with_group_names(table, mapping)
+        own = {channel: spec for channel, spec in mapping.items() if _has_column(headings, channel, spec)}
         taken |= own.keys()
         columns = resolve_columns(headings, own, source)
         kept = tuple(one for one in columns if one.channel not in mapping or one.channel in own)
@@ -194,15 +194,15 @@ def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, s
     for channel in mapping.keys() - taken:
         names = [one.name for table in tables for one in table.headings]
         raise MissingColumnError(
-            channel, mapping[channel].rpartition(":")[0] or mapping[channel], listed(names), source
+            channel, mapping[channel].rpartition(":")[0] or mapping[channel], list_in_words(names), source
         )
-    _once(chosen, source)
+    _refuse_repeated_channels(chosen, source)
     if any(table.step is None and all(one.channel != TIME for one in columns) for table, columns in chosen):
         chosen += clocks  # clocks in groups of their own serve tables without one
     return chosen or [(table, ()) for table in tables[:1]]
 
 
-def _labelled(table: Table, mapping: Mapping[str, str]) -> Sequence[Heading]:
+def _with_group_names(table: Table, mapping: Mapping[str, str]) -> Sequence[Heading]:
     """Return headings, with the group name in front of a name that the mapping refers to."""
     if not table.label:
         return table.headings
@@ -216,9 +216,9 @@ def _labelled(table: Table, mapping: Mapping[str, str]) -> Sequence[Heading]:
     ]
 
 
-def _has(headings: Sequence[Heading], channel: str, spec: str) -> bool:
+def _has_column(headings: Sequence[Heading], channel: str, spec: str) -> bool:
     try:
-        resolve_columns(cleaned(headings), {channel: spec}, "")
+        resolve_columns(headings_of(headings), {channel: spec}, "")
     except MissingColumnError:
         return False
     except LogError:
@@ -226,7 +226,7 @@ def _has(headings: Sequence[Heading], channel: str, spec: str) -> bool:
     return True
 
 
-def _once(chosen: Chosen, source: str) -> None:
+def _refuse_repeated_channels(chosen: Chosen, source: str) -> None:
     """Refuse a channel that occurs in two tables."""
     owners: dict[str, list[tuple[Table, Column]]] = {}
     for table, columns in chosen:
@@ -249,7 +249,7 @@ def _read(table: Table, columns: Sequence[Column], notes: list[Note]) -> dict[st
     raw = table.read(columns)
     stamps = {column: values for column, values in raw.items() if values.dtype.kind == "M"}
     for column in stamps:
-        if column.channel != TIME and not column.channel.startswith(TRUTH):
+        if column.channel != TIME and not column.channel.startswith(TRUTH_PREFIX):
             raise LogError(f"column {column.name!r} must hold numbers, got dates", table.source)
     numbers: dict[Column, Array] = {}
     for column, values in ((one, values) for one, values in raw.items() if one not in stamps):
@@ -258,32 +258,32 @@ def _read(table: Table, columns: Sequence[Column], notes: list[Note]) -> dict[st
     return converted(numbers) | {column.channel: values for column, values in stamps.items()}
 
 
-def _timed(
+def _with_time(
     table: Table,
     values: dict[str, Array],
     parts: Sequence[tuple[Table, dict[str, Array]]],
     sample_time: float | None,
     source: str,
-) -> Timed:
+) -> LoggerChannels:
     """Return a table's channels with their time: its own, from its step, from an equal table, or as requested."""
     channels = {name: one for name, one in values.items() if name != TIME}
     rows = len(next(iter(values.values()), ()))
     if TIME in values:
-        return Timed(table.source, values[TIME], channels, table.label)
+        return LoggerChannels(table.source, values[TIME], channels, table.label)
     step = table.step or sample_time
     if table.step is None:
         alike = [other[TIME] for _, other in parts if TIME in other and len(other[TIME]) == rows]
         if len(alike) == 1:
-            return Timed(table.source, alike[0], channels, table.label)
+            return LoggerChannels(table.source, alike[0], channels, table.label)
     if step is None:
         raise missing_channels([TIME], list(table.headings), source)
     time: Any = table.offset + step * np.arange(rows)
     if table.began is not None:
         time = table.began + np.rint(1e9 * time).astype("timedelta64[ns]")
-    return Timed(table.source, time, channels, table.label)
+    return LoggerChannels(table.source, time, channels, table.label)
 
 
-def _from_start(columns: Mapping[str, Any]) -> tuple[dict[str, Array], str | None]:
+def _seconds_from_start(columns: Mapping[str, Any]) -> tuple[dict[str, Array], str | None]:
     """Return times of day as seconds from the first, and the first time."""
     out = dict(columns)
     time: Any = out.get(TIME)

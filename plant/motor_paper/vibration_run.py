@@ -11,7 +11,7 @@ import numpy as np
 from plant.arrays import Array
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.motor_paper.fractional import fractional_history, fractional_push, gl_weights
 from plant.motor_paper.vibration_model import VibrationParameters, reduced_stiffness
 
@@ -65,8 +65,8 @@ def forced_vibration(
 @cache
 def _kernel() -> NativeKernel:
     parts = (
-        pasted(fractional_history, freely=("reassoc", "contract")),
-        pasted(fractional_push, forced_vibration),
+        functions_text(fractional_history, freely=("reassoc", "contract")),
+        functions_text(fractional_push, forced_vibration),
     )
     text = kernel_text("forced vibration with cubic spring and fractional damping", *parts)
     return load_native("vibration", text, {"forced_vibration": signature_of(forced_vibration)})

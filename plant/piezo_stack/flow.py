@@ -17,7 +17,7 @@ FLOW_TIME = 0.16
 STAGES = ("compression", "discharge", "expansion", "intake")
 """The four stages of a pump cycle, in order (Figure 2; equation 15 decides)."""
 
-OPEN = 1e-5
+OPEN_LIFT = 1e-5
 """Lift above which a reed counts as open [m]; on its seat it still moves by some micrometres."""
 
 
@@ -101,8 +101,8 @@ def stages(states: Array, parameters: PiezoStackParameters) -> NDArray[np.int64]
     pressure = stack_pressures(tuple(states.T), parameters)
     rising = np.gradient(pressure.chamber) > 0.0
     outlet, inlet = states[:, 5], states[:, 7]
-    discharging = (outlet > np.maximum(OPEN, inlet)) & (pressure.chamber > pressure.delivery)
-    taking_in = (inlet > np.maximum(OPEN, outlet)) & (pressure.intake > pressure.chamber)
+    discharging = (outlet > np.maximum(OPEN_LIFT, inlet)) & (pressure.chamber > pressure.delivery)
+    taking_in = (inlet > np.maximum(OPEN_LIFT, outlet)) & (pressure.intake > pressure.chamber)
     return np.where(discharging, 1, np.where(taking_in, 3, np.where(rising, 0, 2)))
 
 

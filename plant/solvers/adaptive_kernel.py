@@ -17,11 +17,11 @@ from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
 from plant.compiled.native.machine import native_width
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.compiled.simplify import fused, share_ratios, simplified
 from plant.compiled.source import lines_source, operations_source
-from plant.solvers.adaptive_loop import INNER, NEARLY, TINY, run_controlled
-from plant.solvers.drive_pieces import ROUNDEST, smooth
+from plant.solvers.adaptive_loop import INLINED_LOOPS, NEARLY, TINY, run_controlled
+from plant.solvers.drive_pieces import ROUNDEST, parabolic_piece
 from plant.solvers.steps import Derivative, Parameters, State, parameter_names, parameter_symbols, solve_linear
 
 Kernel: TypeAlias = Callable[[Array, Array, Array, float, Array, float, float, float, float, Array], None]
@@ -92,7 +92,7 @@ def _outputs(derivative: Derivative, width: int, p: object) -> dict[str, Express
     return outputs | {"error": error * (1.0 / width)}
 
 
-def _between(width: int) -> dict[str, Expression]:
+def _interpolated_state(width: int) -> dict[str, Expression]:
     """Return the state ``y`` at a fraction ``j`` of the previous step: the cubic through states and rates at both."""
     part, pace = symbol("j"), symbol("pace")
     result: dict[str, Expression] = {}
@@ -147,7 +147,7 @@ def _lines(derivative: Derivative, width: int, parameter_class: type[Parameters]
     lines = {
         "settle": lines_source("settle", fixed),
         "stages": lines_source("stages", fused(stages)),
-        "between": lines_source("between", fused(_between(width))),
+        "between": lines_source("between", fused(_interpolated_state(width))),
     }
     return lines, [*fixed]
 
@@ -164,8 +164,17 @@ def _text(name: str, derivative: Derivative, width: int, parameter_class: type[P
     sizes = {"LANES": lanes, "VECTOR": vector, "WIDTH": width, "COLUMNS": len(names), "NUMBERS": lanes * len(every)}
     parts = (
         operations_source(lines, slots, vector) + f"\nmove = moving({lanes})",
-        pasted(*INNER, constants={**sizes, "TINY": TINY, "NEARLY": NEARLY, "ROUNDEST": ROUNDEST}, inlined=True),
-        pasted(smooth, run_controlled),
+        functions_text(
+            *INLINED_LOOPS,
+            constants={
+                **sizes,
+                "TINY": TINY,
+                "NEARLY": NEARLY,
+                "ROUNDEST": ROUNDEST,
+            },
+            inlined=True,
+        ),
+        functions_text(parabolic_piece, run_controlled),
     )
     title = f"trajectories of the {name} plant in steps of controlled error, {lanes} side by side"
     return kernel_text(title, *parts)

@@ -6,8 +6,8 @@ from typing import Protocol
 import numpy as np
 
 from plant.arrays import Array
-from plant.solvers.drive_pieces import same, slope_at, smooth
-from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
+from plant.solvers.drive_pieces import are_equal, parabolic_piece, slope_at
+from plant.solvers.fixed_step_loops import Operation, SideBySide, place_rows, place_shared
 
 TINY = 1e-6
 """Fraction of a sample time within which a step ends at a sample."""
@@ -66,7 +66,7 @@ def run_controlled(
     bend : float
         Amount by which a step may smooth the drive [the drive's unit].
     bulge : float
-        See `plant.solvers.drive_pieces.smooth` [dimensionless].
+        See `plant.solvers.drive_pieces.parabolic_piece` [dimensionless].
     longest, shortest : float
         Steps [count of samples].
     states : ndarray, shape (n, states, up to lanes)
@@ -77,59 +77,59 @@ def run_controlled(
     room = np.empty(kernel.NUMBERS + 8)
     work = room[-room.ctypes.data % 64 // 8 :]  # a vector that spans two cache lines takes twice as long
     slots, vectors = work.ctypes.data, range(0, 8 * kernel.LANES, 8 * kernel.VECTOR)
-    lay(kernel, work, 0, initial, kernel.WIDTH)
-    share(kernel, work, 6 * block, weights)
-    _keep(kernel, work, 0, states, 0)
+    place_rows(kernel, work, 0, initial, kernel.WIDTH)
+    place_shared(kernel, work, 6 * block, weights)
+    _store_sample(kernel, work, 0, states, 0)
     begin = end = lost = 0
     start = reach = place = lift = ramp = curvature = 0.0
     size, taken, row, sample = longest, 1.0, -1, 1
     while True:
         if place >= reach and end < n - 1:
-            if sample < end and parameters.shape[0] > 1 and not same(parameters[end], parameters[row]):
+            if sample < end and parameters.shape[0] > 1 and not are_equal(parameters[end], parameters[row]):
                 # samples before a parameter change are interpolated with the parameters before it
-                driven = along(lift, ramp, curvature, reach, reach, taken)
-                share(kernel, work, shared, (*driven, taken * sample_time, taken * sample_time))
+                driven = drive_along_step(lift, ramp, curvature, reach, reach, taken)
+                place_shared(kernel, work, shared, (*driven, taken * sample_time, taken * sample_time))
                 for first in vectors:
                     kernel.stages_at(slots + first, 0.0)
-                sample = _fill(kernel, work, states, sample, end, start, taken)
+                sample = _fill_samples(kernel, work, states, sample, end, start, taken)
             begin, place = end, 0.0
-            end, lift, ramp, curvature = smooth(drive, parameters, begin, bend, bulge)
+            end, lift, ramp, curvature = parabolic_piece(drive, parameters, begin, bend, bulge)
             reach = float(end - begin)
             if row < 0 or parameters.shape[0] > 1:
                 row = min(begin, parameters.shape[0] - 1)
-                lay(kernel, work, shared + 5 * kernel.LANES, parameters[row].T, kernel.COLUMNS)
+                place_rows(kernel, work, shared + 5 * kernel.LANES, parameters[row].T, kernel.COLUMNS)
                 for first in vectors:
                     kernel.settle_at(slots + first, 0.0)
         left = reach - place
-        size = within(size, left, longest, shortest)
-        driven = along(lift, ramp, curvature, place, reach, size)
-        share(kernel, work, shared, (*driven, size * sample_time, taken * sample_time))
+        size = step_within_piece(size, left, longest, shortest)
+        driven = drive_along_step(lift, ramp, curvature, place, reach, size)
+        place_shared(kernel, work, shared, (*driven, size * sample_time, taken * sample_time))
         for first in vectors:
             kernel.stages_at(slots + first, 0.0)
         here = begin + place
-        sample = _fill(kernel, work, states, sample, here, start, taken)
+        sample = _fill_samples(kernel, work, states, sample, here, start, taken)
         if left <= 0.0:
             break
-        error = _largest(kernel, work, 7 * block, lost)
+        error = _largest_error(kernel, work, 7 * block, lost)
         # a step of nearly the shortest size is accepted; otherwise it would be retried for ever
         if not error <= 1.0 and NEARLY * size > shortest:
             size = max(size * (0.5 if error < 64.0 else 0.25), shortest)
             continue
         # a shorter step cannot repair a run whose states are NaN: the other runs go on without it
         if error == np.inf:
-            lost = _unknown(kernel, work, 7 * block)
+            lost = _count_nan(kernel, work, 7 * block)
         start, taken = here, size
         place = reach if size == left else place + size
-        _accept(work, block)
+        _accept_step(work, block)
         near = begin + int(place + 0.5)
         if abs(begin + place - near) < TINY:
-            _keep(kernel, work, 0, states, near)
+            _store_sample(kernel, work, 0, states, near)
             if sample == near:
                 sample += 1
-        size = max(size * growth(error), shortest)
+        size = max(size * step_growth(error), shortest)
 
 
-def within(size: float, left: float, longest: float, shortest: float) -> float:
+def step_within_piece(size: float, left: float, longest: float, shortest: float) -> float:
     """Return a step that ends at the end of its piece of the drive, or leaves enough of the piece for another step.
 
     Parameters
@@ -152,7 +152,7 @@ def within(size: float, left: float, longest: float, shortest: float) -> float:
     return 0.5 * left if size > 0.5 * left else size
 
 
-def along(
+def drive_along_step(
     lift: float, ramp: float, curvature: float, place: float, reach: float, size: float
 ) -> tuple[float, float, float]:
     """Return the drive at a step's start and end, and its rise at the initial rate, along a piece of a parabola.
@@ -176,7 +176,7 @@ def along(
     return start, start + size * (slope + 0.5 * curvature * size), size * slope
 
 
-def growth(error: float) -> float:
+def step_growth(error: float) -> float:
     """Return the growth factor of the next step, for a third-order scheme.
 
     Parameters
@@ -200,16 +200,16 @@ def growth(error: float) -> float:
     return 0.9 if error > 0.5 else 1.0
 
 
-def _largest(kernel: ControlledKernel, work: Array, place: int, lost: int) -> float:
+def _largest_error(kernel: ControlledKernel, work: Array, place: int, lost: int) -> float:
     """Return the largest error at a place; infinite if more errors are NaN than the number of runs already lost."""
     error = 0.0
     for lane in range(kernel.LANES):
         if work[place + lane] > error:
             error = work[place + lane]
-    return error if _unknown(kernel, work, place) <= lost else np.inf
+    return error if _count_nan(kernel, work, place) <= lost else np.inf
 
 
-def _unknown(kernel: ControlledKernel, work: Array, place: int) -> int:
+def _count_nan(kernel: ControlledKernel, work: Array, place: int) -> int:
     """Return the number of errors at a place that are NaN."""
     count = 0
     for lane in range(kernel.LANES):
@@ -218,7 +218,7 @@ def _unknown(kernel: ControlledKernel, work: Array, place: int) -> int:
     return count
 
 
-def _accept(work: Array, block: int) -> None:
+def _accept_step(work: Array, block: int) -> None:
     """Make a step's new states the current ones, and the current states and rates the old ones; each is a block."""
     for i in range(block):
         work[3 * block + i] = work[i]
@@ -226,7 +226,7 @@ def _accept(work: Array, block: int) -> None:
         work[i] = work[block + i]
 
 
-def _fill(
+def _fill_samples(
     kernel: ControlledKernel, work: Array, states: Array, sample: int, here: float, start: float, taken: float
 ) -> int:
     """Copy the states at the samples within the last step, and return the first sample that remains.
@@ -237,12 +237,12 @@ def _fill(
     while sample < here - TINY:
         for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
             kernel.between_at(work.ctypes.data + first, (sample - start) / taken)
-        _keep(kernel, work, 5 * kernel.WIDTH * kernel.LANES, states, sample)
+        _store_sample(kernel, work, 5 * kernel.WIDTH * kernel.LANES, states, sample)
         sample += 1
     return sample
 
 
-def _keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sample: int) -> None:
+def _store_sample(kernel: ControlledKernel, work: Array, place: int, states: Array, sample: int) -> None:
     """Copy the states at a place to a sample's row."""
     count = states.shape[2]
     for i in range(kernel.WIDTH):
@@ -253,5 +253,18 @@ def _keep(kernel: ControlledKernel, work: Array, place: int, states: Array, samp
                 states[sample, i, lane] = work[place + kernel.LANES * i + lane]
 
 
-INNER = (lay, share, same, slope_at, within, along, growth, _unknown, _largest, _accept, _keep, _fill)
-"""Parts of the loop and of `smooth`, which are inlined."""
+INLINED_LOOPS = (
+    place_rows,
+    place_shared,
+    are_equal,
+    slope_at,
+    step_within_piece,
+    drive_along_step,
+    step_growth,
+    _count_nan,
+    _largest_error,
+    _accept_step,
+    _store_sample,
+    _fill_samples,
+)
+"""Parts of the loop and of `parabolic_piece`, which are inlined."""

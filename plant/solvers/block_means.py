@@ -13,11 +13,11 @@ from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
 from plant.compiled.native.machine import native_width
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.compiled.simplify import fused, simplified
 from plant.compiled.source import lines_source, operations_source
 from plant.solvers.block_means_loop import average_blocks
-from plant.solvers.fixed_step_loops import lay
+from plant.solvers.fixed_step_loops import place_rows
 from plant.solvers.steps import Parameters, parameter_names, parameter_symbols
 
 LANES = 8
@@ -83,6 +83,6 @@ def _text(observe: Observe, channel: str, width: int, parameter_class: type[Para
     return kernel_text(
         f"means over blocks of {channel}, {LANES} runs side by side",
         operations_source(lines, {one: LANES * i for i, one in enumerate(every)}, vector),
-        pasted(lay, constants=sizes, inlined=True),
-        pasted(average_blocks),
+        functions_text(place_rows, constants=sizes, inlined=True),
+        functions_text(average_blocks),
     )

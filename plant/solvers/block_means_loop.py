@@ -5,10 +5,10 @@ from typing import Protocol
 import numpy as np
 
 from plant.arrays import Array
-from plant.solvers.fixed_step_loops import Operation, SideBySide, lay
+from plant.solvers.fixed_step_loops import Operation, SideBySide, place_rows
 
 
-class ShowingKernel(SideBySide, Protocol):
+class BlockMeansKernel(SideBySide, Protocol):
     """Interface of the kernel of block means.
 
     The memory holds, `LANES` numbers each, the states, the channel computed from them, the parameters, and the results
@@ -23,7 +23,7 @@ class ShowingKernel(SideBySide, Protocol):
     show_at: Operation
 
 
-def average_blocks(kernel: ShowingKernel, states: Array, parameters: Array, block: int, means: Array) -> None:
+def average_blocks(kernel: BlockMeansKernel, states: Array, parameters: Array, block: int, means: Array) -> None:
     """Fill in the block means of the channel of runs side by side.
 
     Parameters
@@ -46,7 +46,7 @@ def average_blocks(kernel: ShowingKernel, states: Array, parameters: Array, bloc
         for k in range(b * block, (b + 1) * block):
             if row < 0 or parameters.shape[0] > 1:
                 row = min(k, parameters.shape[0] - 1)
-                lay(kernel, work, shown + kernel.LANES, parameters[row].T, kernel.COLUMNS)
+                place_rows(kernel, work, shown + kernel.LANES, parameters[row].T, kernel.COLUMNS)
                 for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
                     kernel.settle_at(slots + first, 0.0)
             for i in range(kernel.WIDTH):

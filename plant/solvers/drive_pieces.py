@@ -8,7 +8,9 @@ ROUNDEST = 100.0
 """A drive has a corner if its second difference exceeds this multiple of the amount that a step may smooth."""
 
 
-def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: float) -> tuple[int, float, float, float]:
+def parabolic_piece(
+    drive: Array, parameters: Array, begin: int, bend: float, bulge: float
+) -> tuple[int, float, float, float]:
     """Return the last sample up to which the drive follows one parabola, and that parabola.
 
     Parameters
@@ -35,7 +37,7 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: floa
     if bulge > 0.0 and begin > 0:
         low = high = drive[end] - 2.0 * drive[begin] + drive[begin - 1]
     total = 0.5 * (drive[begin] + drive[end])
-    while end < n - 1 and (parameters.shape[0] == 1 or same(parameters[end], parameters[begin])):
+    while end < n - 1 and (parameters.shape[0] == 1 or are_equal(parameters[end], parameters[begin])):
         curvature = drive[end + 1] - 2.0 * drive[end] + drive[end - 1]
         lower, upper = min(low, curvature), max(high, curvature)
         length = end + 1 - begin
@@ -78,7 +80,7 @@ def slope_at(drive: Array, sample: int) -> float:
     return (drive[after] - drive[before]) / (after - before)
 
 
-def same(one: Array, other: Array) -> bool:
+def are_equal(one: Array, other: Array) -> bool:
     """Return whether two matrices are equal.
 
     Parameters

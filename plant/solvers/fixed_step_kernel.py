@@ -16,10 +16,10 @@ from plant.compiled.native.load import load_native
 from plant.compiled.native.machine import native_width
 from plant.compiled.native.signature import signature_of
 from plant.compiled.pack import packed_source
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.compiled.simplify import fused, simplified
 from plant.compiled.source import lines_source, operations_source
-from plant.solvers.fixed_step_loops import lay, run_side_by_side, share
+from plant.solvers.fixed_step_loops import place_rows, place_shared, run_side_by_side
 from plant.solvers.steps import Parameters, StepFunction, parameter_names, parameter_symbols
 
 FixedStepRun: TypeAlias = Callable[[Array, Array, Array, float, int, Array], None]
@@ -77,7 +77,7 @@ def _source(name: str, step: StepFunction, width: int, parameter_class: type[Par
     title = f"trajectories of the {name} plant in fixed steps, {lanes} side by side"
     parts = (
         operations_source(lines, slots, vector),
-        pasted(lay, share, constants=sizes, inlined=True),
-        pasted(run_side_by_side),
+        functions_text(place_rows, place_shared, constants=sizes, inlined=True),
+        functions_text(run_side_by_side),
     )
     return kernel_text(title, *parts)

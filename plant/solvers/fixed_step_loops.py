@@ -159,9 +159,9 @@ def run_side_by_side(
     slots = work.ctypes.data
     drives = kernel.WIDTH * kernel.LANES
     rises, paces, known = drives + kernel.LANES, drives + 2 * kernel.LANES, drives + 3 * kernel.LANES
-    lay(kernel, work, 0, initial, kernel.WIDTH)
-    share(kernel, work, paces, (sample_time / substeps,))
-    lay(kernel, work, known, parameters.T, kernel.COLUMNS)
+    place_rows(kernel, work, 0, initial, kernel.WIDTH)
+    place_shared(kernel, work, paces, (sample_time / substeps,))
+    place_rows(kernel, work, known, parameters.T, kernel.COLUMNS)
     for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
         kernel.settle_at(slots + first, 0.0)
     n, _, count = states.shape
@@ -179,7 +179,7 @@ def run_side_by_side(
                 kernel.step_at(slots + first, float(j))
 
 
-def lay(kernel: SideBySide, work: Array, place: int, values: Array, count: int) -> None:
+def place_rows(kernel: SideBySide, work: Array, place: int, values: Array, count: int) -> None:
     """Write the numbers of runs side by side to their places in memory.
 
     Parameters
@@ -196,7 +196,7 @@ def lay(kernel: SideBySide, work: Array, place: int, values: Array, count: int) 
             work[place + i * kernel.LANES + lane] = values[i, lane]
 
 
-def share(kernel: SideBySide, work: Array, place: int, values: Array | tuple[float, ...]) -> None:
+def place_shared(kernel: SideBySide, work: Array, place: int, values: Array | tuple[float, ...]) -> None:
     """Write numbers that all runs share to their places in memory.
 
     Parameters

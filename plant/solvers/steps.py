@@ -33,7 +33,7 @@ StepFunction: TypeAlias = Callable[[Any, tuple[Scalar, Scalar], Any, Scalar], St
 GAMMA = 1.0 - 0.5**0.5
 """Diagonal coefficient of two-stage, second-order, L-stable schemes: ROS2, and SDIRK2 (Alexander 1977, theorem 5)."""
 
-NEWTON = 2
+NEWTON_ITERATIONS = 2
 """Newton iterations per stage of SDIRK2 [count]. A check valve's flow is close to two straight lines, and the first
 iteration finds the right line. A third changes nothing: on eleven rigs at most 0.01 deviations of a log's noise."""
 
@@ -143,7 +143,7 @@ def solve_linear(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) ->
     return b
 
 
-def _ahead(slopes: list[list[Scalar]], h: Scalar) -> list[list[Scalar]]:
+def _implicit_matrix(slopes: list[list[Scalar]], h: Scalar) -> list[list[Scalar]]:
     """Return ``I - h J`` from one row of slopes for each state; the slopes by non-states stand last and are ignored."""
     states = range(len(slopes))
     return [[(ONE if i == j else ZERO) - h * slopes[i][j] for j in states] for i in states]
@@ -169,7 +169,7 @@ def ros2_step(derivative: Derivative) -> StepFunction:
         rates = derivative(state, start, p)
         slopes = jacobian(rates, [*state, start])
         drift = [GAMMA * row[-1] * (end - start) for row in slopes]
-        matrix = _ahead(slopes, GAMMA * h)
+        matrix = _implicit_matrix(slopes, GAMMA * h)
         k1 = solve_linear(matrix, [f + d for f, d in zip(rates, drift, strict=True)])
         inner = tuple(x + h * k for x, k in zip(state, k1, strict=True))
         later = derivative(inner, end, p)
@@ -199,23 +199,23 @@ def sdirk2_step(derivative: Derivative) -> StepFunction:
 
     def step(state: State, speeds: tuple[Scalar, Scalar], p: object, h: Scalar) -> State:
         start, end = speeds
-        inner = _solved(derivative, state, state, start + GAMMA * (end - start), p, GAMMA * h)
+        inner = _newton_solution(derivative, state, state, start + GAMMA * (end - start), p, GAMMA * h)
         rates = [(y - x) / (GAMMA * h) for x, y in zip(state, inner, strict=True)]
         base = tuple(x + (1.0 - GAMMA) * h * rate for x, rate in zip(state, rates, strict=True))
         guess = tuple(x + h * rate for x, rate in zip(state, rates, strict=True))
-        return _solved(derivative, base, guess, end, p, GAMMA * h)
+        return _newton_solution(derivative, base, guess, end, p, GAMMA * h)
 
     return step
 
 
-def _solved(derivative: Derivative, base: State, guess: State, speed: Scalar, p: object, h: Scalar) -> State:
+def _newton_solution(derivative: Derivative, base: State, guess: State, speed: Scalar, p: object, h: Scalar) -> State:
     """Return the solution of ``x = base + h f(x)`` by Newton's iterations from a guess."""
     x = guess
-    for _ in range(NEWTON):
+    for _ in range(NEWTON_ITERATIONS):
         rates = derivative(x, speed, p)
         slopes = jacobian(rates, x)
         left = [start + h * rate - y for start, rate, y in zip(base, rates, x, strict=True)]
-        x = tuple(y + d for y, d in zip(x, solve_linear(_ahead(slopes, h), left), strict=True))
+        x = tuple(y + d for y, d in zip(x, solve_linear(_implicit_matrix(slopes, h), left), strict=True))
     return x
 
 

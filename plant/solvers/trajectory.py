@@ -9,7 +9,7 @@ from plant.compiled.expression import as_expression, symbol
 from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.compiled.source import lines_source, operations_source
 from plant.runs import require_finite, steps_a_sample
 from plant.solvers.fixed_step_loops import run_alone
@@ -109,7 +109,7 @@ def compile_trajectory(name: str, step: StepFunction, width: int, parameter_clas
         operations_source({"settle": lines_source("settle", fixed)}, slots, 1),
         lines_source("step", stepped),
         f"load = loading({width})\nadvance = advancing({given}, SLOTS, step, {width})",
-        pasted(run_alone, constants={"WIDTH": width, "COLUMNS": len(names), "NUMBERS": len(every)}),
+        functions_text(run_alone, constants={"WIDTH": width, "COLUMNS": len(names), "NUMBERS": len(every)}),
     )
     text = kernel_text(f"trajectory of the {name} plant", *parts)
     return load_native(name, text, {"run_alone": signature_of(run_alone, states=width)}).run_alone

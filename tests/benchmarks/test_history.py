@@ -7,7 +7,7 @@ import pytest
 from benchmarks import __main__ as command
 from benchmarks import history
 from benchmarks.history import Entry, draw, entry_of, main, record, regression, series_of
-from benchmarks.targets import Check, printed, say
+from benchmarks.targets import Check, check_target, print_and_keep
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def slower(*values: float) -> list[Check]:
 
 def test_printed_figures_are_recorded_and_read_back_unchanged(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     checks = [Check("covers [%]", 95.5, 90.0, 98.0), Check("times faster", 7.0, least=5.0), Check("open", 3.0)]
-    assert printed(checks) == checks
+    assert print_and_keep(checks) == checks
     assert record("study --seeds 3", [*checks, Check("never found", inf, most=1.0)], path) == 3
     found = [entry_of(line) for line in path.read_text().splitlines()]
     assert [one.check for one in found] == checks
@@ -35,8 +35,8 @@ def test_a_figure_that_misses_its_target_is_marked_missed(capsys: pytest.Capture
     from benchmarks.targets import misses
 
     misses.clear()
-    say("wall [s]", 2.0, 1.0)
-    say("speed-up", 2.0, 1.0, most=False)
+    check_target("wall [s]", 2.0, 1.0)
+    check_target("speed-up", 2.0, 1.0, most=False)
     assert misses == ["wall [s]"]
     assert capsys.readouterr().out.startswith("MISSED wall [s]: 2 (wanted: at most 1)\nmet    speed-up")
 
@@ -93,7 +93,7 @@ def test_figures_are_recorded_only_with_the_record_option_before_the_name(
     import benchmarks.many_logs.start_up as benchmark
 
     def measured(arguments: list[str]) -> int:
-        say(f"took {arguments}", 2.0, 1.0)
+        check_target(f"took {arguments}", 2.0, 1.0)
         return 1
 
     monkeypatch.setattr(benchmark, "main", measured)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from estimation.models.eha_forms import volume_left_open
+from estimation.models.eha_forms import undetermined_volume
 from estimation.models.model import ProcessModel, StateVariable
 from plant.arrays import Array
 from plant.compiled.functions import Scalar
@@ -36,7 +36,7 @@ LINEAR = ProcessModel(
     _observe,
     2.5e-4,
     parameters=EhaParameters,
-    opening=volume_left_open,
+    opening=undetermined_volume,
 )
 
 

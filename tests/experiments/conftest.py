@@ -17,11 +17,11 @@ from experiments.nine_conditions.settings import StudySettings
 from experiments.nine_conditions.study import NINE_CONDITIONS
 from experiments.page import figure_files
 from experiments.page.frames import Tables
-from experiments.page.style import styled
+from experiments.page.style import project_style
 from experiments.piezo_stack import study as stack_study
 from experiments.piezo_stack.study import PIEZO_STACK, StackSettings
-from experiments.running.progress import untracked
-from experiments.running.study import Found, Seeded, write_result
+from experiments.running.progress import without_progress
+from experiments.running.study import SeedSettings, StudyResult, write_result
 
 SMALL = StudySettings(
     seed=7,
@@ -44,26 +44,26 @@ def _few_dots() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def study() -> Found:
-    return NINE_CONDITIONS.find(SMALL, untracked)
+def study() -> StudyResult:
+    return NINE_CONDITIONS.find(SMALL, without_progress)
 
 
 class Drawn(dict[str, Figure]):
     """Figures of the small study, each drawn and laid out at its first use."""
 
-    def __init__(self, study: Found) -> None:
+    def __init__(self, study: StudyResult) -> None:
         super().__init__()
         self.study = study
 
     def __missing__(self, name: str) -> Figure:
-        with styled():
+        with project_style():
             self[name] = FIGURES[name](self.study.frames)
             self[name].draw_without_rendering()
         return self[name]
 
 
 @pytest.fixture(scope="session")
-def drawn(study: Found) -> Drawn:
+def drawn(study: StudyResult) -> Drawn:
     return Drawn(study)
 
 
@@ -72,7 +72,7 @@ WRITTEN = "forms_on_sticking_plant"
 
 
 @pytest.fixture(scope="session")
-def written(study: Found, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written(study: StudyResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the written study, with one real figure and the others empty."""
     folder = tmp_path_factory.mktemp("results") / "study"
     figures = {name: FIGURES[name] if name == WRITTEN else lambda _: Figure(figsize=(1.0, 1.0)) for name in FIGURES}
@@ -88,7 +88,7 @@ def stack_tables() -> Tables:
     """Return the stack's tables except that of figure 12 left out, which `test_left_out` makes itself."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stack_study, "figure_12_left_out", lambda *_: pd.DataFrame())
-        frames = PIEZO_STACK.find(STACK, untracked).frames
+        frames = PIEZO_STACK.find(STACK, without_progress).frames
     return {name: frame for name, frame in frames.items() if name != "figure 12 left out"}
 
 
@@ -96,12 +96,12 @@ def stack_tables() -> Tables:
 def motor_tables() -> Tables:
     """Return the motor's tables except that of other sets of plates, which takes as long as most others together."""
     sweeps = {name: sweep for name, sweep in SWEEPS.items() if name != "other sets"}
-    return claim_tables(RIG, 7, untracked, sweeps)
+    return claim_tables(RIG, 7, without_progress, sweeps)
 
 
 @pytest.fixture(scope="session")
 def motor_paper_tables() -> Tables:
-    return MOTOR_PAPER.find(Seeded(2024), untracked).frames
+    return MOTOR_PAPER.find(SeedSettings(2024), without_progress).frames
 
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from experiments import actuators
-from experiments.actuators import actuator, kind_meant, kind_of_rig, kinds_by_columns, offered
+from experiments.actuators import actuator, infer_kind, kind_of_rig, kinds_by_columns, verb_of_kind
 from plant.eha.rig import Rig
 from plant.errors import HydrostateError, NoChannelError
 
@@ -29,9 +29,9 @@ def test_a_kind_that_is_registered_under_another_name_than_its_own_is_refused(mo
 
 def test_a_verb_that_a_kind_does_not_offer_is_refused_by_both_names() -> None:
     kind = replace(actuator("piezo-stack"), estimate=None)
-    assert offered(kind, "diagnose") is kind.diagnose
+    assert verb_of_kind(kind, "diagnose") is kind.diagnose
     with pytest.raises(HydrostateError, match="estimate is not available for piezo-stack, "):
-        offered(kind, "estimate")
+        verb_of_kind(kind, "estimate")
 
 
 def test_the_columns_of_a_log_determine_its_kind_of_actuator() -> None:
@@ -44,8 +44,8 @@ def test_the_columns_of_a_log_determine_its_kind_of_actuator() -> None:
 def test_columns_of_several_kinds_are_refused_with_the_option_that_names_one() -> None:
     both = NoChannelError("column motor_speed_rad_s is missing", "run.csv", "; more", ("drive_voltage_v", "position_m"))
     with pytest.raises(NoChannelError, match="columns of piezo-stack or diaphragm-motor: name the kind with --plant"):
-        kind_meant(both, None, None)
+        infer_kind(both, None, None)
     stack = NoChannelError("column motor_speed_rad_s is missing", "run.csv", "", ("drive_voltage_v", "stack_force_n"))
-    assert kind_meant(stack, None, None) == "piezo-stack"
+    assert infer_kind(stack, None, None) == "piezo-stack"
     with pytest.raises(NoChannelError, match=r"is missing$"):
-        kind_meant(stack, "eha", None)
+        infer_kind(stack, "eha", None)

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import faults.conditions
-from experiments.cli import ALONE, app, app_for
+from experiments.cli import VERBS_LOADED_ALONE, app, app_for
 from experiments.nine_conditions.settings import quick_settings
 from experiments.running.study import Study
 from faults.conditions import CONDITIONS
@@ -39,7 +39,7 @@ def test_help_of_every_command_gives_an_example(command: tuple[str, ...]) -> Non
 
 
 @pytest.mark.parametrize(
-    "words", [[verb, *more] for verb in ALONE for more in (["--help"], [], ["--no-such", "x.csv"])]
+    "words", [[verb, *more] for verb in VERBS_LOADED_ALONE for more in (["--help"], [], ["--no-such", "x.csv"])]
 )
 def test_a_verb_loaded_alone_gives_the_same_output_as_in_the_whole_app(words: list[str]) -> None:
     alone, among = CliRunner().invoke(app_for(words), words), CliRunner().invoke(app, words)

@@ -28,7 +28,7 @@ def order(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     monkeypatch.setattr(os, "_exit", end)
     monkeypatch.setattr(atexit, "_run_exitfuncs", lambda: happened.append("exit functions"))
     monkeypatch.setattr(cli, "trust_sources", lambda: happened.append("sources trusted"))
-    monkeypatch.setattr(cli, "LEFT_TO_END", 5.0)
+    monkeypatch.setattr(cli, "SHUTDOWN_WAIT", 5.0)
     for name in ("OPENBLAS", "OMP", "MKL"):
         monkeypatch.setenv(f"{name}_NUM_THREADS", "3")
     yield happened

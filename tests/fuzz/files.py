@@ -14,7 +14,7 @@ import numpy as np
 
 from experiments.command.json_output import plain
 from experiments.command.logs import read_log
-from experiments.log_pages.inspected import looked_into
+from experiments.log_pages.inspected import inspect_log
 from tests.fuzz.guard import limited
 from tests.fuzz.mutations import CELLS, mutated
 from tests.fuzz.seeds import seeds
@@ -29,7 +29,7 @@ def read(path: Path) -> None:
 
 def inspect(path: Path) -> None:
     """Inspect a file as the command does."""
-    found, _ = looked_into(path, None)
+    found, _ = inspect_log(path, None)
     json.dumps(plain(found), allow_nan=False)
 
 

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from plant.lazy import lazily
+from plant.lazy import lazy_getattr
 
 
 def test_only_names_imported_with_as_are_exported(tmp_path: Path) -> None:
     file = tmp_path / "face.py"
     text = "from math import pi as number\nfrom math import tau as tau\nfrom math import e\n"
     file.write_text(f"from typing import TYPE_CHECKING\n{text}")
-    found = lazily("face", str(file))
+    found = lazy_getattr("face", str(file))
     assert found("__all__") == ["number", "tau"]
     assert 2.0 * found("number") == found("tau")
     for name in ("e", "nowhere"):

@@ -7,7 +7,7 @@ import pytest
 
 from plant.errors import RigError
 from plant.unit_text import plain_unit
-from plant.units import LITRE_PER_MINUTE, SI, USUAL, by_pint, conversion_to, notes, require_number
+from plant.units import LITRE_PER_MINUTE, SI, USUAL, conversion_to, notes, pint_conversion, require_number
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,9 @@ def test_a_parameter_without_a_unit_is_refused_by_name() -> None:
 def test_common_units_convert_without_pint_as_pint_converts_them() -> None:
     for name in USUAL:
         for wanted in {si for si, _ in USUAL.values()}:
-            assert _converted(conversion_to, name, wanted) == _converted(by_pint, name, plain_unit(name), wanted)
+            assert _converted(conversion_to, name, wanted) == _converted(
+                pint_conversion, name, plain_unit(name), wanted
+            )
 
 
 def _converted(convert: Callable[..., tuple[float, float]], *units: str) -> object:

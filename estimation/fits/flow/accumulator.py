@@ -27,11 +27,11 @@ LEAST_GAS, MOST_GAS = 1.0, 100.0
 pressure falls by half, so designers choose more gas; at the upper end the pressure is constant. All ratios in between
 are equally likely on a logarithmic scale."""
 
-SOFT = 2.0
+SOFT_DEVIATIONS = 2.0
 """Deviations below the presumed stiffness at which searches begin [dimensionless]; judged, see decision 389."""
 
 
-def oil_taken(p: EhaParameters) -> float:
+def oil_exchange(p: EhaParameters) -> float:
     """Return the oil that the inner circuit gives and takes.
 
     Parameters
@@ -76,12 +76,12 @@ def presumed_stiffness(p: EhaParameters, uncertainties: Mapping[str, float]) -> 
     """
     gas, doubt = p.accumulator_gas, uncertainties.get(GAS, 0.0)
     if gas is None:
-        gas, doubt = math.sqrt(LEAST_GAS * MOST_GAS) * oil_taken(p), _even(LEAST_GAS, MOST_GAS)
-    spread = math.hypot(_even(SLOWEST, QUICKEST), doubt)
+        gas, doubt = math.sqrt(LEAST_GAS * MOST_GAS) * oil_exchange(p), _uniform_deviation(LEAST_GAS, MOST_GAS)
+    spread = math.hypot(_uniform_deviation(SLOWEST, QUICKEST), doubt)
     return {STIFFNESS: (math.sqrt(SLOWEST * QUICKEST) * p.accumulator_pressure / gas, spread)}
 
 
-def _even(least: float, most: float) -> float:
+def _uniform_deviation(least: float, most: float) -> float:
     """Return the standard deviation of a logarithm that is evenly likely between two ends [dimensionless]."""
     return math.log(most / least) / math.sqrt(12.0)
 
@@ -103,7 +103,7 @@ def first_stiffness(log: GreyBoxLog) -> float:
         Rise of its pressure per volume of oil that it takes in [Pa/m^3].
     """
     value, spread = log.presumed[STIFFNESS]
-    return value * math.exp(-SOFT * spread)
+    return value * math.exp(-SOFT_DEVIATIONS * spread)
 
 
 FAR_STIFFER = 2.0
@@ -128,7 +128,7 @@ def is_far_stiffer(log: GreyBoxLog, values: Mapping[str, float]) -> bool:
     return math.log(values[STIFFNESS] / usual) > FAR_STIFFER * std
 
 
-CONTRADICTS = 3.0
+CONTRADICTING_DEVIATIONS = 3.0
 """Deviations by which a log must move a stated accumulator before it contradicts the rig file [dimensionless]."""
 
 
@@ -160,7 +160,7 @@ def gas_contradicted(log: GreyBoxLog, fit: GreyBoxFit, p: EhaParameters) -> tupl
     if not left < spread:
         return ()
     moved, told = math.log(usual / found), spread**2 + log.uncertainties.get(CHARGE, 0.0) ** 2 - left**2
-    if abs(moved) <= CONTRADICTS * math.sqrt(told):
+    if abs(moved) <= CONTRADICTING_DEVIATIONS * math.sqrt(told):
         return ()
     limit = "least" if moved > 0.0 else "most"
     return (RigCode.GAS_CONTRADICTED.note(limit=limit, ratio=math.exp(moved)),)

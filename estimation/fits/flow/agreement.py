@@ -1,17 +1,17 @@
-"""`agreed(straight, read)`: effects in a slow log that hold for straight lines and for turns read from the log."""
+"""`agreed_answer(straight, read)`: effects in a slow log that hold for straight lines and with turns read."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from estimation.fits.flow.asked_hypotheses import worth_in
+from estimation.fits.flow.asked_hypotheses import wanted_gain_at_turns
 from estimation.fits.flow.plain import PlainFits
 from estimation.fits.hypotheses import Hypothesis
-from estimation.fits.hypothesis_search.explain import WORTH
+from estimation.fits.hypothesis_search.explain import REQUIRED_GAIN
 from estimation.fits.hypothesis_search.explanation import Explanation
 from plant.notes import Note
 
 
-class Answered(NamedTuple):
+class LogAnswer(NamedTuple):
     """What a fit of a log says, after the search for unusual effects.
 
     Parameters
@@ -40,7 +40,7 @@ class Answered(NamedTuple):
         return () if self.strange is None else self.strange.names
 
 
-def wanted_of(plain: PlainFits, left: float = 1.0) -> float:
+def wanted_gain(plain: PlainFits, left: float = 1.0) -> float:
     """Return the gain that a hypothesis must reach: at each turn of a slow log, unless turns are read as well.
 
     Parameters
@@ -55,10 +55,10 @@ def wanted_of(plain: PlainFits, left: float = 1.0) -> float:
     float
         Gain in log-likelihood [dimensionless].
     """
-    return WORTH if plain.turns_told or plain.start.turns_read else worth_in(plain.log, left)
+    return REQUIRED_GAIN if plain.turns_readable or plain.start.turns_read else wanted_gain_at_turns(plain.log, left)
 
 
-def agreed(straight: Answered, read: Answered) -> Answered:
+def agreed_answer(straight: LogAnswer, read: LogAnswer) -> LogAnswer:
     """Return what a slow log says, from fits with straight lines between samples and with turns read from the log.
 
     The error of straight lines at a turn may look like oil that the pump compresses, or like a drift of pressure. So an
@@ -79,22 +79,22 @@ def agreed(straight: Answered, read: Answered) -> Answered:
         read = read._replace(strange=None)
     by_lines, by_turns = (one.plain.explains(one.plain.best) for one in (straight, read))
     if straight.names == read.names and (straight.strange or by_lines or not by_turns):
-        return straight if read.strange else _plain(straight, read)
+        return straight if read.strange else _without_effects(straight, read)
     if read.strange is None and by_lines:
-        return _plain(straight, read)
+        return _without_effects(straight, read)
     return read
 
 
-def _plain(straight: Answered, read: Answered) -> Answered:
+def _without_effects(straight: LogAnswer, read: LogAnswer) -> LogAnswer:
     """Return what straight lines say of a log without unusual effects; undecided is what both fits leave undecided."""
     open_too = {note.code for note in straight.open_ends}
     ends = tuple(note for note in read.open_ends if note.code in open_too)
     return straight._replace(strange=None, open_ends=ends)
 
 
-def _gains_at_each_turn(answer: Answered) -> bool:
-    """Return whether the effect gains `WORTH` over the plain form at each turn."""
+def _gains_at_each_turn(answer: LogAnswer) -> bool:
+    """Return whether the effect gains `REQUIRED_GAIN` over the plain form at each turn."""
     if answer.strange is None:
         return False
     gain = answer.plain.best.cost - answer.strange.fit.cost
-    return gain > worth_in(answer.plain.log, answer.strange.fit.chi_square[0])
+    return gain > wanted_gain_at_turns(answer.plain.log, answer.strange.fit.chi_square[0])

@@ -8,11 +8,11 @@ from estimation.fits.flow.plain import PlainFits
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.wide_valves import outruns_pump
 from estimation.fits.greybox.fit import GreyBoxFit
-from estimation.fits.greybox.lateness import most_late
+from estimation.fits.greybox.lateness import latest_channel
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_shows
+from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shows_play
 from estimation.fits.hypotheses import (
-    BEGUN,
+    BEGUN_UNDER_LOAD,
     CHECKS_HIDDEN,
     DELIVERY,
     ENCODER_ZERO,
@@ -33,11 +33,16 @@ from estimation.fits.hypotheses import (
     Hypothesis,
 )
 from estimation.fits.hypothesis_search.coarse_search import VANISHED
-from estimation.fits.hypothesis_search.explain import WORTH
-from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains, is_too_close
+from estimation.fits.hypothesis_search.explain import REQUIRED_GAIN
+from estimation.fits.hypothesis_search.fit_objections import exceeds_noise, fit_explains, is_too_close
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost
-from estimation.fits.hypothesis_search.predicted_gains import PredictedGain, predicted_gain, predicted_gains, slopes_of
-from estimation.fits.hypothesis_search.wide_log import HELD
+from estimation.fits.hypothesis_search.predicted_gains import (
+    PredictedGain,
+    predicted_gain,
+    predicted_gains,
+    shared_slopes,
+)
+from estimation.fits.hypothesis_search.wide_log import HELD_PARAMETERS
 from estimation.fits.hypothesis_search.wide_problem import widest_makeup
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.wide_flow import LINEAR
@@ -57,7 +62,7 @@ modulus 5.6 % too high."""
 TOO_WIDE = 20.0
 """Conductance of make-up valves over its first guess, from which a search also begins at the guess [dimensionless]."""
 
-WIDEST = 0.9
+WIDEST_SHARE = 0.9
 """Conductance of make-up valves over the largest that model steps resolve, from which all effects are tested though the
 plain form explains the log [fraction]. In 48 sound logs it is at most 0.42, and 0.09 if the oil is not stiff. A
 pressure that lagged by 2 ms was fitted by valves at the limit, with bulk modulus 1 % too low and residuals of 1.07
@@ -76,7 +81,7 @@ smaller [fraction]. 5 mm change a chamber of the paper's actuator by 0.35 %, and
 ZERO_SIZE = LINEAR[ENCODER_ZERO.free[0]]
 """Size of an encoder zero for which slopes predict the gain [m]."""
 
-MOST_ASKED = 70_000
+LONGEST_TESTED = 70_000
 """Length of a log from which no effects are tested, since that would take minutes [samples]."""
 
 
@@ -89,7 +94,7 @@ def hypotheses_asked(
     *,
     loaded: bool,
     moving: bool,
-    worth: float = WORTH,
+    worth: float = REQUIRED_GAIN,
 ) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
     """Return the hypotheses to test on a log, given its best fits with varying and with held volumes.
 
@@ -119,15 +124,15 @@ def hypotheses_asked(
     tuple of Note
         What the log leaves open.
     """
-    if len(log.drives) > MOST_ASKED:
+    if len(log.drives) > LONGEST_TESTED:
         return (), ()
     if loaded:  # at rest a sensor that reads too high looks like a load
-        return (BEGUN, OFFSET_AT_REST), ()
+        return (BEGUN_UNDER_LOAD, OFFSET_AT_REST), ()
     if is_too_close(swinging, log.passes_on):
         return (), ()
     all_strange = (*HYPOTHESES, MAKEUP_BENDS) if outruns_pump(log, parameters) else HYPOTHESES
-    if not fit_explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
-        return (BEGUN,) if moving else all_strange, ()
+    if not fit_explains(swinging, log.passes_on) or latest_channel(swinging.late)[2] > REQUIRED_GAIN:
+        return (BEGUN_UNDER_LOAD,) if moving else all_strange, ()
     by_mass = balances_mass(swinging.model)
     promises = predicted_gains(
         log.stepped(swinging.steps),
@@ -135,19 +140,21 @@ def hypotheses_asked(
         swinging.values,
         ALWAYS_ASKED,
         by_mass=by_mass,
-        slopes=slopes_of(swinging, log),
+        slopes=shared_slopes(swinging, log),
     )
-    delivery, zero, *hidden = _possible(promises, swinging)
+    delivery, zero, *hidden = _possible_gains(promises, swinging)
     sought = ZERO_HIDDEN if is_far_stiffer(log, swinging.values) else ENCODER_ZERO
     shows_zero = best is swinging or homed_at_stop(log)
     # the fit with varying volumes may be wrong: its slopes then predict no gain
     if best is not swinging and shows_zero:
         zero = max(zero, predicted_gain(log, parameters, best.values, ENCODER_ZERO))
     if sought is ZERO_HIDDEN:  # the accumulator has absorbed the zero, so slopes beside it predict no gain
-        zero = max(zero, predicted_gain(log, parameters, _unheld(swinging.values), ENCODER_ZERO, by_mass=by_mass))
+        zero = max(
+            zero, predicted_gain(log, parameters, _without_held_values(swinging.values), ENCODER_ZERO, by_mass=by_mass)
+        )
     worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) * ZERO_SIZE > _least_zero(parameters)
-    plays = play_shows(swinging.play, sensed)
+    plays = shows_play(swinging.play, sensed)
     lead = swinging.values.get("speed_lead", 0.0) / log.sample_time
     behind, ahead = lead > FARTHEST_LEAD, lead < -FARTHEST_LEAD
     tried = (DELIVERY, worn), (sought, shifted), (PLAY, plays), (SPEED_LATE, behind), (PRESSURE_LATE, ahead)
@@ -156,14 +163,16 @@ def hypotheses_asked(
     asked += tuple(one for one in _late_valves(swinging) if one not in asked)
     remarks = open_wear_note(delivery, share_lost(log, swinging.values, parameters.pump_displacement))
     if at_widest(swinging, parameters, log):
-        return (BEGUN,) if moving else all_strange, remarks
+        return (BEGUN_UNDER_LOAD,) if moving else all_strange, remarks
     if not moving:
-        return HYPOTHESES if not log.passes_on and doubted(swinging) else asked, remarks
+        return HYPOTHESES if not log.passes_on and exceeds_noise(swinging) else asked, remarks
     # chambers shut in far above the accumulator draw no make-up flow for seconds; a search from rest then loses it
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
-    lost = swinging is best and not fed and doubted(swinging)
+    lost = swinging is best and not fed and exceeds_noise(swinging)
     begun = predicted_gain(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
-    return (BEGUN, *asked) if lost or _possible([begun], swinging)[0].gain > WORTH else asked, remarks
+    return (BEGUN_UNDER_LOAD, *asked) if lost or _possible_gains([begun], swinging)[
+        0
+    ].gain > REQUIRED_GAIN else asked, remarks
 
 
 def at_widest(fit: GreyBoxFit, parameters: EhaParameters, log: GreyBoxLog) -> bool:
@@ -181,7 +190,9 @@ def at_widest(fit: GreyBoxFit, parameters: EhaParameters, log: GreyBoxLog) -> bo
         Its log.
     """
     stiff = max(parameters.bulk_modulus, fit.values["bulk_modulus"])
-    return fit.values.get("makeup_conductance", 0.0) > WIDEST * widest_makeup(parameters.chamber_volume, stiff, log)
+    return fit.values.get("makeup_conductance", 0.0) > WIDEST_SHARE * widest_makeup(
+        parameters.chamber_volume, stiff, log
+    )
 
 
 def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bool:
@@ -199,7 +210,7 @@ def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bo
     return at_widest(fit, parameters, log) or is_far_stiffer(log, fit.values)
 
 
-def asked_alone(plain: PlainFits, asked: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+def hypotheses_tested_alone(plain: PlainFits, asked: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
     """Return the hypotheses that are tested after all others: unequal gauges, and equal pressure locked in at first.
 
     Parameters
@@ -212,7 +223,7 @@ def asked_alone(plain: PlainFits, asked: Sequence[Hypothesis]) -> tuple[Hypothes
     if len(asked) < len(HYPOTHESES):
         return ()
     astray = is_astray(plain.log, plain.swinging, plain.start.parameters)
-    return (PRESSURE_SIDES, BEGUN) if astray else (PRESSURE_SIDES,)
+    return (PRESSURE_SIDES, BEGUN_UNDER_LOAD) if astray else (PRESSURE_SIDES,)
 
 
 def _least_zero(p: EhaParameters) -> float:
@@ -228,8 +239,8 @@ def _late_valves(fit: GreyBoxFit) -> tuple[Hypothesis, ...]:
     return (CHECKS_HIDDEN,) * late + (MAKEUP_HIDDEN,) * unlike
 
 
-def worth_in(log: GreyBoxLog, left: float = 1.0) -> float:
-    """Return the gain that a hypothesis must reach: `WORTH` at each turn of a slow log.
+def wanted_gain_at_turns(log: GreyBoxLog, left: float = 1.0) -> float:
+    """Return the gain that a hypothesis must reach: `REQUIRED_GAIN` at each turn of a slow log.
 
     The motor passes all turns alike, so straight lines err alike in all of them: a hypothesis that repairs that error
     gains at all turns at once. A real effect must be seen at each turn. The noise of a slow log is read from the log
@@ -248,10 +259,10 @@ def worth_in(log: GreyBoxLog, left: float = 1.0) -> float:
     float
         Gain in log-likelihood [dimensionless].
     """
-    return WORTH * log.passes * (1.0 if log.course is None else min(left, 1.0))
+    return REQUIRED_GAIN * log.turn_count * (1.0 if log.course is None else min(left, 1.0))
 
 
-def _possible(promises: Sequence[PredictedGain], fit: GreyBoxFit) -> Sequence[PredictedGain]:
+def _possible_gains(promises: Sequence[PredictedGain], fit: GreyBoxFit) -> Sequence[PredictedGain]:
     """Return the predicted gains; none if a prediction exceeds all that the fit leaves.
 
     Slopes were then taken where an unfed chamber of the model is below vapour pressure, which no oil can be. The
@@ -300,9 +311,9 @@ def near_starts(
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
     lost = fit.values["makeup_conductance"] > TOO_WIDE * MAKEUP_TRIED[0]
     near = [fit.values, fed] if lost else [fit.values]
-    return [*map(_unheld, near), *usual]
+    return [*map(_without_held_values, near), *usual]
 
 
-def _unheld(values: Mapping[str, float]) -> dict[str, float]:
-    """Return values without those that a search for unusual effects holds, see `HELD`."""
-    return {name: value for name, value in values.items() if name not in HELD}
+def _without_held_values(values: Mapping[str, float]) -> dict[str, float]:
+    """Return values without those that a search for unusual effects holds, see `HELD_PARAMETERS`."""
+    return {name: value for name, value in values.items() if name not in HELD_PARAMETERS}

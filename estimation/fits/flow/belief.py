@@ -6,22 +6,22 @@ from functools import partial
 import numpy as np
 
 from estimation.fits.flow.accumulator import is_far_stiffer
-from estimation.fits.flow.agreement import wanted_of
+from estimation.fits.flow.agreement import wanted_gain
 from estimation.fits.flow.log import homed_at_stop
 from estimation.fits.flow.log_traits import LogTraits
 from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, OFFSET, PLAY, PRESSURE_LATE, Hypothesis
-from estimation.fits.hypothesis_search.explain import WORTH
+from estimation.fits.hypothesis_search.explain import REQUIRED_GAIN
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.fit_objections import fit_explains_all
 from estimation.notes import RigCode
 from plant.notes import Note
 
-NEARLY_ALL = 0.1
+MOST_LEFT = 0.1
 """What may be left of what no plain form explains, for a hint on its cause [fraction]; judged."""
 
-LITTLE = 0.01
+LEAST_REMOVED = 0.01
 """Share of the plain form's misfit beyond noise that the best hypothesis must remove before pairs are tried
 [fraction]."""
 
@@ -46,7 +46,7 @@ def hopeless_cost(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
     if len(asked) < len(HYPOTHESES):
         return np.inf
     left = swinging.cost * (1.0 - 1.0 / max(swinging.chi_square[0], 1.0))
-    return swinging.cost - max(WORTH, LITTLE * left)
+    return swinging.cost - max(REQUIRED_GAIN, LEAST_REMOVED * left)
 
 
 def wanted_cost(
@@ -57,7 +57,7 @@ def wanted_cost(
     homed: bool,
     late: bool,
     astray: bool = False,
-    worth: float = WORTH,
+    worth: float = REQUIRED_GAIN,
 ) -> float:
     """Return the cost below which hypotheses are believed rather than the plain form.
 
@@ -89,13 +89,13 @@ def wanted_cost(
     if PLAY.name in names and len(names) > 1:
         return -np.inf
     if tuple(names) == (PRESSURE_LATE.name,) and late:
-        return best.cost + WORTH
+        return best.cost + REQUIRED_GAIN
     if tuple(names) == (ENCODER_ZERO.name,) and homed:
-        return min(best.cost + WORTH, swinging.cost - (0.0 if astray else worth))
+        return min(best.cost + REQUIRED_GAIN, swinging.cost - (0.0 if astray else worth))
     return best.cost - worth
 
 
-def wanted_in(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: float) -> float:
+def wanted_cost_in(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: float) -> float:
     """Return the cost below which hypotheses are believed rather than the plain form of a log.
 
     Parameters
@@ -114,7 +114,7 @@ def wanted_in(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: f
     float
         As of `wanted_cost` [dimensionless].
     """
-    best, swinging, worth = plain.best, plain.swinging, wanted_of(plain, left)
+    best, swinging, worth = plain.best, plain.swinging, wanted_gain(plain, left)
     homed, astray = homed_at_stop(plain.log), is_far_stiffer(plain.log, swinging.values)
     return wanted_cost(names, best, swinging, homed=homed, late=traits.filtered, astray=astray, worth=worth)
 
@@ -138,12 +138,12 @@ def nearly_explained(plain: PlainFits, strange: Explanation) -> tuple[Note, ...]
         Empty if the plain form explains the log, or if much is left.
     """
     before, left = (max(fit.chi_square[0] - 1.0, 0.0) for fit in (plain.best, strange.fit))
-    if plain.explains(plain.best) or left >= NEARLY_ALL * before:
+    if plain.explains(plain.best) or left >= MOST_LEFT * before:
         return ()
     return (RigCode.PARTLY_EXPLAINED.note(cause=strange.names[0], left=100.0 * left / before),)
 
 
-def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
+def explanation_test(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
     """Return the test of whether a fit explains the log. It is stricter if initial conditions are fitted.
 
     Initial conditions have many minima, so they are believed only if the sensors' noise is all that remains. A pressure
@@ -168,7 +168,7 @@ def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
     return told
 
 
-def likelier(one: Explanation | None, other: Explanation | None) -> Explanation | None:
+def likelier_of(one: Explanation | None, other: Explanation | None) -> Explanation | None:
     """Return the likelier of two explanations, the first if they are equal; either may be None.
 
     Parameters

@@ -8,17 +8,17 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.fits.flow.accumulator import GAS, presumed_stiffness
-from estimation.fits.flow.pumped import pumped_evenly
-from estimation.fits.greybox.block_averages import averaged, odd_block
+from estimation.fits.flow.pumped import with_pump_correction
+from estimation.fits.greybox.block_averages import averaged_log, odd_block
 from estimation.fits.greybox.intersample_doubt import OWN_NOISE, SLOW
-from estimation.fits.greybox.intersample_speed import straightened
+from estimation.fits.greybox.intersample_speed import straight_line_speed
 from estimation.fits.greybox.leaked_noise import encoder_noise
 from estimation.fits.greybox.log import GreyBoxLog, greybox_log
 from estimation.fits.hypothesis_search.fault_guesses import leakage_guess
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.log_checks.bridging import bridged, within_gaps
 from estimation.log_checks.dropout import LONG_GAP, without_pauses
-from estimation.log_checks.measurement_noise import measurement_variances, position_variance, struck_variance
+from estimation.log_checks.measurement_noise import excited_noise_variance, measurement_variances, position_variance
 from estimation.log_checks.order import median
 from estimation.log_checks.outliers import without_outliers
 from estimation.models.completed_flow import CRACKS
@@ -52,7 +52,7 @@ MOST_LEAD = 0.25
 """Prior standard deviation of the motor's lead, over the sample time [dimensionless]. The lead is a twelfth of the
 sample time over the motor's lag, so only a motor that settles within one sample leads by more."""
 
-FULLEST = 0.7
+LARGEST_SWEPT = 0.7
 """Largest share of a chamber that the piston is believed to sweep [fraction]: the encoder's zero may be anywhere."""
 
 FELT_GAP = 0.1
@@ -170,7 +170,7 @@ def flow_log(
     sensed, record = record, without_pauses(record)
     # motor speed keeps its larger variance, with sudden changes, so that intervals cover its course
     pressure = "differential_pressure_pa"
-    quiet = {pressure: min(variances[pressure], struck_variance(sensed[pressure]))}
+    quiet = {pressure: min(variances[pressure], excited_noise_variance(sensed[pressure]))}
     log = greybox_log(
         FLOW_FORM,
         record,
@@ -183,7 +183,7 @@ def flow_log(
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
     drives = log.drives.copy()
     if not held:
-        drives[:, speed] = straightened(log.drives[:, speed], slow=record.sample_time >= SLOW)
+        drives[:, speed] = straight_line_speed(log.drives[:, speed], slow=record.sample_time >= SLOW)
     passed_on = _swept_share(log.drives[:, position], parameters) * position_variance(sensed["position_m"]) ** 0.5
     open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
     log = replace(
@@ -192,7 +192,7 @@ def flow_log(
         timed=FLOW_FORM.drives,
         drive_std=(log.drive_std[0], 0.0),  # the output noise includes position noise
         # the piston's place is unknown within a gap of its position, but known after it
-        drives=_balanced_across(open_gaps, record, drives, parameters),
+        drives=_with_gaps_balanced(open_gaps, record, drives, parameters),
         measured=np.where(within_gaps(record["position_m"])[:, None], np.nan, log.measured),
         gaps=open_gaps,
         presumed={
@@ -204,12 +204,12 @@ def flow_log(
         },
         within=WITHIN,
     )
-    log = pumped_evenly(averaged(log, LONGEST_STEP, _block(log, parameters)), log, parameters)
+    log = with_pump_correction(averaged_log(log, LONGEST_STEP, _samples_per_block(log, parameters)), log, parameters)
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
-    return _noisy(log, parameters, record) if felt else log.taken_at(parameters.bulk_modulus)
+    return _with_leaking_noise(log, parameters, record) if felt else log.with_noise_at(parameters.bulk_modulus)
 
 
-def _noisy(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:
+def _with_leaking_noise(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:
     """Return a log whose output noise has a part that grows with the oil's stiffness and decays by leakage.
 
     A position error ``d`` compresses oil by ``b A d / V``, which leaks off within ``V / (b L)``. So means over ``T``
@@ -233,7 +233,7 @@ def _noisy(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:
     return replace(log, noise=(noise,), block=NOISY_BLOCK)
 
 
-def carried(
+def with_random_walk(
     log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float], stiffest: float = np.inf
 ) -> GreyBoxLog:
     """Return a log in which noise of motor speed adds a random walk to the pressure.
@@ -259,7 +259,7 @@ def carried(
     """
     (noise,), stiffness = log.noise, min(values["bulk_modulus"], stiffest) / parameters.chamber_volume
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
-    variance = min(log.drive_std[0] ** 2, struck_variance(speed))
+    variance = min(log.drive_std[0] ** 2, excited_noise_variance(speed))
     walk = (stiffness * parameters.pump_displacement) ** 2 * variance * log.sample_time
     remembered = 0.5 / max(stiffness * values["leakage_coefficient"], 1.0 / (len(log.drives) * log.sample_time))
     felt = walk * remembered > FELT_NOISE**2 * noise.variance
@@ -280,7 +280,7 @@ def homed_at_stop(log: GreyBoxLog) -> bool:
     return min(max(-low, 0.0), max(high, 0.0)) <= beside < abs(float(read[0]))
 
 
-def _block(log: GreyBoxLog, p: EhaParameters) -> int:
+def _samples_per_block(log: GreyBoxLog, p: EhaParameters) -> int:
     """Return over how many samples a fast log is averaged: as many as keep corners of the pumped flow negligible.
 
     The loss of the pump is zero for a moment where the motor reverses, and the course of its speed has a corner where
@@ -303,12 +303,15 @@ def _swept_share(position: Array, p: EhaParameters) -> float:
     """Return the relative change of volume per piston travel, summed over both chambers, root mean square [1/m]."""
     area_1, area_2 = piston_areas(p)
     volume = 2.0 * p.chamber_volume
-    swept = [np.clip(area * side * position / volume, -FULLEST, FULLEST) for area, side in ((area_1, 1), (area_2, -1))]
+    swept = [
+        np.clip(area * side * position / volume, -LARGEST_SWEPT, LARGEST_SWEPT)
+        for area, side in ((area_1, 1), (area_2, -1))
+    ]
     shares = area_1 / (1.0 + swept[0]) + area_2 / (1.0 + swept[1])
     return float(np.sqrt(np.mean(shares**2))) / volume
 
 
-def _balanced_across(open_gaps: Array, record: Record, drives: Array, p: EhaParameters) -> Array:
+def _with_gaps_balanced(open_gaps: Array, record: Record, drives: Array, p: EhaParameters) -> Array:
     """Return the drives with speeds in gaps that deliver what the piston sweeps, plus compression and leakage.
 
     These follow well enough from the ends of a gap and the rig file. Speeds on a straight line across the gap may

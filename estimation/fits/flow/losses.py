@@ -18,7 +18,7 @@ from plant.eha.model import EhaParameters
 
 LEAKAGE, DRAIN, BIAS = "leakage_coefficient", "case_leakage", "flow_bias"
 
-OF_DRAIN = 0.5
+DRAIN_SHARE = 0.5
 """Share of a port's drain that is lumped leakage [fraction]: each of the two ports takes half of the differential
 pressure."""
 
@@ -30,7 +30,7 @@ UNEVEN_OIL = 1e-3
 """Relative standard deviation of bulk modulus from the same cause [fraction]: root mean square error of 13 building
 logs."""
 
-MOST_ALIKE = 0.999
+LARGEST_CORRELATION = 0.999
 """Largest correlation of the two that is reported [dimensionless]: a covariance estimated from windows may exceed
 one."""
 
@@ -52,7 +52,7 @@ def losses(fits: Sequence[GreyBoxFit], weights: Array) -> tuple[Array, Array]:
         the log does not determine one of the two.
     """
     heavy = [(fit, weight) for fit, weight in zip(fits, weights, strict=True) if weight > np.finfo(np.float64).eps]
-    each = [_of(fit) for fit, _ in heavy]
+    each = [_losses_of_fit(fit) for fit, _ in heavy]
     shares = np.array([weight for _, weight in heavy]) / sum(weight for _, weight in heavy)
     values = np.array([value for value, _ in each])
     mean = shares @ values
@@ -61,15 +61,15 @@ def losses(fits: Sequence[GreyBoxFit], weights: Array) -> tuple[Array, Array]:
     return mean, np.asarray(within + (apart.T * shares) @ apart, dtype=np.float64)
 
 
-def _of(fit: GreyBoxFit) -> tuple[Array, Array]:
+def _losses_of_fit(fit: GreyBoxFit) -> tuple[Array, Array]:
     """Return the same of one fit, whose unknowns are logarithms."""
     names = (LEAKAGE, DRAIN, BIAS)
     across, drain, bias = (fit.values[name] for name in names)
-    found = np.array([across + OF_DRAIN * drain, bias])
+    found = np.array([across + DRAIN_SHARE * drain, bias])
     if math.isinf(fit.std[LEAKAGE]) or math.isinf(fit.std[BIAS]):
         return found, np.diag([np.inf, np.inf])
     places = [fit.model.unknowns.index(name) for name in names]
-    answers = np.array([[across, OF_DRAIN * drain, 0.0], [0.0, 0.0, bias]])
+    answers = np.array([[across, DRAIN_SHARE * drain, 0.0], [0.0, 0.0, bias]])
     return found, answers @ fit.covariance[np.ix_(places, places)] @ answers.T
 
 
@@ -110,16 +110,18 @@ def with_lumped(
     covariance[0, 0] += (left_out / (min(p.relief_pressure, pressure) if single else p.relief_pressure)) ** 2
     if single:
         # a side held at accumulator pressure drains nothing, so the two leaks look alike
-        covariance[0, 0] += (OF_DRAIN * found[DRAIN][0]) ** 2
+        covariance[0, 0] += (DRAIN_SHARE * found[DRAIN][0]) ** 2
         covariance[1, 1] += left_out**2
         found = {**found, BIAS: (found[BIAS][0], math.hypot(found[BIAS][1], left_out))}
     deviations = np.sqrt(np.diag(covariance))
     if not np.all(np.isfinite(deviations)) or not np.all(deviations > 0.0):
-        return {**found, LEAKAGE: (found[LEAKAGE][0] + OF_DRAIN * found[DRAIN][0], found[LEAKAGE][1])}, 0.0
+        return {**found, LEAKAGE: (found[LEAKAGE][0] + DRAIN_SHARE * found[DRAIN][0], found[LEAKAGE][1])}, 0.0
     across = float(np.sum(weights * [fit.values[LEAKAGE] for fit in fits]) / np.sum(weights))
     grown = found[LEAKAGE][0] / across
     lumped = float(grown * values[0]), float(grown * deviations[0])
-    return {**found, LEAKAGE: lumped}, float(np.clip(covariance[0, 1] / np.prod(deviations), -MOST_ALIKE, MOST_ALIKE))
+    return {**found, LEAKAGE: lumped}, float(
+        np.clip(covariance[0, 1] / np.prod(deviations), -LARGEST_CORRELATION, LARGEST_CORRELATION)
+    )
 
 
 def with_lumped_slopes(slopes: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
@@ -136,6 +138,6 @@ def with_lumped_slopes(slopes: Mapping[str, Mapping[str, float]]) -> dict[str, d
         The same.
     """
     return {
-        entry: {**one, LEAKAGE: one[LEAKAGE] + OF_DRAIN * one[DRAIN]} if {LEAKAGE, DRAIN} <= set(one) else {**one}
+        entry: {**one, LEAKAGE: one[LEAKAGE] + DRAIN_SHARE * one[DRAIN]} if {LEAKAGE, DRAIN} <= set(one) else {**one}
         for entry, one in slopes.items()
     }

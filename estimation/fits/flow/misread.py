@@ -18,19 +18,19 @@ from estimation.fits.flow.guesses import guesses_about
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits
 from estimation.fits.flow.rough_search import GUESSED_WITHIN, ROUGH_ENOUGH
 from estimation.fits.flow.search import flow_starts
-from estimation.fits.flow.slips import PAIRS, SLIPS, Slip, set_right
+from estimation.fits.flow.slips import PAIRS, SLIPS, Slip, with_slips_corrected
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.side_by_side import LANES
 from estimation.fits.hypotheses import CHECKS_CRACK, MAKEUP_BENDS, OFFSET, PRESSURE_DRIFT
-from estimation.fits.hypothesis_search.explain import WORTH, Explanation
+from estimation.fits.hypothesis_search.explain import REQUIRED_GAIN, Explanation
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.flow_balance import MOST_LOST
-from estimation.log_checks.sliding_pressure import beyond_sliding, sliding_pressure
+from estimation.log_checks.sliding_pressure import sliding_excess, sliding_pressure
 from estimation.log_checks.standstill import travels
-from estimation.models.flow import FLOW_FORM, reaches_relief, relieving
+from estimation.models.flow import FLOW_FORM, form_with_relief, reaches_relief
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
 from plant.notes import Note
@@ -42,7 +42,7 @@ FOREIGN, KIN = 7.0, 3.0
 log has oil like the rig's [dimensionless]; judged. Air may reduce an oil's stiffness to a fifth; rpm read as rad/s
 gives a tenth."""
 
-SURELY = 2.0
+SURE_DEVIATIONS = 2.0
 """Deviations by which a fit that explains a log must be beyond what the rig allows [dimensionless]."""
 
 ASKED_SECONDS = 2.0
@@ -54,7 +54,7 @@ TURNING = 0.1
 ALIKE = 0.1
 """Share by which the block counts of two fits may differ if their costs are compared [fraction]."""
 
-FELT = 4.0
+LEAST_CHANGE = 4.0
 """Variance of a channel over that of its noise from which the channel counts as changing [dimensionless]; judged. A
 dead sensor shows its noise alone, and any slower pump would explain that."""
 
@@ -66,7 +66,7 @@ HOPEFUL, MOST_FITTED = 10.0, 4
 and how many slips are fitted at most [count]; judged. The rough misfit of right slips is 1.0 to 1.2, of wrong ones 2 to
 3,000."""
 
-AS_RIGHT = 1.2
+EQUAL_MISFITS = 1.2
 """Ratio of rough misfits up to which slips count as equally good [dimensionless]: right slips have that misfit at most.
 Of these, the first to be fitted is that whose pressure is nearest to what the rig's friction takes."""
 
@@ -110,10 +110,12 @@ class CorrectedLogs:
             None if the fit says that the log may be one of the rig's, if no slip explains it, or if pressure does not
             change.
         """
-        if (plain.explains(found) and self.is_kin(plain, found)) or not _changes(self.logged, PRESSURE):
+        if (plain.explains(found) and self.is_kin(plain, found)) or not _shows_change(self.logged, PRESSURE):
             return None
-        slips = _likeliest(self._single, found) or (_likeliest(self._double, found) if paired else [])
-        return _told(slips) if slips else None
+        slips = _likeliest_slips(self._single_slips, found) or (
+            _likeliest_slips(self._double_slips, found) if paired else []
+        )
+        return _misread_note(slips) if slips else None
 
     def is_kin(self, plain: PlainFits, found: GreyBoxFit) -> bool:
         """Return whether a fit says that the log, as it was read, may be one of the rig's.
@@ -127,9 +129,9 @@ class CorrectedLogs:
         """
         stiffer = found.values["bulk_modulus"] > self.rig.bulk_modulus
         # whether friction and oil agree that pressure is off
-        alike = self._beyond > 0.0 if stiffer else self._beyond < 0.0
+        alike = self._sliding_excess > 0.0 if stiffer else self._sliding_excess < 0.0
         times = KIN if alike else FOREIGN
-        return _kin(found, self.rig, times, SURELY if plain.explains(found) else 0.0)
+        return _is_kin(found, self.rig, times, SURE_DEVIATIONS if plain.explains(found) else 0.0)
 
     def is_sound(self, plain: PlainFits, strange: Explanation) -> bool:
         """Return whether an effect makes the log match the rig and cannot be mistaken for a slip.
@@ -144,51 +146,51 @@ class CorrectedLogs:
         return UNLIKE_SLIPS.issuperset(strange.names) and self.is_kin(plain, strange.fit)
 
     @cached_property
-    def _beyond(self) -> float:
-        """How far the pressure as read exceeds that at which pistons slide, see `beyond_sliding`; 0 for one at rest."""
-        still = _still(self.logged, self.rig)
-        return 0.0 if still else beyond_sliding(sliding_pressure(self.logged.record, self.rig))
+    def _sliding_excess(self) -> float:
+        """How far the pressure as read exceeds that at which pistons slide, see `sliding_excess`; 0 for one at rest."""
+        still = _is_still(self.logged, self.rig)
+        return 0.0 if still else sliding_excess(sliding_pressure(self.logged.record, self.rig))
 
     @cached_property
-    def _single(self) -> Sequence[tuple[Slips, GreyBoxFit]]:
-        return self._explained([(slip,) for slip in SLIPS])
+    def _single_slips(self) -> Sequence[tuple[Slips, GreyBoxFit]]:
+        return self._explaining_slips([(slip,) for slip in SLIPS])
 
     @cached_property
-    def _double(self) -> Sequence[tuple[Slips, GreyBoxFit]]:
-        return self._explained(PAIRS)
+    def _double_slips(self) -> Sequence[tuple[Slips, GreyBoxFit]]:
+        return self._explaining_slips(PAIRS)
 
-    def _explained(self, tried: Sequence[Slips]) -> Sequence[tuple[Slips, GreyBoxFit]]:
+    def _explaining_slips(self, tried: Sequence[Slips]) -> Sequence[tuple[Slips, GreyBoxFit]]:
         """Return the slips whose correction makes the log match the rig, each with its fit."""
         begun, rig = _beginning(self.logged), self.rig
-        hopeful = _hopeful(tried, begun, rig)
-        fits = [(slips, one) for slips in hopeful if (one := _right_with(slips, begun, rig)) is not None]
+        hopeful = _hopeful_slips(tried, begun, rig)
+        fits = [(slips, one) for slips in hopeful if (one := _fit_if_corrected(slips, begun, rig)) is not None]
         if begun is self.logged:
             return fits
-        return [(slips, one) for slips, _ in fits if (one := _right_with(slips, self.logged, rig)) is not None]
+        return [(slips, one) for slips, _ in fits if (one := _fit_if_corrected(slips, self.logged, rig)) is not None]
 
 
-def _likeliest(explained: Sequence[tuple[Slips, GreyBoxFit]], found: GreyBoxFit) -> Sequence[Slips]:
+def _likeliest_slips(explained: Sequence[tuple[Slips, GreyBoxFit]], found: GreyBoxFit) -> Sequence[Slips]:
     """Return the slips that explain a log no worse than its fit as read, and no worse than each other."""
     fits = [found, *(one for _, one in explained)]
-    return [slips for slips, one in explained if all(_lost_to(other, one) < WORTH for other in fits)]
+    return [slips for slips, one in explained if all(_likelihood_lost(other, one) < REQUIRED_GAIN for other in fits)]
 
 
-def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequence[Slips]:
+def _hopeful_slips(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequence[Slips]:
     """Return the slips whose correction may explain a log, by the misfit of a rough search for each.
 
     Noise alone does not reveal a unit of position, and a piston that then stands still reveals none at all.
     """
     left: list[tuple[tuple[float, float], Slips]] = []
-    changes, as_read = _changes(logged, POSITION), _off_sliding(logged, rig)
+    changes, as_read = _shows_change(logged, POSITION), _sliding_distances(logged, rig)
     for slips in tried:
-        if any(slip.channel == POSITION and not _changes(logged, slip.other or POSITION) for slip in slips):
+        if any(slip.channel == POSITION and not _shows_change(logged, slip.other or POSITION) for slip in slips):
             continue
-        right = _sliding(slips, logged, rig, as_read)
-        if right is not None and any(slip.factor > 0.0 for slip in slips) and (not changes or _still(right, rig)):
+        right = _corrected_log(slips, logged, rig, as_read)
+        if right is not None and any(slip.factor > 0.0 for slip in slips) and (not changes or _is_still(right, rig)):
             continue
         misfit = np.inf if right is None else _rough_misfit(right, rig)
         if right is not None and 0.0 < misfit < HOPEFUL:
-            left.append(((max(misfit, 1.0 / misfit, AS_RIGHT), _off_sliding(right, rig)[1]), slips))
+            left.append(((max(misfit, 1.0 / misfit, EQUAL_MISFITS), _sliding_distances(right, rig)[1]), slips))
     return [slips for _, slips in sorted(left, key=itemgetter(0))[:MOST_FITTED]]
 
 
@@ -197,8 +199,8 @@ def _rough_misfit(logged: Logged, rig: EhaParameters) -> float:
 
     It is infinite if that guess is already hopeless, or if the search ends at oil unlike the rig's.
     """
-    log = logged.seen_at(rig).taken_at(rig.bulk_modulus)
-    form = relieving(FLOW_FORM) if reaches_relief(log.measured, rig.relief_pressure) else FLOW_FORM
+    log = logged.as_flow_log(rig).with_noise_at(rig.bulk_modulus)
+    form = form_with_relief(FLOW_FORM) if reaches_relief(log.measured, rig.relief_pressure) else FLOW_FORM
     problem = FreedProblem.of(form, log.coarsened())
     guesses = guesses_about(flow_starts(rig, rig.bulk_modulus)[0], form, rig)
     costs = problem.costs(guesses, LANES)
@@ -210,19 +212,19 @@ def _rough_misfit(logged: Logged, rig: EhaParameters) -> float:
     return 2.0 * found.cost / problem.blocks if 1.0 / FOREIGN < modulus / rig.bulk_modulus < FOREIGN else np.inf
 
 
-def _told(found: Sequence[Slips]) -> Note:
+def _misread_note(found: Sequence[Slips]) -> Note:
     channels = dict.fromkeys(" and ".join(slip.channel for slip in slips) for slips in found)
     said = " or ".join(" and ".join(slip.said for slip in slips) for slips in found)
     return ChannelCode.CHANNEL_MISREAD.note(channel=" or ".join(channels), slip=said)
 
 
-def _lost_to(found: GreyBoxFit, other: GreyBoxFit) -> float:
+def _likelihood_lost(found: GreyBoxFit, other: GreyBoxFit) -> float:
     """Return by how much a fit is likelier than another [log-likelihood]; 0 if their blocks differ."""
     lost = 0.5 * found.seen * (other.chi_square[0] - found.chi_square[0])
     return lost if abs(other.seen - found.seen) < ALIKE * found.seen else 0.0
 
 
-def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bool:
+def _is_kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bool:
     """Return whether a fit's oil may be the rig's, and its pump loses no more than a leaky one does.
 
     A flow bias is at most a quarter of the rated flow. If a leak took the whole flow before the piston slides, the
@@ -240,15 +242,15 @@ def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bo
     return abs(ln(modulus / rig.bulk_modulus)) - surely * std < ln(times)
 
 
-def _still(logged: Logged, rig: EhaParameters) -> bool:
+def _is_still(logged: Logged, rig: EhaParameters) -> bool:
     gone = travels(logged.record, rig)
     return gone is not None and gone.still
 
 
-def _changes(logged: Logged, channel: str) -> bool:
+def _shows_change(logged: Logged, channel: str) -> bool:
     """Return whether a channel exists and shows more than its noise."""
     there = channel in logged.record and channel in logged.variances
-    return there and bool(np.nanvar(logged.record[channel]) > FELT * logged.variances[channel])
+    return there and bool(np.nanvar(logged.record[channel]) > LEAST_CHANGE * logged.variances[channel])
 
 
 def _beginning(logged: Logged) -> Logged:
@@ -263,25 +265,25 @@ def _beginning(logged: Logged) -> Logged:
     return logged if samples >= len(record) else replace(logged, record=record.slice(0, samples))
 
 
-def _sliding(slips: Slips, logged: Logged, rig: EhaParameters, as_read: tuple[float, float]) -> Logged | None:
+def _corrected_log(slips: Slips, logged: Logged, rig: EhaParameters, as_read: tuple[float, float]) -> Logged | None:
     """Return a log with slips corrected; None if it lacks such channels, or its pressure then moves no piston.
 
-    Its pressure must be no further from what the rig's friction takes than as read (`_off_sliding`).
+    Its pressure must be no further from what the rig's friction takes than as read (`_sliding_distances`).
     """
-    right = set_right(slips, logged)
-    return right if right is not None and _off_sliding(right, rig) <= as_read else None
+    right = with_slips_corrected(slips, logged)
+    return right if right is not None and _sliding_distances(right, rig) <= as_read else None
 
 
-def _right_with(slips: Slips, logged: Logged, rig: EhaParameters) -> GreyBoxFit | None:
+def _fit_if_corrected(slips: Slips, logged: Logged, rig: EhaParameters) -> GreyBoxFit | None:
     """Return the fit of a log with slips corrected, if it explains the log as one of the rig's."""
-    right = _sliding(slips, logged, rig, _off_sliding(logged, rig))
+    right = _corrected_log(slips, logged, rig, _sliding_distances(logged, rig))
     if right is None:
         return None
     plain = plain_fits(right, FitStart(rig, rig.bulk_modulus))
-    return plain.best if plain.explains(plain.best) and _kin(plain.best, rig, KIN, 0.0) else None
+    return plain.best if plain.explains(plain.best) and _is_kin(plain.best, rig, KIN, 0.0) else None
 
 
-def _off_sliding(logged: Logged, rig: EhaParameters) -> tuple[float, float]:
+def _sliding_distances(logged: Logged, rig: EhaParameters) -> tuple[float, float]:
     """Return how far pressure is from that at which pistons slide, and from the rig's friction [logarithms]."""
     ratio = sliding_pressure(logged.record, rig)
-    return abs(beyond_sliding(ratio)), abs(ln(ratio)) if ratio > 0.0 else np.inf
+    return abs(sliding_excess(ratio)), abs(ln(ratio)) if ratio > 0.0 else np.inf

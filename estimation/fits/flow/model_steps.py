@@ -57,19 +57,19 @@ def with_implicit_steps(plain: PlainFits) -> FitStart | None:
     quick = plain.best.chi_square[0] > WRONG_VALLEY and not explained and fills_within_a_step(p)
     if quick or (p.single_rod and at_widest(plain.swinging, p, plain.log)):
         return replace(plain.start, implicit=True)
-    asked = not explained or p.single_rod or p.pilot_share > 0.0 or any(map(_leaps, swinging))
-    felt = asked and any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
+    asked = not explained or p.single_rod or p.pilot_share > 0.0 or any(map(_has_steep_blocks, swinging))
+    felt = asked and any(_has_large_step_errors(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
     return replace(plain.start, implicit=True) if felt else None
 
 
-def _chatters(log: GreyBoxLog, fit: GreyBoxFit, least: float) -> bool:
+def _has_large_step_errors(log: GreyBoxLog, fit: GreyBoxFit, least: float) -> bool:
     """Return whether step errors of a fit exceed the noise, and at least the least share of its residuals."""
     errors = step_errors(FreedProblem.of(fit.model, log), fit.model.theta(fit.values))
     share = float(np.sqrt(np.mean(errors**2) / max(fit.chi_square[0], 1.0)))
     return share >= least and float(np.max(np.abs(errors))) > STEPS_FELT
 
 
-def _leaps(fit: GreyBoxFit) -> bool:
+def _has_steep_blocks(fit: GreyBoxFit) -> bool:
     """Return whether a few blocks determine bulk modulus far better than all others."""
     if not fit.slopes.size:
         return False

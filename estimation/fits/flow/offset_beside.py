@@ -1,4 +1,4 @@
-"""`offset_settled(plain, strange, explained)`: the offset of motor speed, fitted again beside what explains a log.
+"""`settled_offset(plain, strange, explained)`: the offset of motor speed, fitted again beside what explains a log.
 
 An encoder with another zero, or a single rod, makes a plain fit find an offset of speed that does not exist. The effect
 is then fitted beside that wrong offset, and is several deviations off.
@@ -12,12 +12,12 @@ from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.pump_ripple import MOST_OFFSET, Turning, with_ripple
 from estimation.fits.hypotheses import DELIVERY, Hypothesis
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT, OFFSET_SETTLED, OFFSET_WORTH, told_offset
+from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT_GAIN, OFFSET_SETTLED, OFFSET_WORTH, offset_note
 from estimation.fits.hypothesis_search.speed_offset import MOST_SHARE
 from estimation.notes import RigCode
 
 
-def offset_settled(
+def settled_offset(
     plain: PlainFits,
     strange: Explanation | None,
     asked: Sequence[Hypothesis],
@@ -56,21 +56,21 @@ def offset_settled(
     most = MOST_OFFSET if alike else MOST_SHARE * plain.start.parameters.rated_speed
     if abs(offset) > max(most, 2.0 * abs(taken)):
         return plain, strange
-    other = _turned(plain, offset, shown.std)
+    other = _with_offset(plain, offset, shown.std)
     same = [one for one in asked if one.name in (*strange.names, DELIVERY.name)]
     known = {one.name for one in same}
     again = explained(other, same) if known.issuperset(strange.names) else None
-    kept = again is not None and again.fit.cost <= strange.fit.cost - KEPT * shown.gain
+    kept = again is not None and again.fit.cost <= strange.fit.cost - KEPT_GAIN * shown.gain
     if again is None or not kept or not known.issuperset(again.names):
         return plain, strange
     return other, again
 
 
-def _turned(plain: PlainFits, offset: float, std: float) -> PlainFits:
+def _with_offset(plain: PlainFits, offset: float, std: float) -> PlainFits:
     """Return plain fits whose log has another offset of speed; the fits are still those at the old offset."""
     turning = Turning(plain.turning.teeth, offset)
     drives = plain.log.drives.copy()
     drives[:, 0] = with_ripple(plain.unturned, turning.teeth, offset).drives[:, 0]
     others = tuple(note for note in plain.teeth if note.code is not RigCode.SPEED_OFFSET)
     log = replace(plain.log, drives=drives, speed_offset=offset)
-    return replace(plain, log=log, turning=turning, teeth=(*others, *told_offset(offset, std)))
+    return replace(plain, log=log, turning=turning, teeth=(*others, *offset_note(offset, std)))

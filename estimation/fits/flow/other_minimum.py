@@ -12,9 +12,9 @@ from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
-from estimation.fits.greybox.spared_steps import spared
+from estimation.fits.greybox.spared_steps import with_steps_where_needed
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds
-from estimation.models.completed_flow import CRACKS, completed
+from estimation.models.completed_flow import CRACKS, completed_flow_form
 from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.inner_circuit import BEND
@@ -25,7 +25,7 @@ FINISHING = 60
 """Most evaluations with short model steps [count]. Most searches converge by the tenth. With stiff oil and a large
 pump, long model steps end so far off that 15 evaluations left 74 of log-likelihood, and bulk modulus 1.3 % wrong."""
 
-WITHIN = 0.3
+VALLEY_RADIUS = 0.3
 """First trust radius of a search that starts in another valley [dimensionless]."""
 
 DRAIN = "case_leakage"
@@ -37,7 +37,7 @@ Found: TypeAlias = tuple[Problem, Point, tuple[Array, Array]]
 """A problem, its solution, and the bounds of its search."""
 
 
-def nearest(one: Found, other: Found, guesses: Mapping[str, float]) -> Point:
+def lower_end(one: Found, other: Found, guesses: Mapping[str, float]) -> Point:
     """Return where a form's search continues: at its own end, or at another form's end if that is lower.
 
     A wrong balance may drive leakage to zero, and its logarithm does not come back from there. So what may vanish
@@ -137,8 +137,8 @@ def from_minimum(
     problem = FreedProblem.of(form, log)
     theta = form.theta({STIFFNESS: first_stiffness(log), **valley})
     bounds = flow_bounds(form, [theta], log)
-    quick = spared(problem, theta)
-    return quick, descend(quick.at, theta, FINISHING, bounds, radius=WITHIN, wanted=wanted), bounds
+    quick = with_steps_where_needed(problem, theta)
+    return quick, descend(quick.at, theta, FINISHING, bounds, radius=VALLEY_RADIUS, wanted=wanted), bounds
 
 
 def completed_form(form: GreyBoxModel, *, bent: bool) -> GreyBoxModel:
@@ -152,4 +152,4 @@ def completed_form(form: GreyBoxModel, *, bent: bool) -> GreyBoxModel:
         Whether make-up valves must pass so much flow that they are modelled as orifices.
     """
     known = CRACKS[0] in form.unknowns or form.rates is HELD_FLOW_FORM.rates
-    return form if known else completed(form, bent=bent)
+    return form if known else completed_flow_form(form, bent=bent)

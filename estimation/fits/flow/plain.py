@@ -8,18 +8,18 @@ from operator import attrgetter
 import numpy as np
 
 from estimation.fits.flow.log import flow_log
-from estimation.fits.flow.search import balanced, flow_starts, followed, likeliest_swinging
+from estimation.fits.flow.search import balance_fits, flow_starts, likeliest_swinging, refitted_balances
 from estimation.fits.flow.swept import with_first_fit
 from estimation.fits.flow.turns_read import with_turns_read
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.play import ShownPlay, play_untaken
+from estimation.fits.greybox.play import ShownPlay, omitted_play_uncertainty
 from estimation.fits.greybox.pump_ripple import Turning
 from estimation.fits.hypothesis_search.between_samples import with_course
-from estimation.fits.hypothesis_search.fit_objections import fit_explains, is_too_close, limits
+from estimation.fits.hypothesis_search.fit_objections import fit_explains, is_too_close, residual_limits
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.fits.hypothesis_search.pump_ripple_fits import with_pump_ripple
-from estimation.fits.hypothesis_search.speed_offset import bears_out, offset_by_lost_flow
+from estimation.fits.hypothesis_search.speed_offset import confirms_offset, offset_by_lost_flow
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -28,7 +28,7 @@ from plant.notes import Note
 LEAST_GUESS = 1e-2
 """Smallest first guess of bulk modulus, over the rig file's [fraction]."""
 
-TOO_LOUD = 2.0
+MOST_EXCESS_NOISE = 2.0
 """Ratio of the noise variance assumed for a fit to that at the bulk modulus which explains the log, from which the log
 is fitted again [dimensionless]. Below it, gates at 1.1 to 1.44 times the noise still detect a misfit, and sound logs
 need no second search."""
@@ -59,7 +59,7 @@ class Logged:
     variances: Mapping[str, float]
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
 
-    def seen_at(self, parameters: EhaParameters, *, held: bool = False) -> GreyBoxLog:
+    def as_flow_log(self, parameters: EhaParameters, *, held: bool = False) -> GreyBoxLog:
         """Return the log as the flow form sees it for an actuator, whose motor command may be ``held``."""
         return flow_log(self.record, parameters, self.uncertainties, self.variances, held=held)
 
@@ -79,7 +79,7 @@ class FitStart:
     valley : Mapping[str, float], optional
         Values of the plain form's unknowns at which searches begin as well, see `lower_minimum` [SI].
     stiffest : float
-        Largest bulk modulus for which the effect of motor speed noise is computed, see `quieter` [Pa].
+        Largest bulk modulus for which the effect of motor speed noise is computed, see `quieter_start` [Pa].
     turns_read : bool
         Whether the volume pumped in a slow log's turns is read from the samples after them, see `with_turns_read`.
     implicit : bool
@@ -137,7 +137,7 @@ class PlainFits:
     turning: Turning
 
     @cached_property
-    def turns_told(self) -> bool:
+    def turns_readable(self) -> bool:
         """Whether the volume pumped in a slow log's turns can be read from the samples after them, and is not yet."""
         log = self.unturned
         return not self.start.turns_read and with_turns_read(log, self.start.parameters) is not log
@@ -171,7 +171,7 @@ class PlainFits:
         return softness * bulk_modulus
 
     def play_untaken(self, shown: ShownPlay, sensed: ShownPlay) -> tuple[float, tuple[Note, ...]]:
-        """Return the uncertainty due to a play that no fit includes; see `estimation.fits.greybox.play.play_untaken`.
+        """Return the uncertainty due to a play that no fit includes, see `omitted_play_uncertainty`.
 
         Parameters
         ----------
@@ -185,7 +185,7 @@ class PlainFits:
         tuple of (float, tuple of Note)
             Relative deviation of bulk modulus [fraction], and a note if the gate does not reject the fit for it.
         """
-        return play_untaken(shown, sensed, self.yields(sensed, self.swinging.values["bulk_modulus"]))
+        return omitted_play_uncertainty(shown, sensed, self.yields(sensed, self.swinging.values["bulk_modulus"]))
 
 
 def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ()) -> PlainFits:
@@ -203,15 +203,15 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
         Fits of nearly the same log: searches start from them.
     """
     parameters = start.parameters
-    log = logged.seen_at(parameters, held=start.held)
+    log = logged.as_flow_log(parameters, held=start.held)
     if start.turns_read:
         log = with_turns_read(log, parameters)
     log = replace(log, stiff=start.implicit)
     starts = flow_starts(parameters, max(start.bulk_modulus, LEAST_GUESS * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
-    largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
-    fitted = partial(balanced, parameters=parameters, starts=starts, valley=start.valley, stiffest=start.stiffest)
-    led = partial(followed, parameters=parameters, fits=near, stiffest=start.stiffest) if near else fitted
+    largest, _ = residual_limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
+    fitted = partial(balance_fits, parameters=parameters, starts=starts, valley=start.valley, stiffest=start.stiffest)
+    led = partial(refitted_balances, parameters=parameters, fits=near, stiffest=start.stiffest) if near else fitted
     unturned = with_course(log, led, parameters, always=start.turns_open)
     turned = partial(with_pump_ripple, unturned, led, explains, largest)
     found = turned(start.speed_offset)
@@ -219,7 +219,7 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
     if settled and not (explains(found.best) or start.speed_offset):
         offset = offset_by_lost_flow(unturned, parameters)
         other = turned(offset) if offset else found
-        found = other if explains(other.best) and bears_out(other, largest, parameters) else found
+        found = other if explains(other.best) and confirms_offset(other, largest, parameters) else found
     log, fits, teeth, left = found
     turning = Turning(log.teeth, log.speed_offset)
     values = likeliest_swinging(fits).values
@@ -239,7 +239,7 @@ def fills_within_a_step(p: EhaParameters) -> bool:
     return 2.0 * p.chamber_volume * VALVE_DROP < LONGEST_STEP * p.bulk_modulus * p.rated_flow
 
 
-def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
+def with_stiff_oil(logged: Logged, plain: PlainFits) -> EhaParameters | None:
     """Return the actuator with the stiff oil that was found, if position noise starts to matter at that stiffness.
 
     Parameters
@@ -259,10 +259,10 @@ def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
     if plain.log.passes_on or found <= parameters.bulk_modulus or not plain.explains(swinging):
         return None
     stiff = replace(parameters, bulk_modulus=found)
-    return stiff if logged.seen_at(stiff).passes_on else None
+    return stiff if logged.as_flow_log(stiff).passes_on else None
 
 
-def quieter(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
+def quieter_start(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
     """Return the start of a second fit, if the noise was computed for far stiffer oil than the one that fits.
 
     The effect of motor speed noise on pressure grows with the oil's stiffness. If the plain form ends in a wrong
@@ -285,4 +285,4 @@ def quieter(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
     heard = min(plain.swinging.values["bulk_modulus"], plain.start.stiffest)
     white, walked = log.noise[0].variance * log.sample_time / log.block, log.noise[0].walk * log.block
     quiet = white + walked * min(modulus / heard, 1.0) ** 2
-    return replace(plain.start, stiffest=modulus) if white + walked > TOO_LOUD * quiet else None
+    return replace(plain.start, stiffest=modulus) if white + walked > MOST_EXCESS_NOISE * quiet else None

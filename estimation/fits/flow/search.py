@@ -1,4 +1,4 @@
-"""`balanced(log, ...)`: fits of the flow form, balanced by volume, by mass, and by volume in held chambers."""
+"""`balance_fits(log, ...)`: fits of the flow form, balanced by volume, by mass, and by volume in held chambers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -8,18 +8,18 @@ import numpy as np
 from estimation.arrays import IntArray
 from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.flow.log import DRAIN_START, OPENING_START
-from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, nearest
-from estimation.fits.flow.rough_search import RIVAL, UNLIKELY, RoughOptimum, rough_optima
+from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, lower_end
+from estimation.fits.flow.rough_search import RIVAL_COST, UNLIKELY, RoughOptimum, rough_optima
 from estimation.fits.flow.swept import with_first_fit
 from estimation.fits.flow.wide_valves import opens_wide
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.drive_noise import moved_by_drives
-from estimation.fits.greybox.fit import GreyBoxFit, concluded, explained
+from estimation.fits.greybox.drive_noise import effect_of_drive_noise
+from estimation.fits.greybox.fit import GreyBoxFit, explains_log, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
-from estimation.fits.greybox.spared_steps import sparing_steps, with_steps
+from estimation.fits.greybox.spared_steps import steps_where_needed, with_steps
 from estimation.fits.hypothesis_search.fault_guesses import (
     FAULTS_TRIED,
     faulty_coefficient,
@@ -32,7 +32,7 @@ from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
 from estimation.models.inner_circuit import BEND
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
-from plant.spare_processors import each
+from plant.spare_processors import map_cases
 
 MAKEUP_TRIED = (1e-9, 1e-13)
 """Make-up conductances of the starts [m^3/(s Pa)]: a circuit with make-up valves, and one without."""
@@ -70,13 +70,13 @@ balances."""
 NO_SLOPES = np.zeros(0), np.zeros((0, 0))
 """Gradient and Hessian of a point of which only the cost is known."""
 
-NOWHERE: Mapping[str, float] = {}
+NO_VALUES: Mapping[str, float] = {}
 """Values of a search that no other leads."""
 
 SETTLING = 15
 """Evaluations with short model steps of a form that does not explain its log, before hypotheses are tested [count]."""
 
-CLOSE = 0.75
+CLOSE_COST = 0.75
 """Cost per residual (0.5 for noise alone) below which such a search continues to its end [dimensionless]; judged. The
 search for a single rod was stopped at 0.65 on its way to 0.47, and passed its gate there."""
 
@@ -116,7 +116,7 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
     ]
 
 
-def balanced(
+def balance_fits(
     log: GreyBoxLog,
     parameters: EhaParameters,
     starts: Sequence[Mapping[str, float]],
@@ -146,33 +146,35 @@ def balanced(
     """
     rough = rough_optima(log, parameters, starts)
     least = min(one.point.cost for one in rough)
-    near = min((one for one in rough if not _held(one.problem)), key=lambda one: one.point.cost)
-    likely = [one for one in rough if one is near or one.point.cost < least + RIVAL]
-    behind = [one for one in rough if not (_held(one.problem) or one in likely)]
+    near = min((one for one in rough if not _holds_volumes(one.problem)), key=lambda one: one.point.cost)
+    likely = [one for one in rough if one is near or one.point.cost < least + RIVAL_COST]
+    behind = [one for one in rough if not (_holds_volumes(one.problem) or one in likely)]
     bent = opens_wide(log, parameters)
     log = with_first_fit(log, parameters, near.values, stiffest)
     first = rough[0] if rough[0] in likely else near  # its kernel has fewer runs side by side
-    steps = sparing_steps(first.problem.on(log), first.point.theta)
+    steps = steps_where_needed(first.problem.on(log), first.point.theta)
     # the balance by mass leads, since it has had an accumulator from the start
     leader = min(likely, key=lambda one: STIFFNESS not in one.problem.model.unknowns)
-    lead = _finished(leader, log, steps, bent=bent)
-    valves = _valves(lead)
-    done = each(lambda one: lead if one is leader else _finished(one, log, steps, led=valves, bent=bent), likely)
+    lead = _final_optimum(leader, log, steps, bent=bent)
+    valves = _valve_values(lead)
+    done = map_cases(
+        lambda one: lead if one is leader else _final_optimum(one, log, steps, led=valves, bent=bent), likely
+    )
     best, here = min(done, key=_cost), log.stepped(steps)
-    if not explained(best[0], best[1]):
-        led = (nearest((one.problem.on(here), one.point, one.bounds), best, starts[0]) for one in behind)
+    if not explains_log(best[0], best[1]):
+        led = (lower_end((one.problem.on(here), one.point, one.bounds), best, starts[0]) for one in behind)
         behind = [replace(one, point=point) for one, point in zip(behind, led, strict=True)]
     elif least - best[1].cost < COMPLETED and _is_noise(best):
         behind = [one for one in behind if one.point.cost < best[1].cost + TOO_FAR]
-    done += each(lambda one: _finished(one, log, steps, best[1].cost, bent=bent), behind)
+    done += map_cases(lambda one: _final_optimum(one, log, steps, best[1].cost, bent=bent), behind)
     if valley is not None:
-        done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
+        done = map_cases(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
     if _one_sided(log):
-        done = [found for minima in each(_with_less_drain, done) for found in minima]
-    return _told(done, log, steps)
+        done = [found for minima in map_cases(_with_less_drain, done) for found in minima]
+    return _reported_fits(done, log, steps)
 
 
-def followed(
+def refitted_balances(
     log: GreyBoxLog, parameters: EhaParameters, fits: Sequence[GreyBoxFit], stiffest: float = np.inf
 ) -> Sequence[GreyBoxFit]:
     """Return the fits of a log that differs little from one already fitted, started from those fits.
@@ -184,7 +186,7 @@ def followed(
     parameters : EhaParameters
         The actuator.
     fits : sequence of GreyBoxFit
-        The fits of the other log, as from `balanced`.
+        The fits of the other log, as from `balance_fits`.
     stiffest : float
         Largest bulk modulus for which the effect of motor speed noise is computed [Pa].
     """
@@ -195,9 +197,9 @@ def followed(
 
     def led(fit: GreyBoxFit) -> Found:
         ended, bounds = Point(fit.theta, fit.cost, *NO_SLOPES), flow_bounds(fit.model, [fit.theta], log)
-        return _finished(RoughOptimum(FreedProblem.of(fit.model, log), ended, bounds), log, steps, bent=bent)
+        return _final_optimum(RoughOptimum(FreedProblem.of(fit.model, log), ended, bounds), log, steps, bent=bent)
 
-    return _told(each(led, fits), log, steps)
+    return _reported_fits(map_cases(led, fits), log, steps)
 
 
 def likeliest_swinging(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
@@ -205,23 +207,23 @@ def likeliest_swinging(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
     return min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=lambda fit: fit.cost)
 
 
-def _told(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> Sequence[GreyBoxFit]:
+def _reported_fits(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> Sequence[GreyBoxFit]:
     """Return the fits at the minima of the balances; those that are reported have short model steps throughout."""
-    done = _told_ended(done, log)
-    best, swinging = _told_of(done)
+    done = _ended_where_reported(done, log)
+    best, swinging = _reported_minima(done)
     least = best[1].cost
 
     counting = [one for one in done if one[1].cost < least + UNLIKELY]
-    shaken = _shaken(best) if len(counting) > 1 else None
+    shaken = _effect_of_drive_noise(best) if len(counting) > 1 else None
 
     def told(one: Found) -> GreyBoxFit:
         problem, point, bounds = one
         counts, asked = one in counting, one is best or one is swinging
-        return concluded(
+        return fit_at_solution(
             problem, point, least=bounds[0], disturbed=counts, asked=asked, steps=steps, moved_by_noise=shaken
         )
 
-    return each(told, done)
+    return map_cases(told, done)
 
 
 def _is_noise(one: Found) -> bool:
@@ -230,20 +232,20 @@ def _is_noise(one: Found) -> bool:
     return 2.0 * point.cost < largest_chi_square(problem.blocks, 1.0) * problem.blocks
 
 
-def _shaken(one: Found) -> Array | None:
+def _effect_of_drive_noise(one: Found) -> Array | None:
     """Return the effect of drive noise on the residuals of the likeliest balance, which the others share."""
     log = one[0].log
     noisy = any(spread > 0.0 for spread in log.drive_std) and not log.passes_on
-    return moved_by_drives(one[0], one[1].theta) if noisy else None
+    return effect_of_drive_noise(one[0], one[1].theta) if noisy else None
 
 
-def _finished(
+def _final_optimum(
     one: RoughOptimum,
     log: GreyBoxLog,
     steps: IntArray,
     wanted: float = np.inf,
     *,
-    led: Mapping[str, float] = NOWHERE,
+    led: Mapping[str, float] = NO_VALUES,
     bent: bool,
 ) -> Found:
     """Return the optimum with short model steps (``steps``); a form that explains its log is completed as well.
@@ -253,38 +255,38 @@ def _finished(
     flow are orifices (``bent``).
     """
     one = replace(one, problem=one.problem.on(log.stepped(steps)))
-    if not _plain(one):
+    if not _explains_to_last_digits(one):
         settled = descend(one.problem.at, one.point.theta, SETTLING, one.bounds, wanted=wanted)
-        if settled.cost < CLOSE * one.problem.blocks:
+        if settled.cost < CLOSE_COST * one.problem.blocks:
             settled = descend(one.problem.at, settled.theta, FINISHING, one.bounds, wanted=wanted)
         one = replace(one, point=settled)
-        if not _plain(one):
+        if not _explains_to_last_digits(one):
             return one.problem, one.point, one.bounds
-    problem, theta, bounds = _completed(one, log, led, bent=bent)
+    problem, theta, bounds = _completed_problem(one, log, led, bent=bent)
     problem.near = NEAR if steps is not log.steps else 0.0
     return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
 
 
-def _told_ended(done: Sequence[Found], log: GreyBoxLog) -> list[Found]:
+def _ended_where_reported(done: Sequence[Found], log: GreyBoxLog) -> list[Found]:
     """Return minima; those that are reported have short model steps throughout."""
     done = list(done)
-    while sparing := [one for one in _told_of(done) if one[0].log.steps is not log.steps]:
-        done = each(lambda one, ending=sparing: _ended(one, log) if one in ending else one, done)
+    while sparing := [one for one in _reported_minima(done) if one[0].log.steps is not log.steps]:
+        done = map_cases(lambda one, ending=sparing: _end_with_short_steps(one, log) if one in ending else one, done)
     return done
 
 
-def _ended(one: Found, log: GreyBoxLog) -> Found:
+def _end_with_short_steps(one: Found, log: GreyBoxLog) -> Found:
     """Return the end of a search whose last steps have short model steps throughout."""
     problem, point, bounds = one
     ending = with_steps(problem, log.steps)
-    evaluations = FINISHING if explained(problem, point) else 1
+    evaluations = FINISHING if explains_log(problem, point) else 1
     return ending, descend(ending.at, point.theta, evaluations, bounds), bounds
 
 
-def _valves(lead: Found) -> Mapping[str, float]:
+def _valve_values(lead: Found) -> Mapping[str, float]:
     """Return valves and accumulator of a form that explains its log [SI]; nothing otherwise."""
-    if _held(lead[0]) or not explained(lead[0], lead[1]):
-        return NOWHERE
+    if _holds_volumes(lead[0]) or not explains_log(lead[0], lead[1]):
+        return NO_VALUES
     values = lead[0].model.values(lead[1].theta)
     return {name: values[name] for name in VALVES if name in values}
 
@@ -313,29 +315,29 @@ def _with_less_drain(one: Found) -> list[Found]:
     return [one, (problem, other, bounds)] if apart and other.cost < point.cost + UNLIKELY else [one]
 
 
-def _told_of(done: Sequence[Found]) -> tuple[Found, Found]:
+def _reported_minima(done: Sequence[Found]) -> tuple[Found, Found]:
     """Return the likeliest minimum, and the likeliest with varying volumes."""
-    return min(done, key=_cost), min((one for one in done if not _held(one[0])), key=_cost)
+    return min(done, key=_cost), min((one for one in done if not _holds_volumes(one[0])), key=_cost)
 
 
 def _cost(one: Found) -> float:
     return one[1].cost
 
 
-def _held(problem: Problem) -> bool:
+def _holds_volumes(problem: Problem) -> bool:
     return problem.model.rates is HELD_FLOW_FORM.rates
 
 
-def _plain(one: RoughOptimum) -> bool:
+def _explains_to_last_digits(one: RoughOptimum) -> bool:
     """Return whether a form explains a log so well that the last digits matter.
 
     Otherwise cracking valves would absorb and hide another effect: an encoder homed at the end stop, or a worn pump.
     Held chambers belong to the lumped plant, which has no such valves.
     """
-    return not _held(one.problem) and explained(one.problem, one.point)
+    return not _holds_volumes(one.problem) and explains_log(one.problem, one.point)
 
 
-def _completed(
+def _completed_problem(
     one: RoughOptimum, log: GreyBoxLog, led: Mapping[str, float], *, bent: bool
 ) -> tuple[FreedProblem, Array, tuple[Array, Array]]:
     """Return the problem with parameters that matter to the last digits only, where its search starts, and bounds."""

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.fits.flow.log_traits import LogTraits
-from estimation.fits.flow.other_minimum import FINISHING, WITHIN
+from estimation.fits.flow.other_minimum import FINISHING, VALLEY_RADIUS
 from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
-from estimation.fits.hypothesis_search.explain import WORTH
+from estimation.fits.hypothesis_search.explain import REQUIRED_GAIN
 from estimation.fits.hypothesis_search.not_excluded import blocked_note, unseen_note
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.models.completed_flow import CRACKS
@@ -19,7 +19,7 @@ from plant.notes import Note
 
 MAKEUP = "makeup_conductance"
 
-BEHIND = 3.0
+LEAST_LEAD = 3.0
 """Log-likelihood by which held chambers must be behind [dimensionless]: odds of twenty to one. A lumped plant has no
 valves."""
 
@@ -48,14 +48,14 @@ def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
     if traits.loaded or traits.moving or not (unfelt and plain.explains(best)):
         return ()
     held = [fit.cost for fit in plain.fits if fit.model.rates is HELD_FLOW_FORM.rates]
-    if min(held, default=np.inf) < best.cost + BEHIND:
+    if min(held, default=np.inf) < best.cost + LEAST_LEAD:
         return ()
     narrowest = min(p.makeup_conductance, p.rated_flow / p.accumulator_pressure)
-    sound = best.values[MAKEUP] >= narrowest or cost_of_sound_ones(plain, best, narrowest) < WORTH
+    sound = best.values[MAKEUP] >= narrowest or cost_of_sound_valves(plain, best, narrowest) < REQUIRED_GAIN
     return (unseen_note("A or B") if sound else blocked_note("A or B"),)
 
 
-def cost_of_sound_ones(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> float:
+def cost_of_sound_valves(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> float:
     """Return how much worse valves of at least a given width fit, searched from the fit and from the rig file.
 
     Parameters
@@ -80,6 +80,6 @@ def cost_of_sound_ones(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> 
             begun = problem.model.theta({**values, MAKEUP: conductance})
             lower, upper = flow_bounds(problem.model, [begun], problem.log)
             lower[place], upper[place] = np.log(narrowest), max(np.log(narrowest), upper[place])
-            ended = descend(problem.at, np.clip(begun, lower, upper), FINISHING, (lower, upper), radius=WITHIN)
+            ended = descend(problem.at, np.clip(begun, lower, upper), FINISHING, (lower, upper), radius=VALLEY_RADIUS)
             costs.append(ended.cost)
     return min(costs) - problem.at(problem.model.theta(best.values)).cost

@@ -69,21 +69,21 @@ class Slip(NamedTuple):
     other: str = ""
 
 
-def _turned(channel: str) -> Slip:
+def _sign_slip(channel: str) -> Slip:
     return Slip(channel, f"a wrong sign of {channel} (-UNIT)", -1.0)
 
 
-def _units(channel: str, units: Mapping[float, str]) -> list[Slip]:
+def _unit_slips(channel: str, units: Mapping[float, str]) -> list[Slip]:
     return [Slip(channel, said, times) for times, said in units.items()]
 
 
 SLIPS: Sequence[Slip] = (
-    _turned(SPEED),
-    *_units(SPEED, SPEEDS),
-    _turned(PRESSURE),
-    *_units(PRESSURE, PRESSURES),
-    _turned(POSITION),
-    *_units(POSITION, POSITIONS),
+    _sign_slip(SPEED),
+    *_unit_slips(SPEED, SPEEDS),
+    _sign_slip(PRESSURE),
+    *_unit_slips(PRESSURE, PRESSURES),
+    _sign_slip(POSITION),
+    *_unit_slips(POSITION, POSITIONS),
     Slip(POSITION, f"{VELOCITY} in the place of {POSITION}", 0.0, VELOCITY),
 )
 """Slips that are tried."""
@@ -99,7 +99,7 @@ PAIRS: Sequence[tuple[Slip, Slip]] = tuple(
 """Pairs of slips that are tried. Two wrong signs equal one wrong sign of the third channel."""
 
 
-def set_right(slips: Sequence[Slip], logged: Logged) -> Logged | None:
+def with_slips_corrected(slips: Sequence[Slip], logged: Logged) -> Logged | None:
     """Return a log with slips corrected.
 
     Parameters

@@ -1,4 +1,4 @@
-"""`swept_evenly(log, ...)`: positions whose straight lines sweep the volume that the piston sweeps; `with_first_fit`.
+"""`with_sweep_correction(log, ...)`: positions whose straight lines sweep what the piston sweeps; `with_first_fit`.
 
 See decision 313.
 """
@@ -8,22 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.fits.flow.log import carried
-from estimation.fits.flow.pumped import pumped_evenly_at
+from estimation.fits.flow.log import with_random_walk
+from estimation.fits.flow.pumped import with_pump_correction_at
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.models.flow import FLOW_FORM
 from plant.eha.model import EhaParameters
 
-FELT = 2e-4
+LEAST_SWEEP_ERROR = 2e-4
 """Relative error of bulk modulus due to straight lines, from which they are corrected [fraction]: as large as other
 effects that the balance omits."""
 
-MOST = 0.15
+MOST_SWEEP_ERROR = 0.15
 """The same up to which the first-order correction holds [fraction]; judged: the sample time is then 1.3 times the time
 in which a chamber leaks empty."""
 
 
-def swept_evenly(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:
+def with_sweep_correction(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:
     """Return a log whose positions are corrected for what a chamber leaks between samples beyond the straight lines.
 
     Between samples the flow form moves the piston at constant velocity, and the motor on a straight line. A piston that
@@ -48,7 +48,7 @@ def swept_evenly(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str
     """
     leaks = values["bulk_modulus"] * values["leakage_coefficient"] / parameters.chamber_volume
     off = (log.sample_time * leaks) ** 2 / 12.0
-    if not FELT < off < MOST:
+    if not LEAST_SWEEP_ERROR < off < MOST_SWEEP_ERROR:
         return log
     position = FLOW_FORM.drives.index("position_m")
     drives = log.drives.copy()
@@ -70,7 +70,7 @@ def with_first_fit(
     values : Mapping[str, float]
         Parameters of the first fit [SI].
     stiffest : float
-        As in `carried` [Pa].
+        As in `with_random_walk` [Pa].
     """
-    log = pumped_evenly_at(log, parameters, values)
-    return swept_evenly(carried(log, parameters, values, stiffest), parameters, values)
+    log = with_pump_correction_at(log, parameters, values)
+    return with_sweep_correction(with_random_walk(log, parameters, values, stiffest), parameters, values)

@@ -1,4 +1,4 @@
-"""`bound_told`, `ratio_doubt`: how well bulk modulus is known if the log determines the volume of the chambers.
+"""`explained_bound`, `ratio_doubt`: how well bulk modulus is known if the log determines the volume of the chambers.
 
 A piston at rest determines only volume over bulk modulus. A piston that travels changes its chambers by a share that
 depends on their volume, so the log determines both. A common scale of all flows and chamber volumes then leaves bulk
@@ -12,16 +12,16 @@ from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import VOLUME
 from estimation.fits.hypothesis_search.explanation import Explanation
 
-RATIO = ("pump_displacement", "piston_area")
+RATIO_ENTRIES = ("pump_displacement", "piston_area")
 """Entries whose ratio scales all flows: bulk modulus responds to both alike, in opposite directions."""
 
 
-def is_told(strange: Explanation | None) -> bool:
+def determines_volume(strange: Explanation | None) -> bool:
     """Return whether an explanation of a log determines the volume of the chambers."""
     return strange is not None and VOLUME.name in strange.names
 
 
-def bound_told(strange: Explanation, plain: GreyBoxFit) -> float:
+def explained_bound(strange: Explanation, plain: GreyBoxFit) -> float:
     """Return the relative Cramér-Rao bound of bulk modulus under an explanation.
 
     Parameters
@@ -38,7 +38,7 @@ def bound_told(strange: Explanation, plain: GreyBoxFit) -> float:
         is no less observable [fraction].
     """
     bound, known = (one.std["bulk_modulus"] / one.values["bulk_modulus"] for one in (strange.fit, plain))
-    return min(bound, known) if is_told(strange) else bound
+    return min(bound, known) if determines_volume(strange) else bound
 
 
 def ratio_doubt(strange: Explanation, uncertainties: Mapping[str, float]) -> float:
@@ -56,9 +56,9 @@ def ratio_doubt(strange: Explanation, uncertainties: Mapping[str, float]) -> flo
     float
         Relative; 0 if the volume is not determined, since the total interval then includes all of it [fraction].
     """
-    slopes = [strange.fit.rig_slopes[name]["bulk_modulus"] for name in RATIO if name in strange.fit.rig_slopes]
-    if not is_told(strange) or not slopes:
+    slopes = [strange.fit.rig_slopes[name]["bulk_modulus"] for name in RATIO_ENTRIES if name in strange.fit.rig_slopes]
+    if not determines_volume(strange) or not slopes:
         return 0.0
     response = max(map(abs, slopes)) / strange.fit.values["bulk_modulus"]
-    doubt = math.hypot(*(uncertainties.get(name, 0.0) for name in RATIO))
+    doubt = math.hypot(*(uncertainties.get(name, 0.0) for name in RATIO_ENTRIES))
     return response * min(strange.delivery_open.deviation or 0.0, doubt)

@@ -86,7 +86,7 @@ def block_means(values: Array, block: int) -> Array:
     return values[:whole].reshape(-1, block, *values.shape[1:]).mean(axis=1)
 
 
-def averaged(log: GreyBoxLog, longest_step: float, block: int | None = None) -> GreyBoxLog:
+def averaged_log(log: GreyBoxLog, longest_step: float, block: int | None = None) -> GreyBoxLog:
     """Return a log whose drives and outputs are means over blocks.
 
     Inputs and outputs are filtered alike, which does not change a linear model. The first sample is not averaged, since

@@ -3,12 +3,12 @@
 LARGEST_CHI_SQUARE = 1.2
 """Mean squared normalised residual above which a model does not explain its log [dimensionless]."""
 
-MORE_THAN_CHANCE = 7.7
+LARGEST_EXCESS_BY_CHANCE = 7.7
 """Excess of the mean squared residual over one, times the root of the number of samples, that one log in a thousand has
 by chance [dimensionless]. The variance of white noise over what `measurement_variances` finds scatters by 2.45 over
 that root. It is skewed: with 400 samples four logs in a thousand exceed the limit."""
 
-ALIKE_BY_CHANCE = 3.3
+LARGEST_CORRELATION_BY_CHANCE = 3.3
 """The same for the correlation of neighbouring residuals, in either direction; that of white noise scatters by one over
 that root (Bartlett 1946) [dimensionless]."""
 
@@ -33,10 +33,10 @@ def largest_chi_square(samples: float, least: float = LARGEST_CHI_SQUARE) -> flo
     >>> [round(largest_chi_square(samples), 2) for samples in (400, 1_482, 20_000)]
     [1.39, 1.2, 1.2]
     """
-    return max(least, 1.0 + MORE_THAN_CHANCE / samples**0.5)
+    return max(least, 1.0 + LARGEST_EXCESS_BY_CHANCE / samples**0.5)
 
 
-def alike_by_chance(samples: float) -> float:
+def correlation_by_chance(samples: float) -> float:
     """Return the lag-one correlation of white residuals that one log in a thousand exceeds by chance.
 
     Parameters
@@ -51,7 +51,7 @@ def alike_by_chance(samples: float) -> float:
 
     Examples
     --------
-    >>> [round(alike_by_chance(samples), 2) for samples in (900, 20_000)]
+    >>> [round(correlation_by_chance(samples), 2) for samples in (900, 20_000)]
     [0.11, 0.02]
     """
-    return ALIKE_BY_CHANCE / samples**0.5
+    return LARGEST_CORRELATION_BY_CHANCE / samples**0.5

@@ -25,10 +25,10 @@ LEAST_GAIN = 1e-3
 """Half the sum of squares that a further step must promise: a smaller gain moves no unknown by a twentieth of its
 deviation."""
 
-SHORTEST = 1e-5
+SHORTEST_STEP = 1e-5
 """Length of a failed step after which the search ends [dimensionless]: the cost is rougher than its slopes say."""
 
-SHORTENED = 12
+MOST_SHORTENINGS = 12
 """Most often that a step which promises a loss is shortened."""
 
 POOR, GOOD = 0.25, 0.75
@@ -181,7 +181,7 @@ def descend_together(
     return [ended[i] for i in range(len(searches))]
 
 
-def remembered(at: Callable[[Array], Point]) -> Callable[[Array], Point]:
+def cached_cost(at: Callable[[Array], Point]) -> Callable[[Array], Point]:
     """Return a cost function that is computed once per point: searches from the same starts share their first points.
 
     Parameters
@@ -243,14 +243,14 @@ def search(
     gained = np.inf
     for left in range(evaluations - 1, 0, -1):
         curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
-        step, promised, radius = _downhill(best, curvature, radius, bounds)
+        step, promised, radius = _best_step(best, curvature, radius, bounds)
         if promised < max(least_gain, least_share * best.cost):
             break
         if not worth(best, best.cost - left * max(promised, gained)):
             break
         tried = yield best.theta + step
         gain, length = (best.cost - tried.cost) / promised, _length(step)
-        if gain <= 0.0 and length < SHORTEST:
+        if gain <= 0.0 and length < SHORTEST_STEP:
             break
         if gain < POOR:
             radius = POOR * length
@@ -262,12 +262,14 @@ def search(
     return best
 
 
-def _downhill(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> tuple[Array, float, float]:
+def _best_step(
+    point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]
+) -> tuple[Array, float, float]:
     """Return the best step, by how much it lowers the quadratic model, and its radius.
 
     A bound may turn a long step uphill; a shorter one then goes down.
     """
-    for _ in range(SHORTENED):
+    for _ in range(MOST_SHORTENINGS):
         step = _step(point, curvature, radius, bounds)
         promised = float(-point.gradient @ step - 0.5 * step @ curvature @ step)
         if promised >= 0.0:
@@ -279,7 +281,7 @@ def _downhill(point: Point, curvature: Array, radius: float, bounds: tuple[Array
 def _step(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> Array:
     """Return the best step by the quadratic model that ends within the radius and within bounds."""
     lower, upper = (bound - point.theta for bound in bounds)
-    step = _shortened(curvature, point.gradient, radius)
+    step = _shortened_step(curvature, point.gradient, radius)
     outside = (step < lower) | (step > upper)
     if not outside.any():
         return step
@@ -287,7 +289,7 @@ def _step(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Ar
     while free.any():
         rows, held = np.flatnonzero(free)[:, None], np.flatnonzero(~free)
         gradient = point.gradient[free] + curvature[rows, held] @ step[held]
-        step[free] = _shortened(curvature[rows, rows.T], gradient, radius)
+        step[free] = _shortened_step(curvature[rows, rows.T], gradient, radius)
         outside = (step < lower) | (step > upper)
         if not outside.any():
             break
@@ -296,7 +298,7 @@ def _step(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Ar
     return step
 
 
-def _shortened(curvature: Array, gradient: Array, radius: float) -> Array:
+def _shortened_step(curvature: Array, gradient: Array, radius: float) -> Array:
     """Return ``-(C + shift)^-1 g``, with the least shift that makes it no longer than the radius."""
     values, vectors = np.linalg.eigh(curvature)
     values, along = np.maximum(values, 0.0) + RIDGE, vectors.T @ gradient

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.drive_noise import drive_covariance
-from estimation.fits.greybox.intersample_doubt import opened, vanished
+from estimation.fits.greybox.intersample_doubt import covariance_of_turns, slopes_of_vanished
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.sign_constraints import sign_constrained_covariance
 from plant.arrays import Array
@@ -69,7 +69,7 @@ class Information:
         return self.bread @ (self.slopes.T @ shift.ravel())
 
 
-def believed(problem: Problem) -> Array:
+def prior_precision(problem: Problem) -> Array:
     """Return one over the prior variance of each coordinate that counts in deviations.
 
     Returns
@@ -103,11 +103,11 @@ def information(
         Whether to warn if unknowns are not separately determined.
     """
     fitted = slopes if len(felt) == len(theta) else slopes[:, felt]
-    left_over, prior, used = errors.ravel(), believed(problem)[felt], int(np.count_nonzero(errors))
+    left_over, prior, used = errors.ravel(), prior_precision(problem)[felt], int(np.count_nonzero(errors))
     lags = automatic_lags(left_over)
     fitted_bread, spread = least_squares_covariance(fitted, left_over, used, lags, prior, warned=warned)
     beside, bread = fitted, fitted_bread
-    if problem.log.course is not None and (gone := vanished(problem, theta, errors, felt)):
+    if problem.log.course is not None and (gone := slopes_of_vanished(problem, theta, errors, felt)):
         beside, prior = np.column_stack([fitted, *gone]), np.append(prior, np.zeros(len(gone)))
         bread, spread = least_squares_covariance(beside, left_over, used, lags, prior, warned=warned)
     return Information(felt, errors, fitted, fitted_bread, beside, bread, spread)
@@ -157,7 +157,7 @@ def covariance_of(
         covariance = covariance + drive_covariance(problem, theta, bread, slopes, undisturbed, moved)
     if problem.log.course is not None and disturbed:  # with few turns the windowed estimate is poor
         covariance = covariance + np.diag(np.maximum(np.diag(bread - spread), 0.0))
-        covariance = covariance + opened(problem, theta, told.errors, bread, slopes)
+        covariance = covariance + covariance_of_turns(problem, theta, told.errors, bread, slopes)
     # the windowed estimate need not be positive; if it is not, the unknown is undetermined
     covariance[~(np.diag(spread) > 0.0), ~(np.diag(spread) > 0.0)] = np.inf
     return covariance[: len(felt), : len(felt)]

@@ -41,7 +41,7 @@ def drive_covariance(
     undisturbed : ndarray, shape (outputs, blocks), optional
         The normalised residuals there with one model step per sample; computed if not given [dimensionless].
     moved : ndarray, shape (outputs * blocks, draws), optional
-        Effect of drive noise on the residuals, see `moved_by_drives`; computed if not given [dimensionless].
+        Effect of drive noise on the residuals, see `effect_of_drive_noise`; computed if not given [dimensionless].
 
     Returns
     -------
@@ -50,12 +50,12 @@ def drive_covariance(
     """
     if not any(spread > 0.0 for spread in problem.log.drive_std):
         return 0.0
-    moved = moved_by_drives(problem, theta, undisturbed) if moved is None else moved
+    moved = effect_of_drive_noise(problem, theta, undisturbed) if moved is None else moved
     answers = bread @ (slopes.T @ moved)
     return np.asarray(answers @ answers.T / DRAWS, dtype=np.float64)
 
 
-def moved_by_drives(problem: Problem, theta: Array, undisturbed: Array | None = None) -> Array:
+def effect_of_drive_noise(problem: Problem, theta: Array, undisturbed: Array | None = None) -> Array:
     """Return the effect of random draws of drive noise on the residuals of a log.
 
     All balances of a log integrate the pumped flow, so the draws of one serve for the others.

@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 from estimation.arrays import IntArray
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.deviations import Information, believed, covariance_of, information
-from estimation.fits.greybox.lateness import changes_beside, lateness, left_by
+from estimation.fits.greybox.deviations import Information, covariance_of, information, prior_precision
+from estimation.fits.greybox.lateness import lateness, residuals_and_changes, unabsorbed_part
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.noise_shift import noise_shift
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shown_play
 from estimation.fits.greybox.problem import Problem, search_bounds
 from estimation.fits.greybox.pump_ripple import NO_OFFSET, ShownOffset, ShownRipple, shown_ripple
-from estimation.fits.greybox.rig_response import answers_by_rig
-from estimation.fits.greybox.small_pump_ripple import NOT_MOVED, small_pump_ripple
+from estimation.fits.greybox.rig_response import responses_to_rig
+from estimation.fits.greybox.small_pump_ripple import NO_SHIFTS, small_pump_ripple
 from estimation.fits.greybox.spared_steps import with_steps
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
-from plant.spare_processors import each
+from plant.spare_processors import map_cases
 
 LEAST_EFFECT = 1.0
 """Standard deviations of one sample by which a unit change of an unknown must move the prediction; otherwise it has no
@@ -34,7 +34,7 @@ effect."""
 SCREENED_SAMPLES = 200_000
 """Length above which starts are compared on the beginning of a log."""
 
-LENGTHENED = 8
+BEGINNING_RATIO = 8
 """Ratio of successive beginnings of a long log on which the fit approaches the optimum."""
 
 NEAR_ENOUGH = 0.01
@@ -84,7 +84,7 @@ class GreyBoxFit:
     seen : float
         Number of residuals of the first output; infinite if they are not counted [count].
     steps : ndarray of int, shape (n,), optional
-        Fewer model steps than the log's that are equally exact near the solution, see `sparing_steps` [count].
+        Fewer model steps than the log's that are equally exact near the solution, see `steps_where_needed` [count].
     """
 
     model: GreyBoxModel
@@ -101,8 +101,8 @@ class GreyBoxFit:
     covariance: Array = field(default_factory=lambda: np.empty((0, 0)))
     teeth: Mapping[int, ShownRipple] = field(default_factory=dict[int, ShownRipple])
     speed_offset: ShownOffset = NO_OFFSET
-    small_teeth: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
-    noise_shift: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
+    small_teeth: tuple[Mapping[str, float], Mapping[str, float]] = NO_SHIFTS
+    noise_shift: tuple[Mapping[str, float], Mapping[str, float]] = NO_SHIFTS
     seen: float = np.inf
     steps: IntArray | None = None
 
@@ -158,11 +158,11 @@ def fit_greybox(
     """
     problem, guesses = Problem(model, log), [model.theta(start) for start in starts]
     bounds = search_bounds(model, guesses, {})
-    near = roughly(problem, guesses, search, bounds)
-    return concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds))
+    near = coarse_optimum(problem, guesses, search, bounds)
+    return fit_at_solution(problem, descend(problem.at, near.theta, search.evaluations, bounds))
 
 
-def roughly(
+def coarse_optimum(
     problem: Problem,
     guesses: Sequence[Array],
     search: Search,
@@ -206,23 +206,23 @@ def roughly(
         return descend(whole.at, guess, evaluations, bounds, search.near_enough, wanted=wanted)
 
     if len(guesses) > 1:
-        screened = each(lambda guess: descended(guess, search.screened, search.screening), guesses)
+        screened = map_cases(lambda guess: descended(guess, search.screened, search.screening), guesses)
         likely = sorted(screened, key=_cost)[: search.finalists]
-        if hopeful and not explained(problem.on(log.beginning(search.screened)), likely[0]):
+        if hopeful and not explains_log(problem.on(log.beginning(search.screened)), likely[0]):
             return replace(likely[0], cost=np.inf)
         guesses = [point.theta for point in likely]
     points: list[Point] = []
     for guess in guesses:
-        length = LENGTHENED * search.screened
+        length = BEGINNING_RATIO * search.screened
         while length < len(log.measured):  # ever longer beginnings, so that the whole log takes few steps
-            guess, length = descended(guess, length, search.evaluations).theta, LENGTHENED * length
+            guess, length = descended(guess, length, search.evaluations).theta, BEGINNING_RATIO * length
         points.append(descended(guess, len(log.measured), search.evaluations))
-        if explained(whole, points[-1]):
+        if explains_log(whole, points[-1]):
             break
     return min(points, key=_cost)
 
 
-def explained(problem: Problem, point: Point) -> bool:
+def explains_log(problem: Problem, point: Point) -> bool:
     """Return whether a point of the search explains a log so well that no better one is needed.
 
     Parameters
@@ -244,7 +244,7 @@ def _cost(point: Point) -> float:
     return point.cost
 
 
-def concluded(
+def fit_at_solution(
     problem: Problem,
     point: Point,
     *,
@@ -279,15 +279,15 @@ def concluded(
     model, theta = problem.model, point.theta
     errors, all_slopes = problem.linearised(theta)
     effects = np.einsum("ij,ij->j", all_slopes, all_slopes)
-    felt = np.flatnonzero(effects > np.where(believed(problem) > 0.0, 0.0, LEAST_EFFECT**2))
+    felt = np.flatnonzero(effects > np.where(prior_precision(problem) > 0.0, 0.0, LEAST_EFFECT**2))
     whole, rig, late = np.diag(np.full(len(theta), np.inf)), dict[str, Array](), dict[str, tuple[float, float]]()
-    play, teeth, offset, by_noise = NO_PLAY, dict[int, ShownRipple](), NO_OFFSET, NOT_MOVED
+    play, teeth, offset, by_noise = NO_PLAY, dict[int, ShownRipple](), NO_OFFSET, NO_SHIFTS
     used, names = int(np.count_nonzero(errors)), [model.unknowns[place] for place in felt]
     if len(felt) and used > len(theta):
         known_of = information(problem, theta, errors, all_slopes, felt, warned=warned)
         left_over, slopes, bread = known_of.left_over, known_of.fitted_slopes, known_of.fitted_bread
         told = disturbed and asked
-        here, moved = changes_beside(problem, theta) if told else (None, [])
+        here, moved = residuals_and_changes(problem, theta) if told else (None, [])
         covariance = covariance_of(
             problem, point, known_of, least=least, disturbed=disturbed, undisturbed=here, moved=moved_by_noise
         )
@@ -300,7 +300,7 @@ def concluded(
         whole[np.ix_(felt, felt)] = covariance
         if told:
             by_noise = noise_shift(problem, theta, known_of)
-            rig = dict(answers_by_rig(with_steps(problem, steps), theta, known_of))
+            rig = dict(responses_to_rig(with_steps(problem, steps), theta, known_of))
             late, play = _late_and_play(problem, known_of, moved, effects[felt] > LEAST_EFFECT**2)
     # infinite for unknowns that this log does not determine
     noise = np.where(effects > LEAST_EFFECT**2, np.sqrt(np.diag(whole)), np.inf)
@@ -337,7 +337,7 @@ def _late_and_play(
 ) -> tuple[dict[str, tuple[float, float]], ShownPlay]:
     """Return the apparent delays of drives, and what the residuals show of an encoder's play."""
     timed, left_over, at_play = problem.log.timed, known_of.left_over, moved[len(problem.log.timed) :]
-    left = left_by(known_of.fitted_slopes, known_of.fitted_bread, told)
+    left = unabsorbed_part(known_of.fitted_slopes, known_of.fitted_bread, told)
     names = [problem.model.unknowns[place] for place in known_of.felt]
     late = dict(lateness(timed, moved, left_over, left))
     return late, shown_play(at_play, left_over, left, lambda one: zip(names, known_of.response(one), strict=False))

@@ -17,19 +17,19 @@ from estimation.fits.greybox.kernel import compile_kernel
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.normal_loops import fill_differences
 from estimation.fits.greybox.nudges import nudge_for
-from estimation.fits.greybox.problem import OUTLIER, Problem, weighed
+from estimation.fits.greybox.problem import OUTLIER, Problem, quadratic
 from estimation.fits.greybox.ridge import Ridge
-from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side, lanes_for
+from estimation.fits.greybox.side_by_side import LANES, MOST_LANES, ResidualsRun, compile_side_by_side, lanes_for
 from estimation.fits.greybox.work_limit import spend
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
-from plant.spare_processors import each
+from plant.spare_processors import map_cases
 
 MOST_SIDE_BY_SIDE = 200_000
 """Longest log whose drives are copied for each run side by side [samples]: some 30 MB."""
 
-MOST_REMEMBERED = 100_000
+MOST_BLOCKS_CACHED = 100_000
 """Blocks of the longest log whose last slopes are kept [count]: some 15 MB."""
 
 
@@ -65,10 +65,10 @@ class FreedProblem(Problem):
         if not log.gaps.size:  # following the uncertainty of gaps doubles the cost
             model = replace(model, jump=())
         model = replace(model, stiff=log.stiff)
-        super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_by_itself, model))
+        super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_run_alone, model))
         self._bare, self._sizes, self._ridge = model, linear, ridge
         self._nudge = nudge_for(log, model, free)
-        self._most = LANES if model.jump else MANY  # with gaps, `MANY` take twice as long as `LANES`
+        self._most = LANES if model.jump else MOST_LANES  # with gaps, `MOST_LANES` take twice as long as `LANES`
         self._last: list[tuple[Array, Array, Array, Array]] = []
         self._columns = [parameter_names(model.parameters).index(name) for name in free]
         self._kernels: dict[int, ResidualsRun] = {}
@@ -115,7 +115,7 @@ class FreedProblem(Problem):
         rows = np.vstack([self._rows(self._nudged(theta), self.log.parameters) for theta in thetas])
         found = self._residuals(rows, None, self._variances(thetas[0]))[..., : len(rows)]
         parts = np.split(found, len(thetas), axis=-1)
-        return [self._point(at, *weighed(*self._slopes(part, at))) for at, part in zip(thetas, parts, strict=True)]
+        return [self._point(at, *quadratic(*self._slopes(part, at))) for at, part in zip(thetas, parts, strict=True)]
 
     def at_beside(self, theta: Array, known: Mapping[str, Array]) -> Point:
         """Return the cost and slopes at a point at which the slopes of some unknowns are known from a fit.
@@ -135,7 +135,7 @@ class FreedProblem(Problem):
         names = self.model.unknowns
         asked = [place for place, name in enumerate(names) if name not in known]
         rows = self._rows(self._nudged(theta)[[0, *(1 + place for place in asked)]], self.log.parameters)
-        # padded to `MANY`, which the other runs need: compiling a smaller kernel takes longer than this run
+        # padded to `MOST_LANES`, which the other runs need: compiling a smaller kernel takes longer than this run
         rows = np.concatenate([rows, np.repeat(rows[-1:], max(0, LANES + 1 - len(rows)), axis=0)])
         here, columns = self._differences(self._residuals(rows, None, self._variances(theta)), len(asked))
         slopes = np.empty((*here.shape, len(names)))
@@ -145,9 +145,9 @@ class FreedProblem(Problem):
                 slopes[..., place] = known[name].reshape(here.shape)
         if self._placed is not None and names[self._placed.nudged] not in known:
             self._placed.turn_back(slopes, theta)
-        return self._point(theta, *weighed(here, slopes))
+        return self._point(theta, *quadratic(here, slopes))
 
-    def costs(self, thetas: Sequence[Array], lanes: int = MANY) -> Array:
+    def costs(self, thetas: Sequence[Array], lanes: int = MOST_LANES) -> Array:
         """Return the cost at several points, without slopes: eight points take as long as one with its slopes.
 
         Parameters
@@ -155,7 +155,7 @@ class FreedProblem(Problem):
         thetas : sequence of ndarray, shape (unknowns,)
             Fitted coordinates [dimensionless].
         lanes : int
-            Points side by side: `MANY`, or `LANES` if a search already uses that kernel and there are few points.
+            Points side by side: `MOST_LANES`, or `LANES` if a search already uses that kernel and there are few points.
 
         Returns
         -------
@@ -206,7 +206,7 @@ class FreedProblem(Problem):
             yield from super().disturbed(theta, drives)
             return
         waiting = iter(drives)
-        while some := list(islice(waiting, MANY)):
+        while some := list(islice(waiting, MOST_LANES)):
             lanes = lanes_for(len(some))
             found = self.disturbed_together(theta, np.stack([*some, *some[-1:] * (lanes - len(some))], axis=-1))
             yield from (found[..., i] for i in range(len(some)))
@@ -218,12 +218,12 @@ class FreedProblem(Problem):
         ----------
         theta : ndarray, shape (unknowns,)
             Fitted coordinates [dimensionless].
-        drives : ndarray, shape (n, channels, `LANES` or `MANY`)
+        drives : ndarray, shape (n, channels, `LANES` or `MOST_LANES`)
             The channels [SI].
 
         Returns
         -------
-        ndarray, shape (outputs, blocks, `LANES` or `MANY`)
+        ndarray, shape (outputs, blocks, `LANES` or `MOST_LANES`)
             As of `residuals`.
         """
         # the same number of lanes as the slopes use, so that no further kernel is compiled
@@ -248,20 +248,20 @@ class FreedProblem(Problem):
             errors[...] = self._residuals(self._rows(theta[None], parameters), drives, variance)[..., 0]
             return 0.0, np.zeros(0), np.zeros((0, 0))
         own = drives is None and parameters is self.log.parameters
-        here, columns = self._remembered(theta, variance) if own else (None, None)
+        here, columns = self._cached_slopes(theta, variance) if own else (None, None)
         if here is None or columns is None:
             found = self._residuals(self._rows(self._nudged(theta), parameters), drives, variance)
             here, columns = self._slopes(found, theta)
-            if own and len(here[0]) <= MOST_REMEMBERED:
+            if own and len(here[0]) <= MOST_BLOCKS_CACHED:
                 self._last = [*self._last[-1:], (theta.copy(), variance, here, columns)]
         if errors.size:
             errors[...] = here
         if slopes.size:
             slopes[...] = columns
             return 0.0, np.zeros(0), np.zeros((0, 0))
-        return weighed(here, columns)
+        return quadratic(here, columns)
 
-    def _remembered(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
+    def _cached_slopes(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
         """Return the residuals and slopes at one of the last two points, or so near to one that its slopes suffice."""
         last = [(theta - one[0], *one[2:]) for one in self._last if np.array_equal(one[1], variance)]
         for away, here, columns in last:
@@ -308,20 +308,20 @@ class FreedProblem(Problem):
         found = self._in_groups(rows, drives, variance)
         return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
 
-    def _in_groups(self, rows: Array, drives: Array | None, variance: Array, most: int = MANY) -> list[Array]:
+    def _in_groups(self, rows: Array, drives: Array | None, variance: Array, most: int = MOST_LANES) -> list[Array]:
         """Return the same in groups of rows, of which ``most`` run side by side."""
         if len(rows) == 1:  # a single run is cheaper without lanes
             spend(self.log)
-            return [self._alone(rows[0], drives, variance)[..., None]]
+            return [self._single_run(rows[0], drives, variance)[..., None]]
         most, shared = min(most, self._most), (self.log.drives if drives is None else drives)[..., None]
         groups = [rows[first : first + most] for first in range(0, len(rows), most)]
         spend(self.log, sum(lanes_for(len(some)) for some in groups))
-        return each(lambda some: self._side_by_side(some, shared, variance), groups)
+        return map_cases(lambda some: self._side_by_side(some, shared, variance), groups)
 
     def _side_by_side(self, rows: Array, drives: Array, variance: Array) -> Array:
-        """Return the normalised residuals of up to `MANY` runs, shape (outputs, blocks, lanes)."""
+        """Return the normalised residuals of up to `MOST_LANES` runs, shape (outputs, blocks, lanes)."""
         lanes = lanes_for(len(rows))
-        found = self._room(lanes)
+        found = self._empty_residuals(lanes)
         filled = rows if len(rows) == lanes else np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
         with np.errstate(all="ignore"):  # the search rejects a trial that diverges
             gaps = (self.log.gaps,) if self._bare.jump else ()
@@ -333,13 +333,13 @@ class FreedProblem(Problem):
             self._kernels[lanes] = compile_side_by_side(self._bare, lanes)
         return self._kernels[lanes]
 
-    def _alone(self, row: Array, drives: Array | None, variance: Array) -> Array:
-        errors = self._room()
+    def _single_run(self, row: Array, drives: Array | None, variance: Array) -> Array:
+        errors = self._empty_residuals()
         super()._run(np.empty(0), errors, np.empty((0, 0, 0)), drives, row, variance)
         return errors
 
 
-def _by_itself(model: GreyBoxModel, *given: Any) -> tuple[float, Array, Array]:
+def _run_alone(model: GreyBoxModel, *given: Any) -> tuple[float, Array, Array]:
     """Run a model alone: most problems only run it side by side, and need not load this kernel."""
     return compile_kernel(model)(*given)
 

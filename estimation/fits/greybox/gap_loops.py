@@ -11,7 +11,7 @@ import numpy as np
 
 from estimation.arrays import Array, IntArray
 from estimation.fits.greybox.side_by_side_loops import SideBySideKernel, close, drive
-from plant.solvers.fixed_step_loops import Operation, lay, share
+from plant.solvers.fixed_step_loops import Operation, place_rows, place_shared
 
 
 class GapKernel(SideBySideKernel, Protocol):
@@ -84,9 +84,9 @@ def residuals_across_gaps(
     slots, lanes = work.ctypes.data, kernel.LANES
     shown = (kernel.WIDTH + 2 * kernel.DRIVES) * lanes
     pace = shown + kernel.OUTPUTS * lanes
-    lay(kernel, work, pace + lanes, parameters.T, kernel.COLUMNS)
+    place_rows(kernel, work, pace + lanes, parameters.T, kernel.COLUMNS)
     jump, covariance = np.zeros(kernel.JUMPS * lanes), np.zeros((kernel.JUMPS * kernel.JUMPS, lanes))
-    share(kernel, jump, 0, kernel.JUMP)
+    place_shared(kernel, jump, 0, kernel.JUMP)
     reach, weight = np.zeros((kernel.JUMPS * kernel.JUMPS, lanes)), np.zeros(lanes)
     excess, level = np.zeros((kernel.OUTPUTS, lanes)), np.zeros((kernel.OUTPUTS, lanes))
     present, spread = np.zeros(kernel.OUTPUTS), np.zeros(kernel.OUTPUTS)
@@ -97,7 +97,7 @@ def residuals_across_gaps(
         if k > 0:
             if substeps[k] != steps:
                 steps = substeps[k]
-                share(kernel, work, pace, (sample_time / steps,))
+                place_shared(kernel, work, pace, (sample_time / steps,))
                 for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
                     kernel.settle_at(slots + first, 0.0)
             drive(kernel, work, drives, k, steps)

@@ -33,10 +33,10 @@ NUDGE = 1e-2
 
 
 IN_VOLUME = 0.5 * np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-"""Oil that the three of `ways` pump in a sample, per rise in the sample before, after, and two before; the motor's lead
-absorbs what is proportional to the sample's own rise."""
+"""Oil that the three of `speed_rises` pump in a sample, per rise in the sample before, after, and two before; the
+motor\'s lead absorbs what is proportional to the sample's own rise."""
 
-USUAL = 0.1
+USUAL_DEVIATION = 0.1
 """Prior standard deviation of each, over a sample time [fraction]: 0.02 to 0.15 for motors of 2 to 6 ms at 100 to 500
 Hz."""
 
@@ -60,7 +60,7 @@ class IntersampleDoubt:
     passing: float = 1.0
     kept: float = 1.0
 
-    def passes(self, variance: float) -> float:
+    def turn_count(self, variance: float) -> float:
         """Return the number of bends of motor speed that exceed the noise.
 
         Each turn affects the interval before it and the one after it.
@@ -96,7 +96,7 @@ class IntersampleDoubt:
         >>> IntersampleDoubt(np.array([0.0, 0.0, 3.0, 4.0]), 2.0).walk(4, 1).tolist()
         [0.0, 36.0, 64.0]
         """
-        begins = _begins(samples, block)[1:]
+        begins = _block_starts(samples, block)[1:]
         return np.add.reduceat((self.staying * self.turns[:samples]) ** 2, begins) if begins.size else np.zeros(1)
 
     def beside(self, samples: int, block: int) -> Array:
@@ -118,11 +118,11 @@ class IntersampleDoubt:
         [0.0, 36.0, 64.0, 64.0]
         """
         near = np.maximum(self.turns, np.append(self.turns[1:], 0.0))[:samples]
-        begins = _begins(samples, block)
+        begins = _block_starts(samples, block)
         return np.add.reduceat((self.passing * near) ** 2, begins) / np.diff(np.append(begins, samples)) ** 2
 
 
-def _begins(samples: int, block: int) -> IntArray:
+def _block_starts(samples: int, block: int) -> IntArray:
     return np.arange(0, samples, block)
 
 
@@ -145,7 +145,7 @@ def turns(log: GreyBoxLog) -> Array:
     return np.maximum(np.maximum(turn, np.append(0.0, turn[:-1])) - OWN_NOISE * log.drive_std[0], 0.0)
 
 
-def answered(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:
+def responses_to_speed(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:
     """Return the response of residuals to a change of motor speed.
 
     Parameters
@@ -168,7 +168,7 @@ def answered(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:
     return np.stack([(one - known).ravel() for one in moved], axis=-1) / NUDGE
 
 
-def ways(speed: Array) -> Array:
+def speed_rises(speed: Array) -> Array:
     """Return the rises of speed near each sample on which the oil pumped up to it may depend.
 
     Parameters
@@ -183,14 +183,14 @@ def ways(speed: Array) -> Array:
 
     Examples
     --------
-    >>> ways(np.array([0.0, 1.0, 3.0])).tolist()
+    >>> speed_rises(np.array([0.0, 1.0, 3.0])).tolist()
     [[0.0, 1.0, 2.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]]
     """
     rise = np.diff(speed, prepend=speed[0])
     return np.stack([rise, np.append(rise[1:], 0.0), np.append(0.0, rise[:-1])])
 
 
-def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: Array) -> Array:
+def covariance_of_turns(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: Array) -> Array:
     """Return the covariance of unknowns due to a motor that bends its course alike at each turn.
 
     Such a motor filters the samples with weights that are not fitted. The residuals determine these weights in part;
@@ -214,15 +214,15 @@ def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: 
     ndarray, shape (felt, felt)
         [dimensionless]
     """
-    columns = answered(problem.coarse, theta, ways(problem.log.drives[:, 0]))
+    columns = responses_to_speed(problem.coarse, theta, speed_rises(problem.log.drives[:, 0]))
     answers = bread @ (slopes.T @ columns)
     free = columns - slopes @ answers
-    spread = np.linalg.inv(free.T @ free + IN_VOLUME.T @ IN_VOLUME / USUAL**2)
+    spread = np.linalg.inv(free.T @ free + IN_VOLUME.T @ IN_VOLUME / USUAL_DEVIATION**2)
     weights = spread @ (free.T @ errors.ravel())
     return np.asarray(answers @ (spread + np.outer(weights, weights)) @ answers.T, dtype=np.float64)
 
 
-def vanished(problem: Problem, theta: Array, errors: Array, felt: NDArray[np.intp]) -> list[Array]:
+def slopes_of_vanished(problem: Problem, theta: Array, errors: Array, felt: NDArray[np.intp]) -> list[Array]:
     """Return the derivatives by unknowns that a fit has reduced to zero, where their logarithms have no effect.
 
     Without them, bulk modulus would seem as certain as if the pump were known to have no loss.

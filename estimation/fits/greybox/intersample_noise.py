@@ -1,33 +1,33 @@
-"""`likeliest(problem, theta, course)`: size of the intersample uncertainty of a slow log."""
+"""`likeliest_noise(problem, theta, course)`: size of the intersample uncertainty of a slow log."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.fits.greybox.intersample_doubt import IntersampleDoubt, answered
+from estimation.fits.greybox.intersample_doubt import IntersampleDoubt, responses_to_speed
 from estimation.fits.greybox.problem import Problem
 
 SHARES = np.array([0.5, 0.7, 1.0, 1.4])
 """Variances of the pressure noise that are tried, over that read from the log [fraction]: in a slow log the latter
 includes some of the actuator's motion."""
 
-TRIED = np.array([0.0, *np.geomspace(0.005, 0.28, 7)])
+UNCERTAINTIES_TRIED = np.array([0.0, *np.geomspace(0.005, 0.28, 7)])
 """Uncertainties of the pumped volume that are tried, over the largest effect of a turn of the speed [fraction]: a speed
 that jumps at an unknown time has ``12^-1/2``."""
 
 LONGEST = 5000
 """Blocks of a log's beginning on which it is determined [count]."""
 
-AT_ONCE = 64
+BLOCKS_AT_ONCE = 64
 """Blocks whose products are summed at a time [count]."""
 
-ALIKE = 1e-9
+LEAST_INFORMATION = 1e-9
 """Squared length of a combination of unit columns below which it has no information [dimensionless]: rounding is about
 1e-15."""
 
 
-def likeliest(problem: Problem, theta: Array, course: IntersampleDoubt) -> tuple[float, float, float]:
+def likeliest_noise(problem: Problem, theta: Array, course: IntersampleDoubt) -> tuple[float, float, float]:
     """Return the likeliest lasting and returning parts of the uncertainty, with any of `SHARES` of the pressure noise.
 
     In a log that the form does not explain, the error may not leak off: whether it does is tested too.
@@ -54,13 +54,14 @@ def likeliest(problem: Problem, theta: Array, course: IntersampleDoubt) -> tuple
     level = noise.variance / block
     walk, beside = np.append(0.0, unit.walk(samples, block)), unit.beside(samples, block)
     tried = [
-        (*restricted(left * level**0.5, freed, level, walk, beside, one**block), one) for one in (course.kept, 1.0)
+        (*restricted_likelihood_noise(left * level**0.5, freed, level, walk, beside, one**block), one)
+        for one in (course.kept, 1.0)
     ]
     staying, passing, _, kept = min(tried, key=lambda one: one[2])
     return staying, passing, kept
 
 
-def restricted(
+def restricted_likelihood_noise(
     left: Array, freed: Array, level: float, walk: Array, beside: Array, kept: float = 1.0
 ) -> tuple[float, float, float]:
     """Return the likeliest noise of residuals from which a fit has removed what its unknowns could absorb.
@@ -88,7 +89,9 @@ def restricted(
         Lasting and returning part, see `IntersampleDoubt` [fraction], and twice the negative log-likelihood, up to a
         constant.
     """
-    share, staying, passing = (one.ravel() for one in np.meshgrid(SHARES, TRIED, TRIED, indexing="ij"))
+    share, staying, passing = (
+        one.ravel() for one in np.meshgrid(SHARES, UNCERTAINTIES_TRIED, UNCERTAINTIES_TRIED, indexing="ij")
+    )
     white, walks, passes = share * level, staying**2, passing**2
     values = np.column_stack([left, freed])
     mean, spread, cost = np.zeros((len(white), values.shape[1])), np.zeros_like(white), np.zeros_like(white)
@@ -102,19 +105,19 @@ def restricted(
         innovation = (value - mean) / np.sqrt(total)[:, None]
         cost += np.minimum(innovation[:, 0] ** 2, 9.0) + np.log(total)
         whitened.append(innovation)
-        if len(whitened) == AT_ONCE:
-            together += _squares(whitened)
+        if len(whitened) == BLOCKS_AT_ONCE:
+            together += _column_products(whitened)
         mean += (spread / np.sqrt(total))[:, None] * innovation
         spread -= spread / total * spread
     if whitened:
-        together += _squares(whitened)
+        together += _column_products(whitened)
     known, pulled = together[:, 1:, 1:], together[:, 1:, 0]
     cost += np.linalg.slogdet(known)[1] - np.sum(pulled * np.linalg.solve(known, pulled[..., None])[..., 0], axis=1)
     at = int(np.argmin(cost))
     return float(staying[at]), float(passing[at]), float(cost[at])
 
 
-def _squares(whitened: list[Array]) -> Array:
+def _column_products(whitened: list[Array]) -> Array:
     """Return sums of products of whitened columns, shape (noises, columns, columns), and reset them."""
     parts = np.stack(whitened, axis=1)
     whitened.clear()
@@ -128,11 +131,11 @@ def _without_offset(problem: Problem, theta: Array, most: int) -> tuple[Array, A
     returned is what was removed, as orthonormal columns.
     """
     errors, slopes = problem.linearised(theta)
-    columns = np.column_stack([answered(problem, theta, [np.ones(len(problem.log.drives))]), slopes])
+    columns = np.column_stack([responses_to_speed(problem, theta, [np.ones(len(problem.log.drives))]), slopes])
     errors, columns = errors.ravel()[:most], columns[:most]
     sizes = np.linalg.norm(columns, axis=0)
     columns = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
     squares, ways_out = np.linalg.eigh(columns.T @ columns)
-    told = squares > ALIKE
+    told = squares > LEAST_INFORMATION
     basis = columns @ (ways_out[:, told] / np.sqrt(squares[told]))  # exactly zero for a missing block
     return errors - basis @ (basis.T @ errors), basis

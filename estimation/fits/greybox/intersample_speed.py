@@ -1,14 +1,14 @@
-"""`straightened(speed)`: motor speed whose straight lines deliver the volume that the motor delivers."""
+"""`straight_line_speed(speed)`: motor speed whose straight lines deliver the volume that the motor delivers."""
 
 import numpy as np
 
 from plant.arrays import Array
 
-ALIKE = 0.5
+MOST_UNSTEADY = 0.5
 """Range of three second differences, over the middle one, up to which a bend is steady [fraction]; judged."""
 
 
-def straightened(speed: Array, *, slow: bool = False) -> Array:
+def straight_line_speed(speed: Array, *, slow: bool = False) -> Array:
     """Return motor speed corrected so that straight lines between samples give the right pumped volume.
 
     A motor that approaches its new speed follows a curve between samples, and the error of the trapezoidal rule is a
@@ -32,18 +32,18 @@ def straightened(speed: Array, *, slow: bool = False) -> Array:
     --------
     A parabola, and a corner:
 
-    >>> course = straightened(np.arange(8.0) ** 2)
+    >>> course = straight_line_speed(np.arange(8.0) ** 2)
     >>> float(np.trapezoid(course[2:6])), (5.0**3 - 2.0**3) / 3.0
     (39.0, 39.0)
-    >>> straightened(np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0])).tolist()
+    >>> straight_line_speed(np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0])).tolist()
     [0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0]
     """
-    before, here, after = _bends(speed)
+    before, here, after = _neighbouring_bends(speed)
     median = np.maximum(np.minimum(before, here), np.minimum(np.maximum(before, here), after))
     return speed - (steady_bend(speed) if slow else median) / 12.0
 
 
-def _bends(speed: Array) -> tuple[Array, Array, Array]:
+def _neighbouring_bends(speed: Array) -> tuple[Array, Array, Array]:
     """Return the second differences at the sample before, at each sample, and at the one after [rad/s]."""
     bends = np.pad(np.diff(speed, n=2), 2) if len(speed) > 2 else np.zeros(len(speed) + 2)
     return bends[:-2], bends[1:-1], bends[2:]
@@ -69,6 +69,6 @@ def steady_bend(speed: Array) -> Array:
     >>> steady_bend(np.array([0.0, 1.0, 4.0, 9.0, 16.0, 17.0])).tolist()
     [0.0, 0.0, 2.0, 0.0, 0.0, 0.0]
     """
-    before, here, after = _bends(speed)
+    before, here, after = _neighbouring_bends(speed)
     apart = np.maximum(np.maximum(before, here), after) - np.minimum(np.minimum(before, here), after)
-    return np.where(apart <= ALIKE * np.abs(here), here, 0.0)
+    return np.where(apart <= MOST_UNSTEADY * np.abs(here), here, 0.0)

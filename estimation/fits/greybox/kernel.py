@@ -18,7 +18,7 @@ from plant.compiled.functions import Scalar
 from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.solvers.steps import parameter_names, parameter_symbols, ros2_step, sdirk2_step
 
 Kernel: TypeAlias = Callable[..., tuple[float, Array, Array]]
@@ -55,7 +55,7 @@ def _source(model: GreyBoxModel) -> str:
     point = places("point", chain.from_iterable(names))
     data = {f"{when}{i}": f"{when}[{i}]" for when in ("before", "after") for i in range(len(model.drives))}
     moved = _rows(
-        model_step(model, state, p, [_between(i) for i in range(len(model.drives))]), state, theta, len(jumps)
+        model_step(model, state, p, [_drive_over_step(i) for i in range(len(model.drives))]), state, theta, len(jumps)
     )
     varying = {*point, *data, "start", "end", "h", "share"}
     settled, stepped = hoisted(dict(zip(point, moved, strict=True)), varying, "c")
@@ -74,8 +74,8 @@ def _source(model: GreyBoxModel) -> str:
         function_source("step", "point, fixed, before, after, start, end, h", reads, stepped),
         function_source("observe", "point, shown", point, seen, {place: place for place in seen}),
         f"load = loading({len(point)})",
-        pasted(absorb, constants=counts | settings, inlined=True),
-        pasted(carry, correct, run),
+        functions_text(absorb, constants=counts | settings, inlined=True),
+        functions_text(carry, correct, run),
     )
 
 
@@ -101,7 +101,7 @@ def model_step(
     return [as_expression(value) for value in stepped(tuple(state), (symbol("share"), ONE), p, h)]
 
 
-def _between(drive: int) -> tuple[Expression, Expression]:
+def _drive_over_step(drive: int) -> tuple[Expression, Expression]:
     """Return a drive at the start and the end of a step."""
     before = symbol(f"before{drive}")
     rise = symbol(f"after{drive}") - before

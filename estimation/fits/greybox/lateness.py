@@ -18,7 +18,7 @@ LATE_NUDGE = 1e-5
 """Time by which a driving channel is shifted for the finite difference [s]."""
 
 
-def changes_beside(problem: Problem, theta: Array) -> tuple[Array | None, list[Array]]:
+def residuals_and_changes(problem: Problem, theta: Array) -> tuple[Array | None, list[Array]]:
     """Return the residuals under the log's drives, with one model step per sample, and their changes by other drives.
 
     The other drives are each tested channel, shifted a little, and the courses of an encoder play.
@@ -48,7 +48,7 @@ def changes_beside(problem: Problem, theta: Array) -> tuple[Array | None, list[A
     return known, [one - known for one in found]
 
 
-def left_by(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[Array], Array]:
+def unabsorbed_part(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[Array], Array]:
     """Return the part of a change of residuals that the determined unknowns cannot absorb.
 
     Undetermined unknowns are held back by their priors only. In the linear approximation a motor's lead may become
@@ -85,7 +85,7 @@ def lateness(
     timed : sequence of str
         The channels.
     changes : sequence of ndarray, shape (outputs, blocks)
-        Change of the normalised residuals by each, see `changes_beside`; further ones are ignored [dimensionless].
+        Change of the normalised residuals by each, see `residuals_and_changes`; others are ignored [dimensionless].
     errors : ndarray, shape (outputs * blocks,)
         The normalised residuals at the solution [dimensionless].
     left : callable
@@ -104,7 +104,7 @@ def lateness(
             yield channel, (-along / power, 0.5 * along**2 / power)
 
 
-def most_late(late: Mapping[str, tuple[float, float]]) -> tuple[str, float, float]:
+def latest_channel(late: Mapping[str, tuple[float, float]]) -> tuple[str, float, float]:
     """Return the driving channel whose timing explains most of what a fit leaves.
 
     Parameters

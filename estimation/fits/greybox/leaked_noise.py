@@ -23,11 +23,11 @@ LAGS = 8
 """Blocks over which the autocorrelation of encoder errors is computed [count]. A longer correlation is constant within
 a block, and leaks off."""
 
-UNEVEN = 0.02
+MOST_UNEVEN = 0.02
 """Mean distance of readings from multiples of a step above which the encoder has no steps [steps]; that of a continuous
 one is 0.25."""
 
-READ = 3
+BLOCKS_PER_READING = 3
 """Blocks over which an encoder's reading is averaged to find its place within a step [count]; judged. Over one, the
 mean of a steady piston changes by half a step from block to block; over more, the piston may reverse in between."""
 
@@ -55,7 +55,7 @@ class LeakedNoise:
     cosines: Array
     powers: Array
 
-    def kept(self, lost: float) -> tuple[float, float]:
+    def remaining_noise(self, lost: float) -> tuple[float, float]:
         """Return the noise that remains after losses.
 
         Parameters
@@ -96,12 +96,12 @@ def white_noise(samples: int, every: int = 1) -> LeakedNoise:
 
     Examples
     --------
-    >>> [round(number, 3) for number in white_noise(10).kept(0.1)]
+    >>> [round(number, 3) for number in white_noise(10).remaining_noise(0.1)]
     [0.795, -0.21]
-    >>> round(white_noise(10, every=5).kept(0.1)[0], 3)
+    >>> round(white_noise(10, every=5).remaining_noise(0.1)[0], 3)
     0.959
     """
-    return _leaked(np.ones(1), samples, every)
+    return _noise_after_losses(np.ones(1), samples, every)
 
 
 def encoder_noise(
@@ -135,23 +135,23 @@ def encoder_noise(
         For the motion in this log.
     """
     step, block = _step(position), averaged * samples
-    if not step or len(position) <= 2 * READ * block:
+    if not step or len(position) <= 2 * BLOCKS_PER_READING * block:
         return white_noise(samples, every)
     of_steps = min(step**2 / (12.0 * variance), 1.0)  # share of rounding in the variance
     blurred = (1.0 / of_steps - 1.0) / 12.0
-    course = _course(bridged(position), pumped, READ * block) / step
+    course = _piston_position(bridged(position), pumped, BLOCKS_PER_READING * block) / step
     lags = min(LAGS * block, len(course) // 2)
     alike = np.zeros(lags)
     for k in range(1, HARMONICS + 1):
         share = float(np.exp(-((2.0 * np.pi * k) ** 2) * blurred)) / (2.0 * (np.pi * k) ** 2)
         if share > 1e-3:
-            alike += 12.0 * of_steps * share * _likeness(np.exp(2j * np.pi * k * course), lags)
+            alike += 12.0 * of_steps * share * _autocorrelation(np.exp(2j * np.pi * k * course), lags)
     alike = (alike - alike[-1]) * (1.0 - np.arange(lags) / lags)
     alike[0] = 1.0
     # triangular weights of the autocorrelation for means of samples
     within = np.convolve(np.ones(averaged), np.ones(averaged)) / averaged
     both = np.convolve(np.concatenate([alike[:0:-1], alike]), within)
-    return _leaked(both[len(both) // 2 :: averaged], samples, every)
+    return _noise_after_losses(both[len(both) // 2 :: averaged], samples, every)
 
 
 def _step(position: Array) -> float:
@@ -162,10 +162,10 @@ def _step(position: Array) -> float:
         return 0.0
     step = float(np.min(moved))
     multiples = moved / step
-    return step if np.mean(np.abs(multiples - np.round(multiples))) < UNEVEN else 0.0
+    return step if np.mean(np.abs(multiples - np.round(multiples))) < MOST_UNEVEN else 0.0
 
 
-def _course(position: Array, pumped: Array, over: int) -> Array:
+def _piston_position(position: Array, pumped: Array, over: int) -> Array:
     """Return the piston's position: motion by the pump, plus a running mean of the rest over an odd count."""
     over += 1 - over % 2
     beside = position - pumped
@@ -173,7 +173,7 @@ def _course(position: Array, pumped: Array, over: int) -> Array:
     return pumped[over // 2 : len(pumped) - over // 2] + (sums[over:] - sums[:-over]) / over
 
 
-def _likeness(turned: Array, lags: int) -> Array:
+def _autocorrelation(turned: Array, lags: int) -> Array:
     """Return the real part of the autocorrelation of a series of unit vectors [dimensionless]."""
     count = len(turned)
     length = smooth_length(count + lags, (2, 3, 5))
@@ -181,7 +181,7 @@ def _likeness(turned: Array, lags: int) -> Array:
     return np.fft.ifft(spectrum.real**2 + spectrum.imag**2).real[:lags] / (count - np.arange(lags))
 
 
-def _leaked(alike: Array, samples: int, every: int) -> LeakedNoise:
+def _noise_after_losses(alike: Array, samples: int, every: int) -> LeakedNoise:
     """Return noise that remains after losses, given its autocorrelation from lag zero on."""
     count = max(1, round(samples / every))
     frequency = np.pi * (np.arange(FREQUENCIES) + 0.5) / FREQUENCIES

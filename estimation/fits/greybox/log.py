@@ -57,7 +57,7 @@ class OutputNoise:
     lost: float = 0.0
     lost_from: LeakedNoise | None = None
 
-    def passing(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+    def passed_noise(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
         """Return the output noise due to a driving channel's noise, and its slope by each unknown.
 
         Parameters
@@ -75,7 +75,7 @@ class OutputNoise:
         felt = values.get(self.passed_by, 0.0) * usual / values.get(divisor, usual)
         losses = {name: self.lost * felt * values.get(name, 0.0) for name in self.lost_by}
         total = sum(losses.values())
-        kept, bent = (1.0, 0.0) if self.lost_from is None else self.lost_from.kept(total)
+        kept, bent = (1.0, 0.0) if self.lost_from is None else self.lost_from.remaining_noise(total)
         goes = {name: bent * loss / total for name, loss in losses.items() if loss > 0.0}
         goes |= {
             name: slope for name, slope in ((self.passed_by, 1.0 + bent), (divisor, -1.0 - bent)) if name in values
@@ -219,15 +219,15 @@ class GreyBoxLog:
         return float(np.sqrt(np.nanmean(self.measured**2)))
 
     @property
-    def passes(self) -> float:
+    def turn_count(self) -> float:
         """Number of bends of a slow log's motor speed, at least 1; 1 for any other log [count].
 
         The motor passes all turns alike. So what one form gains on another at one turn, it gains at all, without more
         evidence.
         """
-        return 1.0 if self.course is None else self.course.passes(self.noise[0].variance)
+        return 1.0 if self.course is None else self.course.turn_count(self.noise[0].variance)
 
-    def walks(self, block: int) -> tuple[Array, Array, float]:
+    def walk_variances(self, block: int) -> tuple[Array, Array, float]:
         """Return each output's random-walk variance per block, its other variance, and the share of its level kept.
 
         Parameters
@@ -251,7 +251,7 @@ class GreyBoxLog:
         samples, course = len(self.measured), self.course
         return walk + course.walk(samples, block), beside + course.beside(samples, block), course.kept**block
 
-    def taken_at(self, value: float) -> "GreyBoxLog":
+    def with_noise_at(self, value: float) -> "GreyBoxLog":
         """Return the log with the noise passed on by driving channels fixed at a value of the unknown.
 
         The variance then does not depend on any unknown, so a search from far away finds no minimum with infinite
@@ -270,7 +270,7 @@ class GreyBoxLog:
         noise = tuple(OutputNoise(one.variance + (value * one.passed_on) ** 2, one.walk) for one in self.noise)
         return replace(self, noise=noise)
 
-    def softened(self, variance: float, walk: float) -> "GreyBoxLog":
+    def with_larger_noise(self, variance: float, walk: float) -> "GreyBoxLog":
         """Return the log with larger assumed noise, which smooths the way to the optimum.
 
         Parameters

@@ -1,10 +1,10 @@
 """Plain loops that sum the normal equations of a fit block by block; they are compiled."""
 
 from estimation.arrays import Array
-from plant.compiled.native.loops import natively
+from plant.compiled.native.loops import natively_compiled
 
 
-@natively()
+@natively_compiled()
 def fill_differences(found: Array, nudge: float, here: Array, slopes: Array) -> None:
     """Fill in the residuals at a point and their slopes, from the residuals there and at its neighbours.
 
@@ -27,8 +27,8 @@ def fill_differences(found: Array, nudge: float, here: Array, slopes: Array) -> 
                 slopes[i, k, j] = (found[i, k, j + 1] - value) / nudge
 
 
-@natively()
-def fill_weighed(
+@natively_compiled()
+def fill_quadratic(
     errors: Array, slopes: Array, outlier: float, straight: float, squares: Array, pulling: Array, bent: Array
 ) -> None:
     """Fill in the terms whose sums are cost, gradient and ``J'J``; gross outliers count linearly (Huber 1964).

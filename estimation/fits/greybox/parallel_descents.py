@@ -8,7 +8,7 @@ import numpy as np
 from estimation.fits.greybox.descent import FIRST_RADIUS, LEAST_GAIN, Point, search
 from plant.arrays import Array
 
-ABREAST = 4
+PARALLEL_SEARCHES = 4
 """Searches that run in parallel [count]: with nine to twelve runs each they fill nine tenths of a kernel's lanes, and
 few run in vain."""
 
@@ -66,12 +66,12 @@ def descend_in_turn(
     list of Point
         The best point of each way.
     """
-    waiting = [_Ahead(way, evaluations, radius, least_share) for way in ways]
+    waiting = [_SearchAhead(way, evaluations, radius, least_share) for way in ways]
     found: list[Point] = []
     while waiting:
         first = waiting[0]
         beside = (one for one in waiting[1:] if one.way.at_each == first.way.at_each)
-        some = [one for one in (first, *beside) if one.goes_on(wanted)][:ABREAST]
+        some = [one for one in (first, *beside) if one.goes_on(wanted)][:PARALLEL_SEARCHES]
         if first.ended is not None:
             found.append(first.ended)
             wanted = min(wanted, after(len(found) - 1, found[-1]))
@@ -82,7 +82,7 @@ def descend_in_turn(
     return found
 
 
-class _Ahead:
+class _SearchAhead:
     """A search that runs ahead for as long as no known bound ends it."""
 
     def __init__(self, way: Way, evaluations: int, radius: float, least_share: float) -> None:

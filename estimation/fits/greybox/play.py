@@ -6,7 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.arrays import Array, BoolArray
-from estimation.fits.greybox.play_courses import SMOOTHED, STANDS, cell, crossings, smoothed, standings
+from estimation.fits.greybox.play_courses import (
+    SMOOTHING_TIME,
+    SPRING_BACK_TIME,
+    cell_width,
+    crossings,
+    smoothed,
+    standings,
+)
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.hypotheses import LEAST_PLAY
 from estimation.log_checks.bridging import bridged
@@ -136,12 +143,12 @@ def shown_play(
     return found._replace(moved={name: -size * float(one) for name, one in taken(course.ravel())})
 
 
-def play_shows(shown: ShownPlay, sensed: ShownPlay) -> bool:
+def shows_play(shown: ShownPlay, sensed: ShownPlay) -> bool:
     """Return whether residuals or a velocity sensor show a play that is worth a test."""
     return sensed.gain > PLAY_SENSED or (shown.gain > PLAY_SHOWN and shown.size > LEAST_PLAY)
 
 
-def play_left(shown: ShownPlay, sensed: ShownPlay = NO_PLAY, least: float = 0.0) -> tuple[Note, ...]:
+def omitted_play_note(shown: ShownPlay, sensed: ShownPlay = NO_PLAY, least: float = 0.0) -> tuple[Note, ...]:
     """Return the objection to a fit that omits a play which its residuals or a velocity sensor show.
 
     Parameters
@@ -174,7 +181,7 @@ def play_structure(moved: float, yields: float) -> float:
     return float(np.hypot(PLAY_STRUCTURE, PLAY_OPEN * max(moved, yields)))
 
 
-def play_untaken(shown: ShownPlay, sensed: ShownPlay, yields: float) -> tuple[float, tuple[Note, ...]]:
+def omitted_play_uncertainty(shown: ShownPlay, sensed: ShownPlay, yields: float) -> tuple[float, tuple[Note, ...]]:
     """Return the uncertainty due to a play that residuals or a velocity sensor may show and no fit includes.
 
     Parameters
@@ -192,11 +199,11 @@ def play_untaken(shown: ShownPlay, sensed: ShownPlay, yields: float) -> tuple[fl
         Relative deviation of bulk modulus, zero if one log in 100 shows as much by chance [fraction]; and a note, if
         the gate does not reject the log for it.
     """
-    if not play_shows(shown, sensed):
+    if not shows_play(shown, sensed):
         return 0.0, ()
     moved = shown.moved.get("bulk_modulus", 0.0) if shown.gain > PLAY_SHOWN else 0.0
     size = max(one.size for one, least in ((shown, PLAY_SHOWN), (sensed, PLAY_SENSED)) if one.gain > least)
-    said = () if play_left(shown, sensed) else (RigCode.PLAY_NOT_EXCLUDED.note(play_um=1e6 * size),)
+    said = () if omitted_play_note(shown, sensed) else (RigCode.PLAY_NOT_EXCLUDED.note(play_um=1e6 * size),)
     return float(np.hypot(PLAY_STRUCTURE, max(yields, abs(moved)))), said
 
 
@@ -221,32 +228,32 @@ def sensed_play(record: Record) -> ShownPlay:
         return NO_PLAY
     position = bridged(record[POSITION])
     stands = standings(position)
-    force = smoothed(bridged(record[PRESSURE]), round(SMOOTHED / record.sample_time))
+    force = smoothed(bridged(record[PRESSURE]), round(SMOOTHING_TIME / record.sample_time))
     # the encoder's rate spans two sample times, so velocity is averaged over them too
     velocity, rate = (
         np.convolve(record[VELOCITY], (0.25, 0.5, 0.25), mode="same"),
         np.gradient(force) / record.sample_time,
     )
-    still = np.isfinite(velocity) & (stands.length * record.sample_time >= STANDS) & (stands.away > EDGE)
+    still = np.isfinite(velocity) & (stands.length * record.sample_time >= SPRING_BACK_TIME) & (stands.away > EDGE)
     power = float(np.sum(rate[still] ** 2))
     if np.count_nonzero(still) < FEWEST or power == 0.0:
         return NO_PLAY
     read = np.gradient(position) / record.sample_time
     moved, seen = (float(rate[still] @ one[still]) / power for one in (velocity, read))
-    left, together = velocity - read - (moved - seen) * rate, max(1, round(SMOOTHED / record.sample_time))
-    chance = _lasting(left, still, together)
+    left, together = velocity - read - (moved - seen) * rate, max(1, round(SMOOTHING_TIME / record.sample_time))
+    chance = _averaged_variance(left, still, together)
     if chance == 0.0 or moved - 2.0 * seen <= (chance / power) ** 0.5:
         return NO_PLAY
     here, standing = force[still], stands.first[still]
     at_once = here - (np.bincount(standing, here) / np.maximum(np.bincount(standing), 1))[standing]
-    if (moved - seen) * _spread(at_once) <= max(cell(position), LEAST_PLAY):
+    if (moved - seen) * _spread(at_once) <= max(cell_width(position), LEAST_PLAY):
         return NO_PLAY
     looks = np.count_nonzero(still) / together
     gain = 0.5 * looks * np.log1p((moved - seen) ** 2 * power / chance / looks)
     return ShownPlay((moved - seen) * _spread(here), float(gain), moved - seen)
 
 
-def _lasting(left: Array, there: BoolArray, samples: int) -> float:
+def _averaged_variance(left: Array, there: BoolArray, samples: int) -> float:
     """Return the effective variance of residuals over so many samples: averaged noise is not white."""
     parts = len(left) // samples
     left, count = (

@@ -19,11 +19,11 @@ CELLS = 8.0
 FINEST = 1e-9
 """Their least width [m]."""
 
-SMOOTHED = 2e-2
+SMOOTHING_TIME = 2e-2
 """Length over which pressure is averaged, by a Hann window [s]; judged. The fastest crossings take as long, and
 pressure noise moves no piston then."""
 
-STANDS = 0.02
+SPRING_BACK_TIME = 0.02
 """Time at rest from which the piston is assumed to spring back [s]; judged: an encoder may creep in steps."""
 
 
@@ -61,7 +61,7 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     stands = standings(position)
     across, share = stands.next_side - stands.side, stands.share
     late, early = stands.side + across * share**2, stands.side + across * (share * (2 - share))
-    force = smoothed(bridged(pressure), round(SMOOTHED / sample_time))
+    force = smoothed(bridged(pressure), round(SMOOTHING_TIME / sample_time))
     before, after = force[stands.first], force[stands.last]
     turned = np.divide(force - before, after - before, out=np.ones_like(force), where=after != before)
     followed = turned.clip(0.0, 1.0)
@@ -70,7 +70,7 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     most = np.abs(held)
     below = np.maximum(stands.side * (force - held), -2.0 * most).clip(max=0.0)
     lost = np.divide(below, most, out=below, where=below < 0.0)
-    sprung = np.where(stands.turns | (stands.length * sample_time < STANDS), 0.0, stands.side * lost)
+    sprung = np.where(stands.turns | (stands.length * sample_time < SPRING_BACK_TIME), 0.0, stands.side * lost)
     return np.column_stack([late, by_pressure - late, early - late, sprung])
 
 
@@ -127,7 +127,7 @@ def standings(position: Array) -> Standings:
     Standings
         For each sample.
     """
-    at = np.round(position / cell(position))
+    at = np.round(position / cell_width(position))
     steps = np.flatnonzero(np.diff(at)) + 1
     ways = np.sign(at[steps] - at[steps - 1])
     sure = np.flatnonzero(ways[1:] == ways[:-1]) + 1
@@ -138,7 +138,7 @@ def standings(position: Array) -> Standings:
     return Standings(places[before], places[before + 1], sides[before], sides[before + 1])
 
 
-def cell(position: Array) -> float:
+def cell_width(position: Array) -> float:
     """Return the width of the cells in which a reading is followed.
 
     Parameters

@@ -10,7 +10,7 @@ from estimation.arrays import Array, IntArray
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.kernel import Kernel, compile_kernel
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.normal_loops import fill_weighed
+from estimation.fits.greybox.normal_loops import fill_quadratic
 from estimation.models.greybox import GreyBoxModel
 
 OUTLIER = 3.0
@@ -77,7 +77,7 @@ class Problem:
         self._block = max(1, round(log.block / log.sample_time))
         self._passes_on = log.passes_on
         self._white = np.array([noise.variance for noise in log.noise])
-        self._walks = log.walks(self._block)
+        self._walks = log.walk_variances(self._block)
         sizes = dict(model.linear)
         presumed = [log.presumed.get(name, (sizes.get(name, 1.0), np.inf)) for name in model.unknowns]
         self.presumed = model.theta({name: value for name, (value, _) in zip(model.unknowns, presumed, strict=True)})
@@ -113,9 +113,9 @@ class Problem:
         """
         if not self.log.passes_on:
             return self._point(theta, *self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0))))
-        errors, slopes = self._room(), self._room(len(theta))
+        errors, slopes = self._empty_residuals(), self._empty_residuals(len(theta))
         self._run(theta, errors, slopes)
-        return self._point(theta, *weighed(errors, self._tilted(theta, errors, slopes)))
+        return self._point(theta, *quadratic(errors, self._with_variance_slopes(theta, errors, slopes)))
 
     def _point(self, theta: Array, cost: float, gradient: Array, gram: Array) -> Point:
         """Return a point whose misfit is given, with the prior added and a full matrix."""
@@ -142,7 +142,7 @@ class Problem:
         ndarray, shape (outputs, blocks)
             White and of unit variance if the model explains the log; zero for a missing block [dimensionless].
         """
-        errors = self._room()
+        errors = self._empty_residuals()
         self._run(theta, errors, np.empty((0, 0, 0)), drives, parameters)
         return errors
 
@@ -225,11 +225,11 @@ class Problem:
         tuple of ndarray, shapes (outputs, blocks) and (outputs * blocks, unknowns)
             As of `residuals` and `slopes`.
         """
-        errors, slopes = self._room(), self._room(len(theta))
+        errors, slopes = self._empty_residuals(), self._empty_residuals(len(theta))
         self._run(theta, errors, slopes)
-        return errors, self._tilted(theta, errors, slopes).reshape(errors.size, len(theta))
+        return errors, self._with_variance_slopes(theta, errors, slopes).reshape(errors.size, len(theta))
 
-    def _room(self, *columns: int) -> Array:
+    def _empty_residuals(self, *columns: int) -> Array:
         return np.zeros((self.log.measured.shape[1], -(-len(self.log.measured) // self._block), *columns))
 
     def _run(
@@ -255,27 +255,27 @@ class Problem:
                 slopes,
             )
 
-    def _passing(self, theta: Array) -> Array:
+    def _passed_variance(self, theta: Array) -> Array:
         """Return the variance that driving channels' noise passes on to each output, in SI."""
         if not self.log.passes_on:
             return np.zeros(len(self.log.noise))
         values = self.model.values(theta)
-        return np.array([one.passing(values)[0] ** 2 for one in self.log.noise])
+        return np.array([one.passed_noise(values)[0] ** 2 for one in self.log.noise])
 
     def _variances(self, theta: Array) -> Array:
-        return self._white + self._passing(theta) if self._passes_on else self._white
+        return self._white + self._passed_variance(theta) if self._passes_on else self._white
 
-    def _tilts(self, theta: Array) -> Iterator[tuple[int, int, float]]:
+    def _variance_slopes(self, theta: Array) -> Iterator[tuple[int, int, float]]:
         """Yield each output whose variance depends on an unknown: its index, the unknown's, and the dependent share."""
         if self.log.passes_on:
-            share, values = self._passing(theta) / self._variances(theta), self.model.values(theta)
+            share, values = self._passed_variance(theta) / self._variances(theta), self.model.values(theta)
             for i, noise in enumerate(self.log.noise):
-                for name, slope in noise.passing(values)[1].items():  # fitted as logarithms
+                for name, slope in noise.passed_noise(values)[1].items():  # fitted as logarithms
                     yield i, self.model.unknowns.index(name), float(share[i]) * slope
 
-    def _tilted(self, theta: Array, errors: Array, slopes: Array) -> Array:
+    def _with_variance_slopes(self, theta: Array, errors: Array, slopes: Array) -> Array:
         """Return the derivatives of normalised residuals, given those at constant variance."""
-        for i, place, share in self._tilts(theta):
+        for i, place, share in self._variance_slopes(theta):
             slopes[i, :, place] -= share * errors[i]
         return slopes
 
@@ -295,7 +295,7 @@ class Problem:
             Zero if no channel passes noise on [dimensionless].
         """
         out = np.zeros(len(theta))
-        for i, place, share in self._tilts(theta):
+        for i, place, share in self._variance_slopes(theta):
             out[place] += share * float(errors[i] @ errors[i])
         return out
 
@@ -304,7 +304,7 @@ class Problem:
         return self.log.sample_time, self.log.steps, self._block, variance, *self._walks
 
 
-def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
+def quadratic(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
     """Return cost, gradient and lower triangle of ``J'J`` of normalised residuals; gross outliers count linearly.
 
     Parameters
@@ -321,7 +321,7 @@ def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
     """
     columns = slopes.reshape(errors.size, -1)
     squares, pulling, bent = np.empty(errors.shape), np.empty(errors.size), np.empty(columns.shape)
-    fill_weighed(errors.ravel(), columns, OUTLIER, STRAIGHT, squares.ravel(), pulling, bent)
+    fill_quadratic(errors.ravel(), columns, OUTLIER, STRAIGHT, squares.ravel(), pulling, bent)
     return float(np.sum(squares)), pulling @ columns, np.where(_lower(columns.shape[1]), bent.T @ columns, 0.0)
 
 

@@ -16,7 +16,7 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from plant.solvers.steps import parameter_names
 
-COUNTS = tuple(range(5, 20))
+TOOTH_COUNTS = tuple(range(5, 20))
 """Teeth per revolution that are searched for [count]: gear pumps have 7 to 16; an odd number of pistons pulses twice
 each."""
 
@@ -35,10 +35,10 @@ LEAST_TEETH = 0.03
 MOST_OFFSET = 1.0
 """Largest offset of logged speed that is searched for [rad/s]: 10 revolutions per minute; judged."""
 
-LOOKS_A_TURN = 16
+PARTS_A_TURN = 16
 """Parts of a full phase turn, by the fastest offset, over which residuals are summed [count]."""
 
-FINER = 4
+FINENESS = 4
 """Offsets that are tried per resolvable one [count]."""
 
 OFFSET_NUDGE = 1e-4
@@ -82,7 +82,7 @@ class Turning(NamedTuple):
     offset: float = 0.0
 
 
-EVENLY = Turning()
+NO_RIPPLE = Turning()
 """No ripple and no offset."""
 
 
@@ -141,11 +141,11 @@ def with_ripple(log: GreyBoxLog, teeth: Sequence[Ripple], offset: float = 0.0) -
     [0.11, 0.11, 0.11]
     """
     drives = log.drives.copy()
-    drives[:, 0] = delivering(drives[:, 0], teeth, offset, log.sample_time)
+    drives[:, 0] = delivering_speed(drives[:, 0], teeth, offset, log.sample_time)
     return replace(log, drives=drives, teeth=tuple(teeth), speed_offset=offset)
 
 
-def delivering(speed: Array, teeth: Sequence[Ripple], offset: float, sample_time: float) -> Array:
+def delivering_speed(speed: Array, teeth: Sequence[Ripple], offset: float, sample_time: float) -> Array:
     """Return the speed at which a pump without ripple delivers the flow of one with ripple.
 
     Parameters
@@ -165,8 +165,8 @@ def delivering(speed: Array, teeth: Sequence[Ripple], offset: float, sample_time
         [rad/s]
     """
     shaft = speed - offset
-    turned = _turned(shaft, sample_time)
-    return sum((_delivered(one, turned, sample_time) for one in teeth), shaft)
+    turned = _shaft_angle(shaft, sample_time)
+    return sum((_ripple_speed(one, turned, sample_time) for one in teeth), shaft)
 
 
 class ShownOffset(NamedTuple):
@@ -199,7 +199,7 @@ def shown_ripple(
 ) -> tuple[Mapping[int, ShownRipple], ShownOffset]:
     """Return the flow ripple that a fit's residuals show, and an offset of speed.
 
-    In a log without ripple, a given count gains 10 by chance in one log of 22,000, and one of `COUNTS` in one log of
+    In a log without ripple, a given count gains 10 by chance in one log of 22,000, and one of `TOOTH_COUNTS` in one of
     1500.
 
     Parameters
@@ -223,9 +223,9 @@ def shown_ripple(
         By tooth count, `opened` for the unknowns that have an effect; a count without effect is left out.
     """
     log = problem.log
-    sought = [_Sought(count) for count in counts]
-    sought = _likeliest(problem, theta, errors, counts) if len(counts) > LIKELIEST else sought
-    ways = [_ways(log, one) for one in sought]
+    sought = [_Candidate(count) for count in counts]
+    sought = _candidates(problem, theta, errors, counts) if len(counts) > LIKELIEST else sought
+    ways = [_unit_changes(log, one) for one in sought]
     level = np.full(len(log.drives), -1.0)
     every = [*(each for several in ways for each in several), (level, NUDGE)]
     moved_drives = [np.column_stack([log.drives[:, 0] + size * way, log.drives[:, 1:]]) for way, size in every]
@@ -263,7 +263,7 @@ def shown_ripple(
 
 
 @dataclass(frozen=True)
-class _Sought:
+class _Candidate:
     """A tooth count, the offset of speed with which it is searched, and its cost in log-likelihood."""
 
     count: int
@@ -271,21 +271,21 @@ class _Sought:
     price: float = 0.0
 
 
-def _ways(log: GreyBoxLog, one: _Sought) -> list[tuple[Array, float]]:
+def _unit_changes(log: GreyBoxLog, one: _Candidate) -> list[tuple[Array, float]]:
     """Return unit changes of speed and how many units are tried: two waves, and an offset.
 
     If the drives include an offset, it is varied together with the ripple that determines it.
     """
     speed, step = log.drives[:, 0], log.sample_time
-    turned = _turned(speed - one.offset, step)
+    turned = _shaft_angle(speed - one.offset, step)
     ways = [(wave, NUDGE) for wave in _waves(one.count, turned, step)]
     if log.speed_offset == 0.0 or all(each.count != one.count for each in log.teeth):
         return ways
-    now, then = (delivering(speed, log.teeth, off, step) for off in (0.0, OFFSET_NUDGE))
+    now, then = (delivering_speed(speed, log.teeth, off, step) for off in (0.0, OFFSET_NUDGE))
     return [*ways, ((then - now) / OFFSET_NUDGE, NUDGE)]
 
 
-def _turned(speed: Array, step: float) -> tuple[Array, Array]:
+def _shaft_angle(speed: Array, step: float) -> tuple[Array, Array]:
     """Return the shaft's angle halfway between samples, before the first and after the last one too, and its steps."""
     at = np.concatenate([[0.0], np.cumsum(0.5 * step * (speed[1:] + speed[:-1]))])
     halfway = at[:-1] + step * (3.0 * speed[:-1] + speed[1:]) / 8.0
@@ -293,7 +293,7 @@ def _turned(speed: Array, step: float) -> tuple[Array, Array]:
     return between, np.pad(np.abs(np.diff(at)), 1, mode="edge")
 
 
-def _delivered(teeth: Ripple, turned: tuple[Array, Array], sample_time: float) -> Array:
+def _ripple_speed(teeth: Ripple, turned: tuple[Array, Array], sample_time: float) -> Array:
     """Return the speed that delivers the flow of the ripple [rad/s].
 
     Straight lines between samples then deliver the right volume at constant speed. If there are too few samples per
@@ -312,7 +312,7 @@ def _waves(count: int, turned: tuple[Array, Array], sample_time: float) -> tuple
     return np.diff(np.sin(phase) * share) / sample_time, np.diff(-np.cos(phase) * share) / sample_time
 
 
-def _likeliest(problem: Problem, theta: Array, errors: Array, counts: Sequence[int]) -> Sequence[_Sought]:
+def _candidates(problem: Problem, theta: Array, errors: Array, counts: Sequence[int]) -> Sequence[_Candidate]:
     """Return the tooth counts that correlate most with residuals, by a linear response at constant speed.
 
     Pressure then leaks off at one rate, so its phase lag behind the ripple is smaller the faster teeth pass. An offset
@@ -325,26 +325,26 @@ def _likeliest(problem: Problem, theta: Array, errors: Array, counts: Sequence[i
     }
     rate = value["leakage_coefficient"] * value["bulk_modulus"] / value["chamber_volume"]
     blocks = np.linspace(0, len(log.drives) - 1, len(errors)).astype(np.intp)
-    speed, angle = log.drives[:, 0], _turned(log.drives[:, 0], log.sample_time)[0][1:]
+    speed, angle = log.drives[:, 0], _shaft_angle(log.drives[:, 0], log.sample_time)[0][1:]
     delivers = np.abs(speed) * value["pump_displacement"] > value["flow_bias"]
     speed, weighed, turn = speed[blocks], errors * delivers[blocks], np.exp(1j * angle[blocks])
-    length, wave, found = log.sample_time * len(log.drives), np.ones_like(turn), list[tuple[float, _Sought]]()
+    length, wave, found = log.sample_time * len(log.drives), np.ones_like(turn), list[tuple[float, _Candidate]]()
     for count, more in zip(counts, np.diff(counts, prepend=0).tolist(), strict=True):
         wave, passing = wave * (turn if more == 1 else turn**more), count * speed
         seen = np.abs(passing) * log.sample_time < 2.0 * MOST_BETWEEN
         answer = passing * seen / (rate**2 + passing**2)  # real factor, for speed; times rate - 1j * passing below
         power = float(np.sum(answer * passing * delivers[blocks]))
         turns = MOST_OFFSET * count * length / (2.0 * np.pi)  # turns of the phase at the largest offset
-        looks = min(len(errors), int(np.ceil(LOOKS_A_TURN * turns)))
+        looks = min(len(errors), int(np.ceil(PARTS_A_TURN * turns)))
         starts = np.arange(looks) * len(errors) // looks
         along = np.add.reduceat(wave * (weighed * answer * (rate - 1j * passing)), starts)
-        peaks = np.abs(np.fft.fft(along, FINER * looks)) ** 2 / power if power > 0.0 else np.zeros(FINER * looks)
-        turned = np.fft.fftfreq(FINER * looks, 1.0 / looks)
+        peaks = np.abs(np.fft.fft(along, FINENESS * looks)) ** 2 / power if power > 0.0 else np.zeros(FINENESS * looks)
+        turned = np.fft.fftfreq(FINENESS * looks, 1.0 / looks)
         near = np.where(np.abs(turned) <= turns, peaks, 0.0)
         at, price = int(np.argmax(near)), float(np.log(max(2.0 * turns, 1.0)))
         if near[at] - price > near[0]:
             offset = 2.0 * np.pi * float(turned[at]) / (count * length)
-            found.append((float(near[at]) - price, _Sought(count, offset, price)))
+            found.append((float(near[at]) - price, _Candidate(count, offset, price)))
         else:
-            found.append((float(near[0]), _Sought(count)))
+            found.append((float(near[0]), _Candidate(count)))
     return [one for _, one in sorted(found, key=lambda pair: -pair[0])[:LIKELIEST]]

@@ -45,7 +45,7 @@ def rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array
         yield name, -response(errors - known) / RIG_NUDGE
 
 
-def answers_by_rig(problem: Problem, theta: Array, known_of: Information) -> Iterator[tuple[str, Array]]:
+def responses_to_rig(problem: Problem, theta: Array, known_of: Information) -> Iterator[tuple[str, Array]]:
     """Yield the change of each unknown per relative change of an uncertain parameter of the rig.
 
     Parameters

@@ -19,16 +19,16 @@ from plant.compiled.native.load import load_native
 from plant.compiled.native.machine import native_width
 from plant.compiled.native.signature import signature_of
 from plant.compiled.pack import packed_source
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from plant.compiled.simplify import fused, simplified
 from plant.compiled.source import lines_source, operations_source
-from plant.solvers.fixed_step_loops import lay, share
+from plant.solvers.fixed_step_loops import place_rows, place_shared
 from plant.solvers.steps import parameter_names, parameter_symbols
 
 LANES = 8
 """Parameter sets side by side, as many as a vector register of 512 bits holds."""
 
-MANY = 2 * LANES
+MOST_LANES = 2 * LANES
 """The same for more sets: two vectors per step, one computed while the other waits, take 1.3 to 1.6 times as long as
 one."""
 
@@ -38,8 +38,8 @@ errors; of a model that bears gaps, these come before the errors."""
 
 
 def lanes_for(runs: int) -> int:
-    """Return the number of lanes of the kernel for so many runs, `MANY` at most [count]."""
-    return LANES if runs <= LANES else MANY
+    """Return the number of lanes of the kernel for so many runs, `MOST_LANES` at most [count]."""
+    return LANES if runs <= LANES else MOST_LANES
 
 
 @cache
@@ -51,7 +51,7 @@ def compile_side_by_side(model: GreyBoxModel, lanes: int) -> ResidualsRun:
     model : GreyBoxModel
         The model; stepped as in `model_step`.
     lanes : int
-        Parameter sets side by side: `LANES` or `MANY`.
+        Parameter sets side by side: `LANES` or `MOST_LANES`.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def compile_side_by_side(model: GreyBoxModel, lanes: int) -> ResidualsRun:
 
 
 @cache
-def _written(model: GreyBoxModel) -> tuple[dict[str, str], list[str], int]:
+def _model_source(model: GreyBoxModel) -> tuple[dict[str, str], list[str], int]:
     """Return the lines of a model, the names of its numbers in memory, and the count of states; alike for any lanes."""
     names, drives = parameter_names(model.parameters), range(len(model.drives))
     p = parameter_symbols(model.parameters)
@@ -78,8 +78,8 @@ def _written(model: GreyBoxModel) -> tuple[dict[str, str], list[str], int]:
     moved = model_step(model, states, p, list(zip(starts, ends, strict=True)))
     shown = {f"y{i}": as_expression(value) for i, value in enumerate(model.observe(tuple(states)))}
     jumps = states[: len(model.jump)]
-    opened = _named("f", jacobian(moved[: len(jumps)], jumps))
-    seen = _named("g", jacobian([*shown.values()], jumps))
+    opened = _named_slopes("f", jacobian(moved[: len(jumps)], jumps))
+    seen = _named_slopes("g", jacobian([*shown.values()], jumps))
     moving = [*begun, *(f"base{i}" for i in drives), *(f"rise{i}" for i in drives)]
     settled, stepped = hoisted(
         simplified({**dict(zip(begun, moved, strict=True)), **opened}, {*names, "h", "share"}), {*moving, "j"}, "c"
@@ -96,14 +96,14 @@ def _written(model: GreyBoxModel) -> tuple[dict[str, str], list[str], int]:
     return lines, every, len(begun)
 
 
-def _named(letter: str, slopes: list[list[Expression]]) -> dict[str, Expression]:
+def _named_slopes(letter: str, slopes: list[list[Expression]]) -> dict[str, Expression]:
     """Return slopes by the names of their places in memory, row by row."""
     return {f"{letter}{i}_{m}": slope for i, row in enumerate(slopes) for m, slope in enumerate(row)}
 
 
 def _source(model: GreyBoxModel, lanes: int) -> str:
     """Write the kernel."""
-    lines, every, width = _written(model)
+    lines, every, width = _model_source(model)
     vector = min(lanes, native_width())
     sizes = {
         "LANES": lanes,
@@ -115,7 +115,7 @@ def _source(model: GreyBoxModel, lanes: int) -> str:
         "NUMBERS": lanes * len(every),
         "RUNAWAY": RUNAWAY,
     }
-    parts, loop = [lay, share, drive, absorb, close], residuals_side_by_side
+    parts, loop = [place_rows, place_shared, drive, absorb, close], residuals_side_by_side
     if model.jump:
         sizes |= {
             "JUMP": model.jump,
@@ -127,6 +127,6 @@ def _source(model: GreyBoxModel, lanes: int) -> str:
     return kernel_text(
         f"residuals of the {model.name} model, {lanes} parameter sets side by side",
         operations_source(lines, {each: lanes * i for i, each in enumerate(every)}, vector),
-        pasted(*parts, constants=sizes, inlined=True),
-        pasted(loop),
+        functions_text(*parts, constants=sizes, inlined=True),
+        functions_text(loop),
     )

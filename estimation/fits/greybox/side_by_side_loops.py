@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
+from plant.solvers.fixed_step_loops import Operation, SideBySide, place_rows, place_shared
 
 
 class SideBySideKernel(SideBySide, Protocol):
@@ -80,7 +80,7 @@ def residuals_side_by_side(
     slots, lanes = work.ctypes.data, kernel.LANES
     shown = (kernel.WIDTH + 2 * kernel.DRIVES) * lanes
     pace = shown + kernel.OUTPUTS * lanes
-    lay(kernel, work, pace + lanes, parameters.T, kernel.COLUMNS)
+    place_rows(kernel, work, pace + lanes, parameters.T, kernel.COLUMNS)
     excess, level = np.zeros((kernel.OUTPUTS, lanes)), np.zeros((kernel.OUTPUTS, lanes))
     present, spread = np.zeros(kernel.OUTPUTS), np.zeros(kernel.OUTPUTS)
     n, steps = drives.shape[0], 0
@@ -90,7 +90,7 @@ def residuals_side_by_side(
         if k > 0:
             if substeps[k] != steps:
                 steps = substeps[k]
-                share(kernel, work, pace, (sample_time / steps,))
+                place_shared(kernel, work, pace, (sample_time / steps,))
                 for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
                     kernel.settle_at(slots + first, 0.0)
             drive(kernel, work, drives, k, steps)

@@ -10,23 +10,23 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimation.fits.greybox.pump_ripple import COUNTS, LEAST_TEETH, ShownRipple
+from estimation.fits.greybox.pump_ripple import LEAST_TEETH, TOOTH_COUNTS, ShownRipple
 
-ANY_TEETH = 0.5
+RIPPLE_PROBABILITY = 0.5
 """Prior probability that ripple has an effect at all: a simulator may have none [fraction]."""
 
 SMALL_STD = LEAST_TEETH / 6.0**0.5
 """Standard deviation of the cosine and the sine of small ripple, uniform up to `LEAST_TEETH` [fraction]."""
 
 
-MOVED = ("bulk_modulus", "leakage_coefficient", "flow_bias")
+CORRECTED_PARAMETERS = ("bulk_modulus", "leakage_coefficient", "flow_bias")
 """Parameters that are corrected for small ripple; all are fitted as logarithms."""
 
-NOT_MOVED: tuple[Mapping[str, float], Mapping[str, float]] = ({}, {})
+NO_SHIFTS: tuple[Mapping[str, float], Mapping[str, float]] = ({}, {})
 """Correction if a fit does not test for ripple, or includes some."""
 
 
-MOST_MOVED = 1.0
+LARGEST_SHIFT = 1.0
 """Largest shift of a parameter's logarithm by small ripple [dimensionless]; judged."""
 
 
@@ -51,7 +51,7 @@ def small_pump_ripple(
         In the fitted coordinates [dimensionless], by unknown.
     """
     alone = [one for one in shown.values() if one.offset == 0.0]
-    share = ANY_TEETH / len(COUNTS)
+    share = RIPPLE_PROBABILITY / len(TOOTH_COUNTS)
     weights, moves, variances = [1.0 - share * len(alone)], [np.zeros(len(names))], [np.zeros(len(names))]
     for one in alone:
         along = one.power @ np.array([one.teeth.cosine, one.teeth.sine])
@@ -81,7 +81,7 @@ def with_shifts(
     Returns
     -------
     dict[str, tuple of float]
-        The same, those of `MOVED` changed [SI].
+        The same, those of `CORRECTED_PARAMETERS` changed [SI].
 
     Examples
     --------
@@ -90,9 +90,9 @@ def with_shifts(
     """
     out = dict(found)
     for moved, variance in shifts:
-        for name in (name for name in MOVED if name in moved and name in out):
+        for name in (name for name in CORRECTED_PARAMETERS if name in moved and name in out):
             value, std = out[name]
-            # no fit is linear beyond `MOST_MOVED`: there only the deviation grows
-            step = moved[name] if abs(moved[name]) <= MOST_MOVED else 0.0
+            # no fit is linear beyond `LARGEST_SHIFT`: there only the deviation grows
+            step = moved[name] if abs(moved[name]) <= LARGEST_SHIFT else 0.0
             out[name] = value * math.exp(step), math.hypot(std, value * variance[name] ** 0.5)
     return out

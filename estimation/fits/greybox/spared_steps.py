@@ -27,11 +27,11 @@ AROUND = 3
 MOST_SHORT = 0.3
 """Share of samples with short steps that is too large [fraction]."""
 
-LAST = 4
+LAST_EVALUATIONS = 4
 """Evaluations with all short steps at the end of a search that had few [count]."""
 
 
-def sparing_steps(problem: Problem, theta: Array) -> IntArray:
+def steps_where_needed(problem: Problem, theta: Array) -> IntArray:
     """Return model steps up to each sample: one where that is as exact as several, near a point.
 
     Parameters
@@ -77,8 +77,8 @@ def with_steps(problem: Problem, steps: IntArray | None) -> Problem:
     return problem if log is problem.log else problem.on(log)
 
 
-def spared(problem: Problem, theta: Array) -> Problem:
-    """Return a problem with short model steps where they matter near a point, see `sparing_steps`.
+def with_steps_where_needed(problem: Problem, theta: Array) -> Problem:
+    """Return a problem with short model steps where they matter near a point, see `steps_where_needed`.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def spared(problem: Problem, theta: Array) -> Problem:
     Problem
         The problem; the same object if nothing can be saved.
     """
-    return with_steps(problem, sparing_steps(problem, theta))
+    return with_steps(problem, steps_where_needed(problem, theta))
 
 
 def step_errors(problem: Problem, theta: Array) -> Array:
@@ -110,7 +110,7 @@ def step_errors(problem: Problem, theta: Array) -> Array:
     ndarray, shape (outputs, blocks)
         Of each block's residual, in standard deviations of its noise [dimensionless].
     """
-    return _apart(problem, theta, problem.log, replace(problem.log, stiff=True))
+    return _residual_difference(problem, theta, problem.log, replace(problem.log, stiff=True))
 
 
 def _long_step_errors(problem: Problem, theta: Array) -> Array:
@@ -121,11 +121,11 @@ def _long_step_errors(problem: Problem, theta: Array) -> Array:
     log = problem.log
     white = tuple(one.scaled(1.0, 0.0) for one in log.noise)
     bare = replace(log, measured=np.zeros(log.measured.shape), block=log.sample_time, noise=white, course=None)
-    errors = _apart(problem, theta, bare.coarsened(), bare)
+    errors = _residual_difference(problem, theta, bare.coarsened(), bare)
     return np.max(np.abs(np.diff(errors, axis=1, prepend=0.0)), axis=0)
 
 
-def _apart(problem: Problem, theta: Array, rough: GreyBoxLog, fine: GreyBoxLog) -> Array:
+def _residual_difference(problem: Problem, theta: Array, rough: GreyBoxLog, fine: GreyBoxLog) -> Array:
     """Return a log's residuals with some model steps minus those with others, shape (outputs, blocks)."""
     # side by side, as in a search, so that no further kernel is compiled for these two runs
     rows = [rough.parameters] * min(1 + len(theta), LANES)

@@ -11,15 +11,15 @@ from estimation.fits.hypotheses import LATEST, Hypothesis
 from estimation.fits.hypothesis_search.decimation import cost_over_noise, decimated
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.fit_objections import QUIET
-from estimation.fits.hypothesis_search.wide_log import balanced_by, delayed, usual_values
+from estimation.fits.hypothesis_search.wide_log import usual_values, with_balance, without_delays
 from estimation.fits.hypothesis_search.wide_problem import (
     AIR_ONSET,
     AIR_WIDTH,
     STEP_AT,
     STEP_WIDTH,
     flow_bounds,
-    freed,
-    freed_at_end,
+    hypothesis_problem,
+    parameters_at_end,
 )
 from estimation.models.wide_flow import LINEAR
 from plant.arrays import Array
@@ -30,7 +30,7 @@ SETTLING = 40
 SLIGHT = 1e-4
 """Share of the cost that a further step must promise with long model steps [fraction]: their errors are larger."""
 
-NEAR = 2.0
+NEAR_RADIUS = 2.0
 """First trust radius of a search [dimensionless]: it begins where the plain form or a simpler hypothesis ended."""
 
 FINEST_DELAY = 1e-3
@@ -65,24 +65,24 @@ def search_coarsely(log: GreyBoxLog, tried: Trial, wanted: float = np.inf, every
     every : int
         How many samples are merged into one, see `decimated` [count].
     """
-    early, known = coarsened(log, tried.delays, tried.together, every), freed_at_end(tried.together[:-1])
+    early, known = coarse_log(log, tried.delays, tried.together, every), parameters_at_end(tried.together[:-1])
     tried = replace(tried, void=False)
-    best = _led_down(early, tried, tried.point.theta, *known, wanted=wanted)
-    if (revived := _revived(log, best, *known)) is not None:
-        best = min(best, _led_down(early, best, revived, *known, wanted=wanted), key=lambda one: one.cost)
+    best = _coarse_descent(early, tried, tried.point.theta, *known, wanted=wanted)
+    if (revived := _start_with_rig_values(log, best, *known)) is not None:
+        best = min(best, _coarse_descent(early, best, revived, *known, wanted=wanted), key=lambda one: one.cost)
     if len(tried.together[-1].delays) > 1:
-        best = _punctual(log, best, every, *known)
+        best = _with_best_delay(log, best, every, *known)
     if any(one.from_entry for one in tried.together):
         times = [(max(onset - 0.5 * width, 0.0), width) for width in WIDTHS for onset in ONSETS]
-        best = _timed(early, best, (AIR_ONSET, AIR_WIDTH), times, wanted)
+        best = _with_best_time(early, best, (AIR_ONSET, AIR_WIDTH), times, wanted)
     if any(one.from_change for one in tried.together):
         at = best.values[STEP_AT]
         times = [(min(max(at + off, 0.0), 1.0), width) for width in STEP_WIDTHS for off in STEP_NEAR]
-        best = _timed(early, best, (STEP_AT, STEP_WIDTH), times, wanted)
-    return unless_quiet(log, best)
+        best = _with_best_time(early, best, (STEP_AT, STEP_WIDTH), times, wanted)
+    return void_if_quiet(log, best)
 
 
-def unless_quiet(log: GreyBoxLog, tried: Trial) -> Trial:
+def void_if_quiet(log: GreyBoxLog, tried: Trial) -> Trial:
     """Return a trial; void if its residuals are far smaller than the effect of position noise.
 
     For oil as stiff as steel that noise is so large that it explains any log. No other explanation would cost as
@@ -98,35 +98,35 @@ def unless_quiet(log: GreyBoxLog, tried: Trial) -> Trial:
     return replace(tried, void=log.passes_on and cost_over_noise(log, tried.point.cost) < QUIET)
 
 
-def _led_down(log: GreyBoxLog, tried: Trial, start: Array, *more: str, wanted: float) -> Trial:
+def _coarse_descent(log: GreyBoxLog, tried: Trial, start: Array, *more: str, wanted: float) -> Trial:
     """Return a set of hypotheses after a descent with long model steps."""
-    return descended(log, tried, start, SETTLING, *more, wanted=wanted, least_share=SLIGHT)
+    return after_descent(log, tried, start, SETTLING, *more, wanted=wanted, least_share=SLIGHT)
 
 
-def _punctual(log: GreyBoxLog, best: Trial, every: int, *known: str) -> Trial:
+def _with_best_delay(log: GreyBoxLog, best: Trial, every: int, *known: str) -> Trial:
     """Return a set of hypotheses with the delay of its last one searched in steps of `FINEST_DELAY`."""
     channel, early = best.together[-1].late, min(best.together[-1].delays) < 0.0
     least, most = (-LATEST, 0.0) if early else (0.0, LATEST)
     for step in (FINEST_DELAY, -FINEST_DELAY):
         while least <= (delay := best.delays.get(channel, 0.0) + step) <= most:
             moved = replace(best, delays={channel: delay})
-            later = coarsened(log, moved.delays, moved.together, every)
-            moved = _led_down(later, moved, best.point.theta, *known, wanted=best.cost)
+            later = coarse_log(log, moved.delays, moved.together, every)
+            moved = _coarse_descent(later, moved, best.point.theta, *known, wanted=best.cost)
             if moved.cost >= best.cost:
                 break
             best = moved
     return best
 
 
-def _timed(
+def _with_best_time(
     log: GreyBoxLog, tried: Trial, names: tuple[str, str], times: Sequence[tuple[float, float]], wanted: float
 ) -> Trial:
     """Return a set of hypotheses with the likeliest time and width of its change.
 
     A descent finds only the nearest time, and none if the change is quick.
     """
-    more = freed_at_end(tried.together)
-    problem = freed(log, tried.together, *more)
+    more = parameters_at_end(tried.together)
+    problem = hypothesis_problem(log, tried.together, *more)
     places = [problem.model.unknowns.index(name) for name in names]
     theta = problem.model.theta({**usual_values(log), **tried.values})
     asked = [(at / LINEAR[names[0]], np.log(width)) for at, width in times]
@@ -134,17 +134,17 @@ def _timed(
         thetas = np.repeat(theta[None], len(asked) + 1, axis=0)
         thetas[1:, places] = asked
         start = thetas[int(np.argmin(problem.costs([*thetas])))]
-        further = _led_down(log, tried, start, *more, wanted=wanted)
+        further = _coarse_descent(log, tried, start, *more, wanted=wanted)
         if further.cost > tried.cost - LEAST_BETTER:
             break
         tried, theta = further, further.point.theta
     return tried
 
 
-def _revived(log: GreyBoxLog, tried: Trial, *more: str) -> Array | None:
+def _start_with_rig_values(log: GreyBoxLog, tried: Trial, *more: str) -> Array | None:
     """Return a start with the rig's value of what has almost vanished: a logarithm does not come back from there."""
     lost = vanished_values(log, tried.values)
-    return freed(log, tried.together, *more).model.theta({**tried.values, **lost}) if lost else None
+    return hypothesis_problem(log, tried.together, *more).model.theta({**tried.values, **lost}) if lost else None
 
 
 def vanished_values(log: GreyBoxLog, values: Mapping[str, float]) -> dict[str, float]:
@@ -166,7 +166,7 @@ def vanished_values(log: GreyBoxLog, values: Mapping[str, float]) -> dict[str, f
     return {name: usual[name] for name in MAY_VANISH if values[name] < VANISHED * usual[name]}
 
 
-def descended(
+def after_descent(
     log: GreyBoxLog,
     tried: Trial,
     start: Array,
@@ -199,13 +199,13 @@ def descended(
     Trial
         The set where the search ended.
     """
-    problem = freed(log, tried.together, *more)
+    problem = hypothesis_problem(log, tried.together, *more)
     bounds = flow_bounds(problem.model, [start], log)
-    point = descend(problem.at, start, evaluations, bounds, radius=NEAR, wanted=wanted, least_share=least_share)
+    point = descend(problem.at, start, evaluations, bounds, radius=NEAR_RADIUS, wanted=wanted, least_share=least_share)
     return replace(tried, point=point, values=problem.model.values(point.theta))
 
 
-def coarsened(
+def coarse_log(
     log: GreyBoxLog, delays: Mapping[str, float], together: tuple[Hypothesis, ...], every: int = 1
 ) -> GreyBoxLog:
     """Return a log with one model step per sample, as the coarse search uses it.
@@ -221,5 +221,5 @@ def coarsened(
     every : int
         How many samples are merged into one, see `decimated` [count].
     """
-    row = decimated(delayed(log, delays), every)
-    return balanced_by(row, 1.0) if any(one.by_mass for one in together) else row
+    row = decimated(without_delays(log, delays), every)
+    return with_balance(row, 1.0) if any(one.by_mass for one in together) else row

@@ -11,19 +11,17 @@ from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, LEAST_DELIVERY, V
 from estimation.fits.hypothesis_search.conclusion import Accepted, delivery_beside, is_explained
 from estimation.fits.hypothesis_search.decimation import Decimation
 from estimation.fits.hypothesis_search.explanation import Trial
-from estimation.fits.hypothesis_search.ranking import likeliest
+from estimation.fits.hypothesis_search.ranking import likeliest_sets
 from estimation.fits.hypothesis_search.screening import screen
-from estimation.fits.hypothesis_search.wide_log import delayed
+from estimation.fits.hypothesis_search.wide_log import without_delays
 
-BESIDE_OTHERS = 20.0
+DELIVERY_GAIN = 20.0
 """Predicted gain in log-likelihood of another delivery beside an explanation, from which both are searched together
 [dimensionless]; judged, twice what a hypothesis must gain. With a pump of 90 % and a pressure 3.7 ms late, slopes
 promised 27, and bulk modulus was 11 % too low."""
 
 
-def delivery_followed(
-    log: GreyBoxLog, finished: Sequence[Trial], spared: Decimation, accepted: Accepted
-) -> list[Trial]:
+def fit_of_delivery(log: GreyBoxLog, finished: Sequence[Trial], spared: Decimation, accepted: Accepted) -> list[Trial]:
     """Return the final fit of another pump delivery, if no single hypothesis explains the log.
 
     A worn pump biases leakage, bulk modulus and valves of the plain form together. The slopes there do not show it, and
@@ -49,7 +47,7 @@ def delivery_followed(
     followed = any(one.together == (DELIVERY,) and one.fits for one in finished)
     if followed or is_explained(finished[0], accepted):
         return []
-    return _sought(log, (DELIVERY,), spared, known=finished[0].cost)
+    return _joint_search(log, (DELIVERY,), spared, known=finished[0].cost)
 
 
 def with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
@@ -71,7 +69,7 @@ def with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accep
     """
     if ENCODER_ZERO in first.together or is_explained(first, accepted):
         return []
-    return _sought(log, (*first.together, ENCODER_ZERO), spared, accepted, first.delays)
+    return _joint_search(log, (*first.together, ENCODER_ZERO), spared, accepted, first.delays)
 
 
 def rig_and_load(log: GreyBoxLog, load: Hypothesis, best: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
@@ -95,7 +93,7 @@ def rig_and_load(log: GreyBoxLog, load: Hypothesis, best: Trial, spared: Decimat
     """
     if is_explained(best, accepted):
         return []
-    return _sought(log, (DELIVERY, VOLUME, load), spared, accepted)
+    return _joint_search(log, (DELIVERY, VOLUME, load), spared, accepted)
 
 
 def with_delivery(log: GreyBoxLog, best: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
@@ -120,12 +118,12 @@ def with_delivery(log: GreyBoxLog, best: Trial, spared: Decimation, accepted: Ac
     if DELIVERY in best.together or not is_explained(best, accepted):
         return []
     promised = delivery_beside(log, best)
-    if promised.gain < BESIDE_OTHERS or abs(promised.size) < LEAST_DELIVERY:
+    if promised.gain < DELIVERY_GAIN or abs(promised.size) < LEAST_DELIVERY:
         return []
-    return _sought(log, (*best.together, DELIVERY), spared, accepted, best.delays, [best.coarse or best.values])
+    return _joint_search(log, (*best.together, DELIVERY), spared, accepted, best.delays, [best.coarse or best.values])
 
 
-def _sought(
+def _joint_search(
     log: GreyBoxLog,
     together: tuple[Hypothesis, ...],
     spared: Decimation,
@@ -135,7 +133,7 @@ def _sought(
     known: float = np.inf,
 ) -> list[Trial]:
     """Return the ends of a search for hypotheses together, best first; on request only those that explain the log."""
-    late = delayed(log, delays)
+    late = without_delays(log, delays)
     tried = [*screen(late, together, starts or spared.starts, every=spared.every)]
-    ended = [replace(one, delays={**delays, **one.delays}) for one in likeliest(late, [tried], known, spared)]
+    ended = [replace(one, delays={**delays, **one.delays}) for one in likeliest_sets(late, [tried], known, spared)]
     return [one for one in ended if accepted is None or is_explained(one, accepted)]

@@ -11,9 +11,9 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, VOLUME
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
 from estimation.fits.hypothesis_search.final_fits import with_details
-from estimation.fits.hypothesis_search.form_fit import TEMPER, weighed
+from estimation.fits.hypothesis_search.form_fit import TEMPER, likelihood_mean
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain, predicted_gain_beside
-from estimation.fits.hypothesis_search.wide_log import balanced_by, delayed, usual_pressure
+from estimation.fits.hypothesis_search.wide_log import usual_pressure, with_balance, without_delays
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import GROWTH, grown_leakage
@@ -42,7 +42,7 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
     fits = tuple(fit for one, _ in weighted for fit in one.fits)
     likely = tuple(weight for one, weight in weighted for _ in one.fits)
     values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()}
-    values |= dict(weighed(fits, priors=likely))
+    values |= dict(likelihood_mean(fits, priors=likely))
     if any(name in values for name in GROWTH):  # the reported leakage is that at the end of the log
         ended = float(grown_leakage(1.0, *(values.get(name, (0.0, 0.0))[0] for name in GROWTH)))
         value, std = values["leakage_coefficient"]
@@ -52,7 +52,7 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
         values=values,
         delays=best.delays,
         fits=fits,
-        rivals=tuple(name for name in dict.fromkeys(map(_named, rivals)) if name != _named(best)),
+        rivals=tuple(name for name in dict.fromkeys(map(_names_of_set, rivals)) if name != _names_of_set(best)),
         stated_pressure=usual_pressure(log, parameters),
         opening=partial(delivery_beside, log, best),
         detailing=partial(_detailed, log, parameters, (best, *rivals), accepted),
@@ -60,7 +60,7 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
     )
 
 
-def _named(tried: Trial) -> str:
+def _names_of_set(tried: Trial) -> str:
     return " and ".join(one.name for one in tried.together)
 
 
@@ -115,6 +115,6 @@ def delivery_beside(log: GreyBoxLog, best: Trial) -> PredictedGain:
     """
     if DELIVERY.free[0] in best.values:
         return NO_GAIN
-    row = balanced_by(delayed(log, best.delays), float(best.by_mass))
+    row = with_balance(without_delays(log, best.delays), float(best.by_mass))
     more = [name for name in (STIFFNESS, *CRACKS) if name in best.values]
     return predicted_gain_beside(row, best.together, best.values, DELIVERY, *more)

@@ -14,7 +14,7 @@ from plant.arrays import Array
 LONG_STEP, SHORT_STEP = 4e-3, 2e-3
 """Model step for the comparison of hypotheses if the plain form leaves much, or little, unexplained [s]."""
 
-FEW = 8_000
+SHORT_LOG = 8_000
 """Length of a log that is not decimated [samples]: it takes a second or two, and its minima are narrow."""
 
 LOUD, FAINT = 10.0, 2.0
@@ -88,7 +88,7 @@ def decimated(log: GreyBoxLog, every: int) -> GreyBoxLog:
         sample_time=every * log.sample_time,
         steps=np.ones(len(drives), log.steps.dtype),
         noise=tuple(one.scaled(1.0 / block) for one in log.noise),
-        gaps=_gaps_at(log.gaps, first, every),
+        gaps=_decimated_gaps(log.gaps, first, every),
         stands_for=max(every / apart, 1.0) / block,
     )
 
@@ -100,7 +100,7 @@ def _smoothed(speed: Array, every: int) -> Array:
     return np.convolve(np.pad(speed, every - 1, mode="edge"), window, "valid")
 
 
-def _gaps_at(gaps: Array, row: int, every: int) -> Array:
+def _decimated_gaps(gaps: Array, row: int, every: int) -> Array:
     """Return gaps for the samples that remain from a row on; each has the uncertainty of those it replaces."""
     first, last, variance = gaps.T
     begun, ended = (np.maximum(end - row, 0.0) // every for end in (first, last))
@@ -151,7 +151,7 @@ def decimation_for(log: GreyBoxLog, left: float) -> int:
     int
         One if little is left, since small gains then matter, and in short logs [count].
     """
-    if left < FAINT or len(log.drives) < FEW:
+    if left < FAINT or len(log.drives) < SHORT_LOG:
         return 1
     step = LONG_STEP if left > LOUD else SHORT_STEP
     return max(1, round(step / log.sample_time))

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import Hypothesis
-from estimation.fits.hypothesis_search.coarse_search import coarsened
+from estimation.fits.hypothesis_search.coarse_search import coarse_log
 from estimation.fits.hypothesis_search.decimation import cost_over_noise
 from estimation.fits.hypothesis_search.wide_log import usual_values
-from estimation.fits.hypothesis_search.wide_problem import freed, freed_at_end
+from estimation.fits.hypothesis_search.wide_problem import hypothesis_problem, parameters_at_end
 
 MOVED, MOVED_LEAST = 0.15, 0.3
 """Change of the cost by decimation that is allowed: share of the cost, and at least so much over that of noise
@@ -48,7 +48,9 @@ def decimation_limit(
     """
 
     def left(samples: int) -> float:
-        problem = freed(coarsened(log, delays or {}, together, samples), together, *freed_at_end(together))
+        problem = hypothesis_problem(
+            coarse_log(log, delays or {}, together, samples), together, *parameters_at_end(together)
+        )
         return cost_over_noise(log, problem.at(problem.model.theta({**usual_values(log), **values})).cost)
 
     if every == 1:

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.fit import GreyBoxFit, concluded
+from estimation.fits.greybox.fit import GreyBoxFit, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.play import play_left
-from estimation.fits.greybox.spared_steps import LAST, spared
+from estimation.fits.greybox.play import omitted_play_note
+from estimation.fits.greybox.spared_steps import LAST_EVALUATIONS, with_steps_where_needed
 from estimation.fits.hypotheses import CHECKS_CRACK, PRESSURE_FILTERED, PRESSURE_LATE, Hypothesis
-from estimation.fits.hypothesis_search.coarse_search import NEAR, coarsened, descended
-from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise
+from estimation.fits.hypothesis_search.coarse_search import NEAR_RADIUS, after_descent, coarse_log
+from estimation.fits.hypothesis_search.decimation import SHORT_LOG, cost_over_noise
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.fit_objections import is_too_close
-from estimation.fits.hypothesis_search.wide_log import balanced_by, balances_mass, delayed, usual_values
-from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, freed_at_end
+from estimation.fits.hypothesis_search.wide_log import balances_mass, usual_values, with_balance, without_delays
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, hypothesis_problem, parameters_at_end
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import STIFFNESS
 from estimation.models.wrong_pressure import SETTLING
@@ -39,27 +39,27 @@ rounds make an eighth), but never needs to promise less than the second times th
 FAR_BEHIND = 1.2
 """Cost after twelve evaluations over the cost that would be of use, above which the search ends [dimensionless]."""
 
-NEVER = float(np.finfo(np.float64).max)
+UNBELIEVABLE_COST = float(np.finfo(np.float64).max)
 """Cost of a fit that does not mean what its hypotheses say, so that it is never believed [dimensionless]."""
 
 VALVES = {*CRACKS, *CHECKS_CRACK.free}
 """Drops at which make-up valves open, of each and of both."""
 
-NO_SURER = 0.7
+LEAST_DEVIATION_RATIO = 0.7
 """Ratio of the deviation of bulk modulus after and before parameters are added, below which the model chatters
 [dimensionless]: added parameters cannot reduce it. Two of 58 logs had 0.06 and 0.26, one of them 9 deviations off, and
 all others 0.78 to 2."""
 
-LITTLE = 1e-3
+NEGLIGIBLE_SHARE = 1e-3
 """Share of the cost below which a gain means nothing, if far more than noise is left [fraction]; judged."""
 
-WORTH = 10.0
+REQUIRED_GAIN = 10.0
 """Gain in log-likelihood below which a hypothesis is not accepted, and a drift of pressure is even [dimensionless]."""
 
-CLOSE = 60.0
+RIVAL_DISTANCE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
 
-ALIKE = 15.0
+EQUAL_DISTANCE = 15.0
 """Difference of log-likelihood up to which two sets of hypotheses explain a log equally well [dimensionless]."""
 
 
@@ -85,32 +85,32 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
     -------
     Trial
         The set at the end of its search with short model steps, with its fits. If it no longer means what its
-        hypotheses say, its cost is `NEVER`.
+        hypotheses say, its cost is `UNBELIEVABLE_COST`.
     """
-    row = delayed(log, tried.delays)
+    row = without_delays(log, tried.delays)
     done: list[tuple[Trial, FreedProblem]] = []
-    last = (*details, *freed_at_end(tried.together))
-    sought_by = balances_mass(coarsened(log, {}, tried.together))
+    last = (*details, *parameters_at_end(tried.together))
+    sought_by = balances_mass(coarse_log(log, {}, tried.together))
     for share in (1.0, 0.0) if sought_by else (0.0, 1.0):
-        own, more = balanced_by(row, share), (STIFFNESS, *last) if share else last
-        problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
+        own, more = with_balance(row, share), (STIFFNESS, *last) if share else last
+        problem, begun = hypothesis_problem(own, tried.together, *more), done[-1][0] if done else tried
         start = problem.model.theta({**usual_values(own), **begun.values})
-        ended = _to_its_end(problem, begun, start, *more, useful=useful)
+        ended = _completed_search(problem, begun, start, *more, useful=useful)
         done.append((replace(ended, by_mass=bool(share)), problem))
-        useful = min(useful, done[-1][0].cost + ALIKE)
+        useful = min(useful, done[-1][0].cost + EQUAL_DISTANCE)
     done.sort(key=lambda one: one[0].cost)
     best = replace(done[0][0], coarse=tried.values)
-    count = [one for one in done if one[0].cost <= best.cost + ALIKE]
-    first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
+    count = [one for one in done if one[0].cost <= best.cost + EQUAL_DISTANCE]
+    first, *rivals = (_fit_at_end(problem, one.point, log) for one, problem in count)
     sound = best.meant and not is_too_close(first, log.passes_on)
     if SETTLING in last:  # an even drift is better determined if it is fitted as one
         even = tuple(replace(one, at_end=()) if one.at_end == (SETTLING,) else one for one in tried.together)
-        evenly = final_fit(log, replace(tried, together=even), best.cost + WORTH, *details)
-        if evenly.cost < best.cost + WORTH:
+        evenly = final_fit(log, replace(tried, together=even), best.cost + REQUIRED_GAIN, *details)
+        if evenly.cost < best.cost + REQUIRED_GAIN:
             return replace(evenly, together=tried.together)
     if sound and all(one.told(best.values, first.std) for one in best.together):
         return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
-    return replace(best, void=True, fits=(replace(first, cost=NEVER),))
+    return replace(best, void=True, fits=(replace(first, cost=UNBELIEVABLE_COST),))
 
 
 def with_details(log: GreyBoxLog, tried: Trial) -> Trial:
@@ -136,17 +136,17 @@ def with_details(log: GreyBoxLog, tried: Trial) -> Trial:
     if VALVES & {name for one in tried.together for name in (*one.free, *one.beside)}:
         return tried
     further = final_fit(log, tried, np.inf, STIFFNESS, *CRACKS)
-    if "pilot_share" in further.values and further.fits and play_left(further.fit.play):
+    if "pilot_share" in further.values and further.fits and omitted_play_note(further.fit.play):
         # corners of piloted valves end a search early, and its residuals then look like play
         again = final_fit(log, further, np.inf, STIFFNESS, *CRACKS)
         further = replace(again, coarse=tried.coarse) if again.cost < further.cost else further
     if further.cost > tried.cost:
         return tried
     known, before = (one.fit.std["bulk_modulus"] for one in (further, tried))
-    return further if known >= NO_SURER * before else tried
+    return further if known >= LEAST_DEVIATION_RATIO * before else tried
 
 
-def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
+def with_pressure_filter(log: GreyBoxLog, tried: Trial) -> Trial:
     """Return the final fit of a set with a second-order pressure filter in place of a delay and a lag, if likelier.
 
     The delay of a filter is no whole number of samples: a modelled delay of 8 ms for one of 7.5 ms put bulk modulus 4
@@ -177,7 +177,7 @@ def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
     return filtered if filtered.cost < tried.cost else tried
 
 
-def without_idle(log: GreyBoxLog, tried: Trial) -> Trial:
+def without_vanished_effect(log: GreyBoxLog, tried: Trial) -> Trial:
     """Return the final fit of a set without a hypothesis whose effect vanished.
 
     A second hypothesis may lead a search out of a false minimum, and its effect then vanishes. Air in the oil was found
@@ -198,11 +198,11 @@ def without_idle(log: GreyBoxLog, tried: Trial) -> Trial:
     if len(tried.together) < 2 or not tried.fits:
         return tried
     for one in tried.together:
-        if _is_absent(one, tried, (2.0 * WORTH) ** 0.5):
+        if _is_absent(one, tried, (2.0 * REQUIRED_GAIN) ** 0.5):
             rest = tuple(other for other in tried.together if other != one)
             values = {**tried.values, **{name: tried.rig[name] for name in one.free}}
-            fewer = final_fit(log, replace(tried, together=rest, values=values), tried.cost + WORTH)
-            if fewer.cost < tried.cost + WORTH:
+            fewer = final_fit(log, replace(tried, together=rest, values=values), tried.cost + REQUIRED_GAIN)
+            if fewer.cost < tried.cost + REQUIRED_GAIN:
                 return fewer
     return tried
 
@@ -214,20 +214,22 @@ def _is_absent(one: Hypothesis, tried: Trial, deviations: float) -> bool:
     return not delayed_too and all(near)
 
 
-def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:
+def _fit_at_end(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:
     least, _ = flow_bounds(problem.model, [point.theta], log)
-    return concluded(problem, point, least=least, warned=False)
+    return fit_at_solution(problem, point, least=least, warned=False)
 
 
-def _to_its_end(problem: FreedProblem, tried: Trial, start: Array, *more: str, useful: float = np.inf) -> Trial:
+def _completed_search(problem: FreedProblem, tried: Trial, start: Array, *more: str, useful: float = np.inf) -> Trial:
     """Return the end of a search with short model steps: first where they matter, at last everywhere."""
-    best = _led_on(problem, tried, start, *more, useful=useful)
+    best = _search_with_short_steps(problem, tried, start, *more, useful=useful)
     bounds = flow_bounds(problem.model, [best.point.theta], problem.log)
-    point = descend(problem.at, best.point.theta, LAST, bounds, radius=NEAR, wanted=useful)
+    point = descend(problem.at, best.point.theta, LAST_EVALUATIONS, bounds, radius=NEAR_RADIUS, wanted=useful)
     return replace(best, point=point, values=problem.model.values(point.theta))
 
 
-def _led_on(problem: FreedProblem, tried: Trial, start: Array, *more: str, useful: float = np.inf) -> Trial:
+def _search_with_short_steps(
+    problem: FreedProblem, tried: Trial, start: Array, *more: str, useful: float = np.inf
+) -> Trial:
     """Return the optimum with short model steps, which may be far from that with long ones.
 
     Each round determines anew which samples need them.
@@ -235,8 +237,8 @@ def _led_on(problem: FreedProblem, tried: Trial, start: Array, *more: str, usefu
     log = problem.log
 
     def further(one: Trial, theta: Array) -> Trial:
-        wanted = min(useful, _hoped(log, one.cost))
-        return descended(spared(problem, theta).log, one, theta, FINISHING, *more, wanted=wanted)
+        wanted = min(useful, _cost_to_promise(log, one.cost))
+        return after_descent(with_steps_where_needed(problem, theta).log, one, theta, FINISHING, *more, wanted=wanted)
 
     best = further(tried, start)
     for _ in range(ROUNDS - 1):
@@ -246,14 +248,14 @@ def _led_on(problem: FreedProblem, tried: Trial, start: Array, *more: str, usefu
         gained = best.cost - again.cost
         if gained > 0.0:
             best = again
-        if gained < max(CLOSE, LITTLE * best.cost):
+        if gained < max(RIVAL_DISTANCE, NEGLIGIBLE_SHARE * best.cost):
             break
     return best
 
 
-def _hoped(log: GreyBoxLog, cost: float) -> float:
+def _cost_to_promise(log: GreyBoxLog, cost: float) -> float:
     """Return the cost that a search with short model steps must promise to reach, or else it ends."""
-    if len(log.drives) < FEW or not np.isfinite(cost):
+    if len(log.drives) < SHORT_LOG or not np.isfinite(cost):
         return np.inf
     return max(FINISHED * cost, REACHED * cost / cost_over_noise(log, cost))
 
@@ -268,4 +270,4 @@ def is_hopeless(log: GreyBoxLog, cost: float) -> bool:
     cost : float
         Half the sum of squares that is left [dimensionless].
     """
-    return len(log.drives) >= FEW and cost_over_noise(log, cost) >= UNFINISHED
+    return len(log.drives) >= SHORT_LOG and cost_over_noise(log, cost) >= UNFINISHED

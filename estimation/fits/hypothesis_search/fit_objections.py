@@ -1,13 +1,13 @@
 """`objections(fit, noisy)`: objections to a fit of the flow form, from its residuals."""
 
-from estimation.fits.greybox.chance import LARGEST_CHI_SQUARE, alike_by_chance, largest_chi_square
+from estimation.fits.greybox.chance import LARGEST_CHI_SQUARE, correlation_by_chance, largest_chi_square
 from estimation.fits.greybox.fit import GreyBoxFit
-from estimation.fits.greybox.lateness import most_late
-from estimation.fits.greybox.play import ShownPlay, play_left
+from estimation.fits.greybox.lateness import latest_channel
+from estimation.fits.greybox.play import ShownPlay, omitted_play_note
 from estimation.notes import EstimateCode
 from plant.notes import Note
 
-DOUBTED = 1.1
+DOUBTED_CHI_SQUARE = 1.1
 """The same for a log that begins under load or in motion: its fit has many minima, and the sensors' noise is known to a
 twentieth [dimensionless]."""
 
@@ -25,14 +25,14 @@ explained a leaky rig's log at a fifth of the noise, and passed the gate."""
 LATE_WORTH = 20.0
 """Gain in log-likelihood from which speed or position is reported as late or early, if no hypothesis says more
 [dimensionless]. For right explanations the gain is at most 6, on logs of 18 kinds of strange rigs and on 18 of a
-foreign bench; for a position that lags by 3 ms it is 390 to 2800. The test begins at `WORTH`: half a millisecond may
-gain 10, and move bulk modulus by seven deviations."""
+foreign bench; for a position that lags by 3 ms it is 390 to 2800. The test begins at `REQUIRED_GAIN`: half a
+millisecond may gain 10, and move bulk modulus by seven deviations."""
 
 NAMED_SHARE = 0.25
 """Share of the unexplained cost that a cause must account for, to be named beside it [fraction]."""
 
 
-def limits(noisy: bool, samples: float) -> tuple[float, float]:
+def residual_limits(noisy: bool, samples: float) -> tuple[float, float]:
     """Return the limits on the residuals of a fit that explains a log; a short log has wider ones.
 
     Parameters
@@ -48,10 +48,10 @@ def limits(noisy: bool, samples: float) -> tuple[float, float]:
         The largest mean squared normalised residual, and correlation of neighbouring ones [dimensionless].
     """
     largest, correlated = NOISY if noisy else (LARGEST_CHI_SQUARE, LARGEST_AUTOCORRELATION)
-    return largest_chi_square(samples, largest), max(correlated, alike_by_chance(samples))
+    return largest_chi_square(samples, largest), max(correlated, correlation_by_chance(samples))
 
 
-def doubted(fit: GreyBoxFit) -> bool:
+def exceeds_noise(fit: GreyBoxFit) -> bool:
     """Return whether the residuals of a fit exceed the sensors' noise.
 
     Parameters
@@ -59,7 +59,7 @@ def doubted(fit: GreyBoxFit) -> bool:
     fit : GreyBoxFit
         The fit of a log whose position noise does not matter.
     """
-    return fit.chi_square[0] > largest_chi_square(fit.seen, DOUBTED)
+    return fit.chi_square[0] > largest_chi_square(fit.seen, DOUBTED_CHI_SQUARE)
 
 
 def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
@@ -78,14 +78,14 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
         Empty if the fit explains the log.
     """
     reasons: list[Note] = []
-    largest, correlated = limits(noisy, fit.seen)
+    largest, correlated = residual_limits(noisy, fit.seen)
     if fit.chi_square[0] > largest:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
     if is_too_close(fit, noisy):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_SMALL.note(ratio=fit.chi_square[0] ** -0.5))
-    if abs(fit.autocorrelation[0]) > correlated and not _alternates(fit, noisy):
+    if abs(fit.autocorrelation[0]) > correlated and not _residuals_alternate(fit, noisy):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
-    channel, late, gain = most_late(fit.late)
+    channel, late, gain = latest_channel(fit.late)
     if gain > max(LATE_WORTH, _share_left(fit) if reasons else 0.0):
         when = "late" if late > 0.0 else "early"
         reasons.insert(0, EstimateCode.CHANNEL_LATE.note(channel=channel, milliseconds=1e3 * abs(late), when=when))
@@ -105,7 +105,7 @@ def objections_and_play(fit: GreyBoxFit, noisy: bool, shown: ShownPlay, sensed: 
         Play that the residuals show, and play that a velocity sensor shows.
     """
     reasons = objections(fit, noisy)
-    return (*reasons, *play_left(shown, sensed, _share_left(fit) if reasons else 0.0))
+    return (*reasons, *omitted_play_note(shown, sensed, _share_left(fit) if reasons else 0.0))
 
 
 def _share_left(fit: GreyBoxFit) -> float:
@@ -126,7 +126,7 @@ def is_too_close(fit: GreyBoxFit, noisy: bool) -> bool:
     return noisy and 0.0 < fit.chi_square[0] < QUIET  # residuals are 0 if pressure is 0 throughout
 
 
-def _alternates(fit: GreyBoxFit, noisy: bool) -> bool:
+def _residuals_alternate(fit: GreyBoxFit, noisy: bool) -> bool:
     """Return whether residuals alternate due to their noise: motor noise was overestimated, or encoder noise leaks off.
 
     The random walk that motor noise causes in pressure is then followed too closely, and intervals are too wide, not
@@ -169,4 +169,4 @@ def fit_explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
     bool
         Whether it is so.
     """
-    return fit_explains(fit, noisy) and (noisy or not doubted(fit))
+    return fit_explains(fit, noisy) and (noisy or not exceeds_noise(fit))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from estimation.fits.greybox.fit import GreyBoxFit
-from estimation.fits.greybox.pump_ripple import EVENLY, Turning
+from estimation.fits.greybox.pump_ripple import NO_RIPPLE, Turning
 from plant.arrays import Array
 from plant.notes import Note
 
@@ -60,7 +60,7 @@ class FormFit:
     rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
     explanation: "Explanation | None" = None
     remarks: tuple[Note, ...] = ()
-    turning: Turning = EVENLY
+    turning: Turning = NO_RIPPLE
     correlation: float = 0.0
 
 
@@ -106,7 +106,7 @@ def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, priors: Seque
     return np.asarray(weights / np.sum(weights), dtype=np.float64)
 
 
-def weighed(
+def likelihood_mean(
     fits: Sequence[GreyBoxFit], temper: float = TEMPER, priors: Sequence[float] | None = None
 ) -> Mapping[str, tuple[float, float]]:
     """Return values and deviations over several models of one log, each weighted by its likelihood.
@@ -129,11 +129,11 @@ def weighed(
     Mapping[str, tuple of float]
         Value and deviation by parameter [SI].
     """
-    return averaged(fits, weights_of(fits, temper, priors))
+    return model_mean(fits, weights_of(fits, temper, priors))
 
 
-def averaged(fits: Sequence[GreyBoxFit], weights: Array) -> Mapping[str, tuple[float, float]]:
-    """Return values and deviations over several models of one log under given weights, see `weighed`.
+def model_mean(fits: Sequence[GreyBoxFit], weights: Array) -> Mapping[str, tuple[float, float]]:
+    """Return values and deviations over several models of one log under given weights, see `likelihood_mean`.
 
     Parameters
     ----------

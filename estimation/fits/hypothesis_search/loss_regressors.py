@@ -20,7 +20,7 @@ BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR = "bore", "tooth", "filling", "lift
 """What a loss depends on: position, the shaft's angle, speed above a limit, pressure above a limit, the sign of
 pressure, speed."""
 
-AVERAGED = 1e-2
+AVERAGING_TIME = 1e-2
 """Time over which pressure is averaged to find its sign [s]; judged: it reverses about as fast."""
 
 NARROWEST = 2e-4
@@ -66,7 +66,7 @@ class LossSignals(NamedTuple):
     speed, angle, position, pressure : ndarray, shape (n,)
         Motor speed and angle [rad/s, rad], piston position [m], differential pressure [Pa].
     steady : ndarray, shape (n,)
-        The pressure averaged over `AVERAGED` [Pa]: at rest, half of its noise would count as one direction.
+        The pressure averaged over `AVERAGING_TIME` [Pa]: at rest, half of its noise would count as one direction.
     leakage, displacement : float
         Values of the rig [m^3/(s Pa), m^3/rad].
     """
@@ -99,15 +99,15 @@ class LossSignals(NamedTuple):
             case "tooth":
                 return along * np.exp((np.cos(self.angle - course.at) - 1.0) / course.width**2)
             case "filling":
-                return self.displacement * np.sign(self.speed) * _above(self.speed, course)
+                return self.displacement * np.sign(self.speed) * _power_of_excess(self.speed, course)
             case "wear":
                 return self.displacement * self.speed
             case "lifting":
-                return self.leakage * np.sign(self.pressure) * _above(self.pressure, course)
+                return self.leakage * np.sign(self.pressure) * _power_of_excess(self.pressure, course)
             case _:
                 return self.leakage * np.where(self.steady * course.at > 0.0, self.steady, 0.0)
 
-    def tried(self) -> list[LossRegressor]:
+    def regressors_tried(self) -> list[LossRegressor]:
         """Return the regressors that are tried on a log.
 
         Returns
@@ -129,7 +129,7 @@ class LossSignals(NamedTuple):
             LossRegressor(WEAR, 0.0),
         ]
 
-    def moves(self, course: LossRegressor) -> dict[str, float]:
+    def field_steps(self, course: LossRegressor) -> dict[str, float]:
         """Return the finite-difference steps of a regressor's fitted fields.
 
         Parameters
@@ -146,7 +146,7 @@ class LossSignals(NamedTuple):
         return {name: along[course.kind] if name == "at" else 0.05 * course.width for name in course.free}
 
 
-def _above(what: Array, course: LossRegressor) -> Array:
+def _power_of_excess(what: Array, course: LossRegressor) -> Array:
     """Return a power of a signal's excess over a limit, in the signal's unit; the excess itself for a power of 1."""
     return course.at * np.maximum(np.abs(what) / course.at - 1.0, 0.0) ** course.width
 
@@ -170,7 +170,7 @@ def loss_signals(log: GreyBoxLog, parameters: EhaParameters) -> LossSignals:
     rows, seen = np.arange(len(pressure)), np.isfinite(pressure)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * log.sample_time * (speed[1:] + speed[:-1]))])
     pressure = np.interp(rows, rows[seen], pressure[seen]) if np.any(seen) else np.zeros(len(rows))
-    half = round(0.5 * AVERAGED / log.sample_time)
+    half = round(0.5 * AVERAGING_TIME / log.sample_time)
     window = np.full(2 * half + 1, 1.0 / (2 * half + 1))
     return LossSignals(
         speed,
@@ -183,7 +183,7 @@ def loss_signals(log: GreyBoxLog, parameters: EhaParameters) -> LossSignals:
     )
 
 
-def shifted(course: LossRegressor, step: Mapping[str, float], share: float) -> LossRegressor:
+def shifted_regressor(course: LossRegressor, step: Mapping[str, float], share: float) -> LossRegressor:
     """Return a regressor shifted by a share of a step.
 
     Parameters
@@ -202,7 +202,7 @@ def shifted(course: LossRegressor, step: Mapping[str, float], share: float) -> L
 
     Examples
     --------
-    >>> shifted(LossRegressor(BORE, 0.01, 0.004), {"at": 0.002, "width": 0.1}, 0.5)
+    >>> shifted_regressor(LossRegressor(BORE, 0.01, 0.004), {"at": 0.002, "width": 0.1}, 0.5)
     LossRegressor(kind='bore', at=0.011, width=0.008)
     """
     changed = {name: getattr(course, name) + share * by for name, by in step.items()}

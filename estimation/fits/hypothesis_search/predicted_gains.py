@@ -11,19 +11,19 @@ from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import Hypothesis
 from estimation.fits.hypothesis_search.lost_flow import likeliest_entry, likeliest_step
-from estimation.fits.hypothesis_search.wide_log import balanced_by, usual_values, widened
-from estimation.fits.hypothesis_search.wide_problem import freed, freed_at_end
+from estimation.fits.hypothesis_search.wide_log import usual_values, widened_log, with_balance
+from estimation.fits.hypothesis_search.wide_problem import hypothesis_problem, parameters_at_end
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
 LIKELIEST = 4
 """Hypotheses that are tried first: those of largest predicted gain [count]."""
 
-STEPPED = 0.25
+STEP_SHARE = 0.25
 """Share of the lost flow's variance that a step of leakage must explain to be tried first [fraction]; judged. A step
 that multiplies leakage is too large for slopes to predict."""
 
-AIRED = 0.1
+AIR_SHARE = 0.1
 """The same for air that enters within the log, relative to oil of constant stiffness [fraction]; judged."""
 
 
@@ -97,8 +97,8 @@ def predicted_gains(
     slopes : Mapping[str, ndarray of shape (blocks,)], optional
         Derivatives of the plain fit's normalised residuals, by unknown; computed if not given [dimensionless].
     """
-    wide = widened(log, parameters, plain)
-    return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, asked, slopes)
+    wide = widened_log(log, parameters, plain)
+    return _predicted_gains_beside(with_balance(wide, 1.0 if by_mass else 0.0), (), plain, asked, slopes)
 
 
 def predicted_gain_beside(
@@ -119,7 +119,7 @@ def predicted_gain_beside(
     *more : str
         Other unknowns of that fit.
     """
-    return _promises(log, together, found, (one,), more=more)[0]
+    return _predicted_gains_beside(log, together, found, (one,), more=more)[0]
 
 
 def by_predicted_gain(
@@ -144,9 +144,9 @@ def by_predicted_gain(
         The `LIKELIEST`, one at least; the others; and the gain in log-likelihood that each promises, by its name
         [dimensionless].
     """
-    promises = _promises(log.coarsened(), together, found, asked)
-    stepped = any(one.from_change for one in asked) and likeliest_step(log).share > STEPPED
-    aired = any(one.from_entry for one in asked) and likeliest_entry(log).share > AIRED
+    promises = _predicted_gains_beside(log.coarsened(), together, found, asked)
+    stepped = any(one.from_change for one in asked) and likeliest_step(log).share > STEP_SHARE
+    aired = any(one.from_entry for one in asked) and likeliest_entry(log).share > AIR_SHARE
     first = [(stepped and one.from_change) or (aired and one.from_entry) for one in asked]
     order = sorted(range(len(asked)), key=lambda i: (not first[i], -promises[i].gain))
     likely = [asked[i] for i in order if first[i] or not asked[i].far][:LIKELIEST] or [asked[i] for i in order[:1]]
@@ -154,7 +154,7 @@ def by_predicted_gain(
     return likely, [one for one in asked if one not in likely], gains
 
 
-def _promises(
+def _predicted_gains_beside(
     log: GreyBoxLog,
     together: tuple[Hypothesis, ...],
     found: Mapping[str, float],
@@ -163,13 +163,13 @@ def _promises(
     more: Sequence[str] = (),
 ) -> list[PredictedGain]:
     """Return the predicted gain of each hypothesis beside those accepted, from one evaluation."""
-    last = *freed_at_end(together), *more
-    problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)), *last)
+    last = *parameters_at_end(together), *more
+    problem = hypothesis_problem(log, (*together, *(replace(one, instead=()) for one in asked)), *last)
     theta = problem.model.theta({**usual_values(log), **found})
     point = problem.at_beside(theta, slopes) if slopes else problem.at(theta)
     # an unknown at its bound predicts a gain that only the hypothesis in its place can reach
     held = {name for one in asked for name in one.instead}
-    own = [name for name in freed(log, together, *last).model.unknowns if name not in held]
+    own = [name for name in hypothesis_problem(log, together, *last).model.unknowns if name not in held]
 
     def step(names: Sequence[str]) -> tuple[float, Array, Array]:
         places = [problem.model.unknowns.index(name) for name in names]
@@ -189,7 +189,7 @@ def _promises(
     return promises
 
 
-def slopes_of(fit: GreyBoxFit, log: GreyBoxLog) -> Mapping[str, Array]:
+def shared_slopes(fit: GreyBoxFit, log: GreyBoxLog) -> Mapping[str, Array]:
     """Return the slopes of a plain fit's residuals that the wide form shares.
 
     Returns

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from estimation.fits.hypothesis_search.explanation import Explanation
 
 
-def delivered(found: "Explanation", parameters: EhaParameters) -> float | None:
+def delivery_share(found: "Explanation", parameters: EhaParameters) -> float | None:
     """Return the pump's delivery as a share of its displacement in the rig file.
 
     Parameters
@@ -31,12 +31,12 @@ def delivered(found: "Explanation", parameters: EhaParameters) -> float | None:
     return found.values["pump_displacement"][0] / parameters.pump_displacement
 
 
-def contradicted(found: "Explanation", parameters: EhaParameters) -> tuple[Note, ...]:
+def delivery_objection(found: "Explanation", parameters: EhaParameters) -> tuple[Note, ...]:
     """Return the objection to an explanation whose flow the pump of the rig file cannot deliver.
 
     Displacement, area and the scales of speed and position share one ratio; bulk modulus depends on which is wrong.
     """
-    share = delivered(found, parameters)
+    share = delivery_share(found, parameters)
     if share is None or LEAST_SHARE <= share <= MOST_SHARE:
         return ()
     return (EstimateCode.RIG_CONTRADICTED.note(percent=100.0 * share),)

@@ -9,7 +9,7 @@ import numpy as np
 from estimation.finding import NORMAL_95
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.pump_ripple import COUNTS, LEAST_TEETH, MOST_OFFSET, Ripple, ShownRipple, with_ripple
+from estimation.fits.greybox.pump_ripple import LEAST_TEETH, MOST_OFFSET, TOOTH_COUNTS, Ripple, ShownRipple, with_ripple
 from estimation.notes import EstimateCode, RigCode
 from plant.notes import Note
 
@@ -23,11 +23,11 @@ OFFSET_WORTH = 20.0
 OFFSET_SETTLED = 2.0
 """Gain from which a subtracted offset is corrected again [dimensionless]: two deviations."""
 
-KEPT = 0.5
+KEPT_GAIN = 0.5
 """Share of its predicted gain that an offset of speed must reach [fraction]: residuals respond linearly, so a real one
 reaches 0.8 or more."""
 
-SURE = 0.3
+SURE_SHARE = 0.3
 """Share of the rejection limit that a fit with an offset of speed and no ripple may reach [fraction]; judged. A single
 rod looks like an offset: a log passed with one, with bulk modulus 39 % too low and a variance 12 % above the noise. In
 160 plain training logs it is at most 6 %."""
@@ -36,7 +36,7 @@ CHANCE = 3.0
 """Standard deviations of the mean of squared noise that do not count as a misfit [dimensionless]: they matter in short
 logs."""
 
-CONTRADICTS = 4.0
+CONTRADICTING_DEVIATIONS = 4.0
 """Deviations between the offset of speed from the flow and that from ripple, above which they contradict each other
 [dimensionless]."""
 
@@ -69,7 +69,7 @@ training logs of 34 kinds all 13 counts found in this way are right."""
 OVERTONE_WORTH = 5.0
 """Gain from which the double tooth count is fitted as well [dimensionless]: by chance one log in 150 gains it."""
 
-HOPE = 10.0
+MOST_GAIN_RATIO = 10.0
 """Largest factor by which the actual gain of ripple or speed offset may exceed the predicted one, if the log is not
 explained without them [dimensionless]; judged: residuals respond almost linearly to both."""
 
@@ -142,17 +142,17 @@ def with_pump_ripple(
     if log.gaps.size:
         return RippleFits(log, fitted(log))
     guessed = with_ripple(log, (), offset) if offset else log
-    plain = RippleFits(guessed, fitted(asked_for_ripple(guessed)))
-    if not _hopeful(plain.fits, largest):
-        return plain._replace(left=_left(plain))
-    shifted = _shifted(log, plain, fitted, largest)
+    plain = RippleFits(guessed, fitted(with_ripple_test(guessed)))
+    if not _may_be_explained(plain.fits, largest):
+        return plain._replace(left=_ripple_left_note(plain))
+    shifted = _fits_without_offset(log, plain, fitted, largest)
     if offset:
         plain, shifted = shifted or plain, None
-        plain = plain._replace(remarks=told_offset(plain.log.speed_offset, plain.best.speed_offset.std))
+        plain = plain._replace(remarks=offset_note(plain.log.speed_offset, plain.best.speed_offset.std))
     worth = plain.best.cost - TEETH_WORTH
     found = None
     for begun in (plain,) if shifted is None else (shifted, plain):
-        found = _with_teeth(log, begun, fitted, needed=not explains(begun.best))
+        found = _fits_with_ripple(log, begun, fitted, needed=not explains(begun.best))
         if found is not None and found.best.cost < worth and explains(found.best):
             return found
         if (
@@ -162,9 +162,11 @@ def with_pump_ripple(
             and begun.best.cost < plain.best.cost - OFFSET_WORTH
         ):
             offset = begun.log.speed_offset
-            told = told_offset(offset, begun.best.speed_offset.std)
+            told = offset_note(offset, begun.best.speed_offset.std)
             return begun._replace(log=replace(begun.log, counts=()), remarks=told)
-    return plain._replace(left=() if found is not None and _by_chance(plain.best, found.best) else _left(plain))
+    return plain._replace(
+        left=() if found is not None and _is_chance_gain(plain.best, found.best) else _ripple_left_note(plain)
+    )
 
 
 def is_sure(found: RippleFits, largest: float) -> bool:
@@ -178,30 +180,30 @@ def is_sure(found: RippleFits, largest: float) -> bool:
         As in `with_pump_ripple` [dimensionless].
     """
     left, by_chance = found.best.chi_square[0], CHANCE * (2.0 / len(found.log.drives)) ** 0.5
-    return left <= 1.0 + SURE * (largest - 1.0) + by_chance
+    return left <= 1.0 + SURE_SHARE * (largest - 1.0) + by_chance
 
 
-def _by_chance(plain: GreyBoxFit, with_them: GreyBoxFit) -> bool:
+def _is_chance_gain(plain: GreyBoxFit, with_them: GreyBoxFit) -> bool:
     """Return whether a fit with ripple reached its predicted gain, and gained no more than chance does."""
     promised = max(one.gain for one in plain.teeth.values())
-    return KEPT * promised < plain.cost - with_them.cost < TEETH_WORTH
+    return KEPT_GAIN * promised < plain.cost - with_them.cost < TEETH_WORTH
 
 
-def asked_for_ripple(log: GreyBoxLog) -> GreyBoxLog:
+def with_ripple_test(log: GreyBoxLog) -> GreyBoxLog:
     """Return a log on which fits test for pump ripple, if it has none yet and the shaft's angle is known."""
-    return log if log.teeth or log.gaps.size else replace(log, counts=COUNTS)
+    return log if log.teeth or log.gaps.size else replace(log, counts=TOOTH_COUNTS)
 
 
-def _hopeful(fits: Sequence[GreyBoxFit], largest: float) -> bool:
+def _may_be_explained(fits: Sequence[GreyBoxFit], largest: float) -> bool:
     """Return whether pump ripple or a speed offset may explain a log that is unexplained without them."""
     for fit in fits:
         promised = max([fit.speed_offset.gain, *(one.gain for one in fit.teeth.values())])
-        if fit.chi_square[0] <= largest or HOPE * promised >= fit.cost * (1.0 - largest / fit.chi_square[0]):
+        if fit.chi_square[0] <= largest or MOST_GAIN_RATIO * promised >= fit.cost * (1.0 - largest / fit.chi_square[0]):
             return True
     return False
 
 
-def _shifted(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float) -> RippleFits | None:
+def _fits_without_offset(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float) -> RippleFits | None:
     """Return the fits of a log without its offset of speed; None if residuals show none, or a large one.
 
     The correction ends if the log is then unexplained and neither ripple nor more offset may explain the rest.
@@ -215,18 +217,18 @@ def _shifted(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float)
         offset, wanted = offset + shown.value, OFFSET_SETTLED
         if abs(offset - plain.log.speed_offset) > MOST_OFFSET + abs(plain.log.speed_offset):
             return None
-        held = with_ripple(replace(log, counts=COUNTS), (), offset)
+        held = with_ripple(replace(log, counts=TOOTH_COUNTS), (), offset)
         found = RippleFits(held, fitted(held))
-        if shown.gain > OFFSET_WORTH and found.best.cost > likely.cost - KEPT * shown.gain:
+        if shown.gain > OFFSET_WORTH and found.best.cost > likely.cost - KEPT_GAIN * shown.gain:
             return None
-        if not _hopeful(found.fits, largest + CHANCE * (2.0 / len(log.drives)) ** 0.5):
+        if not _may_be_explained(found.fits, largest + CHANCE * (2.0 / len(log.drives)) ** 0.5):
             return None
     return None if found is plain else found
 
 
-def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted, *, needed: bool) -> RippleFits | None:
+def _fits_with_ripple(log: GreyBoxLog, begun: RippleFits, fitted: Fitted, *, needed: bool) -> RippleFits | None:
     """Return fits with the ripple that other fits show, corrected until nothing is left; None if there is none."""
-    if (first := _asked_for(begun.best, needed=needed)) is None:
+    if (first := _ripple_to_fit(begun.best, needed=needed)) is None:
         return None
     found, taken, offset = None, [first.teeth], begun.log.speed_offset + first.offset
     for _ in range(ROUNDS):
@@ -241,39 +243,39 @@ def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted, *, needed: b
             return found
         if found is not None and held.best.cost > found.best.cost:  # the overtone does not help
             break
-        found = held._replace(remarks=_told(taken[0], offset, left[count]))
-        new = _corrected(taken, left)
+        found = held._replace(remarks=_ripple_notes(taken[0], offset, left[count]))
+        new = _corrected_ripple(taken, left)
         if not new:
             break
         taken, offset = new, offset + (left[count].offset if offset != 0.0 else 0.0)
     return found
 
 
-def _felt(fit: GreyBoxFit) -> float:
+def _modulus_shift(fit: GreyBoxFit) -> float:
     """Return the shift of bulk modulus by a small pump ripple, in standard deviations."""
     moved, value = fit.small_teeth[0].get("bulk_modulus", 0.0), fit.values.get("bulk_modulus", 1.0)
     return abs(moved) * value / fit.std["bulk_modulus"] if moved else 0.0
 
 
-def _shown(fit: GreyBoxFit, *, small: bool = False, needed: bool = False) -> list[ShownRipple]:
+def _shown_ripples(fit: GreyBoxFit, *, small: bool = False, needed: bool = False) -> list[ShownRipple]:
     """Return the teeth that a fit's residuals show, the likeliest first; none if their size does not matter.
 
     ``small`` ones matter where they move bulk modulus, or are ``needed`` as a log is not explained without them.
     """
-    ranked = sorted((one for one in fit.teeth.values() if _possible(one, fit)), key=lambda one: -one.gain)
+    ranked = sorted((one for one in fit.teeth.values() if _is_possible(one, fit)), key=lambda one: -one.gain)
     if not ranked or ranked[0].gain < TEETH_WORTH:
         return []
     large = ranked[0].teeth.amplitude > LEAST_TEETH or ranked[0].offset != 0.0
-    return ranked if large or needed or (small and _felt(fit) > MOST_LINEAR) else []
+    return ranked if large or needed or (small and _modulus_shift(fit) > MOST_LINEAR) else []
 
 
-def _possible(one: ShownRipple, fit: GreyBoxFit) -> bool:
+def _is_possible(one: ShownRipple, fit: GreyBoxFit) -> bool:
     """Return whether the flow shows the same offset of speed as the ripple, or the ripple is surely large.
 
     The pump's mean flow determines the offset whatever the ripple, so small ripple that needs another offset is chance.
     """
     differs = abs(one.offset - fit.speed_offset.value)
-    told = differs > max(CONTRADICTS * fit.speed_offset.std, KEPT * abs(one.offset))
+    told = differs > max(CONTRADICTING_DEVIATIONS * fit.speed_offset.std, KEPT_GAIN * abs(one.offset))
     return one.offset == 0.0 or not told or _surely_large(one)
 
 
@@ -281,9 +283,9 @@ def _surely_large(one: ShownRipple) -> bool:
     return one.teeth.amplitude - ONE_SIDED_95 * one.std > LEAST_TEETH
 
 
-def _asked_for(fit: GreyBoxFit, *, needed: bool) -> ShownRipple | None:
+def _ripple_to_fit(fit: GreyBoxFit, *, needed: bool) -> ShownRipple | None:
     """Return the ripple that a fit's residuals show, if no other tooth count fits as well except its overtones."""
-    if not (ranked := _shown(fit, small=True, needed=needed)):
+    if not (ranked := _shown_ripples(fit, small=True, needed=needed)):
         return None
     count = ranked[0].teeth.count
     apart = [one for one in ranked[1:] if one.teeth.count % count and count % one.teeth.count]
@@ -291,19 +293,19 @@ def _asked_for(fit: GreyBoxFit, *, needed: bool) -> ShownRipple | None:
     return ranked[0] if ranked[0].gain > TEETH_WORTH + STANDS_OUT * max(other, 0.0) else None
 
 
-def _left(found: RippleFits) -> tuple[Note, ...]:
+def _ripple_left_note(found: RippleFits) -> tuple[Note, ...]:
     """Return the note on ripple left in residuals; none for a slow log, in which motor speed can look like ripple.
 
     Ripple that may be as small as any pump's, or chance, is ignored: it is reported only if it moves bulk modulus.
     """
-    likeliest = [] if found.log.course is not None else _shown(found.best)[:1]
-    felt = _felt(found.best) > MOST_LINEAR
+    likeliest = [] if found.log.course is not None else _shown_ripples(found.best)[:1]
+    felt = _modulus_shift(found.best) > MOST_LINEAR
     sure = [_surely_large(one) and one.gain > SURELY_WORTH for one in likeliest]
     shown = [one.teeth for one, large in zip(likeliest, sure, strict=True) if felt or one.offset != 0.0 or large]
     return tuple(EstimateCode.TEETH_LEFT.note(percent=100.0 * one.amplitude, teeth=one.count) for one in shown)
 
 
-def _corrected(taken: Sequence[Ripple], left: Mapping[int, ShownRipple]) -> list[Ripple]:
+def _corrected_ripple(taken: Sequence[Ripple], left: Mapping[int, ShownRipple]) -> list[Ripple]:
     """Return the ripple with the correction that residuals show; None if it no longer matters."""
     held = {one.count for one in taken}
     # overtones count only near the optimum, since an error of phase may look like one
@@ -318,14 +320,14 @@ def _corrected(taken: Sequence[Ripple], left: Mapping[int, ShownRipple]) -> list
     ]
 
 
-def _told(teeth: Ripple, offset: float, left: ShownRipple) -> tuple[Note, ...]:
+def _ripple_notes(teeth: Ripple, offset: float, left: ShownRipple) -> tuple[Note, ...]:
     ripples = RigCode.PUMP_RIPPLES.note(
         percent=100.0 * teeth.amplitude, half_width=100.0 * NORMAL_95 * left.std, teeth=teeth.count
     )
-    return (ripples, *told_offset(offset, left.offset_std))
+    return (ripples, *offset_note(offset, left.offset_std))
 
 
-def told_offset(offset: float, std: float) -> tuple[Note, ...]:
+def offset_note(offset: float, std: float) -> tuple[Note, ...]:
     """Return the note on an offset of motor speed; none if it is too small to matter.
 
     Parameters

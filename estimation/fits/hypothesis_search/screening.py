@@ -10,22 +10,22 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.parallel_descents import Way, descend_in_turn
 from estimation.fits.hypotheses import DELIVERY, Hypothesis
-from estimation.fits.hypothesis_search.coarse_search import NEAR, SLIGHT, coarsened, unless_quiet
+from estimation.fits.hypothesis_search.coarse_search import NEAR_RADIUS, SLIGHT, coarse_log, void_if_quiet
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.wide_log import usual_values
 from estimation.fits.hypothesis_search.wide_problem import (
     flow_bounds,
-    freed,
-    freed_at_end,
+    hypothesis_problem,
     misread_start,
     own_starts,
+    parameters_at_end,
     worn_start,
 )
 
 SCREENING = 7
 """Evaluations of the model per start [count]."""
 
-NEARLY = 3.0
+NEARLY_BEST = 3.0
 """Cost over that of the best start up to which other starts count [dimensionless]."""
 
 
@@ -53,8 +53,10 @@ def screen(
     """
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
-    known = freed_at_end(together[:-1])
-    problems = [(delays, freed(coarsened(log, delays, together, every), together, *known)) for delays in asked]
+    known = parameters_at_end(together[:-1])
+    problems = [
+        (delays, hypothesis_problem(coarse_log(log, delays, together, every), together, *known)) for delays in asked
+    ]
     begun = own_starts(log, together[-1])
     ways: list[Way] = []
     of_way: list[tuple[int, Mapping[str, float], FreedProblem]] = []
@@ -70,10 +72,10 @@ def screen(
     def after(way: int, point: Point) -> float:
         place, delays, problem = of_way[way]
         found = Trial(together, point, problem.model.values(point.theta), delays, absent)
-        tried[place].append(unless_quiet(log, found))
-        return NEARLY * tried[place][-1].cost
+        tried[place].append(void_if_quiet(log, found))
+        return NEARLY_BEST * tried[place][-1].cost
 
-    descend_in_turn(ways, SCREENING, wanted, after, radius=NEAR, least_share=SLIGHT)
+    descend_in_turn(ways, SCREENING, wanted, after, radius=NEAR_RADIUS, least_share=SLIGHT)
     yield from (min(each, key=lambda one: one.cost) for each in tried)
 
 
@@ -95,12 +97,14 @@ def promising_starts(
         Some of the starts, or all.
     """
     bests = [min(one.cost for one in each) for each in screened_each]
-    near = [each for each, best in zip(screened_each, bests, strict=True) if best <= NEARLY * min(bests)]
-    kept = [any(each[i].cost <= NEARLY * min(one.cost for one in each) for each in near) for i in range(len(starts))]
+    near = [each for each, best in zip(screened_each, bests, strict=True) if best <= NEARLY_BEST * min(bests)]
+    kept = [
+        any(each[i].cost <= NEARLY_BEST * min(one.cost for one in each) for each in near) for i in range(len(starts))
+    ]
     return [start for start, keep in zip(starts, kept, strict=True) if keep]
 
 
-def nearing(
+def screened_hypotheses(
     log: GreyBoxLog,
     asked: Iterable[Hypothesis],
     starts: Sequence[Mapping[str, float]],
@@ -129,7 +133,7 @@ def nearing(
     lower: list[Sequence[Trial]] = []
     for one in sorted(asked, key=lambda each: not each.far):
         from_these = starts if one.far else promising_starts(starts, lower) if lower else likely
-        found = [*screen(log, (one,), from_these, NEARLY * known, every)]
+        found = [*screen(log, (one,), from_these, NEARLY_BEST * known, every)]
         if one.far and min(each.cost for each in found) < known:
             lower.append(found)
         known = min(known, *(each.cost for each in found))

@@ -16,10 +16,10 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.pump_ripple import with_ripple
 from estimation.fits.hypothesis_search.lost_flow import lost_flow
 from estimation.fits.hypothesis_search.pump_ripple_fits import LEAST_OFFSET, OFFSET_WORTH, RippleFits, is_sure
-from estimation.fits.hypothesis_search.wide_log import widened
+from estimation.fits.hypothesis_search.wide_log import widened_log
 from plant.eha.model import EhaParameters
 
-TOLD = 4.0
+DETERMINED_DEVIATIONS = 4.0
 """Deviations from which the lost flow determines an offset of speed [dimensionless]; judged: pieces of a log are not
 independent, and a fit with the offset decides."""
 
@@ -80,7 +80,7 @@ def offset_by_lost_flow(log: GreyBoxLog, parameters: EhaParameters) -> float:
     float
         First guess [rad/s]; zero if the log does not determine it.
     """
-    flow = lost_flow(widened(log, parameters))
+    flow = lost_flow(widened_log(log, parameters))
     rise, swept = np.diff(flow.ends) / flow.time, np.diff(flow.positions) / flow.time
     columns = np.column_stack([flow.pressure, flow.sign, rise, swept, np.full_like(rise, parameters.pump_displacement)])
     there = np.isfinite(columns).all(axis=1) & np.isfinite(flow.lost)
@@ -93,11 +93,11 @@ def offset_by_lost_flow(log: GreyBoxLog, parameters: EhaParameters) -> float:
     left = lost - columns @ found
     spread = (float(left @ left) / (len(left) - len(sizes)) * float(known[-1, -1])) ** 0.5
     offset = float(found[-1] / sizes[-1])
-    told = abs(found[-1]) > TOLD * spread and abs(offset) < MOST_SHARE * parameters.rated_speed
+    told = abs(found[-1]) > DETERMINED_DEVIATIONS * spread and abs(offset) < MOST_SHARE * parameters.rated_speed
     return offset if told else 0.0
 
 
-def bears_out(found: RippleFits, largest: float, parameters: EhaParameters) -> bool:
+def confirms_offset(found: RippleFits, largest: float, parameters: EhaParameters) -> bool:
     """Return whether fits with an offset from lost flow leave nothing to explain for other effects or another offset.
 
     Parameters

@@ -6,10 +6,10 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import CHECKS_CRACK, MAKEUP_BLOCKED, MAKEUP_HIDDEN, UNLIKE_CRACKS
 from estimation.fits.hypothesis_search.decimation import Decimation
 from estimation.fits.hypothesis_search.explanation import Trial
-from estimation.fits.hypothesis_search.final_fits import WORTH
-from estimation.fits.hypothesis_search.ranking import likeliest
+from estimation.fits.hypothesis_search.final_fits import REQUIRED_GAIN
+from estimation.fits.hypothesis_search.ranking import likeliest_sets
 from estimation.fits.hypothesis_search.screening import screen
-from estimation.fits.hypothesis_search.wide_log import delayed
+from estimation.fits.hypothesis_search.wide_log import without_delays
 
 
 def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation) -> list[Trial]:
@@ -37,6 +37,6 @@ def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation) -> list[Tria
     if stuck or len(others) == len(best.together) or abs(best.values[CHECKS_CRACK.free[1]]) < UNLIKE_CRACKS:
         return []
     together = (*others, MAKEUP_BLOCKED if CHECKS_CRACK in best.together else MAKEUP_HIDDEN)
-    late, starts, wanted = delayed(log, best.delays), (best.values, *spared.starts), best.cost + WORTH
-    tried = likeliest(late, [[*screen(late, together, starts, every=spared.every)]], wanted, spared)
+    late, starts, wanted = without_delays(log, best.delays), (best.values, *spared.starts), best.cost + REQUIRED_GAIN
+    tried = likeliest_sets(late, [[*screen(late, together, starts, every=spared.every)]], wanted, spared)
     return [replace(one, delays=best.delays) for one in tried if one.fits and one.cost < wanted]

@@ -9,15 +9,15 @@ import numpy as np
 from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play_courses import crossings
-from estimation.fits.hypotheses import PRESUMED
+from estimation.fits.hypotheses import PRIOR_SPREADS
 from estimation.log_checks.channel_names import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import (
     COURSES,
-    CROSSED,
     LINEAR,
+    OTHER_COURSES,
     QUICKEST,
     QUICKNESS,
     WIDE_FLOW_FORM,
@@ -28,14 +28,14 @@ from plant.solvers.steps import parameter_names, parameter_row
 
 START_LEVEL = "start_level"
 
-HELD = (STIFFNESS, *CRACKS, BEND)
+HELD_PARAMETERS = (STIFFNESS, *CRACKS, BEND)
 """Parameters of the plain fit that a search for other effects holds, since they would absorb these."""
 
-LEVEL_OPEN = 3.0**-0.5
+LEVEL_SPREAD = 3.0**-0.5
 """Prior root mean square of the pressure level at which the lower side begins, over its largest possible value
 [fraction]: it is anywhere between zero and that."""
 
-EVEN = 3.0**-0.5
+UNIFORM_DEVIATION = 3.0**-0.5
 """Standard deviation of a uniform distribution over half its range [dimensionless]."""
 
 LEAST_PEAK = 1.0
@@ -43,7 +43,7 @@ LEAST_PEAK = 1.0
 logarithm of zero."""
 
 
-def widened(
+def widened_log(
     log: GreyBoxLog, parameters: EhaParameters, found: Mapping[str, float] = MappingProxyType({})
 ) -> GreyBoxLog:
     """Return a log for the wide flow form: elapsed share, rate of position and courses of play are its drives.
@@ -55,7 +55,7 @@ def widened(
     parameters : EhaParameters
         The actuator.
     found : Mapping[str, float], optional
-        Parameters of the plain fit; `HELD` ones are kept [SI].
+        Parameters of the plain fit; `HELD_PARAMETERS` ones are kept [SI].
 
     Returns
     -------
@@ -73,21 +73,21 @@ def widened(
         parameters=parameter_row(
             WideFlowParameters(
                 **known,
-                **{STIFFNESS: first_stiffness(log), **{name: found[name] for name in HELD if name in found}},
+                **{STIFFNESS: first_stiffness(log), **{name: found[name] for name in HELD_PARAMETERS if name in found}},
                 stated_pressure=usual_pressure(log, parameters),
             )
         ),
         presumed={
             **log.presumed,
-            **{name: (known[name], std) for name, std in PRESUMED.items()},
-            **dict.fromkeys(CROSSED, (0.0, 1.0)),
-            QUICKNESS: (0.5 * QUICKEST, 0.5 * QUICKEST * EVEN / LINEAR[QUICKNESS]),
-            START_LEVEL: (0.0, LEVEL_OPEN * shut_in(log) / LINEAR[START_LEVEL]),
+            **{name: (known[name], std) for name, std in PRIOR_SPREADS.items()},
+            **dict.fromkeys(OTHER_COURSES, (0.0, 1.0)),
+            QUICKNESS: (0.5 * QUICKEST, 0.5 * QUICKEST * UNIFORM_DEVIATION / LINEAR[QUICKNESS]),
+            START_LEVEL: (0.0, LEVEL_SPREAD * shut_in_pressure(log) / LINEAR[START_LEVEL]),
         },
     )
 
 
-def shut_in(log: GreyBoxLog) -> float:
+def shut_in_pressure(log: GreyBoxLog) -> float:
     """Return the largest volume that a loaded chamber passes on without make-up flow: half of what loaded it.
 
     Returns
@@ -127,7 +127,7 @@ def usual_values(log: GreyBoxLog) -> dict[str, float]:
     return dict(zip(parameter_names(WideFlowParameters), log.parameters.tolist(), strict=True))
 
 
-def balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
+def with_balance(log: GreyBoxLog, mass: float) -> GreyBoxLog:
     """Return a log whose wide form balances mass (1), or volume (0).
 
     Parameters
@@ -158,7 +158,7 @@ def balances_mass(log: GreyBoxLog) -> bool:
     return bool(usual_values(log)["by_mass"])
 
 
-def delayed(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
+def without_delays(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
     """Return a log whose late channels are shifted forward in time.
 
     Parameters

@@ -13,7 +13,7 @@ from estimation.fits.greybox.side_by_side import LANES
 from estimation.fits.hypotheses import DELIVERY, LEAKAGE_TURBULENT, LEAST_DELIVERY, LIMITS, Hypothesis
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.fits.hypothesis_search.lost_flow import likeliest_entry, likeliest_step
-from estimation.fits.hypothesis_search.wide_log import LEAST_PEAK, START_LEVEL, shut_in, usual_values
+from estimation.fits.hypothesis_search.wide_log import LEAST_PEAK, START_LEVEL, shut_in_pressure, usual_values
 from estimation.log_checks.channel_names import POSITION, SPEED
 from estimation.models.filtered_flow import (
     FILTER_TIME,
@@ -22,7 +22,7 @@ from estimation.models.filtered_flow import (
     FILTERED_TURBULENT_FLOW_FORM,
     FILTERED_TURBULENT_QUICK_FLOW_FORM,
 )
-from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
+from estimation.models.flow import FLOW_FORM, STIFFNESS, form_with_relief, reaches_relief
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.wide_flow import (
     LINEAR,
@@ -91,10 +91,10 @@ FIRST_WIDTH = 0.02
 
 START_PRESSURE = "start_pressure"
 
-MISREAD = {"pressure_offset", "pressure_drift", "pressure_sides"}
+MISREAD_PARAMETERS = {"pressure_offset", "pressure_drift", "pressure_sides"}
 """Parameters in which the displayed pressure is linear."""
 
-SHARES = 0.7 ** np.arange(8)
+SHARES_TRIED = 0.7 ** np.arange(8)
 """Shares of the predicted size of these that are tried [fraction]: side by side they take as long as one."""
 
 LEVELS_TRIED = (0.0, 0.3, 0.8)
@@ -105,7 +105,7 @@ MOST_BIASED = 2.0
 minimum, where noise that grows with the oil's stiffness explains everything."""
 
 
-def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedProblem:
+def hypothesis_problem(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedProblem:
     """Return the least-squares problem of a log under hypotheses.
 
     Parameters
@@ -125,7 +125,7 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     """
     extra = [*(name for one in together for name in (*one.free, *one.beside)), *more]
     relieved = reaches_relief(log.measured, usual_values(log)["relief_pressure"])
-    plain = relieving(FLOW_FORM) if relieved else FLOW_FORM
+    plain = form_with_relief(FLOW_FORM) if relieved else FLOW_FORM
     held = {name for one in together for name in one.instead}
     known = [name for name in plain.unknowns if name not in held]
     late = {one.late for one in together}
@@ -136,7 +136,7 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     return FreedProblem(form, log, free, LINEAR, ridge)
 
 
-def freed_at_end(together: Iterable[Hypothesis]) -> list[str]:
+def parameters_at_end(together: Iterable[Hypothesis]) -> list[str]:
     """Return the parameters that a hypothesis fits only at the end of its search; beside another one, from the start.
 
     Returns
@@ -211,12 +211,12 @@ def misread_start(problem: FreedProblem, guess: Array, one: Hypothesis) -> Seque
     sequence of ndarray, shape (unknowns,)
         One first guess; none for another hypothesis, or if no amount explains more [dimensionless].
     """
-    if not set(one.free) <= MISREAD:
+    if not set(one.free) <= MISREAD_PARAMETERS:
         return []
     point, step = problem.at(guess), np.zeros(len(guess))
     places = [problem.model.unknowns.index(name) for name in one.free]
     step[places] = np.linalg.lstsq(point.gram[np.ix_(places, places)], point.gradient[places])[0]
-    begun = [guess - share * step for share in SHARES]
+    begun = [guess - share * step for share in SHARES_TRIED]
     costs = problem.costs(begun, LANES)
     return [begun[int(np.argmin(costs))]] if np.min(costs) < point.cost else []
 
@@ -234,7 +234,7 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
         begun = float(seen[0]) if len(seen) else 0.0
         if START_PRESSURE not in one.free:
             return [{one.free[0]: begun}]
-        return [{START_PRESSURE: begun, START_LEVEL: share * shut_in(log)} for share in LEVELS_TRIED]
+        return [{START_PRESSURE: begun, START_LEVEL: share * shut_in_pressure(log)} for share in LEVELS_TRIED]
     if one.from_change:
         step = likeliest_step(log)
         if not step.share:
@@ -305,7 +305,7 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
     peak = _peak(log)  # a valve set higher never opens, so no slope leads back
     limits["relief_pressure"] = (LEAST_SETTING * peak, max(peak, rig["relief_pressure"]))
-    limits[START_LEVEL] = (-rig["accumulator_pressure"], shut_in(log))
+    limits[START_LEVEL] = (-rig["accumulator_pressure"], shut_in_pressure(log))
     place = model.unknowns.index("bulk_modulus")  # fitted as a logarithm
     softest, stiffest_guess = (float(np.exp(end(guess[place] for guess in guesses))) for end in (min, max))
     stiff = max(rig["bulk_modulus"], stiffest_guess)

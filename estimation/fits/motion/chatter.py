@@ -25,7 +25,7 @@ MOST_SHORTENED = 4
 """Largest factor by which steps are shortened where the piston reverses [dimensionless]."""
 
 
-def followed(log: GreyBoxLog, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+def bristle_limits(log: GreyBoxLog, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
     """Return the least and largest stiffness [N/m] and damping [N s/m] of a bristle that the model's steps follow.
 
     Parameters
@@ -60,7 +60,7 @@ def without_chatter(problem: FreedProblem, theta: Array) -> FreedProblem:
         The same problem if its steps are short enough.
     """
     log, values = problem.log, problem.model.values(theta)
-    followed_at_most = followed(log, parameter_names(problem.model.parameters))["bristle_stiffness"][1]
+    followed_at_most = bristle_limits(log, parameter_names(problem.model.parameters))["bristle_stiffness"][1]
     times = min(ceil(sqrt(values["bristle_stiffness"] / followed_at_most)), MOST_SHORTENED)
     if times <= 1:
         return problem

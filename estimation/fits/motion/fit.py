@@ -10,7 +10,7 @@ from estimation.fits.flow.log import DRAIN_START
 from estimation.fits.flow.search import LEAD_START
 from estimation.fits.greybox.block_averages import block_means, samples_a_block
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.fit import GreyBoxFit, concluded
+from estimation.fits.greybox.fit import GreyBoxFit, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
 from estimation.fits.hypothesis_search.fault_guesses import (
@@ -19,9 +19,9 @@ from estimation.fits.hypothesis_search.fault_guesses import (
     flow_bias_guess,
     leakage_guess,
 )
-from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP, FormFit, weighed, with_structure
+from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP, FormFit, likelihood_mean, with_structure
 from estimation.fits.motion.chatter import without_chatter
-from estimation.fits.motion.force_scale import Way, bulk_modulus, disagree, rescaled
+from estimation.fits.motion.force_scale import Way, bulk_modulus, disagree, optimum_on_other_scales
 from estimation.fits.motion.noise_annealing import RETURNING
 from estimation.fits.motion.search import (
     ENOUGH,
@@ -33,13 +33,13 @@ from estimation.fits.motion.search import (
     SCREENED,
     SLIGHT_SHARE,
     WAYS,
-    Ended,
     MotionSearch,
-    explained,
-    likeliest,
-    rough,
+    SearchResult,
+    explained_cost,
+    rough_problem,
+    search_results,
 )
-from estimation.fits.motion.weakly_held import MOST_MOVED, far_too_weak, unseen
+from estimation.fits.motion.weakly_held import LARGEST_UNSEEN_SHIFT, is_far_too_weak, unseen_shift
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.models.motion import MOTION_FORMS, MotionParameters
@@ -59,7 +59,7 @@ MOTION_CHANNELS = ("position_m",)
 FRICTION_TRIED = ((1.0, 1.0, 1.0), (18.0, -3.5, 1.15), (68.0, 8.7, 1.25))
 """Friction coefficients a_1, a_2, a_3 of the starts, as multiples of the healthy paper rig's: the spread of Table 4."""
 
-YIELDED = 2e-5
+YIELD_START = 2e-5
 """First guess of the deflection at which seals slide [m]; the literature on presliding has tens of micrometres."""
 
 DAMPING_START = 100.0
@@ -71,7 +71,7 @@ FINEST_STEP = 6.25e-5
 TURNING = 0.3
 """Speed below which the piston counts as reversing, over the log's root mean square [fraction]."""
 
-SET_OFF = 1.0
+LEAST_SPEED_CHANGE = 1.0
 """Change of motor speed between samples from which the pump counts as starting the piston [rad/s]."""
 
 SHORTEST_SAMPLE = 1e-3
@@ -91,14 +91,14 @@ SPARED_NIS, SPARED_SHARE = 0.5 * MISMATCH_NIS, 0.03
 """Mean squared normalised residual, and share of the motion, up to which the residuals of a log rule out no class
 [dimensionless, fraction]: half of the limit."""
 
-BEGINNING = 0.2
+BEGINNING_SHARE = 0.2
 """Share of these that holds for the beginning of a log [fraction]: the rest may fit less well."""
 
-NEARLY = 1.1
+NEARLY_EXPLAINED = 1.1
 """Cost on a beginning over that of an explained one, up to which other scales of forces are still searched
 [dimensionless]: a local minimum near that of an explained log, some percent away in bulk modulus."""
 
-ALIKE = 5.0
+EQUAL_DIFFERENCE = 5.0
 """Difference of log-likelihood up to which two structures explain a log equally well [dimensionless]."""
 
 
@@ -139,27 +139,27 @@ def fit_motion(
     noise = (variances or measurement_variances(record, ("motor_speed_rad_s",)))["motor_speed_rad_s"]
     log = motion_log(record, parameters, uncertainties or {}, noise)
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
-    ended = likeliest([MotionSearch.of(form, log, starts) for form in MOTION_FORMS])
-    found, spared = _concluded(ended, log, sparing=True)
+    ended = search_results([MotionSearch.of(form, log, starts) for form in MOTION_FORMS])
+    found, spared = _result_of_searches(ended, log, sparing=True)
     if spared and not found.reasons:  # bulk modulus is determined after all, so other scales are searched too
-        found, _ = _concluded(ended, log, sparing=False)
+        found, _ = _result_of_searches(ended, log, sparing=False)
     return found
 
 
-def _concluded(ended: list[Ended], log: GreyBoxLog, *, sparing: bool) -> tuple[FormFit, bool]:
+def _result_of_searches(ended: list[SearchResult], log: GreyBoxLog, *, sparing: bool) -> tuple[FormFit, bool]:
     """Return the result of a log's finished searches, and whether that on other scales was skipped."""
     fits, others, spared = _fitted(ended, sparing=sparing)
     best = min(fits, key=lambda fit: fit.cost)
-    found = weighed(fits)
+    found = likelihood_mean(fits)
     value, std = found["bulk_modulus"]
     apart = max((abs(float(np.log(other / value))) for other in others), default=0.0)
     bound = float(np.hypot(std / value, apart))
-    moved = unseen(best.chi_square[0], len(log.measured)) * std / value
+    moved = unseen_shift(best.chi_square[0], len(log.measured)) * std / value
     believed = with_structure(found, float(np.linalg.norm([STRUCTURE, apart, moved])))
     reasons = _objections(fits, best, others, share_of_motion(best.chi_square[0], log))
     if not reasons and not np.isfinite(moved):
         reasons = (EstimateCode.NOT_HELD.note(),)
-    elif not reasons and moved > MOST_MOVED:
+    elif not reasons and moved > LARGEST_UNSEEN_SHIFT:
         reasons = (EstimateCode.WEAKLY_HELD.note(percent=100.0 * moved, noise_percent=100.0 * std / value),)
     return FormFit(believed, bound, best.chi_square[0], reasons, best.rig_slopes), spared
 
@@ -234,7 +234,7 @@ def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:
     sums = np.cumsum(np.pad(drives[:, 1] - drives[0, 1], (reach + 1, reach), mode="symmetric"))
     pace = np.gradient(sums[2 * reach + 1 :] - sums[: -2 * reach - 1])  # proportional to the mean velocity
     turning = np.abs(pace) < TURNING * np.sqrt(np.mean(pace**2))
-    set_off = np.abs(np.diff(drives[:, 0], prepend=drives[0, 0])) > SET_OFF
+    set_off = np.abs(np.diff(drives[:, 0], prepend=drives[0, 0])) > LEAST_SPEED_CHANGE
     fine, coarse = (steps_a_sample(sample_time, step) for step in (FINEST_STEP, LONGEST_STEP))
     return np.where(turning | set_off, fine, coarse)
 
@@ -255,7 +255,7 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
             "friction_quadratic": faulty_coefficient(p, "friction_quadratic", quadratic, a1),
             "friction_linear": faulty_coefficient(p, "friction_linear", p.friction_linear, a2),
             "friction_coulomb": faulty_coefficient(p, "friction_coulomb", coulomb, a3),
-            "bristle_stiffness": faulty_coefficient(p, "friction_coulomb", coulomb, a3) / YIELDED,
+            "bristle_stiffness": faulty_coefficient(p, "friction_coulomb", coulomb, a3) / YIELD_START,
             "bristle_damping": DAMPING_START,
         }
         for leaking, biased in FAULTS_TRIED
@@ -263,7 +263,7 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
     ]
 
 
-def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxFit], list[float], bool]:
+def _fitted(ended: list[SearchResult], *, sparing: bool = False) -> tuple[list[GreyBoxFit], list[float], bool]:
     """Return the fits of both structures to the whole log, other bulk moduli that explain it, and what was skipped.
 
     Other scales are searched if the final fit explains the log, even if no earlier search did. They may be skipped if
@@ -273,33 +273,33 @@ def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxF
     search, best, reached, others = first.search, first.point, first.point, list[float]()
     part, whole, bounds = search.part, search.whole, search.bounds
     if not first.explains:
-        wanted = _wanted(part, best, BEGINNING)
+        wanted = _wanted_cost(part, best, BEGINNING_SHARE)
         best = reached = descend(part.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
-    asked = best.cost < explained(part)
-    spared = sparing and asked and far_too_weak(part, best, whole)
+    asked = best.cost < explained_cost(part)
+    spared = sparing and asked and is_far_too_weak(part, best, whole)
     if spared:
         others = [bulk_modulus(part, best)]
-    elif best.cost < NEARLY * explained(part):
+    elif best.cost < NEARLY_EXPLAINED * explained_cost(part):
         best, others = _rescaled(part, best, search)
-        asked = best.cost < explained(part)
+        asked = best.cost < explained_cost(part)
     hopeful = asked and not disagree([bulk_modulus(part, best), *others])
     if hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
     elif first.explains or best is not reached or len(part.log.measured) < len(whole.log.measured):
-        wanted = _wanted(whole, best)
+        wanted = _wanted_cost(whole, best)
         best = descend(whole.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
-    if not asked and best.cost < explained(whole):
+    if not asked and best.cost < explained_cost(whole):
         best, others = _rescaled(whole, best, search)
-    told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
+    told = best.cost < explained_cost(whole) and not disagree([bulk_modulus(whole, best), *others])
     if told and not hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
     if told and not spared and (finer := without_chatter(whole, best.theta)) is not whole:
         whole, best = finer, descend(finer.at, best.theta, RETURNING, bounds)
-        told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
-    return [concluded(whole, best), *_rival(second, whole, best, told=told)], others, spared
+        told = best.cost < explained_cost(whole) and not disagree([bulk_modulus(whole, best), *others])
+    return [fit_at_solution(whole, best), *_rival_fits(second, whole, best, told=told)], others, spared
 
 
-def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
+def _wanted_cost(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
     """Return the cost that a search from a point must reach to be worth while.
 
     If the point's residuals are so small that they rule out no class, only an explanation of the log would matter.
@@ -308,15 +308,15 @@ def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
     samples = len(problem.log.measured)
     chi_square = 2.0 * problem.at(begun.theta).cost / samples  # the search begins here and reuses this run
     spared = chi_square < share * SPARED_NIS or share_of_motion(chi_square, problem.log) < share * SPARED_SHARE
-    return explained(problem) if spared and samples * problem.log.sample_time > SCREENED else np.inf
+    return explained_cost(problem) if spared and samples * problem.log.sample_time > SCREENED else np.inf
 
 
-def _rival(second: Ended, whole: FreedProblem, best: Point, *, told: bool) -> list[GreyBoxFit]:
+def _rival_fits(second: SearchResult, whole: FreedProblem, best: Point, *, told: bool) -> list[GreyBoxFit]:
     """Return the fit of the other structure of friction to the whole log; None if it cannot matter."""
     own = second.search.whole
     whole = own if whole.log is own.log else own.on(whole.log)  # the same model steps, so that costs are comparable
     bounds, thetas = second.search.bounds, [best.theta, second.point.theta]
-    costs, wanted = whole.costs(thetas), explained(whole)
+    costs, wanted = whole.costs(thetas), explained_cost(whole)
     begun = thetas[int(np.argmin(costs))]
     if told:
         point = descend(whole.at, begun, NEARING, bounds, wanted=best.cost + UNLIKELY)
@@ -326,13 +326,14 @@ def _rival(second: Ended, whole: FreedProblem, best: Point, *, told: bool) -> li
         point = descend(whole.at, begun, NEARING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
         if point.cost < wanted:
             point = descend(whole.at, point.theta, FINISHING, bounds)
-    return [concluded(whole, point)]
+    return [fit_at_solution(whole, point)]
 
 
 def _rescaled(problem: FreedProblem, best: Point, search: MotionSearch) -> tuple[Point, list[float]]:
     """Return the best optimum of forces on other scales, and other bulk moduli that explain the log."""
-    way = Way(rough(problem, WAYS[0][1]), NEARING, NEAR_ENOUGH, FINISHING, ENOUGH, search.bounds, explained(problem))
-    return rescaled(problem, best, way)
+    coarse = rough_problem(problem, WAYS[0][1])
+    way = Way(coarse, NEARING, NEAR_ENOUGH, FINISHING, ENOUGH, search.bounds, explained_cost(problem))
+    return optimum_on_other_scales(problem, best, way)
 
 
 def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float], share: float) -> tuple[Note, ...]:
@@ -340,7 +341,7 @@ def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float], s
     if best.chi_square[0] > EXPLAINED:
         large = {"ratio": best.chi_square[0] ** 0.5, "motion_percent": 100.0 * share}
         reasons.append(EstimateCode.POSITION_RESIDUALS_LARGE.note(**large))
-    values = [fit.values["bulk_modulus"] for fit in fits if fit.cost < best.cost + ALIKE]
+    values = [fit.values["bulk_modulus"] for fit in fits if fit.cost < best.cost + EQUAL_DIFFERENCE]
     if disagree(values):
         reasons.append(EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=min(values), most_pa=max(values)))
     scales = [*others, best.values["bulk_modulus"]]

@@ -14,14 +14,14 @@ SCALES = (0.8, 1.25)
 and stiffness may grow together with little effect on position: a search can end anywhere along such a valley, and the
 curvature at its end does not show it."""
 
-STIFFENED = (0.93, 1.07)
+STIFFNESS_SCALES = (0.93, 1.07)
 """The same for bulk modulus alone [dimensionless]. With frequent stick-slip the cost is rough: local minima lie a few
 percent apart, and the curvature in one does not show the next."""
 
-RESCALED = 3
+MOST_RESCALINGS = 3
 """Most often that an optimum is replaced by a better one found in this way."""
 
-BETTER = 5.0
+LEAST_FALL = 5.0
 """Fall of the cost from which a better optimum is left in its turn [dimensionless]."""
 
 ELSEWHERE, SHORT = 0.005, 4.0
@@ -83,7 +83,7 @@ class Way:
     explained: float
 
 
-def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[float]]:
+def optimum_on_other_scales(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[float]]:
     """Search for optima with forces or stiffness on another scale, until some disagree.
 
     Parameters
@@ -103,14 +103,14 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
     found, moduli = [best], list[float]()
     short = len(problem.log.measured) * problem.log.sample_time <= SHORT
     far = ELSEWHERE if short else np.log(1.0 + LARGEST_DISAGREEMENT)
-    for _ in range(RESCALED):
-        for moved in _moved(problem.model.values(best.theta)):
-            found += _ended(problem, best, moved, way)
+    for _ in range(MOST_RESCALINGS):
+        for moved in _rescaled_starts(problem.model.values(best.theta)):
+            found += _downhill_optima(problem, best, moved, way)
             if disagree([bulk_modulus(problem, one) for one in found if one.cost < way.explained or one is best]):
                 break
         lowest = min(found, key=lambda point: point.cost)
         moved = abs(np.log(bulk_modulus(problem, lowest) / bulk_modulus(problem, best)))
-        over, best = lowest.cost > best.cost - BETTER, lowest
+        over, best = lowest.cost > best.cost - LEAST_FALL, lowest
         moduli = [bulk_modulus(problem, one) for one in found if one is not best and one.cost < way.explained]
         if over or moved < far or disagree([bulk_modulus(problem, best), *moduli]):
             break
@@ -144,17 +144,17 @@ def deviation(problem: FreedProblem, point: Point) -> float:
     return float(np.sqrt(np.linalg.pinv(point.gram, hermitian=True)[place, place]))
 
 
-def _moved(values: Mapping[str, float]) -> Iterator[list[dict[str, float]]]:
+def _rescaled_starts(values: Mapping[str, float]) -> Iterator[list[dict[str, float]]]:
     """Yield new starts from an optimum: all forces on another scale, then another stiffness alone."""
     scaled: list[dict[str, float]] = []
     for factor in SCALES:
         growing = {name: values[name] * factor for name in GROWING}
         scaled.append(growing | {name: values[name] / factor for name in FALLING})
     yield scaled
-    yield [{"bulk_modulus": values["bulk_modulus"] * factor} for factor in STIFFENED]
+    yield [{"bulk_modulus": values["bulk_modulus"] * factor} for factor in STIFFNESS_SCALES]
 
 
-def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, float]], way: Way) -> list[Point]:
+def _downhill_optima(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, float]], way: Way) -> list[Point]:
     """Return the optima downhill from changed starts; searched side by side."""
     values = problem.model.values(best.theta)
     starts = [np.clip(problem.model.theta({**values, **some}), *way.bounds) for some in moved]

@@ -17,10 +17,10 @@ longer ones end in chatter."""
 LEAVING, RETURNING = 12, 100
 """Evaluations of the model for the escape and the return. Descents of 25 were still falling by tenths at their last."""
 
-LEFT_BY = 0.01
+ESCAPE_GAIN = 0.01
 """Cost that a further step of the escape must promise [dimensionless]."""
 
-TIMES = 3
+MOST_ESCAPES = 3
 """Most escapes."""
 
 
@@ -57,9 +57,9 @@ def annealed(
     Point
         No worse than the one given.
     """
-    softened = problem.on(problem.log.softened(1.0, LARGER_WALK))
-    for _ in range(TIMES):
-        near = descend(at(softened), point.theta, LEAVING, bounds, LEFT_BY)
+    softened = problem.on(problem.log.with_larger_noise(1.0, LARGER_WALK))
+    for _ in range(MOST_ESCAPES):
+        near = descend(at(softened), point.theta, LEAVING, bounds, ESCAPE_GAIN)
         back = descend(at(problem), near.theta, RETURNING, bounds, promising, least_share=least_share)
         gained = point.cost - back.cost
         point = back if gained > 0.0 else point

@@ -1,4 +1,4 @@
-"""`likeliest(searches) -> list[Ended]`: ends of searches for the motion form's unknowns, on ever longer beginnings.
+"""`search_results(searches)`: ends of searches for the motion form's unknowns, on ever longer beginnings.
 
 A start first descends under larger noise, and is then searched on the first seconds; if it explains these, on more of
 the log. Both structures of friction are searched in turn, so that neither is searched in vain if the other explains the
@@ -17,7 +17,7 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import search_bounds
 from estimation.fits.greybox.side_by_side import LANES
-from estimation.fits.motion.chatter import followed
+from estimation.fits.motion.chatter import bristle_limits
 from estimation.fits.motion.force_scale import bulk_modulus
 from estimation.fits.motion.noise_annealing import RETURNING, annealed
 from estimation.models.greybox import GreyBoxModel
@@ -55,7 +55,7 @@ ENOUGH = 0.1
 FINALISTS = 3
 """Starts that are searched further in each way, the likeliest of each way first, until one explains the log."""
 
-ROUGHLY = 2
+STEP_FACTOR = 2
 """Factor on the length of model steps during the approach."""
 
 MOST_WORK = 10_000_000
@@ -86,7 +86,7 @@ SAME_COST, SAME_MODULUS = 0.02, 0.01
 
 
 @dataclass(eq=False)
-class Begun:
+class SharedState:
     """State that all searches of a log share.
 
     Parameters
@@ -162,14 +162,14 @@ class MotionSearch:
         whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
         guesses = [whole.model.theta(start) for start in starts]
         lead = {"speed_lead": (0.0, 0.5 * log.sample_time)}
-        soft = followed(log, parameter_names(form.parameters))
+        soft = bristle_limits(log, parameter_names(form.parameters))
         bounds, near = (search_bounds(whole.model, guesses, limits) for limits in (lead, lead | soft))
         speed = log.drives[:, form.drives.index("motor_speed_rad_s")]
         lengths = (driven_samples(speed, round(length / log.sample_time)) for length in (SEARCHED, SCREENED))
         part, short = (whole.on(log.beginning(samples)) for samples in lengths)
         return cls(whole, part, short, guesses, bounds, near)
 
-    def brought_near(self, rank: int, begun: Begun, worth: Callable[[], bool]) -> Iterator[Array]:
+    def ends_of_approach(self, rank: int, begun: SharedState, worth: Callable[[], bool]) -> Iterator[Array]:
         """Yield the ends of the approach for the starts of a rank, on the short beginning under larger noise.
 
         An end that does not explain the log even with the larger noise is left out, and so is one that equals another
@@ -194,26 +194,26 @@ class MotionSearch:
             if rank + way > 0 and not worth():
                 return
             if way not in begun.screened:
-                screen = begun.at_each(rough(self.short, first))
+                screen = begun.at_each(rough_problem(self.short, first))
                 points = descend_together(screen, self.guesses, SCREENING, self.near, NEAR_ENOUGH)
                 begun.screened[way] = sorted(points, key=cost_of)
             start = begun.screened[way][rank].theta
             if second == UNCHANGED:
                 yield start
                 continue
-            near = descend(begun.at(rough(self.short, second)), start, NEARING, self.near, NEAR_ENOUGH)
-            if near.cost < explained(self.short) and not any(self.same_pit(near, other) for other in reached):
+            near = descend(begun.at(rough_problem(self.short, second)), start, NEARING, self.near, NEAR_ENOUGH)
+            if near.cost < explained_cost(self.short) and not any(self.is_same_basin(near, other) for other in reached):
                 yield near.theta
             reached.append(near)
 
-    def same_pit(self, one: Point, other: Point) -> bool:
+    def is_same_basin(self, one: Point, other: Point) -> bool:
         """Return whether two points of the short beginning lie in the same basin."""
         moved = abs(np.log(bulk_modulus(self.whole, one) / bulk_modulus(self.whole, other)))
         return abs(one.cost - other.cost) < SAME_COST * other.cost and bool(moved < SAME_MODULUS)
 
 
 @dataclass(frozen=True, eq=False)
-class Ended:
+class SearchResult:
     """Result of a search.
 
     Parameters
@@ -231,7 +231,7 @@ class Ended:
     explains: bool
 
 
-def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
+def search_results(searches: Sequence[MotionSearch]) -> list[SearchResult]:
     """Return the results of several searches, in their order; all stop once one explains the log.
 
     Parameters
@@ -239,20 +239,22 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
     searches : sequence of MotionSearch
         One per structure of friction.
     """
-    begun = Begun()
+    begun = SharedState()
     tries = [_Tries(search, begun) for search in searches]
     for rank in range(FINALISTS):
         for place, one in enumerate(tries, start=1):
             share = place / len(tries)
-            for near in one.search.brought_near(rank, begun, partial(one.may_go_on, share)):
-                if (found := one.carried_on(near)) is not None:
-                    return [Ended(each.search, found if each is one else each.best, each is one) for each in tries]
-        if begun.work > MOST_WORK or all(one.best.cost > HOPELESS * explained(one.search.short) for one in tries):
+            for near in one.search.ends_of_approach(rank, begun, partial(one.may_go_on, share)):
+                if (found := one.optimum_if_explained(near)) is not None:
+                    return [
+                        SearchResult(each.search, found if each is one else each.best, each is one) for each in tries
+                    ]
+        if begun.work > MOST_WORK or all(one.best.cost > HOPELESS * explained_cost(one.search.short) for one in tries):
             break
     likelier = min(tries, key=lambda one: one.best.cost)
     last, explains = likelier.ended()
     ends = [(last, explains) if one is likelier else (one.best, False) for one in tries]
-    return [Ended(one.search, *end) for one, end in zip(tries, ends, strict=True)]
+    return [SearchResult(one.search, *end) for one, end in zip(tries, ends, strict=True)]
 
 
 class _Tries:
@@ -266,30 +268,30 @@ class _Tries:
         Its work is counted there.
     """
 
-    def __init__(self, search: MotionSearch, begun: Begun) -> None:
+    def __init__(self, search: MotionSearch, begun: SharedState) -> None:
         self.search, self._begun = search, begun
         self.best = search.short.at(search.guesses[0])
         self._followed: list[tuple[Point, Point]] = []
 
     def may_go_on(self, share: float) -> bool:
         """Return whether another start may be tried: within a share of `MOST_WORK`, or all where one is promising."""
-        promising = self.best.cost < explained(self.search.short)
+        promising = self.best.cost < explained_cost(self.search.short)
         return self._begun.work <= MOST_WORK * (1.0 if promising else share)
 
-    def carried_on(self, near: Array) -> Point | None:
+    def optimum_if_explained(self, near: Array) -> Point | None:
         """Return the optimum from a start on the first `SEARCHED` seconds if it explains them.
 
         What explains the shorter beginning is searched once per local minimum, and once in all after `MOST_WORK`.
         """
-        search, wanted = self.search, explained(self.search.short)
+        search, wanted = self.search, explained_cost(self.search.short)
         point, at = Point(near, np.inf, np.zeros(0), np.zeros((0, 0))), self._begun.at(search.short)
         for bounds in (search.near, search.bounds):
             point = descend(at, point.theta, FINISHING, bounds, ENOUGH, wanted=wanted)
         self.best = min(self.best, point, key=cost_of)
-        known = any(search.same_pit(point, other) for other, _ in self._followed)
+        known = any(search.is_same_basin(point, other) for other, _ in self._followed)
         if point.cost >= wanted or known or (self._followed and self._begun.work > MOST_WORK):
             return None
-        wanted = explained(search.part)
+        wanted = explained_cost(search.part)
         more = descend(self._begun.at(search.part), point.theta, FINISHING, search.bounds, ENOUGH, wanted=wanted)
         self._followed.append((point, more))
         return more if more.cost < wanted else None
@@ -300,25 +302,25 @@ class _Tries:
         A near explanation of the beginning is annealed: in which local minimum a descent ends depends on rounding.
         """
         search, at = self.search, self._begun.at
-        short, bounds, wanted = search.short, search.bounds, explained(search.short)
+        short, bounds, wanted = search.short, search.bounds, explained_cost(search.short)
         if self._followed:
             _, more = min(self._followed, key=lambda pair: pair[1].cost)
             return short.at(more.theta), False
         promising, share = SLIGHT * wanted, SLIGHT_SHARE if self._begun.work > MOST_WORK else 0.0
         point = descend(at(short), self.best.theta, RETURNING, bounds, promising, least_share=share)
-        if point.cost < HOPELESS * wanted and self._leads_on(point):
+        if point.cost < HOPELESS * wanted and self._explains_more(point):
             point = annealed(short, point, bounds, promising, SAME_COST * wanted, at, share)
-        found = self.carried_on(point.theta) if point.cost < wanted else None
+        found = self.optimum_if_explained(point.theta) if point.cost < wanted else None
         return (point, False) if found is None else (found, True)
 
-    def _leads_on(self, point: Point) -> bool:
+    def _explains_more(self, point: Point) -> bool:
         """Return whether more of the log is nearly explained from a point that nearly explains its beginning."""
-        search, wanted = self.search, FOREIGN * explained(self.search.part)
+        search, wanted = self.search, FOREIGN * explained_cost(self.search.part)
         at = self._begun.at(search.part)
         return descend(at, point.theta, FINISHING, search.bounds, ENOUGH, wanted=wanted, good=wanted).cost < wanted
 
 
-def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
+def rough_problem(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
     """Return a problem with more noise and longer model steps.
 
     Parameters
@@ -328,11 +330,11 @@ def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
     factors : tuple of float
         Factors on variance and random walk [dimensionless].
     """
-    log = problem.log.softened(*factors)
-    return problem.on(replace(log, steps=np.maximum(log.steps // ROUGHLY, 1)))
+    log = problem.log.with_larger_noise(*factors)
+    return problem.on(replace(log, steps=np.maximum(log.steps // STEP_FACTOR, 1)))
 
 
-def explained(problem: FreedProblem) -> float:
+def explained_cost(problem: FreedProblem) -> float:
     """Return the cost up to which a point explains a log [dimensionless].
 
     Returns

@@ -13,10 +13,10 @@ from estimation.identification.fit.output_error import fit_output_error
 AT_REST, DRIVEN = 0.05, 0.5
 """Shares of the 95th percentiles of output and input, below which the output rests, and above which it is driven."""
 
-SMOOTHED = 9e-3
+SMOOTHING_SPAN = 9e-3
 """Span over which the output is averaged first, so that its noise does not hide a rest [s]."""
 
-MORE, TIMES = 0.01, 1.25
+LEAST_EXCESS, LEAST_RATIO = 0.01, 1.25
 """It is said to rest if it does so in this share of the samples more than a second-order model, and so many times as
 often. That flags 17 of 18 logs of a bench with friction (the excess is 1.6 to 10 %, and 0.4 % of the last), and none of
 108 records of the linear models of Table 6 at 1 and 10 % noise (0.3 % at most)."""
@@ -44,7 +44,7 @@ def rest_shares(u: Array, y: Array, sample_time: float) -> tuple[float, float]:
     level = AT_REST * float(np.quantile(np.abs(y[known]), 0.95))
     model = fit_output_error(u, y, sample_time, n_numerator=3, n_denominator=2)
     simulated = model.simulate(u, initial=model.initial_state)
-    span = max(1, round(SMOOTHED / sample_time))
+    span = max(1, round(SMOOTHING_SPAN / sample_time))
     shares = [
         float(np.mean(np.abs(uniform_filter1d(signal, span))[driven] < level))
         for signal in (np.where(known, y, simulated), simulated)
@@ -52,7 +52,7 @@ def rest_shares(u: Array, y: Array, sample_time: float) -> tuple[float, float]:
     return shares[0], shares[1]
 
 
-def rests(measured: float, linear: float) -> bool:
+def is_sticking(measured: float, linear: float) -> bool:
     """Return whether an output rests more than a linear model explains.
 
     Parameters
@@ -62,7 +62,7 @@ def rests(measured: float, linear: float) -> bool:
 
     Examples
     --------
-    >>> rests(0.12, 0.02), rests(0.03, 0.02)
+    >>> is_sticking(0.12, 0.02), is_sticking(0.03, 0.02)
     (True, False)
     """
-    return measured > max(linear + MORE, TIMES * linear)
+    return measured > max(linear + LEAST_EXCESS, LEAST_RATIO * linear)

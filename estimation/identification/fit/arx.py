@@ -77,12 +77,12 @@ def fit_arx(
     values = np.linalg.lstsq(regressors, wanted, rcond=None)[0]
     residual = wanted - regressors @ values
     b, f = values[:n_numerator], values[n_numerator:]
-    theta = np.concatenate([values, _state_of(form, b, f, data)])
+    theta = np.concatenate([values, _initial_state(form, b, f, data)])
     noise = (np.ones(1), np.concatenate([[1.0], f]))
     return task.model(theta, regressors, residual, replace(data, used=kept), "ARX", noise)
 
 
-def _state_of(form: Structure, b: Array, f: Array, data: Experiments) -> Array:
+def _initial_state(form: Structure, b: Array, f: Array, data: Experiments) -> Array:
     """Return the initial state with which a stable model simulates the first experiment best."""
     if not stable(f):
         return np.zeros(form.n_states)

@@ -21,13 +21,13 @@ from estimation.identification.search.experiments import (
 )
 from plant.errors import HydrostateError
 
-DIFFERENCE = 1e-6
+DIFFERENCE_STEP = 1e-6
 """Relative step of the derivative of discrete coefficients by continuous ones."""
 
 LONGEST = 10.0
 """Dead time looked for at most [samples]."""
 
-LEAST_LEFT = 2
+LEAST_SAMPLES_PER_POLE = 2
 """Samples for each pole that are left of an experiment without its dead time, or it stays as it is [count]."""
 
 MOST_EVALUATIONS = 60
@@ -80,7 +80,7 @@ def fit_continuous(
     return problem.result(values, data_hash(given, sample_time), names)
 
 
-class _At(NamedTuple):
+class _ModelAtPoint(NamedTuple):
     """A model at one point: discrete numerator, denominator and delay, and derivatives by them and by initial states.
 
     The residual uses the best initial states.
@@ -103,7 +103,7 @@ class _Problem:
     ) -> None:
         self.data, self.sample_time = data, sample_time
         self.n_zeros, self.n_poles, self.dead_time = n_zeros, n_poles, dead_time
-        self._last: _At | None = None
+        self._last: _ModelAtPoint | None = None
 
     def without_whole_samples(self) -> "_Problem":
         """Return the same fit with a known dead time of less than a sample, see `Experiments.advanced`.
@@ -113,8 +113,8 @@ class _Problem:
         if self.dead_time is None:
             return self
         whole = int(np.floor(self.dead_time / self.sample_time + 1e-9))
-        least = whole + LEAST_LEFT * self.n_poles
-        if whole == 0 or not self.data.goes_on_behind(least):
+        least = whole + LEAST_SAMPLES_PER_POLE * self.n_poles
+        if whole == 0 or not self.data.has_outputs_after(least):
             return self
         rest = max(self.dead_time - whole * self.sample_time, 0.0)
         return _Problem(self.data.advanced(whole), self.sample_time, self.n_zeros, self.n_poles, rest)
@@ -125,7 +125,7 @@ class _Problem:
         late = self.dead_time / self.sample_time if self.dead_time is not None else values[-1]
         return held_input_model(values[:n_b], values[n_b : n_b + self.n_poles], max(float(late), 0.0), 1.0)
 
-    def _at(self, values: Array) -> _At:
+    def _at(self, values: Array) -> _ModelAtPoint:
         """Return the common part of residual and Jacobian, cached for the last point because a search needs it twice.
 
         `parts` computes the derivative by the continuous values: the residual alone is needed more often.
@@ -139,7 +139,7 @@ class _Problem:
         n_main = form.n_numerator + form.n_denominator
         initial = jacobian[:, n_main:]
         residual = residual - initial @ np.linalg.lstsq(initial, residual, rcond=None)[0]
-        self._last = _At(values.copy(), b, f, delay, jacobian[:, :n_main], initial, residual)
+        self._last = _ModelAtPoint(values.copy(), b, f, delay, jacobian[:, :n_main], initial, residual)
         return self._last
 
     def parts(self, values: Array) -> tuple[Array, Array]:
@@ -148,7 +148,7 @@ class _Problem:
         b, f, delay = at.b, at.f, at.delay
         moved = np.zeros((at.main.shape[1], values.size))
         for k in range(values.size):
-            step = DIFFERENCE * max(abs(values[k]), 1e-3 * np.abs(values).max())
+            step = DIFFERENCE_STEP * max(abs(values[k]), 1e-3 * np.abs(values).max())
             if k == values.size - 1 and self.dead_time is None:
                 step = 1e-5
             up = values.copy()

@@ -7,7 +7,7 @@ from estimation.identification.fit.residual_tests import DEFAULT_LAGS, feedback_
 from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 
-FEEDBACK = 1e-6
+FEEDBACK_PROBABILITY = 1e-6
 """Probability below which an input is held to follow the output's noise; a model's errors must not look like it."""
 
 FEEDBACK_SAMPLES = 20_000
@@ -35,6 +35,6 @@ def feedback_note(residual: Array, u: Array, names: tuple[str, str]) -> Note | N
     if u[part].size < 8 * DEFAULT_LAGS or np.count_nonzero(np.isfinite(residual[part])) < 3 * DEFAULT_LAGS:
         return None
     found = feedback_test(residual[part], u[part])
-    if not found.p_value < FEEDBACK:
+    if not found.p_value < FEEDBACK_PROBABILITY:
         return None
     return IdentificationCode.FEEDBACK.note(input=names[0], output=names[1], p_value=found.p_value)

@@ -25,7 +25,7 @@ from plant.errors import CovarianceWarning, HydrostateError, LogWarning
 
 CovarianceKind = Literal["white", "coloured", "auto"]
 
-COLOURED = 1e-3
+COLOURED_P_VALUE = 1e-3
 """p-value of the whiteness test below which ``covariance="auto"`` takes the robust covariance."""
 
 
@@ -119,7 +119,7 @@ class Task:
         white, robust = (spread[:n_main, :n_main] * np.outer(unscale, unscale) for spread in spreads)
         coloured = self.covariance == "coloured"
         if self.covariance == "auto":
-            coloured = ljung_box(np.where(data.used, residual, np.nan)).p_value < COLOURED
+            coloured = ljung_box(np.where(data.used, residual, np.nan)).p_value < COLOURED_P_VALUE
         found = quality(residual, data, jacobian.shape[1])
         if noise is None:
             _require_effect(float(residual @ residual), float(data.y @ data.y), data.n_used, n_main, self.names)

@@ -8,7 +8,7 @@ from estimation.identification.fit.output_error import jacobian_and_residual
 from estimation.identification.model.lags import lagged
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
-from estimation.identification.search.criterion import Structure, profile, stabilised
+from estimation.identification.search.criterion import Structure, profile, stabilised_denominator
 from estimation.identification.search.experiments import Experiments, Signals
 from estimation.identification.search.noise_model import noise_start
 from estimation.identification.search.starts import least_squares_arx, reduced_high_order_arx
@@ -76,7 +76,7 @@ def fit_instrumental(
         least_squares_arx(n_numerator, n_denominator, delay, longest_u, longest_y)[1],
         reduced_high_order_arx(n_denominator, longest_u, longest_y),
     ]
-    found = [_refined(form, stabilised(f, longest_u.size), data, n_c, n_d) for f in starts]
+    found = [_refined(form, stabilised_denominator(f, longest_u.size), data, n_c, n_d) for f in starts]
     theta, noise, jacobian, residual = min(found, key=lambda one: float(one[3] @ one[3]))
     named = "RIV" if n_c + n_d else "SRIV"
     return task.model(theta, jacobian, residual, data, named, noise if n_c + n_d else None)
@@ -94,7 +94,7 @@ def _refined(
         if n_c + n_d:
             c, d = noise_start(jacobian_and_residual(form, theta, data)[1][data.longest], n_c, n_d)
         values = _pass(form, before, data, c, d)
-        theta = _with_initial(form, stabilised(np.concatenate([[1.0], values[n_b:]]), data.u.size), data)
+        theta = _with_initial(form, stabilised_denominator(np.concatenate([[1.0], values[n_b:]]), data.u.size), data)
         if np.abs(theta[: form.n_main] - before).max() <= SETTLED * np.abs(before).max():
             break
     jacobian, residual = jacobian_and_residual(form, theta, data)

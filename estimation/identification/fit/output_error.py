@@ -39,7 +39,7 @@ STARTS_TIMES_SAMPLES = 160_000
 STARTS = (5, 30)
 """Fewest and most starts that are screened."""
 
-CANCELLED = (0.5, 0.9, 0.99)
+CANCELLED_POLES = (0.5, 0.9, 0.99)
 """Poles that are added, each with its zero, to the minimum of one order less."""
 
 
@@ -171,7 +171,7 @@ def _one_order_less(structure: Structure, data: Experiments) -> list[Array]:
     # the response to an initial state is a polynomial over F, so that polynomial is multiplied too
     states = theta[n_b + n_f :].reshape(data.count, fewer.n_initial)
     starts: list[Array] = []
-    for pole in CANCELLED:
+    for pole in CANCELLED_POLES:
         extra = np.array([1.0, -pole])
         longer = [np.convolve(state, extra) for state in states if state.size]
         starts.append(np.concatenate([np.convolve(b, extra), np.convolve(f, extra)[1:], *longer]))

@@ -80,7 +80,7 @@ def dc_gain_interval(
     # the fit chooses the place of a cancelled pole among many: one more degree of freedom for each
     freedom = 1 + len(model.cancellations)
     quantile = chi_square_quantile(level, freedom)
-    allowed = least + quantile * variance * _stretch(model)
+    allowed = least + quantile * variance * _variance_ratio(model)
     gain = float(best[:n_b].sum() / (1.0 + best[n_b : n_b + form.n_denominator].sum()))
     first = max(model.dc_gain_std / unit, 1e-6 * abs(gain)) * chi_square_quantile(level, 1) ** 0.5
     others = [descend_from(form, start, data, 12)[1] for start in starts[1:]]
@@ -90,7 +90,7 @@ def dc_gain_interval(
 
         def excess(value: float, path: list[Array] = path) -> float:
             cost, theta = min(
-                (_forced(form, data, start, value) for start in [path[-1], *others]), key=lambda found: found[0]
+                (_fit_with_gain(form, data, start, value) for start in [path[-1], *others]), key=lambda found: found[0]
             )
             path.append(theta)
             return cost - allowed
@@ -118,13 +118,13 @@ def _crossing(excess: Callable[[float], float], gain: float, step: float) -> flo
     return outside
 
 
-def _stretch(model: LinearModel) -> float:
+def _variance_ratio(model: LinearModel) -> float:
     """Return the gain's variance over that of a white residual; 1 if both agree or are unknown."""
     plain = replace(model, covariance=model.covariance_white).dc_gain_std
     return (model.dc_gain_std / plain) ** 2 if plain > 0.0 and np.isfinite(model.dc_gain_std / plain) else 1.0
 
 
-def _forced(form: Structure, data: Experiments, start: Array, gain: float) -> tuple[float, Array]:
+def _fit_with_gain(form: Structure, data: Experiments, start: Array, gain: float) -> tuple[float, Array]:
     """Return cost and values of the best fit with a given gain; the last numerator coefficient follows from the rest.
 
     The gain's condition ``sum b = gain (1 + sum f)`` is linear, so sensitivities of the free values are those of all

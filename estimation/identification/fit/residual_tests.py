@@ -126,7 +126,7 @@ def cross_correlation_test(
     freedom = int(known.sum()) - absorbed.shape[1]
     if freedom <= 0:
         raise few
-    columns = _without(absorbed[known], _unit(lagged(inputs, 0, n_lags + 1)[known]))
+    columns = _orthogonal_to(absorbed[known], _unit_columns(lagged(inputs, 0, n_lags + 1)[known]))
     left, strength, _ = np.linalg.svd(columns, full_matrices=False)
     rank = int(np.count_nonzero(strength > max(columns.shape) * np.finfo(float).eps * 1e2 * strength[0]))
     if freedom <= rank:
@@ -215,13 +215,13 @@ def correlations(residual: ArrayLike, other: ArrayLike, lags: ArrayLike) -> Arra
     return np.array(products) / size
 
 
-def _unit(columns: Array) -> Array:
+def _unit_columns(columns: Array) -> Array:
     scale = np.linalg.norm(columns, axis=0)
     return columns / np.where(scale > 0.0, scale, 1.0)
 
 
-def _without(absorbed: Array, columns: Array) -> Array:
-    basis = np.linalg.qr(_unit(absorbed))[0]
+def _orthogonal_to(absorbed: Array, columns: Array) -> Array:
+    basis = np.linalg.qr(_unit_columns(absorbed))[0]
     return columns - basis @ (basis.T @ columns)
 
 

@@ -11,7 +11,7 @@ from estimation.identification.fit.order import order_test
 from estimation.identification.model.lags import lagged
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
-from estimation.identification.search.criterion import Structure, polynomial, profile, stabilised
+from estimation.identification.search.criterion import Structure, polynomial, profile, stabilised_denominator
 from estimation.identification.search.experiments import data_hash, experiments_from
 from plant.errors import HydrostateError
 
@@ -88,7 +88,7 @@ def fit_subspace(
             "move it enough for a model"
         )
     shift = np.linalg.lstsq(left[:-1, :n], left[1:, :n], rcond=None)[0]
-    f = stabilised(polynomial(np.linalg.eigvals(shift).astype(np.complex128)), data.u.size)
+    f = stabilised_denominator(polynomial(np.linalg.eigvals(shift).astype(np.complex128)), data.u.size)
     form = Structure(n + 1, n)
     theta = profile(form, f, given.u, given.y, given.used)[1]
     b, f, state = form.split(theta)

@@ -54,7 +54,7 @@ def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
     >>> fit_percent([0.0, 1.0, 2.0], [1.0, 1.0, 1.0])
     0.0
     """
-    measured, model = _together(y, simulated)
+    measured, model = _present_pairs(y, simulated)
     return float(100.0 * (1.0 - np.linalg.norm(measured - model) / np.linalg.norm(measured - measured.mean())))
 
 
@@ -78,7 +78,7 @@ def rmse(y: ArrayLike, simulated: ArrayLike) -> float:
     >>> rmse([0.0, float("nan"), 2.0], [1.0, 1.0, 1.0])
     1.0
     """
-    measured, model = _together(y, simulated)
+    measured, model = _present_pairs(y, simulated)
     return float(np.sqrt(np.mean((measured - model) ** 2)))
 
 
@@ -137,7 +137,7 @@ def validate(
     )
 
 
-def _together(y: ArrayLike, simulated: ArrayLike) -> tuple[Array, Array]:
+def _present_pairs(y: ArrayLike, simulated: ArrayLike) -> tuple[Array, Array]:
     measured, model = np.asarray(y, dtype=np.float64), np.asarray(simulated, dtype=np.float64)
     if measured.shape != model.shape:
         raise HydrostateError(f"measured and simulated output must match, got {measured.shape} and {model.shape}")

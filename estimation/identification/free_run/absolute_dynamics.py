@@ -44,9 +44,9 @@ class AbsoluteDynamics(OutputErrorDynamics):
         """Fitted coefficients."""
         return self.linear.n_values + (self.lag > 0.0)
 
-    def unanswered(self, length: int) -> int:
+    def undetermined_outputs(self, length: int) -> int:
         """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
-        return self.linear.form.unanswered(length)
+        return self.linear.form.undetermined_outputs(length)
 
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, with its initial state by least squares of the available outputs."""

@@ -8,11 +8,11 @@ from estimation.identification.free_run.choose_absolute import AbsoluteCandidate
 from estimation.identification.free_run.choose_hammerstein import HammersteinCandidate
 from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate
-from estimation.identification.free_run.held_back import Compared
+from estimation.identification.free_run.held_back import ComparedModel
 from estimation.identification.free_run.linear_problem import Form
 
 
-def form_row(structure: str, one: Compared, form: Form, doubt: str = "", **beside: Any) -> dict[str, Any]:
+def form_row(structure: str, one: ComparedModel, form: Form, doubt: str = "", **beside: Any) -> dict[str, Any]:
     """Return the row of a candidate with a linear part.
 
     Parameters

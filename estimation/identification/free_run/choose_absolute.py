@@ -13,13 +13,13 @@ from estimation.identification.free_run.absolute_output import (
     signs_at_first,
     signs_of,
 )
-from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest
+from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest_good_candidate
 from estimation.identification.free_run.data import Channels, Scaling, blocks
-from estimation.identification.free_run.dense_polynomial import Asked
-from estimation.identification.free_run.held_back import BLOCKS, Compared, block_error
+from estimation.identification.free_run.dense_polynomial import RequestedSizes
+from estimation.identification.free_run.held_back import BLOCKS, ComparedModel, block_error
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.linear_problem import Form
-from estimation.progress import tell
+from estimation.progress import report_progress
 
 ORDERS = range(1, 6)
 """Orders of the linear part."""
@@ -30,7 +30,7 @@ its deviation: allowances for noise, and for a lag at a change of sign [dimensio
 
 
 @dataclass(frozen=True, eq=False)
-class AbsoluteCandidate(Compared):
+class AbsoluteCandidate(ComparedModel):
     """A fit with its held-back error.
 
     Parameters
@@ -52,11 +52,11 @@ def may_lack_sign(data: Channels, by: Scaling) -> bool:
         Scaled, and the scaling.
     """
     output = np.concatenate(data.y)
-    low, near = np.nanquantile(output, [0.01, 0.05]) - _zero(by)
+    low, near = np.nanquantile(output, [0.01, 0.05]) - _sensor_zero(by)
     return bool(low > -BELOW and near < NEAR_ZERO)
 
 
-def absolute_candidates(data: Channels, by: Scaling, asked: Asked) -> list[AbsoluteCandidate]:
+def absolute_candidates(data: Channels, by: Scaling, asked: RequestedSizes) -> list[AbsoluteCandidate]:
     """Return models of several orders, each judged on held-back blocks; none with a pole slower than a block.
 
     Parameters
@@ -66,30 +66,30 @@ def absolute_candidates(data: Channels, by: Scaling, asked: Asked) -> list[Absol
     asked : Asked
         Sizes that the user gives.
     """
-    counted, m = from_zero(data, by), len(data.inputs)
+    counted, m = relative_to_zero(data, by), len(data.inputs)
     forms = [
         Form(order, (asked.n_numerator or order + (delay == 0),) * m, (delay,) * m)
         for order in (ORDERS if asked.order is None else [asked.order])
         for delay in ((0, 1) if asked.delay is None else [asked.delay])
     ]
     signs = signs_at_first(counted)
-    first = [_told(fit_absolute(form, counted, signs)) for form in forms]
+    first = [_with_progress_report(fit_absolute(form, counted, signs)) for form in forms]
     # the other orders also start from the signs that the best one has found
     best = min(first, key=lambda fit: fit.cost)
     found = list[AbsoluteCandidate]()
     for fit in first:
-        again = _told(fit_absolute(fit.linear.form, counted, [signs_of(best, counted)]))
-        found.append(_judged(min(fit, again, key=lambda one: one.cost), counted, _zero(by)))
-    slow = float(np.exp(-(BLOCKS + 1.0) / data.told))
+        again = _with_progress_report(fit_absolute(fit.linear.form, counted, [signs_of(best, counted)]))
+        found.append(_judged_candidate(min(fit, again, key=lambda one: one.cost), counted, _sensor_zero(by)))
+    slow = float(np.exp(-(BLOCKS + 1.0) / data.informative_samples))
     return [one for one in found if slowest_pole(one.fit.linear.f) <= slow]
 
 
 def chosen_absolute(candidates: list[AbsoluteCandidate]) -> AbsoluteCandidate:
     """Return the model of least BIC among those nearly as good on held-back blocks as the best."""
-    return smallest(candidates, min(one.held_back for one in candidates))
+    return smallest_good_candidate(candidates, min(one.held_back for one in candidates))
 
 
-def from_zero(data: Channels, by: Scaling) -> Channels:
+def relative_to_zero(data: Channels, by: Scaling) -> Channels:
     """Return the same data with the output relative to the sensor's zero.
 
     Parameters
@@ -97,19 +97,19 @@ def from_zero(data: Channels, by: Scaling) -> Channels:
     data, by : Channels, Scaling
         Scaled, and how.
     """
-    return replace(data, y=tuple(y - _zero(by) for y in data.y))
+    return replace(data, y=tuple(y - _sensor_zero(by) for y in data.y))
 
 
-def _zero(by: Scaling) -> float:
+def _sensor_zero(by: Scaling) -> float:
     return -by.y_mean / by.y_std
 
 
-def _told(fit: AbsoluteFit) -> AbsoluteFit:
-    tell("outputs without a sign")
+def _with_progress_report(fit: AbsoluteFit) -> AbsoluteFit:
+    report_progress("outputs without a sign")
     return fit
 
 
-def _judged(fit: AbsoluteFit, data: Channels, zero: float) -> AbsoluteCandidate:
+def _judged_candidate(fit: AbsoluteFit, data: Channels, zero: float) -> AbsoluteCandidate:
     """Return a fit with its errors on held-back blocks, each by a fit to the others."""
     target, errors = np.concatenate(data.y), list[float]()
     problem = AbsoluteProblem(fit.linear.form, data)

@@ -6,19 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.free_run.choose_linear import Candidate, criteria, smallest
+from estimation.identification.free_run.choose_linear import Candidate, criteria, smallest_good_candidate
 from estimation.identification.free_run.data import Channels, Scaling, blocks
 from estimation.identification.free_run.hammerstein_fit import (
     HammersteinFit,
     HammersteinProblem,
     fit_hammerstein,
-    refitted,
+    refitted_hammerstein,
 )
-from estimation.identification.free_run.held_back import BLOCKS, Compared, block_error, told_apart
+from estimation.identification.free_run.held_back import BLOCKS, ComparedModel, block_error, is_better_beyond_chance
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.transfer_function import linear_model
-from estimation.progress import tell
+from estimation.progress import report_progress
 
 ORDERS = 4
 """Highest order of the linear part."""
@@ -31,7 +31,7 @@ UNSCALED = Scaling(np.zeros(1), np.ones(1), 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class HammersteinCandidate(Compared):
+class HammersteinCandidate(ComparedModel):
     """A fit with its held-back error.
 
     Parameters
@@ -68,12 +68,14 @@ def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[
         best: dict[int, tuple[float, HammersteinFit]] = {}
         for one in _bases(linear):
             order = one.form.order
-            tell("nonlinear inputs")
+            report_progress("nonlinear inputs")
             fit = fit_hammerstein(kind, one.form, data, denominators.get(order, [one.fit.f]))
             if fit is not None and (order not in best or _bic(fit, data) < best[order][0]):
                 best[order] = _bic(fit, data), fit
         found += [
-            HammersteinCandidate(fit, _doubt(fit, data), block_errors=_held_back(fit, data), bic=bic)
+            HammersteinCandidate(
+                fit, _cancellation_doubt(fit, data), block_errors=_held_back_errors(fit, data), bic=bic
+            )
             for bic, fit in best.values()
             if np.sqrt(fit.cost / data.n_samples) < bar
         ]
@@ -92,10 +94,10 @@ def chosen_hammerstein(candidates: Sequence[HammersteinCandidate]) -> Hammerstei
         At least one; if all are doubtful, one of them is returned.
     """
     sound = [one for one in candidates if not one.doubt] or list(candidates)
-    return smallest(sound, min(one.held_back for one in sound))
+    return smallest_good_candidate(sound, min(one.held_back for one in sound))
 
 
-def worthwhile(
+def worthwhile_candidate(
     candidates: Sequence[HammersteinCandidate], linear: Sequence[Candidate], best: Candidate, *, surely: bool
 ) -> HammersteinCandidate | None:
     """Return the candidate, if it is better than every linear model.
@@ -122,7 +124,7 @@ def worthwhile(
     bar = min(best.held_back, *(one.held_back for one in linear))
     if not taken.held_back < (1.0 - BENT_MARGIN) * bar:
         return None
-    return None if surely and not told_apart(taken.block_errors, best.block_errors) else taken
+    return None if surely and not is_better_beyond_chance(taken.block_errors, best.block_errors) else taken
 
 
 def _bases(linear: Sequence[Candidate]) -> list[Candidate]:
@@ -139,7 +141,7 @@ def _bic(fit: HammersteinFit, data: Channels) -> float:
     return criteria(fit.cost, fit.theta.size, data.n_samples)[0]
 
 
-def _doubt(fit: HammersteinFit, data: Channels) -> str:
+def _cancellation_doubt(fit: HammersteinFit, data: Channels) -> str:
     """Return a mark if a pole of the linear part, slower than a held-back block, cancels with a zero."""
     behind, _ = HammersteinProblem(fit.kind, fit.linear.form, data).behind_nonlinearity(fit.values, fit.starts)
     slow = np.exp(-(BLOCKS + 1.0) / data.longest)
@@ -147,12 +149,12 @@ def _doubt(fit: HammersteinFit, data: Channels) -> str:
     return "cancelling" if any(abs(one.pole) > slow for one in pairs) else ""
 
 
-def _held_back(fit: HammersteinFit, data: Channels) -> tuple[float, ...]:
+def _held_back_errors(fit: HammersteinFit, data: Channels) -> tuple[float, ...]:
     """Return the free-run error of each held-back block, simulated by a fit to the others."""
     target, errors = np.concatenate(data.y), list[float]()
     for masks in blocks(data, BLOCKS):
-        tell("nonlinear inputs")
-        part = refitted(fit, data.without(masks), COARSE)
+        report_progress("nonlinear inputs")
+        part = refitted_hammerstein(fit, data.without(masks), COARSE)
         output = HammersteinProblem(fit.kind, fit.linear.form, data).jacobian(part.theta)[0]
         errors.append(block_error(output - target, np.concatenate(masks) & np.isfinite(target)))
     return tuple(errors)

@@ -5,17 +5,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.free_run.believable import BELIEVED
-from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest
+from estimation.identification.free_run.believable import LARGEST_ERROR_BELIEVED
+from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest_good_candidate
 from estimation.identification.free_run.data import FEWEST, Channels, Scaling, blocks
-from estimation.identification.free_run.held_back import BLOCKS, Compared, block_error, told_apart
+from estimation.identification.free_run.held_back import BLOCKS, ComparedModel, block_error, is_better_beyond_chance
 from estimation.identification.free_run.integrating import fit_integrating
-from estimation.identification.free_run.limited_output import LimitedProblem, Limits, at_limits, between, limits_of
+from estimation.identification.free_run.limited_output import (
+    LimitedProblem,
+    Limits,
+    at_limits,
+    between_limits,
+    limits_of,
+)
 from estimation.identification.free_run.linear_comparison import LinearComparison, linear_comparison
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 from estimation.identification.notes import IdentificationCode
-from estimation.progress import tell
+from estimation.progress import report_progress
 from estimation.stretches import stretches
 
 ORDERS = 3
@@ -25,7 +31,7 @@ MARGIN, CUT_OFF = 0.02, 0.7
 """Share by which stops must reduce the held-back error, as a nonlinearity at the input must; and largest ratio of the
 error with saturation to that without, as for a pole at 1."""
 
-SETTLED = 0.2
+SETTLED_ERROR_RATIO = 0.2
 """Largest ratio of the error between stops to that without, if the output may have settled at both [fraction]; judged:
 0.06 to 0.13 for pistons driven between stops, 0.26 for an output that rises faster than it falls, reported as stops."""
 
@@ -36,7 +42,7 @@ value."""
 
 
 @dataclass(frozen=True, eq=False)
-class LimitedCandidate(Compared):
+class LimitedCandidate(ComparedModel):
     """A fit between limits with its held-back error."""
 
     fit: LinearFit
@@ -69,21 +75,23 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     """
     data = one.task.part
     limits = limits_of(data)
-    if limits is None or min(np.isfinite(y).sum() for y in between(data, limits).y) < FEWEST:
+    if limits is None or min(np.isfinite(y).sum() for y in between_limits(data, limits).y) < FEWEST:
         return None
     orders = sorted({one.task.orders[0]} if len(one.task.orders) == 1 else set(one.task.orders[:ORDERS]))
     delays = one.task.delays or one.best.form.delays
     found = [
-        _judged(_fitted(form, data, limited, one), data, limited)
+        _judged_candidate(_best_fit(form, data, limited, one), data, limited)
         for limited in (limits, replace(limits, stops=True))
         for order in orders
         for form in _forms(order, delays, one.task.asked.n_numerator)
     ]
     # a slow output behind a saturated sensor would go far beyond the limit and return late; at a stop it would not
-    found = [each for each in found if each.limits.stops or not each.outlasts(data.told / (BLOCKS + 1.0))]
+    found = [
+        each for each in found if each.limits.stops or not each.outlasts(data.informative_samples / (BLOCKS + 1.0))
+    ]
     if not found:
         return None
-    taken = smallest(found, min(each.held_back for each in found))
+    taken = smallest_good_candidate(found, min(each.held_back for each in found))
     # a run between stops may drift as one with a pole at 1 does, and has the same bar: not to leave most of the output;
     # saturation leaves only noise: an output that bends towards an end gains less, and exceeds it in other logs
     best, stops = one.best, taken.limits.stops
@@ -91,21 +99,21 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
         return None
     settled, between_ends = _levels_at_ends(data, limits)
     if stops:
-        least = min((SETTLED if settled else 1.0 - MARGIN) * best.held_back, BELIEVED)
+        least = min((SETTLED_ERROR_RATIO if settled else 1.0 - MARGIN) * best.held_back, LARGEST_ERROR_BELIEVED)
     else:
         least = 0.0 if settled else CUT_OFF * best.held_back
-    if taken.held_back < least and told_apart(taken.block_errors, best.block_errors):
+    if taken.held_back < least and is_better_beyond_chance(taken.block_errors, best.block_errors):
         free = one.task.free
         return taken if free is None or _explains_more(taken, linear_comparison(free).best) else None
     # a staircase needs no check: input levels other than those at the ends determine the gain
     open_end = between_ends < 1.0 - NEARLY if settled else not stops
     if open_end:
-        shown, share = told_limits(data, one.task.by, limits)
+        shown, share = limits_in_words(data, one.task.by, limits)
         one.notes.append(IdentificationCode.OUTPUT_AT_END.note(output=data.output, limits=shown, share=share))
     return None
 
 
-def _explains_more(taken: LimitedCandidate, linear: Compared) -> bool:
+def _explains_more(taken: LimitedCandidate, linear: ComparedModel) -> bool:
     """Return whether a model between limits is better on blocks and has the lower BIC of the whole log.
 
     Where dry friction holds an output at its turns, stops may win on blocks alone.
@@ -127,7 +135,7 @@ def _levels_at_ends(data: Channels, limits: Limits) -> tuple[bool, float]:
     return settled, float(np.mean(~np.any(there, axis=0)))
 
 
-def told_limits(data: Channels, by: Scaling, limits: Limits) -> tuple[str, float]:
+def limits_in_words(data: Channels, by: Scaling, limits: Limits) -> tuple[str, float]:
     """Return limits in words, and the share of samples at them.
 
     Parameters
@@ -158,7 +166,7 @@ def refitted_limited(taken: LimitedCandidate, data: Channels) -> LinearFit:
     problem, fit = LimitedProblem(taken.fit.form, data, taken.limits), taken.fit
     theta = fit.theta
     if theta.size != problem.inner.n_parameters:
-        theta = _begun(fit.f, _free(data, taken.limits), problem)
+        theta = _start_values(fit.f, _between_limits(data, taken.limits), problem)
     return problem.descend(theta)
 
 
@@ -170,32 +178,32 @@ def _forms(order: int, delays: tuple[int, ...], sizes: int | None) -> list[Form]
     return [Form(order, (order + 1,) * len(delays), delays), Form(order, (order,) * len(delays), late)]
 
 
-def _fitted(form: Form, data: Channels, limits: Limits, one: LinearComparison) -> LinearFit:
+def _best_fit(form: Form, data: Channels, limits: Limits, one: LinearComparison) -> LinearFit:
     """Return the best fit of one form: started from outputs between limits, and from models without limits."""
-    tell("outputs with limits")
+    report_progress("outputs with limits")
     problem = LimitedProblem(form, data, limits)
-    free = _free(data, limits)
+    free = _between_limits(data, limits)
     starts = [fit_linear(form, free, least_gain=COARSE).f]
     if limits.stops and form.order > 0:
         integrating = fit_integrating(form, free, starts, search=True, least_gain=COARSE)
         starts += [integrating.f] if np.isfinite(integrating.cost) else []
     starts += [each.fit.f for each in one.candidates if each.form == form]
-    fits = [problem.descend(_begun(f, free, problem), least_gain=COARSE) for f in starts]
+    fits = [problem.descend(_start_values(f, free, problem), least_gain=COARSE) for f in starts]
     return min(fits, key=lambda fit: fit.cost)
 
 
-def _begun(f: Array, free: Channels, problem: LimitedProblem) -> Array:
+def _start_values(f: Array, free: Channels, problem: LimitedProblem) -> Array:
     """Return a start for a denominator, from outputs between limits."""
     values = Problem(problem.form, free).profiled(f)[1][: problem.form.n_values]
-    return problem.begun(values)
+    return problem.with_initial_states(values)
 
 
-def _free(data: Channels, limits: Limits) -> Channels:
+def _between_limits(data: Channels, limits: Limits) -> Channels:
     """Return the data between limits: with stops as separate logs."""
-    return _pieces(data, limits) if limits.stops else between(data, limits)
+    return _pieces_between_limits(data, limits) if limits.stops else between_limits(data, limits)
 
 
-def _pieces(data: Channels, limits: Limits) -> Channels:
+def _pieces_between_limits(data: Channels, limits: Limits) -> Channels:
     """Return the data between stays at a limit as separate logs."""
     u, y = list[Array](), list[Array]()
     for inputs, output in zip(data.u, data.y, strict=True):
@@ -203,14 +211,14 @@ def _pieces(data: Channels, limits: Limits) -> Channels:
             if np.count_nonzero(np.isfinite(output[first:last])) >= FEWEST:
                 u.append(np.ascontiguousarray(inputs[first:last]))
                 y.append(output[first:last])
-    return replace(data, u=tuple(u), y=tuple(y)) if u else between(data, limits)
+    return replace(data, u=tuple(u), y=tuple(y)) if u else between_limits(data, limits)
 
 
-def _judged(fit: LinearFit, data: Channels, limits: Limits) -> LimitedCandidate:
+def _judged_candidate(fit: LinearFit, data: Channels, limits: Limits) -> LimitedCandidate:
     """Return a fit with its errors on held-back blocks, each by a fit to the others."""
     target, errors, whole = np.concatenate(data.y), list[float](), LimitedProblem(fit.form, data, limits)
     for masks in blocks(data, BLOCKS):
-        tell("outputs with limits")
+        report_progress("outputs with limits")
         part = LimitedProblem(fit.form, data.without(masks), limits).descend(fit.theta, least_gain=COARSE)
         output = whole.jacobian(part.theta)[0]
         errors.append(block_error(output - target, np.concatenate(masks) & np.isfinite(target)))

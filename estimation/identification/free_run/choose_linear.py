@@ -9,12 +9,12 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.dead_times import estimate_delays
-from estimation.identification.free_run.held_back import BLOCKS, NEAR, Compared, held_back_blocks
+from estimation.identification.free_run.held_back import BLOCKS, COMPARISON_GAIN, ComparedModel, held_back_blocks
 from estimation.identification.free_run.integrating import fit_integrating
-from estimation.identification.free_run.linear_fit import extended, fit_linear
+from estimation.identification.free_run.linear_fit import extended_denominators, fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit
 
-CLEARLY = 0.01
+CLEAR_GAIN = 0.01
 """Share by which a larger model must reduce the held-back error."""
 
 DEAD_TIME = 0.03
@@ -28,7 +28,7 @@ PATIENCE = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate(Compared):
+class Candidate(ComparedModel):
     """A form with its evidence.
 
     Parameters
@@ -64,7 +64,7 @@ class Candidate(Compared):
         data : Channels
             The data on which it was judged.
         """
-        return slowest_pole(self.fit.f) > np.exp(-(BLOCKS + 1.0) / data.told)
+        return slowest_pole(self.fit.f) > np.exp(-(BLOCKS + 1.0) / data.informative_samples)
 
 
 def slowest_pole(f: Array) -> float:
@@ -120,7 +120,7 @@ def doubt_of(fit: LinearFit, data: Channels) -> str:
     if gained < fit.theta.size * float(np.log(n)):
         return "no_fit"
     radius = slowest_pole(fit.f)
-    if radius >= 1.0 or (radius > 0.0 and -1.0 / np.log(radius) > data.told):
+    if radius >= 1.0 or (radius > 0.0 and -1.0 / np.log(radius) > data.informative_samples):
         return "time_constant"
     return ""
 
@@ -151,19 +151,19 @@ def linear_candidates(
         fits = [_best_start(form, data, previous) for form in (forms if delays is None else forms[:1])]
         tried = [candidate(fit, data) for fit in fits]
         beyond = [one for one in tried if one.doubt == "time_constant"]
-        tried += [_within_record(one, data) for one in beyond]
-        tried += [other for one in beyond for other in _integrating(one, data)]
+        tried += [_bounded_candidate(one, data) for one in beyond]
+        tried += [other for one in beyond for other in _integrating_candidates(one, data)]
         found += tried
-        previous = [start for fit in fits for start in extended(fit)]
-        now = _least(found)
-        idle = 0 if now < (1.0 - CLEARLY) * best else idle + 1
+        previous = [start for fit in fits for start in extended_denominators(fit)]
+        now = _least_error(found)
+        idle = 0 if now < (1.0 - CLEAR_GAIN) * best else idle + 1
         best = min(best, now)
         if idle >= PATIENCE:
             break
     return found
 
 
-def _least(candidates: Sequence[Candidate]) -> float:
+def _least_error(candidates: Sequence[Candidate]) -> float:
     """Return the least held-back error of acceptable models: of those with a pole at 1, if one is believed."""
     sound = min((one.held_back for one in candidates if not one.doubt), default=np.inf)
     integrating = min((one.held_back for one in candidates if one.fit.integrates), default=np.inf)
@@ -171,20 +171,20 @@ def _least(candidates: Sequence[Candidate]) -> float:
 
 
 def _best_start(form: Form, data: Channels, previous: Sequence[Array]) -> LinearFit:
-    fits = [fit_linear(form, data, least_gain=NEAR)]
+    fits = [fit_linear(form, data, least_gain=COMPARISON_GAIN)]
     if previous:
-        fits.append(fit_linear(form, data, previous, least_gain=NEAR))
+        fits.append(fit_linear(form, data, previous, least_gain=COMPARISON_GAIN))
     return min(fits, key=lambda fit: fit.cost)
 
 
-def _within_record(one: Candidate, data: Channels) -> Candidate:
+def _bounded_candidate(one: Candidate, data: Channels) -> Candidate:
     """Return the best model of the same form whose time constants are shorter than the record."""
     return candidate(fit_linear(one.form, data, [one.fit.f], bounded=True), data)
 
 
-def _integrating(one: Candidate, data: Channels) -> list[Candidate]:
+def _integrating_candidates(one: Candidate, data: Channels) -> list[Candidate]:
     """Return the best model of the same form with a pole at 1; None if it cannot be written."""
-    fit = fit_integrating(one.form, data, [one.fit.f], search=True, least_gain=NEAR)
+    fit = fit_integrating(one.form, data, [one.fit.f], search=True, least_gain=COMPARISON_GAIN)
     return [candidate(fit, data)] if np.isfinite(fit.cost) else []
 
 
@@ -201,7 +201,7 @@ def _forms(order: int, late: tuple[int, ...], m: int, sizes: int | None) -> list
     return list(dict.fromkeys(forms))
 
 
-def chosen(candidates: Sequence[Candidate]) -> Candidate:
+def chosen_linear(candidates: Sequence[Candidate]) -> Candidate:
     """Return the model of least BIC among those nearly as good on held-back blocks as the best.
 
     A dead time of more than one sample is the best of many and looks better than it is: it counts as a value in BIC,
@@ -213,13 +213,13 @@ def chosen(candidates: Sequence[Candidate]) -> Candidate:
         At least one; if all are doubtful, the best of them is returned.
     """
     sound = [one for one in candidates if not one.doubt] or list(candidates)
-    return smallest(sound, min(one.price for one in sound))
+    return smallest_good_candidate(sound, min(one.price for one in sound))
 
 
-Some = TypeVar("Some", bound=Compared)
+AnyCompared = TypeVar("AnyCompared", bound=ComparedModel)
 
 
-def smallest(candidates: Sequence[Some], least: float) -> Some:
+def smallest_good_candidate(candidates: Sequence[AnyCompared], least: float) -> AnyCompared:
     """Return the model of least BIC among those nearly as good on held-back blocks as the best.
 
     Parameters
@@ -229,5 +229,5 @@ def smallest(candidates: Sequence[Some], least: float) -> Some:
     least : float
         Held-back error of the best one [dimensionless].
     """
-    near = [one for one in candidates if one.held_back <= (1.0 + CLEARLY) * least]
+    near = [one for one in candidates if one.held_back <= (1.0 + CLEAR_GAIN) * least]
     return min(near, key=lambda one: one.bic)

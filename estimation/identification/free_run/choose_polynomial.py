@@ -12,16 +12,27 @@ import numpy as np
 
 from estimation.identification.free_run.choose_linear import Candidate, criteria
 from estimation.identification.free_run.data import Channels, blocks
-from estimation.identification.free_run.dense_polynomial import Asked, JudgedRecipe, Recipe, forms_tried, judged_recipes
-from estimation.identification.free_run.held_back import BLOCKS, Compared, block_error, pooled
+from estimation.identification.free_run.dense_polynomial import (
+    JudgedRecipe,
+    Recipe,
+    RequestedSizes,
+    judged_recipes,
+    tried_forms,
+)
+from estimation.identification.free_run.held_back import BLOCKS, ComparedModel, block_error, pooled_error
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.other_orders import disagreement, is_wild
-from estimation.identification.free_run.output_friction import continued, fit_with_friction
+from estimation.identification.free_run.output_friction import continued_fit, fit_with_friction
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
-from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more, without_term
+from estimation.identification.free_run.polynomial_terms import (
+    candidate_terms,
+    polynomial_of_linear,
+    with_best_product,
+    without_term,
+)
 from estimation.identification.free_run.selected_polynomial import Selection, forms_selected, judged_selections
-from estimation.progress import tell
+from estimation.progress import report_progress
 
 MOST_TERMS = 20
 """Products beside the linear terms."""
@@ -29,13 +40,13 @@ MOST_TERMS = 20
 PATIENCE = 4
 """Products without gain on held-back data after which no more are added."""
 
-CLEARLY = 0.01
+CLEAR_GAIN = 0.01
 """Share by which further products must reduce the held-back error."""
 
 HIGHEST_BASE = 4
 """Highest order of the linear model to which products are added."""
 
-HIGHEST_RUBBING, RUBBING_BASES, RUBS = 3, 2, 0.1
+HIGHEST_FRICTION_ORDER, FRICTION_BASES, LEAST_FRICTION_GAIN = 3, 2, 0.1
 """Highest order of a linear model with output friction, models of each order, and share of the squared error that
 friction must explain."""
 
@@ -51,7 +62,7 @@ SELECTIONS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class PolynomialCandidate(Compared):
+class PolynomialCandidate(ComparedModel):
     """A polynomial fit with its held-back error.
 
     Parameters
@@ -78,7 +89,7 @@ class PolynomialCandidate(Compared):
 
 
 def polynomial_candidates(
-    linear: Sequence[Candidate], data: Channels, asked: Asked | None = None, bar: float = float("inf")
+    linear: Sequence[Candidate], data: Channels, asked: RequestedSizes | None = None, bar: float = float("inf")
 ) -> list[PolynomialCandidate]:
     """Return polynomial models: grown from linear ones, with every product, and with the few that explain most.
 
@@ -96,21 +107,21 @@ def polynomial_candidates(
     bar : float
         Price from which no model is used [dimensionless].
     """
-    delays, wanted = min(linear, key=lambda one: one.held_back).form.delays, asked or Asked()
+    delays, wanted = min(linear, key=lambda one: one.held_back).form.delays, asked or RequestedSizes()
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
-    found = _grown(linear, data)
-    for offered in (_dense, _selected):
+    found = _grown_candidates(linear, data)
+    for offered in (_dense_candidates, _selected_candidates):
         found += offered(data, parts, delays, wanted, min([bar, *(one.price for one in found)]))
     return found
 
 
-def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
+def _grown_candidates(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
     growths = [
         _Growth(whole, _from_linear(base.fit), data)
         for base in _bases(linear)
-        if (whole := begun(base.fit, data)) is not None
+        if (whole := polynomial_of_linear(base.fit, data)) is not None
     ]
-    return [*_best_grown(growths, KEPT), *_best_grown(_with_friction(linear, data), 1)]
+    return [*_best_grown(growths, KEPT), *_best_grown(_growths_with_friction(linear, data), 1)]
 
 
 def _best_grown(growths: Sequence["_Growth"], count: int) -> list[PolynomialCandidate]:
@@ -118,47 +129,47 @@ def _best_grown(growths: Sequence["_Growth"], count: int) -> list[PolynomialCand
     best = sorted(screened, key=lambda one: min(one.errors))[:count]
     for growth in best:
         growth.advance(MOST_TERMS)
-    return [growth.finished() for growth in best]
+    return [growth.finished_candidate() for growth in best]
 
 
 def _from_linear(base: LinearFit) -> Callable[[Channels], PolynomialFit | None]:
-    return lambda part: begun(fit_linear(base.form, part, [base.f]), part)
+    return lambda part: polynomial_of_linear(fit_linear(base.form, part, [base.f]), part)
 
 
-def _with_friction(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
+def _growths_with_friction(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
     """Return growths from models with output friction, if friction explains much that linear models leave."""
     fits: list[PolynomialFit] = []
-    for order in range(1, HIGHEST_RUBBING + 1):
+    for order in range(1, HIGHEST_FRICTION_ORDER + 1):
         # a plant with friction may integrate, so a time constant beyond the record is no objection here
         own = sorted((one for one in linear if one.form.order == order), key=lambda one: one.held_back)
-        for base in own[:RUBBING_BASES]:
+        for base in own[:FRICTION_BASES]:
             for friction in ("velocity", "position")[:order]:
                 fit = fit_with_friction(base.fit, friction, data)
-                if fit is not None and fit.cost < (1.0 - RUBS) * base.fit.cost:
+                if fit is not None and fit.cost < (1.0 - LEAST_FRICTION_GAIN) * base.fit.cost:
                     fits.append(fit)
     best = sorted(fits, key=lambda one: _bic(one, data))[:KEPT]
-    return [_Growth(fit, partial(continued, fit), data) for fit in best]
+    return [_Growth(fit, partial(continued_fit, fit), data) for fit in best]
 
 
-def _dense(
-    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
+def _dense_candidates(
+    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: RequestedSizes, bar: float
 ) -> list[PolynomialCandidate]:
     """Return the models with every product that are best on held-back data, except those that leave their range."""
-    forms = forms_tried(delays, asked)
+    forms = tried_forms(delays, asked)
     judged = sorted(judged_recipes(data, parts, forms, asked), key=lambda one: one.held_back)
     first = [one for one in judged if one.recipe.form in forms][:COMPARED]
-    return _kept([*first, *[one for one in judged if one.recipe.form not in forms][:LARGER]], data, bar)
+    return _candidates_in_range([*first, *[one for one in judged if one.recipe.form not in forms][:LARGER]], data, bar)
 
 
-def _selected(
-    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
+def _selected_candidates(
+    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: RequestedSizes, bar: float
 ) -> list[PolynomialCandidate]:
     """Return the models with few products that are best on held-back data, except those that leave their range."""
     judged = judged_selections(data, parts, forms_selected(delays, asked))
-    return _kept(sorted(judged, key=lambda one: one.held_back)[:SELECTIONS], data, bar)
+    return _candidates_in_range(sorted(judged, key=lambda one: one.held_back)[:SELECTIONS], data, bar)
 
 
-def _kept(
+def _candidates_in_range(
     judged: Sequence[JudgedRecipe[Recipe]] | Sequence[JudgedRecipe[Selection]], data: Channels, bar: float
 ) -> list[PolynomialCandidate]:
     """Return models of all data that were judged without a block each, except those that leave their range.
@@ -170,7 +181,7 @@ def _kept(
     for one in sorted(judged, key=lambda one: one.held_back):
         if one.held_back > bar:
             break
-        tell("polynomial models")
+        report_progress("polynomial models")
         recipe = one.recipe
         fit = _fitted(recipe, data, known) if isinstance(recipe, Recipe) else recipe.fit(data)
         if fit is not None and not is_wild(fit, data):
@@ -229,7 +240,7 @@ class _Growth:
     @property
     def errors(self) -> list[float]:
         """Held-back error by the number of products."""
-        return [pooled(one) for one in self.block_errors]
+        return [pooled_error(one) for one in self.block_errors]
 
     def advance(self, most: int) -> bool:
         """Add products until there are as many as wanted, or more bring no gain; return whether it runs free at all."""
@@ -237,12 +248,12 @@ class _Growth:
             return False
         pool = candidate_terms(self.path[0].variables)
         while len(self.errors) <= most and len(self.errors) - 1 - int(np.argmin(self.errors)) < PATIENCE:
-            tell("products that grow")
+            report_progress("products that grow")
             self.fits = [
-                None if fit is None else one_more(fit, pool, part) or fit
+                None if fit is None else with_best_product(fit, pool, part) or fit
                 for fit, part in zip(self.fits, self.parts, strict=True)
             ]
-            more = one_more(self.path[-1], pool, self.data)
+            more = with_best_product(self.path[-1], pool, self.data)
             if more is None:
                 break
             self.path.append(more)
@@ -251,16 +262,16 @@ class _Growth:
             self.block_errors.append((float("inf"),) * len(self.masks) if wild else self._held_back())
         return True
 
-    def finished(self) -> PolynomialCandidate:
+    def finished_candidate(self) -> PolynomialCandidate:
         """Return the model of all data with the number of products chosen on held-back blocks, pruned."""
         errors = self.errors
         least = min(errors)
-        count = next(k for k, error in enumerate(errors) if error <= (1.0 + CLEARLY) * least)
+        count = next(k for k, error in enumerate(errors) if error <= (1.0 + CLEAR_GAIN) * least)
         fit = _pruned(self.path[count], self.data)
         fit = Runs(fit.variables, fit.terms, self.data).fit(fit.theta, FINAL_STEPS) or fit
         parts = [part for part in self.history[count] if part is not None]
         spread = disagreement(parts, fit, self.data)
-        refit, own, bic = partial(continued, fit), self.block_errors[count], _bic(fit, self.data)
+        refit, own, bic = partial(continued_fit, fit), self.block_errors[count], _bic(fit, self.data)
         return PolynomialCandidate(fit, refit, spread, tuple(parts), block_errors=own, bic=bic)
 
     def _held_back(self) -> tuple[float, ...]:

@@ -62,9 +62,9 @@ class Channels:
         return tuple(common_period(u) for u in self.u)
 
     @property
-    def told(self) -> int:
+    def informative_samples(self) -> int:
         """Samples of the longest log with new information: one period, if its inputs are periodic."""
-        return max(lengths_told(self))
+        return max(informative_lengths(self))
 
     @property
     def duration(self) -> float:
@@ -217,7 +217,7 @@ def in_scale(data: Channels, by: Scaling) -> Channels:
     )
 
 
-def lengths_told(data: Channels, shortest: int = SHORTEST) -> list[int]:
+def informative_lengths(data: Channels, shortest: int = SHORTEST) -> list[int]:
     """Return the period of each log's inputs, or its length if they are not periodic.
 
     Parameters
@@ -248,7 +248,7 @@ def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
         One mask per log, for each block.
     """
     places: list[IntArray] = []
-    for told, y in zip(lengths_told(data, SHORTEST * (count + 1)), data.y, strict=True):
+    for told, y in zip(informative_lengths(data, SHORTEST * (count + 1)), data.y, strict=True):
         period = max(told, 1)
         places.append(np.arange(y.size) % period * (count + 1) // period)
     return [[place == 1 + index for place in places] for index in range(count)]
@@ -262,7 +262,7 @@ def halves(data: Channels) -> tuple[Channels, Channels]:
     tuple of Channels
         With the same number of logs each.
     """
-    begins = [y.size - told for told, y in zip(lengths_told(data), data.y, strict=True)]
+    begins = [y.size - told for told, y in zip(informative_lengths(data), data.y, strict=True)]
     cuts = [(begin + y.size) // 2 for begin, y in zip(begins, data.y, strict=True)]
 
     def part(*, late: bool) -> Channels:
@@ -276,7 +276,7 @@ def halves(data: Channels) -> tuple[Channels, Channels]:
     return part(late=False), part(late=True)
 
 
-def section(data: Channels, most: int) -> Channels:
+def liveliest_sections(data: Channels, most: int) -> Channels:
     """Return the part of each log in which the first input varies most, with a limited number of samples.
 
     Parameters

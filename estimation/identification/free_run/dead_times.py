@@ -19,23 +19,23 @@ LONGEST_SHARE = 5
 """Inverse of the longest dead time over the record: the length of the first block, which is never held back. With a
 limit of a third, a drift was taken for a dead time in one of 91 logs."""
 
-CLEARLY = 0.9
+CLEAR_RATIO = 0.9
 """Largest ratio of the error with a long dead time to that with shorter ones [fraction]: the best of hundreds of dead
 times is a few per cent better than the others by chance."""
 
-APART = 3.0
+TIME_CONSTANT_RATIO = 3.0
 """Ratio of the time constants of the screening, from one sample to a fifth of the record: between two neighbours, the
 dead time moves by less than the time constant, and it is refined afterwards."""
 
-ORDER, NEAR = 3, 1e-4
+ORDER, REFINED_GAIN = 3, 1e-4
 """Order of the fits that refine a long dead time, and their least gain for `levenberg`: with fewer poles, the rise of a
 third one would be taken for dead time."""
 
-NEARLY = 1.005
+SHORTER_RATIO = 1.005
 """Error with a shorter dead time over that with the best one, up to which the shorter is chosen [dimensionless]."""
 
 
-UNEXPLAINED = 0.5
+UNEXPLAINED_RATIO = 0.5
 """Residual of a model over the output's deviation, from which a longer dead time may be the cause, and ratio of errors
 up to which such a dead time is named: in 55 logs without one it is at least 0.6, in five with one at most 0.1."""
 
@@ -59,7 +59,11 @@ def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ..
         One per input [samples].
     """
     m = len(data.inputs)
-    longest = data.told // LONGEST_SHARE if longest is None else min(longest, data.told // LONGEST_SHARE)
+    longest = (
+        data.informative_samples // LONGEST_SHARE
+        if longest is None
+        else min(longest, data.informative_samples // LONGEST_SHARE)
+    )
     most = min(longest, long_dead_time(data.longest))
     delays = [1] * m
     for index in range(m):
@@ -68,12 +72,12 @@ def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ..
             tried = tuple(delay if k == index else one for k, one in enumerate(delays))
             costs.append(quick_fit(Form(2, (2,) * m, tried), data))
         least = min(costs)
-        delays[index] = next(k for k, cost in enumerate(costs) if cost <= NEARLY * least)
-        delays[index] = _longer(data, index, delays, most, longest)
+        delays[index] = next(k for k, cost in enumerate(costs) if cost <= SHORTER_RATIO * least)
+        delays[index] = _longer_dead_time(data, index, delays, most, longest)
     return tuple(delays)
 
 
-def late_answers(data: Channels, rmse: float) -> list[Note]:
+def late_response_notes(data: Channels, rmse: float) -> list[Note]:
     """Return a note on each input with a response later than the dead times that are searched.
 
     Held-back blocks cannot judge such a model: a fit with a dead time of up to half of the log is used.
@@ -85,42 +89,46 @@ def late_answers(data: Channels, rmse: float) -> list[Note]:
     rmse : float
         Root-mean-square error of the chosen model [dimensionless].
     """
-    if rmse < UNEXPLAINED:
+    if rmse < UNEXPLAINED_RATIO:
         return []
     m, notes = len(data.inputs), list[Note]()
     for index, name in enumerate(data.inputs):
-        late = _longer(data, index, [1] * m, data.told // LONGEST_SHARE, data.told // 2)
+        late = _longer_dead_time(
+            data, index, [1] * m, data.informative_samples // LONGEST_SHARE, data.informative_samples // 2
+        )
         form = Form(ORDER, (ORDER,) * m, tuple(late if k == index else 1 for k in range(m)))
         left = (
-            1.0 if late == 1 else float(np.sqrt(fit_linear(form, data, least_gain=NEAR).cost / data.n_samples)) / rmse
+            1.0
+            if late == 1
+            else float(np.sqrt(fit_linear(form, data, least_gain=REFINED_GAIN).cost / data.n_samples)) / rmse
         )
-        if left < UNEXPLAINED:
+        if left < UNEXPLAINED_RATIO:
             told = {"samples": late, "dead_time_s": late * data.sample_time, "left": left}
             notes.append(IdentificationCode.ANSWERS_LATE.note(output=data.output, input=name, **told))
     return notes
 
 
-def _longer(data: Channels, index: int, delays: Sequence[int], tried: int, most: int) -> int:
+def _longer_dead_time(data: Channels, index: int, delays: Sequence[int], tried: int, most: int) -> int:
     """Return a longer dead time of one input if its error is clearly smaller, otherwise the given one."""
     if most <= tried:
         return delays[index]
-    left = _unexplained(data, index, delays, most)
+    left = _unexplained_error(data, index, delays, most)
     far = left[tried + 1 :]
-    if not far.min() < CLEARLY * left[: tried + 1].min():
+    if not far.min() < CLEAR_RATIO * left[: tried + 1].min():
         return delays[index]
     # inputs that repeat themselves, with the same or the opposite sign, explain as much one period later
-    first = tried + 1 + int(np.argmax(far <= NEARLY * far.min()))
+    first = tried + 1 + int(np.argmax(far <= SHORTER_RATIO * far.min()))
     m, costs = len(data.inputs), dict[int, float]()
 
     def cost(delay: int) -> float:
         if delay not in costs:
             late = tuple(delay if k == index else one for k, one in enumerate(delays))
-            costs[delay] = fit_linear(Form(ORDER, (ORDER,) * m, late), data, least_gain=NEAR).cost
+            costs[delay] = fit_linear(Form(ORDER, (ORDER,) * m, late), data, least_gain=REFINED_GAIN).cost
         return costs[delay]
 
     def shortest() -> int:
         least = min(costs.values())
-        return min(delay for delay, one in costs.items() if one <= NEARLY * least)
+        return min(delay for delay, one in costs.items() if one <= SHORTER_RATIO * least)
 
     step, centre = max(first // 8, 1), first
     cost(first)
@@ -131,10 +139,10 @@ def _longer(data: Channels, index: int, delays: Sequence[int], tried: int, most:
         moved, centre = centre, shortest()
         step = step // 2 if centre == moved else step
     # if the last dead time searched is best, longer ones would be better still: it is a drift
-    return centre if centre < most and cost(centre) < CLEARLY * cost(delays[index]) else delays[index]
+    return centre if centre < most and cost(centre) < CLEAR_RATIO * cost(delays[index]) else delays[index]
 
 
-def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -> Array:
+def _unexplained_error(data: Channels, index: int, delays: Sequence[int], most: int) -> Array:
     """Return the squared error that one input leaves for each dead time, shape (most + 1,).
 
     The input passes through two poles of every pair, and has two coefficients after the dead time. What the other
@@ -142,7 +150,7 @@ def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -
     """
     least = np.full(most + 1, np.inf)
     others = [k for k in range(len(delays)) if k != index]
-    for f in _denominators(data.told // LONGEST_SHARE):
+    for f in _denominators(data.informative_samples // LONGEST_SHARE):
         crossed, power, beside, told = np.zeros(most + 2), np.zeros(most + 2), np.zeros(most + 1), 0.0
         for u, y in zip(data.u, data.y, strict=True):
             n = y.size
@@ -161,21 +169,21 @@ def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -
             told += float(output @ output)
             size = 2 ** int(np.ceil(np.log2(n + most + 2)))
             driven = rows[index] - rows[index].mean()
-            crossed += _met(output, driven, size)[: most + 2]
+            crossed += _cross_products(output, driven, size)[: most + 2]
             # inputs count only where an output is present; beyond the log's end none counts as missing
             there = np.concatenate([known, np.ones(size - n)])
-            power += _met(there, driven**2, size)[: most + 2]
-            beside += _met(there[1:], driven[1:] * driven[:-1], size)[: most + 1]
-        least = np.minimum(least, np.maximum(told - _gained(crossed, power, beside), 0.0))
+            power += _cross_products(there, driven**2, size)[: most + 2]
+            beside += _cross_products(there[1:], driven[1:] * driven[:-1], size)[: most + 1]
+        least = np.minimum(least, np.maximum(told - _explained_power(crossed, power, beside), 0.0))
     return least
 
 
-def _met(later: Array, series: Array, size: int) -> Array:
+def _cross_products(later: Array, series: Array, size: int) -> Array:
     """Return the sums of products of one series with a shifted other one, by FFT."""
     return np.fft.irfft(np.fft.rfft(later, size) * np.fft.rfft(series, size).conj(), size)
 
 
-def _gained(crossed: Array, power: Array, beside: Array) -> Array:
+def _explained_power(crossed: Array, power: Array, beside: Array) -> Array:
     """Return what two coefficients explain for each dead time, shape (most + 1,).
 
     Parameters
@@ -196,7 +204,7 @@ def _gained(crossed: Array, power: Array, beside: Array) -> Array:
 
 def _denominators(longest: int) -> Iterator[Array]:
     """Yield denominators of pairs of real poles: no time constant, one sample, and so on up to a number of samples."""
-    count = int(np.log(max(longest, 1)) / np.log(APART)) + 1
-    poles = [0.0, *(float(np.exp(-(APART**-k))) for k in range(count))]
+    count = int(np.log(max(longest, 1)) / np.log(TIME_CONSTANT_RATIO)) + 1
+    poles = [0.0, *(float(np.exp(-(TIME_CONSTANT_RATIO**-k))) for k in range(count))]
     for pair in combinations_with_replacement(poles, 2):
         yield np.asarray(np.poly(pair), dtype=np.float64)

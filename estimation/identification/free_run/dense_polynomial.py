@@ -12,15 +12,15 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from estimation.arrays import IntArray
-from estimation.identification.free_run.choose_linear import CLEARLY
+from estimation.identification.free_run.choose_linear import CLEAR_GAIN
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.held_back import Judged, block_error
+from estimation.identification.free_run.held_back import JudgedModel, block_error
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, variables_of
 from estimation.identification.free_run.polynomial_moments import Moments, moments, one_step_values
 from estimation.identification.free_run.polynomial_variables import Variables
-from estimation.progress import tell
+from estimation.progress import report_progress
 
 SIZES = ((1, 2), (2, 2), (3, 2), (3, 3))
 """Lags of the output and of each input that are tried first."""
@@ -28,24 +28,24 @@ SIZES = ((1, 2), (2, 2), (3, 2), (3, 3))
 MOST_TERMS = 120
 """Most terms of a model; larger sizes are left out."""
 
-ONE_STEP = (1e-3, 1e-4, 1e-5, 1e-8)
+ONE_STEP_PENALTIES = (1e-3, 1e-4, 1e-5, 1e-8)
 """Penalties of the one-step least squares, on terms of unit deviation [dimensionless]."""
 
-BEGUN = 1e-4
+START_PENALTY = 1e-4
 """The penalty from which the free run starts."""
 
-FREE_RUN = (1e-1, 1e-2, 1e-3)
+FREE_RUN_PENALTIES = (1e-1, 1e-2, 1e-3)
 """Penalties of the free run; each descent begins where the one before ended [dimensionless]."""
 
 STEPS = 15
 """Evaluations of each descent: a model that needs more is poorly determined."""
 
-DESCENDED = 4
+MOST_DESCENDED = 4
 """Sizes whose free run is descended."""
 
 
 @dataclass(frozen=True)
-class Asked:
+class RequestedSizes:
     """Sizes given by the user; None if the data choose.
 
     Parameters
@@ -122,7 +122,7 @@ Kind = TypeVar("Kind")
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedRecipe(Judged, Generic[Kind]):
+class JudgedRecipe(JudgedModel, Generic[Kind]):
     """A recipe with its fits to all blocks but one, and their errors there.
 
     Parameters
@@ -165,7 +165,7 @@ def every_term(n_variables: int, degree: int) -> IntArray:
     return np.array(rows, dtype=np.int64)
 
 
-def forms_tried(delays: tuple[int, ...], asked: Asked) -> list[Form]:
+def tried_forms(delays: tuple[int, ...], asked: RequestedSizes) -> list[Form]:
     """Return sizes of models with every product.
 
     Parameters
@@ -177,16 +177,16 @@ def forms_tried(delays: tuple[int, ...], asked: Asked) -> list[Form]:
 
     Examples
     --------
-    >>> [one.sizes for one in forms_tried((1, 1), Asked(order=2, delay=1))]
+    >>> [one.sizes for one in tried_forms((1, 1), RequestedSizes(order=2, delay=1))]
     [(2, 2)]
     """
     m, order = len(delays), asked.order
     sizes = [one for one in SIZES if one[0] == order] or [(order, order)] if order is not None else SIZES
-    found = [Form(n, (asked.n_numerator or size,) * m, one) for n, size in sizes for one in late_by(delays, asked)]
+    found = [Form(n, (asked.n_numerator or size,) * m, one) for n, size in sizes for one in tried_delays(delays, asked)]
     return list(dict.fromkeys(found))
 
 
-def late_by(delays: tuple[int, ...], asked: Asked) -> list[tuple[int, ...]]:
+def tried_delays(delays: tuple[int, ...], asked: RequestedSizes) -> list[tuple[int, ...]]:
     """Return the dead times of the inputs that are tried: zero, one sample and those given, or the user's.
 
     Parameters
@@ -201,7 +201,7 @@ def late_by(delays: tuple[int, ...], asked: Asked) -> list[tuple[int, ...]]:
 
 
 def judged_recipes(
-    data: Channels, parts: Sequence[Channels], forms: Sequence[Form], asked: Asked | None = None
+    data: Channels, parts: Sequence[Channels], forms: Sequence[Form], asked: RequestedSizes | None = None
 ) -> list[JudgedRecipe[Recipe]]:
     """Return models with every product, each judged on blocks that its fits left out.
 
@@ -233,32 +233,35 @@ def judged_recipes(
         known = [_moments_of(form, degree, part) for part in parts]
         tried = [
             one
-            for penalty in ONE_STEP
-            if (one := _judged(Recipe(form, degree, penalty), data, parts, known=known)) is not None
+            for penalty in ONE_STEP_PENALTIES
+            if (one := _judged_recipe(Recipe(form, degree, penalty), data, parts, known=known)) is not None
         ]
         found += tried
         best[form, degree] = min((one.held_back for one in tried), default=float("inf"))
     descended = [
         one
-        for form, degree in sorted(best, key=lambda size: best[size])[:DESCENDED]
-        for one in _descended(form, degree, data, parts)
+        for form, degree in sorted(best, key=lambda size: best[size])[:MOST_DESCENDED]
+        for one in _descended_recipes(form, degree, data, parts)
     ]
-    return [*found, *descended, *_climbed(descended, data, parts, asked or Asked())]
+    return [*found, *descended, *_recipes_with_more_lags(descended, data, parts, asked or RequestedSizes())]
 
 
-def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels]) -> list[JudgedRecipe[Recipe]]:
+def _descended_recipes(
+    form: Form, degree: int, data: Channels, parts: Sequence[Channels]
+) -> list[JudgedRecipe[Recipe]]:
     """Return models of one size whose free run is descended with one penalty after the other."""
     found: list[JudgedRecipe[Recipe]] = []
-    for k in range(len(FREE_RUN)):
-        one = _judged(Recipe(form, degree, BEGUN, FREE_RUN[: k + 1]), data, parts, found[-1] if found else None)
+    for k in range(len(FREE_RUN_PENALTIES)):
+        recipe = Recipe(form, degree, START_PENALTY, FREE_RUN_PENALTIES[: k + 1])
+        one = _judged_recipe(recipe, data, parts, found[-1] if found else None)
         if one is None:
             break
         found.append(one)
     return found
 
 
-def _climbed(
-    found: Sequence[JudgedRecipe[Recipe]], data: Channels, parts: Sequence[Channels], asked: Asked
+def _recipes_with_more_lags(
+    found: Sequence[JudgedRecipe[Recipe]], data: Channels, parts: Sequence[Channels], asked: RequestedSizes
 ) -> list[JudgedRecipe[Recipe]]:
     """Return models with one lag more than the best, and with more lags as long as each is clearly better."""
     more: list[JudgedRecipe[Recipe]] = []
@@ -267,17 +270,17 @@ def _climbed(
         recipe = best.recipe
         tried = [
             one
-            for form in larger(recipe.form, asked)
+            for form in larger_forms(recipe.form, asked)
             if len(every_term(form.order + form.n_b, recipe.degree)) <= MOST_TERMS
-            for one in _descended(form, recipe.degree, data, parts)
+            for one in _descended_recipes(form, recipe.degree, data, parts)
         ]
         more += tried
-        least = (1.0 - CLEARLY) * best.held_back
+        least = (1.0 - CLEAR_GAIN) * best.held_back
         best = min((one for one in tried if one.held_back < least), key=lambda one: one.held_back, default=None)
     return more
 
 
-def larger(form: Form, asked: Asked) -> list[Form]:
+def larger_forms(form: Form, asked: RequestedSizes) -> list[Form]:
     """Return sizes with one lag more, of the output or of every input, except what the user gives.
 
     Parameters
@@ -287,14 +290,14 @@ def larger(form: Form, asked: Asked) -> list[Form]:
 
     Examples
     --------
-    >>> [(one.order, one.sizes) for one in larger(Form(3, (2,), (1,)), Asked())]
+    >>> [(one.order, one.sizes) for one in larger_forms(Form(3, (2,), (1,)), RequestedSizes())]
     [(4, (2,)), (3, (3,))]
     """
     found = [] if asked.order is not None else [replace(form, order=form.order + 1)]
     return found if asked.n_numerator is not None else [*found, replace(form, sizes=tuple(n + 1 for n in form.sizes))]
 
 
-def _judged(
+def _judged_recipe(
     recipe: Recipe,
     data: Channels,
     parts: Sequence[Channels],
@@ -304,7 +307,7 @@ def _judged(
     """Return a recipe's fits to all blocks but one, started from those before; None if one of them diverges."""
     fits = list[PolynomialFit | None]()
     for index, part in enumerate(parts):
-        tell("polynomial models")
+        report_progress("polynomial models")
         begun, moments_known = None if before is None else before.fits[index], None if known is None else known[index]
         fits.append(recipe.fit(part, begun, moments_known))
         if fits[-1] is None:

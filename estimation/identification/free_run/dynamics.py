@@ -24,7 +24,7 @@ class Dynamics(Protocol):
         """Return the prediction one step ahead, shape (n,)."""
         ...
 
-    def unanswered(self, length: int) -> int:
+    def undetermined_outputs(self, length: int) -> int:
         """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
         ...
 
@@ -36,7 +36,7 @@ class Dynamics(Protocol):
 class OutputErrorDynamics(ABC):
     """Dynamics with noise of the output sensor only: past measurements do not improve the next prediction."""
 
-    def unanswered(self, length: int) -> int:
+    def undetermined_outputs(self, length: int) -> int:
         """Return how many first outputs of a log of a given length [samples] depend on inputs from before it.
 
         None, unless a class overrides it.

@@ -10,11 +10,11 @@ from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.held_back import BLOCKS
 
-SHOWN = 1e-3
+EXCITED_SHARE = 1e-3
 """Share of an input's largest spectral density from which it shows the plant's behaviour: 30 dB less is lost in noise
 of 3 % of the output."""
 
-SMOOTHED = 64
+SMOOTHING_BANDS = 64
 """Bands of half the sampling rate over which a spectral density is averaged; lines of a multisine are closer."""
 
 
@@ -43,13 +43,13 @@ def band_end(data: Channels) -> float:
         return np.pi
     windowed = [(u - u.mean(axis=0))[:, moves] * np.hanning(len(u))[:, None] for u in data.u]
     power = np.sum([np.abs(np.fft.rfft(u, n, axis=0)) ** 2 for u in windowed], axis=0)
-    width = max(len(power) // SMOOTHED, 1)
+    width = max(len(power) // SMOOTHING_BANDS, 1)
     smooth = [np.convolve(one, np.full(width, 1.0 / width), "same") for one in power.T]
-    last = max(int(np.flatnonzero(one >= SHOWN * one.max())[-1]) for one in smooth)
+    last = max(int(np.flatnonzero(one >= EXCITED_SHARE * one.max())[-1]) for one in smooth)
     return np.pi * last / max(len(power) - 1, 1)
 
 
-def rings_beyond(one: Candidate, data: Channels, end: float) -> bool:
+def rings_above_band(one: Candidate, data: Channels, end: float) -> bool:
     """Return whether a model has a pole above the band of its inputs that rings longer than a block.
 
     Parameters
@@ -60,4 +60,6 @@ def rings_beyond(one: Candidate, data: Channels, end: float) -> bool:
         Result of `band_end` [rad].
     """
     poles = np.roots(one.fit.f)
-    return bool(np.any((np.abs(np.angle(poles)) > end) & (np.abs(poles) > np.exp(-(BLOCKS + 1.0) / data.told))))
+    return bool(
+        np.any((np.abs(np.angle(poles)) > end) & (np.abs(poles) > np.exp(-(BLOCKS + 1.0) / data.informative_samples)))
+    )

@@ -7,7 +7,7 @@ from estimation.identification.search.jit import compiled
 
 
 @compiled
-def rubbed(total: float, before: float, rub: Array) -> tuple[float, float]:
+def output_under_friction(total: float, before: float, rub: Array) -> tuple[float, float]:
     """Return an output under friction, and its direction: 1 up, -1 down, 0 where friction holds it.
 
     Parameters
@@ -65,7 +65,7 @@ def run_factored(
     begin : int
         First sample that is written; at least the longest lag.
     rub : ndarray, shape (f,)
-        For `rubbed`; empty without friction.
+        For `output_under_friction`; empty without friction.
     out : ndarray, shape (n,)
         Contains outputs before that sample; the others are written.
     """
@@ -83,7 +83,7 @@ def run_factored(
         if not abs(total) < 1e3:
             return t
         if rub.size > 0:
-            total, _ = rubbed(total, out[t - 1], rub)
+            total, _ = output_under_friction(total, out[t - 1], rub)
         out[t] = min(max(total, ends[0]), ends[1])
     return -1
 
@@ -126,7 +126,7 @@ def slopes_of(
         Written.
     slope : ndarray, shape (n, k)
         Written: derivative of each output by the k before it; with friction by k - 1, and the last column is the
-        direction of motion from `rubbed`.
+        direction of motion from `output_under_friction`.
     """
     own, count = lag.size, parent.size
     past, adjoint, effect = np.zeros(2 * own), np.zeros(count), np.zeros(2 * own)
@@ -151,7 +151,7 @@ def slopes_of(
             if limits[s, 0] <= past[s] and past[s] <= limits[s, 1]:
                 slope[t, lag[s] - 1] += effect[own + s]
         if rub.size > 0:
-            total, side = rubbed(total, out[t - 1], rub)
+            total, side = output_under_friction(total, out[t - 1], rub)
             if side == 0.0:
                 slope[t, :] = 0.0
                 if rub.size == 2:

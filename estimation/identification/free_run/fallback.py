@@ -91,7 +91,7 @@ class Fallback:
         known = float(np.sqrt(self.share))
         straight = known * jackknife(linear, [one.run(u, y) for one in self.linear_parts])
         beyond = 0.0
-        if ends is not None and _integrates(self.linear.f, y.size):
+        if ends is not None and _is_integrating(self.linear.f, y.size):
             beyond = float(np.sqrt(np.mean((linear - np.clip(linear, *ends)) ** 2)))
         apart = known * jackknife(own, [one.run(u, y) for one in self.parts])
         undetermined = float(np.linalg.norm([self.own_error, apart, beyond]))
@@ -150,7 +150,7 @@ def jackknife(whole: Array, parts: Sequence[Array]) -> float:
     return found if np.isfinite(found) else float("inf")
 
 
-def _integrates(f: Array, rows: int) -> bool:
+def _is_integrating(f: Array, rows: int) -> bool:
     """Return whether a denominator has a pole that neither settles nor oscillates within a number of rows."""
     roots = np.roots(f)
     return bool(np.any((np.abs(roots) > np.exp(-1.0 / rows)) & (np.abs(np.angle(roots)) < 1.0 / rows)))

@@ -9,7 +9,7 @@ from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_fit import COARSE
 
 
-def on_fewer(
+def on_fewer_samples(
     linear: Sequence[Candidate], best: Candidate, part: Channels, fewer: Channels
 ) -> tuple[Channels, list[Candidate], Candidate]:
     """Return the data on which nonlinear models are compared, and linear ones judged there, the best one separately.

@@ -19,16 +19,16 @@ from plant.log.record import Record
 SAME_CLOCK = 1e-3
 """Relative difference up to which sample times count as equal."""
 
-SPOILT = 0.05
+LARGEST_BRIDGING_ERROR = 0.05
 """Sum of squared errors of a line over a gap, over the input's variance, from which a log is split there [samples]."""
 
 MOST_GAPS = 30
 """Most gaps of one input at which a log is split, the worst ones: each part has an initial state to estimate."""
 
-LONGEST_ANSWER = 20
+LONGEST_RESPONSE = 20
 """Most outputs that are left out after a gap of an input: about the length of dead times [samples]."""
 
-TRIED = 400
+MOST_TRIED_PARTS = 400
 """Most parts of an input that are bridged for comparison."""
 
 
@@ -81,12 +81,12 @@ def channels_of(
             warnings.warn(LogWarning(said), stacklevel=2)
         parts = pieces(record, inputs) if split else [record]
         for name in inputs:  # one warning for each input, however many parts there are
-            _tell_bridged([part[name] for part in parts], name, stacklevel=3)
+            _warn_of_bridged([part[name] for part in parts], name, stacklevel=3)
         for part in parts:
-            columns = [_on_clock(bridged(part[name]), part.sample_time, wanted) for name in inputs]
-            answer = _on_clock(part[output], part.sample_time, wanted)
+            columns = [_resampled(bridged(part[name]), part.sample_time, wanted) for name in inputs]
+            answer = _resampled(part[output], part.sample_time, wanted)
             if part.start_time > record.start_time:  # after a dead time the output may still respond to unknown inputs
-                answer[: min(LONGEST_ANSWER, answer.size // 20)] = np.nan
+                answer[: min(LONGEST_RESPONSE, answer.size // 20)] = np.nan
             u.append(np.column_stack(columns))
             y.append(answer)
     return channels_from(u, y, wanted, inputs, output)
@@ -124,13 +124,13 @@ def channels_to_run(record: Record, inputs: Sequence[str], output: str, sample_t
     wanted = record.sample_time if sample_time is None else sample_time
     columns: list[Array] = []
     for name in inputs:
-        _tell_bridged([record[name]], name, stacklevel=3)
-        columns.append(_on_clock(bridged(record[name]), record.sample_time, wanted))
+        _warn_of_bridged([record[name]], name, stacklevel=3)
+        columns.append(_resampled(bridged(record[name]), record.sample_time, wanted))
     u = np.column_stack(columns)
     return Channels(tuple(inputs), output, wanted, (u,), (np.full(len(u), np.nan),))
 
 
-def sent_once(record: Record, names: Sequence[str]) -> Record:
+def without_repeated_rows(record: Record, names: Sequence[str]) -> Record:
     """Return a log without rows that its logger wrote twice, whatever its columns are.
 
     Returns
@@ -167,7 +167,7 @@ def pieces(record: Record, inputs: Sequence[str]) -> list[Record]:
     """
     unknown = np.zeros(len(record), dtype=np.bool_)
     for name in inputs:
-        unknown |= _unknown(record[name])
+        unknown |= _unbridged_samples(record[name])
     least = max(FEWEST, len(record) // 200)
     known = zip(*stretches(~unknown), strict=True)
     parts = [record.slice(int(a), int(b)) for a, b in known if b - a >= least]
@@ -180,7 +180,7 @@ def pieces(record: Record, inputs: Sequence[str]) -> list[Record]:
     return parts
 
 
-def _unknown(values: Array) -> BoolArray:
+def _unbridged_samples(values: Array) -> BoolArray:
     """Return a mask of missing input that is not bridged: the worst `MOST_GAPS` gaps, and both ends."""
     missing = np.isnan(values)
     unknown = np.zeros(values.size, dtype=np.bool_)
@@ -189,17 +189,17 @@ def _unknown(values: Array) -> BoolArray:
         return unknown
     unknown[: known[0]], unknown[known[-1] + 1 :] = True, True
     wide = np.flatnonzero(gaps(values)[1])
-    spoilt = [(_spoilt(values, int(known[i + 1] - known[i] - 1)), i) for i in wide]
+    spoilt = [(_bridging_error(values, int(known[i + 1] - known[i] - 1)), i) for i in wide]
     for much, i in sorted(spoilt, reverse=True)[:MOST_GAPS]:
-        if much > SPOILT:
+        if much > LARGEST_BRIDGING_ERROR:
             unknown[known[i] + 1 : known[i + 1]] = True
     return unknown
 
 
-def _spoilt(values: Array, length: int) -> float:
+def _bridging_error(values: Array, length: int) -> float:
     """Return the sum of squared errors of a line over a gap, over the input's variance [samples]."""
     # at random, since evenly spaced stretches may be in step with the input's own clock
-    starts = np.random.default_rng(0).integers(0, max(values.size - length - 1, 1), TRIED)
+    starts = np.random.default_rng(0).integers(0, max(values.size - length - 1, 1), MOST_TRIED_PARTS)
     stretches = values[np.minimum(starts[:, None] + np.arange(length + 2), values.size - 1)]
     stretches = stretches[np.isfinite(stretches).all(axis=1)]
     spread = float(np.nanvar(values))
@@ -210,7 +210,7 @@ def _spoilt(values: Array, length: int) -> float:
     return float(np.mean(np.sum((stretches[:, 1:-1] - lines) ** 2, axis=1))) / spread
 
 
-def _on_clock(values: Array, sample_time: float, wanted: float) -> Array:
+def _resampled(values: Array, sample_time: float, wanted: float) -> Array:
     if abs(sample_time - wanted) <= SAME_CLOCK * wanted:
         return np.array(values, dtype=np.float64)
     return resample(values, sample_time, wanted)
@@ -236,10 +236,10 @@ def without_gaps(values: Array, name: str) -> Array:
     LogWarning
         If samples are bridged.
     """
-    return bridged(values) if _tell_bridged([values], name, stacklevel=4) else values
+    return bridged(values) if _warn_of_bridged([values], name, stacklevel=4) else values
 
 
-def _tell_bridged(parts: Sequence[Array], name: str, *, stacklevel: int) -> bool:
+def _warn_of_bridged(parts: Sequence[Array], name: str, *, stacklevel: int) -> bool:
     """Warn of missing samples of an input in parts; return whether there are any."""
     lacking = sum(int(np.count_nonzero(np.isnan(one))) for one in parts)
     if lacking:

@@ -14,7 +14,7 @@ from estimation.identification.free_run.hammerstein_fit import HammersteinFit
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 
-PLACES = 5
+MOST_INITIAL_STATES = 5
 """Initial states of a play that are tried."""
 
 
@@ -46,9 +46,9 @@ class HammersteinDynamics(OutputErrorDynamics):
         """Fitted coefficients."""
         return self.values.size + self.linear.n_values
 
-    def unanswered(self, length: int) -> int:
+    def undetermined_outputs(self, length: int) -> int:
         """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
-        return self.linear.form.unanswered(length)
+        return self.linear.form.undetermined_outputs(length)
 
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, or that of the linear model if that replaces it."""
@@ -75,7 +75,9 @@ class HammersteinDynamics(OutputErrorDynamics):
     def _own_run(self, u: Array, y: Array) -> Array:
         """Return the free run, with its initial state by least squares of the available outputs."""
         kind, known = NONLINEARITIES[self.at_input], np.isfinite(y)
-        begun = u[0, 0] + self.values[0] * np.linspace(-1.0, 1.0, PLACES) if kind.remembers else np.zeros(1)
+        begun = (
+            u[0, 0] + self.values[0] * np.linspace(-1.0, 1.0, MOST_INITIAL_STATES) if kind.remembers else np.zeros(1)
+        )
         if not known.any():
             begun = begun[len(begun) // 2 :][:1]
         runs = [self.linear.run(kind.apply(u[:, 0], self.values, float(one))[0][:, None], y) for one in begun]

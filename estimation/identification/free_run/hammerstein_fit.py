@@ -17,10 +17,10 @@ from estimation.identification.search.levenberg import levenberg
 TOLERANCE, MOST_STEPS = 1e-9, 60
 """Relative gain of the cost below which a descent ends, and most evaluations."""
 
-REFINED = 3
+MOST_REFINED = 3
 """Starts that are refined."""
 
-NEAR = 1e-3
+LINEAR_START_GAIN = 1e-3
 """As `COARSE`, for the linear model before the nonlinearity's values are varied."""
 
 
@@ -114,7 +114,7 @@ class HammersteinProblem:
         f = np.concatenate([[1.0], linear[self.form.n_b : self.form.n_b + self.form.order]])
         for index, by in enumerate(slopes):
             part = slice(int(problem.bounds[index]), int(problem.bounds[index + 1]))
-            answers = _answers(by, b, f, self.form.delays[0])
+            answers = _responses(by, b, f, self.form.delays[0])
             jacobian[part, : self.n_static] = answers[:, : self.n_static]
             if self.n_starts:
                 jacobian[part, self.n_static + index] = answers[:, -1]
@@ -150,7 +150,7 @@ class HammersteinProblem:
         )
 
 
-def _answers(inputs: Array, b: Array, f: Array, delay: int) -> Array:
+def _responses(inputs: Array, b: Array, f: Array, delay: int) -> Array:
     """Return the response of the linear model to each column, constant at its first value before."""
     rows = np.empty((inputs.shape[1], inputs.shape[0]))
     padded = np.concatenate([np.repeat(inputs[:1], delay + b.size, axis=0), inputs])
@@ -177,33 +177,33 @@ def fit_hammerstein(kind: str, form: Form, data: Channels, denominators: Sequenc
     for values in problem.kind.starts(problem.input):
         if not problem.kind.may(problem.input, values):
             continue
-        behind, _ = problem.behind_nonlinearity(values, _first(problem))
+        behind, _ = problem.behind_nonlinearity(values, _first_inputs(problem))
         if any(np.ptp(u) == 0.0 for u in behind.u):
             continue
         inner = Problem(form, behind)
         tried += [(inner.profiled(f)[0], values, f) for f in denominators]
     fits: list[HammersteinFit] = []
-    for _, values, f in _apart(sorted(tried, key=lambda one: one[0])):
-        behind, _ = problem.behind_nonlinearity(values, _first(problem))
-        near = fit_linear(form, behind, [f], least_gain=NEAR)
-        fits.append(problem.descend(values, _first(problem), near.theta, COARSE))
+    for _, values, f in _distinct_starts(sorted(tried, key=lambda one: one[0])):
+        behind, _ = problem.behind_nonlinearity(values, _first_inputs(problem))
+        near = fit_linear(form, behind, [f], least_gain=LINEAR_START_GAIN)
+        fits.append(problem.descend(values, _first_inputs(problem), near.theta, COARSE))
     return min(fits, key=lambda one: one.cost) if fits else None
 
 
-def _first(problem: HammersteinProblem) -> Array:
+def _first_inputs(problem: HammersteinProblem) -> Array:
     return np.array([u[0, 0] for u in problem.data.u]) if problem.n_starts else np.empty(0)
 
 
-def _apart(ranked: Sequence[tuple[float, Array, Array]]) -> list[tuple[float, Array, Array]]:
+def _distinct_starts(ranked: Sequence[tuple[float, Array, Array]]) -> list[tuple[float, Array, Array]]:
     """Return the best starts of different values of the nonlinearity."""
     kept: list[tuple[float, Array, Array]] = []
     for one in ranked:
-        if len(kept) < REFINED and not any(np.array_equal(one[1], other[1]) for other in kept):
+        if len(kept) < MOST_REFINED and not any(np.array_equal(one[1], other[1]) for other in kept):
             kept.append(one)
     return kept
 
 
-def finished(fit: HammersteinFit, data: Channels) -> HammersteinFit:
+def finished_fit(fit: HammersteinFit, data: Channels) -> HammersteinFit:
     """Return the fit continued to its minimum, on its own data.
 
     Parameters
@@ -214,7 +214,7 @@ def finished(fit: HammersteinFit, data: Channels) -> HammersteinFit:
     return HammersteinProblem(fit.kind, fit.linear.form, data).descend(fit.values, fit.starts, fit.linear.theta)
 
 
-def refitted(fit: HammersteinFit, data: Channels, least_gain: float = 0.0) -> HammersteinFit:
+def refitted_hammerstein(fit: HammersteinFit, data: Channels, least_gain: float = 0.0) -> HammersteinFit:
     """Return the fit continued on other data with as many logs.
 
     Parameters
@@ -225,9 +225,9 @@ def refitted(fit: HammersteinFit, data: Channels, least_gain: float = 0.0) -> Ha
         As `levenberg` takes it [dimensionless].
     """
     problem = HammersteinProblem(fit.kind, fit.linear.form, data)
-    starts = fit.starts if len(fit.starts) == problem.n_starts else _first(problem)
+    starts = fit.starts if len(fit.starts) == problem.n_starts else _first_inputs(problem)
     behind, _ = problem.behind_nonlinearity(fit.values, starts)
-    begun = fit_linear(fit.linear.form, behind, [fit.linear.f], least_gain=max(NEAR, least_gain))
+    begun = fit_linear(fit.linear.form, behind, [fit.linear.f], least_gain=max(LINEAR_START_GAIN, least_gain))
     return problem.descend(fit.values, starts, begun.theta, least_gain)
 
 

@@ -10,7 +10,7 @@ from estimation.identification.free_run.data import Channels, blocks, halves
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import LinearFit, Problem
-from estimation.progress import tell
+from estimation.progress import report_progress
 
 BLOCKS = 4
 """Blocks of every log, each held back once."""
@@ -18,16 +18,16 @@ BLOCKS = 4
 STUDENT_95 = (6.314, 2.920, 2.353)
 """95 % quantile of a mean of two, three and four over its standard error (Student's distribution)."""
 
-TINY = 1e-300
+LEAST_ERROR = 1e-300
 """Replaces a zero error of a block, so that its logarithm is finite [dimensionless]."""
 
-NEAR = 1e-6
+COMPARISON_GAIN = 1e-6
 """Relative gain of two successive steps below which a descent ends while forms are compared: the chosen one is fitted
 further."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Judged:
+class JudgedModel:
     """A model that was judged on held-back blocks.
 
     Parameters
@@ -42,11 +42,11 @@ class Judged:
     @property
     def held_back(self) -> float:
         """Root mean square over the blocks [dimensionless]."""
-        return pooled(self.block_errors)
+        return pooled_error(self.block_errors)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Compared(Judged):
+class ComparedModel(JudgedModel):
     """The same, with a criterion that favours smaller models.
 
     Parameters
@@ -74,9 +74,9 @@ def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
         Over the output's deviation, one per block.
     """
     problem, errors = Problem(fit.form, data), list[float]()
-    tell("linear models")
+    report_progress("linear models")
     for masks in blocks(data, BLOCKS):
-        part = refitted_linear(fit, data.without(masks), least_gain=NEAR)
+        part = refitted_linear(fit, data.without(masks), least_gain=COMPARISON_GAIN)
         errors.append(block_error(problem.jacobian(part.theta)[0] - problem.y, np.concatenate(masks) & problem.used))
     return tuple(errors)
 
@@ -99,7 +99,7 @@ def block_error(error: Array, mask: BoolArray) -> float:
     return float(np.sqrt(np.mean(error[mask] ** 2))) if mask.any() else float("nan")
 
 
-def pooled(errors: Sequence[float]) -> float:
+def pooled_error(errors: Sequence[float]) -> float:
     """Return the root mean square over blocks; infinite if there are none.
 
     Parameters
@@ -114,7 +114,7 @@ def pooled(errors: Sequence[float]) -> float:
 
     Examples
     --------
-    >>> round(pooled([3.0, 4.0, float("nan")]) ** 2, 6)
+    >>> round(pooled_error([3.0, 4.0, float("nan")]) ** 2, 6)
     12.5
     """
     known = [error**2 for error in errors if not np.isnan(error)]
@@ -145,7 +145,7 @@ def surely_better(errors: Sequence[float], others: Sequence[float]) -> bool:
     return known.size > 0 and bool(known.mean() > scatter)
 
 
-def told_apart(errors: Sequence[float], others: Sequence[float]) -> bool:
+def is_better_beyond_chance(errors: Sequence[float], others: Sequence[float]) -> bool:
     """Return whether a model beats another on the same blocks by more than chance, by the ratio of their errors.
 
     Ratios weight all blocks equally, however large the output is there. Their logarithms are tested as in Student
@@ -163,12 +163,12 @@ def told_apart(errors: Sequence[float], others: Sequence[float]) -> bool:
 
     Examples
     --------
-    >>> told_apart([0.5, 0.6, 0.4, 0.5], [1.0] * 4), told_apart([0.1, 0.9, 1.1, 1.0], [1.0] * 4)
-    (True, False)
+    >>> [is_better_beyond_chance(one, [1.0] * 4) for one in ([0.5, 0.6, 0.4, 0.5], [0.1, 0.9, 1.1, 1.0])]
+    [True, False]
     """
     pairs = [(one, other) for one, other in zip(errors, others, strict=True) if not (np.isnan(one) or np.isnan(other))]
-    gains = np.log(np.maximum([other for _, other in pairs], TINY)) - np.log(
-        np.maximum([one for one, _ in pairs], TINY)
+    gains = np.log(np.maximum([other for _, other in pairs], LEAST_ERROR)) - np.log(
+        np.maximum([one for one, _ in pairs], LEAST_ERROR)
     )
     if gains.size < 2:
         return bool(np.all(gains > 0.0)) and gains.size > 0
@@ -198,6 +198,6 @@ def halves_error(fit: LinearFit, data: Channels) -> float:
         return float("nan")
     squares = list[Array]()
     for part, other in ((first, second), (second, first)):
-        dynamics = LinearDynamics.of(refitted_linear(fit, part, least_gain=NEAR))
+        dynamics = LinearDynamics.of(refitted_linear(fit, part, least_gain=COMPARISON_GAIN))
         squares += [(dynamics.run(u, y) - y) ** 2 for u, y in zip(other.u, other.y, strict=True)]
     return float(np.sqrt(np.nanmean(np.concatenate(squares))))

@@ -8,7 +8,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.search.jit import compiled
 
-SHARES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4)
+START_SHARES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4)
 """Shares of the input's samples, or of its range, at which searches begin [fraction]."""
 
 
@@ -63,25 +63,25 @@ def _backlash(u: Array, values: Array, start: float) -> tuple[Array, Array]:
 
 def _inner(u: Array) -> list[Array]:
     """Return bands in the middle of an input, around zero and around its median."""
-    bands = [np.quantile(u, [0.5 - share / 2.0, 0.5 + share / 2.0]) for share in (*SHARES, 0.6)]
-    size = np.quantile(np.abs(u), SHARES)
+    bands = [np.quantile(u, [0.5 - share / 2.0, 0.5 + share / 2.0]) for share in (*START_SHARES, 0.6)]
+    size = np.quantile(np.abs(u), START_SHARES)
     return [*bands, *(np.array([-one, one]) for one in size)]
 
 
 def _outer(u: Array) -> list[Array]:
     """Return levels with equally many samples above and below, and on one side alone."""
     least, most = float(u.min()), float(u.max())
-    both = [np.quantile(u, [share, 1.0 - share]) for share in SHARES]
-    high = [np.array([least, np.quantile(u, 1.0 - share)]) for share in SHARES[1::2]]
-    low = [np.array([np.quantile(u, share), most]) for share in SHARES[1::2]]
+    both = [np.quantile(u, [share, 1.0 - share]) for share in START_SHARES]
+    high = [np.array([least, np.quantile(u, 1.0 - share)]) for share in START_SHARES[1::2]]
+    low = [np.array([np.quantile(u, share), most]) for share in START_SHARES[1::2]]
     return [*both, *high, *low]
 
 
 def _widths(u: Array) -> list[Array]:
-    return [np.array([0.5 * share * float(np.ptp(u))]) for share in (0.005, 0.01, *SHARES)]
+    return [np.array([0.5 * share * float(np.ptp(u))]) for share in (0.005, 0.01, *START_SHARES)]
 
 
-def _acts(u: Array, values: Array) -> bool:
+def _is_within_range(u: Array, values: Array) -> bool:
     """Return whether a band has ordered ends, both within the range of the samples."""
     low, high = values
     return bool(low <= high and low >= u.min() and high <= u.max())
@@ -116,9 +116,9 @@ class Nonlinearity:
 
 
 NONLINEARITIES: Mapping[str, Nonlinearity] = {
-    "dead-zone": Nonlinearity(("lower", "upper"), True, False, _dead_zone, _inner, _acts),
+    "dead-zone": Nonlinearity(("lower", "upper"), True, False, _dead_zone, _inner, _is_within_range),
     "saturation": Nonlinearity(
-        ("lower", "upper"), True, False, _saturation, _outer, lambda u, v: _acts(u, v) and v[0] < v[1]
+        ("lower", "upper"), True, False, _saturation, _outer, lambda u, v: _is_within_range(u, v) and v[0] < v[1]
     ),
     "backlash": Nonlinearity(
         ("half_width",), False, True, _backlash, _widths, lambda u, v: bool(0.0 <= v[0] < 0.5 * np.ptp(u))

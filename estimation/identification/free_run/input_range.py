@@ -9,12 +9,12 @@ from estimation.identification.free_run.data import Channels, in_scale
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
-from estimation.identification.free_run.polynomial_variables import BEYOND
+from estimation.identification.free_run.polynomial_variables import SIGNAL_MARGIN
 from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 
 
-def inputs_beyond(model: FreeRunModel, data: Channels) -> list[Note]:
+def input_range_notes(model: FreeRunModel, data: Channels) -> list[Note]:
     """Return a note on each input that leaves the range in which a polynomial model was fitted.
 
     Parameters
@@ -41,7 +41,7 @@ def inputs_beyond(model: FreeRunModel, data: Channels) -> list[Note]:
         outside = (values < own[0, 0]) | (values > own[0, 1])
         if not outside.any():
             continue
-        margin = BEYOND * (own[0, 1] - own[0, 0]) / (1.0 + 2.0 * BEYOND)
+        margin = SIGNAL_MARGIN * (own[0, 1] - own[0, 0]) / (1.0 + 2.0 * SIGNAL_MARGIN)
         low, high = by.u_mean[index] + by.u_std[index] * (own[0] + margin * np.array([1.0, -1.0]))
         notes.append(
             IdentificationCode.INPUT_BEYOND_RANGE.note(
@@ -56,7 +56,7 @@ def inputs_beyond(model: FreeRunModel, data: Channels) -> list[Note]:
     return notes
 
 
-def linear_instead(
+def linear_fallback_notes(
     model: FreeRunModel, data: Channels, judged: Sequence[tuple[float, float]] | None = None
 ) -> list[Note]:
     """Return a note if a linear model replaces a nonlinear one that these inputs do not determine.
@@ -107,7 +107,7 @@ def doubts_about_inputs(
     data : Channels
         In units of the channels; inputs in the model's order.
     judged : sequence of tuple of float, optional
-        As in `linear_instead` [dimensionless].
+        As in `linear_fallback_notes` [dimensionless].
     named : str
         Name of the logs for the reader.
 
@@ -117,8 +117,8 @@ def doubts_about_inputs(
         That no log is longer than the dead time, or that a linear model replaces the nonlinear one; otherwise one on
         each input beyond its range.
     """
-    if all(model.dynamics.unanswered(y.size) == y.size for y in data.y):
-        dead_time = next(n for n in count(data.longest) if model.dynamics.unanswered(n + 1) == n)
+    if all(model.dynamics.undetermined_outputs(y.size) == y.size for y in data.y):
+        dead_time = next(n for n in count(data.longest) if model.dynamics.undetermined_outputs(n + 1) == n)
         told = {"logs": named, "output": data.output, "longest": data.longest, "dead_time": dead_time}
         return [IdentificationCode.NOTHING_ANSWERED.note(**told)]
-    return linear_instead(model, data, judged) or inputs_beyond(model, data)
+    return linear_fallback_notes(model, data, judged) or input_range_notes(model, data)

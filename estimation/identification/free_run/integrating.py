@@ -16,12 +16,12 @@ from estimation.identification.free_run.linear_fit import fit_linear, steiglitz_
 from estimation.identification.free_run.linear_kernel import settles
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 
-RECORDS = 1e3
+POLE_RECORDS = 1e3
 """Time constant of the pole that is written in place of 1 [records]: a run begins at rest, which a pole at 1 does not
 have."""
 
 
-LOST, ROUNDED = 0.01, 1e-12
+ACCEPTED_COST_CHANGE, LEAST_DENOMINATOR_SUM = 0.01, 1e-12
 """Relative change of the cost by writing it in this way that is accepted, and least ratio of a denominator's sum to its
 coefficients: beside other poles close to 1 the sum is rounding, and a run begins at the first input divided by it."""
 
@@ -47,11 +47,13 @@ def fit_integrating(
     Returns
     -------
     LinearFit
-        Its pole has a time constant of `RECORDS` records. The cost is infinite if such a model cannot be written.
+        Its pole has a time constant of `POLE_RECORDS` records. The cost is infinite if such a model cannot be written.
     """
-    summed, scales = _summed(data)
+    summed, scales = _summed_inputs(data)
     inner = Form(
-        form.order - 1, (*form.sizes, *[1] * (len(summed.inputs) - len(form.sizes))), (*form.delays, *_no_delays(data))
+        form.order - 1,
+        (*form.sizes, *[1] * (len(summed.inputs) - len(form.sizes))),
+        (*form.delays, *_zero_delays(data)),
     )
     if inner.order == 0:
         cost, theta = Problem(inner, summed).profiled(np.ones(1))
@@ -60,7 +62,7 @@ def fit_integrating(
         begun = [_without_slowest(f) for f in starts]
         begun += steiglitz_mcbride(Problem(inner, summed)) if search else []
         found = fit_linear(inner, summed, begun, least_gain=least_gain)
-    return _written(form, data, found, scales)
+    return _fit_of_inputs(form, data, found, scales)
 
 
 def refitted_linear(fit: LinearFit, data: Channels, *, least_gain: float = 0.0) -> LinearFit:
@@ -78,11 +80,11 @@ def refitted_linear(fit: LinearFit, data: Channels, *, least_gain: float = 0.0) 
     return fit_linear(fit.form, data, [fit.f], bounded=fit.bounded, least_gain=least_gain)
 
 
-def _no_delays(data: Channels) -> list[int]:
+def _zero_delays(data: Channels) -> list[int]:
     return [0] * (2 * len(data.u) - 1)
 
 
-def _summed(data: Channels) -> tuple[Channels, Array]:
+def _summed_inputs(data: Channels) -> tuple[Channels, Array]:
     """Return summed inputs with a ramp in every log, and a level in every log but the first; and their scaling.
 
     The level of an input before a log is part of the ramp, so that sums are at rest before it.
@@ -109,12 +111,12 @@ def _without_slowest(f: Array) -> Array:
     return np.asarray(np.poly(kept.real) if np.iscomplexobj(left) else left, dtype=np.float64)
 
 
-def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> LinearFit:
+def _fit_of_inputs(form: Form, data: Channels, found: LinearFit, scales: Array) -> LinearFit:
     """Return a fit to summed inputs as one of the inputs themselves, with initial states by least squares."""
     b = [numerator / scale for numerator, scale in zip(found.numerators, scales, strict=False)]
-    pole = float(np.exp(-1.0 / (RECORDS * data.longest)))
+    pole = float(np.exp(-1.0 / (POLE_RECORDS * data.longest)))
     f, settled = np.convolve(found.f, [1.0, -pole]), float(found.f.sum())
-    if not settles(f[1:]) or f.sum() < ROUNDED * np.abs(f).sum():
+    if not settles(f[1:]) or f.sum() < LEAST_DENOMINATOR_SUM * np.abs(f).sum():
         return LinearFit(form, np.zeros(Problem(form, data).n_parameters), float("inf"), integrates=True)
     gains = np.array([one.sum() for one in b]) / settled
     ramps = found.numerators[len(b) : len(b) + len(data.u)]
@@ -130,5 +132,5 @@ def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> Lin
     left = (problem.y - driven - free @ states)[used]
     cost = problem.share * float(left @ left)
     # several logs share one offset here, but had one ramp each
-    cost = cost if len(data.u) > 1 or cost <= (1.0 + LOST) * found.cost else float("inf")
+    cost = cost if len(data.u) > 1 or cost <= (1.0 + ACCEPTED_COST_CHANGE) * found.cost else float("inf")
     return LinearFit(form, np.concatenate([*b, f[1:], [offset], states]), cost, integrates=True)

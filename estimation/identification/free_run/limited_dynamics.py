@@ -29,7 +29,7 @@ class LimitedDynamics(LinearDynamics):
         """Return the free run, with its initial state by least squares of the available outputs."""
         problem = LimitedProblem(self.form, Channels((), "", 1.0, (u,), (y,)), self.limits)
         if np.count_nonzero(np.isfinite(y)) > self.form.order:
-            return problem.jacobian(problem.begun(self.theta))[0]
+            return problem.jacobian(problem.with_initial_states(self.theta))[0]
         return problem.jacobian(np.concatenate([self.theta, np.zeros(self.form.order)]))[0]
 
     def to_dict(self) -> dict[str, Any]:

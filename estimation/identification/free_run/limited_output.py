@@ -33,7 +33,7 @@ NOISE_BAND = 6.0
 ROUNDING = 1e-9
 """Share of the output's range over which outputs at a limit without noise spread [dimensionless]."""
 
-LEAST_SHARE, LONGEST, PILED = 0.005, 4, 2.0
+LEAST_SHARE, LONGEST, LEAST_PILE_RATIO = 0.005, 4, 2.0
 """Least share of all samples at a limit, least length of the longest stay, and least ratio to the number in the next
 band of the same width. They only start a comparison, which decides [dimensionless]."""
 
@@ -41,7 +41,7 @@ SPARSE_SHARES = (1.0, 0.5, 0.25, 0.125)
 """Shares of that band that are tried if most rows are empty: changes from one sample to the next are then not noise
 alone [fraction]."""
 
-SMOOTH = np.sqrt(6.0) * 0.6745
+WHITE_NOISE_MEDIAN = np.sqrt(6.0) * 0.6745
 """Median of the magnitude of second differences of white noise, over its deviation [dimensionless]."""
 
 
@@ -109,28 +109,28 @@ def limits_of(data: Channels) -> Limits | None:
     bends = np.concatenate([np.abs(np.diff(y, 2)) for y in known])
     if not bends.size:
         return None
-    noise, exact = float(np.median(bends)) / SMOOTH, ROUNDING * float(np.ptp(np.concatenate(known)))
+    noise, exact = float(np.median(bends)) / WHITE_NOISE_MEDIAN, ROUNDING * float(np.ptp(np.concatenate(known)))
     # a limit that acts after the sensor's noise is sharp, one that acts before it is not
     shares = SPARSE_SHARES if 2 * sum(y.size for y in known) < sum(y.size for y in data.y) else (1.0,)
     for band in (exact, *(max(share * NOISE_BAND * noise, exact) for share in shares)):
-        high, low = _end(known, band), -_end([-y for y in known], band)
+        high, low = _upper_limit(known, band), -_upper_limit([-y for y in known], band)
         if np.isfinite([low, high]).any():
             return Limits(low, high, band / 2.0)
     return None
 
 
-def _end(logs: Sequence[Array], band: float) -> float:
+def _upper_limit(logs: Sequence[Array], band: float) -> float:
     """Return the upper end at which valid outputs stay, infinite if there is none."""
     y = np.concatenate(logs)
     top = float(y.max())
     there, below = y >= top - band, (y < top - band) & (y >= top - 2.0 * band)
     share = np.count_nonzero(there) / y.size
-    many = share >= LEAST_SHARE and np.count_nonzero(there) > PILED * np.count_nonzero(below)
-    longest = max(_longest(one >= top - band) for one in logs)
+    many = share >= LEAST_SHARE and np.count_nonzero(there) > LEAST_PILE_RATIO * np.count_nonzero(below)
+    longest = max(_longest_run(one >= top - band) for one in logs)
     return float(np.median(y[there])) if many and longest >= LONGEST else float("inf")
 
 
-def _longest(mask: BoolArray) -> int:
+def _longest_run(mask: BoolArray) -> int:
     """Return the length of the longest run of a mask."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
@@ -154,7 +154,7 @@ def at_limits(y: Array, limits: Limits) -> BoolArray:
     return np.asarray((y >= limits.high - limits.near) | (y <= limits.low + limits.near))
 
 
-def between(data: Channels, limits: Limits) -> Channels:
+def between_limits(data: Channels, limits: Limits) -> Channels:
     """Return channels without the outputs at a limit."""
     return data.without([at_limits(y, limits) for y in data.y])
 
@@ -186,7 +186,7 @@ class LimitedProblem:
         output, left = np.empty_like(free), np.full(free.size, -1)
         for first, last in zip(self.inner.bounds[:-1], self.inner.bounds[1:], strict=True):
             part = slice(int(first), int(last))
-            stopped(free[part], self.limits.low, self.limits.high, output[part], left[part])
+            hold_between_stops(free[part], self.limits.low, self.limits.high, output[part], left[part])
             left[part][left[part] >= 0] += int(first)
         behind = left >= 0
         slopes[behind] -= slopes[left[behind]]
@@ -213,7 +213,7 @@ class LimitedProblem:
         )
         return LinearFit(self.form, best, self.inner.share * cost)
 
-    def begun(self, values: Array) -> Array:
+    def with_initial_states(self, values: Array) -> Array:
         """Return values with the initial states that fit the outputs best, from several parts of them.
 
         Parameters
@@ -266,7 +266,7 @@ class LimitedProblem:
 
 
 @compiled
-def stopped(free: Array, low: float, high: float, output: Array, left: IntArray) -> None:
+def hold_between_stops(free: Array, low: float, high: float, output: Array, left: IntArray) -> None:
     """Hold a series between stops: it moves as a free one does, except beyond them.
 
     Parameters

@@ -7,11 +7,11 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.fit.feedback import feedback_note
-from estimation.identification.free_run.believable import believable
+from estimation.identification.free_run.believable import believable_candidate
 from estimation.identification.free_run.candidate_rows import linear_row
 from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
 from estimation.identification.free_run.data import Channels, Scaling, scaled
-from estimation.identification.free_run.dense_polynomial import Asked
+from estimation.identification.free_run.dense_polynomial import RequestedSizes
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
@@ -24,7 +24,7 @@ from estimation.identification.notes import IdentificationCode
 from estimation.log_checks.bridging import bridged
 from plant.notes import Note
 
-BACKWARDS, REVERSED, FOLLOWED = (1, 2), 0.5, 0.2
+REVERSE_ORDERS, LARGEST_REVERSE_RATIO, LARGEST_REVERSE_ERROR = (1, 2), 0.5, 0.2
 """Orders of models from output to input, and their largest errors for swapped columns, over the model's error and over
 the deviation. In the right direction noise is left; against it, everything that cannot be predicted, and of a
 controller's action its set-point."""
@@ -32,7 +32,7 @@ controller's action its set-point."""
 LEADS = (1, 2, 3, 4, 5)
 """Samples by which an input may be logged late [count]."""
 
-COMPARED = 3
+LEAST_COMPARED_ORDER = 3
 """Orders up to this one at least are compared with a given one before a limit or a random walk is accepted [count]."""
 
 
@@ -60,7 +60,7 @@ class Task:
     whole: Channels
     by: Scaling
     part: Channels
-    asked: Asked
+    asked: RequestedSizes
     orders: list[int]
     delays: tuple[int, ...] | None
 
@@ -70,8 +70,14 @@ class Task:
 
         What a given size that is too large or too small leaves may look like a limit or a walk.
         """
-        orders = list(range(1, max(COMPARED, *self.orders) + 1))  # each order starts from the next lower one
-        return None if self.asked == Asked() else replace(self, asked=Asked(), orders=orders, delays=None)
+        orders = list(
+            range(1, max(LEAST_COMPARED_ORDER, *self.orders) + 1)
+        )  # each order starts from the next lower one
+        return (
+            None
+            if self.asked == RequestedSizes()
+            else replace(self, asked=RequestedSizes(), orders=orders, delays=None)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +126,7 @@ class LinearComparison:
         named = data.inputs, data.output, data.sample_time, "output-error"
         model = FreeRunModel(*named, by, LinearDynamics.of(fit), transfer)
         quality = model.quality(data.u, data.y)
-        notes = [*self.notes, *fed_back(model, data)]
+        notes = [*self.notes, *closed_loop_notes(model, data)]
         ahead = (IdentificationCode.SWAPPED, IdentificationCode.INPUT_LOGGED_LATE)
         sound = self.sound and not any(note.code in ahead for note in notes)
         if best.doubt == "no_fit" or not quality.fit_percent > 0.0 or not best.held_back < 1.0:
@@ -133,13 +139,13 @@ class LinearComparison:
 def linear_comparison(task: Task) -> LinearComparison:
     """Compare linear models of all requested orders."""
     candidates = linear_candidates(task.part, task.orders, task.delays, task.asked.n_numerator)
-    best, notes = believable(candidates, task.part, task.by)
+    best, notes = believable_candidate(candidates, task.part, task.by)
     related = not best.outlasts_block(task.part) or linear_explains(best.fit, task.part)
     said = notes if related else [IdentificationCode.UNRELATED.note(output=task.data.output)]
     return LinearComparison(task, candidates, best, related, [*said], [linear_row(one) for one in candidates])
 
 
-def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> list[Note]:
+def closed_loop_notes(model: FreeRunModel, data: Channels, *, changes: bool = False) -> list[Note]:
     """Return a note if the input of a linear model follows the output's noise, in the longest log.
 
     Parameters
@@ -161,10 +167,10 @@ def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> l
     said = feedback_note(left, followed, (data.inputs[0], data.output))
     if said is None:
         return []
-    return [said if changes else swapped(left, data, k) or said]
+    return [said if changes else swapped_channels_note(left, data, k) or said]
 
 
-def swapped(left: Array, data: Channels, log: int) -> Note | None:
+def swapped_channels_note(left: Array, data: Channels, log: int) -> Note | None:
     """Return a note if the input responds to the output instead of the other way round, or is logged late.
 
     A model of the wrong direction looks ahead, and so does one with a late input: the one with the smaller error is
@@ -180,19 +186,19 @@ def swapped(left: Array, data: Channels, log: int) -> Note | None:
         Which log.
     """
     u, y = data.u[log][:, 0], data.y[log]
-    back = _left(Channels((data.output,), data.inputs[0], data.sample_time, (bridged(y)[:, None],), (u,)))
+    back = _small_model_error(Channels((data.output,), data.inputs[0], data.sample_time, (bridged(y)[:, None],), (u,)))
     own = float(np.sqrt(np.nanmean(left**2)) / np.nanstd(y))
     moved = [replace(data, u=(data.u[log][lead:],), y=(y[:-lead],)) for lead in LEADS]
-    ahead, lead = min((_left(one), lead) for one, lead in zip(moved, LEADS, strict=True))
+    ahead, lead = min((_small_model_error(one), lead) for one, lead in zip(moved, LEADS, strict=True))
     names = {"input": data.inputs[0], "output": data.output}
-    against = back < min(REVERSED * own, FOLLOWED)
-    if ahead <= back and (against or ahead < REVERSED * min(own, FOLLOWED)):
+    against = back < min(LARGEST_REVERSE_RATIO * own, LARGEST_REVERSE_ERROR)
+    if ahead <= back and (against or ahead < LARGEST_REVERSE_RATIO * min(own, LARGEST_REVERSE_ERROR)):
         return IdentificationCode.INPUT_LOGGED_LATE.note(**names, samples=lead, ahead=ahead, left=own)
     return IdentificationCode.SWAPPED.note(**names, back=back, left=own) if against else None
 
 
-def _left(data: Channels) -> float:
+def _small_model_error(data: Channels) -> float:
     """Return the error of a small linear model without dead time, over the output's deviation [dimensionless]."""
     whole, _ = scaled(data)
-    fits = (fit_linear(Form(order, (order + 1,), (0,)), whole, least_gain=COARSE) for order in BACKWARDS)
+    fits = (fit_linear(Form(order, (order + 1,), (0,)), whole, least_gain=COARSE) for order in REVERSE_ORDERS)
     return float(np.sqrt(min(fit.cost for fit in fits) / whole.n_samples))

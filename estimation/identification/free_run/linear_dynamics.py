@@ -49,9 +49,9 @@ class LinearDynamics(OutputErrorDynamics):
             (np.concatenate([np.zeros(delay), b]), self.f) for b, delay in zip(parts, self.form.delays, strict=True)
         ]
 
-    def unanswered(self, length: int) -> int:
+    def undetermined_outputs(self, length: int) -> int:
         """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
-        return self.form.unanswered(length)
+        return self.form.undetermined_outputs(length)
 
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, with its initial state by least squares of the available outputs.
@@ -65,7 +65,7 @@ class LinearDynamics(OutputErrorDynamics):
         known = np.isfinite(y)
         if np.count_nonzero(known) <= form.order:
             return driven
-        free, begin = columns[:, n_b + 1 :], self.unanswered(y.size)
+        free, begin = columns[:, n_b + 1 :], self.undetermined_outputs(y.size)
         run = driven + free @ np.linalg.lstsq(free[known], (y - driven)[known], rcond=None)[0]
         run[:begin] = run[begin : begin + 1] if begin < y.size else driven
         return run

@@ -10,9 +10,9 @@ from estimation.identification.fit.output_error import FINAL_STEPS, descend_from
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.lagged_columns import columns_of
 from estimation.identification.free_run.least_squares import least_squares
-from estimation.identification.free_run.linear_kernel import decay_rows, longest_pole
+from estimation.identification.free_run.linear_kernel import decay_rows, record_length_pole
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem, long_dead_time
-from estimation.identification.search.criterion import Structure, held_within
+from estimation.identification.search.criterion import Structure, with_bounded_roots
 from estimation.identification.search.experiments import Experiments
 
 FIRST_STEPS = 20
@@ -28,7 +28,7 @@ further."""
 PASSES = 12
 """Iterations of Steiglitz and McBride."""
 
-SLOWER = (0.5, 0.9, 0.98)
+ADDED_POLES = (0.5, 0.9, 0.98)
 """Poles that are added, each with its zeros, to the minimum of the next lower order."""
 
 
@@ -49,9 +49,11 @@ def fit_linear(
         As `levenberg` takes it [dimensionless].
     """
     problem = Problem(form, data)
-    tried = list(starts) or [*steiglitz_mcbride(problem), *_searched(problem)]
-    radius = longest_pole(data.told) ** 1.5 if bounded else 1.0 - 0.3 / data.longest
-    ranked = sorted((problem.profiled(held_within(f, data.longest, radius)) for f in tried), key=lambda one: one[0])
+    tried = list(starts) or [*steiglitz_mcbride(problem), *_searched_denominators(problem)]
+    radius = record_length_pole(data.informative_samples) ** 1.5 if bounded else 1.0 - 0.3 / data.longest
+    ranked = sorted(
+        (problem.profiled(with_bounded_roots(f, data.longest, radius)) for f in tried), key=lambda one: one[0]
+    )
     kept: list[tuple[float, Array]] = []
     for cost, theta in ranked:
         if len(kept) < 3 and all(cost - other > 1e-7 * cost for other, _ in kept):
@@ -63,9 +65,9 @@ def fit_linear(
     return problem.descend(theta, bounded=bounded, least_gain=least_gain)
 
 
-def extended(fit: LinearFit) -> list[Array]:
+def extended_denominators(fit: LinearFit) -> list[Array]:
     """Return denominators with one order more at the same minimum: a real pole is added, which zeros can cancel."""
-    return [np.convolve(fit.f, [1.0, -pole]) for pole in SLOWER]
+    return [np.convolve(fit.f, [1.0, -pole]) for pole in ADDED_POLES]
 
 
 def steiglitz_mcbride(problem: Problem) -> list[Array]:
@@ -98,7 +100,7 @@ def steiglitz_mcbride(problem: Problem) -> list[Array]:
             rows.append(np.column_stack([series[:-1].T, -past])[near])
             wanted.append(out[near])
         values = least_squares(np.concatenate(rows), np.concatenate(wanted))[0]
-        new = held_within(np.concatenate([[1.0], values[form.n_b + 1 :]]), n_samples, 1.0 - 0.3 / n_samples)
+        new = with_bounded_roots(np.concatenate([[1.0], values[form.n_b + 1 :]]), n_samples, 1.0 - 0.3 / n_samples)
         found.append(new)
         if np.abs(new - f).max() < 1e-6:
             break
@@ -106,7 +108,7 @@ def steiglitz_mcbride(problem: Problem) -> list[Array]:
     return [found[0], found[len(found) // 2], found[-1]]
 
 
-def _searched(problem: Problem) -> list[Array]:
+def _searched_denominators(problem: Problem) -> list[Array]:
     """Return the denominator of the search for the global minimum, of one input without its mean."""
     form, data = problem.form, problem.data
     if len(form.sizes) > 1 or data.longest * len(data.y) > MOST_SEARCHED:
@@ -121,7 +123,7 @@ def _searched(problem: Problem) -> list[Array]:
         u = np.concatenate([inputs[part, index] for part in parts])
         pair = Experiments(u, np.where(used, y, 0.0), used, bounds)
         structure = Structure(size, form.order, delay)
-        if delay > long_dead_time(data.longest) and pair.goes_on_behind(delay + form.order):
+        if delay > long_dead_time(data.longest) and pair.has_outputs_after(delay + form.order):
             pair, structure = pair.advanced(delay), Structure(size, form.order)
         # the result is only a start, so only the best candidate after a few steps is continued
         begun = screened(structure, pair)[0][1]

@@ -82,7 +82,7 @@ def settles(coefficients: Array) -> bool:
     return bool(stable(coefficients)) and min(float(whole.sum()), sum(whole.tolist())) > 0.0
 
 
-def longest_pole(n_samples: int) -> float:
+def record_length_pole(n_samples: int) -> float:
     """Return the pole whose time constant is a record's length.
 
     Parameters

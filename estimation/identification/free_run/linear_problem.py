@@ -8,7 +8,7 @@ from estimation.arrays import Array, BoolArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.lagged_columns import lay_shifted
 from estimation.identification.free_run.least_squares import Counted, least_squares
-from estimation.identification.free_run.linear_kernel import decay_rows, longest_pole, settles
+from estimation.identification.free_run.linear_kernel import decay_rows, record_length_pole, settles
 from estimation.identification.search.descent import stable
 from estimation.identification.search.levenberg import levenberg
 from estimation.identification.search.reflections import stable_step
@@ -33,7 +33,7 @@ def long_dead_time(length: int) -> int:
     return min(LONG_DEAD_TIME, length // LONG_SHARE)
 
 
-def unanswered(dead_time: int, length: int) -> int:
+def undetermined_outputs(dead_time: int, length: int) -> int:
     """Return how many first outputs of a log are left out, because they depend on inputs from before it.
 
     Parameters
@@ -48,8 +48,8 @@ def unanswered(dead_time: int, length: int) -> int:
 
     Examples
     --------
-    >>> unanswered(12, 1000), unanswered(80, 1000), unanswered(12, 200), unanswered(80, 60)
-    (0, 80, 12, 60)
+    >>> [undetermined_outputs(*one) for one in ((12, 1000), (80, 1000), (12, 200), (80, 60))]
+    [0, 80, 12, 60]
     """
     return min(dead_time, length) if dead_time > long_dead_time(length) else 0
 
@@ -80,9 +80,9 @@ class Form:
         """Coefficients of numerators and denominator, and the offset."""
         return self.n_b + self.order + 1
 
-    def unanswered(self, length: int) -> int:
+    def undetermined_outputs(self, length: int) -> int:
         """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
-        return unanswered(max(self.delays), length)
+        return undetermined_outputs(max(self.delays), length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ class Problem:
         self.y = np.concatenate(data.y)
         self.used: BoolArray = np.isfinite(self.y)
         told = int(np.count_nonzero(self.used))
-        self.begins = [form.unanswered(y.size) for y in data.y]
+        self.begins = [form.undetermined_outputs(y.size) for y in data.y]
         for first, begin in zip(self.bounds[:-1], self.begins, strict=True):
             self.used[first : first + begin] = False
         self.share = told / max(int(np.count_nonzero(self.used)), 1)
@@ -256,7 +256,9 @@ class Problem:
             return self.counted.square(left), *self.counted.normal_equations(jacobian, left)
 
         # all poles are within radius r if those with the coefficients f_k r^-k are within the unit circle
-        stretched = longest_pole(self.data.told) ** -np.arange(1.0, n + 1.0) if bounded else np.ones(n)
+        stretched = (
+            record_length_pole(self.data.informative_samples) ** -np.arange(1.0, n + 1.0) if bounded else np.ones(n)
+        )
 
         poles = slice(n_b, n_b + n)
 

@@ -15,14 +15,14 @@ from estimation.arrays import Array
 from estimation.identification.free_run.choose_linear import Candidate, criteria
 from estimation.identification.free_run.data import Channels, scaled
 from estimation.identification.free_run.dead_times import ORDER, estimate_delays
-from estimation.identification.free_run.held_back import told_apart
+from estimation.identification.free_run.held_back import is_better_beyond_chance
 from estimation.identification.free_run.linear_comparison import LinearComparison
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_problem import Form, Problem
 from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 
-CLEARLY, NEARLY = 0.85, 1.02
+CLEAR_RATIO, NEAR_RATIO = 0.85, 1.02
 """Largest ratio of held-back errors with and without offsets of logs, as for a nonlinear structure; and the same if the
 model with one offset has a pole slower than a block, as for a simpler model."""
 
@@ -49,7 +49,9 @@ class LevelledLogs:
         return IdentificationCode.OFFSETS_DIFFER.note(output=self.data.output, above=shown)
 
 
-def levelled(data: Channels, orders: Sequence[int], delays: tuple[int, ...] | None = None) -> LevelledLogs | None:
+def logs_at_one_offset(
+    data: Channels, orders: Sequence[int], delays: tuple[int, ...] | None = None
+) -> LevelledLogs | None:
     """Return logs brought to one offset; None for a single log, or if their offsets differ by chance.
 
     Parameters
@@ -85,7 +87,7 @@ def levelled(data: Channels, orders: Sequence[int], delays: tuple[int, ...] | No
     return LevelledLogs(flat, above)
 
 
-def believed(own: LinearComparison, one: LinearComparison) -> bool:
+def are_offsets_believed(own: LinearComparison, one: LinearComparison) -> bool:
     """Return whether offsets of logs are believed.
 
     Parameters
@@ -93,14 +95,14 @@ def believed(own: LinearComparison, one: LinearComparison) -> bool:
     own, one : LinearComparison
         Models with an offset for each log, and with one.
     """
-    lasting = [lasts(each.best, each) for each in (own, one)]
+    lasting = [has_slow_pole(each.best, each) for each in (own, one)]
     spread = own.task.by.y_std / one.task.by.y_std
     errors, least = [spread * error for error in own.best.block_errors], spread * own.best.held_back
     if lasting == [False, True]:
-        return least <= NEARLY * one.best.held_back
-    return least < CLEARLY * one.best.held_back and told_apart(errors, one.best.block_errors)
+        return least <= NEAR_RATIO * one.best.held_back
+    return least < CLEAR_RATIO * one.best.held_back and is_better_beyond_chance(errors, one.best.block_errors)
 
 
-def lasts(best: Candidate, of: LinearComparison) -> bool:
+def has_slow_pole(best: Candidate, of: LinearComparison) -> bool:
     """Return whether a pole is slower than a held-back block."""
     return bool(best.doubt) or best.fit.integrates or best.outlasts_block(of.task.part)

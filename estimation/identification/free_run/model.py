@@ -195,16 +195,16 @@ class FreeRunModel:
         tuple of FreeRunQuality and list of tuple of float
             The quality, and the result of `judged_run` for each log; empty for models without a fallback.
         """
-        measured = np.concatenate([self._answered(one) for one in y])
+        measured = np.concatenate([self._without_undetermined(one) for one in y])
         runs = [self.judged_run(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)]
         free = np.concatenate([run for run, _ in runs])
         ahead = np.concatenate([self.predict(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)])
         quality = FreeRunQuality(*_fit(measured, free, running=True), *_fit(measured, ahead, running=False))
         return quality, [errors for _, errors in runs if errors is not None]
 
-    def _answered(self, y: Array) -> Array:
+    def _without_undetermined(self, y: Array) -> Array:
         """Return an output without its first samples that depend, by a long dead time, on earlier inputs."""
-        return np.where(np.arange(y.size) < self.dynamics.unanswered(y.size), np.nan, y)
+        return np.where(np.arange(y.size) < self.dynamics.undetermined_outputs(y.size), np.nan, y)
 
     def _scaled(self, u: ArrayLike, y: ArrayLike | None) -> tuple[Array, Array]:
         try:

@@ -12,14 +12,14 @@ from estimation.identification.free_run.choose_absolute import (
     AbsoluteCandidate,
     absolute_candidates,
     chosen_absolute,
-    from_zero,
     may_lack_sign,
+    relative_to_zero,
 )
-from estimation.identification.free_run.choose_limited import LimitedCandidate, refitted_limited, told_limits
-from estimation.identification.free_run.data import section
+from estimation.identification.free_run.choose_limited import LimitedCandidate, limits_in_words, refitted_limited
+from estimation.identification.free_run.data import liveliest_sections
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.limited_dynamics import LimitedDynamics
-from estimation.identification.free_run.limited_output import at_limits, between
+from estimation.identification.free_run.limited_output import at_limits, between_limits
 from estimation.identification.free_run.linear_comparison import LinearComparison
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.transfer_function import linear_model
@@ -27,11 +27,11 @@ from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError
 from plant.notes import Note
 
-SIGNLESS = 0.5
+SIGNLESS_ERROR_RATIO = 0.5
 """Largest ratio of the held-back error without a sign to that of the linear model: many signs are fitted."""
 
 
-def without_sign(linear: LinearComparison, most: int, *, surely: bool) -> AbsoluteCandidate | None:
+def best_signless(linear: LinearComparison, most: int, *, surely: bool) -> AbsoluteCandidate | None:
     """Return the best model of an output without its sign; None if there is none, or a linear one is good enough.
 
     Parameters
@@ -48,7 +48,7 @@ def without_sign(linear: LinearComparison, most: int, *, surely: bool) -> Absolu
     HydrostateError
         If one was asked for and there is none.
     """
-    data, by = section(linear.task.whole, most), linear.task.by
+    data, by = liveliest_sections(linear.task.whole, most), linear.task.by
     if surely and not may_lack_sign(data, by):
         return None
     found = absolute_candidates(data, by, linear.task.asked)
@@ -60,10 +60,12 @@ def without_sign(linear: LinearComparison, most: int, *, surely: bool) -> Absolu
     taken = chosen_absolute(found)
     # a block with the only step of the inputs says little, so the fit to all blocks must agree
     explains = taken.bic / data.n_samples < linear.best.bic / linear.task.part.n_samples
-    return None if surely and not (explains and taken.held_back < SIGNLESS * linear.best.held_back) else taken
+    return (
+        None if surely and not (explains and taken.held_back < SIGNLESS_ERROR_RATIO * linear.best.held_back) else taken
+    )
 
 
-def absolute(taken: AbsoluteCandidate, linear: LinearComparison, most: int, *, asked: bool) -> Identified:
+def identified_absolute(taken: AbsoluteCandidate, linear: LinearComparison, most: int, *, asked: bool) -> Identified:
     """Return a model whose output has no sign, fitted to all data.
 
     Parameters
@@ -78,31 +80,34 @@ def absolute(taken: AbsoluteCandidate, linear: LinearComparison, most: int, *, a
         Whether the user asked for it; otherwise a note says that it was chosen.
     """
     data, by = linear.task.data, linear.task.by
-    fit = refitted_absolute(taken.fit, from_zero(section(linear.task.whole, most), by))
+    fit = refitted_absolute(taken.fit, relative_to_zero(liveliest_sections(linear.task.whole, most), by))
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "wiener", by, AbsoluteDynamics.of(fit, taken.zero))
-    found, left = told(model, linear, taken.held_back), taken.held_back / max(linear.best.held_back, 1e-300)
+    found, left = (
+        identified_with_quality(model, linear, taken.held_back),
+        taken.held_back / max(linear.best.held_back, 1e-300),
+    )
     said = () if asked else (IdentificationCode.SIGN_NOT_MEASURED.note(output=data.output, left=left),)
     return replace(found, notes=(*said, *found.notes))
 
 
-def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
+def identified_limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
     """Return a linear model whose output has limits, fitted to all data."""
     data, whole, by, limits = linear.task.data, linear.task.whole, linear.task.by, taken.limits
     fit = refitted_limited(taken, whole)
     kind = "stops" if limits.stops else "cut-off"
     linear.rows.append(form_row("output-error", taken, fit.form, nonlinearity=kind))
     # a stop erases the transfer function's own run, so no covariance follows from that run
-    transfer = None if limits.stops or len(data.inputs) > 1 else linear_model(fit, between(whole, limits), by)
+    transfer = None if limits.stops or len(data.inputs) > 1 else linear_model(fit, between_limits(whole, limits), by)
     named = data.inputs, data.output, data.sample_time, "output-error"
     model = FreeRunModel(*named, by, LimitedDynamics.within(fit, limits), transfer)
-    found, notes = told(model, linear, taken.held_back), list[Note]()
-    shown, share = told_limits(whole, by, limits)
+    found, notes = identified_with_quality(model, linear, taken.held_back), list[Note]()
+    shown, share = limits_in_words(whole, by, limits)
     told_by = {"output": data.output, "limits": shown, "share": share}
     if limits.stops:
         notes.append(IdentificationCode.OUTPUT_STOPPED.note(**told_by))
     else:
         notes.append(IdentificationCode.OUTPUT_CUT_OFF.note(**told_by))
-    if taken.outlasts(whole.told):
+    if taken.outlasts(whole.informative_samples):
         notes.append(IdentificationCode.INTEGRATES.note(output=data.output))
     if len(data.inputs) == 1:
         k = int(np.argmax([y.size for y in data.y]))
@@ -112,7 +117,7 @@ def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
     return replace(found, notes=(*notes, *found.notes))
 
 
-def told(model: FreeRunModel, linear: LinearComparison, held_back: float) -> Identified:
+def identified_with_quality(model: FreeRunModel, linear: LinearComparison, held_back: float) -> Identified:
     """Return a nonlinear model with its quality; it is not believed without one.
 
     Parameters

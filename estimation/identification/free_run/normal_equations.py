@@ -151,7 +151,7 @@ class NormalEquations:
         self._shares, self._outputs = [inputs @ weights for inputs in self.inputs], []
         self._rub = theta[theta.size - runs.variables.n_friction :].copy()
         for index, share in enumerate(self._shares):
-            out = runs.begun(theta, index)
+            out = runs.outputs_before_run(theta, index)
             at = (one.parent, one.factor, self.lag, self.limits, self.ends, runs.begins[index], self._rub)
             if run_factored(share, *at, out) >= 0:
                 return None

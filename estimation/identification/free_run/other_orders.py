@@ -7,16 +7,16 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit, Runs
+from estimation.identification.free_run.polynomial_fit import OUTPUT_MARGIN, PolynomialFit, Runs
 
-WILD = 0.003
+WILD_SHARE = 0.003
 """Share of samples at which a model may be clipped if its inputs come in another order; above it, the model is wild."""
 
-REORDERED, PIECES = 10, (8, 25)
+MOST_REORDERED, PIECES = 10, (8, 25)
 """Number of other orders of the inputs on which a model is tried, and alternating numbers of pieces."""
 
 
-def reordered(data: Channels, count: int = REORDERED) -> Iterator[Channels]:
+def reordered_channels(data: Channels, count: int = MOST_REORDERED) -> Iterator[Channels]:
     """Yield the same channels with pieces of the inputs in other orders, some of them reversed.
 
     Parameters
@@ -49,14 +49,14 @@ def is_wild(fit: PolynomialFit, data: Channels) -> bool:
     data : Channels
         Scaled.
     """
-    low, high = fit.variables.around(FARTHEST)
+    low, high = fit.variables.extended_ends(OUTPUT_MARGIN)
     held, total = 0, 0
-    for other in reordered(data):
+    for other in reordered_channels(data):
         ran = Runs(fit.variables, fit.terms, other).outputs(fit.theta)
         if ran is None:
             return True
         held, total = held + int(np.count_nonzero((ran <= low) | (ran >= high))), total + ran.size
-    return held > WILD * total
+    return held > WILD_SHARE * total
 
 
 def disagreement(fits: Sequence[PolynomialFit], whole: PolynomialFit, data: Channels) -> float:
@@ -80,7 +80,7 @@ def disagreement(fits: Sequence[PolynomialFit], whole: PolynomialFit, data: Chan
         Root mean square, over the output's deviation; infinite if one diverges [dimensionless].
     """
     squares = list[float]()
-    for other in reordered(data):
+    for other in reordered_channels(data):
         own = Runs(whole.variables, whole.terms, other).outputs(whole.theta)
         for fit in fits:
             ran = Runs(fit.variables, fit.terms, other).outputs(fit.theta)

@@ -14,20 +14,22 @@ from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.structure_names import STRUCTURE_NAMES
 from plant.errors import HydrostateError
 
-ADOPTED = {name: structure for name, structure in STRUCTURE_NAMES.items() if name != "output-error"}
+OTHER_STRUCTURES = {name: structure for name, structure in STRUCTURE_NAMES.items() if name != "output-error"}
 """Structures that are not fitted by their free run, by their names in the command line."""
 
 HELD_BACK = 1.0 / 3.0
 """Last share of every log that is held back to judge the structure."""
 
 
-def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearDynamics, LinearModel, float]:
+def fit_other_structure(
+    name: str, form: Form, data: Channels, by: Scaling
+) -> tuple[LinearDynamics, LinearModel, float]:
     """Fit a structure, and judge it by the free run on the last third of every log, fitted to the rest.
 
     Parameters
     ----------
     name : str
-        One of `ADOPTED`.
+        One of `OTHER_STRUCTURES`.
     form : Form
         Order, size and dead time.
     data : Channels
@@ -45,15 +47,15 @@ def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearDyn
     """
     if len(data.inputs) > 1:
         raise HydrostateError(f"structure {name} takes one input, got {', '.join(data.inputs)}: use output-error")
-    model = _fitted(name, form, data, by)
-    dynamics, offset = _dynamics(model, data, by)
+    model = _model_fit(name, form, data, by)
+    dynamics, offset = _free_run_dynamics(model, data, by)
     cuts = [round(y.size * (1.0 - HELD_BACK)) for y in data.y]
     shorter = replace(
         data,
         u=tuple(u[:cut] for u, cut in zip(data.u, cuts, strict=True)),
         y=tuple(y[:cut] for y, cut in zip(data.y, cuts, strict=True)),
     )
-    part, _ = _dynamics(_fitted(name, form, shorter, by), shorter, by)
+    part, _ = _free_run_dynamics(_model_fit(name, form, shorter, by), shorter, by)
     whole = in_scale(data, by)
     errors, masks = list[Array](), list[BoolArray]()
     for u, y, cut in zip(whole.u, whole.y, cuts, strict=True):
@@ -69,7 +71,7 @@ def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearDyn
     return dynamics, replace(model, offset=level), held_back
 
 
-def _fitted(name: str, form: Form, data: Channels, by: Scaling) -> LinearModel:
+def _model_fit(name: str, form: Form, data: Channels, by: Scaling) -> LinearModel:
     u = [one[:, 0] - by.u_mean[0] for one in data.u]
     y = [one - by.y_mean for one in data.y]
     if name in ("subspace", "instrumental") and any(np.isnan(one).any() for one in y):
@@ -79,10 +81,10 @@ def _fitted(name: str, form: Form, data: Channels, by: Scaling) -> LinearModel:
     sizes = {"n_numerator": form.sizes[0], "n_denominator": form.order, "delay": form.delays[0]}
     about = {"covariance": "auto", "input_name": data.inputs[0], "output_name": data.output}
     both = (u[0], y[0]) if len(u) == 1 else (u, y)
-    return fit_structure(ADOPTED[name], *both, data.sample_time, {**sizes, **about})
+    return fit_structure(OTHER_STRUCTURES[name], *both, data.sample_time, {**sizes, **about})
 
 
-def _dynamics(model: LinearModel, data: Channels, by: Scaling) -> tuple[LinearDynamics, float]:
+def _free_run_dynamics(model: LinearModel, data: Channels, by: Scaling) -> tuple[LinearDynamics, float]:
     """Return the free-run dynamics of a fit, with the offset that fits the data best."""
     if not model.is_stable:
         raise HydrostateError(

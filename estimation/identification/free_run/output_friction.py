@@ -14,7 +14,7 @@ from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_problem import LinearFit, Problem
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs, variables_of
 
-LEVELS = (0.02, 0.1, 0.3, 0.6)
+START_FRICTIONS = (0.02, 0.1, 0.3, 0.6)
 """Friction at which searches begin, over the effect of the inputs at one deviation [dimensionless]."""
 
 
@@ -33,7 +33,7 @@ def fit_with_friction(linear: LinearFit, friction: str, data: Channels) -> Polyn
     begun = _first_outputs(linear, runs, data)
     put_in = float(np.abs([one.sum() for one in linear.numerators]).sum())
     found: list[PolynomialFit] = []
-    for level in LEVELS:
+    for level in START_FRICTIONS:
         rub = np.array([level * put_in, level * put_in, 0.0])[: runs.variables.n_friction]
         fit = runs.fit(np.concatenate([values, begun, rub]), FINAL_STEPS)
         if fit is not None:
@@ -49,7 +49,7 @@ def _first_outputs(linear: LinearFit, runs: Runs, data: Channels) -> Array:
     return np.concatenate([output[int(first) + begin - n : int(first) + begin] for first, begin in places])
 
 
-def continued(fit: PolynomialFit, data: Channels) -> PolynomialFit | None:
+def continued_fit(fit: PolynomialFit, data: Channels) -> PolynomialFit | None:
     """Return a fit continued on other data with as many logs; None if it diverges."""
     runs = Runs(fit.variables, fit.terms, data)
     return runs.fit(np.concatenate([fit.coefficients, runs.start_values(), fit.friction]), FINAL_STEPS)

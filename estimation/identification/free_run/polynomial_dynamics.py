@@ -9,7 +9,7 @@ import numpy as np
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.fallback import Fallback
-from estimation.identification.free_run.linear_problem import unanswered
+from estimation.identification.free_run.linear_problem import undetermined_outputs
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, ends_of
 from estimation.identification.free_run.polynomial_variables import Variables, lagged_signals, products
@@ -17,11 +17,11 @@ from estimation.identification.free_run.polynomial_variables import Variables, l
 START_STEPS = 12
 """Refinements of the first outputs of a polynomial run."""
 
-AGREED = 0.6
+LARGEST_RELEASE_RATIO = 0.6
 """Uncertainty of a run with released products over that with clipped ones, up to which products are released: with four
 fits each, a smaller ratio occurs by chance in one case of six (Fisher's ratio of variances) [fraction]."""
 
-SMOOTHED = (8, 24)
+SMOOTHING_SAMPLES = (8, 24)
 """Samples through which a constant and a straight line give first outputs without their noise."""
 
 
@@ -53,9 +53,9 @@ class PolynomialDynamics:
         """Fitted coefficients."""
         return self.coefficients.size + self.friction.size
 
-    def unanswered(self, length: int) -> int:
+    def undetermined_outputs(self, length: int) -> int:
         """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
-        return unanswered(int(self.variables.lag.max(initial=0)), length)
+        return undetermined_outputs(int(self.variables.lag.max(initial=0)), length)
 
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, or that of the linear model if that replaces it.
@@ -97,14 +97,16 @@ class PolynomialDynamics:
         if np.array_equal(single, held):
             return told
         # outside the fitted range, products are clipped farther out if fits without a block agree better on that run
-        parts = (one._released() if isinstance(one, PolynomialDynamics) else one for one in self.fallback.parts)
-        released, farther = self._released(), replace(self.fallback, parts=tuple(parts))
+        parts = (
+            one._with_wider_clipping() if isinstance(one, PolynomialDynamics) else one for one in self.fallback.parts
+        )
+        released, farther = self._with_wider_clipping(), replace(self.fallback, parts=tuple(parts))
         freed = farther.judged(u, y, released.own_run(u, y), ends_of(released.variables, self.terms))
-        return freed if freed[1][0] < AGREED * told[1][0] else told
+        return freed if freed[1][0] < LARGEST_RELEASE_RATIO * told[1][0] else told
 
-    def _released(self) -> "PolynomialDynamics":
+    def _with_wider_clipping(self) -> "PolynomialDynamics":
         """Return the same products, clipped farther out."""
-        return replace(self, variables=self.variables.released(), fallback=None)
+        return replace(self, variables=self.variables.with_wider_clipping(), fallback=None)
 
     def own_run(self, u: Array, y: Array) -> Array:
         """Return the free run, with its first outputs fitted to the available ones; NaN from where it diverges.
@@ -271,7 +273,7 @@ def smoothed_starts(y: Array, first: int, count: int) -> list[Array]:
     [0.0, 1.0]
     """
     found = list[Array]()
-    for length in SMOOTHED:
+    for length in SMOOTHING_SAMPLES:
         part = y[first : first + length]
         there = np.flatnonzero(np.isfinite(part))
         for degree in (0, 1):

@@ -8,10 +8,10 @@ from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.normal_equations import NormalEquations
-from estimation.identification.free_run.polynomial_variables import BEYOND, Variables
+from estimation.identification.free_run.polynomial_variables import SIGNAL_MARGIN, Variables
 from estimation.identification.search.levenberg import levenberg
 
-FARTHEST = 0.2
+OUTPUT_MARGIN = 0.2
 """Share of its range by which the output itself may leave it, with products [dimensionless]."""
 
 STEPS, FINAL_STEPS = 8, 40
@@ -75,7 +75,7 @@ def variables_of(linear: LinearFit, data: Channels) -> tuple[Variables, IntArray
     ends += [(float(one.min()), float(one.max())) for one in together.T]
     limits = np.array([ends[k] for k in source])
     span = limits[:, 1] - limits[:, 0]
-    limits = limits + BEYOND * np.column_stack([-span, span])
+    limits = limits + SIGNAL_MARGIN * np.column_stack([-span, span])
     terms = np.full((1 + len(source), 3), -1, dtype=np.int64)
     terms[1:, 0] = np.arange(len(source))
     n_b = form.n_b
@@ -98,7 +98,7 @@ def ends_of(variables: Variables, terms: IntArray) -> Array:
         Least and greatest output, scaled.
     """
     free = not (terms[:, 1] >= 0).any()
-    return np.array([-1e9, 1e9]) if free else variables.around(FARTHEST)
+    return np.array([-1e9, 1e9]) if free else variables.extended_ends(OUTPUT_MARGIN)
 
 
 class Runs:
@@ -149,7 +149,7 @@ class Runs:
         """Ends at which the output is clipped: infinite without products, shape (2,)."""
         return ends_of(self.variables, self.terms)
 
-    def begun(self, theta: Array, index: int) -> Array:
+    def outputs_before_run(self, theta: Array, index: int) -> Array:
         """Return the outputs of a log before its run, followed by zeros.
 
         Parameters

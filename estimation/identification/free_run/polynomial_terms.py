@@ -19,10 +19,10 @@ from estimation.identification.free_run.polynomial_variables import Variables
 MOST_CANDIDATES = 250
 """Products that are compared."""
 
-TRIED = 4
+MOST_TRIED = 4
 """Number of best products that are tried until one reduces the error."""
 
-DEPENDENT = 1e-12
+ROUNDING_SHARE = 1e-12
 """Share of the squared sensitivities below which a direction is rounding."""
 
 LEAST_GAIN = 1e-4
@@ -39,7 +39,7 @@ def candidate_terms(variables: Variables) -> IntArray:
     return np.array([*found, *cubes][:MOST_CANDIDATES], dtype=np.int64)
 
 
-def begun(linear: LinearFit, data: Channels) -> PolynomialFit | None:
+def polynomial_of_linear(linear: LinearFit, data: Channels) -> PolynomialFit | None:
     """Return a linear model as a polynomial one, fitted to its free run; None if it diverges.
 
     Parameters
@@ -52,7 +52,7 @@ def begun(linear: LinearFit, data: Channels) -> PolynomialFit | None:
     return runs.fit(np.concatenate([values, runs.start_values()]), FINAL_STEPS)
 
 
-def one_more(fit: PolynomialFit, pool: IntArray, data: Channels) -> PolynomialFit | None:
+def with_best_product(fit: PolynomialFit, pool: IntArray, data: Channels) -> PolynomialFit | None:
     """Return the fit with the product that explains most in addition; None if none does.
 
     Parameters
@@ -65,7 +65,7 @@ def one_more(fit: PolynomialFit, pool: IntArray, data: Channels) -> PolynomialFi
     gains = _gains_of(fit, pool, data)
     if gains is None:
         return None
-    for k in np.argsort(-gains)[:TRIED]:
+    for k in np.argsort(-gains)[:MOST_TRIED]:
         if not gains[k] > LEAST_GAIN * fit.cost:
             return None
         terms = np.concatenate([fit.terms, pool[k : k + 1]])
@@ -110,7 +110,7 @@ def _gains(own: Array, shared: Array, square: Array, right: Array, explained: Ar
         scale[scale == 0.0] = 1.0
         # directions of the present values that the data do not determine are left out
         powers, directions = np.linalg.eigh(own / np.outer(scale, scale))
-        told = powers > DEPENDENT * powers[-1]
+        told = powers > ROUNDING_SHARE * powers[-1]
         basis = directions[:, told] / np.sqrt(powers[told]) / scale[:, None]
         shadow = basis.T @ np.where(usable, shared, 0.0)
         power = 1.0 - np.einsum("ij,ij->j", shadow, shadow) / size

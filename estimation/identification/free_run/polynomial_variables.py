@@ -7,10 +7,10 @@ import numpy as np
 from estimation.arrays import Array, IntArray
 from estimation.identification.search.jit import compiled
 
-BEYOND = 0.1
+SIGNAL_MARGIN = 0.1
 """Share of its range by which a signal may leave it in a product before it is clipped [dimensionless]."""
 
-RELEASED = 2.0
+RELEASE_FACTOR = 2.0
 """Factor on the distance from the middle at which a released signal is clipped [dimensionless]."""
 
 FRICTIONS = {"": 0, "position": 2, "velocity": 3}
@@ -46,10 +46,10 @@ class Variables:
     def ends(self) -> Array:
         """Least and greatest output that was seen, shape (2,)."""
         own = self.limits[self.source == 0][0]
-        inner = (own[1] - own[0]) / (1.0 + 2.0 * BEYOND)
-        return own + BEYOND * inner * np.array([1.0, -1.0])
+        inner = (own[1] - own[0]) / (1.0 + 2.0 * SIGNAL_MARGIN)
+        return own + SIGNAL_MARGIN * inner * np.array([1.0, -1.0])
 
-    def around(self, share: float) -> Array:
+    def extended_ends(self, share: float) -> Array:
         """Return ends extended by a share of the range, shape (2,).
 
         Parameters
@@ -65,10 +65,10 @@ class Variables:
         low, high = self.ends
         return np.array([low, high]) + share * (high - low) * np.array([-1.0, 1.0])
 
-    def released(self) -> "Variables":
-        """Return the same signals, clipped `RELEASED` times as far from the middle of their range."""
+    def with_wider_clipping(self) -> "Variables":
+        """Return the same signals, clipped `RELEASE_FACTOR` times as far from the middle of their range."""
         middle = self.limits.mean(axis=1, keepdims=True)
-        return replace(self, limits=middle + RELEASED * (self.limits - middle))
+        return replace(self, limits=middle + RELEASE_FACTOR * (self.limits - middle))
 
     @property
     def n_start(self) -> int:

@@ -16,12 +16,12 @@ import numpy as np
 from estimation.arrays import Array, BoolArray
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS
 from estimation.identification.fit.validate import estimate_initial_state
-from estimation.identification.free_run.believable import believable
+from estimation.identification.free_run.believable import believable_candidate
 from estimation.identification.free_run.candidate_rows import linear_row
 from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
 from estimation.identification.free_run.data import Channels, Scaling, blocks, in_scale, scaled
 from estimation.identification.free_run.dead_times import ORDER, estimate_delays
-from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled
+from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled_error
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
@@ -38,32 +38,32 @@ FEWEST = 200
 """Least number of consecutive outputs to distinguish a walk from slow noise; the statistic of white noise is -7
 there."""
 
-COMES_BACK = -3.96
+LARGEST_WALK_STATISTIC = -3.96
 """Statistic of Dickey and Fuller, with a trend, below which a walk falls in 1 % of all long records (their table)."""
 
 LAGS_SHARE = 50
 """Inverse of the largest number of changes in the test over the number of samples, so that white noise has a statistic
 of about -7, the root of this number; and at most as many as Schwert (1989) uses for noise beside a walk."""
 
-REMEMBERED = 1e-3
+MEMORY_SIGNIFICANCE = 1e-3
 """Significance level at which changes have memory beyond one sample: a walk is missed as often."""
 
-ALIKE = 3.0
+SMOOTH_CORRELATION = 3.0
 """Correlation of neighbouring changes from which they are smooth, not white [standard errors]: the same significance
 level."""
 
-SMOOTH = 0.1
+LARGEST_MEMORY_SHARE = 0.1
 """Share of the power of changes that earlier ones than the previous explain beyond chance, from which no more poles
 than `ORDER` are tested for a walk: missing poles leave less, and nonlinearities more (0.2 to 4; judged)."""
 
-MATERIAL = 0.15
+LEAST_WALK_ERROR = 0.15
 """Least root mean square of the walk on held-back blocks, over the output's deviation: a nonlinearity leaves up to 0.12
 behind a linear model that looks like a walk with white noise (five of 99 logs without one), and a smaller walk changes
 a gain by little."""
 
 
 @dataclass(frozen=True, eq=False)
-class Wandering:
+class WalkModel:
     """A linear model fitted to changes, applied to the levels of its data.
 
     Parameters
@@ -88,9 +88,9 @@ class Wandering:
     candidates: tuple[Candidate, ...]
 
 
-def wandering(
+def walk_model(
     data: Channels, part: Channels, orders: Sequence[int], delays: tuple[int, ...] | None, sizes: int | None
-) -> Wandering | None:
+) -> WalkModel | None:
     """Return the linear model of changes of an output with a random walk; None if it has none.
 
     Parameters
@@ -115,22 +115,28 @@ def wandering(
     late = {estimate_delays(changed), (0,) * len(data.inputs)} if delays is None else {delays}
     firsts = [fit_linear(Form(ORDER, (ORDER + 1,) * len(one), one), changed, least_gain=COARSE) for one in late]
     first = min(firsts, key=lambda fit: fit.cost)
-    rest = longest_rest(first, changed)
-    if rest.size < FEWEST or returns(rest) <= COMES_BACK or _explained(rest) > SMOOTH:
+    rest = longest_residual(first, changed)
+    if (
+        rest.size < FEWEST
+        or dickey_fuller_statistic(rest) <= LARGEST_WALK_STATISTIC
+        or _explained_share(rest) > LARGEST_MEMORY_SHARE
+    ):
         return None
     candidates = linear_candidates(changed, orders, delays, sizes)
-    best, _ = believable(candidates, changed, by)
+    best, _ = believable_candidate(candidates, changed, by)
     settles = not (best.doubt or best.fit.integrates or best.outlasts_block(changed))
-    if not settles or not best.held_back < 1.0 or not walks(best.fit, changed):
+    if not settles or not best.held_back < 1.0 or not is_random_walk(best.fit, changed):
         return None
     whole = in_scale(changes_of(data), by)
     found = refitted_linear(best.fit, whole)
-    errors = [_error_held_back(best.fit, part, masks, by) for masks in blocks(part, BLOCKS)]
-    left = pooled(errors)
-    return Wandering(at_levels(found, data, by), whole, by, found, left, tuple(candidates)) if left > MATERIAL else None
+    errors = [_held_back_error(best.fit, part, masks, by) for masks in blocks(part, BLOCKS)]
+    left = pooled_error(errors)
+    if not left > LEAST_WALK_ERROR:
+        return None
+    return WalkModel(fit_of_levels(found, data, by), whole, by, found, left, tuple(candidates))
 
 
-def from_changes(walk: Wandering, data: Channels, by: Scaling) -> Identified:
+def identified_walk(walk: WalkModel, data: Channels, by: Scaling) -> Identified:
     """Return the model of an output with a random walk, with the covariance of the changes.
 
     Parameters
@@ -155,22 +161,22 @@ def from_changes(walk: Wandering, data: Channels, by: Scaling) -> Identified:
     return Identified(model, quality, 100.0 * (1.0 - walk.held_back), rows, (note,), sound=True)
 
 
-def followed_walk(data: Channels, part: Channels, orders: Sequence[int], structure: str) -> list[Note]:
+def walk_followed_notes(data: Channels, part: Channels, orders: Sequence[int], structure: str) -> list[Note]:
     """Return a note if an output has a random walk and a structure fitted to levels was requested.
 
     Parameters
     ----------
     data, part : Channels
-        As in `wandering`.
+        As in `walk_model`.
     orders : sequence of int
         Likewise.
     structure : str
         The requested structure.
     """
-    return [] if wandering(data, part, orders, None, None) is None else [walk_followed(data.output, structure)]
+    return [] if walk_model(data, part, orders, None, None) is None else [walk_followed_note(data.output, structure)]
 
 
-def walk_followed(output: str, structure: str) -> Note:
+def walk_followed_note(output: str, structure: str) -> Note:
     """Return the note on a structure fitted to levels of an output with a random walk."""
     return IdentificationCode.WALK_FOLLOWED.note(output=output, structure=structure)
 
@@ -190,7 +196,7 @@ def changes_of(data: Channels) -> Channels:
     )
 
 
-def walks(fit: LinearFit, changes: Channels) -> bool:
+def is_random_walk(fit: LinearFit, changes: Channels) -> bool:
     """Return whether the residual of changes is white beyond one sample, and its sum does not return.
 
     Parameters
@@ -200,11 +206,11 @@ def walks(fit: LinearFit, changes: Channels) -> bool:
     changes : Channels
         Scaled.
     """
-    left = longest_rest(fit, changes)
-    return left.size >= FEWEST and returns(left) > COMES_BACK and not remembers(left)
+    left = longest_residual(fit, changes)
+    return left.size >= FEWEST and dickey_fuller_statistic(left) > LARGEST_WALK_STATISTIC and not has_long_memory(left)
 
 
-def returns(changes: Array) -> float:
+def dickey_fuller_statistic(changes: Array) -> float:
     """Return the statistic of Dickey and Fuller of the sum of changes: how surely it returns to its trend.
 
     Parameters
@@ -220,8 +226,8 @@ def returns(changes: Array) -> float:
     Examples
     --------
     >>> noise = np.random.default_rng(0).standard_normal(1000)
-    >>> returns(noise) > COMES_BACK, returns(np.diff(noise)) > COMES_BACK
-    (True, False)
+    >>> [dickey_fuller_statistic(one) > LARGEST_WALK_STATISTIC for one in (noise, np.diff(noise))]
+    [True, False]
     """
     n = changes.size
     lags = min(int(12.0 * (n / 100.0) ** 0.25), n // LAGS_SHARE)
@@ -235,7 +241,7 @@ def returns(changes: Array) -> float:
     return float(values[0]) / float(np.sqrt(spread)) if spread > 0.0 else -np.inf
 
 
-def remembers(changes: Array) -> bool:
+def has_long_memory(changes: Array) -> bool:
     """Return whether changes depend on earlier ones otherwise than white noise beside a walk makes them.
 
     Neighbours may be negatively correlated, not positively; larger lags are tested as in Box and Pierce (1970).
@@ -248,16 +254,17 @@ def remembers(changes: Array) -> bool:
     Examples
     --------
     >>> noise = np.random.default_rng(0).standard_normal(1000)
-    >>> remembers(noise), remembers(np.diff(noise)), remembers(noise[2:] + noise[1:-1] + noise[:-2])
+    >>> has_long_memory(noise), has_long_memory(np.diff(noise)), has_long_memory(noise[2:] + noise[1:-1] + noise[:-2])
     (False, False, True)
     """
     found = _correlations(changes)
-    if found[0] > ALIKE / np.sqrt(changes.size):
+    if found[0] > SMOOTH_CORRELATION / np.sqrt(changes.size):
         return True
-    return chi_square_tail(float(np.sum(found[1:] ** 2)) / _by_chance(found, changes), DEFAULT_LAGS - 1) < REMEMBERED
+    statistic = float(np.sum(found[1:] ** 2)) / _chance_variance(found, changes)
+    return chi_square_tail(statistic, DEFAULT_LAGS - 1) < MEMORY_SIGNIFICANCE
 
 
-def at_levels(fit: LinearFit, data: Channels, by: Scaling) -> LinearFit:
+def fit_of_levels(fit: LinearFit, data: Channels, by: Scaling) -> LinearFit:
     """Return a fit of changes as one of levels, with offset and initial states by least squares.
 
     Parameters
@@ -285,19 +292,19 @@ def _correlations(changes: Array) -> Array:
     return np.array([centred[k:] @ centred[:-k] for k in range(1, DEFAULT_LAGS + 1)]) / power
 
 
-def _by_chance(correlations: Array, changes: Array) -> float:
+def _chance_variance(correlations: Array, changes: Array) -> float:
     """Return the variance of autocorrelations at lags without correlation, for changes with memory of one sample."""
     # Bartlett (1946), for a moving average of one term
     return (1.0 + 2.0 * float(correlations[0]) ** 2) / changes.size
 
 
-def _explained(changes: Array) -> float:
+def _explained_share(changes: Array) -> float:
     """Return the share of the power of changes that those two samples ago or more explain, beyond chance."""
     found = _correlations(changes)
-    return float(np.sum(found[1:] ** 2 - _by_chance(found, changes)))
+    return float(np.sum(found[1:] ** 2 - _chance_variance(found, changes)))
 
 
-def longest_rest(fit: LinearFit, changes: Channels) -> Array:
+def longest_residual(fit: LinearFit, changes: Channels) -> Array:
     """Return the residual of a model over the longest row of outputs without gaps.
 
     Parameters
@@ -314,10 +321,10 @@ def longest_rest(fit: LinearFit, changes: Channels) -> Array:
     """
     problem = Problem(fit.form, changes)
     left = np.where(problem.used, problem.y - problem.jacobian(fit.theta)[0], np.nan)
-    return longest(np.split(left, problem.bounds[1:-1]))
+    return longest_gap_free_row(np.split(left, problem.bounds[1:-1]))
 
 
-def longest(parts: Sequence[Array]) -> Array:
+def longest_gap_free_row(parts: Sequence[Array]) -> Array:
     """Return the longest row without gaps; empty if there is none.
 
     Parameters
@@ -334,9 +341,9 @@ def longest(parts: Sequence[Array]) -> Array:
     return max(rows, key=lambda row: row.size, default=np.zeros(0))
 
 
-def _error_held_back(fit: LinearFit, part: Channels, masks: Sequence[BoolArray], by: Scaling) -> float:
+def _held_back_error(fit: LinearFit, part: Channels, masks: Sequence[BoolArray], by: Scaling) -> float:
     """Return the free-run error on a block of levels by a fit to changes outside it."""
     outside = part.without(masks)
-    found = at_levels(refitted_linear(fit, in_scale(changes_of(outside), by), least_gain=COARSE), outside, by)
+    found = fit_of_levels(refitted_linear(fit, in_scale(changes_of(outside), by), least_gain=COARSE), outside, by)
     problem = Problem(found.form, part)
     return block_error(problem.jacobian(found.theta)[0] - problem.y, np.concatenate(masks) & problem.used)

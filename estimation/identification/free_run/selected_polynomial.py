@@ -14,11 +14,11 @@ from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.dense_polynomial import (
     STEPS,
-    Asked,
     JudgedRecipe,
+    RequestedSizes,
     every_term,
     judged_fits,
-    late_by,
+    tried_delays,
 )
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.linear_problem import Form, LinearFit
@@ -29,16 +29,16 @@ from estimation.identification.free_run.polynomial_variables import Variables
 LAGS = (2, 3, 4)
 """Lags of the output and of each input, for the pool of terms."""
 
-COUNTS = (6, 9, 13, 18, 25)
+TERM_COUNTS = (6, 9, 13, 18, 25)
 """Numbers of terms that are kept."""
 
 MOST_POOL = 250
 """Most terms in the pool: if there would be more, those of degree three are left out, then the last of degree two."""
 
-INDEPENDENT = 1e-8
+LEAST_INDEPENDENT_SHARE = 1e-8
 """Least share of a term's square that earlier terms must not explain; otherwise it is skipped."""
 
-DESCENDED = 3
+MOST_DESCENDED = 3
 """Selections whose free run is descended."""
 
 
@@ -68,12 +68,12 @@ class Selection:
         data : Channels
             Scaled; outputs held back are NaN.
         """
-        ordered = _ordered(self.form, data)
+        ordered = _ordered_terms(self.form, data)
         found = None if ordered is None else ordered.model(self.count, data)
-        return _descended(found, data) if self.descended else found
+        return _descended_selections(found, data) if self.descended else found
 
 
-def forms_selected(delays: tuple[int, ...], asked: Asked) -> list[Form]:
+def forms_selected(delays: tuple[int, ...], asked: RequestedSizes) -> list[Form]:
     """Return the lags for the pool of terms.
 
     Parameters
@@ -85,12 +85,12 @@ def forms_selected(delays: tuple[int, ...], asked: Asked) -> list[Form]:
 
     Examples
     --------
-    >>> [(one.order, one.delays) for one in forms_selected((1,), Asked(order=2))]
+    >>> [(one.order, one.delays) for one in forms_selected((1,), RequestedSizes(order=2))]
     [(2, (0,)), (2, (1,))]
     """
     m = len(delays)
     lags = LAGS if asked.order is None else (asked.order,)
-    found = [Form(n, (asked.n_numerator or n,) * m, one) for n in lags for one in late_by(delays, asked)]
+    found = [Form(n, (asked.n_numerator or n,) * m, one) for n in lags for one in tried_delays(delays, asked)]
     return list(dict.fromkeys(found))
 
 
@@ -110,13 +110,13 @@ def judged_selections(
     """
     judged: list[JudgedRecipe[Selection] | None] = []
     for form in forms:
-        ordered = [_ordered(form, part) for part in parts]
-        for count in COUNTS:
+        ordered = [_ordered_terms(form, part) for part in parts]
+        for count in TERM_COUNTS:
             fits = [None if one is None else one.model(count, part) for one, part in zip(ordered, parts, strict=True)]
             judged.append(judged_fits(Selection(form, count), fits, data, parts))
     found = [one for one in judged if one is not None]
-    for one in sorted(found, key=lambda one: one.held_back)[:DESCENDED]:
-        fits = [_descended(fit, part) for fit, part in zip(one.fits, parts, strict=True)]
+    for one in sorted(found, key=lambda one: one.held_back)[:MOST_DESCENDED]:
+        fits = [_descended_selections(fit, part) for fit, part in zip(one.fits, parts, strict=True)]
         recipe = Selection(one.recipe.form, len(one.fits[0].terms), descended=True)
         more = judged_fits(recipe, fits, data, parts)
         found += [] if more is None else [more]
@@ -124,7 +124,7 @@ def judged_selections(
 
 
 @dataclass(frozen=True, eq=False)
-class _Ordered:
+class _OrderedTerms:
     """Terms in the order in which they explain the one-step error, and all moments."""
 
     variables: Variables
@@ -148,20 +148,20 @@ class _Ordered:
         return PolynomialFit(self.variables, terms, theta, float(np.sum((ran - runs.target)[runs.used] ** 2)))
 
 
-def _ordered(form: Form, data: Channels) -> _Ordered | None:
+def _ordered_terms(form: Form, data: Channels) -> _OrderedTerms | None:
     """Return the terms of some lags, best first; None if there are too few samples."""
     variables = variables_of(LinearFit(form, np.zeros(form.n_values), 0.0), data)[0]
     pool = every_term(variables.lag.size, 3)
     if pool.shape[0] > MOST_POOL:
         pool = every_term(variables.lag.size, 2)[:MOST_POOL]
     gram, right, n = moments(variables, pool, data)
-    if n < 2 * COUNTS[-1]:
+    if n < 2 * TERM_COUNTS[-1]:
         return None
-    first = best_first(gram, right, COUNTS[-1])
-    return _Ordered(variables, pool[first], gram[np.ix_(first, first)], right[first])
+    first = best_regressors(gram, right, TERM_COUNTS[-1])
+    return _OrderedTerms(variables, pool[first], gram[np.ix_(first, first)], right[first])
 
 
-def best_first(gram: Array, right: Array, most: int) -> IntArray:
+def best_regressors(gram: Array, right: Array, most: int) -> IntArray:
     """Return the regressors that explain most of a target, each in addition to those before it.
 
     Parameters
@@ -180,14 +180,15 @@ def best_first(gram: Array, right: Array, most: int) -> IntArray:
 
     Examples
     --------
-    >>> best_first(np.array([[4.0, 0.0, 2.0], [0.0, 1.0, 0.0], [2.0, 0.0, 1.0]]), np.array([4.0, 3.0, 2.0]), 3).tolist()
+    >>> gram = np.array([[4.0, 0.0, 2.0], [0.0, 1.0, 0.0], [2.0, 0.0, 1.0]])
+    >>> best_regressors(gram, np.array([4.0, 3.0, 2.0]), 3).tolist()
     [1, 0]
     """
     whole = np.diag(gram).copy()
     left, wanted = whole.copy(), right.astype(np.float64).copy()
     rows, taken = np.zeros((most, right.size)), list[int]()
     for step in range(min(most, right.size)):
-        open_ = left > INDEPENDENT * whole
+        open_ = left > LEAST_INDEPENDENT_SHARE * whole
         open_[taken] = False
         if not open_.any():
             break
@@ -201,5 +202,5 @@ def best_first(gram: Array, right: Array, most: int) -> IntArray:
     return np.array(taken, dtype=np.int64)
 
 
-def _descended(fit: PolynomialFit | None, data: Channels) -> PolynomialFit | None:
+def _descended_selections(fit: PolynomialFit | None, data: Channels) -> PolynomialFit | None:
     return None if fit is None else Runs(fit.variables, fit.terms, data).fit(fit.theta, STEPS, least_gain=COARSE) or fit

@@ -4,7 +4,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.fit.covariances import covariances
-from estimation.identification.fit.fitted import COLOURED
+from estimation.identification.fit.fitted import COLOURED_P_VALUE
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS, ljung_box
 from estimation.identification.fit.validate import estimate_initial_state
 from estimation.identification.free_run.data import Channels, Scaling
@@ -24,7 +24,7 @@ def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
         The scaling.
     """
     form, problem = fit.form, Problem(fit.form, data)
-    output, residual, spreads, coloured = _spreads(fit, problem)
+    output, residual, spreads, coloured = _residual_and_covariances(fit, problem)
     used = problem.used
     n_main, gain = form.n_b + form.order, by.y_std / float(by.u_std[0])
     unscale = np.concatenate([np.full(form.n_b, gain), np.ones(form.order)])
@@ -71,7 +71,7 @@ def gain_deviations(fit: LinearFit, data: Channels, by: Scaling) -> tuple[float,
         One per input [output unit / input unit].
     """
     form, total = fit.form, float(fit.f.sum())
-    _, _, (white, robust), coloured = _spreads(fit, Problem(form, data))
+    _, _, (white, robust), coloured = _residual_and_covariances(fit, Problem(form, data))
     ends = np.cumsum([0, *form.sizes])
     deviations = list[float]()
     for k, b in enumerate(fit.numerators):
@@ -83,7 +83,7 @@ def gain_deviations(fit: LinearFit, data: Channels, by: Scaling) -> tuple[float,
     return tuple(deviations)
 
 
-def _spreads(fit: LinearFit, problem: Problem) -> tuple[Array, Array, tuple[Array, Array], bool]:
+def _residual_and_covariances(fit: LinearFit, problem: Problem) -> tuple[Array, Array, tuple[Array, Array], bool]:
     """Return output, residual, both covariances of numerators and denominator, and whether the residual is coloured."""
     output, jacobian = problem.jacobian(fit.theta)
     used, data, n_main = problem.used, problem.data, fit.form.n_b + fit.form.order
@@ -91,7 +91,7 @@ def _spreads(fit: LinearFit, problem: Problem) -> tuple[Array, Array, tuple[Arra
     jacobian[~used] = 0.0
     white, robust, _ = covariances(jacobian, residual, _experiments(data, problem))
     lags = DEFAULT_LAGS if data.n_samples > DEFAULT_LAGS else data.n_samples // 2
-    coloured = ljung_box(np.where(used, residual, np.nan), n_lags=lags).p_value < COLOURED
+    coloured = ljung_box(np.where(used, residual, np.nan), n_lags=lags).p_value < COLOURED_P_VALUE
     return output, residual, (white[:n_main, :n_main], robust[:n_main, :n_main]), coloured
 
 

@@ -12,14 +12,14 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.choose_linear import criteria, slowest_pole
-from estimation.identification.free_run.data import Channels, scaled, section
+from estimation.identification.free_run.data import Channels, liveliest_sections, scaled
 from estimation.identification.free_run.dead_times import ORDER
 from estimation.identification.free_run.held_back import BLOCKS
 from estimation.identification.free_run.linear_comparison import LinearComparison, linear_comparison
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
-from estimation.identification.free_run.log_offsets import NEARLY, lasts
-from estimation.identification.free_run.random_walk import FEWEST, longest_rest, remembers
+from estimation.identification.free_run.log_offsets import NEAR_RATIO, has_slow_pole
+from estimation.identification.free_run.random_walk import FEWEST, has_long_memory, longest_residual
 from estimation.identification.notes import IdentificationCode
 
 
@@ -50,60 +50,60 @@ def detrended(one: LinearComparison, orders: Sequence[int]) -> Detrended | None:
         Orders of the models that are compared; the first few determine the trend.
     """
     task = one.task
-    part, slow = _beside_time(task.part), one.best.fit
-    if not lasts(one.best, one) and not _leans(one, part):
+    part, slow = _with_time_input(task.part), one.best.fit
+    if not has_slow_pole(one.best, one) and not _has_trend(one, part):
         return None
-    quickest = float(np.exp(-(BLOCKS + 1.0) / task.part.told))
+    quickest = float(np.exp(-(BLOCKS + 1.0) / task.part.informative_samples))
     delays = slow.form.delays
     # a trend replaces the slow pole, so one order less than requested is tried too
     fewer = sorted({max(orders[0] - 1, 1), *orders[:ORDER]})
-    forms = [_beside(Form(order, (order + 1,) * len(delays), delays)) for order in fewer]
+    forms = [_form_with_trend(Form(order, (order + 1,) * len(delays), delays)) for order in fewer]
     settled = [fit for form in forms if slowest_pole((fit := fit_linear(form, part, least_gain=COARSE)).f) <= quickest]
     if not settled:
         return None
-    beside = fit_linear(_beside(slow.form), part, [slow.f], least_gain=COARSE)
+    beside = fit_linear(_form_with_trend(slow.form), part, [slow.f], least_gain=COARSE)
     best = min(settled, key=lambda fit: _bic(fit, part))
     sizes, late = best.form.sizes[:-1], best.form.delays[:-1]
     alone = fit_linear(Form(best.form.order, sizes, late), task.part, [best.f], least_gain=COARSE)
     if not _bic(best, part) < min(_bic(beside, part), _bic(alone, task.part)):
         return None
     # the residual of a nonlinearity is slow too, but it is no trend
-    rest = longest_rest(best, part)
-    if rest.size < FEWEST or remembers(rest):
+    rest = longest_residual(best, part)
+    if rest.size < FEWEST or has_long_memory(rest):
         return None
-    whole = _beside_time(task.whole)
+    whole = _with_time_input(task.whole)
     values = Problem(best.form, whole).profiled(best.f)[1]
     rate = float(values[best.form.n_b - 1] / best.f.sum()) * task.by.y_std
     trends = tuple(rate * u[:, -1] for u in whole.u)
     data = replace(task.data, y=tuple(y - trend for y, trend in zip(task.data.y, trends, strict=True)))
     flat, by = scaled(data)
-    cut = section(flat, sum(y.size for y in task.part.y))
+    cut = liveliest_sections(flat, sum(y.size for y in task.part.y))
     own = linear_comparison(replace(task, data=data, whole=flat, by=by, part=cut))
     left = own.best.held_back * by.y_std / task.by.y_std
-    if lasts(own.best, own) or left > NEARLY * one.best.held_back:
+    if has_slow_pole(own.best, own) or left > NEAR_RATIO * one.best.held_back:
         return None
     slope = rate / (task.whole.longest * task.data.sample_time)
     own.notes.append(IdentificationCode.TREND.note(output=task.data.output, slope=slope))
     return Detrended(own, trends)
 
 
-def _leans(one: LinearComparison, part: Channels) -> bool:
+def _has_trend(one: LinearComparison, part: Channels) -> bool:
     """Return whether a trend explains more than chance beside a stable model, and leaves white noise."""
-    fit = fit_linear(_beside(one.best.form), part, [one.best.fit.f], least_gain=COARSE)
+    fit = fit_linear(_form_with_trend(one.best.form), part, [one.best.fit.f], least_gain=COARSE)
     if not _bic(fit, part) < _bic(one.best.fit, one.task.part):
         return False
-    rest = longest_rest(fit, part)
-    return rest.size >= FEWEST and not remembers(rest)
+    rest = longest_residual(fit, part)
+    return rest.size >= FEWEST and not has_long_memory(rest)
 
 
-def _beside_time(data: Channels) -> Channels:
+def _with_time_input(data: Channels) -> Channels:
     """Return channels with time as one more input: zero in the middle of each log, 1 over the longest."""
     times = [(np.arange(y.size) - 0.5 * (y.size - 1)) / data.longest for y in data.y]
     u = tuple(np.column_stack([own, time]) for own, time in zip(data.u, times, strict=True))
     return replace(data, inputs=(*data.inputs, "time"), u=u)
 
 
-def _beside(form: Form) -> Form:
+def _form_with_trend(form: Form) -> Form:
     return Form(form.order, (*form.sizes, 1), (*form.delays, 0))
 
 

@@ -11,15 +11,15 @@ from collections.abc import Callable
 
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.hammerstein_fit import HammersteinFit, refitted
+from estimation.identification.free_run.hammerstein_fit import HammersteinFit, refitted_hammerstein
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_problem import LinearFit
-from estimation.identification.free_run.other_orders import reordered
+from estimation.identification.free_run.other_orders import reordered_channels
 
-ORDERS = 19
+OTHER_ORDERS = 19
 """Number of other orders of the inputs: one given in advance beats them all by chance in 5 % of unrelated logs."""
 
-MATERIAL = 1.1
+LEAST_ERROR_RATIO = 1.1
 """Least ratio of the error with another order of the inputs to that with the right one, if the model has a pole at 1:
 such a model has a ramp of its own, and beside it an unrelated input wins by a few percent at times (judged)."""
 
@@ -44,7 +44,7 @@ def explains(cost: float, refit: Callable[[Channels], float], data: Channels) ->
     >>> explains(1.0, lambda _: 2.0, data), explains(2.0, lambda _: 1.0, data)
     (True, False)
     """
-    return all(refit(other) > cost for other in reordered(data, ORDERS))
+    return all(refit(other) > cost for other in reordered_channels(data, OTHER_ORDERS))
 
 
 def linear_explains(fit: LinearFit, data: Channels) -> bool:
@@ -57,7 +57,7 @@ def linear_explains(fit: LinearFit, data: Channels) -> bool:
     data : Channels
         Scaled.
     """
-    own = MATERIAL * fit.cost if fit.integrates else fit.cost
+    own = LEAST_ERROR_RATIO * fit.cost if fit.integrates else fit.cost
     return explains(own, lambda other: refitted_linear(fit, other).cost, data)
 
 
@@ -71,7 +71,7 @@ def bend_explains(fit: HammersteinFit, data: Channels) -> bool:
     data : Channels
         Scaled.
     """
-    return explains(fit.cost, lambda other: refitted(fit, other).cost, data)
+    return explains(fit.cost, lambda other: refitted_hammerstein(fit, other).cost, data)
 
 
 def polynomial_explains(found: PolynomialCandidate, data: Channels) -> bool:

@@ -9,7 +9,7 @@ from estimation.fits.root import root_between
 if TYPE_CHECKING:
     from estimation.identification.model.linear_model import LinearModel
 
-NEAR = 1e-5
+SLOPE_STEP = 1e-5
 """Relative step of the gain's slope at the corner."""
 
 
@@ -46,9 +46,11 @@ def bandwidth_std(model: "LinearModel") -> float | None:
     corner = bandwidth(model)
     if corner is None:
         return None
-    response, gradient = model.response_gradient([0.0, corner, corner * (1.0 - NEAR), corner * (1.0 + NEAR)])
+    response, gradient = model.response_gradient(
+        [0.0, corner, corner * (1.0 - SLOPE_STEP), corner * (1.0 + SLOPE_STEP)]
+    )
     power = np.real(np.conj(response[:2, None]) * gradient[:2])
-    slope = (np.abs(response[3]) ** 2 - np.abs(response[2]) ** 2) / (4.0 * NEAR * corner)
+    slope = (np.abs(response[3]) ** 2 - np.abs(response[2]) ** 2) / (4.0 * SLOPE_STEP * corner)
     if slope == 0.0 or not np.isfinite(model.covariance).all():
         return None
     moved = (power[1] - 0.5 * power[0]) / slope

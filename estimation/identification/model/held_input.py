@@ -46,9 +46,9 @@ def held_input_model(
     C = padded[1:] - through * denominator
     whole = int(np.floor(dead_time / sample_time + 1e-9))
     part = max(dead_time - whole * sample_time, 0.0)
-    late, new_gain = _held(A, B, sample_time - part)
-    early_gain = _held(A, B, part)[1]
-    whole_step = _held(A, B, sample_time)[0]
+    late, new_gain = _held_transition(A, B, sample_time - part)
+    early_gain = _held_transition(A, B, part)[1]
+    whole_step = _held_transition(A, B, sample_time)[0]
     f = np.asarray(np.real(np.poly(whole_step)), dtype=np.float64)
     b = np.zeros(n + 2)
     b[: n + 1] += np.real(np.poly(whole_step - new_gain @ C[None, :])) - f
@@ -64,7 +64,7 @@ def held_input_model(
     return np.concatenate([np.zeros(whole), b]), f, whole + leading
 
 
-def _held(A: Array, B: Array, duration: float) -> tuple[Array, Array]:
+def _held_transition(A: Array, B: Array, duration: float) -> tuple[Array, Array]:
     from scipy.linalg import expm  # importing it takes longer than fitting a discrete model
 
     n = A.shape[0]

@@ -23,17 +23,17 @@ from estimation.identification.model.uncertainty import (
 from plant.errors import HydrostateError
 
 
-def _frozen(values: ArrayLike) -> Array:
+def _read_only(values: ArrayLike) -> Array:
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
 
 
-def _nothing() -> Array:
+def _empty_array() -> Array:
     return np.empty(0)
 
 
-def _one() -> Array:
+def _unit_polynomial() -> Array:
     return np.ones(1)
 
 
@@ -97,18 +97,18 @@ class LinearModel:
     input_name: str
     output_name: str
     delay: int = 0
-    covariance: Array = field(default_factory=_nothing)
-    initial_state: Array = field(default_factory=_nothing)
+    covariance: Array = field(default_factory=_empty_array)
+    initial_state: Array = field(default_factory=_empty_array)
     fit_percent: float = float("nan")
     rmse: float = float("nan")
     residual_std: float = float("nan")
     n_samples: int = 0
     data_hash: str = ""
-    covariance_white: Array = field(default_factory=_nothing)
-    covariance_robust: Array = field(default_factory=_nothing)
+    covariance_white: Array = field(default_factory=_empty_array)
+    covariance_robust: Array = field(default_factory=_empty_array)
     structure: str = ""
-    noise_numerator: Array = field(default_factory=_one)
-    noise_denominator: Array = field(default_factory=_one)
+    noise_numerator: Array = field(default_factory=_unit_polynomial)
+    noise_denominator: Array = field(default_factory=_unit_polynomial)
     continuous: bool = False
     dead_time: float = 0.0
     dead_time_std: float = float("nan")
@@ -119,7 +119,7 @@ class LinearModel:
     from_dict = classmethod(from_dict)
 
     def __post_init__(self) -> None:
-        b, f = _frozen(self.numerator), _frozen(self.denominator)
+        b, f = _read_only(self.numerator), _read_only(self.denominator)
         if not (np.isfinite(self.sample_time) and self.sample_time > 0.0):
             raise HydrostateError(f"sample_time must be positive and finite, got {self.sample_time!r}")
         if b.ndim != 1 or f.ndim != 1 or not (np.isfinite(b).all() and np.isfinite(f).all()):
@@ -129,18 +129,18 @@ class LinearModel:
         if not 0 <= self.delay < b.size or b[: self.delay].any():
             raise HydrostateError(f"numerator must begin with {self.delay} zeros for the delay, got {b.tolist()}")
         p, n_states = b.size - self.delay + f.size - 1, max(b.size, f.size) - 1
-        state = _frozen(np.zeros(n_states) if np.size(self.initial_state) == 0 else self.initial_state)
+        state = _read_only(np.zeros(n_states) if np.size(self.initial_state) == 0 else self.initial_state)
         if state.shape != (n_states,):
             raise HydrostateError(f"initial_state must have shape {(n_states,)}, got {state.shape}")
         checked = {"numerator": b, "denominator": f, "initial_state": state}
         for name in ("covariance", "covariance_white", "covariance_robust"):
             given = getattr(self, name)
-            value = _frozen(np.full((p, p), np.nan) if np.size(given) == 0 else given)
+            value = _read_only(np.full((p, p), np.nan) if np.size(given) == 0 else given)
             if value.shape != (p, p):
                 raise HydrostateError(f"{name} must have shape {(p, p)}, got {value.shape}")
             checked[name] = value
         for name in ("noise_numerator", "noise_denominator"):
-            checked[name] = _frozen(getattr(self, name))
+            checked[name] = _read_only(getattr(self, name))
             if checked[name].ndim != 1 or checked[name].size < 1 or checked[name][0] != 1.0:
                 raise HydrostateError(f"{name} must be monic (begin with 1), got {checked[name].tolist()}")
         for name, value in checked.items():

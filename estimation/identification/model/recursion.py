@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
-from plant.compiled.native.loops import natively
+from plant.compiled.native.loops import natively_compiled
 
 
 def filtered(numerator: ArrayLike, denominator: ArrayLike, series: ArrayLike, state: ArrayLike | None = None) -> Array:
@@ -44,7 +44,7 @@ def filtered(numerator: ArrayLike, denominator: ArrayLike, series: ArrayLike, st
     return u
 
 
-@natively()
+@natively_compiled()
 def _run(b: Array, f: Array, u: Array, z: Array) -> None:
     """Write the output over the input (transposed direct form II); the state follows.
 

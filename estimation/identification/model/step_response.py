@@ -9,7 +9,7 @@ from estimation.finding import NORMAL_95
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure, sensitivities
 
-NUDGE = 1e-2
+DIFFERENCE_STEP = 1e-2
 """Step of a finite difference, in standard deviations of the coefficient [dimensionless], judged."""
 
 
@@ -55,20 +55,20 @@ def step_response(model: LinearModel, count: int) -> StepResponse:
     step = np.ones(count)
     plain = replace(model, offset=0.0, initial_state=np.empty(0))
     response = plain.simulate(step)
-    gradient = _differences(plain, step) if model.continuous else _exact(plain, step)
+    gradient = _difference_slopes(plain, step) if model.continuous else _exact_slopes(plain, step)
     with np.errstate(invalid="ignore"):
         std = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", gradient, model.covariance, gradient), 0.0))
     return StepResponse(model.sample_time * np.arange(count, dtype=np.float64), response, std)
 
 
-def _exact(model: LinearModel, step: Array) -> Array:
+def _exact_slopes(model: LinearModel, step: Array) -> Array:
     """Return the derivative by the coefficients, shape (n, p)."""
     structure = Structure(model.free_numerator.size, model.denominator.size - 1, model.delay)
     theta = np.concatenate([model.free_numerator, model.denominator[1:], np.zeros(structure.n_initial)])
     return sensitivities(structure, theta, step)[:, : model.covariance.shape[0]]
 
 
-def _differences(model: LinearModel, step: Array) -> Array:
+def _difference_slopes(model: LinearModel, step: Array) -> Array:
     """Return the same by central differences, of a model in continuous time."""
     values = np.concatenate([model.free_numerator, model.denominator[1:]])
     stds = np.sqrt(np.diag(model.covariance))
@@ -77,8 +77,8 @@ def _differences(model: LinearModel, step: Array) -> Array:
         both: list[Array] = []
         for side in (-1.0, 1.0):
             moved = values.copy()
-            moved[place] += side * NUDGE * std
+            moved[place] += side * DIFFERENCE_STEP * std
             b, f = moved[: model.free_numerator.size], np.concatenate([[1.0], moved[model.free_numerator.size :]])
             both.append(replace(model, numerator=b, denominator=f).simulate(step) if std > 0.0 else np.zeros(step.size))
-        columns.append((both[1] - both[0]) / (2.0 * NUDGE * std) if std > 0.0 else np.full(step.size, std))
+        columns.append((both[1] - both[0]) / (2.0 * DIFFERENCE_STEP * std) if std > 0.0 else np.full(step.size, std))
     return np.column_stack(columns)

@@ -7,13 +7,13 @@ import numpy as np
 from estimation.arrays import Array, ComplexArray
 from estimation.trust.chi_square import chi_square_quantile
 
-CANCELS = 4.0
+CANCELLING_DEVIATIONS = 4.0
 """A pole and a zero that are closer than this many standard deviations of their distance are near cancellation."""
 
-NEAR = 0.5
+CANCELLING_SHARE = 0.5
 """And closer than this share of the pole's distance from zero frequency."""
 
-COINCIDE = 1e-8
+ROUNDING_DISTANCE = 1e-8
 """Distance of a zero from a pole, over the pole's modulus, within which rounding does not tell them apart."""
 
 
@@ -130,10 +130,10 @@ def cancellations(
             distance = np.array([apart.real, apart.imag])
             spread = both @ covariance @ both.T
             # if they coincide the Jacobian is singular, and the covariance of their distance is only rounding
-            away = 0.0 if abs(apart) <= COINCIDE * abs(pole) else _deviations(distance, spread)
+            away = 0.0 if abs(apart) <= ROUNDING_DISTANCE * abs(pole) else _deviations(distance, spread)
             # a distant zero that is hardly determined is uncertain, but cancels nothing
-            near = abs(pole - zero) < NEAR * abs(pole - at_rest)
-            if near and away < CANCELS and zero.imag >= 0.0:
+            near = abs(pole - zero) < CANCELLING_SHARE * abs(pole - at_rest)
+            if near and away < CANCELLING_DEVIATIONS and zero.imag >= 0.0:
                 found.append(Cancellation(complex(pole), complex(zero), away))
     return tuple(sorted(found, key=lambda pair: pair.deviations))
 

@@ -105,7 +105,7 @@ def is_stable(denominator: Array) -> bool:
     return bool(np.isfinite(denominator).all() and (np.abs(np.roots(denominator)) < 1.0).all())
 
 
-def stabilised(denominator: Array, n_samples: int) -> Array:
+def stabilised_denominator(denominator: Array, n_samples: int) -> Array:
     """Return the denominator with its unstable roots reflected into the unit circle.
 
     Parameters
@@ -131,7 +131,7 @@ def stabilised(denominator: Array, n_samples: int) -> Array:
     return polynomial(roots * shrink)
 
 
-def held_within(denominator: Array, n_samples: int, limit: float) -> Array:
+def with_bounded_roots(denominator: Array, n_samples: int, limit: float) -> Array:
     """Return the denominator with unstable roots reflected, and those outside a circle moved onto it.
 
     Parameters
@@ -139,7 +139,7 @@ def held_within(denominator: Array, n_samples: int, limit: float) -> Array:
     denominator : ndarray, shape (n + 1,)
         Monic.
     n_samples : int
-        Length of the data, as `stabilised` takes it.
+        Length of the data, as `stabilised_denominator` takes it.
     limit : float
         Radius of the circle [dimensionless].
 
@@ -148,7 +148,7 @@ def held_within(denominator: Array, n_samples: int, limit: float) -> Array:
     ndarray, shape (n + 1,)
         Monic, stable.
     """
-    f = stabilised(denominator, n_samples)
+    f = stabilised_denominator(denominator, n_samples)
     roots = np.roots(f).astype(np.complex128)
     radius = np.abs(roots)
     return f if (radius <= limit).all() else polynomial(roots * np.minimum(1.0, limit / np.maximum(radius, limit)))

@@ -97,7 +97,7 @@ class Experiments:
         bounds = self.bounds - samples * np.arange(self.bounds.size)
         return replace(self, u=self.u[early], y=self.y[late], used=self.used[late], bounds=bounds)
 
-    def goes_on_behind(self, samples: int) -> bool:
+    def has_outputs_after(self, samples: int) -> bool:
         """Return whether each experiment has outputs after so many samples."""
         return all(self.used[part][samples:].any() for part in self.slices)
 
@@ -129,7 +129,7 @@ def experiments_from(u: Signals, y: Signals, names: tuple[str, str], *, n_excite
         If the signals do not match, hold unusable values, are too short or constant, or the input excites too little.
     """
     input_name, output_name = names
-    inputs, outputs = listed(u), listed(y)
+    inputs, outputs = signal_list(u), signal_list(y)
     if len(inputs) != len(outputs):
         raise HydrostateError(f"as many inputs as outputs are needed, got {len(inputs)} and {len(outputs)}")
     for one_u, one_y in zip(inputs, outputs, strict=True):
@@ -167,7 +167,7 @@ def data_hash(data: Experiments, sample_time: float) -> str:
     return digest.hexdigest()
 
 
-def listed(signals: Signals) -> list[Array]:
+def signal_list(signals: Signals) -> list[Array]:
     """Return signals as a list with one array for each experiment.
 
     Parameters
@@ -207,7 +207,7 @@ def _require_excitation(inputs: list[Array], wanted: int, input_name: str) -> No
             f"input {input_name!r} must excite {wanted} coefficients, got the constant {level}: "
             "use steps, a chirp or a pseudo-random binary signal"
         )
-    excited = max(_excited(u, wanted) for u in inputs)
+    excited = max(_excitation_order(u, wanted) for u in inputs)
     if excited < wanted:
         raise HydrostateError(
             f"input {input_name!r} must excite {wanted} coefficients, got a signal that excites {excited} "
@@ -215,7 +215,7 @@ def _require_excitation(inputs: list[Array], wanted: int, input_name: str) -> No
         )
 
 
-def _excited(u: Array, wanted: int) -> int:
+def _excitation_order(u: Array, wanted: int) -> int:
     if u.size < 2 * wanted:
         return 0
     windows = np.lib.stride_tricks.sliding_window_view(u, wanted)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
-from plant.compiled.native.loops import natively
+from plant.compiled.native.loops import natively_compiled
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
@@ -24,4 +24,4 @@ def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Res
     callable
         The same, compiled at its first call.
     """
-    return natively(freely=("reassoc", "contract", "nsz"))(function)
+    return natively_compiled(freely=("reassoc", "contract", "nsz"))(function)

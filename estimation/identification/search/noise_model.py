@@ -4,7 +4,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.model.lags import lagged
-from estimation.identification.search.criterion import stabilised
+from estimation.identification.search.criterion import stabilised_denominator
 from estimation.identification.search.linear import least_squares
 
 LONG = 30
@@ -39,4 +39,4 @@ def noise_start(v: Array, n_c: int, n_d: int) -> tuple[Array, Array]:
     values = least_squares(regressors.T @ regressors, regressors.T @ v[begin:])
     d = np.concatenate([[1.0], values[:n_d]])
     c = np.concatenate([[1.0], values[n_d:]])
-    return stabilised(c, v.size), stabilised(d, v.size)
+    return stabilised_denominator(c, v.size), stabilised_denominator(d, v.size)

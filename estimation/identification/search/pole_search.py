@@ -31,7 +31,7 @@ REFINEMENTS = 25
 DAMPING_RATIOS = (0.01, 0.03, 0.1, 0.25, 0.5, 0.8)
 """Damping ratios of the complex pairs that are tried."""
 
-DISTINCT = 0.2
+DISTINCT_SHARE = 0.2
 """Two candidates are one start if every pole moves by less than this share of its distance to z = 1."""
 
 SAME_COST = 1e-6
@@ -194,7 +194,7 @@ def _distinct(ranked: Array, count: int) -> Array:
     poles, n = _sorted_poles(rows), ranked.shape[1]
     chosen: list[int] = []
     for index in np.flatnonzero((np.abs(poles) < 1.0).all(axis=1)) if n else ():
-        apart = np.abs(poles[index] - poles[chosen]) > DISTINCT * np.abs(1.0 - poles[chosen])
+        apart = np.abs(poles[index] - poles[chosen]) > DISTINCT_SHARE * np.abs(1.0 - poles[chosen])
         if apart.any(axis=1).all():
             chosen.append(int(index))
         if len(chosen) == count:

@@ -6,7 +6,7 @@ from estimation.arrays import Array
 from estimation.identification.search.descent import solve_damped
 from estimation.identification.search.jit import compiled
 
-FARTHEST = 2.0
+LARGEST_STEP = 2.0
 """Change of a coordinate in one step at most: what is left of the distance to one shrinks some 50-fold [dimensionless].
 """
 
@@ -125,7 +125,7 @@ def stable_step(
     step, factor = np.zeros(theta.size), np.zeros(gram.shape)
     if not solve_damped(own_gram, own_gradient, damping, step, factor):
         return None
-    step *= min(1.0, FARTHEST / max(float(np.abs(step[place]).max()), 1e-300))
+    step *= min(1.0, LARGEST_STEP / max(float(np.abs(step[place]).max()), 1e-300))
     promised = -2.0 * float(own_gradient @ step) - float(step @ own_gram @ step)
     new = theta + step
     new[place] = denominator(np.tanh(np.arctanh(reflected) + step[place]))[0] / stretched

@@ -3,7 +3,7 @@
 from estimation.arrays import Array
 from estimation.identification.search.jit import compiled
 
-FORGOTTEN = 1e-18
+DECAYED_SHARE = 1e-18
 """An initial state is left out of the sums once its response has decayed to this share."""
 
 
@@ -21,7 +21,7 @@ def impulse_response(f: Array, n: int, n_s: int, pad: int, pulse: Array) -> int:
     if n_s == 0:
         return 0
     alive, t, largest = 1.0, 0, 1.0
-    while t < n and alive > FORGOTTEN * largest:
+    while t < n and alive > DECAYED_SHARE * largest:
         value = 1.0 if t == 0 else 0.0
         for j in range(f.size):
             value -= f[j] * pulse[pad + t - 1 - j]

@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from estimation.arrays import Array
 from estimation.identification.model.lags import lagged
 from estimation.identification.model.recursion import filtered
-from estimation.identification.search.criterion import Structure, polynomial, stabilised
+from estimation.identification.search.criterion import Structure, polynomial, stabilised_denominator
 from estimation.identification.search.experiments import Experiments
 from estimation.identification.search.linear import least_squares
 from estimation.identification.search.pole_search import banded_spectra, refine, reflected, search_poles
@@ -23,7 +23,7 @@ HIGH_ORDER = 30
 IMPULSE_SAMPLES = 400
 """Most samples of the impulse response that is reduced to a low order."""
 
-TWINS = 1e-6
+TWIN_DISTANCE = 1e-6
 """Denominators closer than this are one start."""
 
 
@@ -58,7 +58,7 @@ def starting_values(structure: Structure, data: Experiments, count: int) -> list
 def _without_twins(ranked: Array) -> list[Array]:
     kept: list[Array] = []
     for row in ranked:
-        if all(np.abs(row - other).max() > TWINS * (1.0 + np.abs(row).max()) for other in kept):
+        if all(np.abs(row - other).max() > TWIN_DISTANCE * (1.0 + np.abs(row).max()) for other in kept):
             kept.append(row)
     return kept
 
@@ -108,7 +108,7 @@ def reduced_high_order_arx(n_denominator: int, u: Array, y: Array) -> Array:
     b, f = least_squares_arx(order + 1, order, 0, u, y)
     pulse = np.zeros(min(IMPULSE_SAMPLES, max(u.size // 4, 10 * n_denominator)))
     pulse[0] = 1.0
-    response = filtered(b, stabilised(f, u.size), pulse)[1:]
+    response = filtered(b, stabilised_denominator(f, u.size), pulse)[1:]
     half = (response.size + 1) // 2
     left = np.linalg.svd(sliding_window_view(response, response.size - half + 1))[0][:, :n_denominator]
     shift = least_squares(left[:-1], left[1:])

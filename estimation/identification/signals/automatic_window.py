@@ -18,16 +18,16 @@ from estimation.identification.signals.etfe import (
 )
 from plant.errors import HydrostateError
 
-LADDER = 2.0**0.5
+WINDOW_RATIO = 2.0**0.5
 """Ratio of neighbouring window lengths."""
 
-RUNGS = 8
+WINDOW_COUNT = 8
 """Window lengths compared."""
 
 LONGEST = 10
 """The longest window is this part of the record."""
 
-AGREES = 1.0
+AGREEMENT_DEVIATIONS = 1.0
 """Two estimates agree if they differ by less than this many standard deviations of the noisier one."""
 
 
@@ -59,7 +59,7 @@ def automatic_response(u: ArrayLike, y: ArrayLike, sample_time: float) -> Freque
     """
     inputs, outputs = checked_signals(u, y, sample_time)
     longest = inputs.size // LONGEST
-    windows = sorted({max(int(longest / LADDER**k), 4) for k in range(RUNGS)}, reverse=True)
+    windows = sorted({max(int(longest / WINDOW_RATIO**k), 4) for k in range(WINDOW_COUNT)}, reverse=True)
     if longest < 16:
         raise HydrostateError(f"an automatic window needs {16 * LONGEST} samples or more, got {inputs.size}")
     size = 2 * longest
@@ -112,7 +112,7 @@ def _accepted(responses: ComplexArray, deviations: Array) -> np.ndarray:
         for longer in range(row):
             difference = np.abs(responses[row] - responses[longer])
             with np.errstate(invalid="ignore"):
-                agrees &= difference <= AGREES * deviations[longer]
+                agrees &= difference <= AGREEMENT_DEVIATIONS * deviations[longer]
         chosen[agrees] = row
         open_still = agrees
     return chosen

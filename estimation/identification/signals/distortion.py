@@ -11,7 +11,7 @@ from estimation.identification.signals.local_polynomial import ComplexArray, Fre
 from estimation.identification.signals.period import find_period
 from plant.errors import HydrostateError
 
-EXCITED = 1e-3
+EXCITED_AMPLITUDE = 1e-3
 """Amplitude of a line over the largest, above which it is excited [fraction]."""
 
 NEIGHBOURS = 15
@@ -21,14 +21,14 @@ PARTS = 8
 """Parts of half a period, whose powers of distortion show how much a level varies from one multisine to another. High
 powers of a signal have heavy tails: with few long parts the means are closer to normal."""
 
-BESIDE, CURVED = 4, 2
+NEIGHBOURS_A_SIDE, POLYNOMIAL_DEGREE = 4, 2
 """Excited lines on either side over which the response is a polynomial, and its degree."""
 
-ALIKE = 2.0
+LARGEST_EXCITED_RATIO = 2.0
 """Distortion on excited lines over that on silent ones, above which the response is not such a polynomial
 [fraction]."""
 
-NEAR = 1.0
+LEVEL_ACCURACY = 1.0
 """Required accuracy of a level relative to its mean over multisines [dB]."""
 
 
@@ -77,7 +77,7 @@ class Distortion:
         float
             Below the highest excited line [output unit squared]; NaN if all such lines are excited.
         """
-        silent = _silent(self.excited, self.odd == odd)
+        silent = _silent_lines(self.excited, self.odd == odd)
         return float(np.mean(self.power[silent] - self.noise[silent])) if silent.any() else float("nan")
 
     def level_interval(self, *, odd: bool, probability: float = 0.95) -> tuple[float, float]:
@@ -108,7 +108,7 @@ class Distortion:
         return level / factor, level * factor
 
     def period_wanted(self, *, odd: bool) -> int | None:
-        """Return the period for which 95 % of multisines have a level within `NEAR`; None if unknown.
+        """Return the period for which 95 % of multisines have a level within `LEVEL_ACCURACY`; None if unknown.
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class Distortion:
         level, reach = self.level(odd=odd), self._reach(odd, 0.95)
         if not (level > 0.0 and np.isfinite(reach)):
             return None
-        return int(np.ceil(self.period * (10.0 / np.log(10.0) * reach / level / NEAR) ** 2))
+        return int(np.ceil(self.period * (10.0 / np.log(10.0) * reach / level / LEVEL_ACCURACY) ** 2))
 
     def _reach(self, odd: bool, probability: float) -> float:
         return float(stdtrit(PARTS - 1, 0.5 + 0.5 * probability)) * self._spread(odd)
@@ -131,7 +131,7 @@ class Distortion:
     def _spread(self, odd: bool) -> float:
         """Return the standard deviation of a level from multisine to multisine; NaN if unknown."""
         kind = self.odd == odd
-        silent = _silent(self.excited, kind)
+        silent = _silent_lines(self.excited, kind)
         if not self.power[silent].sum() > 0.0 or self.period // 2 < 8 * PARTS:
             return float("nan")
         driven, lines = self.excited & kind, silent.copy()
@@ -139,7 +139,7 @@ class Distortion:
         if driven.any():
             # if even lines were driven, the other kind of distortion would appear on excited lines too
             own = float(np.mean(np.abs(self.stray[driven]) ** 2))
-            if not own <= ALIKE * float(power.mean()) or (self.excited & ~kind).any():
+            if not own <= LARGEST_EXCITED_RATIO * float(power.mean()) or (self.excited & ~kind).any():
                 return float("nan")
             lines |= driven
         spectrum = np.zeros(self.period // 2 + 1, dtype=np.complex128)
@@ -153,7 +153,7 @@ class Distortion:
         return float(power.mean()) * float(np.sqrt(share + lost))
 
 
-def _silent(excited: BoolArray, kind: BoolArray) -> BoolArray:
+def _silent_lines(excited: BoolArray, kind: BoolArray) -> BoolArray:
     highest = int(np.flatnonzero(excited)[-1])
     return kind & ~excited & (np.arange(len(excited)) < highest)
 
@@ -205,25 +205,25 @@ def best_linear_approximation(
     every = np.fft.rfft(outputs[first:].reshape(periods, length), axis=1)[:, lines] / length
     mean = every.mean(axis=0)
     noise = np.sum(np.abs(every - mean) ** 2, axis=0) / (periods * (periods - 1))
-    excited = np.abs(inside) > EXCITED * np.abs(inside).max()
+    excited = np.abs(inside) > EXCITED_AMPLITUDE * np.abs(inside).max()
     number: IntArray = np.arange(1, len(mean) + 1)
     odd, frequency, power = number % 2 == 1, number / (length * sample_time), np.abs(mean) ** 2
     at = np.flatnonzero(excited)
-    stray = _stray(excited, odd, power, at)
+    stray = _silent_power(excited, odd, power, at)
     # the distortion includes the noise of the lines on which it is measured
     variance = np.where(np.isnan(stray), noise[at], np.maximum(stray, noise[at])) / np.abs(inside[at]) ** 2
     freedom = periods - 1 if np.isnan(stray).all() else NEIGHBOURS
     response = FrequencyResponse(frequency[at], mean[at] / inside[at], variance, freedom)
     left = mean.copy()
-    left[at] = _left(mean[at], inside[at])
+    left[at] = _polynomial_residual(mean[at], inside[at])
     return Distortion(response, length, periods, frequency, excited, odd, noise, power, left)
 
 
-def _stray(excited: BoolArray, odd: BoolArray, power: Array, at: IntArray) -> Array:
+def _silent_power(excited: BoolArray, odd: BoolArray, power: Array, at: IntArray) -> Array:
     """Return the mean power on the nearest silent lines of the same kind; NaN if there are none."""
     found = np.full(len(at), np.nan)
     for kind in (True, False):
-        silent = np.flatnonzero(_silent(excited, odd == kind))
+        silent = np.flatnonzero(_silent_lines(excited, odd == kind))
         mine = np.flatnonzero(odd[at] == kind)
         if len(silent) < NEIGHBOURS:
             continue
@@ -233,15 +233,15 @@ def _stray(excited: BoolArray, odd: BoolArray, power: Array, at: IntArray) -> Ar
     return found
 
 
-def _left(output: ComplexArray, inside: ComplexArray) -> ComplexArray:
+def _polynomial_residual(output: ComplexArray, inside: ComplexArray) -> ComplexArray:
     """Return the residual of a polynomial over neighbouring excited lines; NaN if there are too few."""
-    n, span = len(output), 2 * BESIDE + 1
+    n, span = len(output), 2 * NEIGHBOURS_A_SIDE + 1
     if n < span:
         return np.full(n, np.nan, dtype=np.complex128)
-    begin = np.clip(np.arange(n) - BESIDE, 0, n - span)
+    begin = np.clip(np.arange(n) - NEIGHBOURS_A_SIDE, 0, n - span)
     places = begin[:, None] + np.arange(span)
-    distance = (places - np.arange(n)[:, None]) / BESIDE
-    columns = distance[:, :, None] ** np.arange(CURVED + 1) * inside[places][:, :, None]
+    distance = (places - np.arange(n)[:, None]) / NEIGHBOURS_A_SIDE
+    columns = distance[:, :, None] ** np.arange(POLYNOMIAL_DEGREE + 1) * inside[places][:, :, None]
     basis = np.linalg.qr(columns)[0]
     target = output[places][:, :, None]
     left = (target - basis @ (basis.conj().transpose(0, 2, 1) @ target))[:, :, 0]

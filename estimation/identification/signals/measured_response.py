@@ -14,7 +14,7 @@ from plant.errors import HydrostateError
 SETTLING, FEWEST_PERIODS = 1, 2
 """Periods that are left out at the beginning, and least number of periods after them."""
 
-TOLD = (
+MULTISINE_RESULTS = (
     *("period_samples", "periods", "noise_power", "odd_power", "even_power"),
     *("odd_power_interval", "even_power_interval", "odd_period_for_1_db", "even_period_for_1_db"),
 )
@@ -46,7 +46,7 @@ class MeasuredResponse:
             "real": one.response.real.tolist(),
             "imag": one.response.imag.tolist(),
             "radius95": one.radius().tolist(),
-            **dict.fromkeys(TOLD),
+            **dict.fromkeys(MULTISINE_RESULTS),
         }
         if told is not None:
             levels = {name: told.level(odd=name == "odd_power") for name in ("odd_power", "even_power")}

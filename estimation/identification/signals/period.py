@@ -8,16 +8,16 @@ from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
 
-REPEATS = 1e-4
+LARGEST_PERIODIC_CHANGE = 1e-4
 """Power of an input's change over a period, over its own, up to which it is periodic [fraction]."""
 
-NEARLY = 0.01
+LARGEST_NOISY_CHANGE = 0.01
 """The same if the inputs are measured with noise [fraction]."""
 
-OTHERWISE = 0.5
+LEAST_OTHER_CHANGE = 0.5
 """The same from which a signal has changed: a period is longer than a lag with such a change [fraction]."""
 
-LEAST_SHARED = 0.2
+LEAST_REPEATED_SHARE = 0.2
 """Least share of a log that is repeated [fraction]."""
 
 
@@ -40,8 +40,8 @@ def find_period(u: ArrayLike) -> int | None:
     total = float(values @ values)
     if not total > 0.0 or not np.isfinite(total):
         return None
-    change, power = _changes(values, n // 2)
-    same = 1 + np.flatnonzero(change <= 2.0 * REPEATS * power)
+    change, power = _change_energy(values, n // 2)
+    same = 1 + np.flatnonzero(change <= 2.0 * LARGEST_PERIODIC_CHANGE * power)
     return int(same[0]) if len(same) else None
 
 
@@ -64,7 +64,7 @@ def common_period(u: Array) -> int | None:
     >>> common_period(np.concatenate([once, once, once[:9]])), common_period(np.arange(20.0)[:, None])
     (60, None)
     """
-    n, longest = len(u), int((1.0 - LEAST_SHARED) * len(u))
+    n, longest = len(u), int((1.0 - LEAST_REPEATED_SHARE) * len(u))
     if longest < 2:
         return None
     share = np.zeros(longest)
@@ -72,14 +72,14 @@ def common_period(u: Array) -> int | None:
         total = float(values @ values)
         if not total > 0.0:
             continue
-        change, power = _changes(values, longest)
+        change, power = _change_energy(values, longest)
         # if both parts hardly move, their agreement says nothing
-        moves = power >= OTHERWISE * total * (n - np.arange(1, longest + 1)) / n
+        moves = power >= LEAST_OTHER_CHANGE * total * (n - np.arange(1, longest + 1)) / n
         share = np.maximum(share, np.where(moves, change / np.maximum(2.0 * power, 1e-300), np.inf))
-    other = np.flatnonzero((share > OTHERWISE) & np.isfinite(share))
+    other = np.flatnonzero((share > LEAST_OTHER_CHANGE) & np.isfinite(share))
     if not len(other):
         return None
-    same = np.flatnonzero(share[other[0] :] <= NEARLY)
+    same = np.flatnonzero(share[other[0] :] <= LARGEST_NOISY_CHANGE)
     if not len(same):
         return None
     # a smooth signal is nearly the same for some lags around its period
@@ -88,7 +88,7 @@ def common_period(u: Array) -> int | None:
     return 1 + first + int(np.argmin(near))
 
 
-def _changes(values: Array, longest: int) -> tuple[Array, Array]:
+def _change_energy(values: Array, longest: int) -> tuple[Array, Array]:
     """Return the energy of a signal's change over lags from one on, and that of its later part."""
     n = len(values)
     spectrum = np.fft.rfft(values, 2 * n)

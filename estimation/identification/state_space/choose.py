@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from estimation.identification.free_run.choose_linear import CLEARLY, PATIENCE
+from estimation.identification.free_run.choose_linear import CLEAR_GAIN, PATIENCE
 from estimation.identification.free_run.data import Channels, blocks
 from estimation.identification.free_run.dead_times import estimate_delays
-from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled
+from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled_error
 from estimation.identification.state_space.fit import Effort, StateSpaceFit, fit_state_space
-from estimation.identification.state_space.joint import Joint, joined
+from estimation.identification.state_space.joint import Joint, joined_outputs
 from estimation.identification.state_space.problem import Problem, Size
 from plant.errors import HydrostateError
 
-COMPARING, REFITTING = Effort(2, 3, 25, 1e-4), Effort(1, 2, 10, 1e-4)
+COMPARISON_EFFORT, REFIT_EFFORT = Effort(2, 3, 25, 1e-4), Effort(1, 2, 10, 1e-4)
 """Searches where sizes are compared, and those that begin at a fit of nearly the same data."""
 
 Form = tuple[bool, tuple[int, ...]]
@@ -48,7 +48,7 @@ class StateCandidate:
     @property
     def price(self) -> float:
         """Held-back error of all outputs [dimensionless]."""
-        return pooled(self.held_back)
+        return pooled_error(self.held_back)
 
     def row(self) -> dict[str, Any]:
         """Return the row of this candidate, by the names of the JSON contract."""
@@ -86,7 +86,7 @@ def state_candidates(data: Sequence[Channels], orders: Sequence[int], delay: int
     HydrostateError
         If they can bear none.
     """
-    together, found, best, idle = joined(data), list[StateCandidate](), np.inf, 0
+    together, found, best, idle = joined_outputs(data), list[StateCandidate](), np.inf, 0
     refused: HydrostateError | None = None
     forms = _forms(data, delay)
     for order in orders:
@@ -94,14 +94,16 @@ def state_candidates(data: Sequence[Channels], orders: Sequence[int], delay: int
         for direct, delays in forms:
             part = together.delayed(delays)
             try:
-                fit = fit_state_space(Size(order, part.u[0].shape[1], len(data), direct), part, effort=COMPARING)
+                fit = fit_state_space(
+                    Size(order, part.u[0].shape[1], len(data), direct), part, effort=COMPARISON_EFFORT
+                )
             except HydrostateError as error:
                 refused = error
                 continue
             tried.append(_candidate(fit, delays, part, data[0]))
         found += tried
         now = min((one.price for one in tried if not one.doubt), default=np.inf)
-        idle = 0 if now < (1.0 - CLEARLY) * best else idle + 1
+        idle = 0 if now < (1.0 - CLEAR_GAIN) * best else idle + 1
         best = min(best, now)
         if idle >= PATIENCE:
             break
@@ -125,12 +127,12 @@ def _candidate(fit: StateSpaceFit, delays: tuple[int, ...], data: Joint, first: 
     target = np.concatenate(data.y)
     errors: list[list[float]] = []
     for masks in blocks(first, BLOCKS):
-        part = fit_state_space(size, data.without(masks), fit.theta, REFITTING)
+        part = fit_state_space(size, data.without(masks), fit.theta, REFIT_EFFORT)
         problem = Problem(size, data)
         left = problem.outputs(problem.unpacked(part.theta)) - target
         mask = np.concatenate(masks)
         errors.append([block_error(left[:, o], mask & np.isfinite(target[:, o])) for o in range(size.p)])
-    held_back = tuple(pooled(one) for one in zip(*errors, strict=True))
+    held_back = tuple(pooled_error(one) for one in zip(*errors, strict=True))
     criteria = fit.deviance + values * float(np.log(n)), fit.deviance + 2.0 * values
     return StateCandidate(fit, delays, held_back, *criteria, _doubt(fit, data))
 
@@ -152,4 +154,4 @@ def chosen_state(candidates: Sequence[StateCandidate]) -> StateCandidate:
     """
     sound = [one for one in candidates if not one.doubt] or list(candidates)
     least = min(one.price for one in sound)
-    return min((one for one in sound if one.price <= (1.0 + CLEARLY) * least), key=lambda one: one.bic)
+    return min((one for one in sound if one.price <= (1.0 + CLEAR_GAIN) * least), key=lambda one: one.bic)

@@ -9,8 +9,8 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.dynamics import OutputErrorDynamics
-from estimation.identification.free_run.linear_problem import unanswered
-from estimation.identification.state_space.joint import delayed
+from estimation.identification.free_run.linear_problem import undetermined_outputs
+from estimation.identification.state_space.joint import delayed_inputs
 from estimation.identification.state_space.kernel import run_states
 from estimation.identification.state_space.system import StateSpace
 
@@ -41,9 +41,9 @@ class StateSpaceDynamics(OutputErrorDynamics):
         """Output if all inputs are zero [scaled]."""
         return float(self.system.level[self.place])
 
-    def unanswered(self, length: int) -> int:
+    def undetermined_outputs(self, length: int) -> int:
         """Return how many first outputs of a log of some length [samples] respond to inputs from before the log."""
-        return unanswered(max(self.system.delays), length)
+        return undetermined_outputs(max(self.system.delays), length)
 
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, with the initial state by least squares from the outputs that are present.
@@ -52,14 +52,14 @@ class StateSpaceDynamics(OutputErrorDynamics):
         output that responds to inputs of the log; that output also stands for the earlier ones.
         """
         one, n, known = self.system, self.system.order, np.isfinite(y)
-        late, a = delayed(u, one.delays), np.ascontiguousarray(one.a)
+        late, a = delayed_inputs(u, one.delays), np.ascontiguousarray(one.a)
         rest = np.asarray(np.linalg.lstsq(np.eye(n) - a, one.b @ late[0], rcond=None)[0], dtype=np.float64)
         states, quiet = np.empty((len(u), n)), np.zeros((len(u), n))
         run_states(a, np.ascontiguousarray(late @ one.b.T), rest, states)
         out = states @ one.c[self.place] + late @ one.d[self.place] + self.level
         if np.count_nonzero(known) <= n:
             return out
-        free, begin = np.zeros((len(u), n)), self.unanswered(len(u))
+        free, begin = np.zeros((len(u), n)), self.undetermined_outputs(len(u))
         for k in range(n):
             run_states(a, quiet[begin:], np.eye(n)[k], states[begin:])
             free[begin:, k] = states[begin:] @ one.c[self.place]

@@ -6,7 +6,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.fit.covariances import covariances
-from estimation.identification.fit.fitted import COLOURED
+from estimation.identification.fit.fitted import COLOURED_P_VALUE
 from estimation.identification.fit.residual_tests import ljung_box
 from estimation.identification.search.experiments import Experiments
 from estimation.identification.search.levenberg import levenberg
@@ -37,10 +37,10 @@ class Effort:
     gain: float
 
 
-THOROUGH = Effort(3, 6, 25, 1e-7)
+THOROUGH_EFFORT = Effort(3, 6, 25, 1e-7)
 """Effort of the final fit."""
 
-DESCENDED = 2
+MOST_DESCENDED = 2
 """Number of starts from which the search descends [count]."""
 
 
@@ -69,7 +69,9 @@ class StateSpaceFit:
         return self.theta[: self.size.n**2].reshape(self.size.n, self.size.n)
 
 
-def fit_state_space(size: Size, data: Joint, start: Array | None = None, effort: Effort = THOROUGH) -> StateSpaceFit:
+def fit_state_space(
+    size: Size, data: Joint, start: Array | None = None, effort: Effort = THOROUGH_EFFORT
+) -> StateSpaceFit:
     """Return the maximum-likelihood model of a size: white output noise, with unknown covariance.
 
     Parameters
@@ -96,17 +98,17 @@ def fit_state_space(size: Size, data: Joint, start: Array | None = None, effort:
     starts = [start] if start is not None else _starts(problem)
     if not starts:
         raise HydrostateError(f"the logs are too short for a state space of order {size.n}: give a lower order")
-    fits = [_descended(problem, one, effort) for one in starts[:DESCENDED]]
+    fits = [_descended(problem, one, effort) for one in starts[:MOST_DESCENDED]]
     return min(fits, key=lambda fit: fit.deviance)
 
 
 def _starts(problem: Problem) -> list[Array]:
     """Return subspace models with the best B, D, levels and first states, the best fitting first."""
-    found = [_completed(problem, a, c) for a, c in subspace_starts(problem.data, problem.size.n)]
-    return sorted(found, key=lambda theta: float(np.sum(_left(problem, theta) ** 2)))
+    found = [_completed_values(problem, a, c) for a, c in subspace_starts(problem.data, problem.size.n)]
+    return sorted(found, key=lambda theta: float(np.sum(_residual(problem, theta) ** 2)))
 
 
-def _completed(problem: Problem, a: Array, c: Array) -> Array:
+def _completed_values(problem: Problem, a: Array, c: Array) -> Array:
     size = problem.size
     columns = problem.linear_columns(a, c)
     used = problem.used.T
@@ -119,14 +121,14 @@ def _completed(problem: Problem, a: Array, c: Array) -> Array:
     return problem.balanced(problem.packed(whole))
 
 
-def _left(problem: Problem, theta: Array) -> Array:
+def _residual(problem: Problem, theta: Array) -> Array:
     """Return the residual, zero for missing outputs, shape (samples, p)."""
     return np.where(problem.used, problem.outputs(problem.unpacked(theta)) - problem.y, 0.0)
 
 
 def _noise(problem: Problem, theta: Array) -> Array:
     """Return the covariance of the residual over the samples at which both outputs are present."""
-    left, used = _left(problem, theta), problem.used.astype(np.float64)
+    left, used = _residual(problem, theta), problem.used.astype(np.float64)
     noise = left.T @ left / np.maximum(used.T @ used, 1.0)
     size = np.sqrt(np.diag(noise)) + 1e-12
     together = noise / np.outer(size, size)
@@ -149,7 +151,7 @@ def _descended(problem: Problem, start: Array, effort: Effort) -> StateSpaceFit:
         white = _whitener(problem, _noise(problem, theta))
         cost = np.inf
         for _ in range(effort.charts):
-            now, theta = _chart(problem, problem.balanced(theta), white, effort)
+            now, theta = _minimum_near(problem, problem.balanced(theta), white, effort)
             if not now < cost * (1.0 - effort.gain):
                 break
             cost = now
@@ -159,7 +161,7 @@ def _descended(problem: Problem, start: Array, effort: Effort) -> StateSpaceFit:
     return StateSpaceFit(problem.size, theta, noise, deviance)
 
 
-def _chart(problem: Problem, theta: Array, white: Array, effort: Effort) -> tuple[float, Array]:
+def _minimum_near(problem: Problem, theta: Array, white: Array, effort: Effort) -> tuple[float, Array]:
     """Return the least weighted cost near given values, and its position."""
     basis = problem.directions(theta)
 
@@ -204,7 +206,8 @@ def system_of(fit: StateSpaceFit, data: Joint, delays: tuple[int, ...]) -> State
     flat = Experiments(np.zeros(left.size), left.ravel(), used.ravel(), np.array(bounds, dtype=np.int64))
     plain, robust, _ = covariances(columns.reshape(left.size, -1), left.ravel(), flat)
     coloured = any(
-        ljung_box(np.where(there, one, np.nan)).p_value < COLOURED for one, there in zip(left, used, strict=True)
+        ljung_box(np.where(there, one, np.nan)).p_value < COLOURED_P_VALUE
+        for one, there in zip(left, used, strict=True)
     )
     k = fit.size.n_matrices
     spread = (basis @ (robust if coloured else plain) @ basis.T)[:k, :k]

@@ -8,24 +8,24 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimation.identification.free_run.choose_linear import CLEARLY
-from estimation.identification.free_run.data import Channels, require_room, require_size, scaled, section
+from estimation.identification.free_run.choose_linear import CLEAR_GAIN
+from estimation.identification.free_run.data import Channels, liveliest_sections, require_room, require_size, scaled
 from estimation.identification.free_run.doubtful_channels import doubtful_channels
-from estimation.identification.free_run.held_back import pooled
+from estimation.identification.free_run.held_back import pooled_error
 from estimation.identification.free_run.identify import (
-    HIGHEST,
+    HIGHEST_ORDER,
     MOST_CHOSEN,
     MOST_FITTED,
     Identified,
     identify_channels,
 )
 from estimation.identification.free_run.model import FreeRunModel
-from estimation.identification.free_run.random_walk import followed_walk
-from estimation.identification.notes import WARNED, IdentificationCode
+from estimation.identification.free_run.random_walk import walk_followed_notes
+from estimation.identification.notes import RAISED_AS_WARNINGS, IdentificationCode
 from estimation.identification.state_space.choose import StateCandidate, chosen_state, state_candidates
 from estimation.identification.state_space.dynamics import StateSpaceDynamics
 from estimation.identification.state_space.fit import fit_state_space, system_of
-from estimation.identification.state_space.joint import joined
+from estimation.identification.state_space.joint import joined_outputs
 from plant.errors import HydrostateError, LogWarning
 from plant.notes import Note
 
@@ -84,17 +84,17 @@ def identify_outputs(
         return single
     rows = [(*one.candidates, *other.candidates) for one, other in zip(single, together, strict=True)]
     fewer = together[0].model.n_values < sum(one.model.n_values for one in single)
-    bar = _left(single) * (1.0 if fewer else 1.0 - CLEARLY)
+    bar = _pooled_error(single) * (1.0 if fewer else 1.0 - CLEAR_GAIN)
     # with slow poles a state space would follow outputs that wander by themselves or differ from log to log
     alone = (IdentificationCode.UNRELATED, IdentificationCode.RANDOM_WALK, IdentificationCode.OFFSETS_DIFFER)
     related = not any(note.code in alone for one in single for note in one.notes)
-    better = related and all(one.sound for one in together) and _left(together) < bar
+    better = related and all(one.sound for one in together) and _pooled_error(together) < bar
     return [replace(one, candidates=row) for one, row in zip(together if better else single, rows, strict=True)]
 
 
-def _left(found: Sequence[Identified]) -> float:
+def _pooled_error(found: Sequence[Identified]) -> float:
     """Return the held-back error of all outputs, each divided by its standard deviation."""
-    return pooled([1.0 - one.held_back_percent / 100.0 for one in found])
+    return pooled_error([1.0 - one.held_back_percent / 100.0 for one in found])
 
 
 def identify_state_space(
@@ -131,9 +131,9 @@ def identify_state_space(
     found = _fitted_to_levels(data, order, delay)
     found = [
         replace(one, notes=(*one.notes, *notes), sound=one.sound and not notes)
-        for one, notes in zip(found, map(_followed, data), strict=True)
+        for one, notes in zip(found, map(_walk_notes, data), strict=True)
     ]
-    for note in {note.code: note for one in found for note in one.notes if note.code in WARNED}.values():
+    for note in {note.code: note for one in found for note in one.notes if note.code in RAISED_AS_WARNINGS}.values():
         warnings.warn(LogWarning(note), stacklevel=2)
     return found
 
@@ -144,21 +144,21 @@ def _fitted_to_levels(data: Sequence[Channels], order: int | None, delay: int | 
     for one in data:
         require_room(one, None, delay, None)  # the fit itself checks the length for the order
     with threadpool_limits(limits=1, user_api="blas"):
-        return _identified(data, range(1, MOST_STATES + 1) if order is None else [order], delay)
+        return _identified_outputs(data, range(1, MOST_STATES + 1) if order is None else [order], delay)
 
 
-def _followed(data: Channels) -> list[Note]:
+def _walk_notes(data: Channels) -> list[Note]:
     """Return a note if an output drifts by itself."""
     whole, _ = scaled(data)
-    return followed_walk(whole, section(whole, MOST_CHOSEN), range(1, HIGHEST + 1), STATE_SPACE)
+    return walk_followed_notes(whole, liveliest_sections(whole, MOST_CHOSEN), range(1, HIGHEST_ORDER + 1), STATE_SPACE)
 
 
-def _identified(data: Sequence[Channels], orders: Sequence[int], delay: int | None) -> list[Identified]:
+def _identified_outputs(data: Sequence[Channels], orders: Sequence[int], delay: int | None) -> list[Identified]:
     both = [scaled(one) for one in data]
-    whole = [section(one, MOST_FITTED) for one, _ in both]
-    candidates = state_candidates([section(one, MOST_CHOSEN) for one, _ in both], orders, delay)
+    whole = [liveliest_sections(one, MOST_FITTED) for one, _ in both]
+    candidates = state_candidates([liveliest_sections(one, MOST_CHOSEN) for one, _ in both], orders, delay)
     best = chosen_state(candidates)
-    together = joined(whole).delayed(best.delays)
+    together = joined_outputs(whole).delayed(best.delays)
     start = best.fit.theta if together.n_samples <= MOST_CHOSEN else None
     system = system_of(fit_state_space(best.fit.size, together, start), together, best.delays)
     rows = tuple(one.row() for one in candidates)
@@ -166,11 +166,11 @@ def _identified(data: Sequence[Channels], orders: Sequence[int], delay: int | No
     for place, (one, (_, by)) in enumerate(zip(data, both, strict=True)):
         dynamics = StateSpaceDynamics(system, place)
         model = FreeRunModel(one.inputs, one.output, one.sample_time, STATE_SPACE, by, dynamics)
-        found.append(_judged(model, one, best, best.held_back[place], rows))
+        found.append(_judged_output(model, one, best, best.held_back[place], rows))
     return found
 
 
-def _judged(
+def _judged_output(
     model: FreeRunModel, data: Channels, best: StateCandidate, held_back: float, rows: tuple[dict[str, Any], ...]
 ) -> Identified:
     quality, notes = model.quality(data.u, data.y), []

@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.linear_problem import unanswered
+from estimation.identification.free_run.linear_problem import undetermined_outputs
 from plant.errors import HydrostateError
 
 
@@ -66,15 +66,15 @@ class Joint:
         delays : sequence of int
             Of each input [samples].
         """
-        late = replace(self, u=tuple(delayed(u, delays) for u in self.u))
-        begins = tuple(unanswered(max(delays), len(u)) for u in self.u)
+        late = replace(self, u=tuple(delayed_inputs(u, delays) for u in self.u))
+        begins = tuple(undetermined_outputs(max(delays), len(u)) for u in self.u)
         if not any(begins):
             return late
         held = [np.arange(len(u)) < begin for u, begin in zip(self.u, begins, strict=True)]
         return replace(late, begins=begins).without(held)
 
 
-def delayed(u: Array, delays: Sequence[int]) -> Array:
+def delayed_inputs(u: Array, delays: Sequence[int]) -> Array:
     """Return inputs some samples later, their first values in front of them.
 
     Parameters
@@ -93,7 +93,7 @@ def delayed(u: Array, delays: Sequence[int]) -> Array:
     return np.take_along_axis(u, np.maximum(rows, 0), axis=0)
 
 
-def joined(data: Sequence[Channels]) -> Joint:
+def joined_outputs(data: Sequence[Channels]) -> Joint:
     """Return the outputs of the same logs together.
 
     Parameters

@@ -33,7 +33,7 @@ def run_states(a: Array, pushed: Array, start: Array, out: Array) -> None:
 
 
 @compiled
-def answers(a: Array, c: Array, source: Array, room: Array, out: Array) -> None:
+def state_responses(a: Array, c: Array, source: Array, room: Array, out: Array) -> None:
     """Fill in the outputs that follow where one series pushes each state in turn.
 
     Parameters

@@ -10,7 +10,7 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray
 from estimation.identification.state_space.joint import Joint
-from estimation.identification.state_space.kernel import answers, run_states
+from estimation.identification.state_space.kernel import run_states, state_responses
 
 
 @dataclass(frozen=True)
@@ -97,12 +97,12 @@ class Problem:
         """Return the outputs, shape (samples, p)."""
         return self.states(v) @ v.c.T + self.u @ v.d.T + v.level
 
-    def _answers(self, a: Array, c: Array, source: Array) -> Array:
+    def _state_responses(self, a: Array, c: Array, source: Array) -> Array:
         """Return the outputs where a series pushes each state in turn, shape (p, samples, n)."""
         n, p = self.size.n, self.size.p
         out = np.zeros((len(source), p * n))
         for part in self.data.slices:
-            answers(a, c, np.ascontiguousarray(source[part]), np.zeros((2 * p, n)), out[part])
+            state_responses(a, c, np.ascontiguousarray(source[part]), np.zeros((2 * p, n)), out[part])
         return out.reshape(-1, p, n).transpose(1, 0, 2)
 
     def linear_columns(self, a: Array, c: Array) -> Array:
@@ -120,7 +120,7 @@ class Problem:
         """
         size, rows = self.size, len(self.u)
         a, c = np.ascontiguousarray(a), np.ascontiguousarray(c)
-        pushes = [self._answers(a, c, self.u[:, j]) for j in range(size.m)]
+        pushes = [self._state_responses(a, c, self.u[:, j]) for j in range(size.m)]
         by_b = np.stack(pushes, axis=-1).reshape(size.p, rows, -1)
         by_d = np.zeros((size.p, rows, size.p * size.m * size.direct))
         by_level = np.zeros((size.p, rows, size.p))
@@ -134,7 +134,7 @@ class Problem:
             push = np.zeros(part.stop - part.start + 1)
             push[0] = 1.0
             powers = np.zeros((push.size, size.p * size.n))
-            answers(a, c, push, np.zeros((2 * size.p, size.n)), powers)
+            state_responses(a, c, push, np.zeros((2 * size.p, size.n)), powers)
             by_start[:, part, k * size.n : (k + 1) * size.n] = powers[1:].reshape(-1, size.p, size.n).transpose(1, 0, 2)
         return np.concatenate([by_b, by_d, by_level, by_start], axis=2)
 
@@ -154,7 +154,7 @@ class Problem:
         v, size = self.unpacked(theta), self.size
         x, linear = self.states(v), self.linear_columns(v.a, v.c)
         a, c = np.ascontiguousarray(v.a), np.ascontiguousarray(v.c)
-        by_a = np.stack([self._answers(a, c, x[:, j]) for j in range(size.n)], axis=-1)
+        by_a = np.stack([self._state_responses(a, c, x[:, j]) for j in range(size.n)], axis=-1)
         by_c = np.zeros((size.p, len(x), size.p * size.n))
         for o in range(size.p):
             by_c[o, :, o * size.n : (o + 1) * size.n] = x

@@ -39,7 +39,7 @@ def subspace_starts(data: Joint, order: int) -> list[tuple[Array, Array]]:
             continue
         gamma = left[:, :order]
         a = np.asarray(np.linalg.lstsq(gamma[:-p], gamma[p:], rcond=None)[0], dtype=np.float64)
-        found.append((_inside(a, data.n_samples), np.ascontiguousarray(gamma[:p])))
+        found.append((_stable_transition(a, data.n_samples), np.ascontiguousarray(gamma[:p])))
     return found
 
 
@@ -65,7 +65,7 @@ def _hankel(x: Array, first: int, rows: int) -> Array:
     return np.concatenate([x[first + k : first + k + width].T for k in range(rows)])
 
 
-def _inside(a: Array, n_samples: int) -> Array:
+def _stable_transition(a: Array, n_samples: int) -> Array:
     """Return a transition matrix with its poles inside the unit circle; those outside are reflected."""
     values, vectors = np.linalg.eig(a)
     limit = 1.0 - 1.0 / n_samples

@@ -1,4 +1,4 @@
-"""`whatever_accumulator(found, again)`: a single rod whose inner circuit has less or more gas than assumed.
+"""`with_fitted_accumulator(found, again)`: a single rod whose inner circuit has less or more gas than assumed.
 
 Few rig files state the gas of the inner circuit's accumulator. A single rod takes oil from it at every stroke and
 returns it. With little gas its pressure, which acts on the low side of the piston, varies by several bar. The flow
@@ -13,13 +13,13 @@ from operator import attrgetter
 import numpy as np
 
 from faults.conditions import CONDITIONS
-from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.beyond_nine.load import LoadedDiagnosis
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_fit import LASTING, PointFit, fit_freely, misfit
 from faults.diagnosis.circuits.class_regions import ClassFits
-from faults.diagnosis.circuits.out_of_model import unexplained
+from faults.diagnosis.circuits.out_of_model import unexplained_notes
 from plant.eha.circuit_parameters import CircuitParameters, oil_demand
 from plant.eha.model import EhaParameters
 
@@ -27,14 +27,16 @@ TRIED, ROUNDS, PASSES = 8, 2, 3
 """Accumulators that are run side by side; rounds, each between the neighbours of the best; and most fits of a circuit
 with the best [count]."""
 
-LARGEST = 30.0
+LARGEST_GAS = 30.0
 """Most gas that is tried, over the assumed gas [dimensionless]: its pressure is then constant."""
 
-ABOUT = 2.0
+GAS_FACTOR = 2.0
 """Factor by which more or less gas is tried once a circuit was fitted with some [dimensionless]."""
 
 
-def whatever_accumulator(found: Loaded, again: Callable[[EhaParameters], Loaded]) -> Loaded:
+def with_fitted_accumulator(
+    found: LoadedDiagnosis, again: Callable[[EhaParameters], LoadedDiagnosis]
+) -> LoadedDiagnosis:
     """Return a diagnosis with the accumulator under which a circuit follows the log of a single rod.
 
     Parameters
@@ -49,17 +51,17 @@ def whatever_accumulator(found: Loaded, again: Callable[[EhaParameters], Loaded]
     Loaded
         Unchanged if a circuit follows the log already, or none does with another accumulator.
     """
-    if found.diagnosis.followed or not found.parameters.single_rod:
+    if found.diagnosis.circuit_follows or not found.parameters.single_rod:
         return found
     board = found.diagnosis.scoreboard
-    fed = fed_otherwise(board.blocks, board.fits, actuator_of(found.parameters))
+    fed = fit_accumulator(board.blocks, board.fits, actuator_of(found.parameters))
     if fed is None:
         return found
     other = again(fed)
-    return other if other.diagnosis.followed else found
+    return other if other.diagnosis.circuit_follows else found
 
 
-def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> CircuitParameters | None:
+def fit_accumulator(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> CircuitParameters | None:
     """Return the healthy circuit with an accumulator under which circuits follow the log, if they do not otherwise.
 
     Parameters
@@ -79,7 +81,7 @@ def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Circui
     if blocks.pressure is None:
         return None
     nearest, fed, best = list(CONDITIONS)[int(np.argmax(fits.scores))], actuator, fits.best
-    ends = oil_demand(actuator.circuit), LARGEST * actuator.circuit.accumulator_gas
+    ends = oil_demand(actuator.circuit), LARGEST_GAS * actuator.circuit.accumulator_gas
     for _ in range(PASSES):
         gas, left = _likeliest_gas(blocks, fed, best, ends)
         if not left < misfit(blocks, best.fitted) - LASTING:
@@ -88,8 +90,8 @@ def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Circui
         best = min(
             (fit_freely(blocks, fed, nearest, start) for start in (None, best.coordinates)), key=attrgetter("cost")
         )
-        ends = gas / ABOUT, gas * ABOUT
-    return None if fed is actuator or unexplained(blocks, replace(fits, best=best), fed) else fed.circuit
+        ends = gas / GAS_FACTOR, gas * GAS_FACTOR
+    return None if fed is actuator or unexplained_notes(blocks, replace(fits, best=best), fed) else fed.circuit
 
 
 def _likeliest_gas(blocks: Blocks, actuator: Actuator, fit: PointFit, ends: tuple[float, float]) -> tuple[float, float]:
@@ -100,7 +102,7 @@ def _likeliest_gas(blocks: Blocks, actuator: Actuator, fit: PointFit, ends: tupl
     for _ in range(ROUNDS):
         tried = np.geomspace(*ends, TRIED)
         rows[:, COLUMN["accumulator_gas"]] = tried
-        misfits = [misfit(blocks, run) for run in predicted(blocks, rows)]
+        misfits = [misfit(blocks, run) for run in predicted_outputs(blocks, rows)]
         place = int(np.argmin(misfits))
         gas, left = float(tried[place]), misfits[place]
         ends = tried[max(place - 1, 0)], tried[min(place + 1, TRIED - 1)]

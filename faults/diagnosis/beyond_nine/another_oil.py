@@ -6,16 +6,16 @@ With pressure, bulk modulus is measured before a circuit is fitted. Soft oil con
 import math
 from dataclasses import replace
 
-from estimation.eha.rig_share import SOFT
-from faults.diagnosis.beyond_nine.load import Diagnosed, Loaded
-from faults.diagnosis.beyond_nine.near_enough import only_beside
+from estimation.eha.rig_share import SOFT_OIL_RATIO
+from faults.diagnosis.beyond_nine.load import DiagnoseAround, LoadedDiagnosis
+from faults.diagnosis.beyond_nine.near_enough import is_only_outside
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
 
 
-def whatever_the_oil(diagnosed: Diagnosed, parameters: EhaParameters) -> Loaded:
+def with_stiffer_oil(diagnosed: DiagnoseAround, parameters: EhaParameters) -> LoadedDiagnosis:
     """Return a diagnosis around stiffer oil than the rig file's, if stiffness alone contradicts all conditions.
 
     If the log determines the oil only roughly, it is not called stiff, but its circuit may be outside the nine
@@ -34,22 +34,22 @@ def whatever_the_oil(diagnosed: Diagnosed, parameters: EhaParameters) -> Loaded:
         The diagnosis, its actuator, and a note if the oil is another.
     """
     found = diagnosed(parameters, 0.0)
-    ratio = _stiffness(found, parameters)
+    ratio = _stiffness_ratio(found, parameters)
     if ratio is None:
-        return Loaded(found, parameters)
+        return LoadedDiagnosis(found, parameters)
     stiffer = replace(parameters, bulk_modulus=ratio * parameters.bulk_modulus)
     around = diagnosed(stiffer, 0.0)
-    if around.unknown and only_beside(found.against):  # then stiffer oil does not explain the objection
-        return Loaded(found, parameters)
-    return Loaded(around, stiffer, (ClassCode.OIL_STIFFER_CLASS.note(ratio=ratio),))
+    if around.unknown and is_only_outside(found.against):  # then stiffer oil does not explain the objection
+        return LoadedDiagnosis(found, parameters)
+    return LoadedDiagnosis(around, stiffer, (ClassCode.OIL_STIFFER_CLASS.note(ratio=ratio),))
 
 
-def _stiffness(found: Diagnosis, parameters: EhaParameters) -> float | None:
+def _stiffness_ratio(found: Diagnosis, parameters: EhaParameters) -> float | None:
     """Return the oil's bulk modulus over the rig file's, if it may be the only objection to the conditions."""
     if [note.code for note in found.against] == [AgainstCode.OIL_STIFF]:
         return float(found.against[0].data["share"])
-    if not found.against or not only_beside(found.against):
+    if not found.against or not is_only_outside(found.against):
         return None
     logarithm = float(found.scoreboard.fits.best.coordinates[COORDINATES.index("bulk_modulus")])
     ratio = math.exp(logarithm) / parameters.bulk_modulus
-    return ratio if ratio > 1.0 / SOFT else None
+    return ratio if ratio > 1.0 / SOFT_OIL_RATIO else None

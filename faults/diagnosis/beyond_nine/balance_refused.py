@@ -10,7 +10,7 @@ import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
 from estimation.notes import EstimateCode
-from faults.diagnosis.beyond_nine.other_faults import GAIN, NOT_EXCLUDED, SOUND, STUCK, WORN, gains_of_others
+from faults.diagnosis.beyond_nine.other_faults import GAIN, NOT_EXCLUDED, SOUND, STUCK, WORN, gains_of_other_circuits
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
@@ -19,7 +19,7 @@ from faults.diagnosis.circuits.class_regions import is_stuck
 from faults.notes import ClassCode
 from plant.notes import Note
 
-LEFT_BY_BALANCE = {
+RESIDUAL_REASONS = {
     EstimateCode.PRESSURE_RESIDUALS_LARGE,
     EstimateCode.PRESSURE_RESIDUALS_CORRELATED,
     EstimateCode.CHANNEL_LATE,
@@ -31,12 +31,12 @@ LEFT_BY_BALANCE = {
 }
 """Reasons that state the size of the balance's residuals, and none that names a cause."""
 
-CLOSELY = (0.03, 0.04)
+CLOSE_RESIDUALS = (0.03, 0.04)
 """Share of velocity and of pressure, root mean square, up to which a circuit follows a log closely [dimensionless]: a
 quarter and a half of the general limit. In training logs of the open benchmark with faults outside the nine that
 circuits alone would accept, the residual is 7 % of the velocity and more."""
 
-MOST_GAINED = {WORN: NOT_EXCLUDED, STUCK: GAIN, SOUND: -NOT_EXCLUDED}
+LARGEST_GAINS = {WORN: NOT_EXCLUDED, STUCK: GAIN, SOUND: -NOT_EXCLUDED}
 """Log-likelihood up to which another circuit is no objection to the class; 0 for circuits that are not named here
 [dimensionless]. A worn pump may belong to another class, so it must be excluded. A valve that never opens leaves no
 trace, so it must be believed to count. Each other fault then has a probability of 2 % at most, by its prior. Sound
@@ -63,20 +63,20 @@ def class_without_balance(
     Returns
     -------
     Note or None
-        A note if the balance is rejected for its residuals alone, a circuit follows the log `CLOSELY`, and no other
-        circuit, with a fault outside the nine or without, gains more than `MOST_GAINED`; otherwise None.
+        A note if the balance is rejected for its residuals alone, a circuit follows the log within `CLOSE_RESIDUALS`,
+        and no other circuit, with a fault outside the nine or without, gains more than `LARGEST_GAINS`; otherwise None.
     """
     board = diagnosis.scoreboard
     blocks, fits = board.blocks, board.fits
-    of_balance = estimate.form == "flow" and bool(doubts) and all(note.code in LEFT_BY_BALANCE for note in doubts)
-    if not of_balance or diagnosis.against or board.drift is not None or blocks.course is not None:
+    of_balance = estimate.form == "flow" and bool(doubts) and all(note.code in RESIDUAL_REASONS for note in doubts)
+    if not of_balance or diagnosis.against or board.drift is not None or blocks.leakage_course is not None:
         return None
     if blocks.pressure is None or is_stuck(blocks, actuator) or not follows_closely(blocks, fits.best):
         return None
-    gains = gains_of_others(blocks, fits, actuator)
-    if any(gain > MOST_GAINED.get(name, 0.0) for name, gain in gains.items()):
+    gains = gains_of_other_circuits(blocks, fits, actuator)
+    if any(gain > LARGEST_GAINS.get(name, 0.0) for name, gain in gains.items()):
         return None
-    velocity, pressure = (100.0 * fits.best.scales / blocks.sizes).tolist()
+    velocity, pressure = (100.0 * fits.best.scales / blocks.rms).tolist()
     return ClassCode.BALANCE_REFUSED.note(velocity_percent=velocity, pressure_percent=pressure)
 
 
@@ -93,6 +93,6 @@ def follows_closely(blocks: Blocks, fit: PointFit) -> bool:
     Returns
     -------
     bool
-        Whether it leaves no more than `CLOSELY`, noise included: much noise may hide a fault.
+        Whether it leaves no more than `CLOSE_RESIDUALS`, noise included: much noise may hide a fault.
     """
-    return bool(np.all(fit.scales <= np.array(CLOSELY) * blocks.sizes))
+    return bool(np.all(fit.scales <= np.array(CLOSE_RESIDUALS) * blocks.rms))

@@ -14,10 +14,10 @@ from estimation.eha.explanation_notes import LEAKAGE_COURSE
 from estimation.finding import Quantity
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import RigCode
-from faults.diagnosis.beyond_nine.load import Loaded
-from faults.diagnosis.beyond_nine.wear import whatever_fault
+from faults.diagnosis.beyond_nine.load import LoadedDiagnosis
+from faults.diagnosis.beyond_nine.wear import with_other_faults
 from faults.diagnosis.calibration import Calibration, shipped_calibration
-from faults.diagnosis.changes.warming import with_course
+from faults.diagnosis.changes.warming import with_leakage_course
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
@@ -31,16 +31,18 @@ from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note
 
-EARLIER = (0.5, 0.0)
+EARLIER_PLACES = (0.5, 0.0)
 """Other places of the rig file's oil besides the end of a log [fraction of it]: over a factor of 2, as in a log that
 warms by some 15 K, neighbouring places are three deviations of actuators of one kind apart, so none is farther than 1.5
 away."""
 
-PLACED = {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}
+OIL_OBJECTIONS = {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}
 """Objections to a log with one oil, and not with another."""
 
 
-def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Sequence[Note]) -> Loaded:
+def averaged_over_drift(
+    diagnosed: Callable[[CleanLog], LoadedDiagnosis], log: CleanLog, notes: Sequence[Note]
+) -> LoadedDiagnosis:
     """Return a diagnosis whose classes are averaged over the place in the drift of the rig file's oil.
 
     All places have the same prior, and count by how well the nine conditions fit the log there. An objection to the
@@ -63,7 +65,7 @@ def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Se
     """
     last = diagnosed(log)
     if (drift := last.diagnosis.scoreboard.drift) is not None:
-        log, note = with_course(log, drift)
+        log, note = with_leakage_course(log, drift)
         last, notes = diagnosed(log), (*notes, note)
         last = last._replace(notes=(note, *last.notes))
         if note.code is RigCode.LEAKAGE_GROWS:
@@ -71,32 +73,32 @@ def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Se
     if all(note.code is not RigCode.LEAKAGE_DRIFTS for note in notes):
         return last
     course = log.record[LEAKAGE_COURSE]
-    there = [float(course[round(share * (len(course) - 1))]) for share in EARLIER]
+    there = [float(course[round(share * (len(course) - 1))]) for share in EARLIER_PLACES]
     found = [last.diagnosis, *(diagnosed(_with_oil_of(log, one)).diagnosis for one in there)]
-    placed = next((one for one in found if _is_placed(one)), found[0])
+    placed = next((one for one in found if _has_no_oil_objection(one)), found[0])
     calibration = shipped_calibration()
     if drift is not None:
         actuator = actuator_of(last.parameters)
-        found[0] = _followed(found, [1.0, *there], actuator, calibration)
+        found[0] = _refitted_from_best(found, [1.0, *there], actuator, calibration)
         # a circuit within one of the nine conditions ranks first, then the one with more evidence
-        ranks = [(_is_placed(one), _evidence(one.scoreboard, calibration)) for one in found]
+        ranks = [(_has_no_oil_objection(one), _evidence(one.scoreboard, calibration)) for one in found]
         likeliest = ranks.index(max(ranks))
-        placed = found[likeliest] = whatever_fault(found[likeliest], actuator, calibration)
+        placed = found[likeliest] = with_other_faults(found[likeliest], actuator, calibration)
     diagnosis = replace(
         found[0],
-        probabilities=weighed(found, calibration),
+        probabilities=averaged_probabilities(found, calibration),
         against=placed.against,
-        severity={name: _whatever_the_oil(name, found) for name in found[0].severity},
+        severity={name: _severity_over_places(name, found) for name in found[0].severity},
         not_told=placed.not_told if drift is not None else found[0].not_told,
     )
     return last._replace(diagnosis=diagnosis)
 
 
-def _is_placed(one: Diagnosis) -> bool:
-    return not any(note.code in PLACED for note in one.against)
+def _has_no_oil_objection(one: Diagnosis) -> bool:
+    return not any(note.code in OIL_OBJECTIONS for note in one.against)
 
 
-def _followed(
+def _refitted_from_best(
     found: Sequence[Diagnosis], courses: Sequence[float], actuator: Actuator, calibration: Calibration
 ) -> Diagnosis:
     """Return the diagnosis at the end of a log, its circuit fitted on from another place's where that follows better.
@@ -115,14 +117,14 @@ def _followed(
     return replace(last, scoreboard=replace(board, fits=fits), severity=severity)
 
 
-def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str, float]:
+def averaged_probabilities(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str, float]:
     """Return the probability of each condition over diagnoses of one log, with equal priors.
 
     Parameters
     ----------
     found : sequence of Diagnosis
-        Diagnoses; they count by their evidences, as far as a wrong model's error lets them (`_looks`), if all compare
-        the same part of the log, otherwise equally.
+        Diagnoses; they count by their evidences, as far as a wrong model's error lets them (`_evidence_share`), if all
+        compare the same part of the log, otherwise equally.
     calibration : Calibration
         Weights of the evidences.
 
@@ -137,12 +139,12 @@ def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str
     shares = np.ones(len(boards))
     if alike:
         evidences = np.array([_evidence(board, calibration) for board in boards])
-        shares = np.exp(min(map(_looks, boards)) * (evidences - np.max(evidences)))
+        shares = np.exp(min(map(_evidence_share, boards)) * (evidences - np.max(evidences)))
     each: Array = np.array([list(one.probabilities.values()) for one in found])
     return dict(zip(found[0].probabilities, (float(one) for one in shares @ each / np.sum(shares)), strict=True))
 
 
-def _looks(board: Scoreboard) -> float:
+def _evidence_share(board: Scoreboard) -> float:
     """Return the share of a log's evidence that counts between places of the rig file's oil [fraction].
 
     Places differ by friction of a few percent, and so does a friction law from the real one. Residuals beyond noise are
@@ -167,7 +169,7 @@ def _with_oil_of(log: CleanLog, leakage: float) -> CleanLog:
     return replace(log, record=log.record.replace(**{LEAKAGE_COURSE: course}))
 
 
-def _whatever_the_oil(name: str, found: Sequence[Diagnosis]) -> Quantity:
+def _severity_over_places(name: str, found: Sequence[Diagnosis]) -> Quantity:
     """Return a severity as at the end of a log, with a total interval that includes those of all places."""
     each = [one.severity[name] for one in found]
     ends = [one.ci95 for one in each if one.ci95 is not None]

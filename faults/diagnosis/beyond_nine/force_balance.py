@@ -18,33 +18,33 @@ from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE
 from plant.eha.model import EhaParameters
 
-BROKEN_LOOSE = 1e-4
+BREAKAWAY_TRAVEL = 1e-4
 """Travel after a reversal from which friction is that of sliding [m]: five times the strain of the seals; judged."""
 
-HEARD = 4.0
+LEAST_SPEED_TO_NOISE = 4.0
 """Velocity over its noise from which its direction is known [dimensionless], in standard deviations."""
 
 FEWEST = 20
 """Least number of blocks with a sliding piston [count]: 0.2 s."""
 
-UNLIKE = 0.3
-"""Relative difference of friction at rest within a condition [dimensionless], as in `WEAK`."""
+FRICTION_SPREAD = 0.3
+"""Relative difference of friction at rest within a condition [dimensionless], as in `WEAK_PRIOR`."""
 
-FREE = 10.0
+WIDE_PRIOR = 10.0
 """Prior size of the other coefficients, over the largest in any condition [dimensionless]."""
 
-SURE = 4.0
+SURE_DEVIATIONS = 4.0
 """Standard deviations from which a load is believed [dimensionless]. In 119 plain training logs none exceeds 1.4."""
 
-LEAST = {"load_force": 0.05, "load_stiffness": 0.01, "moving_mass": 0.01}
+LEAST_SHARES = {"load_force": 0.05, "load_stiffness": 0.01, "moving_mass": 0.01}
 """Share of the pressure force, root mean square, from which a load matters [fraction]: a sensor offset can look like a
 constant force, which counts from 0.05 on, and nothing looks like the others."""
 
-LAGGING = 8.0
+HIDDEN_INERTIA = 8.0
 """Standard deviation of an inertia that friction may hide, as it lags behind speed [kg]: of 60 to 300 kg up to 12 were
 hidden in training logs in which the balance alone was certain to 4."""
 
-NAMES = tuple(LEAST)
+LOAD_NAMES = tuple(LEAST_SHARES)
 """Loads on a rod, as in the actuator's entries."""
 
 
@@ -68,21 +68,21 @@ class Loads:
     shares: Array
 
     @property
-    def sure(self) -> tuple[str, ...]:
-        """Those of `NAMES` that are certain; springs and masses are positive."""
-        sure = np.abs(self.values) > SURE * self.std
+    def certain(self) -> tuple[str, ...]:
+        """Those of `LOAD_NAMES` that are certain; springs and masses are positive."""
+        sure = np.abs(self.values) > SURE_DEVIATIONS * self.std
         sure[1:] &= self.values[1:] > 0.0
-        return tuple(name for name, one in zip(NAMES, sure, strict=True) if one)
+        return tuple(name for name, one in zip(LOAD_NAMES, sure, strict=True) if one)
 
     @property
-    def believed(self) -> tuple[str, ...]:
+    def significant(self) -> tuple[str, ...]:
         """Those that are also large enough to matter."""
-        large = dict(zip(NAMES, self.shares, strict=True))
-        return tuple(name for name in self.sure if large[name] > LEAST[name])
+        large = dict(zip(LOAD_NAMES, self.shares, strict=True))
+        return tuple(name for name in self.certain if large[name] > LEAST_SHARES[name])
 
     def of(self, name: str) -> tuple[float, float]:
         """Return a load and its standard deviation [N, N/m or kg]."""
-        at = NAMES.index(name)
+        at = LOAD_NAMES.index(name)
         return float(self.values[at]), float(self.std[at])
 
 
@@ -126,14 +126,14 @@ def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
     if balance is None:
         return None
     columns, push = balance.columns, balance.push
-    believed, spread = friction_believed(p)
-    count = len(NAMES)
-    found, covariance = _regressed(
+    believed, spread = friction_prior(p)
+    count = len(LOAD_NAMES)
+    found, covariance = _regression(
         columns, push, np.append(np.zeros(count), believed), np.append(np.full(count, np.inf), spread)
     )
     values, std = found[:count], np.sqrt(np.maximum(np.diag(covariance)[:count], 0.0))
     # with unequal areas, the inner circuit's pressure exerts a force, and that pressure is not measured
-    std = np.hypot(std, [p.piston_area * p.area_difference * _held(p), 0.0, LAGGING])
+    std = np.hypot(std, [p.piston_area * p.area_difference * _twice_held_pressure(p), 0.0, HIDDEN_INERTIA])
     size = p.piston_area * float(np.sqrt(np.mean(balance.pressure**2)))
     forces = np.abs(values) * [1.0, float(np.std(columns[:, 1])), float(np.std(columns[:, 2]))]
     return Loads(values, std, forces / max(size, np.finfo(np.float64).tiny))
@@ -165,7 +165,7 @@ def sliding_balance(blocks: Blocks, p: EhaParameters) -> Balance | None:
         return None
     v, dp, x, a = velocity[use], blocks.pressure[use], position[use], np.gradient(velocity, step)[use]
     push = (
-        p.piston_area * (dp + p.area_difference * (_held(p) + np.abs(dp)))
+        p.piston_area * (dp + p.area_difference * (_twice_held_pressure(p) + np.abs(dp)))
         - p.moving_mass * a
         - p.load_force
         - p.load_stiffness * x
@@ -173,12 +173,12 @@ def sliding_balance(blocks: Blocks, p: EhaParameters) -> Balance | None:
     return Balance(use, np.column_stack([np.ones(len(v)), x, a, np.sign(v), v, v * np.abs(v)]), push, dp)
 
 
-def _held(p: EhaParameters) -> float:
+def _twice_held_pressure(p: EhaParameters) -> float:
     """Return twice the gauge pressure of the chamber at the inner circuit's pressure [Pa]."""
     return 2.0 * (p.accumulator_pressure - ATMOSPHERE)
 
 
-def _regressed(columns: Array, push: Array, centre: Array, doubt: Array) -> tuple[Array, Array]:
+def _regression(columns: Array, push: Array, centre: Array, doubt: Array) -> tuple[Array, Array]:
     """Return coefficients and their covariance, from their priors and with lasting errors."""
     sizes = np.maximum(np.max(np.abs(columns), axis=0), np.finfo(np.float64).tiny)
     scaled, pull = columns / sizes, 1.0 / (doubt * sizes) ** 2
@@ -211,10 +211,15 @@ def sliding_blocks(blocks: Blocks) -> NDArray[np.bool_]:
     turned = np.append(True, way[1:] != way[:-1])
     since = gone - np.maximum.accumulate(np.where(turned, gone, 0.0))
     same = np.append(way[1:] == way[:-1], False)
-    return np.isfinite(blocks.velocity) & same & (since > BROKEN_LOOSE) & (np.abs(velocity) > HEARD * blocks.noise[0])
+    return (
+        np.isfinite(blocks.velocity)
+        & same
+        & (since > BREAKAWAY_TRAVEL)
+        & (np.abs(velocity) > LEAST_SPEED_TO_NOISE * blocks.noise[0])
+    )
 
 
-def friction_believed(p: EhaParameters) -> tuple[Array, Array]:
+def friction_prior(p: EhaParameters) -> tuple[Array, Array]:
     """Return the prior of friction, whatever the condition.
 
     Parameters
@@ -230,5 +235,7 @@ def friction_believed(p: EhaParameters) -> tuple[Array, Array]:
     each = [parameters_for(condition, p) for condition in CONDITIONS.values()]
     rest, linear, bent = np.array([[q.friction_coulomb, q.friction_linear, q.friction_quadratic] for q in each]).T
     middle = float(np.mean(rest))
-    spread = np.array([float(np.std(rest)) + UNLIKE * middle, FREE * np.max(np.abs(linear)), FREE * np.max(bent)])
+    spread = np.array(
+        [float(np.std(rest)) + FRICTION_SPREAD * middle, WIDE_PRIOR * np.max(np.abs(linear)), WIDE_PRIOR * np.max(bent)]
+    )
     return np.array([middle, 0.0, 0.0]), np.maximum(spread, np.finfo(np.float64).tiny)

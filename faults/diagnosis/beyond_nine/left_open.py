@@ -11,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.eha.rig_share import DELIVERY_ENTRY
-from estimation.fits.hypotheses import PRESUMED
+from estimation.fits.hypotheses import PRIOR_SPREADS
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS
 from faults.notes import ClassCode
 from plant.arrays import Array
 from plant.notes import Note
 
-WORTH_SAYING = 0.01
+LEAST_REPORTED = 0.01
 """Probability of a fault from which it is reported beside its name [probability]."""
 
 LOWEST = 0.1
@@ -28,19 +28,19 @@ DELIVERIES = (0.7, 0.75, 0.8, 0.85, 0.9)
 """Deliveries of worn pumps over their displacement [dimensionless]. In a log of 10 s, a pump of 0.85 is likelier than a
 sound one by 50 of log-likelihood; its neighbours at 0.8 and 0.9 are no likelier than a sound one."""
 
-SO_WORN = math.log(0.5)
+DELIVERY_LOG_PRIOR = math.log(0.5)
 """Prior log-probability of one of them, beside that of wear [dimensionless]: each stands for 5 % of the displacement, a
 sound pump for 10 %."""
 
-WELL_WORN = 0.8
+WELL_WORN_DELIVERY = 0.8
 """Delivery up to which a pump is worn whatever the accuracy of the rig file's displacement [dimensionless]: an entry
 may be off by 5 %, and the prior of wear has a deviation of 15 %."""
 
-UNSEEN = 1.0 / (1.0 + len(CONDITIONS))
+STUCK_VALVE_PRIOR = 1.0 / (1.0 + len(CONDITIONS))
 """Probability that a make-up valve which never opens in a log is stuck shut [probability]: as likely as each of the
 nine conditions before a log is seen."""
 
-STAYS = 0.5
+SAME_CONDITION = 0.5
 """Probability of a condition, given a fault, from which it is the same as without the fault [probability]."""
 
 
@@ -62,7 +62,7 @@ class OpenFault(NamedTuple):
     scores: Array
 
 
-def odds_of_hidden_relief(pressure: float, setting: float) -> float:
+def hidden_relief_log_prior(pressure: float, setting: float) -> float:
     """Return the prior log-probability that a low relief valve never opens in a log.
 
     Parameters
@@ -80,7 +80,7 @@ def odds_of_hidden_relief(pressure: float, setting: float) -> float:
 
     Examples
     --------
-    >>> odds_of_hidden_relief(3.4e5, 3.4e6), odds_of_hidden_relief(3.4e6, 3.4e6)
+    >>> hidden_relief_log_prior(3.4e5, 3.4e6), hidden_relief_log_prior(3.4e6, 3.4e6)
     (0.0, -inf)
     """
     if not 0.0 < pressure < setting:
@@ -103,18 +103,18 @@ def odds_of_wear(scores: Sequence[float], sound: float) -> float:
     Returns
     -------
     float
-        Logarithm of the ratio of pumps that deliver at most `WELL_WORN` to sound ones [dimensionless].
+        Logarithm of the ratio of pumps that deliver at most `WELL_WORN_DELIVERY` to sound ones [dimensionless].
 
     Examples
     --------
     >>> odds_of_wear([-9.0, -9.0, 0.0, 9.0, 9.0], 0.0) < 0.0 < odds_of_wear([-9.0, 0.0, 2.0, 0.0, 0.0], 0.0)
     True
     """
-    well = np.array(DELIVERIES) <= WELL_WORN
-    return float(np.logaddexp.reduce((np.array(scores) - sound + presumed_of_wear(DELIVERIES))[well]))
+    well = np.array(DELIVERIES) <= WELL_WORN_DELIVERY
+    return float(np.logaddexp.reduce((np.array(scores) - sound + delivery_log_priors(DELIVERIES))[well]))
 
 
-def presumed_of_wear(shares: Sequence[float]) -> Array:
+def delivery_log_priors(shares: Sequence[float]) -> Array:
     """Return the prior log-probabilities of pump deliveries.
 
     Parameters
@@ -125,14 +125,16 @@ def presumed_of_wear(shares: Sequence[float]) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        Half a normal distribution of the logarithm of deviation `PRESUMED`, with `SO_WORN`; 0 for a sound pump
-        [dimensionless].
+        Half a normal distribution of the logarithm of deviation `PRIOR_SPREADS`, with `DELIVERY_LOG_PRIOR`; 0 for a
+        sound pump [dimensionless].
     """
     delivered = np.asarray(shares, dtype=np.float64)
-    return -0.5 * (np.log(delivered) / PRESUMED[DELIVERY_ENTRY]) ** 2 + np.where(delivered < 1.0, SO_WORN, 0.0)
+    return -0.5 * (np.log(delivered) / PRIOR_SPREADS[DELIVERY_ENTRY]) ** 2 + np.where(
+        delivered < 1.0, DELIVERY_LOG_PRIOR, 0.0
+    )
 
 
-def probabilities_of(odds: Mapping[str, float]) -> dict[str, float]:
+def fault_probabilities(odds: Mapping[str, float]) -> dict[str, float]:
     """Return the probability of each of several faults, of which at most one is present.
 
     Parameters
@@ -147,16 +149,16 @@ def probabilities_of(odds: Mapping[str, float]) -> dict[str, float]:
 
     Examples
     --------
-    >>> {name: round(chance, 2) for name, chance in probabilities_of({"one": 0.0, "other": 0.0}).items()}
+    >>> {name: round(chance, 2) for name, chance in fault_probabilities({"one": 0.0, "other": 0.0}).items()}
     {'one': 0.33, 'other': 0.33}
-    >>> probabilities_of({"one": -math.inf})
+    >>> fault_probabilities({"one": -math.inf})
     {'one': 0.0}
     """
     together = np.logaddexp.reduce([0.0, *odds.values()])
     return {name: math.exp(one - together) for name, one in odds.items()}
 
 
-def not_excluded(faults: Sequence[OpenFault], sound: Array) -> tuple[Note, ...]:
+def not_excluded_notes(faults: Sequence[OpenFault], sound: Array) -> tuple[Note, ...]:
     """Return a note that names the faults that a log does not exclude, and the condition given each of them.
 
     Parameters
@@ -173,16 +175,16 @@ def not_excluded(faults: Sequence[OpenFault], sound: Array) -> tuple[Note, ...]:
     """
     if not faults:
         return ()
-    named = [f"{one.name} ({100.0 * one.chance:.0f} %)" if one.chance > WORTH_SAYING else one.name for one in faults]
+    named = [f"{one.name} ({100.0 * one.chance:.0f} %)" if one.chance > LEAST_REPORTED else one.name for one in faults]
     names, likeliest = list(CONDITIONS), int(np.argmax(sound))
-    moved = [one for one in faults if one.chance > WORTH_SAYING and _share(one.scores, likeliest) < STAYS]
+    moved = [one for one in faults if one.chance > LEAST_REPORTED and _share(one.scores, likeliest) < SAME_CONDITION]
     others = {one.name: names[int(np.argmax(one.scores))] for one in moved}
     beside = ", and ".join(f"with {name} it would be {_in_words(one)}" for name, one in others.items())
     condition = f"the condition would be the same, but {beside}" if beside else "the condition would be the same"
     return (ClassCode.NOT_EXCLUDED.note(faults=", ".join(named), condition=condition),)
 
 
-def beside_unseen_valve(
+def with_unseen_valve(
     probabilities: Mapping[str, float], not_told: Sequence[Note]
 ) -> tuple[Mapping[str, float], tuple[Note, ...]]:
     """Return the classes of a log in which a make-up valve never opened: if it is stuck shut, none of the nine holds.
@@ -205,11 +207,11 @@ def beside_unseen_valve(
     """
     if not probabilities or all(note.code is not RigCode.MAKEUP_UNSEEN for note in not_told):
         return probabilities, ()
-    left = {name: (1.0 - UNSEEN) * share for name, share in probabilities.items()}
-    return left, (ClassCode.STUCK_NOT_TOLD.note(percent=100.0 * UNSEEN * sum(probabilities.values())),)
+    left = {name: (1.0 - STUCK_VALVE_PRIOR) * share for name, share in probabilities.items()}
+    return left, (ClassCode.STUCK_NOT_TOLD.note(percent=100.0 * STUCK_VALVE_PRIOR * sum(probabilities.values())),)
 
 
-def likelier_fault(probabilities: Mapping[str, float], not_told: Sequence[Note]) -> tuple[Note, ...]:
+def likelier_fault_notes(probabilities: Mapping[str, float], not_told: Sequence[Note]) -> tuple[Note, ...]:
     """Return the notes on faults that a log does not exclude, if these are likelier than each of the nine.
 
     They are then a reason against all nine: a verdict would name something less likely.

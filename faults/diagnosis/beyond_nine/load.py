@@ -13,7 +13,13 @@ import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import interval_95
-from faults.diagnosis.beyond_nine.force_balance import LEAST, SURE, Loads, force_balance, friction_believed
+from faults.diagnosis.beyond_nine.force_balance import (
+    LEAST_SHARES,
+    SURE_DEVIATIONS,
+    Loads,
+    force_balance,
+    friction_prior,
+)
 from faults.diagnosis.beyond_nine.varying_load import varying_load
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.blocks import Blocks
@@ -25,11 +31,11 @@ from plant.notes import Note
 LOADS_TRIED = 3
 """Most circuits that are fitted under a load: each bias gives a correction by one linear step."""
 
-ASKING = {AgainstCode.PRESSURE_BIAS, AgainstCode.UNEXPLAINED}
+LOAD_OBJECTIONS = {AgainstCode.PRESSURE_BIAS, AgainstCode.UNEXPLAINED}
 """Objections to a circuit under a wrong load."""
 
 
-class Loaded(NamedTuple):
+class LoadedDiagnosis(NamedTuple):
     """A diagnosis under the load that explains a log.
 
     Parameters
@@ -47,11 +53,13 @@ class Loaded(NamedTuple):
     notes: tuple[Note, ...] = ()
 
 
-Diagnosed: TypeAlias = Callable[[EhaParameters, float], Diagnosis]
+DiagnoseAround: TypeAlias = Callable[[EhaParameters, float], Diagnosis]
 """Diagnosis by a circuit fitted around an actuator, given the standard deviation of the force on its rod [N]."""
 
 
-def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkModulusEstimate) -> Loaded:
+def with_rod_load(
+    diagnosed: DiagnoseAround, parameters: EhaParameters, estimate: BulkModulusEstimate
+) -> LoadedDiagnosis:
     """Return a diagnosis under the load that explains a log.
 
     Parameters
@@ -72,19 +80,19 @@ def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkMo
     """
     first = diagnosed(parameters, 0.0)
     blocks = first.scoreboard.blocks
-    seen, asks = force_balance(blocks, parameters), _asks(first)
-    names = () if seen is None else seen.sure if asks else seen.believed
+    seen, asks = force_balance(blocks, parameters), _suggests_load(first)
+    names = () if seen is None else seen.certain if asks else seen.significant
     guesses: Iterable[EhaParameters] = ()
     if seen is not None and names:
         guesses = [with_loads(parameters, seen, names)]
-    elif asks and _open(seen, blocks, parameters):
+    elif asks and _allows_force(seen, blocks, parameters):
         guesses = first_guesses(blocks, parameters, estimate, seen)
-    found = _followed(diagnosed, guesses, seen, parameters)
-    if found is not None and (asks or _better(found.diagnosis, first)):
+    found = _first_following(diagnosed, guesses, seen, parameters)
+    if found is not None and (asks or _follows_better(found.diagnosis, first)):
         return found
     left = any(note.code is AgainstCode.UNEXPLAINED for note in first.against)
     varies = varying_load(blocks, parameters) if left else None
-    return Loaded(first if varies is None else replace(first, against=(varies, *first.against)), parameters)
+    return LoadedDiagnosis(first if varies is None else replace(first, against=(varies, *first.against)), parameters)
 
 
 def with_loads(p: EhaParameters, seen: Loads, names: Sequence[str]) -> EhaParameters:
@@ -133,20 +141,20 @@ def first_guesses(
         yield replace(parameters, load_force=float(np.nanmean(blocks.pressure)) * parameters.piston_area)
 
 
-def _followed(
-    diagnosed: Diagnosed,
+def _first_following(
+    diagnosed: DiagnoseAround,
     guesses: Iterable[EhaParameters],
     seen: Loads | None,
     rig: EhaParameters,
-) -> Loaded | None:
+) -> LoadedDiagnosis | None:
     """Return the first load under which a circuit follows the log, each corrected by the remaining bias."""
-    std = _force(seen, rig)[1]
+    std = _force_and_std(seen, rig)[1]
     for guess in guesses:
         loaded = guess
         for _ in range(LOADS_TRIED):
             found = diagnosed(loaded, std if loaded.load_force != rig.load_force else 0.0)
-            if not _asks(found):
-                return _told(found, loaded, seen, rig)
+            if not _suggests_load(found):
+                return _with_load_notes(found, loaded, seen, rig)
             biases = [float(note.data["bias_pa"]) for note in found.against if note.code is AgainstCode.PRESSURE_BIAS]
             if not biases:
                 break
@@ -154,11 +162,13 @@ def _followed(
     return None
 
 
-def _told(found: Diagnosis, loaded: EhaParameters, seen: Loads | None, rig: EhaParameters) -> Loaded | None:
+def _with_load_notes(
+    found: Diagnosis, loaded: EhaParameters, seen: Loads | None, rig: EhaParameters
+) -> LoadedDiagnosis | None:
     """Return a diagnosis with its loads by name; None if the force balance contradicts them."""
     more = loaded.load_force - rig.load_force
-    force, std = _force(seen, rig)
-    if seen is not None and more != 0.0 and abs(more - force) > SURE * std:
+    force, std = _force_and_std(seen, rig)
+    if seen is not None and more != 0.0 and abs(more - force) > SURE_DEVIATIONS * std:
         return None
     notes: list[Note] = []
     if more != 0.0:
@@ -171,14 +181,14 @@ def _told(found: Diagnosis, loaded: EhaParameters, seen: Loads | None, rig: EhaP
     if seen is not None and (value := loaded.moving_mass) != rig.moving_mass:
         low, high = interval_95(value, seen.of("moving_mass")[1])
         notes.append(ClassCode.MASS_ON_ROD.note(value=value, low=low, high=high, rig=rig.moving_mass))
-    return Loaded(found, loaded, tuple(notes))
+    return LoadedDiagnosis(found, loaded, tuple(notes))
 
 
-def _asks(found: Diagnosis) -> bool:
-    return any(note.code in ASKING for note in found.against)
+def _suggests_load(found: Diagnosis) -> bool:
+    return any(note.code in LOAD_OBJECTIONS for note in found.against)
 
 
-def _better(found: Diagnosis, first: Diagnosis) -> bool:
+def _follows_better(found: Diagnosis, first: Diagnosis) -> bool:
     """Return whether a circuit under a load follows a log better than one without, without further objections."""
     (under, loaded), (free, without) = ((one.scoreboard.blocks, one.scoreboard.fits) for one in (found, first))
     if len(found.against) > len(first.against):
@@ -188,17 +198,17 @@ def _better(found: Diagnosis, first: Diagnosis) -> bool:
     return misfit(under, loaded.best.fitted) < misfit(free, without.best.fitted) - LASTING
 
 
-def _open(seen: Loads | None, blocks: Blocks, p: EhaParameters) -> bool:
+def _allows_force(seen: Loads | None, blocks: Blocks, p: EhaParameters) -> bool:
     """Return whether the force balance allows a constant force that matters."""
     if seen is None or blocks.pressure is None:
         return True
     size = p.piston_area * float(np.sqrt(np.nanmean(blocks.pressure**2)))
-    return SURE * seen.of("load_force")[1] > LEAST["load_force"] * size
+    return SURE_DEVIATIONS * seen.of("load_force")[1] > LEAST_SHARES["load_force"] * size
 
 
-def _force(seen: Loads | None, p: EhaParameters) -> tuple[float, float]:
+def _force_and_std(seen: Loads | None, p: EhaParameters) -> tuple[float, float]:
     """Return the constant force and its standard deviation [N]; friction holds a sticking piston either way."""
     if seen is not None:
         return seen.of("load_force")
-    rest, spread = (one[0] for one in friction_believed(p))
+    rest, spread = (one[0] for one in friction_prior(p))
     return 0.0, float(rest + spread)

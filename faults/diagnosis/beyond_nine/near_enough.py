@@ -10,16 +10,16 @@ from dataclasses import replace
 
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.class_regions import ClassFits, how_near, lasting_misfit
+from faults.diagnosis.circuits.class_regions import ClassFits, lasting_misfit, nearest_score
 from faults.diagnosis.circuits.out_of_model import FARTHEST_OUT
 from faults.notes import AgainstCode
 from plant.notes import Note
 
-BESIDE = (AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS)
+OUTSIDE_CODES = (AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS)
 """Objections to a circuit outside the nine conditions."""
 
 
-def only_beside(against: Sequence[Note]) -> bool:
+def is_only_outside(against: Sequence[Note]) -> bool:
     """Return whether the only objection to the nine is that the circuit is outside them.
 
     Returns
@@ -27,10 +27,10 @@ def only_beside(against: Sequence[Note]) -> bool:
     bool
         Also True if there is no objection.
     """
-    return all(note.code in BESIDE for note in against)
+    return all(note.code in OUTSIDE_CODES for note in against)
 
 
-def lies_beside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> bool:
+def is_outside_conditions(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> bool:
     """Return whether circuits are outside the nine conditions by more than a lasting model error.
 
     Parameters
@@ -48,4 +48,4 @@ def lies_beside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> bool:
         Whether the nearest condition's region contains none of them.
     """
     lasting = max(fits.lasting, lasting_misfit(fits.best.fitted, blocks))
-    return how_near(replace(fits, lasting=lasting), blocks, actuator) < -FARTHEST_OUT
+    return nearest_score(replace(fits, lasting=lasting), blocks, actuator) < -FARTHEST_OUT

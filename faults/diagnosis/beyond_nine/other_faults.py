@@ -17,25 +17,25 @@ import numpy as np
 from faults.conditions import CONDITIONS
 from faults.diagnosis.beyond_nine.left_open import (
     DELIVERIES,
-    UNSEEN,
-    WORTH_SAYING,
+    LEAST_REPORTED,
+    STUCK_VALVE_PRIOR,
     OpenFault,
-    not_excluded,
-    odds_of_hidden_relief,
+    delivery_log_priors,
+    fault_probabilities,
+    hidden_relief_log_prior,
+    not_excluded_notes,
     odds_of_wear,
-    presumed_of_wear,
-    probabilities_of,
 )
-from faults.diagnosis.beyond_nine.sound_circuit import Tried, largest_pressure, likely, sound_circuit
+from faults.diagnosis.beyond_nine.sound_circuit import Trial, largest_pressure, log_likelihood, sound_circuit
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_fit import LASTING, WITHIN, misfit, nominal_runs
+from faults.diagnosis.circuits.class_fit import CONDITION_SPREAD, LASTING, misfit, nominal_runs
 from faults.diagnosis.circuits.class_regions import PRESSURE_SCALE, ClassFits, fit_classes, is_stuck
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
-from plant.eha.one_sided import one_sided
+from plant.eha.one_sided import with_make_up_faults
 from plant.notes import Note
 
 GAIN = 4.0
@@ -62,38 +62,38 @@ EARLY = "a relief valve that opens early"
 STUCK = "a make-up valve that is stuck shut"
 """Name of that fault. A valve that never has to open leaves no trace."""
 
-LEFT_UNSEEN = math.log(UNSEEN / (1.0 - UNSEEN))
+UNSEEN_STUCK_ODDS = math.log(STUCK_VALVE_PRIOR / (1.0 - STUCK_VALVE_PRIOR))
 """Prior log-odds of a stuck valve if the log does not show it [dimensionless]: as with pressure."""
 
 SOUND = "a sound circuit"
 """Name of a circuit that differs from the rig file's in what no rig file states."""
 
-LIKELIER = 10.0
+BELIEVED_ODDS = 10.0
 """How many times likelier than a sound pump a well worn one must be to be believed [dimensionless]: evidence is called
 strong above that (Jeffreys, Theory of Probability, 1961, appendix B). In 16 sound training logs under major leakage and
 friction none exceeds 1.4."""
 
-SHUT = (0.9, 0.97, 0.99, 1.0)
+SHUT_SHARES = (0.9, 0.97, 0.99, 1.0)
 """Shares of a make-up valve that are blocked [dimensionless]: one that passes a little oil looks like friction beside
 one that passes none. A search finds no more than its neighbours."""
 
-SEATS = (0.4, 1.0)
+SEAT_LEAKAGES = (0.4, 1.0)
 """Leakage past the seat of a make-up valve, over the whole leakage of an actuator with major leakage
 [dimensionless]."""
 
 SETTINGS = (0.75, 0.9)
 """Settings of a relief valve, over the largest pressure of the sound circuit in the log [dimensionless]."""
 
-SO_SET = math.log(math.log(SETTINGS[1] / SETTINGS[0]) / math.log(10.0))
+SETTING_LOG_PRIOR = math.log(math.log(SETTINGS[1] / SETTINGS[0]) / math.log(10.0))
 """Prior log-probability of such a setting [dimensionless]: it may be as low as a tenth of the right one, below which no
 piston slides, and each of `SETTINGS` stands for those near it."""
 
-SET_AS_SAID = 0.1
+SETTING_SPREAD = 0.1
 """Deviation of the logarithm of a relief valve's setting, judged [dimensionless]: one sound about the rig file's, and
 one set low about the nearest of `SETTINGS`."""
 
 
-class Outside(NamedTuple):
+class OutsideFaults(NamedTuple):
     """Findings on faults outside the nine conditions.
 
     Parameters
@@ -102,7 +102,7 @@ class Outside(NamedTuple):
         The fault that a log shows, a reason against all nine.
     open : tuple of Note
         The faults that the log leaves open.
-    worn : ndarray, shape (1 + pumps, 9), optional
+    worn_scores : ndarray, shape (1 + pumps, 9), optional
         How well each condition fits the log with a sound pump, then with each of `DELIVERIES`: log-likelihoods
         [dimensionless]; None if a worn pump is excluded.
     faulty : float
@@ -111,7 +111,7 @@ class Outside(NamedTuple):
 
     against: tuple[Note, ...] = ()
     open: tuple[Note, ...] = ()
-    worn: Array | None = None
+    worn_scores: Array | None = None
     faulty: float = 0.0
 
 
@@ -127,50 +127,50 @@ class _Fault:
     note: Note
     name: str
     circuit: CircuitParameters
-    elsewhere: bool = False
-    presumed: float = 0.0
-    beyond: float = 0.0
+    in_another_condition: bool = False
+    log_prior: float = 0.0
+    extra_gain: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Beside:
+class _FaultyCircuits:
     """Circuits with faults beside the best sound one: what each gains over it in explaining a log."""
 
     blocks: Blocks
-    faulty: tuple[tuple[_Fault, Tried], ...]
-    sound: Tried
+    faulty: tuple[tuple[_Fault, Trial], ...]
+    sound: Trial
 
-    def gain(self, fault: _Fault, tried: Tried) -> float:
+    def gain(self, fault: _Fault, tried: Trial) -> float:
         """Return the log-likelihood that a fault gains, with the prior of its size [dimensionless]."""
-        gain = likely(self.blocks, tried) - likely(self.blocks, self.sound)
-        return gain + fault.presumed + _by_scale(self.blocks, tried, self.sound)
+        gain = log_likelihood(self.blocks, tried) - log_likelihood(self.blocks, self.sound)
+        return gain + fault.log_prior + _scale_gain(self.blocks, tried, self.sound)
 
     @property
-    def leading(self) -> tuple[_Fault, Tried]:
+    def leading(self) -> tuple[_Fault, Trial]:
         """The fault that gains most, and its circuit."""
-        return max(self.faulty, key=lambda one: self.gain(*one) - one[0].beyond)
+        return max(self.faulty, key=lambda one: self.gain(*one) - one[0].extra_gain)
 
     @property
-    def delivered(self) -> list[float]:
+    def delivery_scores(self) -> list[float]:
         """How well pumps with each of `DELIVERIES` explain the log [dimensionless]."""
-        return [likely(self.blocks, tried) for fault, tried in self.faulty if fault.name == WORN]
+        return [log_likelihood(self.blocks, tried) for fault, tried in self.faulty if fault.name == WORN]
 
     @property
-    def wear(self) -> float:
+    def wear_log_odds(self) -> float:
         """Log-odds of a well worn pump against a sound one."""
-        return odds_of_wear(self.delivered, likely(self.blocks, self.sound))
+        return odds_of_wear(self.delivery_scores, log_likelihood(self.blocks, self.sound))
 
     @property
-    def shown(self) -> Note | None:
+    def shown_fault(self) -> Note | None:
         """The fault that is likelier than a sound actuator."""
         fault, tried = self.leading
-        if self.gain(fault, tried) - fault.beyond > GAIN:
+        if self.gain(fault, tried) - fault.extra_gain > GAIN:
             return fault.note
-        worn = self.wear > math.log(LIKELIER)
-        return _delivering(DELIVERIES[int(np.argmax(self.delivered))]) if worn else None
+        worn = self.wear_log_odds > math.log(BELIEVED_ODDS)
+        return _delivery_note(DELIVERIES[int(np.argmax(self.delivery_scores))]) if worn else None
 
 
-def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outside:
+def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> OutsideFaults:
     """Return the fault outside the nine conditions that a log without pressure shows, and those that it leaves open.
 
     Parameters
@@ -188,20 +188,20 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         Empty with pressure, and if the piston sticks.
     """
     if blocks.pressure is not None or is_stuck(blocks, actuator):
-        return Outside()
+        return OutsideFaults()
     runs = nominal_runs(blocks, actuator)
     sound = sound_circuit(blocks, fits, actuator, runs)
-    beside = _Beside(blocks, tuple(_with_each(blocks, sound, runs)), sound)
+    beside = _FaultyCircuits(blocks, tuple(_fits_with_faults(blocks, sound, runs)), sound)
     asked = list[_Fault]()
-    while beside.shown is not None and (leading := beside.leading)[0] not in asked:
+    while beside.shown_fault is not None and (leading := beside.leading)[0] not in asked:
         # a search may end short of the best: the sound circuit is searched again from the faulty one, and once anew
         starts = (leading[1].fits.best.coordinates, *(() if asked else (None,)))
-        again = [Tried(sound.actuator, fit_classes(blocks, sound.actuator, runs=runs, start=start)) for start in starts]
-        beside = replace(beside, sound=max([beside.sound, *again], key=lambda one: likely(blocks, one)))
+        again = [Trial(sound.actuator, fit_classes(blocks, sound.actuator, runs=runs, start=start)) for start in starts]
+        beside = replace(beside, sound=max([beside.sound, *again], key=lambda one: log_likelihood(blocks, one)))
         asked.append(leading[0])
-    if (shown := beside.shown) is not None:
-        return Outside((shown,))
-    sound, gains, likeliest, wear = beside.sound, dict[str, float](), dict[str, Array](), beside.wear
+    if (shown := beside.shown_fault) is not None:
+        return OutsideFaults((shown,))
+    sound, gains, likeliest, wear = beside.sound, dict[str, float](), dict[str, Array](), beside.wear_log_odds
     for fault, tried in beside.faulty:
         gain = beside.gain(fault, tried)
         if gain >= gains.get(fault.name, gain):
@@ -210,19 +210,19 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     if WORN in odds:
         odds[WORN] = wear
     if STUCK in odds:  # a valve that never had to open fits like a sound one, so it keeps at least its prior odds
-        odds[STUCK] = max(odds[STUCK], min(gains[STUCK], 0.0) + LEFT_UNSEEN)
+        odds[STUCK] = max(odds[STUCK], min(gains[STUCK], 0.0) + UNSEEN_STUCK_ODDS)
     best, pressure = sound.fits.scores, largest_pressure(blocks, sound.fits.best, sound.actuator)
-    hidden = odds_of_hidden_relief(pressure, sound.actuator.circuit.relief_pressure) - GAIN
+    hidden = hidden_relief_log_prior(pressure, sound.actuator.circuit.relief_pressure) - GAIN
     likeliest[EARLY] = likeliest[EARLY] if odds.get(EARLY, -math.inf) > hidden else best  # if hidden, no score changes
     odds[EARLY] = float(np.logaddexp(odds.get(EARLY, -math.inf), hidden))
-    chances = probabilities_of(odds)
+    chances = fault_probabilities(odds)
     # if the pressure came near the rig file's setting, few settings remain above it, and a report would say little
-    told = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
+    told = {name: chance for name, chance in chances.items() if name != EARLY or chance > LEAST_REPORTED}
     above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"} if likeliest[EARLY] is best else {}
     open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
     worn = [tried.fits.scores for fault, tried in beside.faulty if fault.name == WORN]
     scores = np.array([best, *worn]) if WORN in odds else None
-    return Outside((), not_excluded(open_, best), scores, sum(chances.values()))
+    return OutsideFaults((), not_excluded_notes(open_, best), scores, sum(chances.values()))
 
 
 def circuits_with_faults(
@@ -249,11 +249,11 @@ def circuits_with_faults(
         [dimensionless], and the circuits with it.
     """
     runs = nominal_runs(blocks, actuator)
-    for fault, tried in _with_each(blocks, sound_circuit(blocks, fits, actuator, runs), runs, HOPELESS - gained):
-        yield fault.presumed - GAIN, tried.fits
+    for fault, tried in _fits_with_faults(blocks, sound_circuit(blocks, fits, actuator, runs), runs, HOPELESS - gained):
+        yield fault.log_prior - GAIN, tried.fits
 
 
-def gains_of_others(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Mapping[str, float]:
+def gains_of_other_circuits(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Mapping[str, float]:
     """Return the gain of other circuits in explaining a log, with or without pressure.
 
     Parameters
@@ -274,35 +274,37 @@ def gains_of_others(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Mapp
     runs = nominal_runs(blocks, actuator)
     sound = sound_circuit(blocks, fits, actuator, runs)
     gains = {SOUND: sound.score - float(np.max(fits.scores))}
-    for fault, tried in _with_each(blocks, sound, runs):
-        gain = tried.score - sound.score + fault.presumed
+    for fault, tried in _fits_with_faults(blocks, sound, runs):
+        gain = tried.score - sound.score + fault.log_prior
         gains[fault.name] = max(gain, gains.get(fault.name, gain))
     return gains
 
 
-def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELESS) -> Iterator[tuple[_Fault, Tried]]:
+def _fits_with_faults(
+    blocks: Blocks, sound: Trial, runs: Array, behind: float = HOPELESS
+) -> Iterator[tuple[_Fault, Trial]]:
     """Yield each fault, and the circuit with it that explains a log best."""
     for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
-        yield fault, _with(fault, blocks, sound, runs, behind)
+        yield fault, _fit_with_fault(fault, blocks, sound, runs, behind)
 
 
-def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: float) -> Tried:
+def _fit_with_fault(fault: _Fault, blocks: Blocks, sound: Trial, runs: Array, behind: float) -> Trial:
     """Return the best circuit with a fault, unless it is too far behind the sound one."""
     faulty = replace(sound.actuator, circuit=fault.circuit)
     wanted = LASTING * (behind - sound.score)  # a region's score is never better than the misfit
-    if not fault.elsewhere:
+    if not fault.in_another_condition:
         start = sound.fits.best.coordinates
-        return Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
+        return Trial(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
     runs = nominal_runs(blocks, faulty)
     start = faulty.conditions[int(np.argmin([misfit(blocks, run) for run in runs]))]
-    roughly = Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
+    roughly = Trial(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
     if roughly.score < sound.score - behind + HOPELESS - THOROUGH:
         return roughly
-    anew = Tried(faulty, fit_classes(blocks, faulty, runs=runs, wanted=wanted))
+    anew = Trial(faulty, fit_classes(blocks, faulty, runs=runs, wanted=wanted))
     return max(roughly, anew, key=lambda one: one.score)
 
 
-def _by_scale(blocks: Blocks, tried: Tried, sound: Tried) -> float:
+def _scale_gain(blocks: Blocks, tried: Trial, sound: Trial) -> float:
     """Return what a low relief valve gains by the scale of pressures, of which no score knows [dimensionless].
 
     Nothing where the sound circuit's valve stays shut: one that opens tells the scale.
@@ -311,18 +313,18 @@ def _by_scale(blocks: Blocks, tried: Tried, sound: Tried) -> float:
     if not tried.actuator.circuit.relief_pressure < setting:
         return 0.0
     opens = largest_pressure(blocks, sound.fits.best.as_run, sound.actuator) >= setting
-    return _likely_scale(tried) - _likely_scale(sound) if opens else 0.0
+    return _scale_log_likelihood(tried) - _scale_log_likelihood(sound) if opens else 0.0
 
 
-def _likely_scale(tried: Tried) -> float:
+def _scale_log_likelihood(tried: Trial) -> float:
     """Return the log-likelihood of a circuit's scale of pressures in the condition that holds it [dimensionless]."""
-    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    pull = np.linalg.solve(CONDITION_SPREAD, PRESSURE_SCALE)
     told = float(pull @ PRESSURE_SCALE)
     off = tried.fits.best.as_run.coordinates - tried.actuator.conditions[int(np.argmax(tried.fits.scores))]
-    return -0.5 * (float(pull @ off) / told) ** 2 / (1.0 / told + SET_AS_SAID**2)
+    return -0.5 * (float(pull @ off) / told) ** 2 / (1.0 / told + SETTING_SPREAD**2)
 
 
-def _delivering(share: float) -> Note:
+def _delivery_note(share: float) -> Note:
     return AgainstCode.PUMP_DELIVERS_LESS.note(percent=100.0 * share)
 
 
@@ -331,17 +333,17 @@ def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
     sound = actuator.circuit
     for share in DELIVERIES:
         worn = replace(sound, pump_displacement=share * sound.pump_displacement)
-        (presumed,) = presumed_of_wear((share,)).tolist()
-        yield _Fault(_delivering(share), WORN, worn, elsewhere=True, beyond=-presumed)
+        (presumed,) = delivery_log_priors((share,)).tolist()
+        yield _Fault(_delivery_note(share), WORN, worn, in_another_condition=True, extra_gain=-presumed)
     for share in SETTINGS if 0.0 < pressure < math.inf else ():
         early = replace(sound, relief_pressure=share * pressure)
-        yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, presumed=SO_SET)
+        yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, log_prior=SETTING_LOG_PRIOR)
     major = actuator.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]
     for side in "ab":
         note = AgainstCode.MAKEUP_STUCK.note(side=side.upper())
-        for share in SHUT:
-            stuck = one_sided(sound, **{f"makeup_shut_{side}": share})
+        for share in SHUT_SHARES:
+            stuck = with_make_up_faults(sound, **{f"makeup_shut_{side}": share})
             yield _Fault(note, STUCK, stuck)
-        for size in SEATS:
-            leaking = one_sided(sound, **{f"seat_leakage_{side}": size * float(np.exp(major))})
+        for size in SEAT_LEAKAGES:
+            leaking = with_make_up_faults(sound, **{f"seat_leakage_{side}": size * float(np.exp(major))})
             yield _Fault(AgainstCode.MAKEUP_LEAKS.note(), "a make-up valve that leaks", leaking)

@@ -11,22 +11,22 @@ import numpy as np
 
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_fit import LASTING, PointFit, nominal_runs
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
-from faults.diagnosis.circuits.out_of_model import unexplained
+from faults.diagnosis.circuits.out_of_model import unexplained_notes
 from plant.arrays import Array
 
-WIDER = 5.0
+MAKEUP_FACTOR = 5.0
 """Factor by which wider make-up valves are tried [dimensionless]: no rig file states them."""
 
-FOLLOWED = 0.005
+FOLLOWED_RESIDUAL = 0.005
 """Residual over the velocity, root mean square, up to which circuits follow a log equally well [dimensionless]: the
 best sound circuit leaves less in one of ten plain training logs of the open benchmark, 1.6 % in the median."""
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class Trial:
     """A circuit, and how well it explains a log within the regions of the nine conditions.
 
     Parameters
@@ -46,8 +46,8 @@ class Tried:
         return float(np.max(self.fits.scores))
 
 
-def likely(blocks: Blocks, tried: Tried) -> float:
-    """Return how well a circuit explains a log, if circuits are no more exact than `FOLLOWED`.
+def log_likelihood(blocks: Blocks, tried: Trial) -> float:
+    """Return how well a circuit explains a log, if circuits are no more exact than `FOLLOWED_RESIDUAL`.
 
     Parameters
     ----------
@@ -59,13 +59,13 @@ def likely(blocks: Blocks, tried: Tried) -> float:
     Returns
     -------
     float
-        Its score, residuals below `FOLLOWED` counted as that [dimensionless].
+        Its score, residuals below `FOLLOWED_RESIDUAL` counted as that [dimensionless].
     """
-    finer = np.fmax(1.0, FOLLOWED * blocks.sizes / tried.fits.best.scales)
+    finer = np.fmax(1.0, FOLLOWED_RESIDUAL * blocks.rms / tried.fits.best.scales)
     return tried.score - float(blocks.counts @ np.log(finer)) / LASTING
 
 
-def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Array) -> Tried:
+def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Array) -> Trial:
     """Return the best circuit without a fault, among some that differ in what no rig file states.
 
     Parameters
@@ -84,19 +84,19 @@ def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Arr
     Tried
         That circuit: the actuator's, one without a drain from the pump's case, with wider make-up valves, or both.
     """
-    tried, healthy = [Tried(actuator, fits)], actuator.circuit
-    start = as_told(blocks, fits.best, actuator).coordinates
+    tried, healthy = [Trial(actuator, fits)], actuator.circuit
+    start = at_determined_scale(blocks, fits.best, actuator).coordinates
     undrained = replace(healthy, pump_case_leakage=0.0)
-    wider = {"makeup_conductance": WIDER * healthy.makeup_conductance}
+    wider = {"makeup_conductance": MAKEUP_FACTOR * healthy.makeup_conductance}
     for circuit in (undrained, replace(healthy, **wider), replace(undrained, **wider)):
         other = replace(actuator, circuit=circuit)
-        tried.append(Tried(other, fit_classes(blocks, other, runs=runs, start=start)))
+        tried.append(Trial(other, fit_classes(blocks, other, runs=runs, start=start)))
     best = max(tried, key=lambda one: one.score)
-    told = as_told(blocks, best.fits.best, best.actuator)
+    told = at_determined_scale(blocks, best.fits.best, best.actuator)
     return best if told is best.fits.best else replace(best, fits=replace(best.fits, best=told))
 
 
-def as_told(blocks: Blocks, fit: PointFit, actuator: Actuator) -> PointFit:
+def at_determined_scale(blocks: Blocks, fit: PointFit, actuator: Actuator) -> PointFit:
     """Return a circuit at the scale that a log without pressure determines, if its relief valve opened as it ran.
 
     Parameters
@@ -113,7 +113,7 @@ def as_told(blocks: Blocks, fit: PointFit, actuator: Actuator) -> PointFit:
     PointFit
         As it ran; unchanged if its relief valve stayed shut, since motion then determines no scale.
     """
-    if fit.ran is None:
+    if fit.run_coordinates is None:
         return fit
     opened = largest_pressure(blocks, fit.as_run, actuator) >= actuator.circuit.relief_pressure
     return fit.as_run if opened else fit
@@ -139,7 +139,7 @@ def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float
     """
     seen = replace(blocks, pressure=np.zeros(len(blocks.velocity)))
     rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
-    return float(np.max(np.abs(predicted(seen, rows)[0, blocks.first :, 1])))
+    return float(np.max(np.abs(predicted_outputs(seen, rows)[0, blocks.first :, 1])))
 
 
 def another_sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Actuator | None:
@@ -163,4 +163,4 @@ def another_sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator) -
     if blocks.pressure is not None:
         return None
     sound = sound_circuit(blocks, fits, actuator, nominal_runs(blocks, actuator))
-    return None if unexplained(blocks, sound.fits, sound.actuator) else sound.actuator
+    return None if unexplained_notes(blocks, sound.fits, sound.actuator) else sound.actuator

@@ -20,22 +20,22 @@ SPACING = 0.4
 FEWEST_A_KNOT = 5.0
 """Least number of blocks with a sliding piston per knot [count]."""
 
-EXPLAINED = 0.7
+LEAST_EXPLAINED = 0.7
 """Share of what friction, inertia, spring and constant load leave that a varying load must explain [fraction];
 judged."""
 
-BETTER = 0.5
+MOST_LEFT_RATIO = 0.5
 """What a course of the one must leave, at most, over what a course of the other leaves [dimensionless]; judged."""
 
-MATTERS = 0.05
+LEAST_FORCE_SHARE = 0.05
 """Share of the pressure's force from which what varies matters, both root mean square [fraction], as a constant load
 does."""
 
-HOLDS_BACK = 0.95
+LEAST_OPPOSING_SHARE = 0.95
 """Least share of the force left over by the usual friction that must oppose the motion, as a sum of squares [fraction].
 A load that changes by itself also drives the piston; eight logs with six bursts of friction give at least 0.997."""
 
-BOTH_WAYS = 0.02
+LEAST_EACH_WAY = 0.02
 """Least share of it in each direction of motion [fraction]; judged. In one direction alone it may be a load."""
 
 ROUNDS = 20
@@ -68,37 +68,40 @@ def varying_load(blocks: Blocks, p: EhaParameters) -> Note | None:
         return None
     course = np.maximum(1.0 - np.abs(time[:, None] - knots) / SPACING, 0.0)
     way = balance.columns[:, [3]]
-    none, _ = _left(balance.columns, balance.push)
-    of_friction, _ = _left(np.hstack([balance.columns, way * course]), balance.push)
-    of_load, found = _left(np.hstack([balance.columns, course]), balance.push)
+    none, _ = _least_squares(balance.columns, balance.push)
+    of_friction, _ = _least_squares(np.hstack([balance.columns, way * course]), balance.push)
+    of_load, found = _least_squares(np.hstack([balance.columns, course]), balance.push)
     force = course @ found[balance.columns.shape[1] :]
-    matters = MATTERS * p.piston_area * float(np.sqrt(np.mean(balance.pressure**2)))
-    if of_load <= min((1.0 - EXPLAINED) * none, BETTER * of_friction) and float(np.std(force)) >= matters:
+    matters = LEAST_FORCE_SHARE * p.piston_area * float(np.sqrt(np.mean(balance.pressure**2)))
+    if (
+        of_load <= min((1.0 - LEAST_EXPLAINED) * none, MOST_LEFT_RATIO * of_friction)
+        and float(np.std(force)) >= matters
+    ):
         return AgainstCode.LOAD_VARIES.note(force_n=float(np.std(force)))
-    more = way[:, 0] * _beyond(balance.columns, balance.push)
+    more = way[:, 0] * _robust_residuals(balance.columns, balance.push)
     grips = np.maximum(more, 0.0) ** 2
-    at_times = np.sum(grips) >= HOLDS_BACK * np.sum(more**2)
-    if of_friction > (1.0 - EXPLAINED) * none or not at_times or float(np.sqrt(np.mean(grips))) < matters:
+    at_times = np.sum(grips) >= LEAST_OPPOSING_SHARE * np.sum(more**2)
+    if of_friction > (1.0 - LEAST_EXPLAINED) * none or not at_times or float(np.sqrt(np.mean(grips))) < matters:
         return None
     size, at = float(np.quantile(more, 0.99)), float(time[np.argmax(more)])
     one_way = float(np.sum(grips[way[:, 0] > 0.0]) / np.sum(grips))
-    if min(one_way, 1.0 - one_way) < BOTH_WAYS:
+    if min(one_way, 1.0 - one_way) < LEAST_EACH_WAY:
         return AgainstCode.GRIPS_ONE_WAY.note(force_n=size, at_s=at)
     return AgainstCode.FRICTION_VARIES.note(force_n=size, at_s=at)
 
 
-def _beyond(columns: Array, push: Array) -> Array:
+def _robust_residuals(columns: Array, push: Array) -> Array:
     """Return what columns leave of a force by least absolute values [N]: what is there at times alone is left whole."""
     weights, left = np.ones(len(push)), push
     for _ in range(ROUNDS):
         root = np.sqrt(weights)
-        _, found = _left(columns * root[:, None], push * root)
+        _, found = _least_squares(columns * root[:, None], push * root)
         left = push - columns @ found
         weights = 1.0 / np.maximum(np.abs(left), max(float(np.median(np.abs(left))), np.finfo(np.float64).tiny))
     return left
 
 
-def _left(columns: Array, push: Array) -> tuple[float, Array]:
+def _least_squares(columns: Array, push: Array) -> tuple[float, Array]:
     """Return the sum of squares that columns leave of a force [N^2], and their minimum-norm coefficients.
 
     The mean of a varying load and a constant force are the same, so the coefficients are not unique.

@@ -13,14 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.eha.explanation_notes import WORN
+from estimation.eha.explanation_notes import WORN_SHARE
 from estimation.eha.result import BulkModulusEstimate
-from estimation.eha.rig_share import OpenDelivery, delivery_left_open, wear_left_open
+from estimation.eha.rig_share import UndeterminedDelivery, undetermined_delivery, undetermined_wear
 from estimation.finding import NORMAL_95
 from estimation.fits.hypotheses import OFFSET
 from estimation.notes import RigCode
-from faults.diagnosis.beyond_nine.left_open import DELIVERIES, WORTH_SAYING, presumed_of_wear
-from faults.diagnosis.beyond_nine.near_enough import lies_beside, only_beside
+from faults.diagnosis.beyond_nine.left_open import DELIVERIES, LEAST_REPORTED, delivery_log_priors
+from faults.diagnosis.beyond_nine.near_enough import is_only_outside, is_outside_conditions
 from faults.diagnosis.beyond_nine.other_faults import faults_outside
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -28,9 +28,9 @@ from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import LASTING, misfit
 from faults.diagnosis.circuits.class_regions import is_stuck
-from faults.diagnosis.circuits.friction_shape import told_of_bent
+from faults.diagnosis.circuits.friction_shape import bent_information
 from faults.diagnosis.circuits.region_scores import region_scores, scores_in_forces
-from faults.diagnosis.evidence import Scoreboard, bounded
+from faults.diagnosis.evidence import Scoreboard, bounded_log_odds
 from faults.notes import AgainstCode, ClassCode
 from plant.arrays import Array
 from plant.notes import Note
@@ -38,7 +38,7 @@ from plant.notes import Note
 OFFSETS = {OFFSET.name, "pressure_drift"}
 """Hypotheses that look like an offset of the speed."""
 
-SUREST = 0.99
+LARGEST_CHANCE = 0.99
 """Largest probability of a worn pump from slopes alone, without a search [probability]; judged. Slopes hold to first
 order, and the nine conditions keep their order below it."""
 
@@ -46,17 +46,17 @@ FLOW_SCALE = np.array([{"leakage": 1.0, "bias": 1.0, "bulk_modulus": -1.0}.get(n
 """Direction in which all flows of a nearly resting piston scale with the pump's delivery [dimensionless]: pumps that
 differ explain the log equally well along it, which is why wear is open."""
 
-TRIED = DELIVERIES[::2]
+TRIED_DELIVERIES = DELIVERIES[::2]
 """Deliveries of pumps for which conditions are scored if pressure is logged [dimensionless]."""
 
-UNLIKELY = math.log(1e-3)
+LEAST_LOG_LIKELIHOOD = math.log(1e-3)
 """Log-likelihood of a delivery below the likeliest one's from which it is ignored [dimensionless]."""
 
 FARTHEST, PUMPS = 4.0, 65
 """Range of pumps about the likeliest, in deviations, and their number [dimensionless, count]."""
 
 
-def whatever_the_pump_delivers(
+def with_pump_delivery(
     diagnosis: Diagnosis, actuator: Actuator, estimate: BulkModulusEstimate, strange: Sequence[Note] = ()
 ) -> Diagnosis:
     """Return a diagnosis with the pump delivery from the flow balance.
@@ -80,23 +80,23 @@ def whatever_the_pump_delivers(
         the probability that the pump is not worn (`chance_of_wear`).
     """
     chance = chance_of_wear((*estimate.remarks, *strange))
-    if known := known_of_flow(estimate):
+    if known := known_by_flow_balance(estimate):
         told = replace(diagnosis, against=tuple(note for note in diagnosis.against if note.code not in known))
     else:
-        board, calibration, left = diagnosis.scoreboard, shipped_calibration(), delivery_left_open(estimate.remarks)
+        board, calibration, left = diagnosis.scoreboard, shipped_calibration(), undetermined_delivery(estimate.remarks)
         found = probabilities_over_wear(board, actuator, estimate.remarks, calibration)
         told = diagnosis if found is None else replace(diagnosis, probabilities=found)
         if left is not None and found is not None:
             chance = chance_by_conditions(board, actuator, left, calibration)
-    if chance == 0.0 or (chance < WORTH_SAYING and not wear_left_open(estimate.remarks)):
+    if chance == 0.0 or (chance < LEAST_REPORTED and not undetermined_wear(estimate.remarks)):
         return told
-    note = ClassCode.WEAR_NOT_TOLD.note(percent=100.0 * chance, limit=100.0 * WORN)
+    note = ClassCode.WEAR_NOT_TOLD.note(percent=100.0 * chance, limit=100.0 * WORN_SHARE)
     left = {name: (1.0 - chance) * share for name, share in told.probabilities.items()}
     return replace(told, probabilities=left, not_told=(*told.not_told, note))
 
 
 def chance_of_wear(said: Sequence[Note]) -> float:
-    """Return the probability that a pump delivers less than `WORN`, by the flow balance.
+    """Return the probability that a pump delivers less than `WORN_SHARE`, by the flow balance.
 
     Parameters
     ----------
@@ -106,20 +106,24 @@ def chance_of_wear(said: Sequence[Note]) -> float:
     Returns
     -------
     float
-        From a normal distribution with the prior of a pump, cut off where oil would leak backwards; at most `SUREST`
-        [probability]. Zero if a worn pump was found, which is a reason against all nine conditions, and if wear is
-        excluded.
+        From a normal distribution with the prior of a pump, cut off where oil would leak backwards; at most
+        `LARGEST_CHANCE` [probability]. Zero if a worn pump was found, which is a reason against all nine conditions,
+        and if wear is excluded.
     """
-    if (left := delivery_left_open(said)) is not None:
-        return min(_between(left.least, math.log(WORN), left.size, left.deviation), SUREST)
+    if (left := undetermined_delivery(said)) is not None:
+        return min(
+            _truncated_probability_below(left.least, math.log(WORN_SHARE), left.size, left.deviation), LARGEST_CHANCE
+        )
     for note in said:
         if note.code is RigCode.AREA_TO_DISPLACEMENT:
-            return _below(100.0 * WORN, note.data["percent"], note.data["half_width"] / NORMAL_95)
+            return _probability_below(100.0 * WORN_SHARE, note.data["percent"], note.data["half_width"] / NORMAL_95)
     return 0.0
 
 
-def chance_by_conditions(board: Scoreboard, actuator: Actuator, left: OpenDelivery, calibration: Calibration) -> float:
-    """Return the probability that a pump delivers less than `WORN`, by the flow balance and by the conditions.
+def chance_by_conditions(
+    board: Scoreboard, actuator: Actuator, left: UndeterminedDelivery, calibration: Calibration
+) -> float:
+    """Return the probability that a pump delivers less than `WORN_SHARE`, by the flow balance and by the conditions.
 
     A worn pump looks like a sound one with more leakage than any condition has, in softer oil. The conditions count by
     how well they fit the log with each pump, with their weight in the class.
@@ -138,34 +142,34 @@ def chance_by_conditions(board: Scoreboard, actuator: Actuator, left: OpenDelive
     Returns
     -------
     float
-        At most `SUREST` [probability].
+        At most `LARGEST_CHANCE` [probability].
     """
-    limit, reach = math.log(WORN), FARTHEST * left.deviation
+    limit, reach = math.log(WORN_SHARE), FARTHEST * left.deviation
     least = max(left.size - reach, left.least)
     if limit <= least or not left.deviation > 0.0:
         return 0.0
     deliveries = np.linspace(least, max(left.size, left.least) + reach, PUMPS)
-    held = np.array([np.logaddexp.reduce(_regions_at(board, one * FLOW_SCALE, actuator)) for one in deliveries])
+    held = np.array([np.logaddexp.reduce(_region_scores_at(board, one * FLOW_SCALE, actuator)) for one in deliveries])
     weight = calibration.weights(board.blocks.pressure is not None)["parameters"]
     likely = weight * held - 0.5 * ((deliveries - left.size) / left.deviation) ** 2
     shares = np.exp(likely - np.max(likely))
-    return min(float(np.sum(shares[deliveries < limit]) / np.sum(shares)), SUREST)
+    return min(float(np.sum(shares[deliveries < limit]) / np.sum(shares)), LARGEST_CHANCE)
 
 
-def _between(least: float, limit: float, mean: float, std: float) -> float:
+def _truncated_probability_below(least: float, limit: float, mean: float, std: float) -> float:
     """Return the probability that a normal variable, cut off below a least value, is below a limit."""
     if limit <= least:
         return 0.0
-    above = 1.0 - _below(least, mean, std)
-    return 1.0 if above <= 0.0 else 1.0 - (1.0 - _below(limit, mean, std)) / above
+    above = 1.0 - _probability_below(least, mean, std)
+    return 1.0 if above <= 0.0 else 1.0 - (1.0 - _probability_below(limit, mean, std)) / above
 
 
-def _below(limit: float, mean: float, std: float) -> float:
+def _probability_below(limit: float, mean: float, std: float) -> float:
     """Return the probability that a normal variable is below a limit."""
     return 0.5 * math.erfc((mean - limit) / (math.sqrt(2.0) * std)) if std > 0.0 else float(mean < limit)
 
 
-def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibration) -> Diagnosis:
+def with_other_faults(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibration) -> Diagnosis:
     """Return a diagnosis with faults outside the nine conditions, without pressure.
 
     Parameters
@@ -186,15 +190,17 @@ def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibr
     """
     board = diagnosis.scoreboard
     asked = board.blocks.pressure is None and not is_stuck(board.blocks, actuator)
-    if not asked or not only_beside(diagnosis.against):
+    if not asked or not is_only_outside(diagnosis.against):
         return diagnosis
     others = faults_outside(board.blocks, board.fits, actuator)
-    beside = diagnosis.against if diagnosis.against and lies_beside(board.blocks, board.fits, actuator) else ()
+    beside = (
+        diagnosis.against if diagnosis.against and is_outside_conditions(board.blocks, board.fits, actuator) else ()
+    )
     if others.against or beside:
         return replace(diagnosis, against=(*others.against, *beside))
     probabilities = diagnosis.probabilities
-    if others.worn is not None:
-        probabilities = summed_over_wear(board, others.worn, calibration)
+    if others.worn_scores is not None:
+        probabilities = summed_over_wear(board, others.worn_scores, calibration)
     return replace(
         diagnosis,
         probabilities={name: (1.0 - others.faulty) * share for name, share in probabilities.items()},
@@ -203,7 +209,7 @@ def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibr
     )
 
 
-def known_of_flow(estimate: BulkModulusEstimate) -> frozenset[AgainstCode]:
+def known_by_flow_balance(estimate: BulkModulusEstimate) -> frozenset[AgainstCode]:
     """Return the quantities that the flow balance determines better than a circuit.
 
     Parameters
@@ -217,7 +223,7 @@ def known_of_flow(estimate: BulkModulusEstimate) -> frozenset[AgainstCode]:
         The pump's delivery, if the balance holds and does not leave wear open; and whether motor speed has an offset,
         unless a pressure offset, which leaks as much, was found in its place. Otherwise none.
     """
-    if estimate.form != "flow" or not estimate.gate.passed or wear_left_open(estimate.remarks):
+    if estimate.form != "flow" or not estimate.gate.passed or undetermined_wear(estimate.remarks):
         return frozenset()
     names = estimate.explanation.names if estimate.explanation is not None else ()
     return frozenset({AgainstCode.PUMP_OFF} if OFFSETS & set(names) else {AgainstCode.PUMP_OFF, AgainstCode.SPEED_BIAS})
@@ -228,7 +234,7 @@ def probabilities_over_wear(
 ) -> Mapping[str, float] | None:
     """Return the probability of each condition, averaged over the pump's delivery, if a log leaves it open.
 
-    The conditions are scored again for pumps with `TRIED` deliveries, as far as the flow balance leaves them likely;
+    The conditions are scored again for pumps with `TRIED_DELIVERIES`, as far as the flow balance leaves them likely;
     see `summed_over_wear`. Along `FLOW_SCALE` they explain the log equally well, which is why wear is open, so no
     circuit is fitted with them.
 
@@ -248,14 +254,14 @@ def probabilities_over_wear(
     Mapping[str, float] or None
         Probability by condition [probability]; None where wear is excluded or found, and without pressure.
     """
-    left = delivery_left_open(remarks)
+    left = undetermined_delivery(remarks)
     if board.blocks.pressure is None or left is None:
         return None
-    deliveries = np.log([1.0, *TRIED])
+    deliveries = np.log([1.0, *TRIED_DELIVERIES])
     likely = -0.5 * ((deliveries - left.size) / left.deviation) ** 2
     likely[deliveries < left.least] = -math.inf
     likely -= np.max(likely)
-    kept = [0, *(place for place in range(1, len(likely)) if likely[place] >= UNLIKELY)]
+    kept = [0, *(place for place in range(1, len(likely)) if likely[place] >= LEAST_LOG_LIKELIHOOD)]
     worn = [_scores_at(board, deliveries[place] * FLOW_SCALE, actuator) for place in kept[1:]]
     return summed_over_wear(board, np.array([board.fits.scores, *worn]), calibration, likely[kept])
 
@@ -263,15 +269,15 @@ def probabilities_over_wear(
 def _scores_at(board: Scoreboard, along: Array, actuator: Actuator) -> Array:
     """Return the scores of another circuit that explains a log as well as the best one, shape (9,)."""
     best = board.fits.best
-    return _regions_at(board, along, actuator) - misfit(board.blocks, best.fitted, best.scales) / LASTING
+    return _region_scores_at(board, along, actuator) - misfit(board.blocks, best.fitted, best.scales) / LASTING
 
 
-def _regions_at(board: Scoreboard, along: Array, actuator: Actuator) -> Array:
+def _region_scores_at(board: Scoreboard, along: Array, actuator: Actuator) -> Array:
     """Return how well each condition's region fits such a circuit, shape (9,)."""
     fits = board.fits
     there = replace(fits.best, coordinates=fits.best.coordinates + along)
-    if np.any(fits.moved):
-        return scores_in_forces(there, told_of_bent(fits.information, fits.moved), actuator)
+    if np.any(fits.bend_shifts):
+        return scores_in_forces(there, bent_information(fits.information, fits.bend_shifts), actuator)
     return region_scores(there, fits.information, actuator)
 
 
@@ -290,13 +296,15 @@ def summed_over_wear(
         Weights of the evidences.
     likely : ndarray, shape (1 + pumps,), optional
         Log-likelihoods of these pumps [dimensionless]. By default, the worn ones have `DELIVERIES` and the prior of a
-        pump: half a normal distribution of the logarithm of delivery over displacement, with deviation `PRESUMED`.
+        pump: half a normal distribution of the logarithm of delivery over displacement, with deviation `PRIOR_SPREADS`.
 
     Returns
     -------
     Mapping[str, float]
         Probability by condition [probability].
     """
-    likely = presumed_of_wear([1.0, *DELIVERIES]) if likely is None else likely
+    likely = delivery_log_priors([1.0, *DELIVERIES]) if likely is None else likely
     summed = np.logaddexp.reduce(scores + likely[:, None], axis=0)
-    return replace(board, log_odds={**board.log_odds, "parameters": bounded(summed)}).probabilities(calibration)
+    return replace(board, log_odds={**board.log_odds, "parameters": bounded_log_odds(summed)}).probabilities(
+        calibration
+    )

@@ -13,23 +13,23 @@ import numpy as np
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.class_fit import LASTING, WITHIN
+from faults.diagnosis.circuits.class_fit import CONDITION_SPREAD, LASTING
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
-from faults.diagnosis.circuits.model_doubt import distrust
+from faults.diagnosis.circuits.model_doubt import information_divisor
 from faults.diagnosis.circuits.region_scores import region_scores
-from faults.diagnosis.circuits.rivals import behind
+from faults.diagnosis.circuits.rivals import log_likelihood_behind
 
-CHANGES = 0.05
+CHANGE_PRIOR = 0.05
 """Prior share of logs in which the condition changes [fraction]."""
 
 
-LIKELIER = 10.0
+BELIEVED_ODDS = 10.0
 """How many times likelier than none a change must be to be believed [dimensionless]: evidence is called strong above
 that (Jeffreys, Theory of Probability, 1961, appendix B). In plain logs without a change the ratio is at most a
 thirtieth, and in those with one at least 36."""
 
 
-def believed(
+def is_change_believed(
     blocks: Blocks, parts: Sequence[Blocks], fits: Sequence[ClassFits], whole: ClassFits, actuator: Actuator
 ) -> bool:
     """Return whether a change of condition is so much likelier than none that it is believed.
@@ -52,16 +52,16 @@ def believed(
     Returns
     -------
     bool
-        Whether it is `LIKELIER` times as likely.
+        Whether it is `BELIEVED_ODDS` times as likely.
     """
     again = [fit_classes(blocks, actuator, start=one.best.coordinates) for one in fits]
-    gains = [gain_of(one, parts, fits) for one in (whole, *again)]
+    gains = [gain_of_parts(one, parts, fits) for one in (whole, *again)]
     least = int(np.argmin(gains))
     odds = odds_of_change(gains[least], fits, (whole, *again)[least], blocks, actuator)
-    return odds > math.log(LIKELIER)
+    return odds > math.log(BELIEVED_ODDS)
 
 
-def gain_of(whole: ClassFits, parts: Sequence[Blocks], fits: Sequence[ClassFits]) -> float:
+def gain_of_parts(whole: ClassFits, parts: Sequence[Blocks], fits: Sequence[ClassFits]) -> float:
     """Return the gain of two circuits, one for each part, over one circuit for all.
 
     Each part is compared separately: noise or a model's error that changes with the motion is no other condition.
@@ -80,7 +80,9 @@ def gain_of(whole: ClassFits, parts: Sequence[Blocks], fits: Sequence[ClassFits]
     float
         Log-likelihood, in `LASTING` blocks that count as one [dimensionless].
     """
-    return sum(float(behind([whole.best], one.best, part)[0]) for part, one in zip(parts, fits, strict=True))
+    return sum(
+        float(log_likelihood_behind([whole.best], one.best, part)[0]) for part, one in zip(parts, fits, strict=True)
+    )
 
 
 def odds_of_change(
@@ -116,24 +118,25 @@ def odds_of_change(
     times = max(len(blocks.velocity) / LASTING, 1.0)
     outputs = len(whole.best.scales)
     pressure = blocks.pressure is not None
-    doubts = [distrust(one.best, blocks) if pressure else 1.0 for one in (*parts, whole)]
+    doubts = [information_divisor(one.best, blocks) if pressure else 1.0 for one in (*parts, whole)]
     shares = [
-        _share(one, outputs * max(doubts) / doubt, actuator) for one, doubt in zip((*parts, whole), doubts, strict=True)
+        _region_share(one, outputs * max(doubts) / doubt, actuator)
+        for one, doubt in zip((*parts, whole), doubts, strict=True)
     ]
     to_one = (
         gain / outputs
         + sum(shares[:-1])
         - shares[-1]
         - math.log(len(CONDITIONS) * times)
-        + math.log(CHANGES / (1.0 - CHANGES))
+        + math.log(CHANGE_PRIOR / (1.0 - CHANGE_PRIOR))
     )
-    before, after = (one.of_one_law for one in parts)
+    before, after = (one.one_law_scores for one in parts)
     to_drift = float(np.max(before) + np.max(after) - np.max(before + after))
     return -float(np.logaddexp(-to_one, -to_drift))
 
 
-def _share(fits: ClassFits, less: float, actuator: Actuator) -> float:
+def _region_share(fits: ClassFits, less: float, actuator: Actuator) -> float:
     """Return the logarithm of the share of its condition's region that a log leaves to a circuit, by its density."""
     told = fits.information / (LASTING * less)
-    volume = 0.5 * float(np.linalg.slogdet(np.eye(len(WITHIN)) + WITHIN @ told)[1])
+    volume = 0.5 * float(np.linalg.slogdet(np.eye(len(CONDITION_SPREAD)) + CONDITION_SPREAD @ told)[1])
     return float(np.max(region_scores(fits.best, told, actuator))) - volume

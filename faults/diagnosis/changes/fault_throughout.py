@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 
 from faults.diagnosis.beyond_nine.other_faults import circuits_with_faults
-from faults.diagnosis.changes.change_odds import LIKELIER, gain_of, odds_of_change
+from faults.diagnosis.changes.change_odds import BELIEVED_ODDS, gain_of_parts, odds_of_change
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.class_regions import ClassFits
@@ -35,15 +35,15 @@ def fault_throughout(
     Returns
     -------
     bool
-        Whether the change is not `LIKELIER` times as likely as some fault, with the priors of both. Always False with
-        pressure, since the flow balance tests for such faults.
+        Whether the change is not `BELIEVED_ODDS` times as likely as some fault, with the priors of both. Always False
+        with pressure, since the flow balance tests for such faults.
     """
     if blocks.pressure is not None:
         return False
-    least = math.log(LIKELIER)
-    needed = odds_of_change(gain_of(whole, parts, fits), fits, whole, blocks, actuator) - least
+    least = math.log(BELIEVED_ODDS)
+    needed = odds_of_change(gain_of_parts(whole, parts, fits), fits, whole, blocks, actuator) - least
     for presumed, faulty in circuits_with_faults(blocks, whole, actuator, needed):
-        odds = odds_of_change(gain_of(faulty, parts, fits), fits, faulty, blocks, actuator)
+        odds = odds_of_change(gain_of_parts(faulty, parts, fits), fits, faulty, blocks, actuator)
         if odds - presumed <= least:
             return True
     return False

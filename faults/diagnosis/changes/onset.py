@@ -13,40 +13,40 @@ import numpy as np
 
 from estimation.finding import Change
 from faults.conditions import CONDITIONS
-from faults.diagnosis.changes.change_odds import believed, gain_of
-from faults.diagnosis.changes.end_stop import stopped
+from faults.diagnosis.changes.change_odds import gain_of_parts, is_change_believed
+from faults.diagnosis.changes.end_stop import with_end_stop
 from faults.diagnosis.changes.fault_throughout import fault_throughout
 from faults.diagnosis.changes.split import GAIN, in_one_condition, likeliest_split
-from faults.diagnosis.changes.warming import Drift, drift_of
+from faults.diagnosis.changes.warming import Drift, find_drift
 from faults.diagnosis.circuits.actuator import Actuator
-from faults.diagnosis.circuits.between_samples import with_lead
+from faults.diagnosis.circuits.between_samples import with_fitted_lead
 from faults.diagnosis.circuits.blocks import LONGEST, Blocks, blocks_of
-from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_fit import least_scales, nominal_runs
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, lasting_misfit
-from faults.diagnosis.circuits.out_of_model import unexplained
+from faults.diagnosis.circuits.out_of_model import unexplained_notes
 from faults.notes import AgainstCode
-from faults.watch.events import SLOW, Alarm
+from faults.watch.events import LOSS_BALANCE, Alarm
 from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 
-SOFTENED = 30.0
+SOFTENING_GAIN = 30.0
 """Log-likelihood that two circuits must gain before softer oil is tested [dimensionless]: steady training logs of the
 open benchmark gain up to 27, those with air entry 95 to 126."""
 
-ONE_SIDED = 1.645
+ONE_SIDED_95 = 1.645
 """Deviations by which bulk modulus must have fallen then [dimensionless]: a chance of one in twenty, beside that
 gain."""
 
-LATE, EARLY = 0.8, 0.1
+MOST_LATE, MOST_EARLY = 0.8, 0.1
 """How much later, or earlier, than its true time a change may be detected [s]."""
 
 MOST_ALARMS = 3
 """Most alarms of a watch that are examined, from the last."""
 
-LIKELY = 1.92
+INTERVAL_DROP = 1.92
 """Log-likelihood below the best up to which a time is in the 95 % interval [dimensionless]: half of chi-squared's."""
 
 
@@ -81,7 +81,7 @@ class LastPart:
     drift: Drift | None = None
 
 
-class Parted(NamedTuple):
+class TwoParts(NamedTuple):
     """A log in two parts, each fitted separately.
 
     Parameters
@@ -107,7 +107,7 @@ class Parted(NamedTuple):
     @property
     def conditions(self) -> tuple[int, int]:
         """Indices of the conditions of the two parts."""
-        first, last = (int(np.argmax(one.of_one_law)) for one in self.fits)
+        first, last = (int(np.argmax(one.one_law_scores)) for one in self.fits)
         return first, last
 
 
@@ -132,22 +132,24 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
     LogError
         If the log has neither position nor velocity, or is too short.
     """
-    for window in _about_alarms(record, actuator):
-        found = _last_of(window, actuator)
+    for window in _windows_about_alarms(record, actuator):
+        found = _last_part_of_window(window, actuator)
         if found.onset is not None:
             return found
-    return _last_of(record, actuator)
+    return _last_part_of_window(record, actuator)
 
 
-def _last_of(window: Record, actuator: Actuator) -> LastPart:
-    blocks = with_lead(blocks_of(window), actuator)
-    blocks, fits = stopped(blocks, fit_classes(blocks, actuator), actuator)
-    two = parted(blocks, fits, actuator)
-    drift = drift_of(blocks, fits, actuator, 0.0 if two is None else two.gain)
+def _last_part_of_window(window: Record, actuator: Actuator) -> LastPart:
+    blocks = with_fitted_lead(blocks_of(window), actuator)
+    blocks, fits = with_end_stop(blocks, fit_classes(blocks, actuator), actuator)
+    two = two_parts(blocks, fits, actuator)
+    drift = find_drift(blocks, fits, actuator, 0.0 if two is None else two.gain)
     if drift is not None and (two is None or drift.gain > two.gain):
         return LastPart(window, window, blocks, fits, None, drift=drift)
-    against = () if two is None else softened(two)
-    drifts = blocks.pressure is None and blocks.course is not None  # drift explains the log better than a change
+    against = () if two is None else softening_notes(two)
+    drifts = (
+        blocks.pressure is None and blocks.leakage_course is not None
+    )  # drift explains the log better than a change
     found = None if two is None or against or drifts else find_onset(blocks, two, actuator)
     if found is None:
         return LastPart(window, window, blocks, fits, None, against)
@@ -157,19 +159,19 @@ def _last_of(window: Record, actuator: Actuator) -> LastPart:
     return LastPart(window, rest, blocks, fits, Change(onset.since + window.start_time, ends, onset.before))
 
 
-def _about_alarms(record: Record, actuator: Actuator) -> Iterator[Record]:
+def _windows_about_alarms(record: Record, actuator: Actuator) -> Iterator[Record]:
     """Yield parts about the last alarms of a watch, the last first, for logs too long to be fitted whole."""
     if record.duration <= LONGEST + LEAST_LEARNING or record.sample_time > SLOWEST:
         return
     events = watch_record(record, actuator.circuit, learning=LEAST_LEARNING)
-    sudden = (event for event in events if isinstance(event, Alarm) and event.balance != SLOW)
+    sudden = (event for event in events if isinstance(event, Alarm) and event.balance != LOSS_BALANCE)
     changes = [event.since - record.start_time for event in sudden]
     for since in changes[: -MOST_ALARMS - 1 : -1]:
         first = round(max(since - 0.5 * LONGEST, 0.0) / record.sample_time)
         yield record.slice(first, first + round(LONGEST / record.sample_time) + 1)
 
 
-def parted(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Parted | None:
+def two_parts(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> TwoParts | None:
     """Return a log in two parts, if two successive circuits may explain it much better than one.
 
     Parameters
@@ -196,10 +198,10 @@ def parted(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Parted | None
     parts = [part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))]
     runs, start = nominal_runs(blocks, actuator), fits.best.coordinates
     found = [fit_classes(part, actuator, runs=runs, start=start) for part in parts]
-    return Parted(place, parts, found, gain_of(fits, parts, found), fits)
+    return TwoParts(place, parts, found, gain_of_parts(fits, parts, found), fits)
 
 
-def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change, Blocks, ClassFits] | None:
+def find_onset(blocks: Blocks, two: TwoParts, actuator: Actuator) -> tuple[Change, Blocks, ClassFits] | None:
     """Return when the condition changed, and the part of the log after that.
 
     Parameters
@@ -221,24 +223,24 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
     (before, after), (first, last) = two.fits, two.conditions
     if two.gain < GAIN or first == last:
         return None
-    if unexplained(two.parts[0], before, actuator):  # a fault that comes and goes: the rest is a quiet stretch
+    if unexplained_notes(two.parts[0], before, actuator):  # a fault that comes and goes: the rest is a quiet stretch
         return None
-    if not believed(blocks, two.parts, two.fits, two.whole, actuator):
+    if not is_change_believed(blocks, two.parts, two.fits, two.whole, actuator):
         return None
     if fault_throughout(blocks, two.parts, two.fits, two.whole, actuator):
         return None
     row = parameter_rows(before.best.coordinates[None], actuator.circuit, actuator.rated)[0]
-    low, best, high = _when(blocks, row, after.best.coordinates, two.place, actuator)
+    low, best, high = _change_block(blocks, row, after.best.coordinates, two.place, actuator)
     step = blocks.block * blocks.sample_time
     onset = Change(best * step, (low * step, high * step), list(CONDITIONS)[first])
-    rest = replace(part_of(blocks, best, len(blocks.velocity)), earlier=(best * blocks.block, row))
+    rest = replace(part_of(blocks, best, len(blocks.velocity)), earlier_circuit=(best * blocks.block, row))
     fits = fit_classes(rest, actuator)
-    if unexplained(rest, fits, actuator):  # no circuit follows it, so it is in no condition
+    if unexplained_notes(rest, fits, actuator):  # no circuit follows it, so it is in no condition
         return None
     return onset, rest, fits
 
 
-def softened(two: Parted) -> tuple[Note, ...]:
+def softening_notes(two: TwoParts) -> tuple[Note, ...]:
     """Return a note if the oil of a log without pressure softened: air entered, which no condition has.
 
     It is tested whatever the conditions of the parts: air in the oil may look like friction, and no condition softens
@@ -249,11 +251,11 @@ def softened(two: Parted) -> tuple[Note, ...]:
     tuple of Note
         Empty with pressure, since the flow balance tests for it.
     """
-    if two.parts[0].pressure is not None or two.gain < SOFTENED:
+    if two.parts[0].pressure is not None or two.gain < SOFTENING_GAIN:
         return ()
     at = COORDINATES.index("bulk_modulus")
     fallen = float(two.fits[1].best.coordinates[at] - two.fits[0].best.coordinates[at])
-    if fallen > -ONE_SIDED * float(np.sqrt(sum(one.spread[at, at] for one in two.fits))):
+    if fallen > -ONE_SIDED_95 * float(np.sqrt(sum(one.spread[at, at] for one in two.fits))):
         return ()
     begun = two.place * two.parts[0].block * two.parts[0].sample_time
     return (AgainstCode.OIL_SOFTENS.note(share=float(np.exp(fallen)), at_s=begun),)
@@ -275,20 +277,20 @@ def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:
     return replace(blocks, velocity=np.where(away, np.nan, blocks.velocity), pressure=pressure)
 
 
-def _when(blocks: Blocks, before: Array, after: Array, place: int, actuator: Actuator) -> tuple[int, int, int]:
+def _change_block(blocks: Blocks, before: Array, after: Array, place: int, actuator: Actuator) -> tuple[int, int, int]:
     """Return the likeliest block of the change, and the ends of its 95 % interval, from a run of both circuits.
 
     A circuit needs time to show what changed, so most candidates are before the block at which the change was detected.
     """
     step = blocks.block * blocks.sample_time
-    first = max(place - round(LATE / step), blocks.first)
-    candidates = np.arange(first, min(place + round(EARLY / step), len(blocks.velocity) - 1))
+    first = max(place - round(MOST_LATE / step), blocks.first)
+    candidates = np.arange(first, min(place + round(MOST_EARLY / step), len(blocks.velocity) - 1))
     (row,) = parameter_rows(after[None], actuator.circuit, actuator.rated)
-    changing = replace(blocks, earlier=(blocks.block * candidates, before))
-    runs = predicted(changing, np.repeat(row[None], len(candidates), axis=0))
+    changing = replace(blocks, earlier_circuit=(blocks.block * candidates, before))
+    runs = predicted_outputs(changing, np.repeat(row[None], len(candidates), axis=0))
     scales = least_scales(blocks)
     costs = [0.5 * float(np.nansum(((blocks.outputs - run)[blocks.first :] / scales) ** 2)) for run in runs]
     best = int(np.argmin(costs))
-    room = LIKELY * max(1.0, lasting_misfit(runs[best], blocks) ** 2)
+    room = INTERVAL_DROP * max(1.0, lasting_misfit(runs[best], blocks) ** 2)
     likely = candidates[np.array(costs) <= costs[best] + room]
     return int(likely[0]) - 1, int(candidates[best]), int(likely[-1]) + 1

@@ -12,8 +12,8 @@ import numpy as np
 
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.class_fit import LASTING, WEAK, PointFit
-from faults.diagnosis.circuits.class_regions import believed_information
+from faults.diagnosis.circuits.class_fit import LASTING, WEAK_PRIOR, PointFit
+from faults.diagnosis.circuits.class_regions import credible_information
 from faults.diagnosis.circuits.region_scores import region_scores
 
 EDGE = 1.0
@@ -64,7 +64,7 @@ def likeliest_split(blocks: Blocks, fit: PointFit) -> Split | None:
         return None
     scores = np.cumsum(np.einsum("ink,nk->ni", slopes, left), axis=0)
     known = np.cumsum(np.einsum("ink,jnk->nij", slopes, slopes), axis=0)
-    weak = np.linalg.inv(WEAK)
+    weak = np.linalg.inv(WEAK_PRIOR)
     moved = np.linalg.solve(known[places] + weak, scores[places, :, None])[..., 0]
     moved_on = np.linalg.solve(known[-1] - known[places] + weak, (scores[-1] - scores[places])[..., None])[..., 0]
     gains = np.einsum("ti,ti->t", scores[places], moved) + np.einsum("ti,ti->t", scores[-1] - scores[places], moved_on)
@@ -107,7 +107,7 @@ def in_one_condition(split: Split, blocks: Blocks, actuator: Actuator) -> bool:
         Whether each has lost `GAIN` of log-likelihood in every other condition.
     """
     scores = np.array(
-        [region_scores(fit, believed_information(fit, blocks), actuator) for fit in (split.before, split.after)]
+        [region_scores(fit, credible_information(fit, blocks), actuator) for fit in (split.before, split.after)]
     )
     ranked = np.sort(scores, axis=1)
     first, last = np.argmax(scores, axis=1)

@@ -54,7 +54,7 @@ def actuator_of(parameters: EhaParameters) -> Actuator:
     RigError
         If no circuit fits around it.
     """
-    parameters = with_room(parameters)
+    parameters = with_room_for_stroke(parameters)
     rated = steady_state(parameters.rated_speed, parameters)[0]
     points = [coordinates_of(parameters_for(condition, parameters), rated) for condition in CONDITIONS.values()]
     circuit = circuit_of(parameters)
@@ -63,7 +63,7 @@ def actuator_of(parameters: EhaParameters) -> Actuator:
     return Actuator(circuit, rated, np.array(points))
 
 
-def with_room(p: EhaParameters) -> EhaParameters:
+def with_room_for_stroke(p: EhaParameters) -> EhaParameters:
     """Return an actuator whose chambers have room for its stroke: a stroke is measured, a volume is estimated.
 
     Parameters

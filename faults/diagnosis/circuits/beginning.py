@@ -15,19 +15,19 @@ from plant.log.record import Record
 SETTLING = 0.1
 """Time at the start that does not count [s]: the circuit starts at rest, a log may not."""
 
-FORGOTTEN = 1.0
+TURNING_SETTLING = 1.0
 """The same if the motor turns as a log without pressure begins, a fifth of the log at most [s]: pressure that a stuck
 piston holds leaks off in about that time, ``V / (beta L)`` of the healthy actuator."""
 
-REFILLED = 3.0
+SLIDING_SETTLING = 3.0
 """The same if the piston slides as well, three tenths of the log at most [s]: three times that for the oil that its
 motion has shut in."""
 
-STIRRED = 0.05
+LEAST_MOTION = 0.05
 """First motor speed over the log's root mean square from which the log begins in motion [fraction]: a motor also passes
 through zero, and the noise of logs that begin at rest is some 0.001."""
 
-LEAST_BEGUN = 0.1
+LEAST_START_PRESSURE = 0.1
 """First pressure over the log's root mean square from which it is more than noise [fraction]."""
 
 
@@ -36,19 +36,19 @@ class Beginning(NamedTuple):
 
     Parameters
     ----------
-    begun : tuple of float, or None
+    start_values : tuple of float, or None
         Differential pressure [Pa] and velocity [m/s]; None at rest, or if unknown.
-    opening : tuple of float, or None
+    raw_start_values : tuple of float, or None
         The same [Pa, m/s] even if it is within noise: under a load a piston without pressure is not at rest.
-    sliding : float
+    start_velocity : float
         Velocity with which a log without pressure begins [m/s]; 0 if motor or piston is at rest, and with pressure.
     settling : float
         Time at the start that does not count [s].
     """
 
-    begun: tuple[float, float] | None
-    opening: tuple[float, float] | None
-    sliding: float
+    start_values: tuple[float, float] | None
+    raw_start_values: tuple[float, float] | None
+    start_velocity: float
     settling: float
 
 
@@ -72,11 +72,13 @@ def beginning_of(record: Record, pressure: Array | None, velocity: Array) -> Beg
     first = float(np.nan_to_num(velocity[0]))
     if pressure is not None:
         opening = (float(pressure[0]), first) if np.isfinite(pressure[0]) else None
-        pressed = opening is not None and abs(opening[0]) > LEAST_BEGUN * float(np.sqrt(np.nanmean(pressure**2)))
+        pressed = opening is not None and abs(opening[0]) > LEAST_START_PRESSURE * float(
+            np.sqrt(np.nanmean(pressure**2))
+        )
         return Beginning(opening if pressed else None, opening, 0.0, SETTLING)
-    if not begins_in_motion(record, STIRRED):
+    if not begins_in_motion(record, LEAST_MOTION):
         return Beginning(None, None, 0.0, SETTLING)
-    slides = abs(first) > STIRRED * float(np.sqrt(np.nanmean(velocity**2)))
-    share, most = (0.3, REFILLED) if slides else (0.2, FORGOTTEN)
+    slides = abs(first) > LEAST_MOTION * float(np.sqrt(np.nanmean(velocity**2)))
+    share, most = (0.3, SLIDING_SETTLING) if slides else (0.2, TURNING_SETTLING)
     settling = float(np.clip(share * record.duration, SETTLING, most))
     return Beginning(None, None, first if slides else 0.0, settling)

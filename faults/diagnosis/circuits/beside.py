@@ -7,7 +7,7 @@ import numpy as np
 from faults.conditions import severity
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of
-from faults.diagnosis.circuits.class_fit import WITHIN
+from faults.diagnosis.circuits.class_fit import CONDITION_SPREAD
 from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.notes import AgainstCode
 from plant.arrays import Array
@@ -50,7 +50,7 @@ def beside_note(fits: ClassFits, actuator: Actuator) -> Note:
 
     leakage, friction = level("leakage", 1.0, 0.0), level("friction_rated", 0.0, 1.0)
     off = place - at(leakage, friction)
-    odd = int(np.argmax(off**2 / (np.diag(WITHIN) + np.diag(fits.covariance))))
+    odd = int(np.argmax(off**2 / (np.diag(CONDITION_SPREAD) + np.diag(fits.covariance))))
     return AgainstCode.OUTSIDE_CONDITIONS.note(
         leakage=round(4.0 * leakage) / 4.0,
         friction=round(4.0 * friction) / 4.0,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from estimation.arrays import IntArray
 from estimation.eha.explanation_notes import LEAKAGE_COURSE
-from estimation.log_checks.bridging import bridged, filled
+from estimation.log_checks.bridging import bridged, bridged_slow_channel
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.dropout import long_gaps
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
@@ -57,19 +57,19 @@ class Blocks:
         Mean differential pressure over each block [Pa], None if it is not logged.
     noise : ndarray, shape (outputs,)
         Standard deviation of sensor noise in velocity [m/s] and pressure [Pa].
-    earlier : tuple of int or ndarray, shape (circuits,), and ndarray, shape (parameters,), or None
+    earlier_circuit : tuple of int or ndarray, shape (circuits,), and ndarray, shape (parameters,), or None
         Another circuit that ran up to a sample, or up to one sample per circuit, as a row of parameters; None if one
         ran throughout.
-    course : ndarray, shape (samples,), or None
+    leakage_course : ndarray, shape (samples,), or None
         Leakage over its value at the end of the log [dimensionless]; None if it does not change.
     stop : float or None
         Distance from the beginning of the log at which the piston ran into a stop [m]; None if only the rig file has
         stops.
-    begun : tuple of float, or None
+    start_values : tuple of float, or None
         Differential pressure [Pa] and velocity [m/s] at the beginning of the log; None at rest, or if unknown.
-    opening : tuple of float, or None
+    raw_start_values : tuple of float, or None
         The same [Pa, m/s] even if it is within noise: under a load a piston without pressure is not at rest.
-    sliding : float
+    start_velocity : float
         Velocity with which a log without pressure begins [m/s]; 0 if motor or piston is at rest, and with pressure.
     place : float
         Position at the beginning of the log [m]; 0 if none is logged.
@@ -82,7 +82,7 @@ class Blocks:
     lead : float
         Time by which the motor leads straight lines between logged samples [s], see
         `faults.diagnosis.circuits.between_samples`.
-    between : int
+    substeps : int
         Samples of the motor speed from one logged sample to the next.
     """
 
@@ -92,23 +92,23 @@ class Blocks:
     velocity: Array
     pressure: Array | None
     noise: Array
-    earlier: tuple[int | IntArray, Array] | None = None
-    course: Array | None = None
+    earlier_circuit: tuple[int | IntArray, Array] | None = None
+    leakage_course: Array | None = None
     stop: float | None = None
-    begun: tuple[float, float] | None = None
-    opening: tuple[float, float] | None = None
-    sliding: float = 0.0
+    start_values: tuple[float, float] | None = None
+    raw_start_values: tuple[float, float] | None = None
+    start_velocity: float = 0.0
     place: float = 0.0
     settling: float = SETTLING
     averaged: bool = False
     differenced: bool = False
     lead: float = 0.0
-    between: int = 1
+    substeps: int = 1
 
     @property
     def rows(self) -> int:
         """Logged samples in a block."""
-        return self.block // self.between
+        return self.block // self.substeps
 
     @cached_property
     def outputs(self) -> Array:
@@ -116,32 +116,32 @@ class Blocks:
         return np.column_stack([self.velocity] if self.pressure is None else [self.velocity, self.pressure])
 
     @cached_property
-    def seen(self) -> NDArray[np.bool_]:
+    def valid(self) -> NDArray[np.bool_]:
         """Which outputs are valid in the blocks that count, shape (n - first, outputs)."""
         return np.isfinite(self.outputs[self.first :])
 
     @cached_property
     def counts(self) -> NDArray[np.intp]:
         """Number of valid values, shape (outputs,)."""
-        return np.sum(self.seen, axis=0)
+        return np.sum(self.valid, axis=0)
 
     @cached_property
-    def sizes(self) -> Array:
+    def rms(self) -> Array:
         """Their root mean squares, shape (outputs,) [m/s, Pa]."""
         return root_mean_square(self.outputs[self.first :])
 
     @property
     def travel(self) -> float:
         """Total travel of the piston in both directions [m]."""
-        return float(np.ptp(self.gone))
+        return float(np.ptp(self.distances))
 
     @cached_property
     def reach(self) -> float:
         """Largest distance of the piston from its start [m], to either side."""
-        return float(np.max(np.abs(self.gone), initial=0.0))
+        return float(np.max(np.abs(self.distances), initial=0.0))
 
     @cached_property
-    def gone(self) -> Array:
+    def distances(self) -> Array:
         """Distance of the piston up to each block [m], gaps bridged at the neighbouring speed."""
         known = bridged(self.velocity) if np.any(np.isfinite(self.velocity)) else np.zeros(len(self.velocity))
         return np.cumsum(known) * self.block * self.sample_time
@@ -196,7 +196,7 @@ def blocks_of(record: Record) -> Blocks:
     if count * block * sample_time < 2.0 * SETTLING or count < FEWEST:
         least = max(2.0 * SETTLING, FEWEST * block * sample_time)
         raise LogError(f"a diagnosis needs a log of {least:.3g} s or more, got {record.duration:g} s")
-    slow, rows = filled(record[PRESSURE]) if PRESSURE in record else (None, 1)
+    slow, rows = bridged_slow_channel(record[PRESSURE]) if PRESSURE in record else (None, 1)
     given = record if slow is None or rows == 1 else record.replace(**{PRESSURE: slow})
     whole = {name: _pooled(given[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
     velocity = _velocity(whole, block, sample_time)
@@ -206,8 +206,8 @@ def blocks_of(record: Record) -> Blocks:
     if pressure is None:
         whole.pop(PRESSURE, None)
     speed = bridged(whole["motor_speed_rad_s"])
-    blind = _with_gaps(whole["motor_speed_rad_s"], block, round(SETTLING / sample_time))
-    velocity = np.where(blind | _with_gaps(whole.get("position_m"), block), np.nan, velocity)
+    blind = _gap_blocks(whole["motor_speed_rad_s"], block, round(SETTLING / sample_time))
+    velocity = np.where(blind | _gap_blocks(whole.get("position_m"), block), np.nan, velocity)
     pressure = None if pressure is None else np.where(blind, np.nan, pressure)
     noise, course = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE)
     if pressure is not None and rows > 1:
@@ -220,10 +220,10 @@ def blocks_of(record: Record) -> Blocks:
         velocity,
         pressure,
         noise,
-        course=course,
-        place=_place(whole),
+        leakage_course=course,
+        place=_start_position(whole),
         averaged=pooled > 1,
-        differenced=_position_goes(whole),
+        differenced=_uses_position(whole),
         **beginning_of(record, whole.get(PRESSURE), velocity)._asdict(),
     )
 
@@ -243,14 +243,14 @@ def _samples_in_one(record: Record) -> int:
 
 def _velocity(whole: Mapping[str, Array], block: int, sample_time: float) -> Array | None:
     """Return the mean velocity over each block [m/s], None if no motion is logged; position is preferred."""
-    if _position_goes(whole):
+    if _uses_position(whole):
         return np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
     if "velocity_m_s" in whole and np.any(np.isfinite(whole["velocity_m_s"])):
         return _mean(whole["velocity_m_s"], block)
     return None
 
 
-def _position_goes(whole: Mapping[str, Array]) -> bool:
+def _uses_position(whole: Mapping[str, Array]) -> bool:
     """Return whether velocity is taken from a logged position."""
     return "position_m" in whole and bool(np.any(np.isfinite(whole["position_m"])))
 
@@ -263,7 +263,7 @@ def _pressure(whole: Mapping[str, Array], block: int, sample_time: float) -> Arr
     return pressure if np.any(np.isfinite(pressure[round(SETTLING / (block * sample_time)) :])) else None
 
 
-def _with_gaps(values: Array | None, block: int, behind: int = 0) -> NDArray[np.bool_]:
+def _gap_blocks(values: Array | None, block: int, behind: int = 0) -> NDArray[np.bool_]:
     """Return the blocks that contain, or closely follow, a long gap of a channel: the circuit ran without data."""
     if values is None or not np.any(gone := long_gaps(values)):
         return np.zeros(1, dtype=np.bool_)
@@ -272,7 +272,7 @@ def _with_gaps(values: Array | None, block: int, behind: int = 0) -> NDArray[np.
     return np.any(within[: (len(values) - 1) // block * block].reshape(-1, block), axis=1)
 
 
-def _place(whole: Mapping[str, Array]) -> float:
+def _start_position(whole: Mapping[str, Array]) -> float:
     """Return the first position of a log, 0 if none is logged [m]."""
     position = whole.get("position_m")
     return 0.0 if position is None or not np.any(np.isfinite(position)) else float(bridged(position)[0])

@@ -17,7 +17,7 @@ from plant.components.friction import quadratic_friction
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
 from plant.eha.circuit_start import at_rest, under_pressure
 from plant.eha.model import EhaParameters
-from plant.eha.one_sided import as_wide, circuit_groups, circuit_plant
+from plant.eha.one_sided import circuit_groups, circuit_plant, padded_row
 from plant.eha.simulate import CIRCUIT
 from plant.solvers.adaptive import LANES, MEANS, SAMPLES, STRAIGHT
 from plant.solvers.block_means import block_means
@@ -31,13 +31,13 @@ judged in a rig file and differs from seal to seal; held at a wrong value it wou
 PRESLIDING_REACH = 3.0
 """Farthest presliding displacement from the rig's, as a logarithm [dimensionless]: 20 times."""
 
-AT_STOP = 0.02
+NEAR_STOP = 0.02
 """A log shows a stop if its piston reversed this near to one, as a share of half the stroke [fraction]."""
 
 SOFTEST_END = 0.01
 """Stiffness of an end that yields most, over what is judged [fraction]; judged."""
 
-ALLOWED = {"tolerance": 1e-4, "drive_tolerance": 2e-3}
+TOLERANCES = {"tolerance": 1e-4, "drive_tolerance": 2e-3}
 """Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_groups`: far below what
 matters."""
 
@@ -117,7 +117,7 @@ def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array
     ndarray, shape (n, parameters)
         Rows for the circuit plant; the motor follows the logged speed at once.
     """
-    rows = np.tile(_at_once(rig), (len(points), 1))
+    rows = np.tile(_row_without_lag(rig), (len(points), 1))
     values = fitted_parameters(points, rig, rated)
     for name, one in values.items():
         rows[:, COLUMN[name]] = one
@@ -160,12 +160,12 @@ def fitted_parameters(points: Array, rig: CircuitParameters, rated: float) -> di
 
 
 @lru_cache(maxsize=16)
-def _at_once(rig: CircuitParameters) -> Array:
+def _row_without_lag(rig: CircuitParameters) -> Array:
     """Return the row of a circuit whose motor follows the logged speed at once."""
     return parameter_row(replace(rig, motor_lag=0.0))
 
 
-def predicted(blocks: Blocks, rows: Array) -> Array:
+def predicted_outputs(blocks: Blocks, rows: Array) -> Array:
     """Return the outputs of circuits under the logged motor speed.
 
     Parameters
@@ -180,27 +180,27 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     ndarray, shape (m, n, outputs)
         Mean velocity [m/s] over each block, and mean pressure [Pa] where it is logged.
     """
-    rows = _as_logged(blocks, rows)[None]
-    if blocks.earlier is not None:
-        until, before = blocks.earlier
+    rows = _in_log_coordinates(blocks, rows)[None]
+    if blocks.earlier_circuit is not None:
+        until, before = blocks.earlier_circuit
         ends = np.broadcast_to(until, rows.shape[1])
-        if blocks.course is None and not np.any(ends % blocks.block):
+        if blocks.leakage_course is None and not np.any(ends % blocks.block):
             some = (slice(first, first + LANES) for first in range(0, len(ends), LANES))
-            return np.concatenate([_changed(blocks, rows[:, these], ends[these]) for these in some])
-        before = as_wide(_as_logged(blocks, before[None])[0], rows.shape[-1])
-        rows = _after(until, before, rows[0], len(blocks.speed))
-    if blocks.course is not None:
+            return np.concatenate([_outputs_with_change(blocks, rows[:, these], ends[these]) for these in some])
+        before = padded_row(_in_log_coordinates(blocks, before[None])[0], rows.shape[-1])
+        rows = _rows_per_sample(until, before, rows[0], len(blocks.speed))
+    if blocks.leakage_course is not None:
         if blocks.pressure is None and len(rows) == 1:
-            return _in_steps(blocks, blocks.course, rows)
-        rows = rows * _drift(blocks.course, rows.shape[-1])[:, None, :]
-    return _run(blocks, _starts(blocks, rows[0]), rows)[0]
+            return _outputs_with_drift(blocks, blocks.leakage_course, rows)
+        rows = rows * _drift_factors(blocks.leakage_course, rows.shape[-1])[:, None, :]
+    return _run(blocks, _initial_states(blocks, rows[0]), rows)[0]
 
 
-def _changed(blocks: Blocks, rows: Array, ends: IntArray) -> Array:
+def _outputs_with_change(blocks: Blocks, rows: Array, ends: IntArray) -> Array:
     """Return the outputs of circuits that each go on from another one at the end of a block, (m, blocks, outputs)."""
-    since, before, outputs, state = _brought(blocks, rows.shape[-1])
+    since, before, outputs, state = _run_to_first_change(blocks, rows.shape[-1])
     found, starts = [np.repeat(outputs, len(ends), axis=0)], np.repeat(state, len(ends), axis=0)
-    for first, last in pairwise(np.unique([since, *ends, _last_end(blocks)]).tolist()):
+    for first, last in pairwise(np.unique([since, *ends, _last_block_end(blocks)]).tolist()):
         here = np.where((ends <= first)[:, None], rows, before)
         outputs, starts = _run(blocks, starts, here, slice(first, last + 1))
         found.append(outputs)
@@ -208,23 +208,23 @@ def _changed(blocks: Blocks, rows: Array, ends: IntArray) -> Array:
 
 
 @lru_cache(maxsize=2)
-def _brought(blocks: Blocks, width: int) -> tuple[int, Array, Array, Array]:
+def _run_to_first_change(blocks: Blocks, width: int) -> tuple[int, Array, Array, Array]:
     """Return the first change, the circuit before it, its outputs up to there and its state then.
 
     All circuits after the change begin there, so it is run once.
     """
-    until, before = blocks.earlier or (0, np.empty(0))
-    first, row = int(np.min(until)), as_wide(_as_logged(blocks, before[None])[0], width)[None, None]
-    return first, row, *_run(blocks, _starts(blocks, row[0]), row, slice(first + 1))
+    until, before = blocks.earlier_circuit or (0, np.empty(0))
+    first, row = int(np.min(until)), padded_row(_in_log_coordinates(blocks, before[None])[0], width)[None, None]
+    return first, row, *_run(blocks, _initial_states(blocks, row[0]), row, slice(first + 1))
 
 
-def _last_end(blocks: Blocks) -> int:
+def _last_block_end(blocks: Blocks) -> int:
     return (len(blocks.speed) - 1) // blocks.block * blocks.block
 
 
 def _run(blocks: Blocks, starts: Array, rows: Array, span: slice = _WHOLE) -> tuple[Array, Array]:
     """Return the outputs of circuits over a span of samples, (m, blocks, outputs), and their states after it."""
-    groups = circuit_groups(starts, blocks.speed[span], rows, blocks.sample_time, **_allowed(blocks))
+    groups = circuit_groups(starts, blocks.speed[span], rows, blocks.sample_time, **_run_tolerances(blocks))
     found, ends, first = list[Array](), list[Array](), 0
     for states in groups:
         last = first + states.shape[2]
@@ -234,29 +234,29 @@ def _run(blocks: Blocks, starts: Array, rows: Array, span: slice = _WHOLE) -> tu
     return found[0] if len(found) == 1 else np.concatenate(found), np.concatenate(ends)
 
 
-def _allowed(blocks: Blocks) -> dict[str, float]:
+def _run_tolerances(blocks: Blocks) -> dict[str, float]:
     """Return the errors allowed in runs, and how motor speed changes between its samples: it has inertia."""
-    if blocks.between > 1:  # its straight lines have the means of the curve
-        return {**ALLOWED, "bulge": STRAIGHT}
-    return {**ALLOWED, "bulge": MEANS if blocks.averaged else SAMPLES}
+    if blocks.substeps > 1:  # its straight lines have the means of the curve
+        return {**TOLERANCES, "bulge": STRAIGHT}
+    return {**TOLERANCES, "bulge": MEANS if blocks.averaged else SAMPLES}
 
 
-def _in_steps(blocks: Blocks, course: Array, rows: Array) -> Array:
+def _outputs_with_drift(blocks: Blocks, course: Array, rows: Array) -> Array:
     """Return the outputs of circuits whose leakage drifts in small steps, shape (m, blocks, outputs).
 
     Rows of parameters for every sample take some 50 MB and five times as long.
     """
-    count = _last_end(blocks) // blocks.block
+    count = _last_block_end(blocks) // blocks.block
     ends = blocks.block * np.unique(np.linspace(0, count, min(DRIFT_STEPS, count) + 1).astype(np.intp))
-    found, starts = list[Array](), _starts(blocks, rows[0])
+    found, starts = list[Array](), _initial_states(blocks, rows[0])
     for first, last in pairwise(ends.tolist()):
-        here = rows * _drift(course[[(first + last) // 2]], rows.shape[-1])[:, None, :]
+        here = rows * _drift_factors(course[[(first + last) // 2]], rows.shape[-1])[:, None, :]
         outputs, starts = _run(blocks, starts, here, slice(first, last + 1))
         found.append(outputs)
     return np.concatenate(found, axis=1)
 
 
-def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> Array:
+def _rows_per_sample(until: int | IntArray, before: Array, rows: Array, samples: int) -> Array:
     """Return the parameters per sample if another circuit ran up to a sample, shape (samples, m, parameters)."""
     ends = np.broadcast_to(until, len(rows))
     first, last = int(np.min(ends)), int(np.max(ends))
@@ -267,18 +267,18 @@ def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> A
     return found
 
 
-def _starts(blocks: Blocks, rows: Array) -> Array:
+def _initial_states(blocks: Blocks, rows: Array) -> Array:
     """Return the initial states of circuits, shape (m, states): at rest, or as the log begins.
 
     Under a load, rest is at the pressure that holds it: a log that begins at another pressure begins in motion. A log
     without pressure that begins in motion begins with the pressure that the circuit's own friction takes.
     """
     p = circuit_values(rows)
-    begun = blocks.opening if blocks.begun is None and np.any(p.load_force) else blocks.begun
-    if blocks.sliding:
-        way, speed = np.sign(blocks.sliding), abs(blocks.sliding)
+    begun = blocks.raw_start_values if blocks.start_values is None and np.any(p.load_force) else blocks.start_values
+    if blocks.start_velocity:
+        way, speed = np.sign(blocks.start_velocity), abs(blocks.start_velocity)
         force = quadratic_friction(speed, 1.0, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
-        begun = (way * force + p.load_force) / p.piston_area, blocks.sliding
+        begun = (way * force + p.load_force) / p.piston_area, blocks.start_velocity
     states = at_rest(p) if begun is None else under_pressure(*begun, p)
     found = np.empty((len(rows), len(states)))
     for place, state in enumerate(states):
@@ -286,7 +286,7 @@ def _starts(blocks: Blocks, rows: Array) -> Array:
     return found
 
 
-def _drift(course: Array, width: int) -> Array:
+def _drift_factors(course: Array, width: int) -> Array:
     """Return the factors on a circuit's parameters, shape (samples, parameters): viscosity falls as leakage rises."""
     factors = np.ones((len(course), width))
     factors[:, [COLUMN[name] for name in _LEAKAGES]] = course[:, None]
@@ -297,14 +297,14 @@ def _drift(course: Array, width: int) -> Array:
 _LEAKAGES = ("leakage_coefficient", "pump_crossport_leakage", "pump_case_leakage", "cylinder_drain_leakage")
 
 
-def _as_logged(blocks: Blocks, rows: Array) -> Array:
+def _in_log_coordinates(blocks: Blocks, rows: Array) -> Array:
     """Return circuits in a log's coordinates: position is relative to its beginning, where a spring may be strained."""
-    rows = _between_stops(blocks, rows)
+    rows = _with_stops(blocks, rows)
     rows[:, COLUMN["load_force"]] += rows[:, COLUMN["load_stiffness"]] * blocks.place
     return rows
 
 
-def _between_stops(blocks: Blocks, rows: Array) -> Array:
+def _with_stops(blocks: Blocks, rows: Array) -> Array:
     """Return circuits with the stops of the rig's stroke if the log may show one, otherwise without stops.
 
     A piston that reversed before a stop, or passed its place, shows none. A stop found in the log replaces the rig's.
@@ -314,13 +314,13 @@ def _between_stops(blocks: Blocks, rows: Array) -> Array:
         rows[:, COLUMN["stroke"]] = 2.0 * blocks.stop
         return rows
     half = 0.5 * rows[:, COLUMN["stroke"]]
-    shown = np.abs(blocks.reach - half) <= AT_STOP * half
-    rows[:, COLUMN["end_stop_stiffness"]] = _pressed_ends(blocks, rows, half)
+    shown = np.abs(blocks.reach - half) <= NEAR_STOP * half
+    rows[:, COLUMN["end_stop_stiffness"]] = _end_stiffness(blocks, rows, half)
     rows[:, COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(circuit_values(rows)))
     return rows
 
 
-def _pressed_ends(blocks: Blocks, rows: Array, half: Array) -> Array:
+def _end_stiffness(blocks: Blocks, rows: Array, half: Array) -> Array:
     """Return the stiffness of ends that the log shows, by how far pressure drives the piston past them [N/m].
 
     Ends are no stiffer than judged: those of small actuators may yield far more, with half a chamber's pressure.
@@ -329,9 +329,9 @@ def _pressed_ends(blocks: Blocks, rows: Array, half: Array) -> Array:
     if blocks.pressure is None or blocks.reach <= np.min(half):
         return judged
     area, load, spring = (rows[:, COLUMN[name]] for name in ("piston_area", "load_force", "load_stiffness"))
-    depth = np.abs(blocks.gone[:, None]) - half
+    depth = np.abs(blocks.distances[:, None]) - half
     beyond = np.any(depth > 0.0, axis=1) & np.isfinite(blocks.pressure)
-    gone, depth = blocks.gone[beyond, None], np.maximum(depth[beyond], 0.0)
+    gone, depth = blocks.distances[beyond, None], np.maximum(depth[beyond], 0.0)
     push = np.sign(gone) * (area * blocks.pressure[beyond, None] - load - spring * (blocks.place + gone))
     found = np.sum(push * depth, axis=0) / np.maximum(np.sum(depth**2, axis=0), np.finfo(float).tiny)
     return np.where(np.any(depth > 0.0, axis=0), np.clip(found, SOFTEST_END * judged, judged), judged)
@@ -343,7 +343,7 @@ def _outputs(blocks: Blocks, states: Array, rows: Array) -> Array:
     if blocks.pressure is None:
         return np.ascontiguousarray(velocity.T)[..., None]
     whose = circuit_plant(rows.shape[-1]).parameter_class
-    logged, rows = states[: -1 : blocks.between], rows if len(rows) == 1 else rows[:: blocks.between]
+    logged, rows = states[: -1 : blocks.substeps], rows if len(rows) == 1 else rows[:: blocks.substeps]
     logged, rows = np.ascontiguousarray(logged), np.ascontiguousarray(rows)
     pressure = block_means(CIRCUIT.observe, PRESSURE, logged, rows, blocks.rows, whose)
     return np.stack([velocity.T, pressure.T], axis=-1)

@@ -9,7 +9,7 @@ import numpy as np
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks, root_mean_square
-from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted_outputs
 from plant.arrays import Array
 
 STEP = 0.005
@@ -26,14 +26,14 @@ STARTS = 3
 FARTHEST = 0.7
 """Longest step in a logarithm [dimensionless]."""
 
-GAINED = 0.5
+LEAST_GAIN = 0.5
 """Gain in log-likelihood below which the search ends [dimensionless]."""
 
-PROMISING = 2e-3
+LEAST_PROMISED_GAIN = 2e-3
 """Gain that a step must promise to be tried [dimensionless]: a smaller one moves nothing by a fifteenth of its
 deviation."""
 
-SHORTEST = 0.07
+SHORTEST_TRIAL = 0.07
 """Share of a step below which a trial without gain is the last [fraction]: 1, 0.3, 0.09 and 0.027 of it are tried."""
 
 LEAST_SCALE = 1e-3
@@ -42,7 +42,7 @@ LEAST_SCALE = 1e-3
 LASTING = 30.0
 """Blocks over which a model's error persists [dimensionless]: 0.3 s, a few reversals."""
 
-SEALS = 1.0
+SEAL_SPREAD = 1.0
 """Standard deviation of the logarithm of presliding displacement [dimensionless]: 7 to 50 um about 20 um."""
 
 
@@ -54,10 +54,10 @@ def _prior(each: Sequence[float], rubbing_alike: float) -> Array:
     return covariance
 
 
-WITHIN = _prior((0.12, 0.12, 0.12, 0.10, 0.08, 0.2, SEALS), 0.08)
+CONDITION_SPREAD = _prior((0.12, 0.12, 0.12, 0.10, 0.08, 0.2, SEAL_SPREAD), 0.08)
 """Differences of actuators in one condition: covariance of the logarithms, shape (7, 7) [dimensionless]."""
 
-WEAK = _prior((0.5, 0.5, 0.3, 0.3, 0.2, 0.3, SEALS), 0.5)
+WEAK_PRIOR = _prior((0.5, 0.5, 0.3, 0.3, 0.2, 0.3, SEAL_SPREAD), 0.5)
 """Prior of an actuator in no known condition, about the nearest one: covariance, shape (7, 7)."""
 
 
@@ -79,7 +79,7 @@ class PointFit:
         Outputs of the circuit [m/s, Pa].
     slopes : ndarray, shape (7, n, outputs)
         Its derivatives with respect to the coordinates.
-    ran : ndarray, shape (7,), optional
+    run_coordinates : ndarray, shape (7,), optional
         Coordinates that were run, where others are told, at which motion is the same unless a relief valve opens.
     """
 
@@ -89,12 +89,16 @@ class PointFit:
     scales: Array
     fitted: Array
     slopes: Array
-    ran: Array | None = None
+    run_coordinates: Array | None = None
 
     @cached_property
     def as_run(self) -> "PointFit":
         """The circuit where its search ended; one object, so that what is computed from it is remembered."""
-        return self if self.ran is None else replace(self, coordinates=self.ran, ran=None)
+        return (
+            self
+            if self.run_coordinates is None
+            else replace(self, coordinates=self.run_coordinates, run_coordinates=None)
+        )
 
 
 @lru_cache(maxsize=2)
@@ -113,7 +117,7 @@ def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
     ndarray, shape (9, n, outputs)
         Velocity [m/s] and pressure [Pa]; read-only, since the cached array is returned.
     """
-    runs = predicted(blocks, parameter_rows(actuator.conditions, actuator.circuit, actuator.rated))
+    runs = predicted_outputs(blocks, parameter_rows(actuator.conditions, actuator.circuit, actuator.rated))
     runs.flags.writeable = False
     return runs
 
@@ -145,7 +149,7 @@ def least_scales(blocks: Blocks) -> Array:
     ndarray, shape (outputs,)
         The sensors' noise, and at least `LEAST_SCALE` of the signal [m/s, Pa].
     """
-    return np.maximum(blocks.noise, LEAST_SCALE * blocks.sizes)
+    return np.maximum(blocks.noise, LEAST_SCALE * blocks.rms)
 
 
 def least_misfit(blocks: Blocks) -> float:
@@ -191,9 +195,9 @@ def fit_freely(
     actuator: Actuator,
     condition: str,
     start: Array | PointFit | None = None,
-    gained: float = GAINED,
+    gained: float = LEAST_GAIN,
     wanted: float = float("inf"),
-    promising: float = PROMISING,
+    promising: float = LEAST_PROMISED_GAIN,
 ) -> PointFit:
     """Fit the circuit to a log with a very weak prior.
 
@@ -222,11 +226,11 @@ def fit_freely(
         The best circuit.
     """
     centre = actuator.conditions[list(CONDITIONS).index(condition)]
-    pull = _pull()
+    pull = _prior_information()
     if isinstance(start, PointFit):
-        best = about(blocks, actuator, condition, start)
+        best = with_cost_about(blocks, actuator, condition, start)
     else:
-        best = _at(blocks, actuator, centre, centre if start is None else start, pull)
+        best = _fit_at(blocks, actuator, centre, centre if start is None else start, pull)
     step, promised, reach, last = centre, 0.0, 0.0, float("inf")
     least = least_misfit(blocks)
     for left in range(ROUNDS, 0, -1):  # a step that gains nothing is shortened to 0.3 of its length
@@ -234,26 +238,26 @@ def fit_freely(
             break
         if reach == 0.0:
             step, reach = _step(blocks, best, centre, pull), 1.0
-            promised = _promised(blocks, best, centre, pull, step)
+            promised = _promised_gain(blocks, best, centre, pull, step)
             # a circuit whose parameters are not finite would run for ever
             if promised < promising or not np.all(np.isfinite(step)):
                 break
             if best.cost - left * max(promised, last) > wanted:
                 break
-        there = _at(blocks, actuator, centre, best.coordinates + reach * step, pull)
+        there = _fit_at(blocks, actuator, centre, best.coordinates + reach * step, pull)
         gain = best.cost - there.cost
         if gain > 0.0:
             best, reach, last = there, 0.0, gain
             if gain < gained:
                 break
-        elif reach < SHORTEST or _most_gained(promised, reach, gain) < promising:
+        elif reach < SHORTEST_TRIAL or _best_gain(promised, reach, gain) < promising:
             break
         else:
             reach *= 0.3
     return best
 
 
-def _most_gained(promised: float, reach: float, gain: float) -> float:
+def _best_gain(promised: float, reach: float, gain: float) -> float:
     """Return the gain of a step at its best length, on the parabola through a trial.
 
     Its initial slope is twice what the whole step promises, and the trial at a share ``reach`` gave the gain.
@@ -262,7 +266,7 @@ def _most_gained(promised: float, reach: float, gain: float) -> float:
     return promised**2 / curvature
 
 
-def about(blocks: Blocks, actuator: Actuator, condition: str, fit: PointFit) -> PointFit:
+def with_cost_about(blocks: Blocks, actuator: Actuator, condition: str, fit: PointFit) -> PointFit:
     """Return a fit with its cost about another condition.
 
     Parameters
@@ -282,19 +286,19 @@ def about(blocks: Blocks, actuator: Actuator, condition: str, fit: PointFit) -> 
         The same circuit, with its cost there.
     """
     off = fit.coordinates - actuator.conditions[list(CONDITIONS).index(condition)]
-    return replace(fit, cost=misfit(blocks, fit.fitted) + 0.5 * float(off @ _pull() @ off))
+    return replace(fit, cost=misfit(blocks, fit.fitted) + 0.5 * float(off @ _prior_information() @ off))
 
 
 @cache
-def _pull() -> Array:
-    return np.asarray(LASTING * np.linalg.inv(WEAK), dtype=np.float64)
+def _prior_information() -> Array:
+    return np.asarray(LASTING * np.linalg.inv(WEAK_PRIOR), dtype=np.float64)
 
 
-def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: Array) -> PointFit:
-    runs = _around(blocks, actuator, point.tobytes())
+def _fit_at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: Array) -> PointFit:
+    runs = _neighbour_runs(blocks, actuator, point.tobytes())
     scales = scales_of(blocks, runs[0])
     slopes = (runs[1:] - runs[0]) / STEP
-    weighted = np.where(blocks.seen, slopes[:, blocks.first :] / scales, 0.0).reshape(len(point), -1)
+    weighted = np.where(blocks.valid, slopes[:, blocks.first :] / scales, 0.0).reshape(len(point), -1)
     information = weighted @ weighted.T
     off = point - centre
     cost = misfit(blocks, runs[0], scales) + 0.5 * float(off @ pull @ off)
@@ -302,27 +306,27 @@ def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: A
 
 
 @lru_cache(maxsize=ROUNDS + 1)
-def _around(blocks: Blocks, actuator: Actuator, place: bytes) -> Array:
+def _neighbour_runs(blocks: Blocks, actuator: Actuator, place: bytes) -> Array:
     """Return the runs of a circuit and its neighbours; cached, as rough and thorough searches share first points."""
     point = np.frombuffer(place)
     around = np.vstack([point, point + STEP * np.eye(len(point))])
-    runs = predicted(blocks, parameter_rows(around, actuator.circuit, actuator.rated))
+    runs = predicted_outputs(blocks, parameter_rows(around, actuator.circuit, actuator.rated))
     runs.flags.writeable = False
     return runs
 
 
 def _step(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
     """Return a Gauss-Newton step, no longer than `FARTHEST`."""
-    step = np.linalg.solve(fit.information + pull, _uphill(blocks, fit, centre, pull)).astype(np.float64)
+    step = np.linalg.solve(fit.information + pull, _posterior_slope(blocks, fit, centre, pull)).astype(np.float64)
     return step * min(1.0, FARTHEST / float(np.max(np.abs(step))))
 
 
-def _promised(blocks: Blocks, fit: PointFit, centre: Array, pull: Array, step: Array) -> float:
+def _promised_gain(blocks: Blocks, fit: PointFit, centre: Array, pull: Array, step: Array) -> float:
     """Return the gain in log-posterior that a step promises."""
-    return float(step @ (_uphill(blocks, fit, centre, pull) - 0.5 * (fit.information + pull) @ step))
+    return float(step @ (_posterior_slope(blocks, fit, centre, pull) - 0.5 * (fit.information + pull) @ step))
 
 
-def _uphill(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
+def _posterior_slope(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
     """Return the slope of the log-posterior, shape (7,)."""
     left = np.nan_to_num((blocks.outputs - fit.fitted)[blocks.first :]) / fit.scales**2
     gained: Array = np.einsum("ink,nk->i", fit.slopes[:, blocks.first :], left)

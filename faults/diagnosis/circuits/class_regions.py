@@ -18,40 +18,41 @@ from faults.diagnosis.circuits.between_samples import spread_with_pressure
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import (
-    GAINED,
+    CONDITION_SPREAD,
     LASTING,
-    PROMISING,
+    LEAST_GAIN,
+    LEAST_PROMISED_GAIN,
     STARTS,
-    WEAK,
-    WITHIN,
+    WEAK_PRIOR,
     PointFit,
-    about,
     fit_freely,
     least_scales,
     misfit,
     nominal_runs,
     scales_of,
+    with_cost_about,
 )
-from faults.diagnosis.circuits.friction_shape import bent_by, doubt_of_bends, told_of_bent
-from faults.diagnosis.circuits.model_doubt import distrust, lasting_power
-from faults.diagnosis.circuits.region_scores import (
-    apart_in_forces,
-    region_scores,
-    scores_in_forces,
-    told_apart,
+from faults.diagnosis.circuits.friction_shape import bend_covariance, bend_shifts, bent_information
+from faults.diagnosis.circuits.model_doubt import information_divisor, lasting_power
+from faults.diagnosis.circuits.region_scores import region_scores, scores_in_forces, separations, separations_in_forces
+from faults.diagnosis.circuits.rivals import (
+    covariance_between_fits,
+    fits_from_other_friction,
+    is_followed_roughly,
+    leaves_only_noise,
+    log_likelihood_behind,
 )
-from faults.diagnosis.circuits.rivals import behind, between_fits, creeps, explains, other_friction
 from plant.arrays import Array
 
-ROUGHLY_GAINED = 10.0
+ROUGH_GAIN = 10.0
 """Gain in log-likelihood below which a search from near by ends [dimensionless]: a third of a real difference."""
 
-YIELDING = 5.0
+STUCK_TRAVEL = 5.0
 """Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""
 
 ALIKE, ALIKE_COUNT = 0.25, 1.0
-"""Prior squared difference of actuators of one kind, in units of `WITHIN` (0.25 is some 10 % in leakage and friction),
-and the weight of that prior in deviations [dimensionless]."""
+"""Prior squared difference of actuators of one kind, in units of `CONDITION_SPREAD` (0.25 is some 10 % in leakage and
+friction), and the weight of that prior in deviations [dimensionless]."""
 
 _NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
 
@@ -75,14 +76,14 @@ class ClassFits:
         Root mean square of its residuals [m/s, Pa].
     scores : ndarray, shape (9,)
         How well the fitted circuits fit each condition's region: log-likelihoods [dimensionless].
-    spreading : callable
+    compute_spread : callable
         Computes `spread`, which needs runs of circuits: most fits are used for their scores only.
     lasting : float
         Divisor of the information for a lasting model error [dimensionless], see `lasting_misfit`; at least 1, and 1
         without pressure.
-    moved : ndarray, shape (7, m)
-        Shift of the coordinates by bends of the friction law [dimensionless], see `bent_by`.
-    unbent : ndarray, shape (9,), optional
+    bend_shifts : ndarray, shape (7, m)
+        Shift of the coordinates by bends of the friction law [dimensionless], see `bend_shifts`.
+    unbent_scores : ndarray, shape (9,), optional
         The scores without such bends; `scores` if not given.
     """
 
@@ -91,10 +92,10 @@ class ClassFits:
     nominal: Array
     nominal_scales: Array
     scores: Array
-    spreading: Callable[[], Array]
+    compute_spread: Callable[[], Array]
     lasting: float
-    moved: Array = field(default_factory=lambda: np.zeros((len(COORDINATES), 1)))
-    unbent: Array | None = None
+    bend_shifts: Array = field(default_factory=lambda: np.zeros((len(COORDINATES), 1)))
+    unbent_scores: Array | None = None
 
     @cached_property
     def spread(self) -> Array:
@@ -102,30 +103,30 @@ class ClassFits:
 
         See `faults.diagnosis.circuits.model_doubt`, and without pressure `spread_of`.
         """
-        return self.spreading()
+        return self.compute_spread()
 
     @property
-    def of_one_law(self) -> Array:
+    def one_law_scores(self) -> Array:
         """Scores of parts of a log, or of circuits, that share one friction law, shape (9,)."""
-        return self.scores if self.unbent is None else self.unbent
+        return self.scores if self.unbent_scores is None else self.unbent_scores
 
     @property
-    def told(self) -> Array:
+    def discounted_information(self) -> Array:
         """Information on the coordinates, lasting model error included, shape (7, 7) [dimensionless].
 
         It decides whether a circuit is between the conditions. Intervals use `spread`, which is narrower if a model
         error persists: it would find more such circuits on the lumped plant, but one more plain log in 150 would be
         falsely unknown.
         """
-        return told_of_bent(self.information / self.lasting, self.moved)
+        return bent_information(self.information / self.lasting, self.bend_shifts)
 
     @property
     def bent_spread(self) -> Array:
         """Covariance of the coordinates for intervals if the friction law may be bent, shape (7, 7)."""
-        return self.spread + doubt_of_bends(self.information, self.moved)
+        return self.spread + bend_covariance(self.information, self.bend_shifts)
 
-    def apart(self, actuator: Actuator) -> Array:
-        """Return the separation of each pair of conditions by the log, see `told_apart`.
+    def separations(self, actuator: Actuator) -> Array:
+        """Return the separation of each pair of conditions by the log, see `faults.diagnosis.circuits.region_scores`.
 
         Parameters
         ----------
@@ -137,23 +138,18 @@ class ClassFits:
         ndarray, shape (9, 9)
             Expected log-likelihood ratios [dimensionless] if the friction law may be bent.
         """
-        if not np.any(self.moved):
-            return told_apart(self.spread, actuator)
-        return apart_in_forces(self.best, self.spread + self.moved @ self.moved.T, actuator)
+        if not np.any(self.bend_shifts):
+            return separations(self.spread, actuator)
+        return separations_in_forces(self.best, self.spread + self.bend_shifts @ self.bend_shifts.T, actuator)
 
     @property
     def covariance(self) -> Array:
         """Covariance of the coordinates under the weak prior, shape (7, 7) [dimensionless]."""
-        return np.asarray(np.linalg.inv(self.information + np.linalg.inv(WEAK)), dtype=np.float64)
+        return np.asarray(np.linalg.inv(self.information + np.linalg.inv(WEAK_PRIOR)), dtype=np.float64)
 
 
 def fit_classes(
-    blocks: Blocks,
-    actuator: Actuator,
-    *,
-    runs: Array | None = None,
-    start: Array | None = None,
-    wanted: float = np.inf,
+    blocks: Blocks, actuator: Actuator, *, runs: Array | None = None, start: Array | None = None, wanted: float = np.inf
 ) -> ClassFits:
     """Fit circuits to a log from the nearest conditions, and score all nine.
 
@@ -181,46 +177,46 @@ def fit_classes(
     nominal = np.array([misfit(blocks, run, one) for run, one in zip(runs, errors, strict=True)])
     order = np.argsort(nominal)[: STARTS if start is None else 1]
     near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
-    gained, promising = (GAINED, PROMISING) if start is None else (ROUGHLY_GAINED, GAINED)
+    gained, promising = (LEAST_GAIN, LEAST_PROMISED_GAIN) if start is None else (ROUGH_GAIN, LEAST_GAIN)
     fits: list[PointFit] = []
     for name in [list(CONDITIONS)[place] for place in near or [int(order[0])]]:
-        if not fits or not explains(blocks, fits[-1]):
+        if not fits or not leaves_only_noise(blocks, fits[-1]):
             fits.append(fit_freely(blocks, actuator, name, start, gained, wanted, promising))
-        elif about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # this condition is nearer to that circuit
+        elif with_cost_about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # nearer to that circuit
             fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
     stuck, first = is_stuck(blocks, actuator), min(fits, key=lambda fit: fit.cost)
-    if start is None and blocks.pressure is not None and not stuck and creeps(blocks, first):
-        nearest = int(np.argmax(region_scores(first, believed_information(first, blocks), actuator)))
-        fits += other_friction(blocks, actuator, first, list(CONDITIONS)[nearest])
-    known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
+    if start is None and blocks.pressure is not None and not stuck and is_followed_roughly(blocks, first):
+        nearest = int(np.argmax(region_scores(first, credible_information(first, blocks), actuator)))
+        fits += fits_from_other_friction(blocks, actuator, first, list(CONDITIONS)[nearest])
+    known = [credible_information(fit, blocks, stuck=stuck) for fit in fits]
     least = int(np.argmin([fit.cost for fit in fits]))
-    worse = behind(fits, fits[least], blocks)
+    worse = log_likelihood_behind(fits, fits[least], blocks)
     straight = [region_scores(fit, information, actuator) for fit, information in zip(fits, known, strict=True)]
     moved, scores = [np.zeros((len(COORDINATES), 1)) for _ in fits], straight
     if blocks.pressure is not None and not stuck:
-        moved = [bent_by(fit, blocks, actuator) for fit in fits]
-        told = [told_of_bent(information, by) for information, by in zip(known, moved, strict=True)]
+        moved = [bend_shifts(fit, blocks, actuator) for fit in fits]
+        told = [bent_information(information, by) for information, by in zip(known, moved, strict=True)]
         scores = [scores_in_forces(fit, one, actuator) for fit, one in zip(fits, told, strict=True)]
     likeliest = misfit(blocks, fits[least].fitted, fits[least].scales) / LASTING
     held, unbent = (np.max(np.array(one) - worse[:, None], axis=0) - likeliest for one in (scores, straight))
     centre = actuator.conditions[np.argmax(unbent)]
-    best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
+    best = fits[least] if blocks.pressure is not None else _at_likeliest_scale(fits[least], centre)
     # without pressure, no flow balance tests for another pump or other faults, so only the regions can
     lasting = 1.0 if blocks.pressure is None else max(1.0, lasting_misfit(best.fitted, blocks))
     if blocks.pressure is None:
         spreading = partial(spread_of, best, known[least], blocks, centre)
     else:
         seen = _NO_FRICTION if stuck else np.ones(len(COORDINATES))
-        among = between_fits(fits, best, worse)
+        among = covariance_between_fits(fits, best, worse)
         spreading = partial(spread_with_pressure, best, blocks, actuator, unbent, seen, among)
     return ClassFits(best, known[least], nominal, errors, held, spreading, lasting, moved[least], unbent)
 
 
-def _scaled(fit: PointFit, centre: Array) -> PointFit:
+def _at_likeliest_scale(fit: PointFit, centre: Array) -> PointFit:
     """Return a fit without pressure at the scale that is most likely within a condition."""
-    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    pull = np.linalg.solve(CONDITION_SPREAD, PRESSURE_SCALE)
     shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
-    return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE, ran=fit.coordinates)
+    return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE, run_coordinates=fit.coordinates)
 
 
 def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) -> Array:
@@ -236,7 +232,7 @@ def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) 
     fit : PointFit
         The fit.
     information : ndarray, shape (7, 7)
-        Credible information, see `believed_information`.
+        Credible information, see `credible_information`.
     blocks : Blocks
         Its log, without pressure.
     centre : ndarray, shape (7,)
@@ -247,11 +243,11 @@ def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) 
     ndarray, shape (7, 7)
         Covariance under the weak prior [dimensionless].
     """
-    known = information / max(1.0, lasting_misfit(fit.fitted, blocks)) + np.linalg.inv(WEAK)
-    weight = information @ np.linalg.inv(np.eye(len(WITHIN)) + WITHIN @ information)
-    off, told = fit.coordinates - centre, float(np.trace(WITHIN @ weight))
+    known = information / max(1.0, lasting_misfit(fit.fitted, blocks)) + np.linalg.inv(WEAK_PRIOR)
+    weight = information @ np.linalg.inv(np.eye(len(CONDITION_SPREAD)) + CONDITION_SPREAD @ information)
+    off, told = fit.coordinates - centre, float(np.trace(CONDITION_SPREAD @ weight))
     unlike = (ALIKE_COUNT * ALIKE + float(off @ weight @ off)) / (ALIKE_COUNT + told)
-    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    pull = np.linalg.solve(CONDITION_SPREAD, PRESSURE_SCALE)
     known = known + np.outer(pull, pull) / (unlike * float(pull @ PRESSURE_SCALE))
     return np.asarray(np.linalg.inv(known), dtype=np.float64)
 
@@ -290,10 +286,10 @@ def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:
     bool
         Whether it moves by no more than a few presliding displacements.
     """
-    return blocks.travel < YIELDING * actuator.circuit.presliding_displacement
+    return blocks.travel < STUCK_TRAVEL * actuator.circuit.presliding_displacement
 
 
-def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) -> Array:
+def credible_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) -> Array:
     """Return the credible information of a fit: residuals beyond the sensors' noise count as lasting model error.
 
     Without pressure there is none on `PRESSURE_SCALE`: motion is the same at twice the pressure, with half the leakage
@@ -313,7 +309,7 @@ def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) 
     ndarray, shape (7, 7)
         Inverse covariance of the coordinates, without a prior.
     """
-    believed = fit.information / distrust(fit, blocks)
+    believed = fit.information / information_divisor(fit, blocks)
     if stuck:
         believed = believed * np.outer(_NO_FRICTION, _NO_FRICTION)
     if blocks.pressure is not None:
@@ -323,7 +319,7 @@ def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) 
     return believed - np.outer(along, along) / curvature if curvature > 0.0 else believed
 
 
-def how_near(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
+def nearest_score(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
     """Return the score of the condition nearest to a log.
 
     Without pressure, searches from several conditions end at circuits that follow a log about equally well, some within
@@ -344,7 +340,7 @@ def how_near(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
         Log-likelihood of the region with the best circuit [dimensionless], 0 at its centre; without pressure the best
         over all circuits, each less its distance from the best fit.
     """
-    best = float(np.max(region_scores(fits.best, fits.told, actuator)))
+    best = float(np.max(region_scores(fits.best, fits.discounted_information, actuator)))
     if blocks.pressure is not None:
         return best
     return max(best, float(np.max(fits.scores)) + misfit(blocks, fits.best.fitted) / LASTING)

@@ -16,28 +16,28 @@ import numpy as np
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_fit import WEAK, PointFit
+from faults.diagnosis.circuits.class_fit import WEAK_PRIOR, PointFit
 from plant.arrays import Array
 
-FADES = (0.03, 0.1, 0.3)
+FADE_VELOCITIES = (0.03, 0.1, 0.3)
 """Velocities within which a bend fades, over the rated one [fraction]: 1 to 13 mm/s on the paper's actuator. Seals of
 cylinders have Stribeck velocities of one to some tens of millimetres per second."""
 
-BEND = 0.1
+BEND_SPREAD = 0.1
 """Standard deviation of each bend over friction at rest [dimensionless], judged: all three together are 17 % at rest.
 Breakaway friction of seals is 1.05 to 1.5 times that of sliding."""
 
-SLIDES = 0.005
+SLIDING_VELOCITY = 0.005
 """Velocity over the rated one above which a piston slides [fraction]."""
 
 RIDGE = 1e-7
 """Ridge of the regression [dimensionless]: one speed alone does not determine three parts."""
 
-FORCES = [at for at, name in enumerate(COORDINATES) if name.startswith("friction")]
+FORCE_PLACES = [at for at, name in enumerate(COORDINATES) if name.startswith("friction")]
 """Coordinates that are forces."""
 
 
-def bent_by(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
+def bend_shifts(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
     """Return the response of a fit to unknown bends of the friction law.
 
     A search fits the three parts to friction at the velocities that were reached. A bend shifts them as it would shift
@@ -56,20 +56,20 @@ def bent_by(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
     Returns
     -------
     ndarray, shape (7, 3)
-        Shift of the coordinates by each of `FADES` at one standard deviation [dimensionless].
+        Shift of the coordinates by each of `FADE_VELOCITIES` at one standard deviation [dimensionless].
     """
-    speed = np.abs(fit.fitted[blocks.first :, 0][blocks.seen[:, 0]]) / actuator.rated
-    speed = np.append(speed[speed > SLIDES], 0.0)  # friction at rest shows when the piston breaks loose
+    speed = np.abs(fit.fitted[blocks.first :, 0][blocks.valid[:, 0]]) / actuator.rated
+    speed = np.append(speed[speed > SLIDING_VELOCITY], 0.0)  # friction at rest shows when the piston breaks loose
     parts = np.stack([np.ones_like(speed), speed, speed**2], axis=1)
-    bends = BEND * np.exp(-speed[:, None] / np.array(FADES))
+    bends = BEND_SPREAD * np.exp(-speed[:, None] / np.array(FADE_VELOCITIES))
     rest, linear, quadratic = np.linalg.solve(parts.T @ parts + RIDGE * len(speed) * np.eye(3), parts.T @ bends)
-    forces = np.exp(fit.coordinates[FORCES])
-    moved = np.zeros((len(fit.coordinates), len(FADES)))
-    moved[FORCES] = np.array([rest, quadratic, rest + linear + quadratic]) * (forces[0] / forces)[:, None]
+    forces = np.exp(fit.coordinates[FORCE_PLACES])
+    moved = np.zeros((len(fit.coordinates), len(FADE_VELOCITIES)))
+    moved[FORCE_PLACES] = np.array([rest, quadratic, rest + linear + quadratic]) * (forces[0] / forces)[:, None]
     return moved
 
 
-def told_of_bent(information: Array, moved: Array) -> Array:
+def bent_information(information: Array, moved: Array) -> Array:
     """Return the information of a log on a circuit whose friction law may be bent.
 
     Parameters
@@ -77,7 +77,7 @@ def told_of_bent(information: Array, moved: Array) -> Array:
     information : ndarray, shape (7, 7)
         Its information if the law had the circuit's shape.
     moved : ndarray, shape (7, m)
-        Shift of the coordinates by bends, see `bent_by`.
+        Shift of the coordinates by bends, see `bend_shifts`.
 
     Returns
     -------
@@ -86,28 +86,28 @@ def told_of_bent(information: Array, moved: Array) -> Array:
 
     Examples
     --------
-    >>> told_of_bent(np.diag([4.0, 0.0]), np.array([[0.5], [0.0]])).tolist()
+    >>> bent_information(np.diag([4.0, 0.0]), np.array([[0.5], [0.0]])).tolist()
     [[2.0, 0.0], [0.0, 0.0]]
     """
     along = information @ moved
     return np.asarray(information - along @ np.linalg.solve(np.eye(moved.shape[1]) + moved.T @ along, along.T))
 
 
-def doubt_of_bends(information: Array, moved: Array) -> Array:
+def bend_covariance(information: Array, moved: Array) -> Array:
     """Return the covariance that bends of the friction law add to a circuit's coordinates.
 
     Parameters
     ----------
     information : ndarray, shape (7, 7)
-        As in `told_of_bent`.
+        As in `bent_information`.
     moved : ndarray, shape (7, m)
-        As in `told_of_bent`.
+        As in `bent_information`.
 
     Returns
     -------
     ndarray, shape (7, 7)
         Covariance [dimensionless]; no more than the weak prior allows.
     """
-    weak = np.linalg.inv(WEAK)
-    bent, straight = (np.linalg.inv(one + weak) for one in (told_of_bent(information, moved), information))
+    weak = np.linalg.inv(WEAK_PRIOR)
+    bent, straight = (np.linalg.inv(one + weak) for one in (bent_information(information, moved), information))
     return np.asarray(bent - straight, dtype=np.float64)

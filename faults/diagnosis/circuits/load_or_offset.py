@@ -12,14 +12,14 @@ import numpy as np
 
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted
-from faults.diagnosis.circuits.class_fit import LASTING, WEAK, PointFit, fit_freely
-from faults.diagnosis.circuits.yielding import follows
+from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted_outputs
+from faults.diagnosis.circuits.class_fit import LASTING, WEAK_PRIOR, PointFit, fit_freely
+from faults.diagnosis.circuits.yielding import follows_velocity
 from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.notes import Note
 
-APART = math.log(10.0)
+NAMED_ALONE_GAIN = math.log(10.0)
 """Log-likelihood by which one of two explanations must be better to be named alone [dimensionless], in `LASTING` blocks
 that count as one: evidence is called strong above that (Jeffreys, Theory of Probability, 1961, appendix B)."""
 
@@ -37,7 +37,7 @@ class _Load:
     entry: str
     name: str
     unit: str
-    presumed: float
+    prior_std: float
 
 
 def load_for_offset(
@@ -71,18 +71,18 @@ def load_for_offset(
         _Load("load_force", "a constant load", "N", force),
         _Load("load_stiffness", "a spring", "N/m", force / max(blocks.travel, np.finfo(float).eps)),
     )
-    found = [(*_fitted(one, blocks, actuator, nearest, without), one) for one in loads]
+    found = [(*_fit_load(one, blocks, actuator, nearest, without), one) for one in loads]
     gained, size, fit, load = max(found, key=lambda one: one[0])
     gained -= gain * LASTING
-    if gained < -APART * LASTING or not follows(blocks, fit, actuator):
+    if gained < -NAMED_ALONE_GAIN * LASTING or not follows_velocity(blocks, fit, actuator):
         return None
     told = {"load": load.name, "entry": load.entry, "value": size, "unit": load.unit}
-    if gained > APART * LASTING:
+    if gained > NAMED_ALONE_GAIN * LASTING:
         return AgainstCode.LOAD_UNTOLD.note(**told)
     return AgainstCode.LOAD_OR_OFFSET.note(**told, bias_rad_s=-offset)
 
 
-def _fitted(
+def _fit_load(
     load: _Load, blocks: Blocks, actuator: Actuator, nearest: str, without: PointFit
 ) -> tuple[float, float, PointFit]:
     """Return the gain in log-likelihood under a load, its entry in the rig file [SI], and the circuit."""
@@ -93,7 +93,7 @@ def _fitted(
 
     gained, value, fit = 0.0, rig, without
     for _ in range(ROUNDS):
-        further = value + _step(lambda step, at=value: under(at + step), load.presumed, blocks, actuator, fit)
+        further = value + _load_step(lambda step, at=value: under(at + step), load.prior_std, blocks, actuator, fit)
         if load.entry == "load_stiffness" and further < 0.0:
             break
         tried = fit_freely(blocks, replace(actuator, circuit=under(further)), nearest, start=fit.coordinates)
@@ -103,15 +103,17 @@ def _fitted(
     return gained, value, fit
 
 
-def _step(
+def _load_step(
     moved: Callable[[float], CircuitParameters], presumed: float, blocks: Blocks, actuator: Actuator, fit: PointFit
 ) -> float:
     """Return the linear step of a load from a circuit, with all other coordinates free [unit of the load]."""
     first, nudge = blocks.first, NUDGE * presumed
     rows = parameter_rows(fit.coordinates[None], moved(nudge), actuator.rated)
-    columns = np.concatenate([fit.slopes, (predicted(blocks, rows) - fit.fitted) / NUDGE])[:, first:] / fit.scales
-    weighted = np.where(blocks.seen, columns, 0.0).reshape(len(columns), -1)
-    left = np.where(blocks.seen, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
+    columns = (
+        np.concatenate([fit.slopes, (predicted_outputs(blocks, rows) - fit.fitted) / NUDGE])[:, first:] / fit.scales
+    )
+    weighted = np.where(blocks.valid, columns, 0.0).reshape(len(columns), -1)
+    left = np.where(blocks.valid, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
     pull = np.eye(len(columns)) * LASTING
-    pull[: len(WEAK), : len(WEAK)] = LASTING * np.linalg.inv(WEAK)
+    pull[: len(WEAK_PRIOR), : len(WEAK_PRIOR)] = LASTING * np.linalg.inv(WEAK_PRIOR)
     return presumed * float(np.linalg.solve(weighted @ weighted.T + pull, weighted @ left)[-1])

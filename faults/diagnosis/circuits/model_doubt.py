@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks, root_mean_square
-from faults.diagnosis.circuits.circuit_runs import ALLOWED, COLUMN, parameter_rows, predicted
-from faults.diagnosis.circuits.class_fit import WEAK, PointFit
+from faults.diagnosis.circuits.circuit_runs import COLUMN, TOLERANCES, parameter_rows, predicted_outputs
+from faults.diagnosis.circuits.class_fit import WEAK_PRIOR, PointFit
 from plant.arrays import Array
 
 _CASE = "pump_case_leakage"
@@ -44,26 +44,26 @@ NUDGE = 0.05
 _STEPS: Mapping[str, float] = MappingProxyType({"pump_crossport_leakage": -NUDGE, _CASE: SELDOM_KNOWN[_CASE]})
 """Steps of shares: the cylinder leaks the rest."""
 
-RIGHT = 0.25
+RIGHT_SHARE = 0.25
 """Share of the rig files that are right about all of `SELDOM_KNOWN` [fraction], judged."""
 
 NOISE_ALONE = 1.1
 """Root mean square residual over the sensors' noise up to which residuals are noise alone [dimensionless]: the noise is
 known to a twentieth, and a log of 1000 blocks determines the size of residuals no better."""
 
-STRUCTURAL = 100.0
+STRUCTURAL_FACTOR = 100.0
 """Factor on the variance for residuals beyond sensor noise [dimensionless]: they persist, and do not follow the
 derivatives."""
 
 LOOKS = 10.0
 """Number of independent looks that a log gives at a wrong model's error, however long it is [dimensionless]."""
 
-AVERAGED = 10
+AVERAGED_BLOCKS = 10
 """Blocks over which residuals are averaged to find a lasting error, and on either side of a block within which a wrong
 model's error has the same size [dimensionless]: a tenth of a second."""
 
 
-def distrust(fit: PointFit, blocks: Blocks) -> float:
+def information_divisor(fit: PointFit, blocks: Blocks) -> float:
     """Return the divisor of a fit's information for residuals beyond sensor noise.
 
     Parameters
@@ -79,10 +79,10 @@ def distrust(fit: PointFit, blocks: Blocks) -> float:
         Factor [dimensionless], 1 for noise alone.
     """
     unexplained = float(np.max(1.0 - (blocks.noise / fit.scales) ** 2))
-    return 1.0 + STRUCTURAL * max(unexplained, 0.0)
+    return 1.0 + STRUCTURAL_FACTOR * max(unexplained, 0.0)
 
 
-def spreads_of(actuator: Actuator) -> Array:
+def seldom_known_spreads(actuator: Actuator) -> Array:
     """Return the prior deviations of an actuator's seldom known parameters.
 
     Parameters
@@ -116,7 +116,7 @@ def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Ar
     Returns
     -------
     ndarray, shape (m, n, outputs)
-        Derivatives with respect to logarithms and shares, in the order of `spreads_of` [m/s, Pa].
+        Derivatives with respect to logarithms and shares, in the order of `seldom_known_spreads` [m/s, Pa].
     """
     (row,) = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
     leakage, case = row[COLUMN["leakage_coefficient"]], row[COLUMN[_CASE]]
@@ -135,7 +135,7 @@ def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Ar
             nudged[at] += step * leakage
         else:
             nudged[at] *= np.exp(step)
-    runs = predicted(blocks, rows)
+    runs = predicted_outputs(blocks, rows)
     slopes = (runs[1:] - runs[0]) / np.array([step for _, step in steps])[:, None, None]
     if case > 0.0:
         at = list(SELDOM_KNOWN).index(_CASE)
@@ -144,7 +144,7 @@ def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Ar
 
 
 def lasting_power(left: Array) -> Array:
-    """Return the power of residuals averaged over `AVERAGED` blocks, as white noise of one block would have it.
+    """Return the power of residuals averaged over `AVERAGED_BLOCKS` blocks, as white noise of one block would have it.
 
     Parameters
     ----------
@@ -154,20 +154,20 @@ def lasting_power(left: Array) -> Array:
     Returns
     -------
     ndarray, shape (outputs,)
-        For white noise its mean square, for a lasting error `AVERAGED` times that [m^2/s^2, Pa^2].
+        For white noise its mean square, for a lasting error `AVERAGED_BLOCKS` times that [m^2/s^2, Pa^2].
     """
-    size = min(AVERAGED, len(left))
+    size = min(AVERAGED_BLOCKS, len(left))
     parts = left[: len(left) // size * size].reshape(-1, size, left.shape[1])
     there = np.sum(np.isfinite(parts), axis=(0, 1))
     return np.asarray(np.sum(np.nansum(parts, axis=1) ** 2, axis=0) / np.maximum(there, 1), dtype=np.float64)
 
 
-def left_of(fit: PointFit, blocks: Blocks) -> Array:
+def residuals_of(fit: PointFit, blocks: Blocks) -> Array:
     """Return the residuals of a fit on the blocks that count, shape (n, outputs) [m/s, Pa]; NaN where unknown."""
     return (blocks.outputs - fit.fitted)[blocks.first :]
 
 
-def power_left(left: Array, blocks: Blocks) -> Array:
+def residual_power(left: Array, blocks: Blocks) -> Array:
     """Return the mean square of a fit's residuals.
 
     A search counts no residual below `class_fit.LEAST_SCALE` of the signal. Here that would be a model error, of which
@@ -176,7 +176,7 @@ def power_left(left: Array, blocks: Blocks) -> Array:
     Parameters
     ----------
     left : ndarray, shape (n, outputs)
-        As `left_of` returns it.
+        As `residuals_of` returns it.
     blocks : Blocks
         The log.
 
@@ -185,10 +185,10 @@ def power_left(left: Array, blocks: Blocks) -> Array:
     ndarray, shape (outputs,)
         At least the noise, and the error allowed in runs of a circuit [m^2/s^2, Pa^2].
     """
-    return np.maximum(root_mean_square(left), np.maximum(blocks.noise, ALLOWED["tolerance"] * blocks.sizes)) ** 2
+    return np.maximum(root_mean_square(left), np.maximum(blocks.noise, TOLERANCES["tolerance"] * blocks.rms)) ** 2
 
 
-def noise_shown(left: Array, blocks: Blocks) -> Array:
+def noise_power(left: Array, blocks: Blocks) -> Array:
     """Return the power of the sensors' noise; that of a position is at least as large as residuals show it.
 
     Encoder steps act as known noise while a piston crosses many of them from sample to sample. At low speed they do not
@@ -198,7 +198,7 @@ def noise_shown(left: Array, blocks: Blocks) -> Array:
     Parameters
     ----------
     left : ndarray, shape (n, outputs)
-        Residuals, as from `left_of`.
+        Residuals, as from `residuals_of`.
     blocks : Blocks
         The log.
 
@@ -223,7 +223,7 @@ def model_error(left: Array, blocks: Blocks) -> Array:
     Parameters
     ----------
     left : ndarray, shape (n, outputs)
-        Residuals, as from `left_of`.
+        Residuals, as from `residuals_of`.
     blocks : Blocks
         The log.
 
@@ -232,13 +232,13 @@ def model_error(left: Array, blocks: Blocks) -> Array:
     ndarray, shape (outputs,)
         Zero for noise alone [m^2/s^2, Pa^2].
     """
-    power = power_left(left, blocks)
-    beyond = power - NOISE_ALONE**2 * noise_shown(left, blocks)
-    lasting = (lasting_power(left) - (NOISE_ALONE * blocks.noise) ** 2) / AVERAGED
+    power = residual_power(left, blocks)
+    beyond = power - NOISE_ALONE**2 * noise_power(left, blocks)
+    lasting = (lasting_power(left) - (NOISE_ALONE * blocks.noise) ** 2) / AVERAGED_BLOCKS
     return np.asarray(np.clip(np.maximum(beyond, lasting), 0.0, power), dtype=np.float64)
 
 
-def near_by(left: Array, seen: NDArray[np.bool_]) -> Array:
+def local_variance(left: Array, seen: NDArray[np.bool_]) -> Array:
     """Return the local variance of residuals around each block, over that of the whole log.
 
     Parameters
@@ -251,18 +251,18 @@ def near_by(left: Array, seen: NDArray[np.bool_]) -> Array:
     Returns
     -------
     ndarray, shape (n, outputs)
-        Mean squares over `AVERAGED` blocks on either side, over that of all [dimensionless]; 1 for zero residuals.
+        Mean squares over `AVERAGED_BLOCKS` on either side, over that of all [dimensionless]; 1 for zero residuals.
     """
     sums = np.concatenate([np.zeros((1, 2 * left.shape[1])), np.cumsum(np.hstack([left**2, seen]), axis=0)])
     at = np.arange(len(left))
-    within = sums[np.minimum(at + AVERAGED + 1, len(left))] - sums[np.maximum(at - AVERAGED, 0)]
+    within = sums[np.minimum(at + AVERAGED_BLOCKS + 1, len(left))] - sums[np.maximum(at - AVERAGED_BLOCKS, 0)]
     power, counts = np.hsplit(within, 2)
     whole = np.sum(left**2, axis=0) / np.maximum(np.sum(seen, axis=0), 1)
     local = power / np.maximum(counts, 1.0)
     return np.where(whole > 0.0, local / np.where(whole > 0.0, whole, 1.0), 1.0)
 
 
-def taken_back(slopes: Array, seen: NDArray[np.bool_]) -> Array:
+def noise_reduction(slopes: Array, seen: NDArray[np.bool_]) -> Array:
     """Return the reduction of a position's noise in a fit against white noise of its velocity.
 
     Mean velocity over a block is a difference of two positions. The error of the position between two blocks counts in
@@ -284,7 +284,7 @@ def taken_back(slopes: Array, seen: NDArray[np.bool_]) -> Array:
     return np.asarray(0.5 * (beside + beside.T), dtype=np.float64)
 
 
-def doubt_of(
+def error_moment(
     fit: PointFit,
     seldom: Array,
     blocks: Blocks,
@@ -310,25 +310,25 @@ def doubt_of(
     seen : ndarray, shape (7,)
         1 for what the log can determine, 0 for what it cannot, such as friction of a piston that sticks.
     spreads : ndarray, shape (m,)
-        Standard deviations of the nuisance unknowns, see `spreads_of`.
+        Standard deviations of the nuisance unknowns, see `seldom_known_spreads`.
 
     Returns
     -------
     ndarray, shape (7, 7)
         Covariance, plus the squares of the steps that prior and log suggest [dimensionless].
     """
-    known, left = len(fit.coordinates), left_of(fit, blocks)
-    there = np.where(blocks.seen, left, 0.0)
-    power, lasts = power_left(left, blocks), model_error(left, blocks) * blocks.counts / LOOKS
+    known, left = len(fit.coordinates), residuals_of(fit, blocks)
+    there = np.where(blocks.valid, left, 0.0)
+    power, lasts = residual_power(left, blocks), model_error(left, blocks) * blocks.counts / LOOKS
     weight = np.sqrt(power + lasts)
     slopes = np.concatenate([fit.slopes * seen[:, None, None], seldom])[:, blocks.first :]
-    slopes = np.where(blocks.seen, slopes / weight, 0.0)
-    errs = np.sqrt(power + lasts * near_by(there, blocks.seen)) / weight
+    slopes = np.where(blocks.valid, slopes / weight, 0.0)
+    errs = np.sqrt(power + lasts * local_variance(there, blocks.valid)) / weight
     told, erring = (part @ part.T for part in (one.reshape(len(slopes), -1) for one in (slopes, slopes * errs)))
     if blocks.differenced and not np.any(lasts):
-        erring = erring - taken_back(slopes[..., 0] * (blocks.noise[0] / power[0] ** 0.5), blocks.seen[:, 0])
+        erring = erring - noise_reduction(slopes[..., 0] * (blocks.noise[0] / power[0] ** 0.5), blocks.valid[:, 0])
     prior = np.zeros((len(slopes), len(slopes)))
-    prior[:known, :known] = np.linalg.inv(WEAK)
+    prior[:known, :known] = np.linalg.inv(WEAK_PRIOR)
     prior[known:, known:] = np.diag(spreads**-2.0)
     pulls = (slopes.reshape(len(slopes), -1) @ (there / weight).ravel())[:, None]
     pulls = pulls + prior[:, :known] @ (centres - fit.coordinates).T
@@ -345,6 +345,6 @@ def doubt_of(
         evidence.append(0.5 * float(pulls[free, likeliest] @ steps[:, likeliest] + volumes))
         spread = (covariance @ (erring + prior)[its] @ covariance)[:known, :known]
         found.append(spread + (steps[:known] * shares) @ steps[:known].T)
-    odds_right = RIGHT / (1.0 - RIGHT) * np.exp(min(evidence[0] - evidence[1], 700.0))
+    odds_right = RIGHT_SHARE / (1.0 - RIGHT_SHARE) * np.exp(min(evidence[0] - evidence[1], 700.0))
     share = odds_right / (1.0 + odds_right)
     return np.asarray(share * found[0] + (1.0 - share) * found[1], dtype=np.float64)

@@ -17,7 +17,7 @@ from faults.diagnosis.circuits.class_fit import fit_freely
 from faults.diagnosis.circuits.class_regions import ClassFits, is_stuck
 from plant.arrays import Array
 
-OPEN = 0.025
+LEAST_PROBABILITY = 0.025
 """Least probability of a class whose circuit counts [probability]: what an interval leaves out at either end."""
 
 
@@ -60,10 +60,10 @@ def circuits_left_open(
         is then open in any case.
     """
     nearest = list(CONDITIONS)[int(np.argmax(fits.scores))]
-    found = [OpenCircuit(fits.best.coordinates, max(OPEN, probabilities[nearest]))]
+    found = [OpenCircuit(fits.best.coordinates, max(LEAST_PROBABILITY, probabilities[nearest]))]
     if blocks.pressure is None or is_stuck(blocks, actuator):
         return found
     for name, probability in probabilities.items():
-        if name != nearest and probability >= OPEN:
+        if name != nearest and probability >= LEAST_PROBABILITY:
             found.append(OpenCircuit(fit_freely(blocks, actuator, name).coordinates, probability))
     return found

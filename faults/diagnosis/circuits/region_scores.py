@@ -7,8 +7,8 @@ likelihood if it is narrow. If it is wide, friction is treated as forces, since 
 import numpy as np
 
 from faults.diagnosis.circuits.actuator import Actuator
-from faults.diagnosis.circuits.class_fit import WITHIN, PointFit
-from faults.diagnosis.circuits.friction_shape import FORCES
+from faults.diagnosis.circuits.class_fit import CONDITION_SPREAD, PointFit
+from faults.diagnosis.circuits.friction_shape import FORCE_PLACES
 from plant.arrays import Array
 
 
@@ -30,7 +30,7 @@ def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Arra
         Log-likelihoods [dimensionless] up to a constant.
     """
     off = fit.coordinates - actuator.conditions
-    weight = information @ np.linalg.inv(np.eye(len(information)) + WITHIN @ information)
+    weight = information @ np.linalg.inv(np.eye(len(information)) + CONDITION_SPREAD @ information)
     return -0.5 * np.einsum("ci,ij,cj->c", off, weight, off)
 
 
@@ -54,13 +54,13 @@ def scores_in_forces(fit: PointFit, told: Array, actuator: Actuator) -> Array:
     ndarray, shape (9,)
         Log-likelihoods [dimensionless] up to a constant.
     """
-    off, sizes = _in_forces(fit, actuator)
-    blurred, usual = (np.eye(len(told)) + within @ told for within in (_within(sizes), WITHIN))
+    off, sizes = _offsets_in_forces(fit, actuator)
+    blurred, usual = (np.eye(len(told)) + within @ told for within in (_region_covariances(sizes), CONDITION_SPREAD))
     volumes = np.linalg.slogdet(blurred)[1] - np.linalg.slogdet(usual)[1]  # a wide region counts less
     return -0.5 * (np.einsum("ci,cij,cj->c", off, told @ np.linalg.inv(blurred), off) + volumes)
 
 
-def told_apart(spread: Array, actuator: Actuator) -> Array:
+def separations(spread: Array, actuator: Actuator) -> Array:
     """Return the separation of each pair of conditions by a log, as an expected log-likelihood ratio.
 
     Parameters
@@ -76,10 +76,10 @@ def told_apart(spread: Array, actuator: Actuator) -> Array:
         Half the squared distance between their regions, in deviations that include the log's [dimensionless].
     """
     between = actuator.conditions[:, None] - actuator.conditions
-    return 0.5 * np.einsum("abi,ij,abj->ab", between, np.linalg.inv(WITHIN + spread), between)
+    return 0.5 * np.einsum("abi,ij,abj->ab", between, np.linalg.inv(CONDITION_SPREAD + spread), between)
 
 
-def apart_in_forces(fit: PointFit, spread: Array, actuator: Actuator) -> Array:
+def separations_in_forces(fit: PointFit, spread: Array, actuator: Actuator) -> Array:
     """Return the separation of each pair of conditions by a log, with friction as forces.
 
     Parameters
@@ -96,22 +96,22 @@ def apart_in_forces(fit: PointFit, spread: Array, actuator: Actuator) -> Array:
     ndarray, shape (9, 9)
         Half the squared distance between their regions, in deviations that include the log's [dimensionless].
     """
-    off, sizes = _in_forces(fit, actuator)
-    within = _within(sizes)
+    off, sizes = _offsets_in_forces(fit, actuator)
+    within = _region_covariances(sizes)
     between = off[:, None] - off
     blurred = np.linalg.inv(0.5 * (within[:, None] + within) + spread)
     return np.asarray(0.5 * np.einsum("abi,abij,abj->ab", between, blurred, between), dtype=np.float64)
 
 
-def _in_forces(fit: PointFit, actuator: Actuator) -> tuple[Array, Array]:
+def _offsets_in_forces(fit: PointFit, actuator: Actuator) -> tuple[Array, Array]:
     """Return the offset of a circuit from each condition and the weight of a logarithm; forces over the circuit's."""
     off = fit.coordinates - actuator.conditions
     sizes = np.ones_like(off)
-    sizes[:, FORCES] = np.exp(-off[:, FORCES])
-    off[:, FORCES] = 1.0 - sizes[:, FORCES]
+    sizes[:, FORCE_PLACES] = np.exp(-off[:, FORCE_PLACES])
+    off[:, FORCE_PLACES] = 1.0 - sizes[:, FORCE_PLACES]
     return off, sizes
 
 
-def _within(sizes: Array) -> Array:
+def _region_covariances(sizes: Array) -> Array:
     """Return the covariance of each region with friction as forces, shape (9, 7, 7)."""
-    return sizes[:, :, None] * WITHIN * sizes[:, None, :]
+    return sizes[:, :, None] * CONDITION_SPREAD * sizes[:, None, :]

@@ -25,7 +25,7 @@ LOOKS = 5.0
 """Independent looks at a wrong model's error for the choice between two circuits that follow a log roughly
 [dimensionless]: half of those for an interval, since both circuits err where the piston sticks and slips."""
 
-ROUGHLY = 0.06
+ROUGH_RESIDUAL = 0.06
 """Share of velocity, root mean square, that a circuit leaves if it follows a piston roughly [dimensionless]: half of
 the limit. Of 36 plain training logs of the open benchmark with travel over 4 mm, all but one leave less (0.062);
 creeping ones with a wrong class over 90 % leave 0.12 and more."""
@@ -33,7 +33,7 @@ creeping ones with a wrong class over 90 % leave 0.12 and more."""
 _SLIDING = [COORDINATES.index(name) for name in ("friction_quadratic", "friction_rated")]
 
 
-def explains(blocks: Blocks, fit: PointFit) -> bool:
+def leaves_only_noise(blocks: Blocks, fit: PointFit) -> bool:
     """Return whether a circuit's residuals are the sensors' noise alone.
 
     Parameters
@@ -51,7 +51,7 @@ def explains(blocks: Blocks, fit: PointFit) -> bool:
     return bool(np.all(fit.scales <= NOISE_ALONE * least_scales(blocks)))
 
 
-def creeps(blocks: Blocks, fit: PointFit) -> bool:
+def is_followed_roughly(blocks: Blocks, fit: PointFit) -> bool:
     """Return whether a piston moves so little, or so roughly, that a search may have ended at a wrong friction level.
 
     Parameters
@@ -64,13 +64,13 @@ def creeps(blocks: Blocks, fit: PointFit) -> bool:
     Returns
     -------
     bool
-        Whether residuals exceed the noise, and `ROUGHLY` of the velocity.
+        Whether residuals exceed the noise, and `ROUGH_RESIDUAL` of the velocity.
     """
-    left, size = float(fit.scales[0]), float(blocks.sizes[0])
-    return left > max(NOISE_ALONE * float(least_scales(blocks)[0]), ROUGHLY * size)
+    left, size = float(fit.scales[0]), float(blocks.rms[0])
+    return left > max(NOISE_ALONE * float(least_scales(blocks)[0]), ROUGH_RESIDUAL * size)
 
 
-def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[Note, ...]:
+def remaining_doubts(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[Note, ...]:
     """Return the remaining objections given a circuit; a failed fit of motion is none if its form lacks what a log has.
 
     The motion form knows neither drift nor stops nor a start in motion. A circuit, whose beginning does not count,
@@ -92,12 +92,12 @@ def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[
         piston.
     """
     unknown_to_motion = blocks.settling != SETTLING or blocks.stop is not None
-    if blocks.course is None and (creeps(blocks, fit) or not unknown_to_motion):
+    if blocks.leakage_course is None and (is_followed_roughly(blocks, fit) or not unknown_to_motion):
         return tuple(doubts)
     return tuple(note for note in doubts if note.code != EstimateCode.POSITION_RESIDUALS_LARGE)
 
 
-def other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition: str) -> list[PointFit]:
+def fits_from_other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition: str) -> list[PointFit]:
     """Return the ends of searches that begin with another level of friction, and otherwise at a fit.
 
     Parameters
@@ -125,7 +125,7 @@ def other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition
     return found
 
 
-def behind(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
+def log_likelihood_behind(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
     """Return the log-likelihood of each fit relative to the best, scaled by how well any circuit follows the log.
 
     If the better of two follows the piston, the log counts once per `LASTING` blocks. If it follows roughly, a wrong
@@ -160,16 +160,16 @@ def behind(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
 def _roughness(blocks: Blocks, scales: Array, noise: Array) -> Array:
     """Return the share of each output's residuals that is a wrong model's error, if the piston is followed roughly.
 
-    All beyond noise from twice `ROUGHLY` on, nothing up to it [dimensionless].
+    All beyond noise from twice `ROUGH_RESIDUAL` on, nothing up to it [dimensionless].
     """
     if blocks.pressure is None:
         return np.zeros(len(scales))
     tiny = float(np.finfo(float).tiny)
-    rough = min(max(float(scales[0]) / max(ROUGHLY * float(blocks.sizes[0]), tiny) - 1.0, 0.0), 1.0)
+    rough = min(max(float(scales[0]) / max(ROUGH_RESIDUAL * float(blocks.rms[0]), tiny) - 1.0, 0.0), 1.0)
     return np.asarray(rough * np.maximum(1.0 - (noise / scales) ** 2, 0.0), dtype=np.float64)
 
 
-def between_fits(fits: Sequence[PointFit], best: PointFit, worse: Array) -> Array:
+def covariance_between_fits(fits: Sequence[PointFit], best: PointFit, worse: Array) -> Array:
     """Return the covariance that other, nearly equal ends of a search add to the best.
 
     Parameters
@@ -179,7 +179,7 @@ def between_fits(fits: Sequence[PointFit], best: PointFit, worse: Array) -> Arra
     best : PointFit
         The fit that is reported.
     worse : ndarray, shape (fits,)
-        Log-likelihood by which each is behind it, from `behind` [dimensionless].
+        Log-likelihood by which each is behind it, from `log_likelihood_behind` [dimensionless].
 
     Returns
     -------

@@ -11,15 +11,15 @@ from plant.notes import Note
 AGREEMENT = 0.05
 """Share by which velocity and the slope of position may differ, root mean square [dimensionless]."""
 
-BREAK = 3.0
+ALLOWED_DEVIATIONS = 3.0
 """Difference between velocity and the slope of position that is always allowed, in standard deviations of its noise."""
 
-ALIKE = 1.5
+ALLOWED_FILTERED = 1.5
 """Allowed difference over the noise of filtered channels [dimensionless]: between blocks two apart such noise is almost
 uncorrelated, while a lasting sensor error is not."""
 
 
-def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
+def sensor_disagreements(record: Record, blocks: Blocks) -> tuple[Note, ...]:
     """Compare a velocity sensor with the encoder, over the blocks.
 
     Parameters
@@ -37,13 +37,13 @@ def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
     if "velocity_m_s" not in record or "position_m" not in record:
         return ()
     other = blocks_of(record.replace(position_m=None))
-    apart = (_by_trapezia(record, other) - blocks.velocity)[blocks.first :]
+    apart = (_trapezoidal_velocity(record, other) - blocks.velocity)[blocks.first :]
     there = np.isfinite(apart)
     size = float(np.sqrt(np.nanmean(blocks.velocity**2)))
-    noise = BREAK * float(np.hypot(blocks.noise[0], other.noise[0]))
-    sampled = float(np.hypot(noise, _between_samples(record, other)))
+    noise = ALLOWED_DEVIATIONS * float(np.hypot(blocks.noise[0], other.noise[0]))
+    sampled = float(np.hypot(noise, _sampling_error(record, other)))
     filtered = _filtered_noise(apart[there], blocks.velocity[blocks.first :][there])
-    allowed = max(AGREEMENT * size, sampled, ALIKE * filtered)
+    allowed = max(AGREEMENT * size, sampled, ALLOWED_FILTERED * filtered)
     differs = float(np.sqrt(np.mean(apart[there] ** 2))) if np.any(there) else 0.0
     return () if differs <= allowed else (SensorCode.SENSORS_DISAGREE.note(difference_m_s=differs),)
 
@@ -60,7 +60,7 @@ def _filtered_noise(apart: Array, velocity: Array) -> float:
     return float(np.sqrt(0.5 * np.mean((left[2:] - left[:-2]) ** 2)))
 
 
-def _by_trapezia(record: Record, blocks: Blocks) -> Array:
+def _trapezoidal_velocity(record: Record, blocks: Blocks) -> Array:
     """Return the mean velocity over each block by the trapezoidal rule [m/s], comparable to the slope of position.
 
     Means of samples are half a sample early: an error of 5 % if velocity doubles within a block.
@@ -71,7 +71,7 @@ def _by_trapezia(record: Record, blocks: Blocks) -> Array:
     return blocks.velocity + np.nan_to_num(np.pad(late, (0, len(blocks.velocity) - len(late))))
 
 
-def _between_samples(record: Record, blocks: Blocks) -> float:
+def _sampling_error(record: Record, blocks: Blocks) -> float:
     """Return the sampling error of block means of velocity, root mean square [m/s].
 
     Velocity changes at an unknown moment between two samples, so a sample represents too much or too little of it: by a

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from plant.compiled.expression import Expression
 
-LEAST = 8
+FEWEST_OPERATIONS = 8
 """Number of operations that one side needs alone for a block [operations]; judged: a few cost less than a jump."""
 
 
@@ -41,18 +41,21 @@ def blocks_of(order: Sequence[Expression], kept: Sequence[Expression]) -> dict[i
     uses = Counter(id(one) for item in order for one in item.arguments)
     wanted = {id(one) for one in kept}
     found: dict[int, Block] = {}
-    for choices in _apart(order):
+    for choices in _choice_groups(order):
         true, false = (
-            sorted(_alone(uses, wanted, [one.arguments[side] for one in choices]), key=lambda one: places[id(one)])
+            sorted(
+                _one_sided_operations(uses, wanted, [one.arguments[side] for one in choices]),
+                key=lambda one: places[id(one)],
+            )
             for side in (1, 2)
         )
-        if max(len(true), len(false)) >= LEAST:
+        if max(len(true), len(false)) >= FEWEST_OPERATIONS:
             block = Block(choices[0].arguments[0], choices, (true, false))
             found |= {id(one): block for one in choices}
     return found
 
 
-def _apart(order: Sequence[Expression]) -> list[list[Expression]]:
+def _choice_groups(order: Sequence[Expression]) -> list[list[Expression]]:
     """Return groups of choices by the same condition, without those that depend on another choice of the group."""
     groups: dict[int, list[Expression]] = {}
     below: dict[int, set[int]] = {}
@@ -66,7 +69,7 @@ def _apart(order: Sequence[Expression]) -> list[list[Expression]]:
     return list(groups.values())
 
 
-def _alone(uses: Mapping[int, int], wanted: set[int], sides: Sequence[Expression]) -> list[Expression]:
+def _one_sided_operations(uses: Mapping[int, int], wanted: set[int], sides: Sequence[Expression]) -> list[Expression]:
     """Return the operations that only one side of the choices uses."""
     alone: list[Expression] = []
     found, waiting = Counter[int](), [*sides]

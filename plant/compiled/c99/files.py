@@ -64,10 +64,10 @@ def c_files(package: str, kind: str, name: str, real: Precision, facts: Mapping[
     called = {"name": name, "NAME": name.upper(), "version": version("hydrostate")}
     spelt = {"real": real.name, "f": real.function_suffix, "lit": real.literal, "digits": real.digits}
     whole = {**called, **spelt, **facts}
-    return {file: _filled(package, "export/templates", template, whole) for file, template in templates.items()}
+    return {file: _render(package, "export/templates", template, whole) for file, template in templates.items()}
 
 
-def filled(package: str, folder: str, template: str, facts: Mapping[str, Any]) -> str:
+def fill_template(package: str, folder: str, template: str, facts: Mapping[str, Any]) -> str:
     """Fill in one template.
 
     Parameters
@@ -77,10 +77,10 @@ def filled(package: str, folder: str, template: str, facts: Mapping[str, Any]) -
     facts : Mapping[str, Any]
         Values for the template, by name.
     """
-    return _filled(package, folder, f"own/{template}", facts)
+    return _render(package, folder, f"own/{template}", facts)
 
 
-def _filled(package: str, folder: str, template: str, facts: Mapping[str, Any]) -> str:
+def _render(package: str, folder: str, template: str, facts: Mapping[str, Any]) -> str:
     from jinja2 import Environment, PackageLoader, PrefixLoader, StrictUndefined
 
     own, shared = PackageLoader(package, folder), PackageLoader("plant", "compiled/c99/templates")

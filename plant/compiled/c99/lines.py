@@ -31,14 +31,14 @@ KINDS: Mapping[str, str] = {
 """Category in which each operation is counted."""
 
 
-def spelt_in_c(item: Expression, operands: list[str], precision: Precision) -> str:
+def c_operation(item: Expression, operands: list[str], precision: Precision) -> str:
     """Return one operation in C.
 
     Examples
     --------
     >>> from plant.compiled.c99.precision import DOUBLE
     >>> from plant.compiled.expression import symbol, unary
-    >>> spelt_in_c(unary("sqrt", symbol("x")), ["x"], DOUBLE)
+    >>> c_operation(unary("sqrt", symbol("x")), ["x"], DOUBLE)
     'sqrt(x)'
     """
     match item.operation:
@@ -133,10 +133,10 @@ class _Writer:
                 self._write(one, indent)
             operands = [self.names[id(one)] for one in item.arguments]
             kind = "int" if item.operation in COMPARISONS else self._precision.name
-            spelling = spelt_in_c(item, operands, self._precision)
-            self.lines.append(f"{indent}const {kind} {self._named(item)} = {spelling};")
+            spelling = c_operation(item, operands, self._precision)
+            self.lines.append(f"{indent}const {kind} {self._new_variable(item)} = {spelling};")
 
-    def _named(self, item: Expression) -> str:
+    def _new_variable(self, item: Expression) -> str:
         self.names[id(item)] = f"t{self._count}"
         self._count += 1
         return self.names[id(item)]
@@ -149,7 +149,7 @@ class _Writer:
                 if id(one) not in alone:
                     self._write(one, indent)
         for choice in block.choices:
-            self.lines.append(f"{indent}{self._precision.name} {self._named(choice)};")
+            self.lines.append(f"{indent}{self._precision.name} {self._new_variable(choice)};")
         for place, opening in ((1, f"if ({self.names[id(block.condition)]} != 0) {{"), (2, "} else {")):
             self.lines.append(indent + opening)
             for item in block.sides[place - 1]:

@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 
 from plant.compiled.c99.body import Body
 from plant.compiled.c99.precision import Precision
-from plant.compiled.c99.shapes import Block, Scalar, Thing, kind_of, members, received
+from plant.compiled.c99.shapes import Block, Scalar, Thing, as_parameter, flat_parameters, kind_of
 from plant.compiled.paste import bare_text
 
 
 @dataclass(frozen=True)
-class Outside:
+class ExternalFunction:
     """A function that already exists in C.
 
     Parameters
@@ -37,7 +37,7 @@ class Outside:
 
 
 @dataclass(frozen=True)
-class Translated:
+class TranslatedFunction:
     """A function in C.
 
     Parameters
@@ -77,12 +77,16 @@ class Translation:
 
     functions: Mapping[str, Callable[..., object]]
     constants: Mapping[str, int]
-    outside: Mapping[str, Outside]
+    outside: Mapping[str, ExternalFunction]
     precision: Precision
     prefix: str
-    _done: dict[tuple[str, object], Translated] = field(default_factory=dict[tuple[str, object], Translated])
+    _done: dict[tuple[str, object], TranslatedFunction] = field(
+        default_factory=dict[tuple[str, object], TranslatedFunction]
+    )
 
-    def entered(self, name: str, given: Sequence[Thing], known: Mapping[str, int] | None = None) -> Translated:
+    def translate(
+        self, name: str, given: Sequence[Thing], known: Mapping[str, int] | None = None
+    ) -> TranslatedFunction:
         """Translate a function for the shapes of its arguments.
 
         Parameters
@@ -99,7 +103,7 @@ class Translation:
         """
         key = name, tuple(kind_of(one) for one in given)
         if key not in self._done:
-            self._done[key] = self._translated(name, given, known or {})
+            self._done[key] = self._translate(name, given, known or {})
         return self._done[key]
 
     @property
@@ -107,16 +111,16 @@ class Translation:
         """All functions, each after those that it calls."""
         return "\n\n".join(one.text for one in self._done.values())
 
-    def _translated(self, name: str, given: Sequence[Thing], known: Mapping[str, int]) -> Translated:
+    def _translate(self, name: str, given: Sequence[Thing], known: Mapping[str, int]) -> TranslatedFunction:
         function = self.functions[name]
         (node,) = ast.parse(bare_text(function)).body
         assert isinstance(node, ast.FunctionDef)  # noqa: S101  bare_text sees to it
         pairs = list(zip((argument.arg for argument in node.args.args), given, strict=True))
-        names = {called: received(called, thing) for called, thing in pairs}
+        names = {called: as_parameter(called, thing) for called, thing in pairs}
         names |= {called: Scalar(str(value), True) for called, value in known.items()}
         body = Body(self, names, node)
         lines = body.block(node.body)
-        flat = [one for called, thing in pairs if called not in known for one in members(called, thing)]
+        flat = [one for called, thing in pairs if called not in known for one in flat_parameters(called, thing)]
         spelt = [self._parameter(called, thing, called in body.written) for called, thing in flat]
         spelt += [f"{self._type(whole)} *result_{i}" for i, whole in enumerate(body.results) if i > 0]
         variants = sum(known == name for known, _ in self._done)
@@ -125,7 +129,9 @@ class Translation:
         declared = [f"{self._type(whole)} {local} = 0;" for local, whole in body.locals.items()]
         about = (inspect.getdoc(function) or name).splitlines()[0]
         text = "\n".join([f"/* {about} */", head, "{", *(f"    {line}" for line in [*declared, *lines]), "}"])
-        return Translated(in_c, text, tuple(called in body.written for called, _ in flat), body.counted, body.results)
+        return TranslatedFunction(
+            in_c, text, tuple(called in body.written for called, _ in flat), body.counted, body.results
+        )
 
     def _type(self, whole: bool) -> str:
         return "int" if whole else self.precision.name

@@ -87,7 +87,7 @@ def kind_of(thing: Thing) -> object:
             return tuple(kind_of(one) for one in thing)
 
 
-def members(name: str, thing: Thing) -> list[tuple[str, "Scalar | Block"]]:
+def flat_parameters(name: str, thing: Thing) -> list[tuple[str, "Scalar | Block"]]:
     """Return a thing as parameters of C, groups expanded.
 
     Parameters
@@ -103,11 +103,11 @@ def members(name: str, thing: Thing) -> list[tuple[str, "Scalar | Block"]]:
         Name and thing of each parameter.
     """
     if isinstance(thing, tuple):
-        return [pair for i, one in enumerate(thing) for pair in members(f"{name}_{i}", one)]
+        return [pair for i, one in enumerate(thing) for pair in flat_parameters(f"{name}_{i}", one)]
     return [(name, thing)]
 
 
-def received(name: str, thing: Thing) -> Thing:
+def as_parameter(name: str, thing: Thing) -> Thing:
     """Return a thing under its name inside the function that receives it.
 
     Parameters
@@ -126,4 +126,4 @@ def received(name: str, thing: Thing) -> Thing:
         case Block():
             return Block(name, thing.shape, name, thing.whole)
         case _:
-            return tuple(received(f"{name}_{i}", one) for i, one in enumerate(thing))
+            return tuple(as_parameter(f"{name}_{i}", one) for i, one in enumerate(thing))

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from plant.compiled.c99.shapes import Block, Scalar, Thing, members
+from plant.compiled.c99.shapes import Block, Scalar, Thing, flat_parameters
 
 if TYPE_CHECKING:
     from plant.compiled.c99.loops import Translation
@@ -30,7 +30,7 @@ FUNCTIONS = {"exp": "calls of exp, log, tanh", "log": "calls of exp, log, tanh",
 NUMBERS = {"inf": "INFINITY", "nan": "NAN"}
 
 
-def refused(node: ast.AST) -> NotImplementedError:
+def untranslated_error(node: ast.AST) -> NotImplementedError:
     """Return the error for code that is not translated."""
     return NotImplementedError(f"{ast.unparse(node)} is none of what is translated to C")
 
@@ -59,7 +59,7 @@ class Values:
             case ast.Name(id=name) if name in self.owner.constants:
                 return Scalar(str(self.owner.constants[name]), True)
             case ast.Constant(value=bool()):
-                raise refused(node)
+                raise untranslated_error(node)
             case ast.Constant(value=int() as value):
                 return Scalar(str(value), True)
             case ast.Constant(value=float() as value):
@@ -78,9 +78,9 @@ class Values:
             case ast.Tuple(elts=parts):
                 return tuple(self.thing(part) for part in parts)
             case _:
-                return self._computed(node)
+                return self._arithmetic(node)
 
-    def _computed(self, node: ast.expr) -> Scalar:
+    def _arithmetic(self, node: ast.expr) -> Scalar:
         match node:
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 inner = self.scalar(operand)
@@ -94,7 +94,7 @@ class Values:
                 a, b = self.scalar(left), self.scalar(right)
                 if a.whole and b.whole:
                     if sign == "/":
-                        raise refused(node)
+                        raise untranslated_error(node)
                     return Scalar(f"({a.text} {sign} {b.text})", True)
                 self.counted[kind] += 1
                 return Scalar(f"({a.text} {sign} {b.text})")
@@ -109,7 +109,7 @@ class Values:
             case ast.Call():
                 return Scalar(self.call(node))
             case _:
-                raise refused(node)
+                raise untranslated_error(node)
 
     def truth(self, node: ast.expr) -> str:
         """Return a condition."""
@@ -134,15 +134,15 @@ class Values:
     def call(self, node: ast.Call, behind: "list[str] | None" = None) -> str:
         """Return a call of a function that is translated, or that already exists in C."""
         if not isinstance(node.func, ast.Name):
-            raise refused(node)
+            raise untranslated_error(node)
         name, given = node.func.id, [self.thing(one) for one in node.args]
-        flat = [one for thing in given for _, one in members("", thing)]
+        flat = [one for thing in given for _, one in flat_parameters("", thing)]
         if name in self.owner.outside:
             called = self.owner.outside[name]
         elif name in self.owner.functions:
-            called = self.owner.entered(name, given)
+            called = self.owner.translate(name, given)
         else:
-            raise refused(node)
+            raise untranslated_error(node)
         self.counted.update(called.operations)
         for one, written in zip(flat, called.written, strict=True):
             if written and isinstance(one, Block):
@@ -153,22 +153,22 @@ class Values:
         """Return an expression that must be a number."""
         found = self.thing(node)
         if not isinstance(found, Scalar):
-            raise refused(node)
+            raise untranslated_error(node)
         return found
 
     def thing_text(self, node: ast.expr) -> str:
         """Return a number's C expression."""
         return self.scalar(node).text
 
-    def most(self, node: ast.expr) -> int:
+    def known_loop_end(self, node: ast.expr) -> int:
         """Return the end of a loop as a number known at translation."""
         text = self.thing_text(node)
         if not text.isdigit():
-            raise refused(node)
+            raise untranslated_error(node)
         return int(text)
 
     def _block(self, node: ast.expr) -> Block:
         found = self.thing(node)
         if not isinstance(found, Block):
-            raise refused(node)
+            raise untranslated_error(node)
         return found

@@ -8,7 +8,7 @@ from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 
-from plant.compiled.native.kinds import BOOL, COMPLEX, FLOAT, INT, AnyKind, ArrayKind, ScalarKind, Several
+from plant.compiled.native.kinds import BOOL, COMPLEX, FLOAT, INT, AnyKind, ArrayKind, ScalarKind, TupleKind
 from plant.compiled.native.signature import Argument, Signature
 
 Call: TypeAlias = Callable[[Any, Any], None]
@@ -29,14 +29,14 @@ def _code(kind: AnyKind) -> str:
             return _CODES[kind]
         case ArrayKind():
             return "Q" + "q" * kind.rank
-        case Several():
+        case TupleKind():
             return "".join(map(_code, kind.items))
         case _:
             raise TypeError(f"a kernel is not entered with a {kind.name}")
 
 
 @dataclass
-class _Given:
+class _ArgumentLayout:
     """Arguments during their layout.
 
     Parameters
@@ -98,7 +98,7 @@ class Entry:
         ValueError
             If an array has another shape, or overlaps with one that is changed.
         """
-        laid, packed = self._laid_out(given)
+        laid, packed = self._lay_all(given)
         room = self._room()
         self._call(packed, room)
         for array, copy in laid.back:
@@ -112,7 +112,7 @@ class Entry:
             self._release(pointer, None)
         return result
 
-    def again(self, *given: Any) -> Callable[[], None]:
+    def prepared_call(self, *given: Any) -> Callable[[], None]:
         """Return a call on these arguments, laid out only once: for a loop that fills the same arrays again and again.
 
         Raises
@@ -122,7 +122,7 @@ class Entry:
         ValueError
             As for a call.
         """
-        laid, packed = self._laid_out(given)
+        laid, packed = self._lay_all(given)
         if laid.copies or self._results.size:
             raise TypeError(f"{self.__name__}: what is called again takes arrays as they are and returns nothing")
         room = self._room()
@@ -132,19 +132,19 @@ class Entry:
 
         return call
 
-    def _laid_out(self, given: Sequence[Any]) -> tuple[_Given, bytes]:
+    def _lay_all(self, given: Sequence[Any]) -> tuple[_ArgumentLayout, bytes]:
         """Return arguments in the layout of the machine code."""
         if len(given) != len(self._takes):
             names = ", ".join(argument.name for argument in self._takes)
             raise TypeError(f"{self.__name__} takes {len(self._takes)} arguments ({names}), got {len(given)}")
-        laid = _Given([], [], [], [], {})
+        laid = _ArgumentLayout([], [], [], [], {})
         for (argument, dtype, changed), value in zip(self._plan, given, strict=True):
             if type(value) is np.ndarray and value.dtype is dtype and value.flags.carray:
-                self._place(argument, value, laid, changed=changed)
+                self._lay_valid_array(argument, value, laid, changed=changed)
             else:
-                self._lay(argument, value, laid, changed=changed)
+                self._lay_value(argument, value, laid, changed=changed)
         if self._written:
-            self._apart(laid)
+            self._check_disjoint(laid)
         try:
             return laid, self._layout.pack(*laid.numbers)
         except struct.error:
@@ -153,15 +153,15 @@ class Entry:
     def _fail(self, what: str, wanted: str, came: str) -> NoReturn:
         raise TypeError(f"{self.__name__}: {what} must be {wanted}, got {came}")
 
-    def _lay(self, argument: Argument, value: Any, laid: _Given, *, changed: bool) -> None:
+    def _lay_value(self, argument: Argument, value: Any, laid: _ArgumentLayout, *, changed: bool) -> None:
         kind = argument.kind
         if isinstance(kind, ArrayKind):
             self._lay_array(argument, kind, value, laid, changed=changed)
-        elif isinstance(kind, Several):
+        elif isinstance(kind, TupleKind):
             if len(value) != len(argument.items):
                 self._fail(argument.name, f"a tuple of {len(argument.items)}", f"{len(value)} items")
             for item, one in zip(argument.items, value, strict=True):
-                self._lay(item, one, laid, changed=changed)
+                self._lay_value(item, one, laid, changed=changed)
         elif kind == FLOAT and isinstance(value, float | int | np.floating | np.integer):
             laid.numbers.append(value)
         elif (kind == INT and isinstance(value, int | np.integer)) or (
@@ -171,7 +171,9 @@ class Entry:
         else:
             self._fail(argument.name, f"a number ({kind.name})", repr(value))
 
-    def _lay_array(self, argument: Argument, kind: ArrayKind, value: Any, laid: _Given, *, changed: bool) -> None:
+    def _lay_array(
+        self, argument: Argument, kind: ArrayKind, value: Any, laid: _ArgumentLayout, *, changed: bool
+    ) -> None:
         dtype = _dtype(kind)
         if not isinstance(value, np.ndarray) or value.ndim != kind.rank:
             came = f"{value.ndim}-dimensional" if isinstance(value, np.ndarray) else type(value).__name__
@@ -186,9 +188,9 @@ class Entry:
                 laid.back.append((value, array))
         if changed and not value.flags.writeable:
             self._fail(argument.name, "an array that may be changed", "one that is read-only")
-        self._place(argument, array, laid, changed=changed)
+        self._lay_valid_array(argument, array, laid, changed=changed)
 
-    def _place(self, argument: Argument, array: Any, laid: _Given, *, changed: bool) -> None:
+    def _lay_valid_array(self, argument: Argument, array: Any, laid: _ArgumentLayout, *, changed: bool) -> None:
         """Lay out an array that is valid except for its shape, which is checked here."""
         shape, name = array.shape, argument.name
         if len(shape) != len(argument.lengths):
@@ -207,7 +209,7 @@ class Entry:
         if size := array.nbytes:
             laid.arrays.append((name, address, address + size, changed))
 
-    def _apart(self, laid: _Given) -> None:
+    def _check_disjoint(self, laid: _ArgumentLayout) -> None:
         """Check that arrays that are changed do not share memory with others, as the machine code assumes."""
         for name, begin, end, changed in laid.arrays:
             if not changed:
@@ -217,7 +219,7 @@ class Entry:
                     raise ValueError(f"{self.__name__}: {name} and {other} must not share memory")
 
 
-def _through_object(array: Any) -> int:
+def _address_through_object(array: Any) -> int:
     """Return the address of an array's data, which NumPy stores directly after Python's object header."""
     return _WORD.from_address(id(array) + object.__basicsize__).value
 
@@ -227,7 +229,9 @@ _PROBE = np.zeros(4)[1:]
 
 # ten times quicker than `ctypes.data`, which each log needs hundreds of times; used only if both give the same address
 _address: Callable[[Any], int] = (
-    _through_object if _through_object(_PROBE) == _PROBE.ctypes.data else lambda array: array.ctypes.data
+    _address_through_object
+    if _address_through_object(_PROBE) == _PROBE.ctypes.data
+    else lambda array: array.ctypes.data
 )
 
 
@@ -238,17 +242,17 @@ def _dtype(kind: AnyKind) -> Any:
 
 def _result(kind: AnyKind, parts: Any) -> Any:
     """Return a result from its parts."""
-    if isinstance(kind, Several):
+    if isinstance(kind, TupleKind):
         return tuple(_result(item, parts) for item in kind.items)
     if isinstance(kind, ArrayKind):
         address = next(parts)
-        return _copied(address, [next(parts) for _ in range(kind.rank)], _DTYPES[kind.element])
+        return _independent_copy(address, [next(parts) for _ in range(kind.rank)], _DTYPES[kind.element])
     if kind == COMPLEX:
         return complex(next(parts), next(parts))
     return bool(next(parts)) if kind == BOOL else next(parts)
 
 
-def _copied(address: int, shape: Sequence[int], dtype: Any) -> Any:
+def _independent_copy(address: int, shape: Sequence[int], dtype: Any) -> Any:
     """Return an independent array, copied from memory that is about to be freed."""
     result = np.empty(shape, dtype)
     ctypes.memmove(result.ctypes.data, address, result.nbytes)

@@ -88,7 +88,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Several:
+class TupleKind:
     """A tuple.
 
     Parameters
@@ -111,14 +111,14 @@ class Several:
         return f"({', '.join(item.name for item in self.items)})"
 
 
-AnyKind: TypeAlias = ScalarKind | ArrayKind | Slice | Range | Several
+AnyKind: TypeAlias = ScalarKind | ArrayKind | Slice | Range | TupleKind
 
-NOTHING = Several(())
+NOTHING = TupleKind(())
 """Result of a function that returns nothing."""
 
 
 @dataclass(frozen=True)
-class Held:
+class Value:
     """A value: its kind, and the registers or constants that hold its parts.
 
     Parameters
@@ -144,14 +144,14 @@ class Held:
         return self.parts[1 : 1 + self.array.rank]
 
     @property
-    def items(self) -> "tuple[Held, ...]":
+    def items(self) -> "tuple[Value, ...]":
         """Items of a tuple."""
-        if not isinstance(self.kind, Several):
+        if not isinstance(self.kind, TupleKind):
             raise KernelError(f"a tuple is wanted, got {self.kind.name}")
-        found: list[Held] = []
+        found: list[Value] = []
         place = 0
         for kind in self.kind.items:
-            found.append(Held(kind, self.parts[place : place + len(kind.parts)], self.origin))
+            found.append(Value(kind, self.parts[place : place + len(kind.parts)], self.origin))
             place += len(kind.parts)
         return tuple(found)
 
@@ -162,14 +162,14 @@ def structure(kind: AnyKind) -> str:
     return "void" if not parts else parts[0] if len(parts) == 1 else f"{{ {', '.join(parts)} }}"
 
 
-def several(values: "tuple[Held, ...] | list[Held]") -> Held:
+def tuple_value(values: "tuple[Value, ...] | list[Value]") -> Value:
     """Return values as a tuple."""
     parts = tuple(part for value in values for part in value.parts)
     origin = frozenset[str]().union(*(value.origin for value in values))
-    return Held(Several(tuple(value.kind for value in values)), parts, origin)
+    return Value(TupleKind(tuple(value.kind for value in values)), parts, origin)
 
 
-def double(number: float) -> str:
+def double_text(number: float) -> str:
     """Return the hexadecimal text of a number, exact to the bit.
 
     Parameters
@@ -181,19 +181,19 @@ def double(number: float) -> str:
     return f"0x{bits:016X}"
 
 
-def number(value: object) -> Held:
+def number(value: object) -> Value:
     """Return a constant as a value."""
     match value:
         case bool():
-            return Held(BOOL, ("true" if value else "false",))
+            return Value(BOOL, ("true" if value else "false",))
         case int():
-            return Held(INT, (str(value),))
+            return Value(INT, (str(value),))
         case float():
-            return Held(FLOAT, (double(value),))
+            return Value(FLOAT, (double_text(value),))
         case complex():
-            return Held(COMPLEX, (double(value.real), double(value.imag)))
+            return Value(COMPLEX, (double_text(value.real), double_text(value.imag)))
         case tuple():
-            return several([number(item) for item in value])
+            return tuple_value([number(item) for item in value])
         case _:
             raise KernelError(f"a kernel has numbers and tuples of them as constants, got {value!r}")
 
@@ -203,10 +203,10 @@ def is_literal(part: str) -> bool:
     return part.lstrip("-").isdigit()
 
 
-_ORDER = (BOOL, INT, FLOAT, COMPLEX)
+_WIDENING_ORDER = (BOOL, INT, FLOAT, COMPLEX)
 
 
-def joined(name: str, a: AnyKind | None, b: AnyKind) -> AnyKind:
+def common_kind(name: str, a: AnyKind | None, b: AnyKind) -> AnyKind:
     """Return the kind of a variable that holds two kinds of values.
 
     Raises
@@ -218,10 +218,10 @@ def joined(name: str, a: AnyKind | None, b: AnyKind) -> AnyKind:
         return b
     match a, b:
         case ScalarKind(), ScalarKind() if BOOL not in (a, b):
-            return _ORDER[max(_ORDER.index(a), _ORDER.index(b))]
+            return _WIDENING_ORDER[max(_WIDENING_ORDER.index(a), _WIDENING_ORDER.index(b))]
         case ArrayKind(), ArrayKind() if (a.element, a.rank) == (b.element, b.rank):
             return ArrayKind(a.element, a.rank, packed=False)
-        case Several(), Several() if len(a.items) == len(b.items):
-            return Several(tuple(joined(name, *pair) for pair in zip(a.items, b.items, strict=True)))
+        case TupleKind(), TupleKind() if len(a.items) == len(b.items):
+            return TupleKind(tuple(common_kind(name, *pair) for pair in zip(a.items, b.items, strict=True)))
         case _:
             raise KernelError(f"{name} is once {a.name} and once {b.name}: it needs two names")

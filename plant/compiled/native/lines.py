@@ -7,7 +7,7 @@ import ast
 from collections.abc import Mapping, Sequence
 
 from plant.compiled.native.calls import INSTRUCTIONS
-from plant.compiled.native.kinds import KernelError, double
+from plant.compiled.native.kinds import KernelError, double_text
 from plant.compiled.native.operators import COMPARED, FLOATING
 from plant.compiled.native.scope import Scope
 
@@ -41,7 +41,7 @@ class Lines:
                     self._known[name] = self._read(value)
                 case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Call(func=ast.Name(id=of)) as packed):
                     columns = [[self._read(part) for part in ast_tuple(one).elts] for one in packed.args]
-                    for name, value in zip(names, self._packed(of, columns), strict=True):
+                    for name, value in zip(names, self._vectorised(of, columns), strict=True):
                         self._known[ast.unparse(name)] = value
                 case ast.Return(value=ast.Dict(keys=keys, values=values)):
                     return {str(_constant(key)): self._read(value) for key, value in zip(keys, values, strict=True)}
@@ -53,7 +53,7 @@ class Lines:
         return self._scope.op(text)
 
     def _number(self, value: float) -> str:
-        return double(value) if self._width == 1 else f"splat (double {double(value)})"
+        return double_text(value) if self._width == 1 else f"splat (double {double_text(value)})"
 
     def _read(self, node: ast.expr) -> str:
         match node:
@@ -72,11 +72,11 @@ class Lines:
                 a, b = self._read(left), self._read(right)
                 return self._op(f"fcmp {COMPARED[type(operator)][0]} {self._type} {a}, {b}")
             case ast.Call(func=ast.Name(id=name), args=arguments):
-                return self._called(name, [self._read(one) for one in arguments])
+                return self._operation(name, [self._read(one) for one in arguments])
             case _:
                 raise KernelError(f"{ast.unparse(node)} is none of the operations that are compiled")
 
-    def _called(self, name: str, given: Sequence[str]) -> str:
+    def _operation(self, name: str, given: Sequence[str]) -> str:
         kind = self._type
         match name, given:
             case "present", [x]:
@@ -86,11 +86,11 @@ class Lines:
             case "sign", [x]:
                 one = self._instruction("copysign", kind, [self._number(1.0), x])
                 apart = self._op(f"fcmp one {kind} {x}, {self._number(0.0)}")
-                return self._called("where", [apart, one, self._number(0.0)])
+                return self._operation("where", [apart, one, self._number(0.0)])
             case (("fma" | "sqrt" | "abs"), _):
                 return self._instruction("fabs" if name == "abs" else name, kind, given)
             case (("exp" | "log" | "tanh" | "sin" | "cos" | "atan"), [x]):
-                return self._each(name, x)
+                return self._library_call(name, x)
             case _:
                 raise KernelError(f"{name} is none of the operations that are compiled")
 
@@ -99,7 +99,7 @@ class Lines:
         self._scope.program.declare(f"declare {kind} @llvm.{name}.{short}({', '.join([kind] * len(given))})")
         return self._op(f"call {kind} @llvm.{name}.{short}({', '.join(f'{kind} {one}' for one in given)})")
 
-    def _each(self, name: str, x: str) -> str:
+    def _library_call(self, name: str, x: str) -> str:
         """Return a function of the C library, applied number by number."""
         function = INSTRUCTIONS["tanh"] if name == "tanh" else name
         self._scope.program.declare(f"declare double @{function}(double)")
@@ -111,16 +111,16 @@ class Lines:
             x = self._op(f"insertelement {self._type} {x}, double {one}, i32 {place}")
         return x
 
-    def _packed(self, name: str, columns: Sequence[Sequence[str]]) -> list[str]:
+    def _vectorised(self, name: str, columns: Sequence[Sequence[str]]) -> list[str]:
         """Return quotients or roots; those of single numbers are computed by one instruction."""
         if self._width > 1:
             if name == "roots":
-                return [self._called("sqrt", [one]) for one in columns[0]]
+                return [self._operation("sqrt", [one]) for one in columns[0]]
             return [self._op(f"fdiv {self._type} {a}, {b}") for a, b in zip(*columns, strict=True)]
         count = len(columns[0])
         wide, given = vector(count), list[str]()
         for column in columns:
-            beside = f"splat (double {double(1.0)})"
+            beside = f"splat (double {double_text(1.0)})"
             for place, one in enumerate(column):
                 beside = self._op(f"insertelement {wide} {beside}, double {one}, i32 {place}")
             given.append(beside)

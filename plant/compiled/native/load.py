@@ -11,13 +11,13 @@ from typing import Any
 
 from plant.compiled.native import machine, store
 from plant.compiled.native.entry import Entry
-from plant.compiled.native.kinds import SCALARS, AnyKind, ArrayKind, KernelError, Several
+from plant.compiled.native.kinds import SCALARS, AnyKind, ArrayKind, KernelError, TupleKind
 from plant.compiled.native.recipes import recipe
-from plant.compiled.native.signature import Signature, spelt
+from plant.compiled.native.signature import Signature, kind_as_json
 
 logger = logging.getLogger("hydrostate")
 
-_LOADING = threading.Lock()
+_LOADING_LOCK = threading.Lock()
 _LOADED: dict[str, "NativeKernel"] = {}
 
 
@@ -71,19 +71,19 @@ def load_native(
     """
     takes = repr(sorted(entries.items()))
     how = recipe(name, made_of, f"{_compiler()} {machine.target()} {takes}")
-    remembered = store.recalled(f"{name}_recipe", how) if how is not None else None
-    with _LOADING:
+    remembered = store.load_kernel(f"{name}_recipe", how) if how is not None else None
+    with _LOADING_LOCK:
         if remembered is not None:
             key = remembered[0]["kernel"]
-            found = _LOADED.get(key) or _recalled(name, entries, key)
+            found = _LOADED.get(key) or _load_stored(name, entries, key)
             if found is not None:
                 return _LOADED.setdefault(key, found)
         written = text if isinstance(text, str) else text()
         key = _key(written, takes)
         if key not in _LOADED:
-            _LOADED[key] = _recalled(name, entries, key) or _made(name, written, entries, key)
+            _LOADED[key] = _load_stored(name, entries, key) or _compile_and_store(name, written, entries, key)
         if how is not None:
-            store.kept(f"{name}_recipe", how, {"kernel": key}, b"")
+            store.store_kernel(f"{name}_recipe", how, {"kernel": key}, b"")
         return _LOADED[key]
 
 
@@ -102,34 +102,34 @@ def _compiler() -> str:
     return hashlib.sha256(b"\n".join(file.read_bytes() for file in files)).hexdigest()
 
 
-def _recalled(name: str, entries: Mapping[str, Signature], key: str) -> NativeKernel | None:
+def _load_stored(name: str, entries: Mapping[str, Signature], key: str) -> NativeKernel | None:
     """Return a kernel that an earlier run has compiled."""
-    found = store.recalled(name, key)
-    return None if found is None else _linked(name, entries, key, *found)
+    found = store.load_kernel(name, key)
+    return None if found is None else _link(name, entries, key, *found)
 
 
-def _made(name: str, text: str, entries: Mapping[str, Signature], key: str) -> NativeKernel:
+def _compile_and_store(name: str, text: str, entries: Mapping[str, Signature], key: str) -> NativeKernel:
     """Compile a kernel and keep it."""
     logger.info("compiling the kernel %s", name)
-    description, code = _compiled(name, text, entries)
-    store.kept(name, key, description, code)
-    return _linked(name, entries, key, description, code)
+    description, code = _compile(name, text, entries)
+    store.store_kernel(name, key, description, code)
+    return _link(name, entries, key, description, code)
 
 
-def _linked(
+def _link(
     name: str, entries: Mapping[str, Signature], key: str, description: Mapping[str, Any], code: bytes
 ) -> NativeKernel:
-    addresses = machine.linked(f"{name}.{key[:16]}", code, [*entries, "release"])
-    release = machine.entered(addresses["release"])
+    addresses = machine.load_and_link(f"{name}.{key[:16]}", code, [*entries, "release"])
+    release = machine.as_callable(addresses["release"])
     kernel = NativeKernel(**description["constants"])
     for entry, takes in entries.items():
         one = description["entries"][entry]
-        written, call = frozenset(one["written"]), machine.entered(addresses[entry])
+        written, call = frozenset(one["written"]), machine.as_callable(addresses[entry])
         setattr(kernel, entry, Entry(f"{name}.{entry}", takes, _kind(one["returns"]), written, call, release))
     return kernel
 
 
-def _compiled(name: str, text: str, entries: Mapping[str, Signature]) -> tuple[dict[str, Any], bytes]:
+def _compile(name: str, text: str, entries: Mapping[str, Signature]) -> tuple[dict[str, Any], bytes]:
     """Return description and machine code of a kernel."""
     from plant.compiled.native.program import Module
 
@@ -138,11 +138,11 @@ def _compiled(name: str, text: str, entries: Mapping[str, Signature]) -> tuple[d
     try:
         for entry, takes in entries.items():
             compiled = module.enter(entry, tuple(argument.kind for argument in takes))
-            described[entry] = {"returns": spelt(compiled.returns), "written": sorted(compiled.written)}
+            described[entry] = {"returns": kind_as_json(compiled.returns), "written": sorted(compiled.written)}
     except KernelError as error:
         raise KernelError(f"kernel {name}: {error}") from None
     constants = {key: value for key, value in module.plain.items() if isinstance(value, int | float | dict)}
-    return {"entries": described, "constants": constants}, machine.assembled(module.ir())
+    return {"entries": described, "constants": constants}, machine.assemble(module.ir())
 
 
 def _kind(text: Any) -> AnyKind:
@@ -153,4 +153,4 @@ def _kind(text: Any) -> AnyKind:
         case [element, rank]:
             return ArrayKind(SCALARS[element], rank)
         case _:
-            return Several(tuple(_kind(item) for item in text["items"]))
+            return TupleKind(tuple(_kind(item) for item in text["items"]))

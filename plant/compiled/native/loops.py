@@ -6,7 +6,7 @@ from typing import Any, Generic, ParamSpec, TypeVar
 
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import pasted
+from plant.compiled.paste import functions_text
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
@@ -33,10 +33,10 @@ class Loop(Generic[Parameters, Result]):
     def __call__(self, *args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
         """Run the machine code; the documented shapes are checked."""
         if self._kernel is None:
-            self._kernel = self._compiled()
+            self._kernel = self._compile()
         return self._kernel(*args, **kwargs)
 
-    def _compiled(self) -> Callable[..., Any]:
+    def _compile(self) -> Callable[..., Any]:
         function = self.__wrapped__
         name = function.__name__
         takes = {name: signature_of(function)}
@@ -45,12 +45,12 @@ class Loop(Generic[Parameters, Result]):
 
 def text_of(loop: Loop[..., Any]) -> str:
     """Return the text of a kernel: a loop, all that it calls, and their constants."""
-    loops, constants = needed(loop)
-    texts = [pasted(one.__wrapped__, freely=one.freely) for one in loops]
+    loops, constants = dependencies(loop)
+    texts = [functions_text(one.__wrapped__, freely=one.freely) for one in loops]
     return "\n\n".join([*(f"{key} = {value!r}" for key, value in constants.items()), *texts])
 
 
-def needed(loop: Loop[..., Any]) -> tuple[list[Loop[..., Any]], dict[str, object]]:
+def dependencies(loop: Loop[..., Any]) -> tuple[list[Loop[..., Any]], dict[str, object]]:
     """Return a loop and all loops that it calls, and the constants of their modules that they read.
 
     Raises
@@ -73,7 +73,9 @@ def needed(loop: Loop[..., Any]) -> tuple[list[Loop[..., Any]], dict[str, object
     return [found[name] for name in sorted(found)], dict(sorted(constants.items()))
 
 
-def natively(*, freely: Collection[str] = ()) -> Callable[[Callable[Parameters, Result]], Loop[Parameters, Result]]:
+def natively_compiled(
+    *, freely: Collection[str] = ()
+) -> Callable[[Callable[Parameters, Result]], Loop[Parameters, Result]]:
     """Return a decorator that compiles a loop at its first call, together with the loops that it calls.
 
     Parameters
@@ -84,7 +86,7 @@ def natively(*, freely: Collection[str] = ()) -> Callable[[Callable[Parameters, 
     Examples
     --------
     >>> import numpy as np
-    >>> @natively()
+    >>> @natively_compiled()
     ... def total(values):
     ...     '''Return a sum.
     ...

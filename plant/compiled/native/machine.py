@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-LEVEL = 1
+OPTIMISATION_LEVEL = 1
 """LLVM's optimisation level: at 0 a kernel runs half as fast; at 2 it runs no faster and takes a tenth more to
 compile."""
 
-UNROLLED = False
+UNROLL_LOOPS = False
 """Whether LLVM unrolls loops: a step already has hundreds of instructions, and twice as many run 7 % slower, because
 they exceed the processor's cache of decoded instructions; they take a third more to compile."""
 
-_LINKING = threading.Lock()
+_LINKING_LOCK = threading.Lock()
 _LOADED: list[Any] = []
 """References that keep machine code in memory."""
 
@@ -37,7 +37,7 @@ def target() -> str:
     version = ".".join(map(str, llvm.llvm_version_info))
     import llvmlite
 
-    how = f"O{LEVEL} unrolled {UNROLLED}"
+    how = f"O{OPTIMISATION_LEVEL} unrolled {UNROLL_LOOPS}"
     return f"{llvmlite.__version__} {version} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features} {how}"
 
 
@@ -53,13 +53,13 @@ def _machine() -> Any:
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(),
         features=llvm.get_host_cpu_features().flatten(),
-        opt=LEVEL,
+        opt=OPTIMISATION_LEVEL,
         reloc="pic",
         codemodel="jitdefault",
     )
 
 
-def assembled(text: str) -> bytes:
+def assemble(text: str) -> bytes:
     """Return machine code.
 
     Parameters
@@ -75,9 +75,9 @@ def assembled(text: str) -> bytes:
     llvm, machine = binding(), _machine()
     module = llvm.parse_assembly(text)
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
-    options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION_LEVEL)
     options.loop_vectorization, options.slp_vectorization = True, False
-    options.loop_unrolling = UNROLLED
+    options.loop_unrolling = UNROLL_LOOPS
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
     return bytes(machine.emit_object(module))
@@ -88,7 +88,7 @@ def _linker() -> Any:
     return binding().create_lljit_compiler(_machine())
 
 
-def linked(name: str, code: bytes, symbols: Sequence[str]) -> Mapping[str, int]:
+def load_and_link(name: str, code: bytes, symbols: Sequence[str]) -> Mapping[str, int]:
     """Load machine code and return the addresses of functions.
 
     Parameters
@@ -100,7 +100,7 @@ def linked(name: str, code: bytes, symbols: Sequence[str]) -> Mapping[str, int]:
     symbols : sequence of str
         Names of the functions.
     """
-    with _LINKING:
+    with _LINKING_LOCK:
         library = binding().JITLibraryBuilder().add_object_img(code).add_current_process()
         for symbol in symbols:
             library = library.export_symbol(symbol)
@@ -109,6 +109,6 @@ def linked(name: str, code: bytes, symbols: Sequence[str]) -> Mapping[str, int]:
         return {symbol: loaded[symbol] for symbol in symbols}
 
 
-def entered(address: int) -> Any:
+def as_callable(address: int) -> Any:
     """Return a Python callable for the function at an address; it takes two pointers and releases Python's lock."""
     return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(address)

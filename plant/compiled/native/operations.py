@@ -4,17 +4,17 @@ import ast
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from plant.compiled.native.kinds import BOOL, FLOAT, INT, NOTHING, Held, several
+from plant.compiled.native.kinds import BOOL, FLOAT, INT, NOTHING, Value, tuple_value
 from plant.compiled.native.lines import Lines, names_of, vector
 from plant.compiled.native.operators import convert
 from plant.compiled.native.scope import Scope
 from plant.compiled.source import ROWS, Slot
 
 Functions = Mapping[str, ast.FunctionDef]
-Operation = Callable[[Scope, Sequence[Held]], Held]
+Operation = Callable[[Scope, Sequence[Value]], Value]
 """Writes the operation on given values."""
 
-NONE = Held(NOTHING, ())
+NONE = Value(NOTHING, ())
 
 
 def place(scope: Scope, address: str, distance: int | str) -> str:
@@ -86,7 +86,7 @@ def stepping(slots: Mapping[str, Slot], width: int, parts: Sequence[ast.Function
 
     made: list[str] = []
 
-    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+    def operation(scope: Scope, given: Sequence[Value]) -> Value:
         others = [convert(scope, one, INT).parts[0] for one in given[2:]]
         if not made:
             formal = ["i64 %at", "double %j", *(f"i64 %other{k}" for k in range(len(others)))]
@@ -112,7 +112,7 @@ def moving(width: int) -> Operation:
     """Return ``move(source, target)``, which copies a fixed number of numbers."""
     kind = vector(width)
 
-    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+    def operation(scope: Scope, given: Sequence[Value]) -> Value:
         source, target = (place(scope, one.parts[0], 0) for one in given)
         scope.line(f"store {kind} {scope.op(f'load {kind}, ptr {source}, align 8')}, ptr {target}, align 8")
         return NONE
@@ -124,7 +124,7 @@ def complete(width: int, count: int, stride: int) -> Operation:
     """Return ``complete(address)``: whether a fixed number of vectors, a stride in bytes apart, contain no NaN."""
     kind, truths = vector(width), "i1" if width == 1 else f"<{width} x i1>"
 
-    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+    def operation(scope: Scope, given: Sequence[Value]) -> Value:
         address = given[0].parts[0]
         found = [scope.op(f"load {kind}, ptr {place(scope, address, stride * k)}, align 8") for k in range(count)]
         every = ""
@@ -132,9 +132,9 @@ def complete(width: int, count: int, stride: int) -> Operation:
             ordered = scope.op(f"fcmp ord {kind} {a}, {b}")
             every = scope.op(f"and {truths} {every}, {ordered}") if every else ordered
         if width == 1:
-            return Held(BOOL, (every,))
+            return Value(BOOL, (every,))
         bits = scope.op(f"bitcast {truths} {every} to i{width}")
-        return Held(BOOL, (scope.op(f"icmp eq i{width} {bits}, -1"),))
+        return Value(BOOL, (scope.op(f"icmp eq i{width} {bits}, -1"),))
 
     return operation
 
@@ -142,14 +142,14 @@ def complete(width: int, count: int, stride: int) -> Operation:
 def loading(count: int) -> Operation:
     """Return ``load(address)``: a tuple of a fixed number of consecutive numbers."""
 
-    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+    def operation(scope: Scope, given: Sequence[Value]) -> Value:
         places = [place(scope, given[0].parts[0], 8 * k) for k in range(count)]
-        return several([Held(FLOAT, (scope.op(f"load double, ptr {one}"),)) for one in places])
+        return tuple_value([Value(FLOAT, (scope.op(f"load double, ptr {one}"),)) for one in places])
 
     return operation
 
 
-def store(scope: Scope, given: Sequence[Held]) -> Held:
+def store(scope: Scope, given: Sequence[Value]) -> Value:
     """Write a tuple's numbers consecutively: ``store(numbers, address)``."""
     for k, number in enumerate(given[0].items):
         register = convert(scope, number, FLOAT).parts[0]
@@ -160,12 +160,12 @@ def store(scope: Scope, given: Sequence[Held]) -> Held:
 def advancing(names: Sequence[str], slots: Mapping[str, int], part: ast.FunctionDef) -> Operation:
     """Return ``advance((a, b), address)``: lines on a tuple of numbers, and on numbers in memory."""
 
-    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+    def operation(scope: Scope, given: Sequence[Value]) -> Value:
         numbers = dict(zip(names, (convert(scope, one, FLOAT).parts[0] for one in given[0].items), strict=True))
         for name in names_of(part):
             if name not in numbers:
                 numbers[name] = scope.op(f"load double, ptr {place(scope, given[1].parts[0], 8 * slots[name])}")
-        return several([Held(FLOAT, (one,)) for one in Lines(scope, 1, numbers).results(part).values()])
+        return tuple_value([Value(FLOAT, (one,)) for one in Lines(scope, 1, numbers).results(part).values()])
 
     return operation
 
@@ -173,15 +173,15 @@ def advancing(names: Sequence[str], slots: Mapping[str, int], part: ast.Function
 def function_of(part: ast.FunctionDef) -> Operation:
     """Return ``function((a, b))``: lines on a tuple of numbers, in the order of their names."""
 
-    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+    def operation(scope: Scope, given: Sequence[Value]) -> Value:
         numbers = (convert(scope, one, FLOAT).parts[0] for one in given[0].items)
         found = Lines(scope, 1, dict(zip(names_of(part), numbers, strict=True))).results(part)
-        return several([Held(FLOAT, (one,)) for one in found.values()])
+        return tuple_value([Value(FLOAT, (one,)) for one in found.values()])
 
     return operation
 
 
-def transpose(scope: Scope, given: Sequence[Held]) -> Held:
+def transpose(scope: Scope, given: Sequence[Value]) -> Value:
     """Copy 8 numbers from each of 8 places into 8 rows of 8: ``transpose(places, offset, ahead, target, stride)``.
 
     All are in bytes: the address of the places' addresses, the offset added to each, the distance ahead at which data

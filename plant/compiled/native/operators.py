@@ -10,13 +10,13 @@ from plant.compiled.native.kinds import (
     INT,
     AnyKind,
     ArrayKind,
-    Held,
     KernelError,
-    Several,
-    double,
+    TupleKind,
+    Value,
+    double_text,
     is_literal,
     number,
-    several,
+    tuple_value,
 )
 from plant.compiled.native.scope import Scope
 
@@ -33,41 +33,41 @@ COMPARED: Mapping[type[ast.cmpop], tuple[str, str]] = {
 }
 
 
-def convert(scope: Scope, value: Held, kind: AnyKind) -> Held:
+def convert(scope: Scope, value: Value, kind: AnyKind) -> Value:
     """Return a value converted to a wider kind."""
     if value.kind == kind:
         return value
     match value.kind, kind:
         case ArrayKind(), ArrayKind():
-            return Held(kind, (*value.parts, *strides(scope, value)), value.origin)
-        case Several(), Several():
-            return several([convert(scope, *pair) for pair in zip(value.items, kind.items, strict=True)])
+            return Value(kind, (*value.parts, *strides(scope, value)), value.origin)
+        case TupleKind(), TupleKind():
+            return tuple_value([convert(scope, *pair) for pair in zip(value.items, kind.items, strict=True)])
         case _:
             pass
     part = value.parts[0]
     if kind == FLOAT and value.kind == INT:
-        return Held(
-            FLOAT, (double(float(int(part))) if is_literal(part) else scope.op(f"sitofp i64 {part} to double"),)
+        return Value(
+            FLOAT, (double_text(float(int(part))) if is_literal(part) else scope.op(f"sitofp i64 {part} to double"),)
         )
     if kind == FLOAT and value.kind == BOOL:
-        return Held(FLOAT, (scope.op(f"uitofp i1 {part} to double"),))
+        return Value(FLOAT, (scope.op(f"uitofp i1 {part} to double"),))
     if kind == INT and value.kind == BOOL:
-        return Held(INT, (scope.op(f"zext i1 {part} to i64"),))
+        return Value(INT, (scope.op(f"zext i1 {part} to i64"),))
     if kind == COMPLEX:
-        return Held(COMPLEX, (*convert(scope, value, FLOAT).parts, double(0.0)))
+        return Value(COMPLEX, (*convert(scope, value, FLOAT).parts, double_text(0.0)))
     raise KernelError(f"{kind.name} is wanted, got {value.kind.name}")
 
 
-def truth(scope: Scope, value: Held) -> str:
+def truth(scope: Scope, value: Value) -> str:
     """Return the register that says whether a value is true."""
     if value.kind == BOOL:
         return value.parts[0]
     if value.kind == INT:
         return scope.op(f"icmp ne i64 {value.parts[0]}, 0")
-    return scope.op(f"fcmp une double {convert(scope, value, FLOAT).parts[0]}, {double(0.0)}")
+    return scope.op(f"fcmp une double {convert(scope, value, FLOAT).parts[0]}, {double_text(0.0)}")
 
 
-def strides(scope: Scope, value: Held) -> list[str]:
+def strides(scope: Scope, value: Value) -> list[str]:
     """Return the strides of an array along its axes [elements]."""
     kind = value.array
     if not kind.packed:
@@ -78,11 +78,11 @@ def strides(scope: Scope, value: Held) -> list[str]:
     return found
 
 
-def _floating(scope: Scope, name: str, a: str, b: str) -> str:
+def _float_operation(scope: Scope, name: str, a: str, b: str) -> str:
     return scope.op(f"{name} {scope.flags}double {a}, {b}")
 
 
-def arithmetic(scope: Scope, operator: ast.operator, a: Held, b: Held) -> Held:
+def arithmetic(scope: Scope, operator: ast.operator, a: Value, b: Value) -> Value:
     """Return the result of an operator on two numbers, as in Python; a division by zero raises no error."""
     kind = type(operator)
     if COMPLEX in (a.kind, b.kind):
@@ -91,19 +91,19 @@ def arithmetic(scope: Scope, operator: ast.operator, a: Held, b: Held) -> Held:
         return power(scope, a, b)
     if kind in (ast.FloorDiv, ast.Mod) and FLOAT not in (a.kind, b.kind):
         x, y = (convert(scope, value, INT).parts[0] for value in (a, b))
-        return Held(INT, (_divided(scope, x, y, rest=kind is ast.Mod),))
+        return Value(INT, (_integer_division(scope, x, y, rest=kind is ast.Mod),))
     if kind in BITS and a.kind == b.kind and a.kind in (BOOL, INT):
-        return Held(a.kind, (scope.op(f"{BITS[kind]} {a.kind.parts[0]} {a.parts[0]}, {b.parts[0]}"),))
+        return Value(a.kind, (scope.op(f"{BITS[kind]} {a.kind.parts[0]} {a.parts[0]}, {b.parts[0]}"),))
     if kind in FLOATING and (kind is ast.Div or FLOAT in (a.kind, b.kind)):
         x, y = (convert(scope, value, FLOAT).parts[0] for value in (a, b))
-        return Held(FLOAT, (_floating(scope, FLOATING[kind], x, y),))
+        return Value(FLOAT, (_float_operation(scope, FLOATING[kind], x, y),))
     if kind in WHOLE:
         x, y = (convert(scope, value, INT).parts[0] for value in (a, b))
-        return Held(INT, (scope.whole(WHOLE[kind], x, y),))
+        return Value(INT, (scope.whole(WHOLE[kind], x, y),))
     raise KernelError(f"{kind.__name__} of {a.kind.name} and {b.kind.name} is not compiled")
 
 
-def _divided(scope: Scope, a: str, b: str, *, rest: bool) -> str:
+def _integer_division(scope: Scope, a: str, b: str, *, rest: bool) -> str:
     """Return quotient or remainder of integers, rounded down; zero for a division by zero, which would trap."""
     if is_literal(a) and is_literal(b) and int(b) != 0:
         return str(int(a) % int(b) if rest else int(a) // int(b))
@@ -121,7 +121,7 @@ def _divided(scope: Scope, a: str, b: str, *, rest: bool) -> str:
     return found if none == "false" else scope.op(f"select i1 {none}, i64 0, i64 {found}")
 
 
-def power(scope: Scope, base: Held, exponent: Held) -> Held:
+def power(scope: Scope, base: Value, exponent: Value) -> Value:
     """Return a power: a known integer power by products; a power of one half not by a root, to round as Python does."""
     part = exponent.parts[0]
     if exponent.kind == INT and is_literal(part) and int(part) >= 0:
@@ -136,40 +136,42 @@ def power(scope: Scope, base: Held, exponent: Held) -> Held:
         return result
     scope.program.declare("declare double @llvm.pow.f64(double, double)")
     x, y = (convert(scope, value, FLOAT).parts[0] for value in (base, exponent))
-    return Held(FLOAT, (scope.op(f"call {scope.flags}double @llvm.pow.f64(double {x}, double {y})"),))
+    return Value(FLOAT, (scope.op(f"call {scope.flags}double @llvm.pow.f64(double {x}, double {y})"),))
 
 
-def _complex(scope: Scope, kind: type[ast.operator], a: Held, b: Held) -> Held:
+def _complex(scope: Scope, kind: type[ast.operator], a: Value, b: Value) -> Value:
     """Return a sum, difference or product, of which one number may be real; or a quotient by a real number."""
     if kind in (ast.Add, ast.Sub):
         pairs = zip(*(convert(scope, value, COMPLEX).parts for value in (a, b)), strict=True)
-        return Held(COMPLEX, tuple(_floating(scope, FLOATING[kind], x, y) for x, y in pairs))
+        return Value(COMPLEX, tuple(_float_operation(scope, FLOATING[kind], x, y) for x, y in pairs))
     if kind is ast.Mult and a.kind == b.kind:
         (p, q), (r, s) = a.parts, b.parts
-        products = [_floating(scope, "fmul", x, y) for x, y in ((p, r), (q, s), (p, s), (q, r))]
-        return Held(COMPLEX, (_floating(scope, "fsub", *products[:2]), _floating(scope, "fadd", *products[2:])))
+        products = [_float_operation(scope, "fmul", x, y) for x, y in ((p, r), (q, s), (p, s), (q, r))]
+        return Value(
+            COMPLEX, (_float_operation(scope, "fsub", *products[:2]), _float_operation(scope, "fadd", *products[2:]))
+        )
     if kind is ast.Mult and a.kind != COMPLEX:
         a, b = b, a
     if kind in (ast.Mult, ast.Div) and b.kind != COMPLEX:
         factor = convert(scope, b, FLOAT).parts[0]
-        return Held(COMPLEX, tuple(_floating(scope, FLOATING[kind], part, factor) for part in a.parts))
+        return Value(COMPLEX, tuple(_float_operation(scope, FLOATING[kind], part, factor) for part in a.parts))
     raise KernelError(f"{kind.__name__} of {a.kind.name} and {b.kind.name} is not compiled")
 
 
-def negative(scope: Scope, value: Held) -> Held:
+def negative(scope: Scope, value: Value) -> Value:
     """Return a number with the opposite sign."""
     if value.kind == COMPLEX:
-        return Held(COMPLEX, tuple(scope.op(f"fneg {scope.flags}double {part}") for part in value.parts))
+        return Value(COMPLEX, tuple(scope.op(f"fneg {scope.flags}double {part}") for part in value.parts))
     if value.kind == FLOAT:
         part = value.parts[0]
         if part.startswith("0x"):
-            return Held(FLOAT, (f"0x{int(part, 16) ^ 1 << 63:016X}",))
-        return Held(FLOAT, (scope.op(f"fneg {scope.flags}double {part}"),))
+            return Value(FLOAT, (f"0x{int(part, 16) ^ 1 << 63:016X}",))
+        return Value(FLOAT, (scope.op(f"fneg {scope.flags}double {part}"),))
     part = convert(scope, value, INT).parts[0]
-    return Held(INT, (scope.whole("sub", "0", part),))
+    return Value(INT, (scope.whole("sub", "0", part),))
 
 
-def compared(scope: Scope, operator: ast.cmpop, a: Held, b: Held) -> str:
+def comparison(scope: Scope, operator: ast.cmpop, a: Value, b: Value) -> str:
     """Return the register with the result of a comparison of two numbers."""
     floating, whole = COMPARED[type(operator)]
     if FLOAT in (a.kind, b.kind):
@@ -179,7 +181,7 @@ def compared(scope: Scope, operator: ast.cmpop, a: Held, b: Held) -> str:
     return scope.op(f"icmp {whole} i64 {x}, {y}")
 
 
-def chosen(scope: Scope, condition: str, a: Held, b: Held) -> Held:
+def select_value(scope: Scope, condition: str, a: Value, b: Value) -> Value:
     """Return one of two values of the same kind."""
     pairs = zip(a.kind.parts, a.parts, b.parts, strict=True)
-    return Held(a.kind, tuple(scope.op(f"select i1 {condition}, {t} {x}, {t} {y}") for t, x, y in pairs))
+    return Value(a.kind, tuple(scope.op(f"select i1 {condition}, {t} {x}, {t} {y}") for t, x, y in pairs))

@@ -8,18 +8,18 @@ from plant.compiled.native.kinds import (
     NOTHING,
     AnyKind,
     ArrayKind,
-    Held,
     KernelError,
-    Several,
+    TupleKind,
+    Value,
     number,
-    several,
     structure,
+    tuple_value,
 )
 from plant.compiled.native.lines import names_of
 from plant.compiled.native.operations import GIVEN, Operation, operation_of
 from plant.compiled.native.operators import convert
 from plant.compiled.native.scope import Scope
-from plant.compiled.native.statements import NOTHING_VALUE, give, write
+from plant.compiled.native.statements import NOTHING_VALUE, return_value, write
 
 MOST_PASSES = 20
 
@@ -47,7 +47,7 @@ done:
 
 
 @dataclass(frozen=True)
-class Compiled:
+class CompiledFunction:
     """A function that has been written.
 
     Parameters
@@ -72,7 +72,7 @@ class Compiled:
 
 
 def _has_array(kind: AnyKind) -> bool:
-    return isinstance(kind, ArrayKind) or (isinstance(kind, Several) and any(map(_has_array, kind.items)))
+    return isinstance(kind, ArrayKind) or (isinstance(kind, TupleKind) and any(map(_has_array, kind.items)))
 
 
 @dataclass
@@ -86,12 +86,12 @@ class Module:
     """
 
     text: str
-    constants: dict[str, Held] = field(default_factory=dict[str, Held])
+    constants: dict[str, Value] = field(default_factory=dict[str, Value])
     plain: dict[str, object] = field(default_factory=dict[str, object])
     _functions: dict[str, ast.FunctionDef] = field(default_factory=dict[str, ast.FunctionDef])
     _operations: dict[str, Operation] = field(default_factory=dict[str, Operation])
-    _made: dict[tuple[str, tuple[AnyKind, ...], bool], Compiled] = field(
-        default_factory=dict[tuple[str, tuple[AnyKind, ...], bool], Compiled]
+    _made: dict[tuple[str, tuple[AnyKind, ...], bool], CompiledFunction] = field(
+        default_factory=dict[tuple[str, tuple[AnyKind, ...], bool], CompiledFunction]
     )
     _declared: dict[str, None] = field(default_factory=dict[str, None])
     _texts: list[str] = field(default_factory=list[str])
@@ -136,11 +136,11 @@ class Module:
         self._texts.append(f"define internal void @{symbol}({parameters}) alwaysinline #0 {{\n{lines}\n}}\n")
         return symbol
 
-    def call(self, name: str, given: Sequence[Held], scope: Scope) -> Held:
+    def call(self, name: str, given: Sequence[Value], scope: Scope) -> Value:
         """Write a call of another function, which is translated for the kinds of its arguments."""
         if name in self._operations:
             return self._operations[name](scope, given)
-        given = self._filled(name, given)
+        given = self._with_defaults(name, given)
         kinds = tuple(value.kind for value in given)
         compiled = self.function(name, kinds)
         parts = [
@@ -165,9 +165,9 @@ class Module:
             (found,) if count == 1 else tuple(scope.op(f"extractvalue {whole} {found}, {k}") for k in range(count))
         )
         origin = frozenset[str]().union(*(formal[parameter].origin for parameter in compiled.origin))
-        return Held(compiled.returns, registers, origin)
+        return Value(compiled.returns, registers, origin)
 
-    def _filled(self, name: str, given: Sequence[Held]) -> list[Held]:
+    def _with_defaults(self, name: str, given: Sequence[Value]) -> list[Value]:
         """Return arguments completed with defaults."""
         node = self._functions[name]
         missing = len(node.args.args) - len(given)
@@ -176,7 +176,7 @@ class Module:
         defaults = node.args.defaults[len(node.args.defaults) - missing :]
         return [*given, *(number(ast.literal_eval(one)) for one in defaults)]
 
-    def function(self, name: str, kinds: tuple[AnyKind, ...], *, enters: bool = False) -> Compiled:
+    def function(self, name: str, kinds: tuple[AnyKind, ...], *, enters: bool = False) -> CompiledFunction:
         """Write a function for parameters of these kinds, unless it exists already.
 
         Parameters
@@ -192,19 +192,19 @@ class Module:
                 raise error.within(name) if not error.placed else KernelError(f"{name}, {error}") from None
         return self._made[key]
 
-    def _write(self, node: ast.FunctionDef, kinds: tuple[AnyKind, ...], *, enters: bool) -> Compiled:
+    def _write(self, node: ast.FunctionDef, kinds: tuple[AnyKind, ...], *, enters: bool) -> CompiledFunction:
         symbol = f"{node.name}.{len(self._made)}.{len(self._texts)}"
         flags, inlined = _hints(node)
         scope = Scope(self, {}, {}, flags)
         formal: list[str] = []
-        given: list[tuple[str, Held]] = []
+        given: list[tuple[str, Value]] = []
         for name, kind in zip(names_of(node), kinds, strict=True):
             parts = tuple(f"%in.{name}.{k}" for k in range(len(kind.parts)))
             attribute = " noalias" if enters else ""
             formal += [
                 f"{part}{attribute if part == 'ptr' else ''} {one}" for part, one in zip(kind.parts, parts, strict=True)
             ]
-            given.append((name, Held(kind, parts, frozenset((name,)))))
+            given.append((name, Value(kind, parts, frozenset((name,)))))
         for _ in range(MOST_PASSES):
             scope = self._pass(scope, node, given)
             if not scope.again:
@@ -224,9 +224,9 @@ class Module:
         self._texts.append(
             f"define internal {structure(returns)} @{symbol}({', '.join(formal)}) {attribute} #0 {{\n{lines}\n}}\n"
         )
-        return Compiled(symbol, returns, scope.written, scope.origin, scope.heap)
+        return CompiledFunction(symbol, returns, scope.written, scope.origin, scope.heap)
 
-    def _pass(self, before: Scope, node: ast.FunctionDef, given: list[tuple[str, Held]]) -> Scope:
+    def _pass(self, before: Scope, node: ast.FunctionDef, given: list[tuple[str, Value]]) -> Scope:
         """Write a function once, with the kinds of its variables that the previous pass has found."""
         scope = Scope(self, before.kinds, before.origins, before.flags)
         scope.returned, scope.heap, scope.mixed = before.returned, before.heap, before.mixed
@@ -235,18 +235,18 @@ class Module:
             scope.assign(name, value, convert)
         write(scope, node.body)
         if not scope.ended:
-            give(scope, NOTHING_VALUE)
+            return_value(scope, NOTHING_VALUE)
         if scope.returned is not None and _has_array(scope.returned) and not scope.heap:
             scope.heap = scope.again = True
         return scope
 
-    def enter(self, name: str, kinds: tuple[AnyKind, ...]) -> Compiled:
+    def enter(self, name: str, kinds: tuple[AnyKind, ...]) -> CompiledFunction:
         """Write ``name``, to be called with the addresses of its arguments' parts and of memory for its results."""
         compiled = self.function(name, kinds, enters=True)
-        if _has_array(compiled.returns) and not _packed(compiled.returns):
+        if _has_array(compiled.returns) and not _is_packed(compiled.returns):
             raise KernelError(f"{name} returns a view that is not packed")
         scope, parts = Scope(self, {}, {}), list[str]()
-        every = several([Held(kind, tuple(kind.parts)) for kind in kinds]).kind.parts
+        every = tuple_value([Value(kind, tuple(kind.parts)) for kind in kinds]).kind.parts
         for k, part in enumerate(every):
             held = "i64" if part == "i1" else part
             found = scope.op(f"load {held}, ptr {scope.op(f'getelementptr i64, ptr %given, i64 {k}')}")
@@ -274,9 +274,9 @@ class Module:
         return "\n".join([*declared, RELEASE, *self._texts, attributes])
 
 
-def _packed(kind: AnyKind) -> bool:
-    if isinstance(kind, Several):
-        return all(map(_packed, kind.items))
+def _is_packed(kind: AnyKind) -> bool:
+    if isinstance(kind, TupleKind):
+        return all(map(_is_packed, kind.items))
     return kind.packed if isinstance(kind, ArrayKind) else True
 
 

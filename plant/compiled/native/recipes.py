@@ -93,24 +93,24 @@ def identity(thing: object) -> str | None:
         case None | bool() | int() | float() | str():
             return repr(thing)
         case tuple() | list():
-            return _joined(thing)
+            return _joint_identity(thing)
         case Mapping():
-            return _joined(part for pair in thing.items() for part in pair)
+            return _joint_identity(part for pair in thing.items() for part in pair)
         case type() | FunctionType():
-            return _place(thing)
+            return _import_path(thing)
         case _ if is_dataclass(thing):
-            return _joined([type(thing), *(getattr(thing, field.name) for field in fields(thing))])
+            return _joint_identity([type(thing), *(getattr(thing, field.name) for field in fields(thing))])
         case _:
             return None
 
 
-def _joined(things: Iterable[object]) -> str | None:
+def _joint_identity(things: Iterable[object]) -> str | None:
     parts = [identity(thing) for thing in things]
     found = [part for part in parts if part is not None]
     return f"({', '.join(found)})" if len(found) == len(parts) else None
 
 
-def _place(thing: type | FunctionType) -> str | None:
+def _import_path(thing: type | FunctionType) -> str | None:
     """Return the import path of a class or function, if it is found there."""
     if thing.__module__.partition(".")[0] not in PACKAGES:
         return None

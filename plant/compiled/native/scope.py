@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Protocol
 
-from plant.compiled.native.kinds import BOOL, INT, AnyKind, Held, KernelError, is_literal, joined
+from plant.compiled.native.kinds import BOOL, INT, AnyKind, KernelError, Value, common_kind, is_literal
 
 
 class Program(Protocol):
     """Interface of a kernel for its functions."""
 
-    constants: dict[str, Held]
+    constants: dict[str, Value]
 
-    def call(self, name: str, given: Sequence[Held], scope: "Scope") -> Held:
+    def call(self, name: str, given: Sequence[Value], scope: "Scope") -> Value:
         """Call another function of the kernel."""
         ...
 
@@ -38,16 +38,16 @@ def family(kind: AnyKind) -> str:
 
 
 @cache
-def _assigned(node: ast.AST) -> frozenset[str]:
+def _assigned_names(node: ast.AST) -> frozenset[str]:
     if isinstance(node, ast.Name):
         return frozenset((node.id,)) if isinstance(node.ctx, ast.Store) else frozenset()
     # cached for each node, because an inner loop is looked at again as a part of its outer loop
-    return frozenset().union(*map(_assigned, ast.iter_child_nodes(node)))
+    return frozenset().union(*map(_assigned_names, ast.iter_child_nodes(node)))
 
 
 def assigned_in(nodes: Sequence[ast.AST]) -> set[str]:
     """Return the names that statements assign."""
-    return {name for node in nodes for name in _assigned(node)}
+    return {name for node in nodes for name in _assigned_names(node)}
 
 
 @dataclass
@@ -75,7 +75,7 @@ class Scope:
     origins: dict[str, frozenset[str]]
     flags: str = ""
     owner: str = "%owned"
-    known: dict[str, Held] = field(default_factory=dict[str, Held])
+    known: dict[str, Value] = field(default_factory=dict[str, Value])
     again: bool = False
     ended: bool = False
     depth: int = 0
@@ -87,7 +87,7 @@ class Scope:
     begin: list[str] = field(default_factory=list[str])
     written: frozenset[str] = frozenset()
     origin: frozenset[str] = frozenset()
-    spilled: dict[tuple[str, ...], Held] = field(default_factory=dict[tuple[str, ...], Held])
+    spilled: dict[tuple[str, ...], Value] = field(default_factory=dict[tuple[str, ...], Value])
     mixed: set[str] = field(default_factory=set[str])
     _slots: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     _read: set[str] = field(default_factory=set[str])
@@ -131,7 +131,7 @@ class Scope:
         self.begin.append(f"{place} = alloca {kind}, align 16")
         return place
 
-    def assign(self, name: str, value: Held, convert: Callable[["Scope", Held, AnyKind], Held]) -> None:
+    def assign(self, name: str, value: Value, convert: Callable[["Scope", Value, AnyKind], Value]) -> None:
         """Give a variable a value."""
         if name == "_":
             return
@@ -141,7 +141,7 @@ class Scope:
         if name in self.mixed:
             self.known[name] = value
             return
-        kind = joined(name, before, value.kind)
+        kind = common_kind(name, before, value.kind)
         if kind != before:
             self.again = self.again or before is not None
             self.kinds[name] = kind
@@ -156,7 +156,7 @@ class Scope:
             self.again = self.again or before is not None
             self.origins[name] = self.origins.get(name, frozenset()) | value.origin
 
-    def read(self, name: str) -> Held:
+    def read(self, name: str) -> Value:
         """Return a variable's value, or a constant's."""
         if name in self.known:
             return self.known[name]
@@ -166,7 +166,7 @@ class Scope:
             kind, places = self.kinds[name], self._slots[name]
             self._read.update(places)
             parts = [self.op(f"load {part}, ptr {place}") for part, place in zip(kind.parts, places, strict=True)]
-            self.known[name] = Held(kind, tuple(parts), self.origins.get(name, frozenset()))
+            self.known[name] = Value(kind, tuple(parts), self.origins.get(name, frozenset()))
             return self.known[name]
         if name in self.program.constants:
             return self.program.constants[name]
@@ -224,7 +224,7 @@ class Scope:
         return [*self.begin, *kept]
 
 
-def integer(value: Held) -> str:
+def integer(value: Value) -> str:
     """Return the register of an integer.
 
     Raises

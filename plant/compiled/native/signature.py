@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias, get_type_hints
 
-from plant.compiled.native.kinds import BOOL, COMPLEX, FLOAT, INT, AnyKind, ArrayKind, ScalarKind, Several
+from plant.compiled.native.kinds import BOOL, COMPLEX, FLOAT, INT, AnyKind, ArrayKind, ScalarKind, TupleKind
 
 Length: TypeAlias = int | str | None
 """Length of an axis: a number, a name that has the same value in all arguments, or None for no check."""
@@ -80,7 +80,7 @@ def _argument(name: str, text: str, place: int = 0) -> Argument:
     """Read one argument; if several shapes are given, take the one at its position."""
     if text.startswith("tuple ("):
         items = tuple(_argument(f"{name}[{k}]", one) for k, one in enumerate(text[7:-1].split("; ")))
-        return Argument(name, Several(tuple(item.kind for item in items)), items=items)
+        return Argument(name, TupleKind(tuple(item.kind for item in items)), items=items)
     shaped = _SHAPED.match(text)
     if shaped:
         shapes = re.findall(r"\(([^()]*)\)", shaped[2])
@@ -141,14 +141,14 @@ def signature_of(function: Callable[..., object], **lengths: int) -> Signature:
     found = hinted | _documented(function, named) | named
     if set(names) != set(found):
         raise ValueError(f"{function.__qualname__} takes {names}, its documentation has {list(found)}")
-    return tuple(_with(found[name], lengths) for name in names)
+    return tuple(_with_lengths(found[name], lengths) for name in names)
 
 
 def _named_tuple(name: str, of: Any) -> Argument:
     """Return an argument that is a named tuple of numbers or of arrays whose shapes its documentation gives."""
     shown, hints = _documented(of), get_type_hints(of)
     items = [shown.get(field) or Argument(field, _HINTED[hints[field]]) for field in of._fields]
-    kind = Several(tuple(item.kind for item in items), of._fields)
+    kind = TupleKind(tuple(item.kind for item in items), of._fields)
     return Argument(name, kind, items=tuple(replace(item, name=f"{name}.{item.name}") for item in items))
 
 
@@ -160,9 +160,9 @@ def _documented(what: Any, known: Collection[str] = ()) -> dict[str, Argument]:
     return {argument.name: argument for argument in signature(section, known)}
 
 
-def _with(argument: Argument, lengths: dict[str, int]) -> Argument:
+def _with_lengths(argument: Argument, lengths: dict[str, int]) -> Argument:
     known = tuple(lengths.get(one, one) if isinstance(one, str) else one for one in argument.lengths)
-    return Argument(argument.name, argument.kind, known, tuple(_with(item, lengths) for item in argument.items))
+    return Argument(argument.name, argument.kind, known, tuple(_with_lengths(item, lengths) for item in argument.items))
 
 
 def _documentation(what: Any) -> str:
@@ -172,7 +172,7 @@ def _documentation(what: Any) -> str:
     return (ast.get_docstring(node) if isinstance(node, ast.FunctionDef | ast.ClassDef) else None) or ""
 
 
-def spelt(kind: AnyKind) -> object:
+def kind_as_json(kind: AnyKind) -> object:
     """Return the JSON form of a kind."""
     match kind:
         case ScalarKind():
@@ -180,4 +180,4 @@ def spelt(kind: AnyKind) -> object:
         case ArrayKind():
             return [kind.element.name, kind.rank]
         case _:
-            return {"items": [spelt(item) for item in kind.items]} if isinstance(kind, Several) else kind.name
+            return {"items": [kind_as_json(item) for item in kind.items]} if isinstance(kind, TupleKind) else kind.name

@@ -4,8 +4,18 @@ import ast
 from collections.abc import Callable, Mapping, Sequence
 
 from plant.compiled.native import arrays
-from plant.compiled.native.expressions import combined, place_of, read
-from plant.compiled.native.kinds import INT, NOTHING, ArrayKind, Held, KernelError, Range, is_literal, joined, structure
+from plant.compiled.native.expressions import operator_result, place_of, read
+from plant.compiled.native.kinds import (
+    INT,
+    NOTHING,
+    ArrayKind,
+    KernelError,
+    Range,
+    Value,
+    common_kind,
+    is_literal,
+    structure,
+)
 from plant.compiled.native.operators import convert, truth
 from plant.compiled.native.scope import Scope, assigned_in
 
@@ -33,10 +43,10 @@ def write(scope: Scope, statements: Sequence[ast.stmt]) -> None:
 def _assign(scope: Scope, node: ast.Assign) -> None:
     value = read(scope, node.value)
     for target in node.targets:
-        put(scope, target, value)
+        assign_to(scope, target, value)
 
 
-def put(scope: Scope, target: ast.expr, value: Held) -> None:
+def assign_to(scope: Scope, target: ast.expr, value: Value) -> None:
     """Assign a value to a name, an element, a view or several of them."""
     match target:
         case ast.Name():
@@ -46,11 +56,11 @@ def put(scope: Scope, target: ast.expr, value: Held) -> None:
             if len(items) != len(target.elts):
                 raise KernelError(f"{len(target.elts)} values are wanted, got {len(items)}")
             for part, item in zip(target.elts, items, strict=True):
-                put(scope, part, item)
+                assign_to(scope, part, item)
         case ast.Subscript():
             owner, items = place_of(scope, target)
             if len(items) == owner.array.rank and all(item.kind == INT for item in items):
-                indices = [arrays.counted(scope, owner, *place) for place in enumerate(items)]
+                indices = [arrays.nonnegative_index(scope, owner, *place) for place in enumerate(items)]
                 arrays.store(scope, owner, indices, value)
             else:
                 arrays.fill(scope, arrays.view(scope, owner, items), value)
@@ -60,33 +70,33 @@ def put(scope: Scope, target: ast.expr, value: Held) -> None:
 
 def _annotated(scope: Scope, node: ast.AnnAssign) -> None:
     if node.value is not None:
-        put(scope, node.target, read(scope, node.value))
+        assign_to(scope, node.target, read(scope, node.value))
 
 
 def _augmented(scope: Scope, node: ast.AugAssign) -> None:
     if isinstance(node.target, ast.Name):
         old, new = scope.read(node.target.id), read(scope, node.value)
         if isinstance(old.kind, ArrayKind):
-            _change(scope, old, node.op, new)
+            _update_array(scope, old, node.op, new)
         else:
-            scope.assign(node.target.id, combined(scope, node.op, old, new), convert)
+            scope.assign(node.target.id, operator_result(scope, node.op, old, new), convert)
         return
     if not isinstance(node.target, ast.Subscript):
         raise KernelError(f"an assignment to {ast.unparse(node.target)} is not compiled")
     owner, items = place_of(scope, node.target)
     new = read(scope, node.value)
     if len(items) == owner.array.rank and all(item.kind == INT for item in items):
-        indices = [arrays.counted(scope, owner, *place) for place in enumerate(items)]
-        arrays.store(scope, owner, indices, combined(scope, node.op, arrays.load(scope, owner, indices), new))
+        indices = [arrays.nonnegative_index(scope, owner, *place) for place in enumerate(items)]
+        arrays.store(scope, owner, indices, operator_result(scope, node.op, arrays.load(scope, owner, indices), new))
     else:
-        _change(scope, arrays.view(scope, owner, items), node.op, new)
+        _update_array(scope, arrays.view(scope, owner, items), node.op, new)
 
 
-def _change(scope: Scope, target: Held, operator: ast.operator, by: Held) -> None:
+def _update_array(scope: Scope, target: Value, operator: ast.operator, by: Value) -> None:
     """Change an array in place."""
-    with arrays.each(scope, target.lengths) as indices:
+    with arrays.element_loops(scope, target.lengths) as indices:
         other = arrays.load(scope, by, indices) if isinstance(by.kind, ArrayKind) else by
-        changed = combined(scope, operator, arrays.load(scope, target, indices), other)
+        changed = operator_result(scope, operator, arrays.load(scope, target, indices), other)
         arrays.store(scope, target, indices, changed)
 
 
@@ -94,7 +104,7 @@ def _if(scope: Scope, node: ast.If) -> None:
     condition = truth(scope, read(scope, node.test))
     yes, no, done = (scope.fresh(name) for name in ("then", "else", "endif"))
     scope.branch(condition, yes, no if node.orelse else done)
-    outside, ends = dict(scope.known), list[dict[str, Held]]()
+    outside, ends = dict(scope.known), list[dict[str, Value]]()
     for label, body in ((yes, node.body), (no, node.orelse)):
         scope.known = dict(outside)
         if not body:
@@ -115,36 +125,36 @@ def _if(scope: Scope, node: ast.If) -> None:
         scope.forget({name for name in scope.known if scope.known[name] is not ends[1].get(name)})
 
 
-def _without_else(node: ast.For | ast.While) -> None:
+def _refuse_else(node: ast.For | ast.While) -> None:
     if node.orelse:
         raise KernelError("the else of a loop is not compiled")
 
 
 def _for(scope: Scope, node: ast.For) -> None:
-    _without_else(node)
+    _refuse_else(node)
     changed = assigned_in([*node.body, node.target])
     value = read(scope, node.iter)
     if isinstance(value.kind, Range):
         begin, end, step = value.parts
         if not is_literal(step) or int(step) == 0:
-            step = _positive(scope, step)
+            step = _positive_step(scope, step)
         with scope.counting(begin, end, step, forget=changed) as counter:
-            put(scope, node.target, Held(INT, (counter,)))
+            assign_to(scope, node.target, Value(INT, (counter,)))
             write(scope, node.body)
         return
     with scope.counting("0", value.lengths[0], forget=changed) as counter:
-        put(scope, node.target, arrays.indexed(scope, value, [Held(INT, (counter,))]))
+        assign_to(scope, node.target, arrays.indexed(scope, value, [Value(INT, (counter,))]))
         write(scope, node.body)
 
 
-def _positive(scope: Scope, step: str) -> str:
+def _positive_step(scope: Scope, step: str) -> str:
     """Return an unknown step; it is assumed to be positive, and is at least one."""
     small = scope.op(f"icmp slt i64 {step}, 1")
     return scope.op(f"select i1 {small}, i64 1, i64 {step}")
 
 
 def _while(scope: Scope, node: ast.While) -> None:
-    _without_else(node)
+    _refuse_else(node)
     head, body, done = (scope.fresh(name) for name in ("while", "do", "end"))
     changed = assigned_in(node.body)
     scope.forget(changed)
@@ -173,15 +183,15 @@ def _continue(scope: Scope, node: ast.Continue) -> None:  # noqa: ARG001  all ta
 
 
 def _return(scope: Scope, node: ast.Return) -> None:
-    give(scope, NOTHING_VALUE if node.value is None else read(scope, node.value))
+    return_value(scope, NOTHING_VALUE if node.value is None else read(scope, node.value))
 
 
-NOTHING_VALUE = Held(NOTHING, ())
+NOTHING_VALUE = Value(NOTHING, ())
 
 
-def give(scope: Scope, value: Held) -> None:
+def return_value(scope: Scope, value: Value) -> None:
     """End the function with a result."""
-    kind = joined("what is returned", scope.returned, value.kind)
+    kind = common_kind("what is returned", scope.returned, value.kind)
     scope.again = scope.again or (scope.returned is not None and scope.returned != kind)
     scope.returned = kind
     value = convert(scope, value, kind)

@@ -34,7 +34,7 @@ def path_of(name: str, key: str) -> Path:
     return cache_folder() / f"hydrostate_{name}_{key[:16]}.machine"
 
 
-def recalled(name: str, key: str) -> tuple[Mapping[str, Any], bytes] | None:
+def load_kernel(name: str, key: str) -> tuple[Mapping[str, Any], bytes] | None:
     """Return description and machine code of a kernel, or None if they must be compiled.
 
     A file is ignored if it is empty, truncated, damaged, of another kernel, not a regular file, or owned by another
@@ -45,9 +45,9 @@ def recalled(name: str, key: str) -> tuple[Mapping[str, Any], bytes] | None:
     name, key : str
         See `path_of`.
     """
-    if _refused(cache_folder()):
+    if _is_refused(cache_folder()):
         return None
-    content = _own(path_of(name, key))
+    content = _trusted_content(path_of(name, key))
     size = len(MAGIC) + 64
     if content is None or not content.startswith(MAGIC) or len(content) < size:
         return None
@@ -59,7 +59,7 @@ def recalled(name: str, key: str) -> tuple[Mapping[str, Any], bytes] | None:
     return (description, code) if description.get("key") == key else None
 
 
-def _own(path: Path) -> bytes | None:
+def _trusted_content(path: Path) -> bytes | None:
     """Return the content of a regular file that belongs to this user and that nobody else may write to."""
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     try:
@@ -78,7 +78,7 @@ def _own(path: Path) -> bytes | None:
 
 
 @cache
-def _refused(folder: Path) -> bool:
+def _is_refused(folder: Path) -> bool:
     """Return whether the kernels in a folder must not be run, with one warning if so."""
     try:
         found = folder.stat()
@@ -90,7 +90,7 @@ def _refused(folder: Path) -> bool:
     return reason is not None
 
 
-def kept(name: str, key: str, description: Mapping[str, Any], code: bytes) -> None:
+def store_kernel(name: str, key: str, description: Mapping[str, Any], code: bytes) -> None:
     """Keep a kernel for later runs; if the folder cannot be written, warn once and continue without it.
 
     Parameters
@@ -103,7 +103,7 @@ def kept(name: str, key: str, description: Mapping[str, Any], code: bytes) -> No
         An object file.
     """
     folder = cache_folder()
-    if _refused(folder):
+    if _is_refused(folder):
         return
     body = json.dumps({**description, "key": key}).encode() + b"\n" + code
     try:
@@ -113,9 +113,9 @@ def kept(name: str, key: str, description: Mapping[str, Any], code: bytes) -> No
                 os.fchmod(file.fileno(), 0o600)
             file.write(MAGIC + hashlib.sha256(body).hexdigest().encode() + body)
     except OSError as error:
-        _say_once(folder, error.strerror or str(error))
+        _warn_once(folder, error.strerror or str(error))
 
 
 @cache
-def _say_once(folder: Path, reason: str) -> None:
+def _warn_once(folder: Path, reason: str) -> None:
     logger.warning("kernels cannot be cached in %s (%s); compiling for this run only", folder, reason)

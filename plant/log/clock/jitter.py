@@ -13,17 +13,17 @@ GAP = 1.5
 BEYOND_JITTER = 3.5
 """Standard deviations of the steps, beyond one sample time, that jitter alone does not reach [dimensionless]."""
 
-POINTS = 5
+SLOPE_SAMPLES = 5
 """Samples of which a slope is taken [count]."""
 
 FEWEST_QUANTA = 5
 """Steps of a rounded clock, at least [count]; fewer are gaps."""
 
-FILLED = 0.15
+LEAST_ROUNDING_SCATTER = 0.15
 """Least standard deviation of stamps about a uniform clock, over their quantum, that rounding to it leaves; it is 0.29
 where all remainders are alike [dimensionless]."""
 
-ROUNDED = 1.25
+MOST_ROUNDING_RANGE = 1.25
 """Most that rounding leaves of stamps about a uniform clock, end to end, over their quantum [dimensionless]."""
 
 
@@ -135,32 +135,32 @@ def resampled(grid: Grid, time: Array, values: Array) -> Array:
     if len(t) < 2:
         return np.full(len(grid.times), np.nan)
     out = np.interp(grid.times, t, y)
-    if len(t) >= POINTS:
+    if len(t) >= SLOPE_SAMPLES:
         after = np.clip(np.searchsorted(t, grid.times), 1, len(t) - 1)
         nearest = after - (grid.times - t[after - 1] < t[after] - grid.times)
         slopes, whole = _slopes(t, y)
         moved = y[nearest] + slopes[nearest] * (grid.times - t[nearest])
         out = np.where(whole[nearest], moved, out)
-    out = _on_quanta(out, y)
+    out = _round_to_quantum(out, y)
     out[grid.lacking(t)] = np.nan
     return out
 
 
-TOGETHER = 0.01
+SAME_STAMP = 0.01
 """Step up to which two stamps count as one, over the usual step [fraction]; judged."""
 
 
 def _slopes(t: Array, y: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return the slope of a cubic through five samples at each sample, and whether no gap lies between them."""
-    half, usual = POINTS // 2, float(np.median(np.diff(t)))
-    first = np.clip(np.arange(len(t)) - half, 0, len(t) - POINTS)
-    rows = first[:, None] + np.arange(POINTS)
+    half, usual = SLOPE_SAMPLES // 2, float(np.median(np.diff(t)))
+    first = np.clip(np.arange(len(t)) - half, 0, len(t) - SLOPE_SAMPLES)
+    rows = first[:, None] + np.arange(SLOPE_SAMPLES)
     apart = (t[rows] - t[:, None]) / usual
     powers = apart[:, :, None] ** np.arange(4)
     normal = np.swapaxes(powers, 1, 2) @ powers
     right = np.swapaxes(powers, 1, 2) @ (y[rows] - y[:, None])[:, :, None]
-    whole = np.ptp(t[rows], axis=1) <= GAP * (POINTS - 1) * usual
-    whole &= np.count_nonzero(np.diff(t[rows], axis=1) > TOGETHER * usual, axis=1) >= 3  # a cubic needs four stamps
+    whole = np.ptp(t[rows], axis=1) <= GAP * (SLOPE_SAMPLES - 1) * usual
+    whole &= np.count_nonzero(np.diff(t[rows], axis=1) > SAME_STAMP * usual, axis=1) >= 3  # a cubic needs four stamps
     normal[~whole] = np.eye(4)
     slopes: Array = np.linalg.solve(normal, right)[:, 1, 0].astype(np.float64) / usual
     return slopes, whole
@@ -170,7 +170,7 @@ FINEST_QUANTUM = 1e-12
 """Quantum of a sensor over its range below which there is none: numbers end in fewer digits [fraction]."""
 
 
-def _on_quanta(found: Array, measured: Array) -> Array:
+def _round_to_quantum(found: Array, measured: Array) -> Array:
     """Round to a sensor's quantum if every measured value is a multiple of it."""
     steps = np.abs(np.diff(measured))
     quantum = float(np.min(steps[steps > 0.0], initial=np.inf))
@@ -224,7 +224,7 @@ def rounded_clock(time: Array, slots: Array) -> tuple[float, float, float] | Non
     whole = [quantum / max(1.0, np.rint(one)) for one in ticks]
     for tried in (*whole, sample_time):  # a whole number of samples per quantum, if the stamps allow it
         left = time - tried * slots
-        most = 1.0 + 1e-6 if tried is not sample_time else ROUNDED
-        if np.ptp(left) <= most * quantum and np.std(left) >= FILLED * quantum:
+        most = 1.0 + 1e-6 if tried is not sample_time else MOST_ROUNDING_RANGE
+        if np.ptp(left) <= most * quantum and np.std(left) >= LEAST_ROUNDING_SCATTER * quantum:
             return float(left.mean()), float(tried), quantum
     return None

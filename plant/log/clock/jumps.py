@@ -13,13 +13,13 @@ MOST_HOURS, MOST_JUMPS = 24, 2
 ROUNDING = 1e-9
 """Share of an hour by which rounding may move a step [fraction]."""
 
-SLOWEST = 1.0
+LONGEST_STEP = 1.0
 """Longest step of stamps at which an hour, and a step, is no pause that came out so by chance [s]."""
 
-BITS = (16, 24, 31, 32)
+COUNTER_BITS = (16, 24, 31, 32)
 """Bits of a counter that a logger or a controller keeps its time in [count]."""
 
-FINEST = 9
+FINEST_TICK_DECIMALS = 9
 """Decimal places of a second in the finest tick of such a counter [count]."""
 
 BY_CHANCE, OFTEN = 1e-3, 3
@@ -53,10 +53,10 @@ def without_jumps(time: Array) -> tuple[Array, list[tuple[int, int]]]:
     far = np.flatnonzero(np.abs(step) > 0.5 * HOUR)
     if not 0 < len(far) <= MOST_JUMPS:
         return time, []
-    longest = _longest(np.delete(step, far))
+    longest = _longest_regular_step(np.delete(step, far))
     hours = np.floor(step[far] / HOUR + ROUNDING)
     left = np.maximum(0.0, step[far] - HOUR * hours)
-    if not longest <= GAP * SLOWEST or np.any((left > longest) | (np.abs(hours) > MOST_HOURS)):
+    if not longest <= GAP * LONGEST_STEP or np.any((left > longest) | (np.abs(hours) > MOST_HOURS)):
         return time, []
     out = time.copy()
     for row, after in zip(far, left, strict=True):
@@ -64,7 +64,7 @@ def without_jumps(time: Array) -> tuple[Array, list[tuple[int, int]]]:
     return out, [(int(row) + 1, int(jump)) for row, jump in zip(far, hours, strict=True)]
 
 
-def _longest(step: Array) -> float:
+def _longest_regular_step(step: Array) -> float:
     """Return the longest step that skips no row."""
     if not len(step):
         return np.inf
@@ -100,8 +100,8 @@ def without_overruns(time: Array) -> tuple[Array, tuple[int, int, float] | None]
     if not 0 < len(falls) < len(step) // 2:
         return time, None
     rising = np.delete(step, falls)
-    usual, longest = float(np.median(rising)), _longest(rising)
-    spans = np.array([2.0**bits * 10.0**-places for bits in BITS for places in range(FINEST + 1)])
+    usual, longest = float(np.median(rising)), _longest_regular_step(rising)
+    spans = np.array([2.0**bits * 10.0**-places for bits in COUNTER_BITS for places in range(FINEST_TICK_DECIMALS + 1)])
     after = spans + float(np.median(step[falls]))
     span = float(spans[np.argmin(np.abs(after - usual))])
     left = step[falls] + span

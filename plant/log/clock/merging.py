@@ -9,19 +9,19 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.clock.jitter import GAP, Grid, resampled
-from plant.log.clock.uniform import FEWEST_SAMPLES, Checked, on_uniform_clock
+from plant.log.clock.uniform import FEWEST_SAMPLES, CheckedLog, on_uniform_clock
 from plant.log.columns import TIME
 from plant.log.notes import LogCode
 from plant.notes import Note
 
 _LATEST = np.datetime64("2262-01-01", "ns")
 
-SAME = 1e-3
+SAME_TIME_TOLERANCE = 1e-3
 """Share of a step by which stamps of one clock may differ [fraction]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Timed:
+class LoggerChannels:
     """Channels of one logger, or of one group in a file.
 
     Parameters
@@ -48,7 +48,7 @@ class Timed:
 
 
 @dataclass(frozen=True, eq=False)
-class Merged:
+class MergedChannels:
     """Channels on a common clock.
 
     Parameters
@@ -63,7 +63,7 @@ class Merged:
     notes: tuple[Note, ...] = ()
 
 
-def merged(parts: Sequence[Timed], source: str) -> Merged:
+def merge_loggers(parts: Sequence[LoggerChannels], source: str) -> MergedChannels:
     """Return the channels of several loggers on the clock of the fastest, for the time in which all ran.
 
     Stamps with dates are compared directly. Seconds are assumed to count from the same moment in all loggers.
@@ -81,7 +81,7 @@ def merged(parts: Sequence[Timed], source: str) -> Merged:
     parts = [one for one in parts if one.channels]
     if len(parts) == 1 or all(_same_time(parts[0].time, one.time) for one in parts[1:]):
         together = {name: values for one in parts for name, values in one.channels.items()}
-        return Merged({TIME: parts[0].time, **together} if parts else {})
+        return MergedChannels({TIME: parts[0].time, **together} if parts else {})
     dated = [one.time.dtype.kind == "M" for one in parts]
     if any(dated) and not all(dated):
         raise LogError(
@@ -91,33 +91,33 @@ def merged(parts: Sequence[Timed], source: str) -> Merged:
         )
     epoch = min(one.time[~np.isnat(one.time)].min(initial=_LATEST) for one in parts) if dated[0] else None
     notes: list[Note] = []
-    checked = [_checked(one, epoch, source, notes) for one in parts]
+    checked = [_on_own_clock(one, epoch, source, notes) for one in parts]
     fastest = min(checked, key=lambda one: one.sample_time)
     T = fastest.sample_time
     begin = max(one.start_time for one in checked)
     end = min(one.start_time + one.sample_time * (_length(one) - 1) for one in checked)
-    first = int(np.ceil((begin - fastest.start_time) / T - SAME))
-    count = int(np.floor((end - fastest.start_time) / T + SAME)) - first + 1
+    first = int(np.ceil((begin - fastest.start_time) / T - SAME_TIME_TOLERANCE))
+    count = int(np.floor((end - fastest.start_time) / T + SAME_TIME_TOLERANCE)) - first + 1
     if count < FEWEST_SAMPLES:
         spans = " and ".join(f"{one.name} ({_span(one.time)})" for one in parts)
         few = f"overlap in {count} samples, at least {FEWEST_SAMPLES} are needed"
-        apart = few if count > 0 else f"do not overlap in time{_exchanged(parts) if dated[0] else ''}"
+        apart = few if count > 0 else f"do not overlap in time{_exchanged_date_advice(parts) if dated[0] else ''}"
         raise LogError(f"{spans} {apart}", source)
     even: Array = fastest.start_time + T * (first + np.arange(count, dtype=np.float64))
     channels: dict[str, Any] = {}
     for one in checked:
-        channels |= _on(even, T, one, is_fastest=one is fastest, first=first)
+        channels |= _at_common_times(even, T, one, is_fastest=one is fastest, first=first)
     names = " and ".join(one.name for one in parts)
     notes.append(LogCode.LOGGERS_MERGED.note(loggers=names, duration_s=T * (count - 1), sample_time_s=T))
     time: Any = even if epoch is None else epoch + np.rint(1e9 * even).astype("timedelta64[ns]")
-    return Merged({TIME: time, **channels}, tuple(notes))
+    return MergedChannels({TIME: time, **channels}, tuple(notes))
 
 
 def _same_time(one: Any, other: Any) -> bool:
     if len(one) != len(other) or one.dtype.kind != other.dtype.kind or len(one) < 2:
         return False
     apart, step = np.abs(one - other).max(), np.abs(one[-1] - one[0]) / (len(one) - 1)
-    return bool(apart <= SAME * step)
+    return bool(apart <= SAME_TIME_TOLERANCE * step)
 
 
 def _span(time: Any) -> str:
@@ -129,7 +129,7 @@ def _span(time: Any) -> str:
     return f"{first} to {last}"
 
 
-def _exchanged(parts: Sequence[Timed]) -> str:
+def _exchanged_date_advice(parts: Sequence[LoggerChannels]) -> str:
     """Return advice if loggers would be of the same day with day and month exchanged in one of them."""
     days = [str(np.nanmin(one.time).astype("datetime64[D]")).split("-") for one in parts]
     turned = {(year, day, month) for year, month, day in days} & {tuple(day) for day in days}
@@ -138,11 +138,11 @@ def _exchanged(parts: Sequence[Timed]) -> str:
     return "; day and month may be exchanged in one of them: write dates as 2026-03-31"
 
 
-def _length(one: Checked) -> int:
+def _length(one: CheckedLog) -> int:
     return len(next(iter(one.channels.values())))
 
 
-def _checked(one: Timed, epoch: Any, source: str, notes: list[Note]) -> Checked:
+def _on_own_clock(one: LoggerChannels, epoch: Any, source: str, notes: list[Note]) -> CheckedLog:
     """Return a logger's channels on its own uniform clock."""
     time = (
         one.time if epoch is None else np.where(np.isnat(one.time), np.nan, (one.time - epoch).astype(np.int64) * 1e-9)
@@ -154,7 +154,7 @@ def _checked(one: Timed, epoch: Any, source: str, notes: list[Note]) -> Checked:
     return on_uniform_clock(columns, source, None, notes)
 
 
-def _on(even: Array, T: float, one: Checked, *, is_fastest: bool, first: int) -> dict[str, Array]:
+def _at_common_times(even: Array, T: float, one: CheckedLog, *, is_fastest: bool, first: int) -> dict[str, Array]:
     """Return a logger's channels at the times of the common clock; missing where it has no sample nearby."""
     if is_fastest:
         return {name: values[first : first + len(even)] for name, values in one.channels.items()}

@@ -12,19 +12,19 @@ import numpy as np
 
 from plant.arrays import Array
 
-EARLIEST = 0.5
+MOST_EARLY = 0.5
 """How early a row may be stamped at most, in sample times [dimensionless]: stamps jitter beside their stalls."""
 
-STALLED = 2.0
+LEAST_STALL = 2.0
 """How late a row is at least that waited, in sample times [dimensionless]."""
 
-AT_ONCE = 0.25
+SIMULTANEOUS_STEP = 0.25
 """Step between rows that are stamped at once, at most, in sample times [dimensionless]."""
 
-MOST_LATE = 0.2
+MOST_LATE_ROWS = 0.2
 """Share of rows that may have waited [fraction]: the rest tells the clock."""
 
-UNEVEN = 0.2
+LEAST_UNEVENNESS = 0.2
 """How far a row's stamp is from halfway between its neighbours', from which its value tells its time [fraction]."""
 
 FEWEST_ROWS = 50
@@ -83,18 +83,18 @@ def stalled_clock(time: Array) -> StalledClock | None:
         return None
     late = (time - time[0]) / sample_time - rows
     late -= np.median(late)
-    waited = late > EARLIEST
+    waited = late > MOST_EARLY
     begins = np.flatnonzero(waited[1:-1] & ~waited[:-2]) + 1
-    at_once = np.diff(time) < AT_ONCE * sample_time
-    stalls = [begin for begin in begins.tolist() if late[begin] > STALLED and at_once[begin]]
-    even = late.min() > -EARLIEST and not waited[0] and not waited[-1] and np.mean(waited) < MOST_LATE
+    at_once = np.diff(time) < SIMULTANEOUS_STEP * sample_time
+    stalls = [begin for begin in begins.tolist() if late[begin] > LEAST_STALL and at_once[begin]]
+    even = late.min() > -MOST_EARLY and not waited[0] and not waited[-1] and np.mean(waited) < MOST_LATE_ROWS
     if not stalls or not even:
         return None
     start = float(np.mean((time - sample_time * rows)[~waited]))
     return StalledClock(start, sample_time, len(stalls), sample_time * float(np.max(late)))
 
 
-def waited_in_a_queue(time: Array, channels: Mapping[str, Array], sample_time: float) -> bool:
+def is_sampled_evenly(time: Array, channels: Mapping[str, Array], sample_time: float) -> bool:
     """Return whether rows with stalled stamps were sampled evenly, and only stamped late.
 
     A software loop that overruns gives the same stamps, but it also samples late. If a channel moves, its values tell
@@ -110,10 +110,10 @@ def waited_in_a_queue(time: Array, channels: Mapping[str, Array], sample_time: f
         Of the even clock [s].
     """
     late = (time - time[0]) / sample_time - np.arange(float(len(time)))
-    waited = np.abs(late - np.median(late)) > EARLIEST
+    waited = np.abs(late - np.median(late)) > MOST_EARLY
     span = time[2:] - time[:-2]
     share = np.divide(time[1:-1] - time[:-2], span, out=np.full_like(span, 0.5), where=span > 0.0)
-    near = (waited[:-2] | waited[1:-1] | waited[2:]) & (np.abs(share - 0.5) > UNEVEN)
+    near = (waited[:-2] | waited[1:-1] | waited[2:]) & (np.abs(share - 0.5) > LEAST_UNEVENNESS)
     votes = 0.0
     for values in channels.values():
         rise, whole = values[1:-1] - values[:-2], values[2:] - values[:-2]

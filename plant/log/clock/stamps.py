@@ -36,7 +36,9 @@ _WEEKDAY = r"(?:[^\W\d_]{2,10}\.?,?\s+)?"
 _OF = r"(?:(?:er|[°º])?\.?[-/ ]\s?|\s+del?\s+)"
 _COMPACT = r"[T_ -](?P<h>\d{2})(?P<m>\d{2})(?P<s>\d{2})(?:[.,_](?P<f>\d{1,12}))?(?P<half>)"
 _AFTER_DAY = rf"(?:[ T,_:-]\s*(?:(?:à|a las|alle|ore|um|at)\s+)?){_CLOCK}"
-_EITHER = re.compile(rf"(?P<one>\d{{1,2}})[/-](?P<two>\d{{1,2}})[/-](?P<Y>\d{{4}}|\d{{2}}){_AFTER_DAY}{_ZONE}")
+_DAY_OR_MONTH_FIRST = re.compile(
+    rf"(?P<one>\d{{1,2}})[/-](?P<two>\d{{1,2}})[/-](?P<Y>\d{{4}}|\d{{2}}){_AFTER_DAY}{_ZONE}"
+)
 _PATTERNS = (
     *(
         re.compile(rf"{day}{clock}{_ZONE}")
@@ -50,7 +52,7 @@ _PATTERNS = (
             (r"(?P<Y>\d{4})(?P<M>\d{2})(?P<D>\d{2})", _COMPACT),
         )
     ),
-    _EITHER,
+    _DAY_OR_MONTH_FIRST,
     re.compile(rf"{_CLOCK}{_ZONE}"),
 )
 _MINUTES = re.compile(r"(?P<m>\d{1,3}):(?P<s>\d{2})[.,](?P<f>\d{1,12})")
@@ -60,7 +62,7 @@ _ISO = re.compile(r"(?:1[89]|2[01])\d{2}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}(?:\.(\
 
 _DIGITS = str.maketrans("123456789", "000000000")
 
-LONGEST = 48
+LONGEST_STAMP = 48
 """Characters of the longest stamp that is read."""
 
 
@@ -73,11 +75,11 @@ def is_stamp(cell: str) -> bool:
     (True, True, False)
     """
     text = cell.strip()
-    return len(text) <= LONGEST and _shaped(text.translate(_DIGITS))
+    return len(text) <= LONGEST_STAMP and _has_stamp_form(text.translate(_DIGITS))
 
 
 @lru_cache(maxsize=64)
-def _shaped(text: str) -> bool:
+def _has_stamp_form(text: str) -> bool:
     """Return whether a text with masked digits has the form of a stamp. All stamps of a column have one form."""
     return any(one.fullmatch(text) for one in (*_PATTERNS, _MINUTES))
 
@@ -103,7 +105,7 @@ def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception | N
     >>> read_stamps(["23:59:59.5", "00:00:00.5"], lambda row, text: ValueError(text)).astype("i8").tolist()
     [86399500000000, 86400500000000]
     """
-    quick = _all_alike(cells)
+    quick = _uniform_stamps(cells)
     if quick is not None:
         return quick
     months_first = _months_first(cells)
@@ -119,10 +121,10 @@ def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception | N
                 raise error
             value = int(np.iinfo(np.int64).min)
         out[row] = value
-    return over_midnight(out).view("datetime64[ns]")
+    return continue_over_midnight(out).view("datetime64[ns]")
 
 
-def _all_alike(cells: Sequence[str]) -> Stamps | None:
+def _uniform_stamps(cells: Sequence[str]) -> Stamps | None:
     """Return stamps that all have the form of the first, which NumPy reads quickly; None for others."""
     first = _ISO.fullmatch(cells[0].strip()) if cells else None
     if first is None or any(len(cell) != len(cells[0]) for cell in cells):
@@ -147,23 +149,23 @@ def _offset(zone: str) -> int:
 
 def _months_first(cells: Sequence[str]) -> bool:
     """Return whether 3/4/2026 is in March: yes, unless a month is impossible or the days are months apart."""
-    found = (_EITHER.fullmatch(cell.strip()) for cell in cells)
+    found = (_DAY_OR_MONTH_FIRST.fullmatch(cell.strip()) for cell in cells)
     days = {(int(one["one"]), int(one["two"]), int(one["Y"])) for one in found if one}
     if any(one > 12 for one, _, _ in days) or any(two > 12 for _, two, _ in days):
         return not any(one > 12 for one, _, _ in days)
     american = [(year, one, two) for one, two, year in days]
     european = [(year, two, one) for one, two, year in days]
-    return _months_apart(american) <= _months_apart(european)
+    return _span_in_days(american) <= _span_in_days(european)
 
 
-def _months_apart(days: Sequence[tuple[int, int, int]]) -> int:
+def _span_in_days(days: Sequence[tuple[int, int, int]]) -> int:
     """Return the time span of days given as year, month and day, with 31 days in every month."""
     counted = [372 * year + 31 * month + day for year, month, day in days]
     return max(counted, default=0) - min(counted, default=0)
 
 
 def _nanoseconds(text: str, *, months_first: bool) -> int | None:
-    if len(text) > LONGEST:
+    if len(text) > LONGEST_STAMP:
         return None
     found = next((match for one in _PATTERNS if (match := one.fullmatch(text))), None)
     if found is None or (found["s"] is None and found["half"] is None and "Y" not in found.re.groupindex):
@@ -217,7 +219,7 @@ def _day_of_year(text: str) -> int:
     return int(text) - 1
 
 
-def over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
+def continue_over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
     """Move times without a date to the next day where they fall back by most of a day.
 
     Parameters

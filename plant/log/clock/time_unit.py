@@ -6,16 +6,16 @@ from plant.arrays import Array
 
 _UNITS = (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("d", 86_400.0))
 
-_YEARS = (946_684_800.0, 2_524_608_000.0)
+_DATE_RANGE = (946_684_800.0, 2_524_608_000.0)
 """Beginning of 2000 and of 2050, counted from 1970 [s]."""
 
-_FROM = (("d", 25_569.0), ("d", 719_529.0))
+_EPOCH_OFFSETS = (("d", 25_569.0), ("d", 719_529.0))
 """Where spreadsheets and MATLAB's datenum have the beginning of 1970, and their unit."""
 
-STEPS = (1e-6, 10.0)
+STEP_RANGE = (1e-6, 10.0)
 """Steps of a log that dates may have [s]; judged: wider than those of any bench."""
 
-USUAL = 1e-3
+USUAL_STEP = 1e-3
 """Step that logs of hydraulics usually have [s]; of two units that with the nearer step is likely."""
 
 
@@ -36,10 +36,10 @@ def unit_of_dates(values: Array) -> tuple[str, str] | None:
     """
     there = values[np.isfinite(values)]
     step, first = _usual_step(values), float(there[0]) if len(there) else np.nan
-    for unit, zero in (*((unit, 0.0) for unit, _ in _UNITS[:4]), *_FROM):
+    for unit, zero in (*((unit, 0.0) for unit, _ in _UNITS[:4]), *_EPOCH_OFFSETS):
         factor = dict(_UNITS)[unit]
         since = (first - zero) * factor
-        if _YEARS[0] <= since <= _YEARS[1] and STEPS[0] <= step * factor <= STEPS[1]:
+        if _DATE_RANGE[0] <= since <= _DATE_RANGE[1] and STEP_RANGE[0] <= step * factor <= STEP_RANGE[1]:
             return unit, str(np.datetime64(0, "s") + np.timedelta64(round(since), "s"))
     return None
 
@@ -60,7 +60,7 @@ def likely_unit(values: Array) -> str | None:
     step = _usual_step(values)
     if not step > 0.0:
         return None
-    return min(_UNITS, key=lambda one: abs(float(np.log(step * one[1] / USUAL))))[0]
+    return min(_UNITS, key=lambda one: abs(float(np.log(step * one[1] / USUAL_STEP))))[0]
 
 
 def _usual_step(values: Array) -> float:

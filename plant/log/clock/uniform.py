@@ -10,7 +10,7 @@ from plant.arrays import Array
 from plant.errors import ClockError, LogError, SparseLogError
 from plant.log.clock.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
 from plant.log.clock.jumps import without_jumps, without_overruns
-from plant.log.clock.stalls import stalled_clock, waited_in_a_queue
+from plant.log.clock.stalls import is_sampled_evenly, stalled_clock
 from plant.log.columns import TIME
 from plant.log.notes import LogCode
 from plant.notes import Note
@@ -25,7 +25,7 @@ where channels are related. There missing outputs are left out, and a log is spl
 MOST_JITTER = 0.35
 """Root mean square by which steps may differ from the sample time and still be a clock's, over it [fraction]."""
 
-WHOLE = 0.01
+WHOLE_STEP_TOLERANCE = 0.01
 """A step so near a whole number of sample times is one [fraction]."""
 
 ROUNDING = 1e-6
@@ -51,7 +51,7 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedLog:
     """A log on a uniform clock, with its repairs.
 
     Parameters
@@ -72,7 +72,7 @@ class Checked:
 
 def on_uniform_clock(
     columns: Channels, source: str, clock: Clock | None, notes: list[Note], most_missing: float = MOST_MISSING
-) -> Checked:
+) -> CheckedLog:
     """Return a log on a uniform clock; notes list the repairs.
 
     Parameters
@@ -97,8 +97,8 @@ def on_uniform_clock(
     """
     time = columns[TIME]
     channels = {name: values for name, values in columns.items() if name != TIME}
-    if clock is not None and _agrees(time, clock):
-        return Checked(clock.sample_time, clock.start_time, channels)
+    if clock is not None and _agrees_with_clock(time, clock):
+        return CheckedLog(clock.sample_time, clock.start_time, channels)
     _steps_of_a_clock(time, source)
     time, jumps = without_jumps(time)
     for row, hours in jumps:
@@ -107,18 +107,18 @@ def on_uniform_clock(
     if overruns is not None:
         count, row, span = overruns
         notes.append(LogCode.TIME_RAN_OVER.note(channel=TIME, count=count, row=row + 1, span_s=span))
-    if _own_times(channels):
-        return _merged(time, channels, source, notes)
+    if _has_own_times(channels):
+        return _merge_own_times(time, channels, source, notes)
     ticks = _whole_ticks(time)
     if ticks is None:
-        return _mended(time, channels, source, notes)
-    _few_left_out(len(time), float(ticks.sum()) + 1.0, source, most_missing, time)
+        return _repair_stamps(time, channels, source, notes)
+    _require_few_left_out(len(time), float(ticks.sum()) + 1.0, source, most_missing, time)
     sample_time = float((time[-1] - time[0]) / ticks.sum())
     jitter = float(np.abs(np.diff(time) / sample_time - ticks).max())
     if jitter > max(ROUNDING, _resolution(time, sample_time)):
-        return _mended(time, channels, source, notes)
+        return _repair_stamps(time, channels, source, notes)
     slots = np.concatenate(([0.0], np.cumsum(ticks)))
-    return Checked(sample_time, float(time[0]), _spread(channels, slots.astype(np.int64)))
+    return CheckedLog(sample_time, float(time[0]), _place_on_clock(channels, slots.astype(np.int64)))
 
 
 def _steps_of_a_clock(time: Array, source: str) -> None:
@@ -134,35 +134,37 @@ def _steps_of_a_clock(time: Array, source: str) -> None:
         )
 
 
-def _mended(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
+def _repair_stamps(time: Array, channels: Channels, source: str, notes: list[Note]) -> CheckedLog:
     """Put stamps that are rounded, stalled, repeated or jittered on a uniform clock; refuse all others."""
     step = np.diff(time)
     again = np.flatnonzero(step == 0.0) + 1
     if step.min() < 0.0 or len(again) == len(step):
-        raise _not_increasing(time, source)
+        raise _not_increasing_error(time, source)
     copied = all(np.array_equal(one[again], one[again - 1], equal_nan=True) for one in channels.values())
     if len(again) and copied:
-        return _without(again, time, channels, source, notes)
+        return _without_repeats(again, time, channels, source, notes)
     whole = step if len(again) else np.maximum(1.0, np.rint(step / usual_step(step)))
     for slots in (np.arange(float(len(time))), np.concatenate(([0.0], np.cumsum(whole)))):
         if (found := rounded_clock(time, slots)) is not None:
             start, sample_time, quantum = found
-            _few_left_out(len(time), slots[-1] + 1.0, source)
+            _require_few_left_out(len(time), slots[-1] + 1.0, source)
             notes.append(LogCode.TIME_ROUNDED.note(channel=TIME, quantum_s=quantum, sample_time_s=sample_time))
-            return Checked(sample_time, start, _spread(channels, slots.astype(np.int64)))
-    if (behind := stalled_clock(time)) is not None and waited_in_a_queue(time, channels, behind.sample_time):
+            return CheckedLog(sample_time, start, _place_on_clock(channels, slots.astype(np.int64)))
+    if (behind := stalled_clock(time)) is not None and is_sampled_evenly(time, channels, behind.sample_time):
         start, sample_time, count, longest = behind
         note = LogCode.TIME_STALLS.note(channel=TIME, count=count, longest_s=longest, sample_time_s=sample_time)
         notes.append(note)
-        return Checked(sample_time, start, channels)
+        return CheckedLog(sample_time, start, channels)
     if not len(again):
         return _resampled(time, channels, source, notes)
     if len(again) > MOST_MISSING * len(time):
-        raise _not_increasing(time, source)
-    return _without(again, time, channels, source, notes)
+        raise _not_increasing_error(time, source)
+    return _without_repeats(again, time, channels, source, notes)
 
 
-def _without(again: NDArray[np.int64], time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
+def _without_repeats(
+    again: NDArray[np.int64], time: Array, channels: Channels, source: str, notes: list[Note]
+) -> CheckedLog:
     """Drop rows with repeated stamps; rows that held new values leave a gap."""
     count, percent = len(again), 100.0 * len(again) / len(time)
     notes.append(LogCode.TIME_REPEATS.note(channel=TIME, count=count, total=len(time), percent=percent))
@@ -171,11 +173,11 @@ def _without(again: NDArray[np.int64], time: Array, channels: Channels, source: 
     return on_uniform_clock(kept, source, None, notes)
 
 
-def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
+def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) -> CheckedLog:
     shortest = GAP * usual_step(np.diff(time))
     if not shortest > 0.0:
-        raise _not_increasing(time, source)
-    _few_left_out(len(time), (float(time[-1]) - float(time[0])) / shortest, source, time=time)
+        raise _not_increasing_error(time, source)
+    _require_few_left_out(len(time), (float(time[-1]) - float(time[0])) / shortest, source, time=time)
     grid = grid_of(time)
     if not grid.scatter <= MOST_JITTER:
         raise LogError(
@@ -183,7 +185,7 @@ def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) 
             f"got {100.0 * grid.scatter:.0f} % of {grid.sample_time:.6g} s",
             source,
         )
-    _few_left_out(len(grid.times) - int(grid.lacking(time).sum()), float(len(grid.times)), source)
+    _require_few_left_out(len(grid.times) - int(grid.lacking(time).sum()), float(len(grid.times)), source)
     notes.append(
         LogCode.TIME_JITTERS.note(
             channel=TIME,
@@ -193,10 +195,10 @@ def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) 
         )
     )
     even = {name: resampled(grid, time, values) for name, values in channels.items()}
-    return Checked(grid.sample_time, float(time[0]), even)
+    return CheckedLog(grid.sample_time, float(time[0]), even)
 
 
-def _not_increasing(time: Array, source: str) -> ClockError:
+def _not_increasing_error(time: Array, source: str) -> ClockError:
     row = int(np.argmax(np.diff(time) <= 0.0))
     got = f"{time[row + 1]:.12g} in row {row + 2} after {time[row]:.12g}"
     return ClockError(
@@ -206,7 +208,7 @@ def _not_increasing(time: Array, source: str) -> ClockError:
     )
 
 
-def _own_times(channels: Channels) -> bool:
+def _has_own_times(channels: Channels) -> bool:
     """Return whether a channel was logged at its own times, in rows where the fastest channel is missing."""
     there = {name: np.isfinite(values) for name, values in channels.items()}
     fastest = max(there.values(), key=np.count_nonzero)
@@ -215,7 +217,7 @@ def _own_times(channels: Channels) -> bool:
     return any(2 * np.count_nonzero(one & ~fastest) > np.count_nonzero(one) > 0 for one in there.values())
 
 
-def _merged(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
+def _merge_own_times(time: Array, channels: Channels, source: str, notes: list[Note]) -> CheckedLog:
     """Put channels that were logged at their own times on the clock of the fastest.
 
     A sample of a slower channel goes to the nearest tick, with the value interpolated there between the channel's
@@ -225,7 +227,7 @@ def _merged(time: Array, channels: Channels, source: str, notes: list[Note]) -> 
     fastest = max(there, key=lambda name: int(there[name].sum()))
     own = time[there[fastest]]
     if np.diff(time).min() < 0.0:
-        raise _not_increasing(time, source)
+        raise _not_increasing_error(time, source)
     on_clock = on_uniform_clock({TIME: own, fastest: channels[fastest][there[fastest]]}, source, None, notes)
     even = on_clock.start_time + on_clock.sample_time * np.arange(len(on_clock.channels[fastest]))
     out = dict(on_clock.channels)
@@ -237,7 +239,7 @@ def _merged(time: Array, channels: Channels, source: str, notes: list[Note]) -> 
             out[name] = np.full(len(even), np.nan)
             out[name][slots] = np.interp(even[slots], when, values[there[name]])
     notes.append(LogCode.TIMES_OF_THEIR_OWN.note(channel=fastest, sample_time_s=on_clock.sample_time))
-    return Checked(on_clock.sample_time, on_clock.start_time, out)
+    return CheckedLog(on_clock.sample_time, on_clock.start_time, out)
 
 
 def _whole_ticks(time: Array) -> Array | None:
@@ -248,10 +250,12 @@ def _whole_ticks(time: Array) -> Array | None:
     nominal = usual_step(step)
     ticks = np.rint(step / nominal)
     off = np.abs(step / nominal - ticks)
-    return ticks if np.all(ticks >= 1.0) and np.max(off) <= WHOLE + ROUNDING else None
+    return ticks if np.all(ticks >= 1.0) and np.max(off) <= WHOLE_STEP_TOLERANCE + ROUNDING else None
 
 
-def _few_left_out(there: int, total: float, source: str, most: float = MOST_MISSING, time: Array | None = None) -> None:
+def _require_few_left_out(
+    there: int, total: float, source: str, most: float = MOST_MISSING, time: Array | None = None
+) -> None:
     if not there >= (1.0 - most) * total:
         said = "{:.0f} of {:.0f}" if total < 1e15 else "{:.3g} of {:.3g}"
         left_out = said.format(total - there, total)
@@ -259,7 +263,7 @@ def _few_left_out(there: int, total: float, source: str, most: float = MOST_MISS
         raise SparseLogError(f"{TIME} leaves out {left_out} samples, wanted at most {100.0 * most:g} %{where}", source)
 
 
-def _agrees(time: Array, clock: Clock) -> bool:
+def _agrees_with_clock(time: Array, clock: Clock) -> bool:
     error = np.abs(clock.start_time + clock.sample_time * np.arange(len(time)) - time).max()
     return bool(error <= (ROUNDING + _resolution(time, clock.sample_time)) * clock.sample_time)
 
@@ -269,7 +273,7 @@ def _resolution(time: Array, sample_time: float) -> float:
     return 4.0 * float(np.spacing(np.abs(time[[0, -1]]).max())) / sample_time
 
 
-def _spread(channels: Channels, slots: NDArray[np.int64]) -> Channels:
+def _place_on_clock(channels: Channels, slots: NDArray[np.int64]) -> Channels:
     """Put the samples in their places on the uniform clock, with NaN where the log has no sample."""
     total = int(slots[-1]) + 1
     if total == len(slots):

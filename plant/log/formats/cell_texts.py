@@ -13,7 +13,7 @@ _DIGITS = rf"[-+\u2212]?(?:\d+[.,]?\d*|[.,]\d+|{_GROUPED})(?:[eEdD][-+]?\d+)?"
 NUMBER = re.compile(_DIGITS)
 """A number, with a decimal comma or point, and with its thousands apart or not."""
 
-_MEASURED = re.compile(rf"(?P<number>{_DIGITS})\s*(?P<unit>[^\W\d_].*|[%°\[].*)")
+_NUMBER_WITH_UNIT = re.compile(rf"(?P<number>{_DIGITS})\s*(?P<unit>[^\W\d_].*|[%°\[].*)")
 """A number and what may be its unit, in one cell."""
 
 
@@ -38,19 +38,19 @@ def unit_behind(cell: str) -> str:
     ends_as_unit = last.isalpha() or last in "%°²³]" or before.isalpha() or before in "^-"
     if not ends_as_unit or NUMBER.fullmatch(cell):
         return ""
-    _, unit = parted(cell)
+    _, unit = split_unit(cell)
     return unit if unit and _is_known_unit(unit) else ""
 
 
-def parted(text: str) -> tuple[str, str]:
+def split_unit(text: str) -> tuple[str, str]:
     """Return a number as written, and the text that follows it; that text is empty if the cell is not such a pair.
 
     Examples
     --------
-    >>> parted("1,08 L"), parted("8cc/rev"), parted("30"), parted("bar")
+    >>> split_unit("1,08 L"), split_unit("8cc/rev"), split_unit("30"), split_unit("bar")
     (('1,08', 'L'), ('8', 'cc/rev'), ('30', ''), ('bar', ''))
     """
-    found = _MEASURED.fullmatch(text)
+    found = _NUMBER_WITH_UNIT.fullmatch(text)
     return (found["number"], found["unit"]) if found else (text, "")
 
 

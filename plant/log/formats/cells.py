@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from plant.arrays import Array
 from plant.errors import LogError, LogWarning, TextColumnError
-from plant.log.columns import TRUTH, Column
+from plant.log.columns import TRUTH_PREFIX, Column
 from plant.log.notes import LogCode
 from plant.notes import Note
 
@@ -30,7 +30,7 @@ MOST_STRANGE = 0.01
 STAMP = "2026-03-04 12:00:00.001"
 """A time as every reader takes it, for errors."""
 
-SHOWN = 60
+MOST_SHOWN = 60
 """Characters that a note shows of what is no number [count]."""
 
 
@@ -102,7 +102,7 @@ def numbers(values: NDArray[Any], name: str, source: str) -> Array:
     if len(bad) > MOST_STRANGE * len(values):
         raise not_a_number(source, name, bad[0], values[bad[0]])
     if bad:
-        note = no_numbers(name, len(bad), "row", bad[0] + 1, str(values[bad[0]]))
+        note = not_numbers_note(name, len(bad), "row", bad[0] + 1, str(values[bad[0]]))
         warnings.warn(LogWarning(note, source), stacklevel=2)
     return out
 
@@ -144,7 +144,7 @@ def values_of(name: str, given: Any, source: str) -> Any:
     return values.ravel() if values.ndim == 2 and 1 in values.shape else values
 
 
-def no_numbers(name: str, count: int, where: str, place: int, said: str) -> Note:
+def not_numbers_note(name: str, count: int, where: str, place: int, said: str) -> Note:
     """Return the note on a few cells of a column that are not numbers.
 
     Parameters
@@ -156,11 +156,11 @@ def no_numbers(name: str, count: int, where: str, place: int, said: str) -> Note
     said : str
         What it holds.
     """
-    shown = said.strip()[:SHOWN]
+    shown = said.strip()[:MOST_SHOWN]
     return LogCode.CELLS_NO_NUMBERS.note(column=name[:80], count=count, where=where, place=place, said=shown)
 
 
-def each_read(columns: Iterable[Column], read: Callable[[Column], Array]) -> dict[Column, Array]:
+def read_each(columns: Iterable[Column], read: Callable[[Column], Array]) -> dict[Column, Array]:
     """Return columns as they are read, without columns of simulated truth that hold no numbers.
 
     Parameters
@@ -183,7 +183,7 @@ def each_read(columns: Iterable[Column], read: Callable[[Column], Array]) -> dic
         try:
             out[column] = read(column)
         except LogError:
-            if not column.channel.startswith(TRUTH):
+            if not column.channel.startswith(TRUTH_PREFIX):
                 raise
     return out
 

@@ -18,7 +18,7 @@ from plant.log.formats.arrow import from_arrow, to_arrow
 from plant.log.formats.cells import MISSING
 from plant.log.formats.csv_cells import read_cells
 from plant.log.formats.csv_layout import BLANKS, Layout, cells_of, layout_of
-from plant.log.formats.packed import opened, packing_of
+from plant.log.formats.packed import open_unpacked, packing_of
 from plant.log.formats.thousands import may_group_thousands, require_none_grouped
 from plant.log.table import Table
 
@@ -88,7 +88,7 @@ class _NotFastError(Exception):
 @contextmanager
 def _text(path: Path, layout: Layout, errors: str = "replace") -> Generator[TextIO]:
     encoding = "utf-8-sig" if layout.encoding == "utf-8" else layout.encoding
-    with opened(path) as file, io.TextIOWrapper(file, encoding=encoding, errors=errors, newline=None) as text:
+    with open_unpacked(path) as file, io.TextIOWrapper(file, encoding=encoding, errors=errors, newline=None) as text:
         yield text
 
 
@@ -103,7 +103,7 @@ def _source(path: Path, layout: Layout) -> Path | bytes:
             return text.read().encode()
     if packing_of(path) is None:
         return path
-    with opened(path) as file:
+    with open_unpacked(path) as file:
         return b"".join(iter(lambda: file.read(_BLOCK), b""))
 
 
@@ -118,7 +118,7 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
     out: dict[Column, Array] = {}
     for column, label in zip(chosen, wanted, strict=True):
         if label in texts:
-            found: Any = read_stamps([cell or "" for cell in table.column(label).to_pylist()], _refused)
+            found: Any = read_stamps([cell or "" for cell in table.column(label).to_pylist()], _not_fast_error)
             out[column] = found
         else:
             out[column] = from_arrow(table.column(label))
@@ -154,7 +154,7 @@ def _texts(path: Path, layout: Layout, column: Column) -> list[str]:
         return [row[column.position].strip() for row in rows if len(row) > column.position]
 
 
-def _refused(row: int, cell: str) -> Exception:
+def _not_fast_error(row: int, cell: str) -> Exception:
     return _NotFastError(f"{cell!r} in row {row}")
 
 

@@ -11,9 +11,17 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError, LogWarning
 from plant.log.clock.stamps import is_stamp, read_stamps
-from plant.log.columns import TIME, TRUTH, Column
+from plant.log.columns import TIME, TRUTH_PREFIX, Column
 from plant.log.formats.cell_texts import is_value, without_that_unit
-from plant.log.formats.cells import MISSING, MOST_STRANGE, SHOWN, no_numbers, not_a_number, number, wrong_width
+from plant.log.formats.cells import (
+    MISSING,
+    MOST_SHOWN,
+    MOST_STRANGE,
+    not_a_number,
+    not_numbers_note,
+    number,
+    wrong_width,
+)
 from plant.log.formats.csv_column import Cells
 from plant.log.formats.csv_layout import COMMENT, Layout
 from plant.log.formats.thousands import without_thousands
@@ -21,7 +29,7 @@ from plant.log.headings import unit_or_none
 from plant.log.notes import LogCode
 from plant.notes import Note
 
-TOGETHER = 1000
+BLOCK_ROWS = 1000
 """Rows that are put into columns at once [count]."""
 
 
@@ -66,24 +74,24 @@ def read_cells(
             continue
         first = cells[0].strip().removeprefix("\ufeff")
         comment = COMMENT.match(first) and first not in MISSING
-        if comment or _are_names([first, *cells[1:]], names):
+        if comment or _repeats_header([first, *cells[1:]], names):
             body.skipped += 1
         elif len(cells) == len(names):
             block.append(_Row(line, row, cells))
-            if len(block) == TOGETHER:
-                body.take(block)
+            if len(block) == BLOCK_ROWS:
+                body.append_rows(block)
                 block = []
         else:
             body.note_width(_Row(line, row, cells), len(block))
         row += 1
-    body.take(block)
-    found, notes = body.judged()
+    body.append_rows(block)
+    found, notes = body.checked_columns()
     for note in notes:
         warnings.warn(LogWarning(note, source), stacklevel=2)
     return found
 
 
-def _are_names(cells: Sequence[str], names: Sequence[str]) -> bool:
+def _repeats_header(cells: Sequence[str], names: Sequence[str]) -> bool:
     """Return whether a row repeats the header. A column without a name has its number as name."""
     if cells[0] not in (names[0], "") or len(cells) != len(names):
         return False
@@ -100,10 +108,10 @@ class _Row(NamedTuple):
     @property
     def said(self) -> str:
         """Excerpt of the row for a note."""
-        return ", ".join(cell.strip() for cell in self.cells)[:SHOWN]
+        return ", ".join(cell.strip() for cell in self.cells)[:MOST_SHOWN]
 
 
-class _Strange(NamedTuple):
+class _StrangeRow(NamedTuple):
     """A line that is not a row of data."""
 
     line: int
@@ -121,23 +129,23 @@ class _Body:
     source: str
     rows: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
     timeless: dict[int, str] = field(default_factory=dict[int, str])
-    strange: list[_Strange] = field(default_factory=list[_Strange])
+    strange: list[_StrangeRow] = field(default_factory=list[_StrangeRow])
     skipped: int = 0
 
     def note_width(self, row: _Row, waiting: int) -> None:
         """Remember a row of another width; refuse the log if most of its rows have one."""
         wanted, got = len(self.layout.headings), len(row.cells)
         error = wrong_width(self.source, wanted, got, row.row)
-        self.strange.append(_Strange(row.line, row.said, error, got == wanted - 1 and _is_header(row.cells)))
-        if len(self.strange) > TOGETHER + len(self.rows) + waiting:
+        self.strange.append(_StrangeRow(row.line, row.said, error, got == wanted - 1 and _is_header(row.cells)))
+        if len(self.strange) > BLOCK_ROWS + len(self.rows) + waiting:
             raise self.strange[0].error
 
-    def take(self, block: Sequence[_Row]) -> None:
+    def append_rows(self, block: Sequence[_Row]) -> None:
         """Append rows to the columns, without repeated headers and units."""
         odd = {place for column in self.columns for place in self._read(column, self._cells(column, block))[1]}
         headers = {place for place in odd if _is_header(block[place].cells)}
         for row in (block[place] for place in sorted(headers)):
-            if self._units_again(row.cells):
+            if self._repeats_units(row.cells):
                 self.skipped += 1
                 continue
             error = LogError(
@@ -145,7 +153,7 @@ class _Body:
                 "the first; save what stands below it as a log of its own",
                 self.source,
             )
-            self.strange.append(_Strange(row.line, row.said, error, is_header=True))
+            self.strange.append(_StrangeRow(row.line, row.said, error, is_header=True))
         kept = [row for place, row in enumerate(block) if place not in headers]
         for column, cells in self.columns.items():
             texts = self._cells(column, kept)
@@ -159,7 +167,7 @@ class _Body:
                 cells.note_parted(texts, len(self.rows), self.layout.decimal_point)
         self.rows.extend((row.line, row.row) for row in kept)
 
-    def _units_again(self, cells: Sequence[str]) -> bool:
+    def _repeats_units(self, cells: Sequence[str]) -> bool:
         units = [unit_or_none(cell.strip().strip("[]()")) for cell in cells]
         return any(one.said for one in self.layout.headings) and all(
             one.stamped or one.said == unit for one, unit in zip(self.layout.headings, units, strict=True)
@@ -194,7 +202,7 @@ class _Body:
                 bad.append(place)
         return values, bad
 
-    def judged(self) -> tuple[dict[Column, Array], list[Note]]:
+    def checked_columns(self) -> tuple[dict[Column, Array], list[Note]]:
         """Return the columns without bad rows, and what was left out. Refuse a log with too many bad rows."""
         for column, cells in self.columns.items():
             cells.settle(column, self.layout.decimal_point, self.source)
@@ -203,7 +211,7 @@ class _Body:
         found = {one: self._values(one, cells) for one, cells in self.columns.items()}
         allowed = MOST_STRANGE * len(self.rows)
         for column in [one for one in found if len(self.columns[one].bad) > allowed]:
-            if column.channel.startswith(TRUTH):
+            if column.channel.startswith(TRUTH_PREFIX):
                 del found[column]
         bad = set[int]().union(*(self.columns[one].bad for one in found))
         taken = len(self.rows)
@@ -224,7 +232,7 @@ class _Body:
     def _may_leave_out(self) -> bool:
         """Return whether rows may be left out: each has a time of its own, or they are only shown."""
         channels = [one.channel for one in self.columns]
-        return TIME in channels or all(one.startswith(TRUTH) for one in channels)
+        return TIME in channels or all(one.startswith(TRUTH_PREFIX) for one in channels)
 
     def _values(self, column: Column, cells: Cells) -> Any:
         if column.position not in self.layout.stamped:
@@ -248,7 +256,7 @@ class _Body:
                         self.timeless[row] = cell
 
     def _refuse(
-        self, found: Iterable[Column], within: Sequence[_Strange], taken: int, allowed: float, *, spared: bool
+        self, found: Iterable[Column], within: Sequence[_StrangeRow], taken: int, allowed: float, *, spared: bool
     ) -> None:
         """Refuse rows if too many are not data. The error names the first one, or a repeated header if there is one."""
         for one in within:
@@ -272,7 +280,7 @@ class _Body:
             raise within[0].error
 
     def _notes(
-        self, found: Iterable[Column], taken: int, within: Sequence[_Strange], timeless: Mapping[int, str]
+        self, found: Iterable[Column], taken: int, within: Sequence[_StrangeRow], timeless: Mapping[int, str]
     ) -> list[Note]:
         notes = [LogCode.LINES_SKIPPED.note(count=self.skipped)] if self.skipped else []
         left = [(one.line, one.said) for one in within]
@@ -282,7 +290,7 @@ class _Body:
         for column in found:
             bad = self.columns[column].bad
             if rows := sorted(row for row in bad if row < taken and row not in timeless):
-                notes.append(no_numbers(column.name, len(rows), "line", self.rows[rows[0]][0], bad[rows[0]]))
+                notes.append(not_numbers_note(column.name, len(rows), "line", self.rows[rows[0]][0], bad[rows[0]]))
         return notes
 
 

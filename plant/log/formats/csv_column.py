@@ -83,14 +83,14 @@ class Cells:
                 self.bad.pop(row, None)
             self.bad.update({row: cell for row, cell in self.parted.items() if not is_grouped(cell)})
         elif len(thousands) < len(self.parted):
-            if point == "." and self.bad.keys() == self.parted.keys() and self._whole_beside():
+            if point == "." and self.bad.keys() == self.parted.keys() and self._has_other_decimal_sign():
                 for row, cell in self.parted.items():
                     self.values[row] = float(cell.replace(",", "."))
                 self.bad.clear()
         elif thousands and point == ",":
             raise thousands_error(column.name, self.parted[thousands[0]], source)
 
-    def _whole_beside(self) -> bool:
+    def _has_other_decimal_sign(self) -> bool:
         """Return whether many cells are decimals with the other decimal sign, and all others whole numbers."""
         many = len(self.parted) > MOST_STRANGE * len(self.values)
         if not many or not all(map(_DECIMAL.fullmatch, self.parted.values())):

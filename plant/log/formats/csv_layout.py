@@ -20,12 +20,12 @@ from plant.log.formats.csv_loggers import (
     with_twincat_clock,
     without_remarks,
 )
-from plant.log.formats.layouts_seen import remember, remembered
-from plant.log.formats.packed import opened
+from plant.log.formats.layouts_seen import remember_layout, remembered_layout
+from plant.log.formats.packed import open_unpacked
 from plant.log.formats.thousands import decimal_point_of, require_decimal_points, require_ungrouped
 from plant.log.headings import Heading, is_unit_row, names_and_units
 
-LOOKED_AT = 1 << 18
+INSPECTED_BYTES = 1 << 18
 """Bytes of a log that are looked at to tell how it is written."""
 
 LINES = 300
@@ -38,13 +38,15 @@ MOST_ZEROS = 0.02
 """Bytes of zero at the start of a text, as a logger leaves where its power fails; more are of another encoding
 [fraction]."""
 
-NO_TEXT = "a text file is needed for a CSV log, got binary data; export a logger's own format as CSV, MDF, TDMS or MAT"
+BINARY_REFUSAL = (
+    "a text file is needed for a CSV log, got binary data; export a logger's own format as CSV, MDF, TDMS or MAT"
+)
 
 DELIMITERS = (",", ";", "\t", "|", BLANKS)
 COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 """How a line of comment begins."""
 
-_WIDEST = 10_000
+_MOST_COLUMNS = 10_000
 
 
 @dataclass(frozen=True)
@@ -101,18 +103,18 @@ def layout_of(path: Path) -> Layout:
     OSError
         If it cannot be read.
     """
-    with opened(path) as file:
-        start = file.read(LOOKED_AT)
-    if (known := remembered(start, LINES)) is not None:
+    with open_unpacked(path) as file:
+        start = file.read(INSPECTED_BYTES)
+    if (known := remembered_layout(start, LINES)) is not None:
         _require_ungrouped_rows(start, known, str(path))
         return known
     encoding = _encoding(start, str(path))
     text = start.decode(encoding, errors="replace").removeprefix("\ufeff")
     lines = [line.rstrip("\n") for line in islice(io.StringIO(text, newline=None), LINES)]
-    if len(start) == LOOKED_AT and len(lines) < LINES:
+    if len(start) == INSPECTED_BYTES and len(lines) < LINES:
         lines = lines[:-1] or lines  # the last line is incomplete
     layout = layout_of_lines(lines, encoding, str(path))
-    remember(start, LINES, layout)
+    remember_layout(start, LINES, layout)
     return layout
 
 
@@ -131,7 +133,7 @@ def _encoding(start: bytes, source: str) -> str:
         for side, name in ((1, "utf-16-le"), (0, "utf-16-be")):
             if zeros[side] > 0.9 * half > 0 and not zeros[1 - side]:
                 return name
-        raise LogError(NO_TEXT, source)
+        raise LogError(BINARY_REFUSAL, source)
     try:
         start.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -172,13 +174,13 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     head = "\n".join(lines[:5])
     strange = sum(one == "\ufffd" or (ord(one) < 32 and one not in "\t\n\x0c\x0b") for one in head)
     if strange > 0.1 * len(head) or "\0" in head:
-        raise LogError(NO_TEXT, source)
+        raise LogError(BINARY_REFUSAL, source)
     absent = [one for one in DELIMITERS if one != BLANKS and not any(one in line for line in lines)]
     # delimiters that occur in no line all give the same single cells: the first of them stands for all
     tried = [one for one in DELIMITERS if one not in absent[1:]]
     block = max((_block(lines, one) for one in tried), key=lambda one: one.score)
     if not block.score or _header_parts_at_commas(lines, block):
-        return _by_header(lines, encoding, source)
+        return _header_only_layout(lines, encoding, source)
     made, rows = block.layout(lines, encoding), [row for _, row in block.rows]
     require_ungrouped(rows, [one.name for one in made.headings], source)
     if block.delimiter == "," and block.rows[0][0]:
@@ -217,13 +219,13 @@ def _header_parts_at_commas(lines: Sequence[str], block: "_Block") -> bool:
     return not others and cell.count(",") == commas > 0
 
 
-def _by_header(lines: Sequence[str], encoding: str, source: str) -> Layout:
+def _header_only_layout(lines: Sequence[str], encoding: str, source: str) -> Layout:
     """Return the layout of a log without a row of numbers: its first line is the header."""
     first = next(place for place, line in enumerate(lines) if line.strip())
     delimiter = max(",;\t", key=lines[first].count)
     names = [COMMENT.sub("", name) for name in cells_of(lines[first], delimiter)]
-    if len(names) > _WIDEST:
-        raise LogError(f"at most {_WIDEST:,} columns are read, the first line has {len(names):,} cells", source)
+    if len(names) > _MOST_COLUMNS:
+        raise LogError(f"at most {_MOST_COLUMNS:,} columns are read, the first line has {len(names):,} cells", source)
     return Layout(tuple(map(Heading, names)), first + 1, delimiter, ".", encoding)
 
 
@@ -254,7 +256,7 @@ class _Block:
         while first and _has_number(cells_of(lines[first - 1], self.delimiter), width):
             first -= 1
         closed = all(not row[-1] for _, row in self.rows)
-        names, units = names_and_units(_above(lines[:first], self.delimiter, width, closed=closed), width)
+        names, units = names_and_units(_lines_above(lines[:first], self.delimiter, width, closed=closed), width)
         point = "." if self.delimiter == BLANKS else self._decimal_point()
         stamped = frozenset(
             place
@@ -301,7 +303,7 @@ def _block(lines: Sequence[str], delimiter: str) -> _Block:
         for place, line in enumerate(lines)
         if line.strip()
     ]
-    judged = [(place, row, tuple(map(is_value, row))) for place, row in split if len(row) <= _WIDEST]
+    judged = [(place, row, tuple(map(is_value, row))) for place, row in split if len(row) <= _MOST_COLUMNS]
     # a blank separates thousands, rather than two numbers, only if something else separates the cells
     judged = [(place, row, values) for place, row, values in judged if len(row) > 1 or " " not in "".join(row)]
     judged = [one for one in judged if any(one[2])]
@@ -320,7 +322,7 @@ def _block(lines: Sequence[str], delimiter: str) -> _Block:
     return _Block(delimiter, tuple(whole), numeric) if whole else _Block(delimiter)
 
 
-def _above(lines: Sequence[str], delimiter: str, width: int, *, closed: bool) -> list[list[str]]:
+def _lines_above(lines: Sequence[str], delimiter: str, width: int, *, closed: bool) -> list[list[str]]:
     """Return the lines right above the data that are as wide as it, from the top.
 
     Where a delimiter closes every row of data, the header may lack that last, empty cell.

@@ -94,7 +94,7 @@ def format_of(path: Path) -> str:
         raise LogError("a header line is needed, but the file is empty", str(path))
     for sign, kind in SIGNS.items():
         if start.startswith(sign):
-            return _in_zip(path) if kind == "xlsx" else kind
+            return _format_in_zip(path) if kind == "xlsx" else kind
     if start[512:].startswith(b"\x89HDF"):
         return "hdf5"
     if start[126:128] in (b"IM", b"MI") and (start.startswith(b"MATLAB") or start[124:125] in (b"\x00", b"\x01")):
@@ -102,7 +102,7 @@ def format_of(path: Path) -> str:
     return _by_suffix(path, start)
 
 
-def _in_zip(path: Path) -> str:
+def _format_in_zip(path: Path) -> str:
     """Return the format of a zip archive: NumPy arrays, an OpenDocument sheet, or otherwise Excel."""
     try:
         with ZipFile(path) as archive:
@@ -149,16 +149,16 @@ def open_tables(path: Path, metadata: str | None = None) -> tuple[Table, ...]:
         if kind in REFUSED:
             raise LogError(REFUSED[kind], str(path))
         if kind == "csv":
-            return (_guarded(open_csv(path, metadata), kind, path),)
+            return (_with_clear_errors(open_csv(path, metadata), kind, path),)
         module, _, name = READERS[kind].partition(":")
         reader: Callable[[Path], Table | tuple[Table, ...]] = getattr(import_module(module), name)
         made = reader(path)
-        return tuple(_guarded(one, kind, path) for one in (made if isinstance(made, tuple) else (made,)))
+        return tuple(_with_clear_errors(one, kind, path) for one in (made if isinstance(made, tuple) else (made,)))
     except BaseException as error:
         raise refusal(error, kind, path) from error
 
 
-def _guarded(table: Table, kind: str, path: Path) -> Table:
+def _with_clear_errors(table: Table, kind: str, path: Path) -> Table:
     """Return a table that refuses damaged columns with a clear error."""
 
     def read(columns: Sequence[Column]) -> dict[Column, Array]:

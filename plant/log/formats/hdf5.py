@@ -10,14 +10,14 @@ import numpy as np
 
 from plant.errors import LogError
 from plant.log.formats.extras import library
-from plant.log.formats.mat import METADATA, OBJECTS, STRUCT, spread
+from plant.log.formats.mat import METADATA, NO_VECTORS, STRUCT, columns_of_array
 from plant.log.formats.packed import most_unpacked, too_large
 from plant.log.table import Table, table_of
 
-UNITS = ("unit", "units", "Unit", "Units", "UNIT")
-NAMES = ("columns", "names", "column_names", "channels")
+UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT")
+NAME_ATTRIBUTES = ("columns", "names", "column_names", "channels")
 
-PACKED = ("_FillValue", "missing_value", "scale_factor", "add_offset")
+PACKING_ATTRIBUTES = ("_FillValue", "missing_value", "scale_factor", "add_offset")
 """How netCDF says that numbers are packed: what stands for none, and what they are multiplied by and added to."""
 
 MOST_OBJECTS = 10_000
@@ -56,12 +56,12 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
                 raise too_large(str(path), most)
             for column, values in _columns(one, leaf).items():
                 groups[group][column] = values
-                said = next((said for key in UNITS if (said := _attribute(one, key))), None)
+                said = next((said for key in UNIT_ATTRIBUTES if (said := _attribute(one, key))), None)
                 units[group][column] = said.split(" since ")[0] if said else None  # netCDF clocks: "s since 1970"
     if STRUCT in groups and STRUCT in texts:
         groups = defaultdict(dict, {STRUCT: groups[STRUCT]})
     if not any(groups.values()):
-        raise LogError(OBJECTS if path.suffix.lower() == ".mat" else "it holds no vector of numbers", str(path))
+        raise LogError(NO_VECTORS if path.suffix.lower() == ".mat" else "it holds no vector of numbers", str(path))
     return tuple(
         table_of(str(path), columns, units=units[group], metadata=texts.get(group), label=group)
         for group, columns in groups.items()
@@ -91,7 +91,7 @@ def _holds_numbers(one: Any) -> bool:
 
 def _columns(one: Any, leaf: str) -> dict[str, Any]:
     """Return the columns of a numeric data set."""
-    kind, values = one.dtype, _unpacked(one, np.asarray(one[()]))
+    kind, values = one.dtype, _with_netcdf_scaling(one, np.asarray(one[()]))
     if kind.names is not None:
         if values.ndim != 1:
             return {}
@@ -99,18 +99,21 @@ def _columns(one: Any, leaf: str) -> dict[str, Any]:
     values = values.squeeze()
     if values.ndim == 2 and _attribute(one, "MATLAB_class"):
         values = values.T  # MATLAB stores arrays in column order
-    named = spread(leaf, values)
+    named = columns_of_array(leaf, values)
     names = _names(one)
     return dict(zip(names, named.values(), strict=True)) if len(names) == len(named) > 1 else named
 
 
-def _unpacked(one: Any, values: Any) -> Any:
+def _with_netcdf_scaling(one: Any, values: Any) -> Any:
     """Return values with the netCDF conventions applied: missing value, scale and offset."""
-    told = {name: _number(one, name) for name in PACKED}
+    told = {name: _number(one, name) for name in PACKING_ATTRIBUTES}
     if values.dtype.names is not None or not any(number is not None for number in told.values()):
         return values
-    missing = [number for name in PACKED[:2] if (number := told[name]) is not None]
-    scale, offset = (1.0 if told[PACKED[2]] is None else told[PACKED[2]]), told[PACKED[3]] or 0.0
+    missing = [number for name in PACKING_ATTRIBUTES[:2] if (number := told[name]) is not None]
+    scale, offset = (
+        (1.0 if told[PACKING_ATTRIBUTES[2]] is None else told[PACKING_ATTRIBUTES[2]]),
+        told[PACKING_ATTRIBUTES[3]] or 0.0,
+    )
     return np.where(np.isin(values, missing), np.nan, scale * values.astype(float) + offset)
 
 
@@ -140,7 +143,7 @@ def _attribute(one: Any, name: str) -> str:
 
 def _names(one: Any) -> list[str]:
     """Return the names that a data set gives its columns; empty if it gives none."""
-    for name in NAMES:
+    for name in NAME_ATTRIBUTES:
         value = one.attrs.get(name)
         if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "OSU":
             return [each.decode(errors="replace") if isinstance(each, bytes) else str(each) for each in value]

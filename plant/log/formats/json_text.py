@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from plant.errors import LogError
-from plant.log.formats.packed import opened
+from plant.log.formats.packed import open_unpacked
 from plant.log.table import Table, table_of
 
 MOST_PARTS = 8_000_000
 """Lists and objects of the largest file that is read: each takes some hundred bytes, however few its letters."""
 
-WANTED = (
+READABLE_FORMS = (
     "JSON is read as one object a row (a list of them, or one a line), or as one object with a list a column; "
     "save the log as .csv or .parquet"
 )
@@ -28,7 +28,7 @@ def open_json(path: Path) -> Table:
     LogError
         If it is no table, no JSON, or has more parts than a log.
     """
-    with opened(path) as file:
+    with open_unpacked(path) as file:
         content = file.read()
     if content.count(b"[") + content.count(b"{") > MOST_PARTS:
         raise LogError(f"it has more than {MOST_PARTS} lists and objects; save the log as .csv or .parquet", str(path))
@@ -36,7 +36,7 @@ def open_json(path: Path) -> Table:
     del content
     columns = _columns(_document(text, str(path)))
     if not columns:
-        raise LogError(WANTED, str(path))
+        raise LogError(READABLE_FORMS, str(path))
     return table_of(str(path), {name: _array(values) for name, values in columns.items()})
 
 
@@ -53,7 +53,7 @@ def _document(text: str, source: str) -> Any:
         except json.JSONDecodeError as error:
             if place == len(lines) - 1 > 0:  # a logger that is switched off leaves an incomplete last line
                 break
-            raise LogError(f"{WANTED} (line {place + 1} is no JSON: {error.msg})", source) from error
+            raise LogError(f"{READABLE_FORMS} (line {place + 1} is no JSON: {error.msg})", source) from error
     return rows
 
 

@@ -30,7 +30,7 @@ _NUMBER = rb"[-+]?\d{1,17}(?:\.\d{0,35})?(?:[eE][-+]?\d{1,3})?"
 _seen: dict[bytes, "Layout"] = {}
 
 
-def remembered(start: bytes, lines: int) -> "Layout | None":
+def remembered_layout(start: bytes, lines: int) -> "Layout | None":
     """Return the layout of an earlier file with the same header.
 
     Parameters
@@ -40,17 +40,17 @@ def remembered(start: bytes, lines: int) -> "Layout | None":
     lines : int
         Lines of it that would be looked at.
     """
-    for header, layout in _alike(start).items():
-        if _plain(start, header, layout, lines):
+    for header, layout in _matching_layouts(start).items():
+        if _has_plain_rows(start, header, layout, lines):
             return layout
     return None
 
 
-def _alike(start: bytes) -> Mapping[bytes, "Layout"]:
+def _matching_layouts(start: bytes) -> Mapping[bytes, "Layout"]:
     return {header: layout for header, layout in tuple(_seen.items()) if start.startswith(header)}
 
 
-def remember(start: bytes, lines: int, layout: "Layout") -> None:
+def remember_layout(start: bytes, lines: int, layout: "Layout") -> None:
     """Keep a layout for files with the same header.
 
     Parameters
@@ -66,13 +66,13 @@ def remember(start: bytes, lines: int, layout: "Layout") -> None:
     if not usual or layout.stamped or layout.skipped > MOST_ABOVE or len(layout.headings) < FEWEST_COLUMNS:
         return
     header = b"".join(line + b"\n" for line in start.split(b"\n", layout.skipped)[: layout.skipped])
-    if header.count(b"\r") == header.count(b"\r\n") and _plain(start, header, layout, lines):
+    if header.count(b"\r") == header.count(b"\r\n") and _has_plain_rows(start, header, layout, lines):
         if len(_seen) >= MOST_KEPT:
             _seen.clear()
         _seen[header] = layout
 
 
-def _plain(start: bytes, header: bytes, layout: "Layout", lines: int) -> bool:
+def _has_plain_rows(start: bytes, header: bytes, layout: "Layout", lines: int) -> bool:
     """Return whether all inspected lines below the header are rows of plain numbers."""
     wanted = lines - layout.skipped
     found = _rows(len(layout.headings), wanted).match(start, len(header))

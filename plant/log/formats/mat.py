@@ -9,17 +9,17 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError
-from plant.log.formats.mat_reader import DamagedMatError, Value, read_variables
+from plant.log.formats.mat_reader import DamagedMatError, MatValue, read_variables
 from plant.log.formats.mat_structs import each_struct, structs_of
 from plant.log.table import Table, table_of
 
 STRUCT = "record"
 METADATA = "metadata_json"
 
-MOST_SPREAD = 64
+MOST_COLUMNS = 64
 """Columns of the widest matrix that is read as columns."""
 
-OBJECTS = (
+NO_VECTORS = (
     "it holds no vector of numbers; a table, timetable or timeseries can only be read by MATLAB: save its columns as "
     "the fields of a struct, s.time_s = seconds(t.Time); s.position_m = t.Position; save('log.mat', '-struct', 's')"
 )
@@ -45,7 +45,7 @@ def open_mat(path: Path) -> tuple[Table, ...]:
     return tables_of(content, str(path))
 
 
-def tables_of(content: Mapping[str, Value], source: str) -> tuple[Table, ...]:
+def tables_of(content: Mapping[str, MatValue], source: str) -> tuple[Table, ...]:
     """Return the tables of the variables of a MAT file.
 
     Parameters
@@ -63,12 +63,12 @@ def tables_of(content: Mapping[str, Value], source: str) -> tuple[Table, ...]:
     if isinstance(record := content.get(STRUCT), Mapping):
         content = {STRUCT: record}
     made: list[Table] = []
-    structs: dict[str, Mapping[str, Value]] = {}
+    structs: dict[str, Mapping[str, MatValue]] = {}
     for name, value in content.items():
         structs |= structs_of(name, value)
     plain = {name: value for name, value in content.items() if not each_struct(value)}
     for name, value in {"": plain, **structs}.items():
-        if recorded := _recorded(value):
+        if recorded := _dspace_columns(value):
             made += [table_of(source, columns, units=units, label=name) for columns, units in recorded]
             continue
         columns, units = _columns(value)
@@ -77,27 +77,27 @@ def tables_of(content: Mapping[str, Value], source: str) -> tuple[Table, ...]:
             said = text if isinstance(text, str) else None
             made.append(table_of(source, columns, units=units, metadata=said, label=name))
     if not made:
-        raise LogError(OBJECTS, source)
+        raise LogError(NO_VECTORS, source)
     return tuple(made)
 
 
-def _columns(struct: Mapping[str, Value], above: str = "") -> tuple[dict[str, Any], dict[str, str | None]]:
+def _columns(struct: Mapping[str, MatValue], above: str = "") -> tuple[dict[str, Any], dict[str, str | None]]:
     """Return a struct's columns by name, with nested fields as ``outer.inner``, and the units it gives."""
     columns: dict[str, Any] = {}
     units: dict[str, str | None] = {}
     if "time" in struct and "signals" in struct:
-        return _simulink(struct)
+        return _simulink_columns(struct)
     for name, value in struct.items():
         if isinstance(value, Mapping):
             inner, said = _columns(value, f"{above}{name}.")
             columns |= inner
             units |= said
         elif isinstance(value, np.ndarray):
-            columns |= spread(above + name, value)
+            columns |= columns_of_array(above + name, value)
     return columns, units
 
 
-def _recorded(struct: Mapping[str, Value]) -> list[tuple[dict[str, Any], dict[str, str | None]]]:
+def _dspace_columns(struct: Mapping[str, MatValue]) -> list[tuple[dict[str, Any], dict[str, str | None]]]:
     """Return the columns of a dSPACE recording, one table for each raster: signals in Y refer to their times in X."""
     if not {"X", "Y"} <= struct.keys():
         return []
@@ -124,7 +124,7 @@ def _unit(struct: Mapping[str, Any]) -> str | None:
     return said if isinstance(said, str) and said.strip() else None
 
 
-def _simulink(struct: Mapping[str, Value]) -> tuple[dict[str, Any], dict[str, str | None]]:
+def _simulink_columns(struct: Mapping[str, MatValue]) -> tuple[dict[str, Any], dict[str, str | None]]:
     """Return the columns of Simulink's "structure with time"; its time is in seconds."""
     columns: dict[str, Any] = {"time": struct["time"]}
     signals = struct["signals"]
@@ -132,11 +132,13 @@ def _simulink(struct: Mapping[str, Value]) -> tuple[dict[str, Any], dict[str, st
     for number, one in enumerate(many, start=1):
         if isinstance(one, Mapping) and isinstance(one.get("values"), np.ndarray):
             label = one.get("label")
-            columns |= spread(label if isinstance(label, str) and label.strip() else f"signal {number}", one["values"])
+            columns |= columns_of_array(
+                label if isinstance(label, str) and label.strip() else f"signal {number}", one["values"]
+            )
     return columns, {"time": "s"}
 
 
-def spread(name: str, values: Any) -> dict[str, Any]:
+def columns_of_array(name: str, values: Any) -> dict[str, Any]:
     """Return a vector under its name, or each column of a matrix that is longer than wide.
 
     Parameters
@@ -153,12 +155,12 @@ def spread(name: str, values: Any) -> dict[str, Any]:
 
     Examples
     --------
-    >>> list(spread("data", np.zeros((9, 2)))), list(spread("gain", np.array(1.0)))
+    >>> list(columns_of_array("data", np.zeros((9, 2)))), list(columns_of_array("gain", np.array(1.0)))
     (['data 1', 'data 2'], [])
     """
     if values.size < 2:
         return {}
-    if values.ndim == 2 and values.shape[1] < values.shape[0] and values.shape[1] <= MOST_SPREAD:
+    if values.ndim == 2 and values.shape[1] < values.shape[0] and values.shape[1] <= MOST_COLUMNS:
         return {f"{name} {place + 1}": values[:, place] for place in range(values.shape[1])}
     return {name: values}
 

@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.log.formats.packed import inflated, most_unpacked
+from plant.log.formats.packed import inflate, most_unpacked
 
-Value = NDArray[np.generic] | str | Mapping[str, "Value"] | Sequence["Value"] | None
+MatValue = NDArray[np.generic] | str | Mapping[str, "MatValue"] | Sequence["MatValue"] | None
 
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
@@ -23,10 +23,10 @@ MATRIX, COMPRESSED = 14, 15
 STRUCT, CHAR, FIRST_NUMERIC, LAST_NUMERIC = 2, 4, 6, 15
 COMPLEX = 0x0800
 HEADER = 128
-NEWER = (b"\x00\x02IM", b"\x02\x00MI")
+MAT_7_3_VERSIONS = (b"\x00\x02IM", b"\x02\x00MI")
 """Version and byte order of a MAT 7.3."""
 
-DEEPEST = 20
+MOST_NESTED = 20
 """Structs within structs that are read [count]; judged."""
 
 
@@ -46,12 +46,12 @@ class _Reader:
     def integer(self, at: int) -> int:
         return int.from_bytes(self.data[at : at + 4], self.order)
 
-    def more(self) -> bool:
+    def has_more(self) -> bool:
         return self.at + 8 <= len(self.data)
 
     def element(self) -> tuple[int, memoryview]:
         """Return the type and the content of the next element, and move past it."""
-        if not self.more():
+        if not self.has_more():
             raise DamagedMatError("the file ends within an element")
         kind, count, start = self.integer(self.at), self.integer(self.at + 4), self.at + 8
         after = start + count + (0 if kind == COMPRESSED else -count % 8)
@@ -69,18 +69,18 @@ class _Reader:
         dtype = np.dtype(NUMBERS[kind]).newbyteorder("<" if self.order == "little" else ">")
         return np.frombuffer(content[: len(content) // dtype.itemsize * dtype.itemsize], dtype)
 
-    def inside(self, content: memoryview) -> "_Reader":
-        if self.depth > DEEPEST:
-            raise DamagedMatError(f"structs within structs, over {DEEPEST} deep")
+    def nested_reader(self, content: memoryview) -> "_Reader":
+        if self.depth > MOST_NESTED:
+            raise DamagedMatError(f"structs within structs, over {MOST_NESTED} deep")
         return _Reader(content, self.order, depth=self.depth + 1)
 
 
-def read_variables(content: bytes, source: str = "the file") -> dict[str, Value]:
+def read_variables(content: bytes, source: str = "the file") -> dict[str, MatValue]:
     """Return the variables of a MAT file of version 5 to 7.
 
     Returns
     -------
-    dict[str, Value]
+    dict[str, MatValue]
         Arrays without their dimensions of one, text, structs as mappings; None for what is not read.
 
     Raises
@@ -90,7 +90,7 @@ def read_variables(content: bytes, source: str = "the file") -> dict[str, Value]
     LogError
         If it unpacks to more than a log does.
     """
-    if content[HEADER - 4 : HEADER] in NEWER:
+    if content[HEADER - 4 : HEADER] in MAT_7_3_VERSIONS:
         raise DamagedMatError("a MAT file of version 7.3 that holds no HDF5")
     mark = content[HEADER - 2 : HEADER]
     if mark not in (b"IM", b"MI"):
@@ -100,21 +100,21 @@ def read_variables(content: bytes, source: str = "the file") -> dict[str, Value]
     return {name: value for name, value in variables if name}
 
 
-def _variables(reader: _Reader, most: int, source: str) -> Iterator[tuple[str, Value]]:
-    while reader.more():
+def _variables(reader: _Reader, most: int, source: str) -> Iterator[tuple[str, MatValue]]:
+    while reader.has_more():
         kind, content = reader.element()
         if kind == COMPRESSED:
             try:
-                unpacked = inflated(content, most, source)
+                unpacked = inflate(content, most, source)
                 most -= len(unpacked)
             except zlib.error as error:
                 raise DamagedMatError(f"a compressed variable cannot be unpacked: {error}") from error
-            kind, content = reader.inside(memoryview(unpacked)).element()
+            kind, content = reader.nested_reader(memoryview(unpacked)).element()
         if kind == MATRIX:
-            yield _matrix(reader.inside(content))
+            yield _matrix(reader.nested_reader(content))
 
 
-def _matrix(reader: _Reader) -> tuple[str, Value]:
+def _matrix(reader: _Reader) -> tuple[str, MatValue]:
     flags = reader.numbers()
     if len(flags) == 0:
         raise DamagedMatError("a variable without a class")
@@ -128,13 +128,13 @@ def _matrix(reader: _Reader) -> tuple[str, Value]:
     if kind == STRUCT:
         structs = _structs(reader, prod(shape))
         return name, structs[0] if len(structs) == 1 else structs
-    values = _shaped(reader.numbers(), shape)
+    values = _reshape(reader.numbers(), shape)
     if not is_complex:
         return name, values
-    return name, values.astype(np.complex128) + 1j * _shaped(reader.numbers(), shape).astype(np.float64)
+    return name, values.astype(np.complex128) + 1j * _reshape(reader.numbers(), shape).astype(np.float64)
 
 
-def _shaped(values: NDArray[np.generic], shape: tuple[int, ...]) -> NDArray[np.generic]:
+def _reshape(values: NDArray[np.generic], shape: tuple[int, ...]) -> NDArray[np.generic]:
     if any(size < 0 for size in shape) or prod(shape) != len(values):
         raise DamagedMatError(f"{len(values)} numbers in an array of shape {shape}")
     return values if values.size == 0 else values.reshape(shape, order="F").squeeze()
@@ -148,7 +148,7 @@ def _text(reader: _Reader) -> str:
     return bytes(content).decode(encoding, errors="replace")
 
 
-def _structs(reader: _Reader, count: int) -> list[Mapping[str, Value]]:
+def _structs(reader: _Reader, count: int) -> list[Mapping[str, MatValue]]:
     """Return the structs of an array; all have the same fields."""
     width, (_, labels) = reader.numbers(), reader.element()
     if len(width) != 1 or int(width[0]) < 1:
@@ -158,12 +158,12 @@ def _structs(reader: _Reader, count: int) -> list[Mapping[str, Value]]:
         bytes(labels[start : start + size]).split(b"\0", 1)[0].decode("latin-1")
         for start in range(0, len(labels), size)
     ]
-    structs: list[Mapping[str, Value]] = []
+    structs: list[Mapping[str, MatValue]] = []
     for _ in range(count):
-        fields: dict[str, Value] = {}
+        fields: dict[str, MatValue] = {}
         for name in names:
             kind, content = reader.element()
-            fields[name] = _matrix(reader.inside(content))[1] if kind == MATRIX and len(content) else None
+            fields[name] = _matrix(reader.nested_reader(content))[1] if kind == MATRIX and len(content) else None
         if not fields:
             break
         structs.append(fields)

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from plant.log.columns import TIME, TIMES
-from plant.log.formats.mat_reader import Value
+from plant.log.columns import TIME, TIME_NAMES
+from plant.log.formats.mat_reader import MatValue
 from plant.log.headings import Heading
 
 NAMES, DATA, UNITS = ("name", "label", "channel"), ("data", "values", "value", "samples", "y"), ("unit", "units")
@@ -15,7 +15,7 @@ NAMES, DATA, UNITS = ("name", "label", "channel"), ("data", "values", "value", "
 Struct = Mapping[str, Any]
 
 
-def structs_of(name: str, value: Value) -> dict[str, Struct]:
+def structs_of(name: str, value: MatValue) -> dict[str, Struct]:
     """Return a variable as structs by name, one for each table; empty for other variables.
 
     A nested struct with its own time is a table of its own. An array of structs has one struct for each sample, with
@@ -39,10 +39,14 @@ def structs_of(name: str, value: Value) -> dict[str, Struct]:
     each = each_struct(value)
     if not each:
         return {}
-    return _of_samples(name, each) or _of_signals(name, each) or {f"{name}({k})": one for k, one in enumerate(each, 1)}
+    return (
+        _from_sample_structs(name, each)
+        or _from_signal_structs(name, each)
+        or {f"{name}({k})": one for k, one in enumerate(each, 1)}
+    )
 
 
-def each_struct(value: Value) -> list[Struct]:
+def each_struct(value: MatValue) -> list[Struct]:
     """Return the structs of an array, or a single struct; empty for anything else.
 
     Parameters
@@ -55,14 +59,14 @@ def each_struct(value: Value) -> list[Struct]:
 
 
 def _has_time(struct: Struct) -> bool:
-    return any(_is_vector(value) and Heading(name).stem in (*TIMES, TIME) for name, value in struct.items())
+    return any(_is_vector(value) and Heading(name).stem in (*TIME_NAMES, TIME) for name, value in struct.items())
 
 
 def _is_vector(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.size > 1
 
 
-def _of_samples(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
+def _from_sample_structs(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
     """Return an array with one struct for each sample as one struct of columns; empty for other arrays."""
     numbers = [key for key, value in each[0].items() if isinstance(value, np.ndarray) and value.size == 1]
     if not numbers or any(key not in one or np.size(one[key]) != 1 for one in each for key in numbers):
@@ -72,12 +76,12 @@ def _of_samples(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
     return {name: {key: np.array([np.ravel(one[key])[0] for one in each]) for key in numbers}}
 
 
-def _of_signals(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
+def _from_signal_structs(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
     """Return an array with one struct for each signal as tables, split by time; empty for other arrays."""
     found: dict[str, Struct] = {}
     together: dict[str, Any] = {}
     for place, one in enumerate(each, start=1):
-        said = {kind: _first(one, names) for kind, names in (("name", NAMES), ("data", DATA), ("unit", UNITS))}
+        said = {kind: _first_field(one, names) for kind, names in (("name", NAMES), ("data", DATA), ("unit", UNITS))}
         if not isinstance(said["name"], str) or not _is_vector(said["data"]):
             return {}
         unit = said["unit"]
@@ -91,5 +95,5 @@ def _of_signals(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
     return {name: together, **found} if together else found
 
 
-def _first(struct: Struct, names: Sequence[str]) -> Any:
+def _first_field(struct: Struct, names: Sequence[str]) -> Any:
     return next((value for field, value in struct.items() if field.lower() in names), None)

@@ -14,17 +14,17 @@ import numpy as np
 
 from plant.errors import HydrostateError, LogError
 from plant.log.formats.extras import library
-from plant.log.formats.mdf_formula import evaluated
+from plant.log.formats.mdf_formula import evaluate_formula
 from plant.log.formats.packed import most_unpacked, too_large
 from plant.log.table import Table, table_of
 
-VIRTUAL = (3, 6)
+VIRTUAL_CHANNELS = (3, 6)
 """Types of channels of version 4 that are counted, and have no bytes in a record."""
 
-DEEPEST = 3
+MOST_NESTED = 3
 """How deeply one conversion may refer to another [count]."""
 
-IN_TIME = (0, 1)
+TIME_MASTERS = (0, 1)
 """What a master channel of version 4 says that it counts: nothing, or seconds; others count angle, distance, rows."""
 
 
@@ -73,7 +73,7 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
             clock, unit = _clock(group, master)
             names = _names(group)
             for place, channel in enumerate(group.channels):
-                formula, within = _taken_formula(channel)
+                formula, within = _take_formula(channel)
                 if place == master:
                     if formula is not None:
                         raise LogError(f"its clock {channel.name[:80]!r} is converted by a formula", str(path))
@@ -81,7 +81,7 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
                 # by default asammdf leaves out invalid samples, different ones in each channel
                 signal = file.get(group=number, index=place, raw=False, ignore_invalidation_bits=True)
                 columns.setdefault(clock, signal.timestamps)
-                columns.setdefault(names[place], _valid(signal, formula, str(path)))
+                columns.setdefault(names[place], _valid_samples(signal, formula, str(path)))
                 units.setdefault(names[place], signal.unit or within)
             if columns:
                 label = str(getattr(group.channel_group, "acq_name", "") or f"group {number}")
@@ -93,18 +93,21 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
 
 def _clock(group: Any, master: int | None) -> tuple[str, str | None]:
     """Return name and unit of the master channel of a group."""
-    if master is None or getattr(group.channels[master], "sync_type", IN_TIME[1]) in IN_TIME:
+    if master is None or getattr(group.channels[master], "sync_type", TIME_MASTERS[1]) in TIME_MASTERS:
         return "time", "s"
-    return _last(group.channels[master].name), group.channels[master].unit or None
+    return _name_without_device(group.channels[master].name), group.channels[master].unit or None
 
 
 def _names(group: Any) -> list[str]:
     """Return the names of channels, without their device unless two would then have the same name."""
-    short = Counter(_last(one.name) for one in group.channels)
-    return [_last(one.name) if short[_last(one.name)] == 1 else one.name for one in group.channels]
+    short = Counter(_name_without_device(one.name) for one in group.channels)
+    return [
+        _name_without_device(one.name) if short[_name_without_device(one.name)] == 1 else one.name
+        for one in group.channels
+    ]
 
 
-def _taken_formula(channel: Any) -> tuple[str | None, str | None]:
+def _take_formula(channel: Any) -> tuple[str | None, str | None]:
     """Return the formula and unit of a channel, and make asammdf return its raw numbers."""
     conversion = channel.conversion
     formula = _formula_in(conversion)
@@ -119,21 +122,21 @@ def _formula_in(conversion: Any, depth: int = 0) -> str | None:
     if own := str(getattr(conversion, "formula", "") or "").strip(" \t\r\n\0"):
         return own if depth == 0 else f"{own[:80]} in a part of its range"
     within: Mapping[str, Any] = getattr(conversion, "referenced_blocks", None) or {}
-    if depth > DEEPEST:
+    if depth > MOST_NESTED:
         return "formulas within formulas"
     return next((said for one in within.values() if (said := _formula_in(one, depth + 1)) is not None), None)
 
 
-def _valid(signal: Any, formula: str | None, source: str) -> Any:
+def _valid_samples(signal: Any, formula: str | None, source: str) -> Any:
     """Return the samples of a channel, NaN where the logger marked them invalid, or the error."""
     samples, invalid = signal.samples, signal.invalidation_bits
     if formula is not None:
         try:
             if samples.dtype.kind not in "fiub":
                 raise ValueError("its raw samples are not numbers")
-            samples = evaluated(formula, samples)
+            samples = evaluate_formula(formula, samples)
         except ValueError as error:
-            name, said = _last(signal.name)[:80], str(error)
+            name, said = _name_without_device(signal.name)[:80], str(error)
             return partial(_refuse, f"channel {name!r} is converted by {formula[:80]!r}: {said}", source)
     if invalid is None or samples.dtype.kind not in "fiub" or samples.shape != np.shape(invalid):
         return samples
@@ -153,7 +156,7 @@ def _require_within(group: Any, source: str) -> None:
     """Refuse a group with a channel outside its records. asammdf copies from there unchecked, and the process ends."""
     bits = 8 * _record_bytes(group)
     for channel in group.channels:
-        if getattr(channel, "channel_type", 0) in VIRTUAL:
+        if getattr(channel, "channel_type", 0) in VIRTUAL_CHANNELS:
             continue
         if hasattr(channel, "byte_offset"):
             begin = 8 * channel.byte_offset + channel.bit_offset
@@ -163,6 +166,6 @@ def _require_within(group: Any, source: str) -> None:
             raise LogError(f"channel {channel.name[:80]!r} lies outside its records; the file is damaged", source)
 
 
-def _last(name: str) -> str:
+def _name_without_device(name: str) -> str:
     """Return a channel's name without the device that INCA appends."""
     return name.split("\\")[0]

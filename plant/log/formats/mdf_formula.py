@@ -13,7 +13,7 @@ import numpy as np
 
 from plant.arrays import Array
 
-LONGEST = 300
+LONGEST_FORMULA = 300
 """Characters of the longest formula that is evaluated; it cannot be nested too deeply for Python then."""
 
 _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
@@ -33,7 +33,7 @@ _FUNCTIONS: Mapping[str, tuple[int, Callable[..., Any]]] = {
 """How many arguments each function has, and what computes it."""
 
 
-def evaluated(formula: str, raw: Array) -> Array:
+def evaluate_formula(formula: str, raw: Array) -> Array:
     """Return the physical values of raw numbers.
 
     Parameters
@@ -55,11 +55,11 @@ def evaluated(formula: str, raw: Array) -> Array:
 
     Examples
     --------
-    >>> evaluated("X1/100 + 2", np.array([50, 100])).tolist()
+    >>> evaluate_formula("X1/100 + 2", np.array([50, 100])).tolist()
     [2.5, 3.0]
     """
-    if len(formula) > LONGEST:
-        raise ValueError(f"it has more than {LONGEST} characters")
+    if len(formula) > LONGEST_FORMULA:
+        raise ValueError(f"it has more than {LONGEST_FORMULA} characters")
     try:
         tree = ast.parse(formula.strip(), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):

@@ -7,7 +7,7 @@ from zipfile import ZipFile
 import numpy as np
 
 from plant.errors import LogError
-from plant.log.formats.mat import spread
+from plant.log.formats.mat import columns_of_array
 from plant.log.formats.packed import most_unpacked, too_large
 from plant.log.table import Table, table_of
 
@@ -51,7 +51,7 @@ def _columns(name: str, values: "np.ndarray[Any, Any]") -> dict[str, Any]:
         return {}
     if values.dtype.kind == "m":
         values = np.where(np.isnat(values), np.nan, values.astype("timedelta64[ns]").astype(np.int64) * 1e-9)
-    return spread(name, values)
+    return columns_of_array(name, values)
 
 
 def _table(path: Path, columns: dict[str, Any]) -> Table:

@@ -10,10 +10,10 @@ from plant.errors import LogError
 
 GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 
-ALWAYS = 128 << 20
+ALWAYS_ALLOWED = 128 << 20
 """Bytes that any packed file may unpack to."""
 
-MOST_TIMES = 50
+MOST_EXPANSION = 50
 """Times its own size that a packed file may unpack to, beyond that; logs of benches pack to a third or a tenth."""
 
 _BLOCK = 1 << 18
@@ -49,14 +49,14 @@ def most_unpacked(size: int) -> int:
     size : int
         Its own size [bytes].
     """
-    return max(ALWAYS, MOST_TIMES * size)
+    return max(ALWAYS_ALLOWED, MOST_EXPANSION * size)
 
 
 def too_large(source: str, most: int) -> LogError:
     """Return the error for a file that decompresses to more than a log can hold."""
     return LogError(
         f"it unpacks to more than {most / 2**20:.0f} MB, the most that is read of a packed file of its size "
-        f"({ALWAYS >> 20} MB, or {MOST_TIMES} times the file); unpack it first if it is a log",
+        f"({ALWAYS_ALLOWED >> 20} MB, or {MOST_EXPANSION} times the file); unpack it first if it is a log",
         source,
     )
 
@@ -108,7 +108,7 @@ def packing_of(path: Path) -> str | None:
     return "gzip" if start.startswith(GZIP) else "zstd" if start == ZSTD else None
 
 
-def opened(path: Path) -> BinaryIO:
+def open_unpacked(path: Path) -> BinaryIO:
     """Open the decompressed content of a file.
 
     Returns
@@ -136,7 +136,7 @@ def opened(path: Path) -> BinaryIO:
     return cast(BinaryIO, io.BufferedReader(raw, _BLOCK))
 
 
-def inflated(content: "bytes | memoryview", most: int, source: str) -> bytes:
+def inflate(content: "bytes | memoryview", most: int, source: str) -> bytes:
     """Return the decompressed content of zlib data.
 
     Raises

@@ -14,7 +14,7 @@ from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.columns import Column
 from plant.log.formats.arrow import from_arrow, to_arrow
-from plant.log.formats.cells import each_read, numbers
+from plant.log.formats.cells import numbers, read_each
 from plant.log.formats.packed import most_unpacked, too_large
 from plant.log.headings import Heading
 from plant.log.table import Table
@@ -25,7 +25,7 @@ SCHEMA_KEY = b"hydrostate"
 SECONDS: Mapping[str, float] = {**{unit: factor for unit, (of, factor) in USUAL.items() if of == "s"}, "h": 3600.0}
 """Units of time [s]."""
 
-MANY = 200
+COLUMNS_AT_A_TIME = 200
 """Columns that are read one by one, and so many at a time of a wider file [count]."""
 
 
@@ -46,37 +46,41 @@ def open_parquet(path: Path) -> Table:
     if 8 * file.metadata.num_rows > most:
         raise too_large(str(path), most)
     schema = file.schema_arrow
-    before = _before(schema.names)
+    before = _earlier_namesakes(schema.names)
 
     def column(place: int) -> Any:
         name = schema.names[place]
-        return _named(file.read([name]), name, before[place])  # a.b also selects field b of a structure a
+        return _column_by_occurrence(
+            file.read([name]), name, before[place]
+        )  # a.b also selects field b of a structure a
 
     table = _table(path, schema, column)
-    if len(schema.names) <= MANY:
+    if len(schema.names) <= COLUMNS_AT_A_TIME:
         return table
 
     def read(chosen: Sequence[Column]) -> dict[Column, Array]:
-        return table.read(chosen) if len(chosen) <= MANY else _in_parts(path, file, chosen, before)
+        return table.read(chosen) if len(chosen) <= COLUMNS_AT_A_TIME else _read_in_parts(path, file, chosen, before)
 
     return replace(table, read=read)
 
 
-def _in_parts(path: Path, file: Any, chosen: Sequence[Column], before: Sequence[int]) -> dict[Column, Array]:
+def _read_in_parts(path: Path, file: Any, chosen: Sequence[Column], before: Sequence[int]) -> dict[Column, Array]:
     """Return a very large number of columns in parts, because each read of the file examines all names."""
     names, out = file.schema_arrow.names, dict[Column, Array]()
-    for first in range(0, len(chosen), MANY):
-        part = chosen[first : first + MANY]
+    for first in range(0, len(chosen), COLUMNS_AT_A_TIME):
+        part = chosen[first : first + COLUMNS_AT_A_TIME]
         held = file.read(list(dict.fromkeys(names[column.position] for column in part)))
 
         def values(column: Column, held: Any = held) -> Array:
-            return _values(_named(held, names[column.position], before[column.position]), column, str(path))
+            return _values(
+                _column_by_occurrence(held, names[column.position], before[column.position]), column, str(path)
+            )
 
-        out |= each_read(part, values)
+        out |= read_each(part, values)
     return out
 
 
-def _before(names: Sequence[str]) -> list[int]:
+def _earlier_namesakes(names: Sequence[str]) -> list[int]:
     """Return for each column how many earlier columns have the same name."""
     seen, out = Counter[str](), list[int]()
     for name in names:
@@ -85,7 +89,7 @@ def _before(names: Sequence[str]) -> list[int]:
     return out
 
 
-def _named(table: Any, name: str, before: int) -> Any:
+def _column_by_occurrence(table: Any, name: str, before: int) -> Any:
     """Return the column of a name that follows so many others of that name."""
     places = table.schema.get_all_field_indices(name)
     return table.column(places[min(before, len(places) - 1)])
@@ -114,7 +118,7 @@ def open_feather(path: Path) -> Table:
 def _table(path: Path, schema: pa.Schema, read: Any) -> Table:
     kinds = [schema.field(place).type for place in range(len(schema.names))]
     headings = tuple(
-        Heading(name, _said(schema.field(place)), pa.types.is_timestamp(kind) or pa.types.is_time(kind))
+        Heading(name, _field_unit(schema.field(place)), pa.types.is_timestamp(kind) or pa.types.is_time(kind))
         for place, (name, kind) in enumerate(zip(schema.names, kinds, strict=True))
     )
     text = (schema.metadata or {}).get(SCHEMA_KEY)
@@ -123,11 +127,11 @@ def _table(path: Path, schema: pa.Schema, read: Any) -> Table:
         return _values(read(column.position), column, str(path))
 
     return Table(
-        str(path), headings, partial(each_read, read=values), None if text is None else text.decode(errors="replace")
+        str(path), headings, partial(read_each, read=values), None if text is None else text.decode(errors="replace")
     )
 
 
-def _said(field: "pa.Field[Any]") -> str | None:
+def _field_unit(field: "pa.Field[Any]") -> str | None:
     """Return the unit that a field gives; for a duration the unit in its name, or seconds."""
     if pa.types.is_duration(field.type):
         return _unit_of_duration(field.name)
@@ -149,11 +153,11 @@ def _values(values: "pa.ChunkedArray[Any]", column: Column, source: str) -> Any:
         whole: Any = values.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64())
         return np.array(whole.fill_null(np.iinfo(np.int64).min).to_numpy(), dtype=np.int64).view("datetime64[ns]")
     if pa.types.is_time(kind):
-        from plant.log.clock.stamps import over_midnight
+        from plant.log.clock.stamps import continue_over_midnight
 
         of_day: Any = values.cast(pa.time64("ns")).cast(pa.int64())
         stamps = np.array(of_day.fill_null(np.iinfo(np.int64).min).to_numpy(), dtype=np.int64)
-        return over_midnight(stamps).view("datetime64[ns]")
+        return continue_over_midnight(stamps).view("datetime64[ns]")
     if pa.types.is_duration(kind):
         unit = SECONDS[_unit_of_duration(column.name)]
         whole = values.cast(pa.duration("ns")).cast(pa.int64())

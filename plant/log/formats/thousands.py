@@ -8,13 +8,13 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError
 
-APART = " '\u2019\u00a0\u2009\u202f"
+THOUSANDS_SEPARATORS = " '\u2019\u00a0\u2009\u202f"
 """What separates thousands and can be no decimal sign: blanks of several widths, and apostrophes as the Swiss write."""
 
-GROUPS = rf"\d{{1,3}}(?P<apart>[{APART}])\d{{3}}(?:(?P=apart)\d{{3}})*"
+GROUPS = rf"\d{{1,3}}(?P<apart>[{THOUSANDS_SEPARATORS}])\d{{3}}(?:(?P=apart)\d{{3}})*"
 """A whole number with such separators, as a part of a regular expression."""
 
-_SURE = {
+_UNAMBIGUOUS = {
     point: re.compile(
         rf"[-+\u2212]?(?:{GROUPS}(?:{one}\d*)?|\d{{1,3}}(?:{by}\d{{3}}){{2,}}|\d{{1,3}}(?:{by}\d{{3}})+{one}\d*)"
     )
@@ -22,14 +22,14 @@ _SURE = {
 }
 """Numbers whose separators of thousands can be nothing else, by decimal point: 1,234 may be either."""
 
-_PARTS = re.compile(rf"[{APART}]")
+_PARTS = re.compile(rf"[{THOUSANDS_SEPARATORS}]")
 
 _GROUPED = re.compile(r"[-+\u2212]?[1-9]\d{0,2}[.,]\d{3}")
 _SMALL = re.compile(r"[-+\u2212]?\d{1,3}")
 _WHOLE = re.compile(r"[-+\u2212]?\d+")
 _SMALL_OR_GROUPED = re.compile(rf"{_SMALL.pattern}|{_GROUPED.pattern}")
 
-LEAST = 30
+FEWEST_CELLS = 30
 """Cells with a separator from which a column may be judged [count]: decimals of as many would not all be three."""
 
 
@@ -49,7 +49,7 @@ def without_thousands(cell: str, decimal_point: str) -> str | None:
     ('1234.5', '1234567', None)
     """
     text = cell.strip()
-    if not _SURE[decimal_point].fullmatch(text):
+    if not _UNAMBIGUOUS[decimal_point].fullmatch(text):
         return None
     other = "," if decimal_point == "." else "."
     return _PARTS.sub("", text).replace(other, "").replace(",", ".").replace("\u2212", "-")
@@ -99,7 +99,7 @@ def groups_thousands(cells: Sequence[str]) -> bool:
     """
     if not all(map(_SMALL_OR_GROUPED.fullmatch, cells)):
         return False
-    return LEAST <= sum(map(is_grouped, cells)) < len(cells)
+    return FEWEST_CELLS <= sum(map(is_grouped, cells)) < len(cells)
 
 
 def is_grouped(cell: str) -> bool:
@@ -124,7 +124,7 @@ def may_group_thousands(values: Array) -> bool:
         return False
     known = values[np.isfinite(values)]
     small = known == np.trunc(known)
-    return bool(small.any()) and bool((np.abs(known[small]) < 1000.0).all()) and int((~small).sum()) >= LEAST
+    return bool(small.any()) and bool((np.abs(known[small]) < 1000.0).all()) and int((~small).sum()) >= FEWEST_CELLS
 
 
 def _all_grouped(values: Array) -> bool:

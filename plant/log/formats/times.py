@@ -30,7 +30,7 @@ def is_time(values: "np.ndarray[Any, Any]") -> bool:
     return isinstance(first, datetime) or (isinstance(first, str) and is_stamp(first))
 
 
-def moments(values: "np.ndarray[Any, Any]", name: str, source: str) -> Any:
+def universal_times(values: "np.ndarray[Any, Any]", name: str, source: str) -> Any:
     """Return a column of dates and times in universal time.
 
     Parameters
@@ -52,11 +52,11 @@ def moments(values: "np.ndarray[Any, Any]", name: str, source: str) -> Any:
     """
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]")
-    texts = ["" if one is None else _said(one) for one in values]
+    texts = ["" if one is None else _moment_text(one) for one in values]
     return read_stamps(texts, lambda row, cell: not_a_number(source, name, row, cell, stamped=True))
 
 
-def _said(value: Any) -> str:
+def _moment_text(value: Any) -> str:
     """Return a moment as text; a moment with a zone in universal time."""
     if not isinstance(value, datetime):
         return str(value)

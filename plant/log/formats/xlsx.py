@@ -48,7 +48,7 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
         If openpyxl is not installed, it is no workbook, unpacks to more than a log does, or holds no numbers.
     """
     openpyxl = library("openpyxl", "Excel", str(path))
-    uncomputed = _bounded(path)
+    uncomputed = _check_workbook(path)
     import warnings
 
     made: list[Table] = []
@@ -56,7 +56,7 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         reader = openpyxl.reader.excel.ExcelReader(path, read_only=True, data_only=True, keep_links=False)
-        reader.read_chartsheet = _no_charts
+        reader.read_chartsheet = _skip_charts
         reader.read()
         book = reader.wb
         try:
@@ -91,7 +91,7 @@ def _listed_units(rows: Cells) -> dict[str, str]:
         if isinstance(unit, str):
             for place, name in enumerate(row):
                 if isinstance(name, str) and place != column:
-                    told.setdefault(_said(name), set()).add(unit.strip())
+                    told.setdefault(_cell_text(name), set()).add(unit.strip())
     return {name: units.pop() for name, units in told.items() if len(units) == 1}
 
 
@@ -102,11 +102,11 @@ def _with_unit(heading: Heading, units: Mapping[str, str]) -> Heading:
     return replace(heading, said=unit_or_none(units[heading.name]))
 
 
-def _no_charts(*_: object) -> None:
+def _skip_charts(*_: object) -> None:
     """Skip a sheet of charts, which holds no cells; openpyxl fails on an empty one."""
 
 
-def _bounded(path: Path) -> bool:
+def _check_workbook(path: Path) -> bool:
     """Refuse a workbook that decompresses to more than a log can hold; return whether formulas lack values."""
     uncomputed = False
     most = left = most_unpacked(path.stat().st_size)
@@ -146,7 +146,7 @@ def _cells(sheet: Any, source: str) -> Cells:
     return rows
 
 
-def _said(cell: Any, *, of_numbers: bool = False) -> str:
+def _cell_text(cell: Any, *, of_numbers: bool = False) -> str:
     """Return a cell as in a text log. Yes or no in a column of numbers is a word."""
     if cell is None:
         return ""
@@ -170,7 +170,7 @@ def _table(path: Path, title: str, rows: Cells, uncomputed: bool = False) -> Tab
         width -= 1
     if width < 2:
         return None
-    lines = ["\t".join(_said(cell) for cell in _wide(row, width)) for row in islice(rows, LINES)]
+    lines = ["\t".join(_cell_text(cell) for cell in _fit_width(row, width)) for row in islice(rows, LINES)]
     if not any(line.strip() for line in lines):
         return None
     layout = layout_of_lines(lines, "utf-8", str(path))
@@ -193,7 +193,7 @@ def _table(path: Path, title: str, rows: Cells, uncomputed: bool = False) -> Tab
                     str(path),
                 )
         texts = (
-            [_said(cell, of_numbers=one) for cell, one in zip(_wide(row, width), numeric, strict=True)]
+            [_cell_text(cell, of_numbers=one) for cell, one in zip(_fit_width(row, width), numeric, strict=True)]
             if any(cell is not None for cell in row)
             else []
             for row in below
@@ -207,5 +207,5 @@ def _is_number(cell: Any) -> bool:
     return isinstance(cell, int | float) and not isinstance(cell, bool)
 
 
-def _wide(row: Sequence[Any], width: int) -> list[Any]:
+def _fit_width(row: Sequence[Any], width: int) -> list[Any]:
     return [*row[:width], *[None] * (width - len(row))]

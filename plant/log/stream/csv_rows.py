@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.errors import LogError, LogWarning
-from plant.log.columns import TIME, TRUTH, Column, listed, resolve_columns
+from plant.log.columns import TIME, TRUTH_PREFIX, Column, list_in_words, resolve_columns
 from plant.log.formats.cells import MOST_STRANGE, not_a_number, number, wrong_width
-from plant.log.guess import overlooked
-from plant.log.headings import cleaned
+from plant.log.guess import unused_column_notes
+from plant.log.headings import headings_of
 from plant.log.lost_values import LostInStream
 
 FIRST_ROWS = 50
@@ -26,13 +26,13 @@ LONGEST_GAP = 1.0
 SAME_RATE = 0.01
 """By how much the rates of a stream, and of what it is continued or compared with, may differ [fraction]."""
 
-BURST = 50.0
+MOST_GARBAGE = 50.0
 """Rows in a row that may be garbage in a stream that was clean for long [count]."""
 
-AT_ONCE = 5.0
+MOST_INITIAL_GARBAGE = 5.0
 """Rows that may be garbage before any was clean [count]."""
 
-BEHIND = 1e-6
+LEAST_FORWARD_STEP = 1e-6
 """Least step in time, as a share of the time between samples, that counts as forward [fraction]."""
 
 _Placed: TypeAlias = tuple[int, NDArray[np.float64]]
@@ -44,8 +44,8 @@ class CsvStream:
 
     A row with too few or too many cells, or whose time is not a number or does not increase, is left out. A cell that
     is not a number is a missing sample. Both are counted in `left_out`. The stream is refused if they become too many:
-    as in a log (`MOST_STRANGE`) in the long run, and more than `BURST` in a row. A usual mark for lost samples, such as
-    -9999, is also a missing sample if it stands out; it is counted, but never causes a refusal.
+    as in a log (`MOST_STRANGE`) in the long run, and more than `MOST_GARBAGE` in a row. A usual mark for lost samples,
+    such as -9999, is also a missing sample if it stands out; it is counted, but never causes a refusal.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class CsvStream:
 
     def __init__(self, lines: Iterable[str], mapping: Mapping[str, str] | None = None, *, source: str) -> None:
         self._source, self._row = source, 0
-        self._allowed = AT_ONCE
+        self._allowed = MOST_INITIAL_GARBAGE
         self.left_out = 0
         """Rows that were garbage or had a cell of it, so far [count]."""
         self.first_left_out = ""
@@ -89,15 +89,17 @@ class CsvStream:
         if names is None:
             raise LogError(f"the header cannot be split into names, got {header[:60]!r}", source)
         self._width = len(names)
-        columns = [one for one in resolve_columns(names, mapping, source) if not one.channel.startswith(TRUTH)]
+        columns = [one for one in resolve_columns(names, mapping, source) if not one.channel.startswith(TRUTH_PREFIX)]
         time = [one for one in columns if one.channel == TIME]
         if not time:
-            raise LogError(f"a column {TIME} is needed, or in another unit as time_ms, got {listed(names)}", source)
+            raise LogError(
+                f"a column {TIME} is needed, or in another unit as time_ms, got {list_in_words(names)}", source
+            )
         self._columns = time + [one for one in columns if one.channel != TIME]
         self._lost = {one.position: LostInStream() for one in columns if one.channel != TIME}
         read = {one.position for one in columns}
-        left = [heading for place, heading in enumerate(cleaned(names)) if place not in read]
-        for said in overlooked(left, [one.channel for one in columns]):
+        left = [heading for place, heading in enumerate(headings_of(names)) if place not in read]
+        for said in unused_column_notes(left, [one.channel for one in columns]):
             warnings.warn(LogWarning(said, source), stacklevel=2)
         self.channels = tuple(one.channel for one in self._columns[1:])
         """Channels of the samples, in order."""
@@ -172,14 +174,14 @@ class CsvStream:
             if held is not None:
                 at, ahead = held
                 if last < row[0] < ahead[0]:
-                    self._leave_out(self._goes_back(float(row[0]), float(ahead[0]), at))
+                    self._leave_out(self._goes_back_error(float(row[0]), float(ahead[0]), at))
                 else:
                     yield ahead
                     last = float(ahead[0])
                 held = None
             time = float(row[0])
-            if not (time - last) / self.sample_time > BEHIND:
-                self._leave_out(self._goes_back(time, last, place))
+            if not (time - last) / self.sample_time > LEAST_FORWARD_STEP:
+                self._leave_out(self._goes_back_error(time, last, place))
             elif time - last > LONGEST_GAP + self.sample_time:
                 held = place, row
             else:
@@ -188,7 +190,7 @@ class CsvStream:
         if held is not None:
             yield held[1]
 
-    def _goes_back(self, time: float, last: float, place: int) -> LogError:
+    def _goes_back_error(self, time: float, last: float, place: int) -> LogError:
         said = f"{TIME} must increase from row to row, got {time:g} s after {last:g} s in row {place + 1}"
         return LogError(said, self._source)
 
@@ -230,7 +232,7 @@ class CsvStream:
             if wrong is not None:
                 self._leave_out(wrong)
             if row[0] == row[0]:
-                self._allowed = min(self._allowed + MOST_STRANGE, BURST)
+                self._allowed = min(self._allowed + MOST_STRANGE, MOST_GARBAGE)
                 yield place, row
 
     def _quoted(self, line: str) -> list[str] | None:

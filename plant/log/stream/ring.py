@@ -28,7 +28,7 @@ COLUMNS_AT, WRITTEN_AT, READ_AT, ENDED_AT, LENGTH_AT = 8, 16, 24, 32, 36
 PAUSE = 2e-3
 """Time between two looks where nothing is new [s]."""
 
-MOST = 4096
+MOST_ROWS = 4096
 """Rows that are taken at a time."""
 
 
@@ -142,7 +142,7 @@ class RingReader:
         """Return the new rows, shape (n, columns); empty if there are none."""
         size, begin, written = len(self._slots), _whole(self._held, READ_AT), _whole(self._held, WRITTEN_AT)
         oldest = max(begin, written - size + 1)  # the row before may be in the middle of being overwritten
-        end = min(written, oldest + MOST)
+        end = min(written, oldest + MOST_ROWS)
         rows = self._slots[np.arange(oldest, end) % size]
         # older rows were overwritten while they were read
         kept = min(end, max(oldest, _whole(self._held, WRITTEN_AT) - size + 1))

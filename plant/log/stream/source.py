@@ -3,8 +3,8 @@
 Over TCP nothing is lost: unread rows wait at the sender. A broker sends rows in batches, because one message for each
 row is limited to some thousand rows a second. A batch is text: ``rows N`` with its number, the header, the rows; an
 empty message ends the stream. A batch whose number has already arrived is late and is dropped; numbers that never
-arrive are lost. Up to `QUEUED` batches wait here, and a batch that finds the queue full is dropped. All of these are
-counted, and their rows are missing in time.
+arrive are lost. Up to `MOST_QUEUED` batches wait here, and a batch that finds the queue full is dropped. All of these
+are counted, and their rows are missing in time.
 """
 
 import queue
@@ -20,10 +20,10 @@ from plant.errors import HydrostateError, LogError
 SCHEMES = ("tcp", "mqtt", "ring")
 """What an address of a stream begins with."""
 
-QUEUED = 1000
+MOST_QUEUED = 1000
 """Batches that wait to be read [batches]."""
 
-PATIENCE = 10.0
+TIMEOUT = 10.0
 """How long a connection may take [s]."""
 
 LONGEST_LINE = 1 << 20
@@ -200,7 +200,7 @@ def _ring(address: str, received: BatchCounts) -> Iterator[str]:
 
 def _tcp(host: str, port: int, address: str) -> Iterator[str]:
     try:
-        connection = socket.create_connection((host, port), PATIENCE)
+        connection = socket.create_connection((host, port), TIMEOUT)
     except OSError as error:
         raise LogError(f"no answer: {error.strerror or error}", address) from error
     connection.settimeout(None)
@@ -258,7 +258,7 @@ def batch(number: int, header: str, rows: Sequence[str]) -> str:
 
 def _mqtt(host: str, port: int, topic: str, address: str, received: BatchCounts) -> Iterator[str]:
     mqtt, version = broker_package(address)
-    waiting: queue.Queue[str] = queue.Queue(QUEUED)
+    waiting: queue.Queue[str] = queue.Queue(MOST_QUEUED)
 
     def subscribe(client: Any, *_: Any) -> None:
         client.subscribe(topic, qos=1)
@@ -275,7 +275,7 @@ def _mqtt(host: str, port: int, topic: str, address: str, received: BatchCounts)
     try:
         header = ""
         while text := waiting.get():
-            number, names, rows = _opened(text, address)
+            number, names, rows = _unpack_batch(text, address)
             if header and names != header:
                 raise LogError(f"every batch must have the header {header.strip()!r}, got {names.strip()!r}", address)
             if not received.takes(number):
@@ -289,7 +289,7 @@ def _mqtt(host: str, port: int, topic: str, address: str, received: BatchCounts)
         client.disconnect()
 
 
-def _opened(text: str, address: str) -> tuple[int, str, list[str]]:
+def _unpack_batch(text: str, address: str) -> tuple[int, str, list[str]]:
     """Return number, header and rows of a batch."""
     first, *lines = text.splitlines(keepends=True)
     word, _, number = first.strip().partition(" ")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hydrostate as hs
-from benchmarks.diagnosis.own_classes import found_unknown, read_rig_cycles
+from benchmarks.diagnosis.own_classes import read_rig_cycles, unknown_shares
 from plant.errors import LogError
 
 
@@ -37,4 +37,4 @@ def test_component_states_of_the_zema_rig_are_classified_in_contiguous_blocks(
     assert verdicts.balanced_accuracy >= least
     assert verdicts.calibration_error < 0.02
     assert np.mean(verdicts.likeness <= 0.01) <= 0.01
-    assert min(found_unknown(features, labels[component]).values()) > 0.9
+    assert min(unknown_shares(features, labels[component]).values()) > 0.9

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from benchmarks.diagnosis.population import OUT_OF_MODEL, TEST, TRAINING, Drawn, draw_logs, draw_parameters
+from benchmarks.diagnosis.population import OUT_OF_MODEL, TEST, TRAINING, DrawnLog, draw_logs, draw_parameters
 from faults.conditions import CONDITIONS, parameters_for
 
 
 @pytest.fixture(scope="module")
-def logs() -> list[Drawn]:
+def logs() -> list[DrawnLog]:
     return list(draw_logs([TRAINING], drives=("steps",), duration=1.0))
 
 
-def test_every_seed_gives_the_nine_conditions_under_one_drive(logs: list[Drawn]) -> None:
+def test_every_seed_gives_the_nine_conditions_under_one_drive(logs: list[DrawnLog]) -> None:
     assert [log.condition for log in logs] == list(CONDITIONS)
     assert all(np.array_equal(log.drive, logs[0].drive) for log in logs)
     assert {log.record.metadata["drive"] for log in logs} == {"steps"}
@@ -33,7 +33,7 @@ def test_drawn_parameters_spread_up_to_the_stated_width(name: str) -> None:
     assert {p.piston_area for p in drawn} == {nominal.piston_area}
 
 
-def test_each_of_at_least_twelve_out_of_model_kinds_changes_the_log(logs: list[Drawn]) -> None:
+def test_each_of_at_least_twelve_out_of_model_kinds_changes_the_log(logs: list[DrawnLog]) -> None:
     assert len(OUT_OF_MODEL) >= 12
     for kind, changed in OUT_OF_MODEL.items():
         other = changed(logs[0])

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from benchmarks.diagnosis import random_rigs
-from benchmarks.diagnosis.random_rigs import line_of, main, summarised
+from benchmarks.diagnosis.random_rigs import main, print_figures, row_as_text
 
 ROW: dict[str, Any] = {
     "seed": 7,
@@ -28,12 +28,12 @@ ROW: dict[str, Any] = {
 
 
 def missed(rows: list[dict[str, Any]], *, wrong: bool = False) -> set[str]:
-    return {check.what for check in summarised(rows, wrong=wrong) if not check.met}
+    return {check.what for check in print_figures(rows, wrong=wrong) if not check.met}
 
 
 def test_the_line_of_a_rig_shows_verdict_error_coverage_and_time() -> None:
-    assert line_of(ROW) == "7 right | ok error 1.00 %, z 1.0 ++ | 2.0 s | normal; steps | end_stop"
-    wrong = line_of({**ROW, "verdict": "wrong", "flagged": True, "error": None})
+    assert row_as_text(ROW) == "7 right | ok error 1.00 %, z 1.0 ++ | 2.0 s | normal; steps | end_stop"
+    wrong = row_as_text({**ROW, "verdict": "wrong", "flagged": True, "error": None})
     assert wrong.startswith("7 wrong (normal 97 %) | ok, flagged no number  | 2.0 s")
 
 
@@ -59,7 +59,7 @@ def test_intervals_based_on_a_wrong_rig_file_are_not_judged() -> None:
 
 
 def test_a_bulk_modulus_flagged_by_the_check_counts_as_not_estimated(capsys: pytest.CaptureFixture[str]) -> None:
-    summarised([ROW, {**ROW, "flagged": True, "error": 0.5, "covered_total": False}], wrong=False)
+    print_figures([ROW, {**ROW, "flagged": True, "error": 0.5, "covered_total": False}], wrong=False)
     assert "without a believed bulk modulus: 1 of 2" in capsys.readouterr().out
 
 
@@ -76,6 +76,6 @@ def test_every_seed_of_the_range_is_run_including_the_last(monkeypatch: pytest.M
         asked.append((seed, wrong, pressure))
         return {**ROW, "seed": seed}
 
-    monkeypatch.setattr(random_rigs, "scored", one)
+    monkeypatch.setattr(random_rigs, "score_rig", one)
     main(["--seeds", "3:5", "--wrong", "--without-pressure"])
     assert asked == [(3, True, False), (4, True, False), (5, True, False)]

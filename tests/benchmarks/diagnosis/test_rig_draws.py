@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from benchmarks.diagnosis.rig_draws import WRONG, Bench, draw_bench, draw_rig, wrong_file
+from benchmarks.diagnosis.rig_draws import UNCERTAIN_ENTRIES, Bench, draw_bench, draw_rig, wrong_rig_file
 from faults.conditions import CONDITIONS
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.model import EhaParameters
@@ -67,8 +67,10 @@ def test_the_right_rig_file_has_the_true_sizes_but_not_the_circuit_or_the_true_b
 
 def test_a_wrong_rig_file_has_an_error_of_the_usual_size_in_each_size_entry() -> None:
     right = EhaParameters()
-    files = [wrong_file(right, seed) for seed in range(400)]
-    off = np.array([[np.log(getattr(file, name) / getattr(right, name)) for name in WRONG] for file in files])
+    files = [wrong_rig_file(right, seed) for seed in range(400)]
+    off = np.array(
+        [[np.log(getattr(file, name) / getattr(right, name)) for name in UNCERTAIN_ENTRIES] for file in files]
+    )
     assert np.all(off != 0.0)
     assert np.std(off, axis=0) == pytest.approx([0.03, 0.02, 0.15, 0.1], rel=0.1)
     assert {file.leakage_coefficient for file in files} == {right.leakage_coefficient}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.identification.identification_sets import LOOKS_AHEAD
+from benchmarks.identification.identification_sets import LOOKAHEAD_GROWTH
 from benchmarks.identification.identification_sets_peer import growth, state_space_run
 
 
@@ -22,5 +22,5 @@ def test_a_model_with_a_growing_state_follows_an_output_that_its_input_did_not_c
         poles = np.diag([radius, 0.5])
         left[growth(poles, [(u, y)])] = float(np.std(state_space_run(poles, b, c, d, u, y) - y) / np.std(y))
     stable, growing = sorted(left)
-    assert stable < LOOKS_AHEAD < growing
+    assert stable < LOOKAHEAD_GROWTH < growing
     assert left[growing] < 0.2 < left[stable]

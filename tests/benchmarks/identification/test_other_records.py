@@ -32,7 +32,7 @@ def of_records(
 )
 def test_a_difference_is_sure_only_if_the_other_records_agree(default: float, spread: float, said: str) -> None:
     others = OtherRecords()
-    (line,) = others.told(*of_records(16, {"default": default, "first": 1.0}, spread=spread))
+    (line,) = others.comparison_lines(*of_records(16, {"default": default, "first": 1.0}, spread=spread))
     assert line.startswith("default over first ")
     (summary,) = others.summary()
     assert said in summary
@@ -41,12 +41,12 @@ def test_a_difference_is_sure_only_if_the_other_records_agree(default: float, sp
 def test_a_run_that_turns_nan_has_an_infinite_error() -> None:
     one, runs = of_records(4, {"default": 1.0, "auto": 1.0})
     runs["auto"]["record 0"][50:] = np.nan
-    (line,) = OtherRecords().told(one, runs)
+    (line,) = OtherRecords().comparison_lines(one, runs)
     assert line.startswith("auto over default inf")
 
 
 def test_a_set_without_other_records_has_no_line() -> None:
     one, runs = of_records(0, {"default": 1.0, "first": 1.0})
     others = OtherRecords()
-    assert not others.told(one, runs)
+    assert not others.comparison_lines(one, runs)
     assert not others.summary()

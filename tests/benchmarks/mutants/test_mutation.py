@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.mutants.mutants import draw
-from benchmarks.mutants.mutation import count_mutants, mirrored, mutants_of
+from benchmarks.mutants.mutation import count_mutants, mirrored_tests, mutants_of
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -80,13 +80,13 @@ def test_a_seed_determines_the_drawn_faults() -> None:
 
 
 def test_a_file_is_tested_by_kept_numbers_then_its_own_tests_then_its_folder() -> None:
-    assert mirrored(ROOT, "plant/eha/circuit.py") == [
+    assert mirrored_tests(ROOT, "plant/eha/circuit.py") == [
         "tests/plant/eha/test_numbers.py",
         "tests/plant/eha/test_circuit.py",
         "plant/eha/circuit.py",
         "tests/plant/eha",
     ]
-    assert mirrored(ROOT, "faults/diagnosis/calibration.py") == [
+    assert mirrored_tests(ROOT, "faults/diagnosis/calibration.py") == [
         "tests/faults/diagnosis/test_numbers.py",
         "tests/faults/diagnosis/test_numbers_steps.py",
         "tests/faults/diagnosis/test_numbers_verdict.py",

@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 
 from benchmarks.diagnosis.scores import alarm_rate, median_delay
-from benchmarks.watching.watching import PIECE, CircuitStream, at_oil_temperature, detect_fault, false_alarms, learnt
+from benchmarks.watching.watching import (
+    PIECE,
+    CircuitStream,
+    at_oil_temperature,
+    detect_fault,
+    false_alarms,
+    learnt_watch,
+)
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.errors import HydrostateError
 
@@ -24,7 +31,7 @@ def test_an_empty_or_too_long_piece_is_refused(seconds: float) -> None:
 
 @pytest.mark.slow
 def test_minor_faults_are_found_within_half_a_second_and_false_alarms_come_at_the_rate_set() -> None:
-    running, watch = learnt(11, 0.5, false_alarms=10.0)
+    running, watch = learnt_watch(11, 0.5, false_alarms=10.0)
     for condition in ("minor_leakage", "minor_friction"):
         found = [detect_fault(running, watch, condition, seed) for seed in range(10)]
         assert median_delay([one.delay for one in found])[0] <= 0.5

@@ -16,7 +16,7 @@ from estimation.diaphragm_motor.signature import (
 )
 from estimation.trust.card import sentences
 from plant.diaphragm_motor.flow import pump_alone
-from plant.diaphragm_motor.parameters import DiaphragmMotorParameters, changed
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters, with_changed_value
 from plant.diaphragm_motor.run import BENCH_SENSORS, SAMPLE_TIME, Schedule, motor_drive, simulate_motor
 from plant.errors import LogError
 from plant.log.record import Record
@@ -111,7 +111,7 @@ def test_gas_in_every_chamber_is_estimated() -> None:
 
 
 def test_a_faulty_pump_breaks_the_pattern_of_its_electrodes() -> None:
-    leaking = replace(MOTOR, load_force=10.0, valve_leak=changed(MOTOR.valve_leak, 4, 0.2))
+    leaking = replace(MOTOR, load_force=10.0, valve_leak=with_changed_value(MOTOR.valve_leak, 4, 0.2))
     assert not estimate_motor(log_of(leaking), MOTOR).pattern_holds
 
 

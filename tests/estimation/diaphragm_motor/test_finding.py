@@ -5,7 +5,14 @@ from typing import Any
 
 import pytest
 
-from estimation.diaphragm_motor.finding import CLEARLY, MOST_DEVIATION, SIZES, MotorCode, _doubts, _quantity
+from estimation.diaphragm_motor.finding import (
+    CLEARLY_NEGATIVE_DEVIATIONS,
+    MOST_DEVIATION,
+    SIZES,
+    MotorCode,
+    _pattern_notes,
+    _quantity,
+)
 
 
 def estimate(value: float, deviation: float, name: str = "crossport_leakage", *, holds: bool = True) -> Any:
@@ -13,12 +20,12 @@ def estimate(value: float, deviation: float, name: str = "crossport_leakage", *,
 
 
 def test_a_broken_pattern_takes_precedence_over_a_negative_leakage() -> None:
-    (broken,) = _doubts(estimate(-1e-12, 1e-15, holds=False))
+    (broken,) = _pattern_notes(estimate(-1e-12, 1e-15, holds=False))
     assert broken == MotorCode.PATTERN_BROKEN.note(chi_square=30.0)
-    (faster,) = _doubts(estimate(-1.01 * CLEARLY * 1e-14, 1e-14))
+    (faster,) = _pattern_notes(estimate(-1.01 * CLEARLY_NEGATIVE_DEVIATIONS * 1e-14, 1e-14))
     assert faster.code is MotorCode.FASTER_THAN_MAPS
-    for leakage in (-0.99 * CLEARLY * 1e-14, 1e-12):
-        assert _doubts(estimate(leakage, 1e-14)) == ()
+    for leakage in (-0.99 * CLEARLY_NEGATIVE_DEVIATIONS * 1e-14, 1e-12):
+        assert _pattern_notes(estimate(leakage, 1e-14)) == ()
 
 
 @pytest.mark.parametrize("name", SIZES)

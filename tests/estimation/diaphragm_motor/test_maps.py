@@ -10,7 +10,7 @@ from estimation.diaphragm_motor.maps import MIDDLE, MotorMaps, average_run, moto
 from plant.diaphragm_motor.flow import operate
 from plant.diaphragm_motor.model import POSITION
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
-from plant.diaphragm_motor.run import RAMP, SAMPLE_TIME, motor_drive, run_motor
+from plant.diaphragm_motor.run import RAMP_TIME, SAMPLE_TIME, motor_drive, run_motor
 from plant.errors import HydrostateError
 
 HEALTHY = DiaphragmMotorParameters()
@@ -39,7 +39,7 @@ def test_electrode_and_drive_voltage_give_flow_and_pressure_between_map_points(
 def test_the_averaged_motor_moves_as_the_fast_plant(maps: MotorMaps) -> None:
     loaded = replace(HEALTHY, load_force=5.0)
     time = 2e-4 * np.arange(1001)
-    _, velocity, position = average_run(maps, loaded, PEAK, 200.0 * np.minimum(time / RAMP, 1.0))
+    _, velocity, position = average_run(maps, loaded, PEAK, 200.0 * np.minimum(time / RAMP_TIME, 1.0))
     fast = run_motor(loaded, motor_drive(PEAK, 200.0, 0.2, SAMPLE_TIME), SAMPLE_TIME)[:, POSITION]
     assert velocity[-1] == pytest.approx(operate(loaded, PEAK, 200.0).velocity, rel=0.02)
     np.testing.assert_allclose(position, fast[::10], atol=0.04 * position[-1])

@@ -154,8 +154,8 @@ def leakage_that_is_tracked() -> dict[str, Any]:
         "held from an amplitude of [V]": edge(held, 1e-5, 0.1),
         "held from an amplitude of, noisy [V]": edge(lambda one: held(one, 3e-3), 1e-5, 0.1),
         "balances": [list(one) for one in track._balances(block(0, 1.4, -2e-4), 3e4, p, MADE)],  # pyright: ignore[reportPrivateUsage]
-        "tilts": track._tilts(block(0, 1.4), np.array([2e-12, 5.0]), p, MADE),  # pyright: ignore[reportPrivateUsage]
-        "tilts at no pressure": track._tilts(
+        "tilts": track._tolerance_errors(block(0, 1.4), np.array([2e-12, 5.0]), p, MADE),  # pyright: ignore[reportPrivateUsage]
+        "tilts at no pressure": track._tolerance_errors(
             block(0, 2.0), np.array([2e-12, 5.0]), p, replace(MADE, pressure=Polynomial([100.0, 5.0]))
         ),  # pyright: ignore[reportPrivateUsage]
         "alarm [s]": [
@@ -212,8 +212,8 @@ def what_a_log_says() -> dict[str, Any]:
         "worn": told(found),
         "worn, calibrated": told(calibrated),
         "gains": estimate._gains(calibration, replace(MOTOR, load_force=10.0)),  # pyright: ignore[reportPrivateUsage]
-        "gas, fitted": list(estimate._gas_fitted(seen, MOTOR)),  # pyright: ignore[reportPrivateUsage]
-        "gas, fitted to what is no healthy pump": list(estimate._gas_fitted(clogged, MOTOR)),  # pyright: ignore[reportPrivateUsage]
+        "gas, fitted": list(estimate._gas_and_load_fit(seen, MOTOR)),  # pyright: ignore[reportPrivateUsage]
+        "gas, fitted to what is no healthy pump": list(estimate._gas_and_load_fit(clogged, MOTOR)),  # pyright: ignore[reportPrivateUsage]
         "finding": told_finding(motor_finding(log(), MOTOR)),
         "prospect": told_finding(motor_prospect(WORN, 480.0, 200.0)),
     }
@@ -237,7 +237,7 @@ def doubts_of_an_estimate() -> dict[str, Any]:
     def doubts(leakage: float, *, holds: bool = True) -> list[str]:
         values, deviations = {"crossport_leakage": leakage}, {"crossport_leakage": 1e-13}
         one = replace(made, values=values, deviations=deviations, pattern_holds=holds)
-        return [str(note.code) for note in finding._doubts(one)]  # pyright: ignore[reportPrivateUsage]
+        return [str(note.code) for note in finding._pattern_notes(one)]  # pyright: ignore[reportPrivateUsage]
 
     def told(name: str, value: float, std: float) -> bool:
         one = replace(made, values={name: value}, deviations={name: std})

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.eha.bulk_modulus import _fitted, estimate_bulk_modulus
-from estimation.eha.by_filter import _settled, _verdict
+from estimation.eha.bulk_modulus import _fitted_estimate, estimate_bulk_modulus
+from estimation.eha.by_filter import _settled_run, _verdict
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate
 from estimation.finding import Outcome
 from estimation.fits.hypothesis_search.form_fit import FormFit
@@ -55,7 +55,7 @@ def test_tuning_to_a_quiet_log_narrows_the_interval_and_keeps_it_valid() -> None
 
 
 def outcome_of(fit: FormFit) -> BulkModulusEstimate:
-    return _fitted(fit, "flow", ("position_m",))
+    return _fitted_estimate(fit, "flow", ("position_m",))
 
 
 def form_fit(*, bound: float = 0.01, chi_square: float = 1.0, reasons: tuple[Note, ...] = ()) -> FormFit:
@@ -123,6 +123,6 @@ def test_the_likelier_of_two_filter_passes_is_returned_together_with_the_first(s
         name, likelihood = ("first", 0.0) if len(begun) == 1 else ("again", second)
         return SimpleNamespace(name=name, log_likelihood=likelihood, settled=lambda _: (2e8, 1e6))
 
-    found, first = _settled(filtered, 1e7)
+    found, first = _settled_run(filtered, 1e7)
     assert begun == [1e7, 2e8]  # a first guess far below the result, and then the result
     assert (found.name, first.name) == (taken, "first")

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from benchmarks.diagnosis.rig_draws import draw_bench
-from benchmarks.filters.chamber_filter import on_circuit
+from benchmarks.filters.chamber_filter import circuit_log
 from estimation.eha import bulk_modulus as subject
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.by_flow_filter import BIASES, LEAKAGES, MODULI, drive_noise, filter_flow
@@ -63,7 +63,7 @@ def test_it_finds_bulk_modulus_and_leakage_without_being_told_the_condition(cond
 
 @pytest.mark.parametrize("condition", thinned(["minor_leakage", "major_friction"], ["minor_leakage"]))
 def test_on_circuit_logs_it_finds_bulk_modulus_within_its_interval(condition: str) -> None:
-    record = on_circuit(condition, 0)
+    record = circuit_log(condition, 0)
     found = chamber_ekf(record)
     assert (found.form, found.method, found.gate.passed) == ("flow", "chamber-ekf", True)
     assert found.value == pytest.approx(TRUTH, rel=0.003)
@@ -74,14 +74,14 @@ def test_on_circuit_logs_it_finds_bulk_modulus_within_its_interval(condition: st
 @pytest.mark.slow
 @pytest.mark.parametrize("start", [0.0, 0.5e8, 5e8])
 def test_from_any_first_guess_it_comes_to_the_same_value(start: float) -> None:
-    record = on_circuit("normal", 1, duration=4.0)
+    record = circuit_log("normal", 1, duration=4.0)
     found, near = chamber_ekf(record, start=start), chamber_ekf(record)
     assert found.value == pytest.approx(TRUTH, rel=0.01)
     assert found.value == pytest.approx(near.value, rel=1e-3)
 
 
 def test_its_online_track_does_not_depend_on_later_samples() -> None:
-    record = on_circuit("normal", 1, duration=1.0)
+    record = circuit_log("normal", 1, duration=1.0)
     spoilt = record["differential_pressure_pa"].copy()
     spoilt[750:] += 1e6
     noise = measurement_variances(record, tuple(record.channels))  # the noise of the whole log
@@ -94,7 +94,7 @@ def test_its_online_track_does_not_depend_on_later_samples() -> None:
 
 
 def test_its_process_noise_is_the_motor_speed_noise_as_pressure_above_a_floor() -> None:
-    record = on_circuit("normal", 1, duration=4.0)
+    record = circuit_log("normal", 1, duration=4.0)
     rate = TRUTH / (2.0 * HEALTHY.chamber_volume) * HEALTHY.pump_displacement
     told = drive_noise(record, HEALTHY, {"motor_speed_rad_s": 0.01})
     assert told == pytest.approx(FLOOR_NOISE + rate**2 * 0.01 * 1e-3, rel=1e-12)
@@ -133,7 +133,7 @@ def test_on_the_circuit_all_nine_conditions_are_within_one_percent_with_calibrat
     scores: list[float] = []
     for seed in range(4):  # `benchmarks chamber_filter` runs 20
         for condition in CONDITIONS:
-            found = chamber_ekf(on_circuit(condition, seed))
+            found = chamber_ekf(circuit_log(condition, seed))
             assert found.gate.passed, (seed, condition)
             assert found.value == pytest.approx(TRUTH, rel=0.01), (seed, condition)
             scores.append(((found.value or 0.0) - TRUTH) / (found.std or 1.0))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import EstimateOptions, estimate_bulk_modulus, estimate_clean
-from estimation.eha.estimate import estimate_log, finding_of, refused
+from estimation.eha.estimate import estimate_log, finding_of, rejection_notes
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Gate, Outcome
 from estimation.log_checks import measurement_noise
@@ -87,24 +87,24 @@ def test_an_estimate_that_does_not_use_pressure_notes_the_loss(form: str) -> Non
 def test_evidence_against_the_model_refuses_a_fit_and_a_wide_bound_does_not() -> None:
     frozen = with_fault(log(duration=1.0), SensorFault(channel="position_m", kind="freeze", start=0.5))
     found = estimate_log(frozen, Rig())
-    assert SensorCode.SENSOR_FROZE in [note.code for note in refused(found.evidence)]
+    assert SensorCode.SENSOR_FROZE in [note.code for note in rejection_notes(found.evidence)]
     stuck = log("major_friction", "sine", duration=1.0).replace(**{PRESSURE: None})
     unseen = estimate_log(stuck, Rig())
     assert unseen.outcome is Outcome.NOT_OBSERVABLE
     assert [note.code for note in unseen.gate.reasons] == [EstimateCode.BOUND_TOO_WIDE]
-    assert refused(unseen.evidence) == ()
+    assert rejection_notes(unseen.evidence) == ()
 
 
 def test_the_pressure_form_with_given_leakage_and_friction_refuses_no_log() -> None:
     found = estimate_log(log("major_leakage_minor_friction"), Rig(), EstimateOptions(form="pressure"))
     assert EstimateCode.INNOVATIONS_LARGE in [note.code for note in found.gate.reasons]
-    assert refused(found.evidence) == ()
+    assert rejection_notes(found.evidence) == ()
 
 
 def refused_with(form: str, outcome: Outcome, *reasons: Note) -> list[str]:
     gate = Gate(False, reasons)
     found = BulkModulusEstimate(outcome, None, None, 0.01, gate, form, (), {}, {}, None, None)
-    return [note.code for note in refused(found)]
+    return [note.code for note in rejection_notes(found)]
 
 
 def test_slightly_large_position_residuals_without_pressure_do_not_refuse_the_fit() -> None:

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.eha.another_rod import of_another_rod
+from estimation.eha.another_rod import is_of_another_rod
 from estimation.eha.bulk_modulus import _channel_slips
-from estimation.eha.changing_leakage import WARMED
+from estimation.eha.changing_leakage import LARGEST_WARMING_FACTOR
 from estimation.eha.explanation_notes import (
+    FAULTS_BEYOND_CONDITIONS,
     LEAKAGE_COURSE,
-    OUTSIDE,
-    at_pump_speed,
+    corrected_log,
+    corrected_rig,
+    log_at_pump_speed,
     notes_of,
-    rig_set_right,
-    set_right,
 )
-from estimation.fits.greybox.pump_ripple import EVENLY, Ripple, Turning, delivering
+from estimation.fits.greybox.pump_ripple import NO_RIPPLE, Ripple, Turning, delivering_speed
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import RigCode
@@ -110,7 +110,7 @@ def test_areas_unlike_those_of_the_rig_files_single_rod_are_doubted(
     rods = {"area_difference": (told_share, 0.01), "volume_difference": (0.2, 0.1), "pilot_share": (0.0, 0.1)}
     found = explanation("single_rod", **rods)
     (note,) = notes_of(found, replace(P, area_difference=rig))
-    assert of_another_rod(note) == other
+    assert is_of_another_rod(note) == other
 
 
 def test_notes_on_volume_play_load_relief_and_check_valves_hold_the_fitted_values() -> None:
@@ -174,7 +174,7 @@ def test_entrained_air_is_noted_at_atmospheric_pressure_with_the_air_free_bulk_m
 
 @pytest.mark.parametrize(("factor", "code"), [(2.0, "DRIFTS"), (0.5, "DRIFTS"), (4.0, "GROWS"), (0.2, "GROWS")])
 def test_leakage_that_changes_by_more_than_oil_thins_is_a_fault(factor: float, code: str) -> None:
-    assert WARMED == 3.0
+    assert LARGEST_WARMING_FACTOR == 3.0
     growth = 2.0 * (factor - 1.0) / (factor + 1.0)  # a straight line that is 1 halfway
     note = told(
         "leakage_growth", leakage_growth=(growth, 0.0), leakage_bend=(0.0, 0.0), leakage_coefficient=(8e-12, 0.0)
@@ -201,7 +201,7 @@ def test_a_port_that_drains_more_than_a_sound_pump_may_is_a_leak(share: float, c
     """The prior is a twentieth of the healthy leakage; the drain of a sound pump may be seven times as large."""
     note = told("port_a_drains", drain_share_a=(share, 0.0), case_leakage=(case, 0.0))
     assert note.code is (RigCode.PORT_DRAINS if leaks else RigCode.PORTS_DRAIN_APART)
-    assert (note.code in OUTSIDE) == bool(leaks)
+    assert (note.code in FAULTS_BEYOND_CONDITIONS) == bool(leaks)
     assert note.data.get("side", "") == leaks
 
 
@@ -224,13 +224,13 @@ def clean() -> CleanLog:
 
 def test_a_log_is_corrected_by_its_sensors_offsets_and_lateness() -> None:
     found = explanation(delay=2e-3, pressure_lag=(1e-3, 0.0), pressure_offset=(5e4, 0.0), position_zero=(4e-3, 0.0))
-    before, after = clean().record, set_right(clean(), found).record
+    before, after = clean().record, corrected_log(clean(), found).record
     assert after["position_m"] == pytest.approx(before["position_m"] - 4e-3)
     assert after["differential_pressure_pa"][:197] == pytest.approx(before["differential_pressure_pa"][3:] - 5e4)
     assert np.isnan(after["differential_pressure_pa"][-2:]).all()
-    assert set_right(clean(), explanation()).record["position_m"] is not None
+    assert corrected_log(clean(), explanation()).record["position_m"] is not None
     np.testing.assert_array_equal(
-        set_right(clean(), explanation()).record["differential_pressure_pa"], before["differential_pressure_pa"]
+        corrected_log(clean(), explanation()).record["differential_pressure_pa"], before["differential_pressure_pa"]
     )
 
 
@@ -242,7 +242,7 @@ def test_a_late_pressure_at_a_lower_rate_is_corrected_in_its_nearest_rows(late: 
     sampled[rows] = np.sin(30.0 * (time[rows] - late))
     record = Record(1e-3, {"position_m": 0.1 * time, "differential_pressure_pa": sampled})
     found = explanation(delay=late, pressure_offset=(0.0, 0.0))
-    after = set_right(CleanLog(record, {}, (), ()), found).record["differential_pressure_pa"]
+    after = corrected_log(CleanLog(record, {}, (), ()), found).record["differential_pressure_pa"]
     there = np.flatnonzero(np.isfinite(after))
     assert np.all(np.diff(there) == 4)
     assert len(there) >= len(rows) - 1
@@ -251,28 +251,30 @@ def test_a_late_pressure_at_a_lower_rate_is_corrected_in_its_nearest_rows(late: 
 
 def test_the_course_of_leakage_is_one_at_the_end_of_the_log_and_always_positive() -> None:
     found = explanation(leakage_growth=(1.0, 0.0), leakage_bend=(0.4, 0.0))
-    course = set_right(clean(), found).record[LEAKAGE_COURSE]
+    course = corrected_log(clean(), found).record[LEAKAGE_COURSE]
     assert course[-1] == 1.0
     assert course[100] / course[0] == pytest.approx(1.0 / (1.0 - 0.5 + 0.4 * 0.25))
-    steep = set_right(clean(), explanation(leakage_growth=(4.0, 0.0), leakage_bend=(0.0, 0.0))).record[LEAKAGE_COURSE]
+    steep = corrected_log(clean(), explanation(leakage_growth=(4.0, 0.0), leakage_bend=(0.0, 0.0))).record[
+        LEAKAGE_COURSE
+    ]
     assert steep[0] * 2.98 == pytest.approx(1e-3, rel=1e-6)
 
 
 def test_the_rig_is_corrected_only_in_displacement_and_chamber_volume() -> None:
     found = explanation(pump_displacement=(5e-7, 0.0), chamber_volume=(6e-5, 0.0), bulk_modulus=(1e8, 0.0))
-    right = rig_set_right(P, found)
+    right = corrected_rig(P, found)
     assert (right.pump_displacement, right.chamber_volume, right.bulk_modulus) == (5e-7, 6e-5, P.bulk_modulus)
-    assert rig_set_right(P, explanation()) == P
+    assert corrected_rig(P, explanation()) == P
 
 
 def test_a_log_gets_the_speed_at_which_a_pump_without_ripple_delivers_the_same() -> None:
     speed = np.linspace(20.0, 40.0, 200)
     speed[7] = np.nan
     log = CleanLog(Record(1e-3, {"motor_speed_rad_s": speed, "position_m": np.zeros(200)}), {}, (), ())
-    assert at_pump_speed(log, EVENLY) is log
+    assert log_at_pump_speed(log, NO_RIPPLE) is log
     teeth = (Ripple(11, 0.1, 0.02),)
-    found = at_pump_speed(log, Turning(teeth, 0.3)).record
-    wanted = delivering(np.linspace(20.0, 40.0, 200), teeth, 0.3, 1e-3)
+    found = log_at_pump_speed(log, Turning(teeth, 0.3)).record
+    wanted = delivering_speed(np.linspace(20.0, 40.0, 200), teeth, 0.3, 1e-3)
     assert found["motor_speed_rad_s"] == pytest.approx(wanted)
     assert np.ptp(found["motor_speed_rad_s"] - np.linspace(20.0, 40.0, 200)) > 2.0
     assert np.array_equal(found["position_m"], log.record["position_m"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from estimation.eha.foreign_oil import unless_foreign
+from estimation.eha.foreign_oil import rejected_if_foreign_oil
 from estimation.finding import Outcome
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.notes import ChannelCode, EstimateCode
@@ -54,8 +54,8 @@ def test_a_vague_bulk_modulus_unlike_the_rigs_is_withheld_if_the_piston_stays_st
     """Two scale errors that cancel passed with a vague value, 36 % off: a nonexistent leakage explained them."""
     record = seized()
     whole = replace(estimate_bulk_modulus(record, RIG), value=0.7 * RIG.bulk_modulus)
-    assert unless_foreign(replace(whole, std=0.02 * RIG.bulk_modulus), record, RIG).value == whole.value
-    found = unless_foreign(replace(whole, std=0.2 * RIG.bulk_modulus), record, RIG)
+    assert rejected_if_foreign_oil(replace(whole, std=0.02 * RIG.bulk_modulus), record, RIG).value == whole.value
+    found = rejected_if_foreign_oil(replace(whole, std=0.2 * RIG.bulk_modulus), record, RIG)
     assert (found.value, found.outcome) == (None, Outcome.NOT_OBSERVABLE)
     assert EstimateCode.STILL_AND_FOREIGN in [note.code for note in found.gate.reasons]
 
@@ -66,7 +66,7 @@ def test_oil_unlike_the_rigs_with_a_still_piston_is_noted(times: float, said: bo
     rng = np.random.default_rng(18813)
     log = simulate(CIRCUIT, make_drive("sine", 2.0, 1e-3, RIG, rng), 1e-3, RIG, sensors=BENCH, rng=rng)
     whole = replace(estimate_bulk_modulus(seized(), RIG), remarks=())
-    found = unless_foreign(replace(whole, value=times * RIG.bulk_modulus), log, RIG)
+    found = rejected_if_foreign_oil(replace(whole, value=times * RIG.bulk_modulus), log, RIG)
     assert [note.code for note in found.remarks] == ([EstimateCode.PISTON_STANDS_STILL] if said else [])
 
 
@@ -87,7 +87,7 @@ def test_an_impossible_bulk_modulus_is_a_channel_mistake() -> None:
     """Bar read as Pa are smaller than any sensor's noise, so no unit error is tried; a value of 820 Pa passed."""
     whole = estimate_bulk_modulus(seized(), RIG)
     for times in (1e-5, 100.0):
-        found = unless_foreign(replace(whole, value=times * RIG.bulk_modulus), seized(), RIG)
+        found = rejected_if_foreign_oil(replace(whole, value=times * RIG.bulk_modulus), seized(), RIG)
         assert (found.value, found.outcome) == (None, Outcome.MISMATCH)
         assert ChannelCode.NO_SUCH_OIL in [note.code for note in found.gate.reasons]
 
@@ -108,9 +108,9 @@ def test_oil_stiffer_or_softer_than_any_is_a_wrong_unit_of_pressure(modulus: flo
     rng = np.random.default_rng(18814)
     log = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, RIG, rng), 1e-3, RIG, sensors=BENCH, rng=rng)
     told = replace(estimate_bulk_modulus(seized(), RIG), value=modulus, std=1e-3 * modulus)
-    found = unless_foreign(told, log, RIG)
+    found = rejected_if_foreign_oil(told, log, RIG)
     assert (found.value is not None) is kept
     assert (ChannelCode.NO_SUCH_OIL in [note.code for note in found.gate.reasons]) is not kept
     assert (
-        unless_foreign(replace(told, channels=(POSITION,)), log, RIG).value == modulus
+        rejected_if_foreign_oil(replace(told, channels=(POSITION,)), log, RIG).value == modulus
     )  # without pressure, the mass may be wrong instead

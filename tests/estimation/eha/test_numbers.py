@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from estimation.eha import explanation_notes
-from estimation.eha.changing_leakage import leakage_over
-from estimation.eha.explanation_notes import notes_of, rig_set_right, set_right
+from estimation.eha.changing_leakage import relative_leakage
+from estimation.eha.explanation_notes import corrected_log, corrected_rig, notes_of
 from estimation.eha.rig_share import GAIN, rig_notes, scaled_responses, with_total
 from estimation.finding import Quantity
 from estimation.fits.hypothesis_search.explanation import Explanation
@@ -96,7 +96,7 @@ def what_explains_a_log() -> dict[str, Any]:
             notes_of(explanation(("makeup_blocked",), **(VALUES | {"makeup_share_b": (one, 0.0)})), P)[0].data["side"]
             for one in (0.5, 1.0, 3.0)
         ],
-        "least leakage": leakage_over(explanation((), leakage_growth=(5.0, 0.1)), np.array([0.0, 0.5, 1.0])),
+        "least leakage": relative_leakage(explanation((), leakage_growth=(5.0, 0.1)), np.array([0.0, 0.5, 1.0])),
     }
 
 
@@ -126,19 +126,19 @@ def logs_that_are_set_right() -> dict[str, Any]:
     }
     told: dict[str, Any] = {}
     for name, values in changes.items():
-        found = set_right(log, explanation((), **values)).record
+        found = corrected_log(log, explanation((), **values)).record
         told[name] = {
             one: found[one][[0, 7, 30, 58, 59]]
             for one in found
             if one not in record or not np.array_equal(found[one], record[one])
         }
     own = record.replace(**{VELOCITY: 0.1 * np.cos(0.1 * (k - 3.0))})
-    late = set_right(replace(log, record=own), explanation((), {POSITION: 3e-2})).record
+    late = corrected_log(replace(log, record=own), explanation((), {POSITION: 3e-2})).record
     told["velocity that is late too"] = late[VELOCITY][[0, 7, 30, 59]]
     told["without velocity"] = list(
-        set_right(replace(log, record=record.replace(velocity_m_s=None)), explanation((), {POSITION: 3e-2})).record
+        corrected_log(replace(log, record=record.replace(velocity_m_s=None)), explanation((), {POSITION: 3e-2})).record
     )
-    right = rig_set_right(P, explanation((), **VALUES))
+    right = corrected_rig(P, explanation((), **VALUES))
     told["rig"] = {name: getattr(right, name) for name in explanation_notes.RIG_ENTRIES}
     return told
 

@@ -107,15 +107,15 @@ def banks_of_chamber_filters() -> dict[str, Any]:
     def kept(end: int, samples: int = 5000) -> int:
         return len(chamber_bank._survivors(many, near, end, samples))  # pyright: ignore[reportPrivateUsage]
 
-    part = chamber_bank._part(task(), 5, 12)  # pyright: ignore[reportPrivateUsage]
-    first = chamber_bank._part(task(), 0, 4)  # pyright: ignore[reportPrivateUsage]
-    mean, variance = chamber_bank._mixed(
+    part = chamber_bank._block_task(task(), 5, 12)  # pyright: ignore[reportPrivateUsage]
+    first = chamber_bank._block_task(task(), 0, 4)  # pyright: ignore[reportPrivateUsage]
+    mean, variance = chamber_bank._mixture_moments(
         np.array([0.2, 0.8, 1e-14]), np.array([[[0.0]], [[4.0]], [[1e9]]]), np.ones((3, 1, 1))
     )  # pyright: ignore[reportPrivateUsage]
     read = chamber_bank.run_bank([member(0.0), member(0.4, -1.0), member(-0.8, -2.0)], near)
     return {
         "ends": [
-            chamber_bank._ends(samples, every, step)
+            chamber_bank._block_ends(samples, every, step)
             for samples, every, step in ((1500, 1, 1e-3), (40000, 10, 1e-3), (12, 5, 1e-3), (300, 7, 0.1))
         ],  # pyright: ignore[reportPrivateUsage]
         "heard": [kept(end) for end in (100, 499, 500, 999, 1000, 1999)],
@@ -123,9 +123,9 @@ def banks_of_chamber_filters() -> dict[str, Any]:
         "first part": [len(first.measured), bool(np.isnan(first.measured[0]).any())],
         "weights": chamber_bank._weights([member(0.0, -1e4), member(0.0, -1e4 + 1.0)]),  # pyright: ignore[reportPrivateUsage]
         "mixed": [mean[0, 0], variance[0, 0]],
-        "none is sound": chamber_bank._mixed(np.ones(1), np.full((1, 1, 1), np.nan), np.ones((1, 1, 1)))[0],  # pyright: ignore[reportPrivateUsage]
-        "one from": edge(lambda one: chamber_bank._same(member(one), member(0.0, 0.0, 2.0), near), 0.1, 9.0),  # pyright: ignore[reportPrivateUsage]
-        "apart": len(chamber_bank._apart([member(0.3 * k) for k in range(9)], near)),  # pyright: ignore[reportPrivateUsage]
+        "none is sound": chamber_bank._mixture_moments(np.ones(1), np.full((1, 1, 1), np.nan), np.ones((1, 1, 1)))[0],  # pyright: ignore[reportPrivateUsage]
+        "one from": edge(lambda one: chamber_bank._count_as_one(member(one), member(0.0, 0.0, 2.0), near), 0.1, 9.0),  # pyright: ignore[reportPrivateUsage]
+        "apart": len(chamber_bank._distinct_filters([member(0.3 * k) for k in range(9)], near)),  # pyright: ignore[reportPrivateUsage]
         "online": {str(k): read.online.track[[0, 700, -1], k] for k in range(width)},
         "online, variances": {str(k): read.online.track_variance[[700, -1], k] for k in range(width)},
         "at the end": {"mean": read.online.mean, "log-likelihood": read.again.log_likelihood},

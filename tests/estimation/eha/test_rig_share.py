@@ -9,14 +9,14 @@ import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.estimate import estimate_log
-from estimation.eha.rig_share import delivery_left_open, fitted_responses, scaled_responses, with_total, with_wear
+from estimation.eha.rig_share import fitted_responses, scaled_responses, undetermined_delivery, with_total, with_wear
 from estimation.finding import Quantity, positive_interval_95
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
 from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
-from plant.eha.doubts import DOUBTS, PRESSURE_GAIN, Spread
+from plant.eha.doubts import DEFAULT_UNCERTAINTIES, PRESSURE_GAIN, Spread
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
@@ -137,7 +137,7 @@ def test_a_quantity_without_known_responses_has_no_total_interval() -> None:
     assert with_total(quantity(1.0, 0.1), None, {"chamber_volume": Spread.of(0.15)}).ci95_total is None
 
 
-EXACT = {name: 0.0 for name in DOUBTS if getattr(HEALTHY, name, 1.0) is not None}
+EXACT = {name: 0.0 for name in DEFAULT_UNCERTAINTIES if getattr(HEALTHY, name, 1.0) is not None}
 """Uncertainties of a rig file whose entries are all exact."""
 
 
@@ -176,7 +176,10 @@ def test_total_intervals_cover_if_rig_files_err_by_their_stated_uncertainty() ->
     logs = 30
     rng, covered, given = np.random.default_rng(5), list[bool](), list[bool]()
     for trial in range(logs):
-        wrong = {name: math.exp(DOUBTS[name].usual.up * rng.standard_normal()) for name in (*ENTRIES, PRESSURE_GAIN)}
+        wrong = {
+            name: math.exp(DEFAULT_UNCERTAINTIES[name].usual.up * rng.standard_normal())
+            for name in (*ENTRIES, PRESSURE_GAIN)
+        }
         true = replace(HEALTHY, **{name: wrong[name] * asdict(HEALTHY)[name] for name in ENTRIES})
         record = log(true, ("steps", "prbs")[trial % 2], seed=trial)
         found = estimate_log(record.replace(**{PRESSURE: wrong[PRESSURE_GAIN] * record[PRESSURE]}), Rig())
@@ -200,5 +203,5 @@ def test_wear_that_is_not_excluded_widens_displacement_downwards_only() -> None:
 
 def test_an_undetermined_delivery_has_its_likeliest_value_and_deviation() -> None:
     (noted,) = open_wear_note(PredictedGain(1.0, -0.04, 0.05))
-    assert delivery_left_open((noted,)) == (pytest.approx(-0.04), pytest.approx(0.05), -math.inf)
-    assert delivery_left_open(()) is None
+    assert undetermined_delivery((noted,)) == (pytest.approx(-0.04), pytest.approx(0.05), -math.inf)
+    assert undetermined_delivery(()) is None

@@ -5,7 +5,7 @@ import pytest
 
 from estimation.engine.kalman import scaled_step
 from estimation.engine.kernels import LANES, compile_kernel, kernel_source
-from estimation.engine.layout import all_present, at_sample, counting_missing, halves_of
+from estimation.engine.layout import full_sample_update, halves_of, step_at_sample, with_missing_counted
 from estimation.engine.rule import Rule
 from estimation.filters.ekf import EKF, ekf, ekf_predict, ekf_update
 from estimation.filters.run import run_filter
@@ -51,8 +51,8 @@ def test_one_filter_and_many_have_the_same_branch_free_kernel_source() -> None:
 
 
 def test_an_update_with_all_channels_present_checks_for_no_missing_sample() -> None:
-    update = counting_missing(halves_of(EKF, ACCELERATION_FORM, CHANNELS).update)
-    whole = all_present(update)
+    update = with_missing_counted(halves_of(EKF, ACCELERATION_FORM, CHANNELS).update)
+    whole = full_sample_update(update)
     assert update.keys() - whole.keys() == {"count0", "count1"}
     assert "present" in {item.operation for item in ordered(update.values())}
     assert "present" not in {item.operation for item in ordered(whole.values())}
@@ -62,7 +62,7 @@ def test_an_update_with_all_channels_present_checks_for_no_missing_sample() -> N
 @pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
 def test_a_step_that_begins_at_a_sample_equals_the_first_sub_step(model: ProcessModel, rule: Rule) -> None:
     predict, rng = halves_of(rule, model, CHANNELS).predict, np.random.default_rng(3)
-    begins = at_sample(predict)
+    begins = step_at_sample(predict)
     assert "j" in symbols_in(list(predict.values()))
     assert "j" not in symbols_in(list(begins.values()))
     values = {name: rng.uniform(0.5, 2.0) for name in symbols_in(list(predict.values()))}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.engine.kalman import belief_symbols, moved, scaled_step
+from estimation.engine.kalman import belief_symbols, next_state, scaled_step
 from estimation.engine.spread import spread, waypoints_of
 from estimation.filters.ekf import ekf_predict
 from estimation.models.eha_forms import ACCELERATION_FORM, PRESSURE_FORM
@@ -47,13 +47,13 @@ def test_the_covariance_through_waypoints_equals_the_one_by_the_jacobian(state: 
 
 
 def test_the_pressure_form_names_waypoints_and_the_acceleration_form_none() -> None:
-    points, none = (waypoints_of(moved(m, belief_symbols(m)[0])) for m in (PRESSURE_FORM, ACCELERATION_FORM))
+    points, none = (waypoints_of(next_state(m, belief_symbols(m)[0])) for m in (PRESSURE_FORM, ACCELERATION_FORM))
     assert (len(points), none) == (9, [])
 
 
 def test_a_prediction_adds_process_noise_to_the_variances_alone() -> None:
     z, P = belief_symbols(PRESSURE_FORM)
-    before = spread(moved(PRESSURE_FORM, z), z, P)
+    before = spread(next_state(PRESSURE_FORM, z), z, P)
     after = ekf_predict(PRESSURE_FORM)
     for i, j in P:
         noise = symbol(f"q{i}") * symbol("h")

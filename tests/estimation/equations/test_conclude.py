@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.equations.conclude import concluded, covariance_of
+from estimation.equations.conclude import concluded_finding, covariance_of
 from estimation.equations.definition import Equations, Parameter
-from estimation.equations.fit import EquationsFit, _started, fit_equations, simulated
+from estimation.equations.fit import EquationsFit, _with_fitted_starts, fit_equations, simulated_outputs
 from estimation.equations.problem import Problem, part_of
-from estimation.equations.search import EVALUATIONS, MOST_STEPS, SETTLED
+from estimation.equations.search import EVALUATIONS, LARGEST_SHIFT, MOST_STEPS
 from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
 
@@ -98,19 +98,19 @@ def test_starts_disagree_only_if_their_log_likelihoods_differ_by_less_than_two(
     solution = found.solution
     mirror = -solution.point.theta  # the gain is squared, so its sign is undetermined
     other = replace(solution, others=(mirror,), point=replace(solution.point, cost=solution.point.cost - worse))
-    notes = concluded(other, np.array([np.nan]))[0].notes
+    notes = concluded_finding(other, np.array([np.nan]))[0].notes
     assert ("starts_disagree" in codes(notes)) is told
 
 
 def test_too_long_steps_and_a_search_that_did_not_converge_fail_the_gate(found: EquationsFit) -> None:
     given = np.array([np.nan])
-    doubted = replace(found.solution, moved=1.01 * SETTLED, evaluations=EVALUATIONS)
-    reasons = {str(note.code): note.data for note in concluded(doubted, given)[0].gate.reasons}
+    doubted = replace(found.solution, moved=1.01 * LARGEST_SHIFT, evaluations=EVALUATIONS)
+    reasons = {str(note.code): note.data for note in concluded_finding(doubted, given)[0].gate.reasons}
     assert reasons == {
-        "steps_too_long": {"deviations": 1.01 * SETTLED, "steps": 2 * MOST_STEPS},
+        "steps_too_long": {"deviations": 1.01 * LARGEST_SHIFT, "steps": 2 * MOST_STEPS},
         "not_converged": {"evaluations": EVALUATIONS},
     }
-    assert concluded(replace(found.solution, moved=0.99 * SETTLED), given)[0].gate.passed
+    assert concluded_finding(replace(found.solution, moved=0.99 * LARGEST_SHIFT), given)[0].gate.passed
 
 
 def test_equations_need_a_log() -> None:
@@ -142,7 +142,7 @@ def test_a_point_at_which_the_equations_diverge_has_an_infinite_cost(size: float
 
 
 def test_equations_that_diverge_from_every_start_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("estimation.equations.search.stepped", lambda problem, _: problem)
+    monkeypatch.setattr("estimation.equations.search.with_enough_steps", lambda problem, _: problem)
     growing = equations(
         lambda s, i, p: (p.rate * s.way + i.push,),
         parameters={"rate": Parameter(1e4, (9e3, 1e5))},
@@ -153,17 +153,19 @@ def test_equations_that_diverge_from_every_start_are_refused(monkeypatch: pytest
 
 
 def test_steps_are_halved_until_the_solution_no_longer_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("estimation.equations.search.STEPPED_WELL", 1e3)  # the first check finds all steps short enough
+    monkeypatch.setattr(
+        "estimation.equations.search.LARGEST_STEP_CHANGE", 1e3
+    )  # the first check finds all steps short enough
     swinging = equations(
         lambda s, i, p: (s.pace, 40.0 * (i.push - s.way) - p.damping * s.pace),
         states={"way": "m", "pace": "m/s"},
         parameters={"damping": Parameter(2.0, (0.1, 10.0))},
         initial={"way": 0.0, "pace": 0.0},
     )
-    way = simulated(swinging, log(), {"damping": 1.5}, {})["way"]
+    way = simulated_outputs(swinging, log(), {"damping": 1.5}, {})["way"]
     fit = fit_equations(swinging, [Record(0.05, {"push": PUSH, "way": way + 1e-3 * NOISE})])
     assert fit.solution.problem.substeps > 1
-    assert fit.solution.moved <= SETTLED
+    assert fit.solution.moved <= LARGEST_SHIFT
     assert fit.finding.quantities["damping"].covers(1.5)
 
 
@@ -179,7 +181,7 @@ def test_the_search_of_initial_states_takes_at_most_ten_steps() -> None:
     )
     record = Record(0.05, {"push": PUSH, "way": np.zeros(300)})
     problem = Problem(flat, (part_of(flat, record),), "rk4", 1, np.array([1.0]))
-    theta = _started(problem, problem.coordinates(np.array([0.8, 1.0])), [1])
+    theta = _with_fitted_starts(problem, problem.coordinates(np.array([0.8, 1.0])), [1])
     assert problem.values(theta)[1] == pytest.approx((2.0 / 3.0) ** 10)
 
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from estimation.equations.definition import Equations, Parameter
-from estimation.equations.fit import EquationsFit, fit_equations, simulated
+from estimation.equations.fit import EquationsFit, fit_equations, simulated_outputs
 from estimation.equations.problem import Problem, part_of
 from estimation.finding import Outcome
 from plant.errors import HydrostateError, LogError
@@ -91,7 +91,7 @@ def test_sensitivities_are_exact_for_both_schemes(swing: Any) -> None:
 
 
 def test_a_simulation_follows_the_exact_solution_of_the_differential_equation(swing: Any) -> None:
-    run = simulated(model(), logged(swing), TRUTH, {"angle": 0.3, "speed": 0.0})
+    run = simulated_outputs(model(), logged(swing), TRUTH, {"angle": 0.3, "speed": 0.0})
     np.testing.assert_allclose(run["angle"], swing, atol=1e-4)
 
 
@@ -106,8 +106,8 @@ def test_a_held_input_is_constant_between_samples() -> None:
         "parameters": {"one": Parameter(1.0)},
     }
     steps = Record(1.0, {"rate": np.array([0.0, 1.0, 3.0, 0.0])})
-    held = simulated(Equations(growing, **names, held=("rate",)), steps, {}, {"x": 0.0})
-    line = simulated(Equations(growing, **names), steps, {}, {"x": 0.0})
+    held = simulated_outputs(Equations(growing, **names, held=("rate",)), steps, {}, {"x": 0.0})
+    line = simulated_outputs(Equations(growing, **names), steps, {}, {"x": 0.0})
     np.testing.assert_allclose(held["x"], [0.0, 0.0, 1.0, 4.0])
     np.testing.assert_allclose(line["x"], [0.0, 0.5, 2.5, 4.0])
 
@@ -198,7 +198,7 @@ def test_a_stiff_model_is_stepped_implicitly() -> None:
     stiff = Equations(lag, **names, parameters={"rate": Parameter(1.0, (0.1, 100.0))})
     u = np.sign(np.sin(3.0 * TIME))
     log = Record(SAMPLE_TIME, {"u": u})
-    fast = simulated(stiff, log, {"rate": 5.0}, {"x": 0.0, "fast": 0.0})["fast"]
+    fast = simulated_outputs(stiff, log, {"rate": 5.0}, {"x": 0.0, "fast": 0.0})["fast"]
     fit = fit_equations(stiff, [log.replace(fast=fast + 0.01 * np.random.default_rng(2).standard_normal(SAMPLES))])
     assert fit.solution.problem.scheme == "ros2"
     assert fit.finding.quantities["rate"].covers(5.0)
@@ -265,9 +265,9 @@ def test_invalid_options_are_refused(swing: Any, options: Any, said: str) -> Non
 
 def test_a_simulation_refuses_unknown_names(swing: Any) -> None:
     with pytest.raises(HydrostateError, match="initial names 'velocity'"):
-        simulated(model(), logged(swing), {}, {"velocity": 1.0})
+        simulated_outputs(model(), logged(swing), {}, {"velocity": 1.0})
     with pytest.raises(HydrostateError, match="values names 'mass'"):
-        simulated(model(), logged(swing), {"mass": 1.0}, {})
+        simulated_outputs(model(), logged(swing), {"mass": 1.0}, {})
 
 
 def test_a_log_too_short_for_residual_tests_is_still_fitted(swing: Any) -> None:

@@ -11,10 +11,10 @@ import pytest
 
 from estimation.equations import conclude, search
 from estimation.equations.definition import Equations, Parameter
-from estimation.equations.fit import EquationsFit, _started, fit_equations, simulated
+from estimation.equations.fit import EquationsFit, _with_fitted_starts, fit_equations, simulated_outputs
 from estimation.equations.problem import Part, Problem, known_noise, part_of, spread, start_of
 from estimation.equations.search import Solution
-from estimation.equations.stops import RUN, standing
+from estimation.equations.stops import SHORTEST_STAY, standing_ends
 from estimation.stretches import in_long_stretches
 from plant.arrays import Array
 from plant.log.record import Record
@@ -51,7 +51,7 @@ def model(derivative: Any = pendulum, **changes: Any) -> Equations:
 def angle() -> Array:
     truth = {"inertia": 0.2, "weight": 2.0, "damping": 0.05}
     record = Record(T, {"torque": TORQUE, "angle": np.zeros(N)})
-    return np.asarray(simulated(model(), record, truth, {"angle": 0.3, "speed": 0.1})["angle"])
+    return np.asarray(simulated_outputs(model(), record, truth, {"angle": 0.3, "speed": 0.1})["angle"])
 
 
 def logged(noise: float = 0.02, last: int = N) -> Record:
@@ -157,22 +157,22 @@ def parts_of_searches() -> dict[str, Any]:
     told["guesses"] = [np.round(guess, 9) for guess in search._guesses(one, 3, 7)]
     for name, scale in (("slow", 1.0), ("quick", 4.0), ("quicker", 30.0), ("stiff", 1000.0)):
         theta = THETA + np.array([-np.log(scale), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-        found = search.stepped(one, theta)
+        found = search.with_enough_steps(one, theta)
         told[f"steps, {name}"] = [found.scheme, found.substeps]
     told["steps of little noise"] = [
         (found.scheme, found.substeps)
         for size in (1e-4, 1e-6)
-        if (found := search.stepped(one.with_noise(np.array([size])), THETA))
+        if (found := search.with_enough_steps(one.with_noise(np.array([size])), THETA))
     ]
     told["explained"] = [
-        search._explained(one, THETA, np.array([size])) for size in (0.02, 0.025, 0.0265, 0.0275, 0.029, 0.05, 0.3)
+        search._is_explained(one, THETA, np.array([size])) for size in (0.02, 0.025, 0.0265, 0.0275, 0.029, 0.05, 0.3)
     ]
     for robust in (False, True):
         this = replace(problem(), robust=robust)
-        told[f"shown, robust {robust}"] = search._shown(this, THETA, spread(this.parts))
-    told["shown at least"] = search._shown(problem(), THETA, np.array([1e9]))
-    told["moved"] = [search._moved(replace(one, substeps=count), one.at(THETA)) for count in (1, 2)]
-    ended = search._lengthened(
+        told[f"shown, robust {robust}"] = search._residual_deviations(this, THETA, spread(this.parts))
+    told["shown at least"] = search._residual_deviations(problem(), THETA, np.array([1e9]))
+    told["moved"] = [search._step_length_shift(replace(one, substeps=count), one.at(THETA)) for count in (1, 2)]
+    ended = search._optimum_by_lengthening(
         problem(noise=np.array([0.05])), one.coordinates(np.array([p.start for p in one.unknowns]))
     )
     told["lengthened"] = Roughly(ended.cost, 1e-3)
@@ -256,7 +256,7 @@ def fits_and_what_they_say() -> dict[str, Any]:
     told["samples"] = [refused(partial(fit_equations, model(), [logged(last=n)])) for n in (5, 6)]
     told["samples of two logs"] = refused(partial(fit_equations, model(), [logged(last=3), logged(last=4)]))
     this = Problem(model(), parts()[:1], "rk4", 1, np.ones(1))
-    told["states begun"] = _started(this, THETA[:5] + 0.2, [3, 4])
+    told["states begun"] = _with_fitted_starts(this, THETA[:5] + 0.2, [3, 4])
     return told
 
 
@@ -270,7 +270,7 @@ def conclusions() -> dict[str, Any]:
     base = found("plain").solution
     this, theta = base.problem, base.point.theta
     told["doubts"] = [
-        [str(note.code) for note in conclude._doubts(replace(base, moved=moved, evaluations=count))]
+        [str(note.code) for note in conclude._convergence_notes(replace(base, moved=moved, evaluations=count))]
         for moved, count in ((0.04, 0), (0.06, 0), (0.0, 100))
     ]
     told["fit"] = conclude.fits_of(this, theta)
@@ -286,11 +286,11 @@ def conclusions() -> dict[str, Any]:
     ]
     rng = np.random.default_rng(3)
     told["followed"] = [
-        conclude._followed(rng.standard_normal(N) + share * TORQUE, TORQUE, np.ones((N, 1)))
+        conclude._explained_share(rng.standard_normal(N) + share * TORQUE, TORQUE, np.ones((N, 1)))
         for share in (0.0, 0.3, 2.0)
     ]
-    told["followed by nothing"] = conclude._followed(NOISE, np.ones(N), np.ones((N, 1)))
-    told["followed by few"] = conclude._followed(NOISE[:5], TORQUE[:5], np.ones((5, 1)))
+    told["followed by nothing"] = conclude._explained_share(NOISE, np.ones(N), np.ones((N, 1)))
+    told["followed by few"] = conclude._explained_share(NOISE[:5], TORQUE[:5], np.ones((5, 1)))
     low, _ = this.bounds
     told["at bounds"] = [
         [
@@ -300,16 +300,16 @@ def conclusions() -> dict[str, Any]:
         for step in (0.0, 1e-10, 1e-8)
     ]
     poor = replace(found("plain").covariance, std=np.array([0.49, 0.51, 5.1, 0.1, 0.1]))
-    told["poorly told"] = [[str(note.code), _numbers(note.data)] for note in conclude._not_told(this, theta, poor)]
+    vague = conclude._undetermined_notes(this, theta, poor)
+    told["poorly told"] = [[str(note.code), _numbers(note.data)] for note in vague]
     found_std = found("plain").covariance
     for name, shift in (("near", 2.0), ("apart", 4.0)):
         other = theta + shift * np.where(np.arange(theta.size) == 1, found_std.std, 0.0)
         one = Solution(this, base.point, (other,))
-        told[f"other starts, {name}"] = [dict(note.data) for note in conclude._others(one, found_std)]
+        told[f"other starts, {name}"] = [dict(note.data) for note in conclude._other_solution_notes(one, found_std)]
     worse = replace(base.point, cost=this.at(other).cost - 1.9)
-    told["other starts, as well"] = [
-        dict(note.data) for note in conclude._others(Solution(this, worse, (other,)), found_std)
-    ]
+    one = Solution(this, worse, (other,))
+    told["other starts, as well"] = [dict(note.data) for note in conclude._other_solution_notes(one, found_std)]
     return told
 
 
@@ -338,11 +338,11 @@ def channels_that_stand() -> dict[str, Any]:
     told: dict[str, Any] = {
         name: [
             [one.end, one.value, one.share, int(sum(np.count_nonzero(w) for w in one.where))]
-            for one in standing(*given)
+            for one in standing_ends(*given)
         ]
         for name, given in rows.items()
     }
-    return told | {"runs": in_long_stretches(np.array([1, 1, 0, 1, 1, 1, 0, 0, 1, 1, 1, 1], dtype=bool), RUN)}
+    return told | {"runs": in_long_stretches(np.array([1, 1, 0, 1, 1, 1, 0, 0, 1, 1, 1, 1], dtype=bool), SHORTEST_STAY)}
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)

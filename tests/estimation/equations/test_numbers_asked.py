@@ -54,8 +54,8 @@ def descents() -> dict[str, Any]:
     one = problem()
     guesses = [THETA + 0.1 * k for k in range(5)]
     with watched(search, "descend", evaluations) as asked:
-        search._descended(one, guesses[:1])
-        search._descended(one, guesses)
+        search._optima(one, guesses[:1])
+        search._optima(one, guesses)
     told["starts"] = asked
     lengths: list[int] = []
 
@@ -64,13 +64,13 @@ def descents() -> dict[str, Any]:
         return at(start)
 
     with watched(search, "descend", evaluations, stay):
-        search._lengthened(one, THETA)
+        search._optimum_by_lengthening(one, THETA)
     told["beginnings"] = lengths
     with watched(search, "descend", evaluations) as asked:
-        point, left = search._finished(one, THETA + 0.2)
+        point, left = search._final_descent(one, THETA + 0.2)
     told["finished"] = [asked, left, point.theta]
     with watched(search, "descend", evaluations, lambda at, start, most, *_: [at(start) for _ in range(most)].pop()):
-        told["not finished"] = search._finished(one, THETA)[1]
+        told["not finished"] = search._final_descent(one, THETA)[1]
     return told
 
 
@@ -94,11 +94,11 @@ def rounds() -> dict[str, Any]:
         "do not quite": [0.05 * (1.0 + 0.011), *[0.05 * (1.0 + 0.011)] * 9],
     }.items():
         shown = iter(sizes)
-        with watched(search, "_shown", lambda *_: 0, lambda *_: np.array([next(shown)])) as asked:  # noqa: B023
-            search._refined(one, one.at(THETA), np.array([np.nan]), typical)
+        with watched(search, "_residual_deviations", lambda *_: 0, lambda *_: np.array([next(shown)])) as asked:  # noqa: B023
+            search._refined_solution(one, one.at(THETA), np.array([np.nan]), typical)
         told[f"noises that {name}"] = len(asked)
-    with watched(search, "_shown", lambda *_: 0) as asked:
-        found = search._refined(one, one.at(THETA), np.array([0.07]), typical)
+    with watched(search, "_residual_deviations", lambda *_: 0) as asked:
+        found = search._refined_solution(one, one.at(THETA), np.array([0.07]), typical)
     told["noise that is given"] = [len(asked), found.problem.noise, found.moved, found.evaluations]
     return told
 
@@ -118,22 +118,24 @@ def whole_searches() -> dict[str, Any]:
         def refined(this: Problem, *_: Any, left: Iterator[float] = left) -> search.Solution:
             return search.Solution(this, end, moved=next(left))
 
-        with watched(search, "_refined", lambda this, *_: this.substeps, refined) as asked:
-            found = search.searched(MODEL, one.parts, np.array([np.nan]), robust=False, starts=1, seed=0)
+        with watched(search, "_refined_solution", lambda this, *_: this.substeps, refined) as asked:
+            found = search.best_solution(MODEL, one.parts, np.array([np.nan]), robust=False, starts=1, seed=0)
         told[name] = [asked, found.moved]
     for name, explained in (("explained", True), ("astray", False)):
         with (
             watched(
-                search, "_explained", lambda this, _, noise: [this.noise, noise], lambda *_, to=explained: to
+                search, "_is_explained", lambda this, _, noise: [this.noise, noise], lambda *_, to=explained: to
             ) as noises,
-            watched(search, "_lengthened", lambda this, _: this.noise) as longer,
+            watched(search, "_optimum_by_lengthening", lambda this, _: this.noise) as longer,
         ):
-            found = search.searched(MODEL, one.parts, np.array([np.nan]), robust=True, starts=2, seed=1)
+            found = search.best_solution(MODEL, one.parts, np.array([np.nan]), robust=True, starts=2, seed=1)
         told[name] = [noises, longer, len(found.others), found.problem.noise]
     far = Equations(lambda state, *_: (state.way * state.way * 1e9,), **_given())
     told["refused"] = [
-        refused(lambda: search.stepped(Problem(far, one.parts, "rk4", 1, np.ones(1)), np.array([2.0, 0.0, 9e9]))),
-        refused(lambda: search._descended(Problem(far, one.parts, "rk4", 1, np.ones(1)), [np.array([2.0, 0.0, 9e9])])),
+        refused(
+            lambda: search.with_enough_steps(Problem(far, one.parts, "rk4", 1, np.ones(1)), np.array([2.0, 0.0, 9e9]))
+        ),
+        refused(lambda: search._optima(Problem(far, one.parts, "rk4", 1, np.ones(1)), [np.array([2.0, 0.0, 9e9])])),
     ]
     return told
 

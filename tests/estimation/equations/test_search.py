@@ -8,7 +8,7 @@ import pytest
 from estimation.equations import search
 from estimation.equations.definition import Equations, Parameter
 from estimation.equations.problem import Problem, part_of
-from estimation.equations.search import _guesses, _moved
+from estimation.equations.search import _guesses, _step_length_shift
 from plant.log.record import Record
 
 RECORD = Record(0.05, {"push": np.sin(np.arange(100.0)), "way": np.cos(np.arange(100.0))})
@@ -61,7 +61,9 @@ def test_a_solution_that_diverges_with_other_steps_has_an_infinite_step_error(
     )
     problem = Problem(equations, (part_of(equations, RECORD),), "rk4", 1, np.array([0.01]))
     point = problem.at(problem.coordinates(np.array([3.0, 0.5, -1.0, 0.3])))
-    assert 0.0 < _moved(problem, point) < 0.05
-    whole = search._whole
-    monkeypatch.setattr(search, "_whole", lambda one, at: None if one.substeps == substeps else whole(one, at))
-    assert _moved(problem, point) == np.inf
+    assert 0.0 < _step_length_shift(problem, point) < 0.05
+    whole = search._finite_residuals
+    monkeypatch.setattr(
+        search, "_finite_residuals", lambda one, at: None if one.substeps == substeps else whole(one, at)
+    )
+    assert _step_length_shift(problem, point) == np.inf

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.equations.stops import standing
+from estimation.equations.stops import standing_ends
 
 TIME = 0.01 * np.arange(2000)
 RNG = np.random.default_rng(0)
@@ -29,23 +29,23 @@ def test_limits_are_found_at_the_ends_where_a_channel_stays(
     noise: float,
     wanted: dict[str, float],
 ) -> None:
-    found = {one.end: one.value for one in standing([values], noise)}
+    found = {one.end: one.value for one in standing_ends([values], noise)}
     assert found == {end: pytest.approx(value, abs=0.005) for end, value in wanted.items()}
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e9])
 def test_the_limits_of_a_channel_do_not_depend_on_its_unit(unit: float) -> None:
     values = unit * np.clip(np.sin(TIME), -0.7, 0.5)
-    ends = {(one.end, round(one.value / unit, 9)) for one in standing([values], 0.0)}
+    ends = {(one.end, round(one.value / unit, 9)) for one in standing_ends([values], 0.0)}
     assert ends == {("least", -0.7), ("largest", 0.5)}
     # from 0.04 on, three deviations of noise are a tenth of the range and hide its ends
-    assert [one.end for one in standing([values], 0.039 * unit)] == ["largest"]
-    assert list(standing([values], 0.041 * unit)) == []
+    assert [one.end for one in standing_ends([values], 0.039 * unit)] == ["largest"]
+    assert list(standing_ends([values], 0.041 * unit)) == []
 
 
 def test_the_samples_at_a_limit_and_their_share_are_returned() -> None:
     values = np.sin(TIME)
     values[values > 0.5] = 0.5
-    (found,) = standing([values], 0.0)
+    (found,) = standing_ends([values], 0.0)
     np.testing.assert_array_equal(found.where[0], values == 0.5)
     assert found.share == pytest.approx(np.mean(values == 0.5))

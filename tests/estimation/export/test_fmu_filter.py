@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.filters.export_c import SAMPLE_TIME, task
+from benchmarks.filters.export_c import SAMPLE_TIME, filter_problem
 from estimation.export.fmu_filter import filter_fmu
 from estimation.filters.methods import METHODS
 from tests.c_compiler import compiler
@@ -36,7 +36,7 @@ def test_a_filter_fmu_passes_validation_and_agrees_with_the_native_filter(
 ) -> None:
     from fmpy.validation import validate_fmu
 
-    problem = task(form, "normal", 1500)
+    problem = filter_problem(form, "normal", 1500)
     path = tmp_path / "filter.fmu"
     path.write_bytes(filter_fmu(problem, method, fmi, name="believed"))
     assert validate_fmu(str(path)) == []

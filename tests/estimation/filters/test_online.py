@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.filters.export_c import task
+from benchmarks.filters.export_c import filter_problem
 from estimation.filters.methods import METHODS
 from estimation.filters.online import RULES, OnlineFilter
 from plant.errors import HydrostateError
@@ -23,7 +23,7 @@ def pieces(filtered: OnlineFilter, begin: int = 0, end: int = SAMPLES, seed: int
 def test_a_stream_in_pieces_of_any_length_gives_the_same_bits_as_the_filter_of_the_whole_log(
     form: str, method: str
 ) -> None:
-    problem = task(form, "minor_leakage", SAMPLES)
+    problem = filter_problem(form, "minor_leakage", SAMPLES)
     filtered = OnlineFilter(problem, method)
     pieces(filtered)
     trace, now = METHODS[method](problem), filtered.now()
@@ -34,7 +34,7 @@ def test_a_stream_in_pieces_of_any_length_gives_the_same_bits_as_the_filter_of_t
 
 @pytest.mark.parametrize("method", ["ekf", "svsf"])
 def test_a_resumed_filter_gives_the_same_bits_as_an_uninterrupted_one(method: str) -> None:
-    problem = task("pressure", "normal", SAMPLES)
+    problem = filter_problem("pressure", "normal", SAMPLES)
     whole, before, after = (OnlineFilter(problem, method) for _ in range(3))
     pieces(whole)
     pieces(before, end=777)
@@ -47,7 +47,7 @@ def test_a_resumed_filter_gives_the_same_bits_as_an_uninterrupted_one(method: st
 
 
 def test_a_missing_drive_keeps_its_last_value_and_missing_measurements_are_not_counted() -> None:
-    problem = task("pressure", "normal", 100)
+    problem = filter_problem("pressure", "normal", 100)
     drives, measured = problem.drives.copy(), problem.measured.copy()
     drives[41:45], measured[41:45] = np.nan, np.nan
     held = drives.copy()
@@ -61,7 +61,7 @@ def test_a_missing_drive_keeps_its_last_value_and_missing_measurements_are_not_c
 
 
 def test_an_unsuitable_method_sample_shape_or_resumed_form_is_refused() -> None:
-    problem = task("pressure", "normal", 100)
+    problem = filter_problem("pressure", "normal", 100)
     filtered = OnlineFilter(problem)
     with pytest.raises(HydrostateError, match="a method that filters a stream must be one of ekf"):
         OnlineFilter(problem, "smoother")
@@ -70,12 +70,12 @@ def test_an_unsuitable_method_sample_shape_or_resumed_form_is_refused() -> None:
     with pytest.raises(HydrostateError, match="must have every drive"):
         filtered.take(np.full((1, 1), np.nan), problem.measured[:1])
     with pytest.raises(HydrostateError, match="can only continue one of the same form"):
-        filtered.resume(OnlineFilter(task("acceleration", "normal", 100)).remembered())
+        filtered.resume(OnlineFilter(filter_problem("acceleration", "normal", 100)).remembered())
     assert set(RULES) == {"ekf", "iekf", "ukf", "ckf", "svsf", "sif"}
 
 
 def test_no_samples_change_nothing() -> None:
-    problem = task("pressure", "normal", 100)
+    problem = filter_problem("pressure", "normal", 100)
     filtered = OnlineFilter(problem, "ekf")
     pieces(filtered, 0, 50)
     before = filtered.now().values.copy()

@@ -12,7 +12,7 @@ from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypothesis_search.wide_log import widened
+from estimation.fits.hypothesis_search.wide_log import widened_log
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from plant.arrays import Array
 from plant.eha.circuit_parameters import circuit_of
@@ -112,4 +112,4 @@ def made_fit(
 
 @cache
 def wide(stiffness: float = 3e7) -> GreyBoxLog:
-    return widened(seen(log(0.5), chamber_volume=0.1), PAPER, {STIFFNESS: stiffness})
+    return widened_log(seen(log(0.5), chamber_volume=0.1), PAPER, {STIFFNESS: stiffness})

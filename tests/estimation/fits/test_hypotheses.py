@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation.eha.estimate import estimate_log
-from estimation.eha.explanation_notes import notes_of, rig_set_right, set_right
+from estimation.eha.explanation_notes import corrected_log, corrected_rig, notes_of
 from estimation.fits.flow import asked_hypotheses
 from estimation.fits.flow.asked_hypotheses import near_starts
 from estimation.fits.flow.belief import wanted_cost
@@ -81,7 +81,7 @@ def test_a_late_pressure_is_identified_with_its_delay_and_corrected() -> None:
     (note,) = notes_of(found, HEALTHY)
     assert note.code is RigCode.PRESSURE_LATE
     assert note.data["late_ms"] == pytest.approx(5.0, abs=0.3)
-    mended = set_right(clean_log(late(record, 5), HEALTHY), found).record[PRESSURE]
+    mended = corrected_log(clean_log(late(record, 5), HEALTHY), found).record[PRESSURE]
     there = np.isfinite(mended)
     assert np.std((mended - record[PRESSURE])[there]) < 0.1 * np.std(record[PRESSURE])
 
@@ -108,7 +108,7 @@ def test_a_late_speed_or_position_is_identified_with_its_delay_and_corrected(cha
     assert note.code is RigCode.INPUT_LATE
     assert note.data["channel"] == channel
     assert note.data["late_ms"] == pytest.approx(3.0, abs=0.2)
-    mended = set_right(clean_log(given, HEALTHY), found).record[channel]
+    mended = corrected_log(clean_log(given, HEALTHY), found).record[channel]
     there = np.isfinite(mended)
     assert np.std((mended - record[channel])[there]) < 0.2 * np.std((behind - record[channel])[there])
 
@@ -118,10 +118,10 @@ def test_a_velocity_from_a_late_encoder_is_corrected_with_it_and_a_separate_one_
     behind = {name: np.concatenate([np.zeros(5), record[name][:-5]]) for name in ("position_m", "velocity_m_s")}
     fit = cast("GreyBoxFit", None)
     found = Explanation(("position_late",), {"position_lag": (0.0, 1e-4)}, {"position_m": 5e-3}, (fit,), (), 1e6)
-    both = set_right(clean_log(record.replace(**behind), HEALTHY), found).record["velocity_m_s"]
+    both = corrected_log(clean_log(record.replace(**behind), HEALTHY), found).record["velocity_m_s"]
     alone = clean_log(record.replace(position_m=behind["position_m"]), HEALTHY)
     assert np.nanstd(both - record["velocity_m_s"]) < 0.1 * np.std(behind["velocity_m_s"] - record["velocity_m_s"])
-    assert np.array_equal(set_right(alone, found).record["velocity_m_s"], alone.record["velocity_m_s"])
+    assert np.array_equal(corrected_log(alone, found).record["velocity_m_s"], alone.record["velocity_m_s"])
 
 
 def test_a_drifting_pressure_offset_is_identified_and_subtracted() -> None:
@@ -132,7 +132,7 @@ def test_a_drifting_pressure_offset_is_identified_and_subtracted() -> None:
     (note,) = notes_of(found, HEALTHY)
     assert note.code is RigCode.PRESSURE_DRIFTS
     assert note.data["drift_pa"] == pytest.approx(-1e5, rel=0.02)
-    mended = set_right(clean_log(drifting, HEALTHY), found).record[PRESSURE]
+    mended = corrected_log(clean_log(drifting, HEALTHY), found).record[PRESSURE]
     assert np.std(mended - record[PRESSURE]) < 2e3
 
 
@@ -145,7 +145,7 @@ def test_a_pressure_that_reads_a_bar_too_high_is_an_offset_and_not_an_initial_lo
     assert offset == pytest.approx(1e5, rel=0.02)
     explanation = found.evidence.explanation
     assert explanation.names == ("pressure_offset",)
-    mended = set_right(clean_log(off, HEALTHY), explanation).record[PRESSURE]
+    mended = corrected_log(clean_log(off, HEALTHY), explanation).record[PRESSURE]
     assert np.mean(mended - record[PRESSURE]) == pytest.approx(0.0, abs=2e3)
     assert found.gate.passed
     assert found.quantities["bulk_modulus"].value == pytest.approx(HEALTHY.bulk_modulus, rel=0.01)
@@ -159,9 +159,9 @@ def test_delays_are_searched_only_up_to_the_longest_of_a_sensor(monkeypatch: pyt
         delay = tried.delays.get(late.late, 0.0)
         return replace(tried, point=Point(np.zeros(1), 1e3 - delay, np.zeros(1), np.eye(1)))
 
-    monkeypatch.setattr(coarse_search, "descended", falling)
-    monkeypatch.setattr(coarse_search, "_revived", lambda *_: None)
-    monkeypatch.setattr(coarse_search, "delayed", lambda log, _: log)
+    monkeypatch.setattr(coarse_search, "after_descent", falling)
+    monkeypatch.setattr(coarse_search, "_start_with_rig_values", lambda *_: None)
+    monkeypatch.setattr(coarse_search, "without_delays", lambda log, _: log)
     begun = Trial((late,), Point(np.zeros(1), 1e3, np.zeros(1), np.eye(1)), {}, {}, {})
     found = coarse_search.search_coarsely(cast("GreyBoxLog", plain), begun)
     assert found.delays[late.late] == pytest.approx(LATEST, abs=1e-3)
@@ -171,7 +171,7 @@ def test_an_encoder_that_was_homed_at_the_end_stop_is_identified_and_corrected()
     record = log("steps", 2.5)
     found = explained(record.replace(position_m=record["position_m"] + 0.12))
     assert "encoder_zero" in found.names
-    shifted = set_right(clean_log(record.replace(position_m=record["position_m"] + 0.12), HEALTHY), found)
+    shifted = corrected_log(clean_log(record.replace(position_m=record["position_m"] + 0.12), HEALTHY), found)
     assert np.mean(shifted.record["position_m"] - record["position_m"]) == pytest.approx(0.0, abs=0.01)
 
 
@@ -182,7 +182,7 @@ def test_a_pump_with_another_delivery_is_identified_with_its_ratio(share: float,
     note = notes_of(found, HEALTHY)[0]
     assert note.code is code
     assert note.data["percent"] == pytest.approx(100.0 * share, abs=0.5)
-    assert rig_set_right(HEALTHY, found).pump_displacement / HEALTHY.pump_displacement == pytest.approx(share, abs=5e-3)
+    assert corrected_rig(HEALTHY, found).pump_displacement / HEALTHY.pump_displacement == pytest.approx(share, abs=5e-3)
 
 
 @pytest.mark.slow
@@ -222,7 +222,7 @@ def test_a_single_rod_whose_rig_file_gives_one_area_is_identified_with_both_area
     assert note.code is RigCode.SINGLE_ROD
     assert note.data["percent"] == pytest.approx(100.0 * 0.82 / 1.18, abs=2.0)
     assert note.data["volume_percent"] == pytest.approx(100.0 * 0.9 / 1.1, abs=2.0)
-    mended = rig_set_right(HEALTHY, found)
+    mended = corrected_rig(HEALTHY, found)
     assert mended.area_difference == pytest.approx(0.18, abs=0.01)
     assert mended.volume_difference == pytest.approx(0.1, abs=0.01)
     assert mended.pilot_share > 0.0
@@ -239,7 +239,7 @@ def test_encoder_play_is_identified_and_corrected() -> None:
     (note,) = notes_of(found, HEALTHY)
     assert note.code is RigCode.POSITION_PLAY
     assert note.data["play_um"] == pytest.approx(1e6 * play, rel=0.3)
-    mended = set_right(clean_log(given, HEALTHY), found).record["position_m"]
+    mended = corrected_log(clean_log(given, HEALTHY), found).record["position_m"]
     assert np.std(mended - record["position_m"]) < 0.6 * np.std(read - record["position_m"])
 
 
@@ -248,8 +248,8 @@ def test_only_an_encoder_zero_homed_at_a_stop_need_not_gain_over_held_volumes() 
     wanted = partial(wanted_cost, homed=True, late=False)
     assert [wanted(("encoder_zero",), held, one) for one in (swinging, held)] == [110.0, 90.0]
     assert [wanted((one,), held, held, astray=True) for one in ("encoder_zero", "volume")] == [100.0, 90.0]
-    assert wanted_cost(("encoder_zero",), held, swinging, homed=False, late=False) == 100.0 - module.WORTH
-    assert wanted(("position_play",), held, swinging) == 100.0 - module.WORTH
+    assert wanted_cost(("encoder_zero",), held, swinging, homed=False, late=False) == 100.0 - module.REQUIRED_GAIN
+    assert wanted(("position_play",), held, swinging) == 100.0 - module.REQUIRED_GAIN
     assert wanted(("position_play", "position_late"), held, swinging) == -np.inf
     assert wanted(("volume",), held, swinging) == wanted(("encoder_zero", "air"), held, swinging) == 90.0
 
@@ -257,9 +257,9 @@ def test_only_an_encoder_zero_homed_at_a_stop_need_not_gain_over_held_volumes() 
 def test_the_lag_of_a_filtered_pressure_is_accepted_even_without_a_gain() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
     wanted = partial(wanted_cost, best=held, swinging=swinging, homed=False)
-    assert wanted(("pressure_late",), late=True) == 100.0 + module.WORTH
-    assert wanted(("pressure_late",), late=False) == 100.0 - module.WORTH
-    assert wanted(("pressure_late", "air"), late=True) == wanted(("volume",), late=True) == 100.0 - module.WORTH
+    assert wanted(("pressure_late",), late=True) == 100.0 + module.REQUIRED_GAIN
+    assert wanted(("pressure_late",), late=False) == 100.0 - module.REQUIRED_GAIN
+    assert wanted(("pressure_late", "air"), late=True) == wanted(("volume",), late=True) == 100.0 - module.REQUIRED_GAIN
 
 
 @pytest.mark.parametrize(("seed", "seconds"), thinned([(2, 8.0), (2, 20.0), (3, 20.0)], [(2, 8.0)]))

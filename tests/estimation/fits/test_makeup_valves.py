@@ -8,7 +8,7 @@ from estimation.fits.flow.fit import fit_flow
 from estimation.fits.hypotheses import CHECKS_CRACK
 from estimation.log_checks.clean import clean_log
 from estimation.notes import RigCode
-from experiments.open_benchmark.logger import PLAIN, Logger
+from experiments.open_benchmark.logger import PLAIN_CHANNELS, Logger
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import run
 from plant.eha.model import EhaParameters
@@ -26,7 +26,7 @@ def logged(crack_a: float, crack_b: float) -> Record:
     course[:, 0] = 110.0 * np.sin(2.0 * np.pi * time) + 60.0 * np.sin(5.2 * np.pi * time)
     course[:, 3] = 0.0
     frame = Logger().log(run(machine, course), np.random.default_rng(3))
-    return Record(1e-3, {name: frame[name].to_numpy() for name in PLAIN})
+    return Record(1e-3, {name: frame[name].to_numpy() for name in PLAIN_CHANNELS})
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.convolution import convolved, smooth_length
-from estimation.fits.greybox.block_averages import averaged, block_means, samples_a_block
+from estimation.fits.greybox.block_averages import averaged_log, block_means, samples_a_block
 from estimation.fits.greybox.covariance import _autocovariance, automatic_lags, least_squares_covariance
 from estimation.fits.greybox.descent import Point, descend, descend_together
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
@@ -37,7 +37,7 @@ def means_of_blocks() -> dict[str, Any]:
     for name, every in (("few missing", 400), ("9 blocks of 79 missing", 45), ("8 of 79", 50), ("7 of 79", 58)):
         some = holes.copy()
         some[::every] = np.nan
-        found = averaged(replace(plain, measured=some), 2.5e-4)
+        found = averaged_log(replace(plain, measured=some), 2.5e-4)
         told[name] = {
             "drives": found.drives[[0, 1, 40, -1]],
             "measured": found.measured[[0, 1, 40, -1], 0],
@@ -47,9 +47,9 @@ def means_of_blocks() -> dict[str, Any]:
             "noise of drives": list(found.drive_std),
             "length": len(found.drives),
         }
-    told["slow logs stay"] = len(averaged(replace(plain, sample_time=4e-4), 2.5e-4).drives)
-    told["logs with gaps stay"] = len(averaged(replace(plain, gaps=np.ones((1, 3))), 2.5e-4).drives)
-    told["short logs stay"] = [len(averaged(plain.beginning(count), 2.5e-4).drives) for count in (7, 8, 9)]
+    told["slow logs stay"] = len(averaged_log(replace(plain, sample_time=4e-4), 2.5e-4).drives)
+    told["logs with gaps stay"] = len(averaged_log(replace(plain, gaps=np.ones((1, 3))), 2.5e-4).drives)
+    told["short logs stay"] = [len(averaged_log(plain.beginning(count), 2.5e-4).drives) for count in (7, 8, 9)]
     told["means"] = block_means(drives, 150)
     return told
 

@@ -18,16 +18,16 @@ from estimation.fits.flow.log_traits import LogTraits
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import ShownPlay
-from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
+from estimation.fits.hypotheses import BEGUN_UNDER_LOAD, HYPOTHESES, MAY_HIDE
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
 from estimation.fits.hypothesis_search.fit_objections import fit_explains_all
-from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain, slopes_of
-from estimation.fits.hypothesis_search.wide_log import widened
-from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, own_starts
+from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain, shared_slopes
+from estimation.fits.hypothesis_search.wide_log import widened_log
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, hypothesis_problem, own_starts
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion.fit import _starts, _steps, motion_log
-from estimation.fits.motion.search import MOST_WORK, Begun, MotionSearch, explained, rough
-from estimation.fits.motion.weakly_held import unseen
+from estimation.fits.motion.search import MOST_WORK, MotionSearch, SharedState, explained_cost, rough_problem
+from estimation.fits.motion.weakly_held import unseen_shift
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.models.motion import MOTION_FORMS
 from plant.log.record import Record
@@ -69,14 +69,14 @@ def concluded(
             predicted_gains=lambda *_, **__: promises,
             predicted_gain=lambda *_, **__: PredictedGain(0.0, 0.0, 0.05),
         ),
-        patch.object(plain_flow, "balanced", lambda *_, **__: fits),
+        patch.object(plain_flow, "balance_fits", lambda *_, **__: fits),
         patch.multiple(
             flow_fit,
             explain=explained,
             varying_loss=lambda *_: None,
             lower_minimum=lambda *_: None,
             with_implicit_steps=lambda _: None,
-            contradicted=lambda *_: (),
+            delivery_objection=lambda *_: (),
             sensed_play=lambda _: sensed or ShownPlay(0.0, 0.0),
         ),
     ):
@@ -165,16 +165,16 @@ MOVED_BOUNDS = {"chamber_volume", "relief_conductance", "start_level", "position
 @NUMBERS.case()
 def bounds_and_starts_of_hypotheses() -> dict[str, Any]:
     told: dict[str, Any] = {}
-    slow, noisy = wide(), widened(seen(log(0.5, position_noise=3e-5)), PAPER, {STIFFNESS: 3e7})
+    slow, noisy = wide(), widened_log(seen(log(0.5, position_noise=3e-5)), PAPER, {STIFFNESS: 3e7})
     fast = replace(slow, drives=slow.drives * np.where(np.arange(slow.drives.shape[1]) == 0, 40.0, 1.0))
-    asked = [one for one in (BEGUN, *HYPOTHESES) if {*one.free} & MOVED_BOUNDS]
+    asked = [one for one in (BEGUN_UNDER_LOAD, *HYPOTHESES) if {*one.free} & MOVED_BOUNDS]
     for name, base in {"slow": slow, "fast": fast, "noisy": noisy}.items():
         for one in asked:
-            model = freed(base, (one,), STIFFNESS).model
+            model = hypothesis_problem(base, (one,), STIFFNESS).model
             usual_size = model.values(np.zeros(len(model.unknowns)))
             guesses = [model.theta({**usual_size, "bulk_modulus": size}) for size in (1e8, 4e8)]
             bounds = zip(model.unknowns, *(each.tolist() for each in flow_bounds(model, guesses, base)), strict=True)
-            told[f"{one.name}{', begun' if one is BEGUN else ''}, {name}"] = {
+            told[f"{one.name}{', begun' if one is BEGUN_UNDER_LOAD else ''}, {name}"] = {
                 "starts": [dict(start) for start in own_starts(base, one)],
                 "bounds": {unknown: pair for unknown, *pair in bounds},
             }
@@ -210,14 +210,14 @@ def steps_of_the_form_of_motion() -> dict[str, Any]:
         0.0,
         99.0,
     )
-    told["unseen"] = [unseen(chi, samples) for chi in (0.9, 1.0, 1.05, 1.1, 1.3) for samples in (100, 20_000)]
+    told["unseen"] = [unseen_shift(chi, samples) for chi in (0.9, 1.0, 1.05, 1.1, 1.3) for samples in (100, 20_000)]
     theta = usual(found)
     fit = replace(plain(1.0), slopes=found.slopes(theta))
     gapped = replace(found.log, gaps=np.array([[1.0, 2.0, 3.0]]))
     told["slopes that are known"] = {
-        "plain": {name: some(slope) for name, slope in slopes_of(fit, found.log).items()},
-        "noisy": dict(slopes_of(fit, seen(log(0.5, position_noise=3e-5)))),
-        "with gaps": dict(slopes_of(fit, gapped)),
+        "plain": {name: some(slope) for name, slope in shared_slopes(fit, found.log).items()},
+        "noisy": dict(shared_slopes(fit, seen(log(0.5, position_noise=3e-5)))),
+        "with gaps": dict(shared_slopes(fit, gapped)),
     }
     told["channels"] = [SPEED in found.log.timed]
     return told
@@ -233,7 +233,7 @@ def searches_of_the_form_of_motion() -> dict[str, Any]:
         motion_log(Record(1e-3, {SPEED: speed, POSITION: path}), PAPER, {}, 1e-4),
         _starts(PAPER, 2e8)[:3],
     )
-    begun, theta = Begun(), search.guesses[0]
+    begun, theta = SharedState(), search.guesses[0]
     place = search.whole.model.unknowns.index("bulk_modulus")
     counted: Any = SimpleNamespace(
         log=SimpleNamespace(steps=np.array([3, 4])), at=lambda theta: theta, at_each=lambda thetas: thetas
@@ -253,17 +253,17 @@ def searches_of_the_form_of_motion() -> dict[str, Any]:
         "work": [*work, begun.work],
         "bounds": dict(zip(search.whole.model.unknowns, np.column_stack(search.bounds).tolist(), strict=True)),
         "samples": [len(one.log.measured) for one in (search.whole, search.part, search.short)],
-        "one pit up to a cost of": edge(lambda cost: search.same_pit(point(cost), point(100.0)), 100.0, 200.0),
-        "from a cost of": edge(lambda cost: search.same_pit(point(cost), point(100.0)), 1.0, 100.0),
+        "one pit up to a cost of": edge(lambda cost: search.is_same_basin(point(cost), point(100.0)), 100.0, 200.0),
+        "from a cost of": edge(lambda cost: search.is_same_basin(point(cost), point(100.0)), 1.0, 100.0),
         "up to a modulus of [log]": [
-            edge(lambda moved, way=way: search.same_pit(point(100.0, way * moved), point(100.0)), 0.0, 9.0)
+            edge(lambda moved, way=way: search.is_same_basin(point(100.0, way * moved), point(100.0)), 0.0, 9.0)
             for way in (1.0, -1.0)
         ],
         "rough": [
             [one.log.noise[0].variance, one.log.noise[0].walk, int(np.sum(one.log.steps))]
-            for one in (rough(search.short, factors) for factors in ((1.0, 1.0), (4.0, 9.0)))
+            for one in (rough_problem(search.short, factors) for factors in ((1.0, 1.0), (4.0, 9.0)))
         ],
-        "explained": explained(search.short),
+        "explained": explained_cost(search.short),
         "most work": MOST_WORK,
     }
 
@@ -275,7 +275,7 @@ def conclusions_of_the_form_of_motion() -> dict[str, Any]:
         with patch.multiple(
             motion_fit,
             _fitted=lambda _, **__: (fits, others, False),
-            likeliest=lambda searches: searches,
+            search_results=lambda searches: searches,
             MotionSearch=SimpleNamespace(of=lambda _, log, starts: asked.append((log, starts))),
         ):
             found = motion_fit.fit_motion(log(0.2), PAPER, size)

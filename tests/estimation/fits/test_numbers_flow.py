@@ -8,16 +8,16 @@ import pytest
 
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import _swept_share, leakage_guess, speed_gaps, without_strays
-from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.search import balance_fits, flow_starts
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.fit import GreyBoxFit, Search, concluded, explained, fit_greybox
+from estimation.fits.greybox.fit import GreyBoxFit, Search, explains_log, fit_at_solution, fit_greybox
 from estimation.fits.greybox.log import OutputNoise
 from estimation.fits.greybox.problem import Problem, search_bounds
-from estimation.fits.greybox.problem import weighed as sums_of
+from estimation.fits.greybox.problem import quadratic as sums_of
 from estimation.fits.hypotheses import HYPOTHESES, LIMITS
 from estimation.fits.hypothesis_search.form_fit import FormFit
-from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, hypothesis_problem
 from estimation.log_checks.bridging import within_gaps
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
 from tests.estimation.fits.short_logs import (
@@ -40,7 +40,7 @@ NUMBERS = Numbers(__file__)
 
 def noise_of(noise: OutputNoise) -> dict[str, Any]:
     """Return an output's noise, with the noise that remains after losses."""
-    kept = None if noise.lost_from is None else [noise.lost_from.kept(lost) for lost in (0.1, 1.0)]
+    kept = None if noise.lost_from is None else [noise.lost_from.remaining_noise(lost) for lost in (0.1, 1.0)]
     return {**asdict(replace(noise, lost_from=None)), "lost_from": kept}
 
 
@@ -127,7 +127,7 @@ def misfits_of_the_flow_form() -> dict[str, Any]:
     gapped = Problem(FLOW_FORM, seen(record.replace(motor_speed_rad_s=speed)))
     point = gapped.at(usual(problem()))
     told["with gaps of speed"] = {"cost": point.cost, "gradient": point.gradient, "gaps": gapped.log.gaps}
-    walking = problem().on(problem().log.softened(2.0, 1.0))
+    walking = problem().on(problem().log.with_larger_noise(2.0, 1.0))
     walking = walking.on(replace(walking.log, noise=(replace(walking.log.noise[0], walk=1e9),)))
     told["with a walk"] = {
         "cost": walking.at(usual(walking)).cost,
@@ -153,7 +153,7 @@ def bounds_of_searches() -> dict[str, Any]:
         "of the flow form": list(flow_bounds(model, guesses, problem().log)),
         "of a noisy log": list(flow_bounds(noisy.model, guesses, noisy.log)),
         "of the form by mass": list(flow_bounds(mass.model, [usual(mass)], mass.log)),
-        "of a relieving form": list(flow_bounds(freed(wide(), relieving).model, [np.zeros(9)], wide())),
+        "of a relieving form": list(flow_bounds(hypothesis_problem(wide(), relieving).model, [np.zeros(9)], wide())),
     }
 
 
@@ -186,7 +186,7 @@ def fits_of_the_flow_form() -> dict[str, Any]:
     told: dict[str, Any] = {}
     record = log()
     whole = seen(record, chamber_volume=0.1, moving_mass=0.2, piston_area=0.02)
-    for one in balanced(whole, PAPER, flow_starts(PAPER, 2e8)):
+    for one in balance_fits(whole, PAPER, flow_starts(PAPER, 2e8)):
         told[f"balanced: {one.model.name}"] = told_of(one)
     told["log"] = told_of_form(fit_flow(record, PAPER, 2e8, {"chamber_volume": 0.1}))
     told["noisy log"] = told_of_form(fit_flow(log(position_noise=3e-5), PAPER, 2e8))
@@ -202,7 +202,7 @@ def grey_box_fits() -> dict[str, Any]:
     }
     one = problem()
     theta = descend(one.at, usual(one), 25, flow_bounds(one.model, [usual(one)], one.log)).theta
-    plain = concluded(one, one.at(theta), disturbed=False)
+    plain = fit_at_solution(one, one.at(theta), disturbed=False)
     told["not disturbed"] = told_of(plain)
     noisy = one.on(
         replace(
@@ -211,11 +211,11 @@ def grey_box_fits() -> dict[str, Any]:
             uncertainties={"chamber_volume": 0.1, "bulk_modulus": 0.3, "moving_mass": 0.0},
         )
     )
-    told["noisy drives"] = told_of(concluded(noisy, noisy.at(theta)))
+    told["noisy drives"] = told_of(fit_at_solution(noisy, noisy.at(theta)))
     told["usual search"] = asdict(Search())
     most = 0.5 * largest_chi_square(one.blocks) * one.blocks
-    told["explained"] = [explained(one, replace_cost(one.at(theta), share * most)) for share in (0.99, 1.01)]
-    told["insensitive"] = [int(np.count_nonzero(np.isfinite(list(concluded(one, one.at(theta)).std.values()))))]
+    told["explained"] = [explains_log(one, replace_cost(one.at(theta), share * most)) for share in (0.99, 1.01)]
+    told["insensitive"] = [int(np.count_nonzero(np.isfinite(list(fit_at_solution(one, one.at(theta)).std.values()))))]
     return told
 
 

@@ -20,14 +20,14 @@ from estimation.fits.greybox import fit as greybox_fit
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.parallel_descents import Way
-from estimation.fits.greybox.spared_steps import LAST
+from estimation.fits.greybox.spared_steps import LAST_EVALUATIONS
 from estimation.fits.hypotheses import HYPOTHESES
 from estimation.fits.hypothesis_search import coarse_search, explain, final_fits, predicted_gains, screening
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion import force_scale
 from estimation.fits.motion import search as motion_search
 from estimation.fits.motion.fit import _fitted, _starts, motion_log
-from estimation.fits.motion.search import MotionSearch, likeliest
+from estimation.fits.motion.search import MotionSearch, search_results
 from estimation.models.motion import MOTION_FORMS
 from plant.arrays import Array
 from plant.log.record import Record
@@ -62,7 +62,9 @@ def planned(cost: Cost, *modules: Any) -> Iterator[list[list[float]]]:
         rest = [other for other in others[1:] if isinstance(other, float)]
         plan.append([evaluations, len(one.measured), int(np.max(one.steps)), *noise, *rest, *named.values()])
         few, short = bool(np.min(one.steps[1:]) == 1), np.max(one.steps) > 1
-        ended = [cost for theta, cost, sparing in led if theta is start and (sparing or evaluations == LAST)]
+        ended = [
+            cost for theta, cost, sparing in led if theta is start and (sparing or evaluations == LAST_EVALUATIONS)
+        ]
         if ended and not few:
             endings.append(len(plan))
             return still(start, min(ended[-2:]))
@@ -123,10 +125,10 @@ def plan_of_the_form_of_motion() -> dict[str, Any]:
         ("the first seconds alone are explained at first", lambda k: 6000.0 if k % 6 == 1 else 100.0),
     ):
         with planned(cost, motion_fit, motion_search, force_scale) as plan:
-            ended = likeliest([MotionSearch.of(form, whole, _starts(PAPER, 2e8)[:4]) for form in MOTION_FORMS])
+            ended = search_results([MotionSearch.of(form, whole, _starts(PAPER, 2e8)[:4]) for form in MOTION_FORMS])
             told[name] = {"descents": grouped(plan), "explains": [one.explains for one in ended]}
             plan.clear()
-            with patch.object(motion_fit, "concluded", lambda _, point: point):
+            with patch.object(motion_fit, "fit_at_solution", lambda _, point: point):
                 found, others, _ = _fitted(ended)
             told[name] |= {
                 "descents of the fit": grouped(plan),
@@ -158,8 +160,8 @@ def plan_of_explanations() -> dict[str, Any]:
     for name, cost in costs.items():
         with (
             planned(cost, explain, screening, coarse_search, final_fits) as plan,
-            patch.object(predicted_gains, "_promises", promised),
-            patch.object(final_fits, "concluded", concluded),
+            patch.object(predicted_gains, "_predicted_gains_beside", promised),
+            patch.object(final_fits, "fit_at_solution", concluded),
         ):
             for paired in (False, True):
                 plan.clear()
@@ -193,13 +195,13 @@ def plan_of_the_flow_form() -> dict[str, Any]:
         ):
             with (
                 planned(cost, flow_search, rough_search, greybox_fit) as plan,
-                patch.object(flow_search, "concluded", concluded),
+                patch.object(flow_search, "fit_at_solution", concluded),
                 patch.object(FreedProblem, "costs", lambda _, thetas, _lanes: np.arange(len(thetas))),
-                patch.object(flow_search, "each", lambda work, items: [work(item) for item in items]),
-                patch.object(rough_search, "each", lambda work, items: [work(item) for item in items]),
-                patch.object(greybox_fit, "each", lambda work, items: [work(item) for item in items]),
+                patch.object(flow_search, "map_cases", lambda work, items: [work(item) for item in items]),
+                patch.object(rough_search, "map_cases", lambda work, items: [work(item) for item in items]),
+                patch.object(greybox_fit, "map_cases", lambda work, items: [work(item) for item in items]),
             ):
-                found = flow_search.balanced(one, PAPER, flow_starts(PAPER, 2e8)[:3])
+                found = flow_search.balance_fits(one, PAPER, flow_starts(PAPER, 2e8)[:3])
             told[f"{name}, {kind}"] = {"descents": grouped(plan), "costs and whether disturbed": found}
     return told
 

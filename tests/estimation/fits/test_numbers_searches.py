@@ -13,9 +13,9 @@ import pytest
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import without_strays
 from estimation.fits.flow.log_traits import LogTraits
-from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.search import balance_fits, flow_starts
 from estimation.fits.greybox.descent import Point
-from estimation.fits.greybox.fit import Search, explained, roughly
+from estimation.fits.greybox.fit import Search, coarse_optimum, explains_log
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.hypotheses import HYPOTHESES
@@ -108,7 +108,7 @@ def logs_that_no_start_explains() -> dict[str, Any]:
     told: dict[str, Any] = {}
     for name, one in (("drifting", drifting), ("noisy position", log(0.5, position_noise=3e-5)), ("plain", record)):
         with counted() as points:
-            found = balanced(seen(one), PAPER, flow_starts(PAPER, 2.5e8))
+            found = balance_fits(seen(one), PAPER, flow_starts(PAPER, 2.5e8))
         told[name] = {"points": Roughly(len(points), 0.1), "costs": [fit.cost for fit in found]}
     with counted() as points:
         fit = fit_flow(drifting, PAPER, 2e8)
@@ -138,14 +138,14 @@ def starts_that_are_screened() -> dict[str, Any]:
         ("all finalists", Search(screened=50, finalists=3, evaluations=6)),
     ):
         with counted() as points:
-            found = roughly(one, guesses, search, bounds)
+            found = coarse_optimum(one, guesses, search, bounds)
         told[name] = {
             "points by samples": sorted((n, points.count(n)) for n in set(points)),
             "cost": found.cost,
-            "explained": explained(one, found),
+            "explained": explains_log(one, found),
         }
     with counted() as points:
-        lone = roughly(one, guesses[:1], Search(), bounds, wanted=1e-3)
+        lone = coarse_optimum(one, guesses[:1], Search(), bounds, wanted=1e-3)
     told["in vain"] = {"points": Roughly(len(points), 0.1), "cost": lone.cost}
     return told
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox import play, play_courses, pump_ripple
-from estimation.fits.greybox.lateness import LATE_NUDGE, changes_beside, lateness
+from estimation.fits.greybox.lateness import LATE_NUDGE, lateness, residuals_and_changes
 from estimation.fits.greybox.pump_ripple import (
-    COUNTS,
+    TOOTH_COUNTS,
     Ripple,
-    _delivered,
-    _likeliest,
-    _turned,
+    _candidates,
+    _ripple_speed,
+    _shaft_angle,
     shown_ripple,
     with_ripple,
 )
@@ -62,7 +62,7 @@ def courses_of_a_play() -> dict[str, Any]:
         "away": [int(stands.away[i]) for i in (0, 200, 400, 500, 700, 899)],
         "share": [float(stands.share[i]) for i in (0, 200, 400, 500, 700, 899)],
         "cells [m]": [
-            play_courses.cell(one)
+            play_courses.cell_width(one)
             for one in (READING, np.zeros(99), 1e-11 * np.arange(99), 3e-6 * np.random.default_rng(1).normal(size=99))
         ],
         "smoothed": [play_courses.smoothed(FORCE[:60], count)[[0, 4, 30, 58, 59]] for count in (1, 2, 3, 4, 5, 20, 21)],
@@ -135,7 +135,7 @@ def plays_that_a_velocity_sensor_shows() -> dict[str, Any]:
             play.play_structure(*one) for one in ((0.0, 0.0), (0.05, 0.0), (0.0, 0.05), (0.01, 0.02), (-0.05, 0.01))
         ],
         "left": [
-            noted(play.play_left(*(play.ShownPlay(size, gain) for size, gain in shown)))
+            noted(play.omitted_play_note(*(play.ShownPlay(size, gain) for size, gain in shown)))
             for shown in (
                 [(LEAST_PLAY, 9.0)],
                 [(2.0 * LEAST_PLAY, play.PLAY_BELIEVED)],
@@ -161,7 +161,7 @@ def what_is_asked_of_residuals() -> dict[str, Any]:
     told: dict[str, Any] = {}
     for name, one in {"flow": problem(), "held": problem(HELD_FLOW_FORM)}.items():
         theta = usual(one)
-        known, changes = changes_beside(one, theta)
+        known, changes = residuals_and_changes(one, theta)
         assert known is not None
         errors = one.residuals(theta).ravel()
         told[name] = {
@@ -186,12 +186,12 @@ def what_is_asked_of_residuals() -> dict[str, Any]:
         "play, that is hardly felt": shown_as(play.shown_play(small, np.array([-3.0, 1.0, 2.0]), left_of)),
         "play, hardly along": shown_as(play.shown_play(made, 0.01 * np.array([-3.0, 1.0, 2.0]), left_of)),
         "nudges [s]": LATE_NUDGE,
-        "of one that is not asked": changes_beside(replace_log(timed=()), usual(problem()))[1],
+        "of one that is not asked": residuals_and_changes(replace_log(timed=()), usual(problem()))[1],
     }
     long = replace_log(block=12.0 * problem().log.sample_time)
-    told["four samples on either side"] = [some(one) for one in changes_beside(long, usual(long))[1]]
+    told["four samples on either side"] = [some(one) for one in residuals_and_changes(long, usual(long))[1]]
     short = replace_log(sample_time=3.0 * problem().log.block)
-    told["one sample a block"] = [some(one) for one in changes_beside(short, usual(short))[1]]
+    told["one sample a block"] = [some(one) for one in residuals_and_changes(short, usual(short))[1]]
     return told
 
 
@@ -201,7 +201,7 @@ def replace_log(**changed: Any) -> Any:
 
 
 def sought(one: Any, theta: Any, errors: Any, counts: tuple[int, ...]) -> list[list[float]]:
-    return [[each.count, each.offset, each.price] for each in _likeliest(one, theta, errors, counts)]
+    return [[each.count, each.offset, each.price] for each in _candidates(one, theta, errors, counts)]
 
 
 @NUMBERS.case()
@@ -212,7 +212,7 @@ def teeth_in_residuals() -> dict[str, Any]:
     columns = slopes.reshape(-1, slopes.shape[-1])
     bread = np.linalg.inv(columns.T @ columns + 1e-3 * np.eye(columns.shape[1])).astype(np.float64)
     told: dict[str, Any] = {}
-    for name, counts in {"few": (7, 12), "many": COUNTS}.items():
+    for name, counts in {"few": (7, 12), "many": TOOTH_COUNTS}.items():
         shown, offset = shown_ripple(one, theta, errors.ravel(), bread, columns, counts)
         told[name] = {
             str(count): [*astuple(each.teeth), each.teeth.amplitude, each.gain, each.std, *some(each.opened)]
@@ -225,20 +225,20 @@ def teeth_in_residuals() -> dict[str, Any]:
     leaks = one.model.unknowns.index("leakage_coefficient")
     rng = np.random.default_rng(6)
     made = [rng.normal(size=errors.size) for _ in range(6)]
-    told["likeliest"] = [sought(one, theta, each, COUNTS) for each in made]
-    with patch.object(pump_ripple, "LIKELIEST", len(COUNTS)):
-        told["ranks"] = [sought(one, theta, each, COUNTS) for each in made]
-        told["ranks of a fast pump"] = [sought(fast, theta, each, COUNTS) for each in made]
+    told["likeliest"] = [sought(one, theta, each, TOOTH_COUNTS) for each in made]
+    with patch.object(pump_ripple, "LIKELIEST", len(TOOTH_COUNTS)):
+        told["ranks"] = [sought(one, theta, each, TOOTH_COUNTS) for each in made]
+        told["ranks of a fast pump"] = [sought(fast, theta, each, TOOTH_COUNTS) for each in made]
         told["ranks of a leaky pump"] = [
-            sought(one, theta + leaky * (np.arange(len(theta)) == leaks), made[0], COUNTS) for leaky in (3.0, 5.0)
+            sought(one, theta + leaky * (np.arange(len(theta)) == leaks), made[0], TOOTH_COUNTS) for leaky in (3.0, 5.0)
         ]
     told["likeliest of some"] = [sought(one, theta, each, (5, 9, 14, 17)) for each in made[:3]]
     speed = one.log.drives[:, 0]
-    told["likeliest of a fast pump"] = [sought(fast, theta, each, COUNTS) for each in made]
-    between, steps = _turned(one.log.drives[:, 0], one.log.sample_time)
+    told["likeliest of a fast pump"] = [sought(fast, theta, each, TOOTH_COUNTS) for each in made]
+    between, steps = _shaft_angle(one.log.drives[:, 0], one.log.sample_time)
     told["turned"] = [between[:3], some(between, 9), steps[:3], some(steps, 9)]
     told["delivered"] = [
-        some(_delivered(Ripple(count, *parts), (between, steps), one.log.sample_time), 9)
+        some(_ripple_speed(Ripple(count, *parts), (between, steps), one.log.sample_time), 9)
         for count in (7, 19)
         for parts in ((0.1, 0.0), (0.0, 0.1), (-0.03, 0.2))
     ]

@@ -11,18 +11,18 @@ import pytest
 
 from estimation.fits.flow import asked_hypotheses
 from estimation.fits.flow.asked_hypotheses import hypotheses_asked, near_starts
-from estimation.fits.flow.rough_search import _guess, _search
+from estimation.fits.flow.rough_search import _optimum_from_guess, _search
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRIOR_SPREADS
 from estimation.fits.hypothesis_search.explain import explain
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.fit_objections import objections
-from estimation.fits.hypothesis_search.form_fit import weighed, with_structure
+from estimation.fits.hypothesis_search.form_fit import likelihood_mean, with_structure
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain, predicted_gain
-from estimation.fits.hypothesis_search.wide_log import delayed, usual_values
-from estimation.fits.hypothesis_search.wide_problem import freed, own_starts
+from estimation.fits.hypothesis_search.wide_log import usual_values, without_delays
+from estimation.fits.hypothesis_search.wide_problem import hypothesis_problem, own_starts
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion.fit import _starts, _steps, motion_log
 from estimation.fits.motion.force_scale import disagree
@@ -60,7 +60,7 @@ def objections_on_either_side() -> dict[str, Any]:
         told[name] = noted(objections(made_fit(1000.0, 2e8, 1e6, chi=chi, late=late, gain=gain), False))
     told["weighed"] = {
         name: list(pair)
-        for name, pair in weighed(
+        for name, pair in likelihood_mean(
             [made_fit(3.0, 2e8, 1e6), made_fit(6.0, 2.2e8, 2e6), made_fit(3e3, 9e8, np.inf)]
         ).items()
     }
@@ -138,7 +138,7 @@ def first_guesses_of_the_flow_form() -> dict[str, Any]:
     costs = FreedProblem.costs
     begun = FreedProblem.of(FLOW_FORM, log_of.beginning(_search(log_of).screened).coarsened())
     with patch.object(FreedProblem, "costs", autospec=True, side_effect=costs) as asked:
-        found, near = _guess(begun, log_of, PAPER, flow_starts(PAPER, 2e8))
+        found, near = _optimum_from_guess(begun, log_of, PAPER, flow_starts(PAPER, 2e8))
     guesses = np.array(asked.call_args.args[1])
     return {
         "count": len(guesses),
@@ -156,7 +156,7 @@ def the_wide_form() -> dict[str, Any]:
     base = wide()
     told: dict[str, Any] = {
         "hypotheses": {one.name: asdict(one) for one in HYPOTHESES},
-        "presumed of rigs": PRESUMED,
+        "presumed of rigs": PRIOR_SPREADS,
         "row": dict(zip(usual_values(base), base.parameters, strict=True)),
         "drives": base.drives[[0, 77, -1]],
         "presumed": {name: list(pair) for name, pair in base.presumed.items()},
@@ -164,16 +164,18 @@ def the_wide_form() -> dict[str, Any]:
     }
     loud = replace(base, measured=base.measured * 3.3e6 / float(np.nanmax(np.abs(base.measured))))
     louder = replace(base, measured=base.measured * 3.36e6 / float(np.nanmax(np.abs(base.measured))))
-    told["unknowns near the relief"] = [list(freed(one, (DELIVERY,)).model.unknowns) for one in (loud, louder)]
+    told["unknowns near the relief"] = [
+        list(hypothesis_problem(one, (DELIVERY,)).model.unknowns) for one in (loud, louder)
+    ]
     for channel, delay in ((PRESSURE, 4e-3), (SPEED, 3e-3), (POSITION, 2e-3), (PRESSURE, 2e-4)):
-        late = delayed(base, {channel: delay})
+        late = without_delays(base, {channel: delay})
         told[f"{channel} {1e3 * delay:g} ms late"] = {
             "drives": late.drives[[40, -1]],
             "measured [Pa]": late.measured[[40, -6], 0],
             "lost": int(np.count_nonzero(np.isnan(late.measured))) - int(np.count_nonzero(np.isnan(base.measured))),
         }
     for one in HYPOTHESES:
-        tried = freed(base, (one,))
+        tried = hypothesis_problem(base, (one,))
         start = {**usual_values(base), "case_leakage": 4e-13, "speed_lead": 1e-5, **own_starts(base, one)[0]}
         point = tried.at(tried.model.theta(start))
         told[f"{one.name}: cost and slope"] = [point.cost, float(point.gradient[-1])]

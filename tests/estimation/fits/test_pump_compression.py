@@ -8,7 +8,7 @@ import pytest
 from estimation.eha.explanation_notes import notes_of
 from estimation.fits.flow.fit import fit_flow
 from estimation.log_checks.clean import clean_log
-from estimation.models.wide_flow import compressed
+from estimation.models.wide_flow import compressed_delivery
 from estimation.notes import RigCode
 from experiments.open_benchmark.draws import course_of, draw_plain
 from experiments.open_benchmark.run import run
@@ -51,7 +51,7 @@ def test_a_pump_that_compresses_its_oil_is_identified_and_bulk_modulus_is_right(
 
 
 def test_a_pump_loses_the_compression_of_its_oil_and_of_the_oil_left_in_its_teeth() -> None:
-    assert compressed(0.02, 1.0) == pytest.approx(0.98)
-    assert compressed(0.02, 1.5) == pytest.approx(0.97)
-    assert compressed(-0.02, 1.0) == pytest.approx(1.02)
-    assert compressed(0.02, 0.0) == 1.0
+    assert compressed_delivery(0.02, 1.0) == pytest.approx(0.98)
+    assert compressed_delivery(0.02, 1.5) == pytest.approx(0.97)
+    assert compressed_delivery(-0.02, 1.0) == pytest.approx(1.02)
+    assert compressed_delivery(0.02, 0.0) == 1.0

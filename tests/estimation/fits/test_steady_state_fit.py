@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.steady_state_fit import SteadyFit, SteadyPoints, fit_friction, fit_leakage, steady_points
-from faults.eha.physical import throttled
+from faults.eha.physical import with_throttles
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.model import EhaParameters
@@ -30,12 +30,12 @@ def held(p: CircuitParameters, volts: float, seconds: float = 8.0) -> Record:
 
 
 def leaking_logs(a_volts: float) -> tuple[CircuitParameters, list[Record]]:
-    circuits = [throttled(CIRCUIT_RIG, a_volts, b_volts) for b_volts in (0.0, 2.2, 2.3, 2.4)]
+    circuits = [with_throttles(CIRCUIT_RIG, a_volts, b_volts) for b_volts in (0.0, 2.2, 2.3, 2.4)]
     return circuits[0], [held(p, 4.0) for p in circuits]
 
 
 def rubbing_logs(b_volts: float) -> tuple[CircuitParameters, list[Record]]:
-    p = throttled(CIRCUIT_RIG, 10.0, b_volts)
+    p = with_throttles(CIRCUIT_RIG, 10.0, b_volts)
     return p, [held(p, volts) for volts in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)]
 
 

@@ -9,8 +9,8 @@ from estimation.eha.explanation_notes import notes_of
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.hypotheses import LEAKAGE_RISE, LEAKAGE_TURBULENT
-from estimation.fits.hypothesis_search.wide_log import widened
-from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.fits.hypothesis_search.wide_log import widened_log
+from estimation.fits.hypothesis_search.wide_problem import hypothesis_problem
 from estimation.log_checks.clean import clean_log
 from estimation.models.wide_flow import (
     LAMINAR_BELOW,
@@ -72,9 +72,9 @@ def test_turbulent_leakage_follows_the_orifice_law_at_high_pressure_and_is_lamin
 def test_the_form_computes_roots_and_powers_only_if_a_hypothesis_needs_them() -> None:
     record, *_ = leaking(0.0)
     sound, variances = without_strays(record)
-    log = widened(flow_log(sound, RIG, {}, variances), RIG)
+    log = widened_log(flow_log(sound, RIG, {}, variances), RIG)
     asked, turbulent = (LEAKAGE_RISE,), (LEAKAGE_RISE, LEAKAGE_TURBULENT)
-    assert freed(log, asked).model.rates is WIDE_FLOW_FORM.rates
-    assert freed(log, turbulent).model.rates is TURBULENT_FLOW_FORM.rates
-    assert freed(log, asked, QUICKNESS).model.rates is QUICK_FLOW_FORM.rates
-    assert freed(log, turbulent, QUICKNESS).model.rates is TURBULENT_QUICK_FLOW_FORM.rates
+    assert hypothesis_problem(log, asked).model.rates is WIDE_FLOW_FORM.rates
+    assert hypothesis_problem(log, turbulent).model.rates is TURBULENT_FLOW_FORM.rates
+    assert hypothesis_problem(log, asked, QUICKNESS).model.rates is QUICK_FLOW_FORM.rates
+    assert hypothesis_problem(log, turbulent, QUICKNESS).model.rates is TURBULENT_QUICK_FLOW_FORM.rates

@@ -12,12 +12,12 @@ from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import Runs
-from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more
+from estimation.identification.free_run.polynomial_terms import candidate_terms, polynomial_of_linear, with_best_product
 from estimation.identification.search.criterion import Structure
 from estimation.identification.search.descent import descend
 from estimation.identification.search.one_step import prediction_errors
 from estimation.identification.search.pole_search import banded_spectra, search_poles
-from estimation.identification.state_space.joint import joined
+from estimation.identification.state_space.joint import joined_outputs
 from estimation.identification.state_space.problem import Problem, Size
 from plant.compiled.native.loops import Loop
 
@@ -60,9 +60,9 @@ def poles() -> list[Array]:
 
 def polynomial() -> list[Array]:
     data, _ = scaled(channels_from([U[:, None]], [resonance()], 0.01, ["force"], "deflection"))
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    start = polynomial_of_linear(fit_linear(Form(2, (1,), (1,)), data), data)
     assert start is not None
-    fit = one_more(start, candidate_terms(start.variables), data)
+    fit = with_best_product(start, candidate_terms(start.variables), data)
     assert fit is not None
     runs = Runs(fit.variables, fit.terms, data)
     equations = NormalEquations(runs, runs.ends)
@@ -74,7 +74,7 @@ def polynomial() -> list[Array]:
 def state_space() -> list[Array]:
     data = [scaled(channels_from([U[:, None]], [y], 0.1, ["force"], "y"))[0] for y in (resonance(), np.roll(E, 1))]
     size = Size(2, 1, 2, direct=True)
-    problem = Problem(size, joined(data))
+    problem = Problem(size, joined_outputs(data))
     return list(problem.jacobian(0.3 * np.cos(np.arange(size.n_matrices + size.n))))
 
 

@@ -171,7 +171,7 @@ def free_runs() -> dict[str, Any]:
     for name, size in (("searched", n - 1), ("not searched", n)):
         two = channels_from([one[:size] for one in logs], [np.resize(answer(), size)] * 2, 0.1, ("a",), "y")
         with watched(linear_fit, "descend_from", lambda *_: 0, lambda *_: (0.0, np.zeros(9))) as asked:
-            linear_fit._searched(linear_problem.Problem(form, two))
+            linear_fit._searched_denominators(linear_problem.Problem(form, two))
         told[name] = len(asked)
     swinging = iter(np.tile([0.1, 0.2], 99))
     with watched(linear_fit, "least_squares", lambda *_: 0, lambda *_: (np.full(5, next(swinging)), 0.0)) as asked:
@@ -181,11 +181,11 @@ def free_runs() -> dict[str, Any]:
     with watched(linear_fit, "least_squares", lambda *_: 0, lambda *_: (np.full(5, next(creeping)), 0.0)) as asked:
         linear_fit.steiglitz_mcbride(problem)
     told["passes that settle"] = len(asked)
-    begun = polynomial_terms.begun(found, channels())
+    begun = polynomial_terms.polynomial_of_linear(found, channels())
     assert begun is not None
     with watched(polynomial_fit, "levenberg", options) as asked:
-        polynomial_terms.begun(found, channels())
-        polynomial_terms.one_more(begun, polynomial_terms.candidate_terms(begun.variables), channels())
+        polynomial_terms.polynomial_of_linear(found, channels())
+        polynomial_terms.with_best_product(begun, polynomial_terms.candidate_terms(begun.variables), channels())
         polynomial_terms.without_term(begun, 1, channels())
         dense_polynomial.Recipe(Form(1, (1,), (1,)), 2, 1e-3, (0.1, 0.01)).fit(channels())
     told["polynomial"] = asked
@@ -242,7 +242,7 @@ def choices() -> dict[str, Any]:
     ran = hammerstein_fit.fit_hammerstein("dead-zone", base, channels(), [np.array([1.0, -0.8])])
     with (
         watched(choose_hammerstein, "fit_hammerstein", lambda *_: 0, lambda *_: ran),
-        watched(choose_hammerstein, "_held_back", lambda *_: 0, lambda *_: 1.0) as judged,
+        watched(choose_hammerstein, "_held_back_errors", lambda *_: 0, lambda *_: 1.0) as judged,
     ):
         choose_hammerstein.hammerstein_candidates(linear, channels())
     told["Hammerstein, judged"] = len(judged)
@@ -267,8 +267,8 @@ def state_spaces() -> dict[str, Any]:
     problem = Problem(size, data)
     start = fit._starts(problem)[0]
     for name, costs in (("falls", [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3]), ("stands", [1.0, 1.0 - 0.9e-7, 0.5])):
-        with watched(fit, "_chart", lambda *_: 0, partial(_charted, iter(np.tile(costs, 9)))) as charts:
-            fit._descended(problem, start, fit.THOROUGH)
+        with watched(fit, "_minimum_near", lambda *_: 0, partial(_charted, iter(np.tile(costs, 9)))) as charts:
+            fit._descended(problem, start, fit.THOROUGH_EFFORT)
         told[f"charts where it {name}"] = len(charts)
     one = channels()
     with watched(
@@ -288,7 +288,7 @@ def threads() -> dict[str, Any]:
     whole = channels_from([U[:, None]], [answer()], 0.1, ("a",), "y")
     for name, place, inner, call in (
         ("free runs", identify, "_identified", lambda: identify.identify_channels(whole)),
-        ("state spaces", identify_states, "_identified", lambda: identify_states.identify_state_space([whole])),
+        ("state spaces", identify_states, "_identified_outputs", lambda: identify_states.identify_state_space([whole])),
     ):
         with (
             watched(place, "threadpool_limits", lambda **given: given) as asked,

@@ -8,7 +8,7 @@ from estimation.filters.ekf import ekf
 from estimation.filters.filterpy_bridge import filterpy_ekf
 from estimation.filters.run import filter_problem, run_filter
 from estimation.filters.ukf import ukf
-from estimation.log_checks.bridging import bridged, gaps, unknown_angle, unknown_path
+from estimation.log_checks.bridging import angle_variance, bridged, gaps, path_variance
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
@@ -48,7 +48,7 @@ def test_the_variance_added_in_a_gap_is_one_to_two_times_that_of_a_random_walk()
     holed = walks.copy()
     holed[:, 200:230] = np.nan
     strayed = [T * np.sum(walk - bridged(seen)) for walk, seen in zip(walks, holed, strict=True)]
-    opened = np.mean([np.sum(unknown_angle(seen, T)) for seen in holed])
+    opened = np.mean([np.sum(angle_variance(seen, T)) for seen in holed])
     assert np.var(strayed) < opened < 2.0 * np.var(strayed)
 
 
@@ -58,7 +58,7 @@ def test_the_variance_added_in_a_gap_is_that_of_a_step() -> None:
     holed = speeds.copy()
     holed[:, 100:110] = np.nan
     strayed = [T * np.sum(speed - bridged(seen)) for speed, seen in zip(speeds, holed, strict=True)]
-    opened = np.mean([np.sum(unknown_angle(seen, T)) for seen in holed])
+    opened = np.mean([np.sum(angle_variance(seen, T)) for seen in holed])
     assert np.var(strayed) == pytest.approx(opened, rel=1e-9)
 
 
@@ -66,15 +66,15 @@ def test_a_slow_sensor_has_no_gaps_and_adds_variance_only_at_its_steps() -> None
     speed = np.full(1000, np.nan)
     speed[3::10] = np.where(np.arange(100) < 50, -100.0, 100.0)
     assert not np.any(gaps(speed)[1])
-    assert np.flatnonzero(unknown_angle(speed, T)).tolist() == list(range(494, 504))
+    assert np.flatnonzero(angle_variance(speed, T)).tolist() == list(range(494, 504))
     position = np.where(np.isnan(speed), np.nan, np.linspace(0.0, 0.1, 1000) ** 2)
-    assert not np.any(unknown_path(position, T))
+    assert not np.any(path_variance(position, T))
 
 
 def test_the_ends_of_a_log_are_gaps_too() -> None:
     speed = np.cumsum(np.random.default_rng(1).normal(0.0, 3.0, 200))
     speed[:20] = speed[-10:] = np.nan
-    opened = unknown_angle(speed, T)
+    opened = angle_variance(speed, T)
     assert opened[0] == 0.0
     assert np.all(opened[1:21] > 0.0)
     assert np.all(opened[-10:] > 0.0)
@@ -85,7 +85,7 @@ def test_a_log_without_gaps_is_filtered_with_the_original_model(linear: ProcessM
     record = noisy_record()
     problem = filter_problem(linear, PRIOR, record, HEALTHY, variances=VARIANCES)
     assert problem.model is linear
-    assert not np.any(problem.opened)
+    assert not np.any(problem.added_variance)
 
 
 @pytest.mark.parametrize("method", [filterpy_ekf, ukf])
@@ -105,10 +105,10 @@ def test_every_filter_adds_the_same_variance_in_a_gap(linear: ProcessModel, meth
 def test_a_gap_of_motor_speed_adds_the_variance_of_the_swept_position(linear: ProcessModel) -> None:
     record = without(noisy_record(), "motor_speed_rad_s", 200, 220)
     problem = filter_problem(linear, PRIOR, record, HEALTHY, variances=VARIANCES)
-    angle = unknown_angle(record["motor_speed_rad_s"], 0.01)
+    angle = angle_variance(record["motor_speed_rad_s"], 0.01)
     swept = HEALTHY.pump_displacement / HEALTHY.piston_area
-    np.testing.assert_allclose(problem.opened[:, 0] * 1e-3**2, swept**2 * angle, rtol=1e-12)
-    assert not np.any(problem.opened[:, 2])  # the pump does not act on the disturbance force
+    np.testing.assert_allclose(problem.added_variance[:, 0] * 1e-3**2, swept**2 * angle, rtol=1e-12)
+    assert not np.any(problem.added_variance[:, 2])  # the pump does not act on the disturbance force
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimation.log_checks.channel_guess import ChannelGuess, _alike, _differences, guess_channels
+from estimation.log_checks.channel_guess import ChannelGuess, _correlation, _differences, guess_channels
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -78,8 +78,8 @@ def test_columns_with_the_projects_own_names_are_guessed_with_confidence(record:
 def test_likeness_of_columns_is_their_correlation() -> None:
     one, other = np.random.default_rng(2).standard_normal((2, 50))
     wanted = np.corrcoef(one, other)[0, 1]
-    assert _alike(one + 7.0, 3.0 * other - 2.0) == pytest.approx(wanted)
-    assert _alike(np.ones(50), other) == 0.0
+    assert _correlation(one + 7.0, 3.0 * other - 2.0) == pytest.approx(wanted)
+    assert _correlation(np.ones(50), other) == 0.0
 
 
 T = 0.01 * np.arange(3000)

@@ -220,7 +220,7 @@ RADIANS, TURNS_A_SECOND = "rad/s read as rpm", "rev/s read as rad/s"
         ("minor_leakage", 0.5 / np.pi, SPEED, TURNS_A_SECOND),
         ("normal", 1.0 / RPM, SPEED, RADIANS),
         ("minor_leakage", 1.0 / RPM, SPEED, f"{RADIANS} or {TURNS_A_SECOND}"),
-        ("major_leakage_major_friction", 1e-3, f"{POSITION} and {VELOCITY} or {SPEED}", channel_physics.LOSSY),
+        ("major_leakage_major_friction", 1e-3, f"{POSITION} and {VELOCITY} or {SPEED}", channel_physics.LOSSY_UNIT),
     ],
 )
 def test_without_pressure_several_unit_errors_may_explain_the_lost_flow(
@@ -252,15 +252,15 @@ def test_a_position_is_resolved_only_if_its_motion_exceeds_its_noise() -> None:
         moved = 1e-6 * size * np.sin(1e-3 * np.pi * np.arange(2000))
         log = Record(1e-3, {POSITION: moved + noise})
         blocks: Any = SimpleNamespace(position=moved)
-        assert channel_physics._resolved(log, blocks) is resolved
+        assert channel_physics._exceeds_position_noise(log, blocks) is resolved
     absent: Any = SimpleNamespace(position=None)
-    assert not channel_physics._resolved(Record(1e-3, {SPEED: noise}), absent)
+    assert not channel_physics._exceeds_position_noise(Record(1e-3, {SPEED: noise}), absent)
 
 
 def test_a_flow_balance_that_explains_too_little_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[FlowBalance | None] = []
     poor = FlowBalance(*([0.5] * len(FlowBalance._fields)))
-    monkeypatch.setattr(channel_physics, "_reversed", lambda *given: seen.append(given[-1]) or ())
+    monkeypatch.setattr(channel_physics, "_wrong_sign_notes", lambda *given: seen.append(given[-1]) or ())
     for explained in (0.99 * channel_physics.EXPLAINED, 1.01 * channel_physics.EXPLAINED):
         balance = poor._replace(explained=explained)
         monkeypatch.setattr(channel_physics, "flow_balance", lambda *_, balance=balance: balance)
@@ -336,7 +336,7 @@ def test_a_piston_moving_back_against_its_pump_is_no_reversed_channel(
     sound = FlowBalance(swept=1.0, swept_std=0.02, compressed=1.0, compressed_std=0.01, explained=0.999, moving=0.5)
     monkeypatch.setattr(channel_physics, "flow_balance", lambda *_: sound)
     short, long = (channel_physics.channel_blocks(record, HEALTHY, length) for length in (0.02, 0.05))
-    before = channel_physics._reversed(record, short, long, None)
+    before = channel_physics._wrong_sign_notes(record, short, long, None)
     assert [note.code for note in before] == [ChannelCode.CHANNEL_REVERSED]
     assert channel_mistakes(record, HEALTHY) == ()
 

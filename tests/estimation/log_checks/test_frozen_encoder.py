@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from estimation.log_checks.frozen_encoder import missed_motion
+from estimation.log_checks.frozen_encoder import misses_motion
 from estimation.log_checks.sensor_check import sensor_objections
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -96,6 +96,6 @@ def test_flow_bias_explains_a_still_encoder_though_the_motor_rests_most_of_the_l
             PRESSURE: 1e3 * rng.normal(size=len(rows)),
         },
     )
-    assert not missed_motion(log, hold, p)
+    assert not misses_motion(log, hold, p)
     fast = np.where((rows >= hold.start) & (rows < hold.stop), 3.0 * speed, log["motor_speed_rad_s"])
-    assert missed_motion(log.replace(motor_speed_rad_s=fast), hold, p)
+    assert misses_motion(log.replace(motor_speed_rad_s=fast), hold, p)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.held import held_rows, without_held
+from estimation.log_checks.held import held_rows, without_held_values
 from estimation.notes import SensorCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -24,7 +24,7 @@ def held(values: np.ndarray, rows: float) -> np.ndarray:
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
 def test_a_log_sampled_in_every_row_is_unchanged(drive: str, sensors: Sensors) -> None:
     record = circuit_log(drive, sensors)
-    assert without_held(record) == (record, ())
+    assert without_held_values(record) == (record, ())
 
 
 @pytest.mark.parametrize("quantum", [1e-6, 1e-5, 1e-4])
@@ -38,7 +38,7 @@ def test_a_coarse_encoder_is_not_held(quantum: float) -> None:
 def test_a_held_channel_is_named_and_keeps_only_its_own_samples(channel: str, rows: float) -> None:
     record = circuit_log("multisine")
     given = held(record[channel], rows)
-    found, (note,) = without_held(record.replace(**{channel: given}))
+    found, (note,) = without_held_values(record.replace(**{channel: given}))
     there = np.isfinite(found[channel])
     assert note.code is SensorCode.HELD
     assert note.data["channel"] == channel
@@ -52,7 +52,7 @@ def test_a_motor_that_is_driven_in_steps_is_not_held() -> None:
     record = circuit_log("steps")
     stairs = held(100.0 * np.sin(3e-3 * np.arange(len(record))), 10)
     assert "motor_speed_rad_s" not in [
-        n.data["channel"] for n in without_held(record.replace(motor_speed_rad_s=stairs))[1]
+        n.data["channel"] for n in without_held_values(record.replace(motor_speed_rad_s=stairs))[1]
     ]
 
 
@@ -80,7 +80,7 @@ def test_a_slow_log_written_at_a_faster_rate_gets_its_own_rate_back(code: Sensor
     given = {
         name: record[name][late] if code is SensorCode.HELD else bridged(record[name], rows, first) for name in names
     }
-    found, notes = without_held(Record(record.sample_time, given))
+    found, notes = without_held_values(Record(record.sample_time, given))
     assert {(note.code, note.data["channel"], note.data["rows"]) for note in notes} == {(code, n, rows) for n in names}
     assert found.sample_time == pytest.approx(rows * record.sample_time)
     assert found.start_time == pytest.approx(first * record.sample_time)
@@ -91,7 +91,7 @@ def test_a_slow_log_written_at_a_faster_rate_gets_its_own_rate_back(code: Sensor
 def test_a_fast_speed_beside_slow_sensors_keeps_all_its_samples() -> None:
     record = circuit_log("multisine")
     slow = {name: held(record[name], 5) for name in (POSITION, "velocity_m_s", PRESSURE)}
-    found, notes = without_held(record.replace(**slow))
+    found, notes = without_held_values(record.replace(**slow))
     assert {note.data["channel"] for note in notes} == set(slow)
     assert found.sample_time == record.sample_time
     assert np.array_equal(found["motor_speed_rad_s"], record["motor_speed_rad_s"])
@@ -101,7 +101,7 @@ def test_a_fast_speed_beside_slow_sensors_keeps_all_its_samples() -> None:
 def test_a_single_interpolated_channel_keeps_only_its_own_samples(channel: str) -> None:
     record = circuit_log("multisine")
     given = bridged(record[channel], 4, 0)
-    found, (note,) = without_held(record.replace(**{channel: given}))
+    found, (note,) = without_held_values(record.replace(**{channel: given}))
     assert note.code is SensorCode.BRIDGED
     assert note.data["rows"] == 4
     assert np.array_equal(np.flatnonzero(np.isfinite(found[channel])), np.arange(0, len(record), 4))
@@ -110,4 +110,4 @@ def test_a_single_interpolated_channel_keeps_only_its_own_samples(channel: str) 
 @pytest.mark.parametrize("rows", [1, 2, 3, 50])
 def test_a_log_of_a_few_rows_is_neither_held_nor_interpolated(rows: int) -> None:
     record = circuit_log("multisine").slice(0, rows)
-    assert without_held(record) == (record, ())
+    assert without_held_values(record) == (record, ())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.held_alone import FEWEST_ROWS, without_held_alone
+from estimation.log_checks.held_alone import FEWEST_ROWS, without_temporary_holds
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -16,7 +16,7 @@ from tests.estimation.log_checks.made_logs import LOG, PRESSURE, SPEED, VELOCITY
 @pytest.mark.parametrize("rows", [FEWEST_ROWS + 1, 200])
 def test_a_channel_that_is_held_alone_becomes_missing_there_and_is_noted(channel: str, rows: int) -> None:
     given = LOG.replace(**{channel: stands(LOG[channel], 700, rows)})
-    found, (note,) = without_held_alone(given)
+    found, (note,) = without_temporary_holds(given)
     assert note.code is SensorCode.HELD_ALONE
     assert note.data["channel"] == channel
     assert note.data["seconds"] == pytest.approx((rows - 1) * given.sample_time)
@@ -29,7 +29,7 @@ def test_a_channel_that_is_held_alone_becomes_missing_there_and_is_noted(channel
 
 def unchanged(values: Array) -> bool:
     record = LOG.replace(**{PRESSURE: values})
-    return without_held_alone(record) == (record, ())
+    return without_temporary_holds(record) == (record, ())
 
 
 def test_a_sensor_that_freezes_for_good_is_left_to_other_checks() -> None:
@@ -60,4 +60,4 @@ def test_a_channel_that_is_held_for_more_than_a_fifth_of_a_log_is_left_to_other_
 def test_a_drive_without_noise_that_rests_is_not_held() -> None:
     ramp = np.interp(np.arange(3000), [0, 1000, 1400, 3000], [0.0, 50.0, 50.0, 80.0])
     record = Record(1e-3, {SPEED: np.round(ramp, 7), PRESSURE: 1e4 * ramp})
-    assert without_held_alone(record) == (record, ())
+    assert without_temporary_holds(record) == (record, ())

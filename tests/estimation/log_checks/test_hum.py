@@ -101,16 +101,16 @@ def test_no_more_than_the_largest_number_of_tones_is_removed(monkeypatch: pytest
 def test_a_line_at_an_end_of_the_spectrum_is_not_interpolated() -> None:
     frequencies = np.arange(5.0)
     lines = np.array([9.0, 1.0, 2.0, 8.0, 4.0])
-    assert [hum._between(frequencies, lines, place) for place in (0, 4)] == [0.0, 4.0]
-    assert 3.0 < hum._between(frequencies, lines, 3) < 3.5
+    assert [hum._line_frequency(frequencies, lines, place) for place in (0, 4)] == [0.0, 4.0]
+    assert 3.0 < hum._line_frequency(frequencies, lines, 3) < 3.5
 
 
 def test_no_tone_is_fitted_to_a_stretch_with_mostly_missing_pressure() -> None:
     waves = np.column_stack([np.cos(np.arange(20.0)), np.sin(np.arange(20.0))])
     values = 3.0 * waves[:, 0]
-    np.testing.assert_allclose(hum._fitted(waves, values), values)
+    np.testing.assert_allclose(hum._least_squares_fit(waves, values), values)
     values[3:] = np.nan
-    assert not hum._fitted(waves, values).any()
+    assert not hum._least_squares_fit(waves, values).any()
 
 
 @pytest.mark.parametrize("goes_on", [False, True])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.logged_on_change import MATTERS, dead_band, logged_on_change
+from estimation.log_checks.logged_on_change import LEAST_THRESHOLD, dead_band, logged_on_change
 from estimation.log_checks.notes import LoggerCode
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import AdviceCode
@@ -71,7 +71,7 @@ def test_even_steps_that_follow_each_other_are_a_ramp_and_no_threshold() -> None
 @pytest.mark.parametrize("channel", [SPEED, POSITION, PRESSURE])
 def test_the_threshold_is_found_from_the_steps_and_named_if_it_is_large(channel: str) -> None:
     values = log()[channel]
-    for share, told in ((0.05, True), (0.5 * MATTERS, False)):
+    for share, told in ((0.05, True), (0.5 * LEAST_THRESHOLD, False)):
         written = on_change(values, share * float(values.std()))
         assert bool(logged_on_change(log().replace(**{channel: written}))) == told
     threshold = 0.05 * float(values.std())

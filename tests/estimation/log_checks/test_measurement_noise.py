@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from estimation.log_checks.measurement_noise import (
     SMALLEST_VARIANCE,
+    excited_noise_variance,
     measurement_variances,
     position_variance,
-    struck_variance,
 )
 from estimation.log_checks.outliers import without_gross_outliers
 from faults.conditions import CONDITIONS, Condition, parameters_for
@@ -126,10 +126,10 @@ def test_impacts_of_a_binary_drive_are_not_taken_for_noise() -> None:
     time = 1e-3 * np.arange(200)
     rung = np.exp(-40.0 * time) * np.sin(2.0 * np.pi * 60.0 * time)
     struck = 1e5 * np.convolve(blows, rung)[:15_000] + rng.normal(0.0, 5e3, 15_000)
-    assert 0.9 * 25e6 < struck_variance(struck) < 1.2 * 25e6  # seven of twenty differences include a blow
+    assert 0.9 * 25e6 < excited_noise_variance(struck) < 1.2 * 25e6  # seven of twenty differences include a blow
     channel = "differential_pressure_pa"
     assert measurement_variances(Record(1e-3, {channel: struck}), [channel])[channel] > 1.5 * 25e6
-    assert struck_variance(np.where(np.arange(15_000) % 40 == 7, np.nan, struck)) == pytest.approx(25e6, rel=0.3)
+    assert excited_noise_variance(np.where(np.arange(15_000) % 40 == 7, np.nan, struck)) == pytest.approx(25e6, rel=0.3)
 
 
 @pytest.mark.parametrize("steps", [1.0, 2.0, 2.4, 3.0])
@@ -142,7 +142,7 @@ def test_noise_of_a_coarse_converter_is_found_at_any_rest_position_between_its_s
     read = step * np.rint((rests + rng.normal(0.0, 5e3, len(rests))) / step)
     true = np.std(read - rests)
     assert variance_of("differential_pressure_pa", read) ** 0.5 == pytest.approx(true, rel=0.13)
-    assert struck_variance(read) ** 0.5 == pytest.approx(true, rel=0.13)
+    assert excited_noise_variance(read) ** 0.5 == pytest.approx(true, rel=0.13)
 
 
 def test_a_converter_that_flickers_between_two_levels_has_no_gross_outliers() -> None:
@@ -155,4 +155,4 @@ def test_a_converter_that_flickers_between_two_levels_has_no_gross_outliers() ->
 
 @pytest.mark.parametrize("values", [np.zeros(100), np.arange(5.0), np.full(100, np.nan)])
 def test_a_channel_without_noise_has_an_infinite_struck_variance(values: np.ndarray) -> None:
-    assert struck_variance(values) == np.inf
+    assert excited_noise_variance(values) == np.inf

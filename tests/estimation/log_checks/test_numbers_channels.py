@@ -9,10 +9,10 @@ import pytest
 from estimation.log_checks import channel_physics
 from estimation.log_checks.channel_blocks import (
     ChannelBlocks,
-    alike,
     channel_blocks,
-    gone_together,
-    power_of,
+    correlation_and_ratio,
+    path_agreement,
+    pressure_flow_correlation,
 )
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.flow_balance import FlowBalance, flow_balance
@@ -80,16 +80,30 @@ def blocks_of_a_log() -> dict[str, Any]:
 def signals_that_go_together() -> dict[str, Any]:
     still = np.ones(60)
     return {
-        "alike": [alike(one, WAVE) for one in (3.0 * WAVE + 7.0, -0.5 * WAVE, mixed(0.6), OTHER, still, WAVE[:30][:0])],
-        "alike to what is still": alike(WAVE, still),
-        "of 19 and 20": [alike(WAVE[:count], mixed(0.3)[:count]) for count in (19, 20)],
-        "absent": [alike(None, WAVE), alike(WAVE, None), gone_together(None, WAVE), gone_together(WAVE, None)],
-        "gone together": [gone_together(one, WAVE) for one in (0.2 * WAVE, -WAVE + 0.3, mixed(0.6), WAVE + OTHER)],
-        "gone together, of 19 and 20": [gone_together(mixed(0.3)[:count], WAVE[:count]) for count in (19, 20)],
-        "power": [power_of(one, WAVE, mixed(0.8)) for one in (WAVE, OTHER + np.cumsum(mixed(0.8)), WAVE**2)],
-        "power above a load": power_of(WAVE + 5.0, WAVE, mixed(0.8)),
-        "power of what stands": power_of(WAVE, mixed(0.5), np.zeros(60)),
-        "power of nothing": [power_of(None, WAVE, WAVE), power_of(WAVE, WAVE, None), power_of(WAVE, None, WAVE)],
+        "alike": [
+            correlation_and_ratio(one, WAVE)
+            for one in (3.0 * WAVE + 7.0, -0.5 * WAVE, mixed(0.6), OTHER, still, WAVE[:30][:0])
+        ],
+        "alike to what is still": correlation_and_ratio(WAVE, still),
+        "of 19 and 20": [correlation_and_ratio(WAVE[:count], mixed(0.3)[:count]) for count in (19, 20)],
+        "absent": [
+            correlation_and_ratio(None, WAVE),
+            correlation_and_ratio(WAVE, None),
+            path_agreement(None, WAVE),
+            path_agreement(WAVE, None),
+        ],
+        "gone together": [path_agreement(one, WAVE) for one in (0.2 * WAVE, -WAVE + 0.3, mixed(0.6), WAVE + OTHER)],
+        "gone together, of 19 and 20": [path_agreement(mixed(0.3)[:count], WAVE[:count]) for count in (19, 20)],
+        "power": [
+            pressure_flow_correlation(one, WAVE, mixed(0.8)) for one in (WAVE, OTHER + np.cumsum(mixed(0.8)), WAVE**2)
+        ],
+        "power above a load": pressure_flow_correlation(WAVE + 5.0, WAVE, mixed(0.8)),
+        "power of what stands": pressure_flow_correlation(WAVE, mixed(0.5), np.zeros(60)),
+        "power of nothing": [
+            pressure_flow_correlation(None, WAVE, WAVE),
+            pressure_flow_correlation(WAVE, WAVE, None),
+            pressure_flow_correlation(WAVE, None, WAVE),
+        ],
     }
 
 
@@ -110,15 +124,15 @@ def what_pumped_flow_goes_into() -> dict[str, Any]:
     }
     for name, change in changes.items():
         made = flow_balance(record.replace(**change), HEALTHY, 0.02)
-        found[name] = None if made is None else {**made._asdict(), "contradicts": made.contradicts_rig}
+        found[name] = None if made is None else {**made._asdict(), "contradicts": made.rig_contradiction}
     found["of a few blocks"] = [flow_balance(made_log(count), HEALTHY, 0.02) is None for count in (200, 201)]
-    found["perfect"] = FlowBalance(1.2, 0.0, 1.0, 0.0, 1.0, 0.5).contradicts_rig
+    found["perfect"] = FlowBalance(1.2, 0.0, 1.0, 0.0, 1.0, 0.5).rig_contradiction
     return found
 
 
 @NUMBERS.case()
 def slips_of_units() -> dict[str, Any]:
-    near = channel_physics._near  # pyright: ignore[reportPrivateUsage]
+    near = channel_physics._matching_slip  # pyright: ignore[reportPrivateUsage]
     return {
         "of a turn": {name: near(size, TURNS) for name, size in (("rpm", 0.1), ("rad/s", 10.0), ("none", 1.0))},
         "of a length, from": edge(lambda size: near(size, LENGTHS), 5.0, 10.0),
@@ -133,7 +147,7 @@ def slips_of_units() -> dict[str, Any]:
 def channels_that_are_swapped() -> dict[str, Any]:
     def swapped(there: float, ratio: float, here: float) -> list[Any]:
         made = blocks(velocity_slope=mixed(there, ratio), position=WAVE, slope=mixed(here), velocity=WAVE)
-        return codes(channel_physics._swapped(made))  # pyright: ignore[reportPrivateUsage]
+        return codes(channel_physics._swapped_notes(made))  # pyright: ignore[reportPrivateUsage]
 
     return {
         "surely": swapped(0.97, 1.0, 0.1),
@@ -173,7 +187,7 @@ def reversed_by(share: float, slow: float | None = None, **of: Any) -> list[Any]
     piston = together(share, given.get("size", 1.0)) if slow is None else mixed(slow)
     long = blocks(slope=piston, pumped=WAVE, pressure=given.get("pressure"))
     balance = replace_balance(**of) if of else None
-    return codes(channel_physics._reversed(record, long, long, balance))  # pyright: ignore[reportPrivateUsage]
+    return codes(channel_physics._wrong_sign_notes(record, long, long, balance))  # pyright: ignore[reportPrivateUsage]
 
 
 def replace_balance(**of: float) -> FlowBalance:
@@ -208,7 +222,7 @@ def what_counts_the_other_way() -> dict[str, Any]:
         "swept the other way surely from": edge(lambda one: reversed_by(-0.2, swept=-0.8, swept_std=one), 0.01, 0.9),
         "swept the other way, together": edge(lambda one: reversed_by(one, swept=-0.8), -0.25, 0.25),
         "data": [
-            told(channel_physics._reversed(made_log(60), shaped, shaped, balance))  # pyright: ignore[reportPrivateUsage]
+            told(channel_physics._wrong_sign_notes(made_log(60), shaped, shaped, balance))  # pyright: ignore[reportPrivateUsage]
             for shaped, balance in (
                 (blocks(slope=together(-0.9, 1.0), pumped=WAVE, pressure=-WAVE), None),
                 (blocks(slope=together(0.9, 1.0), pumped=WAVE, pressure=-WAVE), BALANCE._replace(compressed=-1.0)),

@@ -98,7 +98,7 @@ def gaps_that_are_bridged() -> dict[str, Any]:
     record = Record(T, {SPEED: speed, POSITION: speed, PRESSURE: np.zeros(40)})
 
     def opened(model: Any, one: Record) -> Any:
-        found, drives, comparable = bridging.with_gaps_open(model, one, HEALTHY)
+        found, drives, comparable = bridging.with_gap_uncertainty(model, one, HEALTHY)
         return {
             "drives": list(found.drives),
             "sums": drives.sum(axis=0),
@@ -128,7 +128,7 @@ def gaps_that_are_bridged() -> dict[str, Any]:
             6,
         ),
         "filled": [
-            [bridging.filled(values)[0], bridging.filled(values)[1]]
+            [bridging.bridged_slow_channel(values)[0], bridging.bridged_slow_channel(values)[1]]
             for values in (
                 speed[:14],
                 slow,
@@ -138,13 +138,13 @@ def gaps_that_are_bridged() -> dict[str, Any]:
                 np.where(ROWS[:40] % 5 < 2, speed, np.nan),
             )
         ],
-        "unknown angle [rad^2]": [bridging.unknown_angle(values, T) for values in (speed, slow)],
-        "unknown path [m^2]": [bridging.unknown_path(values, T) for values in (speed, slow)],
+        "unknown angle [rad^2]": [bridging.angle_variance(values, T) for values in (speed, slow)],
+        "unknown path [m^2]": [bridging.path_variance(values, T) for values in (speed, slow)],
         "of two and of one sample": [
-            bridging.unknown_angle(np.array([1.0, np.nan, 2.0]), T),
-            bridging.unknown_angle(np.array([np.nan, 1.0, np.nan]), T),
-            bridging.unknown_angle(np.ones(3), T),
-            bridging.unknown_path(np.ones(3), T),
+            bridging.angle_variance(np.array([1.0, np.nan, 2.0]), T),
+            bridging.angle_variance(np.array([np.nan, 1.0, np.nan]), T),
+            bridging.angle_variance(np.ones(3), T),
+            bridging.path_variance(np.ones(3), T),
         ],
         "pressure form": opened(PRESSURE_FORM, record),
         "flow form": opened(CHAMBERS, record),

@@ -148,7 +148,7 @@ def holds_that_mean_something() -> dict[str, Any]:
             sensor_check._quantum(one)  # pyright: ignore[reportPrivateUsage]
             for one in (np.array([1.0, 1.0, 3.0, 2.5]), np.ones(4), np.array([1.0, np.nan, 1.5]))
         ],
-        "pumped [m^3/s]": sensor_check._pumped(np.array([-9.0, -3.0, 0.0, 4.0, 5.0, 50.0]), HEALTHY),  # pyright: ignore[reportPrivateUsage]
+        "pumped [m^3/s]": sensor_check._pumped_flow(np.array([-9.0, -3.0, 0.0, 4.0, 5.0, 50.0]), HEALTHY),  # pyright: ignore[reportPrivateUsage]
     }
 
 
@@ -181,7 +181,7 @@ def encoders_that_jump() -> dict[str, Any]:
         position = np.where(rows >= begin + hold, 1e-5 * begin + size + 1e-5 * (rows - begin - hold), position)
         position[begin + hold : begin + hold + late] = np.nan
         record = Record(1e-3, {POSITION: position, SPEED: np.where(rows == 50, -speed, 0.0)})
-        return frozen_encoder.jumped(record, slice(begin, begin + hold), HEALTHY)
+        return frozen_encoder.ends_with_jump(record, slice(begin, begin + hold), HEALTHY)
 
     return {
         "jump from [m], beside the others": edge(lambda one: jumps(one, 1.0), 1e-6, 1e-2),
@@ -189,7 +189,7 @@ def encoders_that_jump() -> dict[str, Any]:
         "jump from [m], late": edge(lambda one: jumps(one, 150.0, late=4), 1e-5, 1e-2),
         "at the end": jumps(1.0, 1.0, 200),
         "from the first": jumps(1e-3, 1.0, 100, 0),
-        "without a pump": frozen_encoder.jumped(
+        "without a pump": frozen_encoder.ends_with_jump(
             Record(1e-3, {POSITION: np.where(np.arange(99) < 50, 0.0, 1.0)}), slice(0, 50), HEALTHY
         ),
     }
@@ -201,7 +201,7 @@ def motions_that_an_encoder_missed() -> dict[str, Any]:
     still = stands(LOG[POSITION], 500, 400)
 
     def missed(hold: slice = hold, **change: Any) -> bool:
-        return frozen_encoder.missed_motion(LOG.replace(**{POSITION: still, **change}), hold, HEALTHY)
+        return frozen_encoder.misses_motion(LOG.replace(**{POSITION: still, **change}), hold, HEALTHY)
 
     inside = (ROWS >= 500) & (ROWS < 900)
 
@@ -228,7 +228,7 @@ def motions_that_an_encoder_missed() -> dict[str, Any]:
             lambda one: missed(**within(SPEED, 150.0), **within(PRESSURE, one)), 2e6, 3.4e6, 14
         ),
         "blocks outside of it": [
-            frozen_encoder.missed_motion(
+            frozen_encoder.misses_motion(
                 LOG.replace(
                     **{POSITION: stands(LOG[POSITION], 10 * count, N)},
                     **{SPEED: np.where(10 * count <= ROWS, 100.0, LOG[SPEED])},
@@ -254,7 +254,7 @@ def motions_that_an_encoder_missed() -> dict[str, Any]:
         ],
         "a fit that is not negative": [
             list(one)
-            for one in frozen_encoder._fitted(  # pyright: ignore[reportPrivateUsage]
+            for one in frozen_encoder._non_negative_fit(  # pyright: ignore[reportPrivateUsage]
                 np.column_stack([np.arange(9.0), np.cos(np.arange(9.0)), np.zeros(9)]),
                 2.0 * np.arange(9.0) + noise(0.1, 9),
             )

@@ -38,7 +38,7 @@ def channels_that_are_held() -> dict[str, Any]:
         begins = np.where((noise(1.0, N, 9) < late) & (begins == ROWS), np.maximum(begins - 1, 0), begins)
         return held.held_rows(quantum * np.rint(size * np.sin(0.05 * begins) / quantum))
 
-    found, notes = held.without_held(
+    found, notes = held.without_held_values(
         Record(T, {POSITION: wave[ROWS // 4 * 4], PRESSURE: wave[ROWS // 3 * 3], SPEED: wave[ROWS // 4 * 4]})
     )
     return {
@@ -154,7 +154,7 @@ def hums() -> dict[str, Any]:
         "no pressure": hum.without_hum(LOG.replace(**{PRESSURE: None}))[1],
         "no sample": hum.without_hum(LOG.replace(**{PRESSURE: np.full(N, np.nan)}))[1],
         "between two lines [Hz]": [
-            hum._between(np.arange(5.0) * 0.2, np.array(lines), place)  # pyright: ignore[reportPrivateUsage]
+            hum._line_frequency(np.arange(5.0) * 0.2, np.array(lines), place)  # pyright: ignore[reportPrivateUsage]
             for lines, place in (
                 ([1.0, 5.0, 40.0, 9.0, 1.0], 2),
                 ([9.0, 5.0, 1.0, 1.0, 2.0], 0),
@@ -207,8 +207,8 @@ def outliers_left_out() -> dict[str, Any]:
         "with gaps": lost(gone(spiked(5.0, 100), 101, 102, 103)),
         "running ranks": outliers._running_ranks(wave[:12], 7, [2, 3, 4])[:, [0, 1, 6, 11]],  # pyright: ignore[reportPrivateUsage]
         "long": [len(outliers._running_ranks(np.arange(count) % 11.0, 7, [3])[0]) for count in (5,)],  # pyright: ignore[reportPrivateUsage]
-        "sorted": [list(map(list, outliers.exchanges(count))) for count in (2, 3, 5, 7)],
-        "comparisons": [len(outliers.exchanges(count)) for count in (1, 8, 11, 16)],
+        "sorted": [list(map(list, outliers.sorting_exchanges(count))) for count in (2, 3, 5, 7)],
+        "comparisons": [len(outliers.sorting_exchanges(count)) for count in (1, 8, 11, 16)],
         "of logs": [told(outliers.without_gross_outliers(one, channels)[1]) for one in (LOG, slip, confirmed, clipped)],
     }
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.sent_twice import FEWEST_ROWS, _widened, without_rows_sent_twice
+from estimation.log_checks.sent_twice import FEWEST_ROWS, _extended_copy, without_rows_sent_twice
 from estimation.notes import SensorCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -90,7 +90,7 @@ def test_a_noiseless_packet_sent_twice_is_found_by_its_step_back() -> None:
 def test_a_copy_extends_over_all_repeated_rows_including_rests_at_its_ends(
     rows: list[int], known: tuple[int, int], whole: tuple[int, int]
 ) -> None:
-    assert _widened(np.array(rows, dtype=np.uint64), *known, 5) == whole
+    assert _extended_copy(np.array(rows, dtype=np.uint64), *known, 5) == whole
 
 
 def test_coarse_channels_at_rest_have_no_copied_rows() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
-from estimation.log_checks.sliding_pressure import LEAST, MOST, beyond_sliding, sliding_pressure
+from estimation.log_checks.sliding_pressure import LEAST, MOST, sliding_excess, sliding_pressure
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -24,8 +24,8 @@ def test_pistons_in_all_conditions_slide_at_the_pressure_of_their_friction(condi
     log = simulate(CIRCUIT, make_drive(drive, 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     ratio = sliding_pressure(log, RIG)
     assert LEAST < ratio < MOST
-    assert beyond_sliding(ratio) == 0.0
-    assert beyond_sliding(0.1 * ratio) < 0.0
+    assert sliding_excess(ratio) == 0.0
+    assert sliding_excess(0.1 * ratio) < 0.0
 
 
 def test_a_still_piston_has_a_neutral_ratio_of_sliding_pressure() -> None:
@@ -43,4 +43,4 @@ def test_viscous_friction_counts_in_the_sliding_pressure() -> None:
     """Over Coulomb friction alone, pressure was 10 times too high, so oil 4 times as stiff made its unit seem wrong."""
     rig, rng = replace(RIG, friction_coulomb=20.0, friction_linear=3000.0), np.random.default_rng(4)
     log = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, rig, rng), 1e-3, rig, sensors=BENCH, rng=rng)
-    assert beyond_sliding(sliding_pressure(log, rig)) == 0.0
+    assert sliding_excess(sliding_pressure(log, rig)) == 0.0

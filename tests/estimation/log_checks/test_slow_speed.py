@@ -7,7 +7,7 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow.log_traits import LogTraits
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.held import without_held
+from estimation.log_checks.held import without_held_values
 from estimation.notes import SensorCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -38,7 +38,7 @@ def held(record: Record, rows: int, *more: str, first: int = 0) -> Record:
 @pytest.mark.parametrize("drive", ["multisine", "prbs", "steps"])
 def test_a_log_is_taken_at_the_samples_of_a_speed_that_was_repeated(drive: str, rows: int, first: int) -> None:
     record = log(drive)
-    found, (note,) = without_held(held(record, rows, first=first))
+    found, (note,) = without_held_values(held(record, rows, first=first))
     assert (note.code, note.data["channel"], note.data["rows"]) == (SensorCode.SPEED_HELD, SPEED, rows)
     assert found.sample_time == pytest.approx(rows * record.sample_time)
     for name in (SPEED, POSITION, PRESSURE):
@@ -47,7 +47,7 @@ def test_a_log_is_taken_at_the_samples_of_a_speed_that_was_repeated(drive: str, 
 
 def test_other_channels_that_are_held_on_clocks_of_their_own_keep_their_samples() -> None:
     record = log()
-    found, notes = without_held(held(record, 5, PRESSURE))
+    found, notes = without_held_values(held(record, 5, PRESSURE))
     assert [note.code for note in notes] == [SensorCode.SPEED_HELD, SensorCode.HELD]
     there = np.isfinite(found[PRESSURE])
     assert np.mean(there) == pytest.approx(0.5, abs=0.02)
@@ -59,9 +59,9 @@ def test_a_motor_that_holds_its_speed_is_believed_row_by_row() -> None:
     stairs = 100.0 * np.sin(2e-2 * (at // 8 * 8)) + 5.0 * np.cos(0.31 * (at // 8 * 8))
     record = simulate(LUMPED, stairs, 1e-3, P, sensors=BENCH, rng=np.random.default_rng(1))
     driven = record.replace(**{SPEED: stairs})
-    assert without_held(driven) == (driven, ())
+    assert without_held_values(driven) == (driven, ())
     lacking = held(log(), 8).replace(**{PRESSURE: None})  # nothing shows whether the logger or the motor held it
-    assert without_held(lacking) == (lacking, ())
+    assert without_held_values(lacking) == (lacking, ())
 
 
 @pytest.mark.parametrize("drive", thinned(["multisine", "steps"], ["steps"]))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from benchmarks.diagnosis.coverage import Case, logged
+from benchmarks.diagnosis.coverage import Case, draw_log
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from estimation.log_checks.told_once import REST, changes_and_rests, told_once
+from estimation.log_checks.told_once import REST, changes_and_rests, with_repeats_used_once
 from plant.arrays import Array
 from plant.log.record import Record
 
@@ -46,9 +46,9 @@ def test_equal_readings_of_a_noisy_or_still_encoder_are_all_kept() -> None:
     rng = np.random.default_rng(1)
     noisy = Record(1e-3, {"position_m": np.round(rng.normal(0.0, 2.0, 5000)) * 1e-6})
     assert np.count_nonzero(np.diff(noisy["position_m"]) == 0.0) > 100
-    assert told_once(noisy) is noisy
+    assert with_repeats_used_once(noisy) is noisy
     still = Record(1e-3, {"position_m": np.zeros(5000)})
-    assert told_once(still) is still
+    assert with_repeats_used_once(still) is still
 
 
 @pytest.mark.slow
@@ -56,7 +56,7 @@ def test_equal_readings_of_a_noisy_or_still_encoder_are_all_kept() -> None:
 def test_a_tuned_filters_interval_covers_if_the_piston_rests_between_moves(
     drive: str, condition: str, seed: int
 ) -> None:
-    log = logged(Case("lumped", "pressure", 1000, drive, condition, seed))
+    log = draw_log(Case("lumped", "pressure", 1000, drive, condition, seed))
     found = estimate_bulk_modulus(log.record, log.true, form="pressure", tuned=True)
     assert found.gate.passed
     assert found.std is not None

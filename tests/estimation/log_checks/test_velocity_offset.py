@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.velocity_offset import CERTAIN, LEAST_PARTS, MATTERS, PARTS, without_velocity_offset
+from estimation.log_checks.velocity_offset import (
+    CERTAIN,
+    LEAST_OFFSET_SHARE,
+    LEAST_PARTS,
+    PARTS,
+    without_velocity_offset,
+)
 from estimation.notes import SensorCode
 from faults.diagnosis.diagnose import diagnose_log
 from plant.eha.drives import make_drive
@@ -49,7 +55,7 @@ def test_noise_and_a_wrong_gain_are_no_offset(gain: float) -> None:
 
 
 def test_an_offset_is_subtracted_only_if_it_is_large_enough_and_significant() -> None:
-    for offset, told in ((1.1 * MATTERS, True), (0.9 * MATTERS, False)):
+    for offset, told in ((1.1 * LEAST_OFFSET_SHARE, True), (0.9 * LEAST_OFFSET_SHARE, False)):
         size = float(np.sqrt(np.mean(moved(size=1.0)["velocity_m_s"] ** 2)))
         assert bool(without_velocity_offset(moved(size=1.0, offset=offset * size))[1]) is told
     error = NOISE / 8000**0.5

@@ -12,7 +12,7 @@ from estimation.log_checks.first_belief import first_belief
 from estimation.models.augment import AIR_FRACTION, AUGMENTABLE, augmented, augmented_prior
 from estimation.models.eha_forms import ACCELERATION_FORM, BULK_MODULUS, FORMS, PRESSURE_FORM
 from estimation.models.model import ProcessModel
-from faults.eha.inject import abrupt
+from faults.eha.inject import abrupt_fault
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -75,7 +75,7 @@ def followed(names: list[str], drift: dict[str, float]) -> tuple[Estimate, EhaPa
     """Filter a run whose leakage jumps fivefold after five seconds."""
     rng = np.random.default_rng(4)
     worn = replace(RIG, leakage_coefficient=5.0 * RIG.leakage_coefficient)
-    path = abrupt(RIG, worn, at=5.0)
+    path = abrupt_fault(RIG, worn, at=5.0)
     drive = make_drive("prbs", 10.0, 1e-3, RIG, rng)
     log = simulate(LUMPED, drive, 1e-3, path, sensors=BENCH, rng=rng)
     model = augmented(PRESSURE_FORM, names, drift)

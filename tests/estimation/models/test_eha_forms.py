@@ -11,7 +11,7 @@ from estimation.models.eha_forms import (
     PRESSURE_FORM,
     acceleration_step,
     pressure_step,
-    volume_left_open,
+    undetermined_volume,
     with_bulk_modulus,
 )
 from estimation.models.model import ProcessModel
@@ -113,9 +113,9 @@ def test_only_the_bulk_modulus_is_replaced() -> None:
 
 def test_an_unknown_oil_volume_moves_each_state_by_its_largest_possible_amount() -> None:
     p, T = EhaParameters(), 1e-3
-    variance, moves = volume_left_open(p, {"motor_speed_rad_s": np.array([0.0, 4.0])}, T)
+    variance, moves = undetermined_volume(p, {"motor_speed_rad_s": np.array([0.0, 4.0])}, T)
     np.testing.assert_allclose(variance, [0.0, 4.0 * p.pump_displacement**2])
-    displaced, _ = volume_left_open(p, {"position_m": np.array([9.0])}, T)
+    displaced, _ = undetermined_volume(p, {"position_m": np.array([9.0])}, T)
     assert displaced == pytest.approx(9.0 * p.piston_area**2)
     volume = 1e-7
     # with the piston at rest, equation 5.8 compresses all of it, half in each of two equal chambers

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.models.completed_flow import balances_mass, completed
+from estimation.models.completed_flow import balances_mass, completed_flow_form
 from estimation.models.flow import (
     FLOW_FORM,
     HELD_FLOW_FORM,
@@ -13,7 +13,7 @@ from estimation.models.flow import (
     chamber_rates,
     delivered_flow,
     flow_rates,
-    relieving,
+    form_with_relief,
 )
 from estimation.models.greybox import GreyBoxModel
 from plant.components.oil import ATMOSPHERE
@@ -71,7 +71,7 @@ def test_a_make_up_valve_lowers_its_chamber_by_its_cracking_pressure() -> None:
 def test_the_accumulator_has_the_same_rate_balanced_by_volume_and_by_mass() -> None:
     state, drives = (3e5, 2e5, 2.6e5), ((60.0, 60.0), (0.0, 1e-4), 1e-3)
     p = values(accumulator_stiffness=1e8, case_leakage=1e-13)
-    by_volume = completed(FLOW_FORM).rates(state, drives, p, 0.0)
+    by_volume = completed_flow_form(FLOW_FORM).rates(state, drives, p, 0.0)
     by_mass = MASS_FLOW_FORM.rates(state, drives, p, 0.0)
     assert by_volume[2] == by_mass[2] != 0.0
     fed = values(accumulator_pressure=2.6e5, case_leakage=1e-13)
@@ -84,14 +84,16 @@ def test_a_make_up_valve_like_an_orifice_feeds_half_the_linear_flow_beyond_its_b
 ) -> None:
     state, drives = (2e5, 1.2e6, 2.6e5), ((60.0, 60.0), (0.0, 1e-4), 1e-3)
     flat, bent = (
-        completed(form, bent=True).rates(state, drives, values(accumulator_stiffness=1e8, makeup_bend=bend), 0.0)
+        completed_flow_form(form, bent=True).rates(
+            state, drives, values(accumulator_stiffness=1e8, makeup_bend=bend), 0.0
+        )
         for bend in (0.0, 3.0 / 6e4)
     )
-    assert flat == completed(form).rates(state, drives, values(accumulator_stiffness=1e8), 0.0)
+    assert flat == completed_flow_form(form).rates(state, drives, values(accumulator_stiffness=1e8), 0.0)
     assert bent[2] == pytest.approx(0.5 * flat[2], rel=1e-12)  # the inner circuit loses only what the valves feed
     assert bent[1] == flat[1]
-    assert completed(form, bent=True).unknowns.count("makeup_bend") == 1
-    assert balances_mass(completed(form, bent=True)) == balances_mass(form) == (form is MASS_FLOW_FORM)
+    assert completed_flow_form(form, bent=True).unknowns.count("makeup_bend") == 1
+    assert balances_mass(completed_flow_form(form, bent=True)) == balances_mass(form) == (form is MASS_FLOW_FORM)
 
 
 def test_two_chambers_without_make_up_have_the_lumped_capacitance() -> None:
@@ -135,7 +137,10 @@ def test_a_lead_shifts_the_delivered_flow_in_time() -> None:
 
 
 def test_the_form_for_a_relieving_log_has_the_valve_among_its_unknowns() -> None:
-    assert set(relieving(FLOW_FORM).unknowns) - set(FLOW_FORM.unknowns) == {"relief_pressure", "relief_conductance"}
+    assert set(form_with_relief(FLOW_FORM).unknowns) - set(FLOW_FORM.unknowns) == {
+        "relief_pressure",
+        "relief_conductance",
+    }
 
 
 def test_the_form_of_held_volumes_depends_on_the_pistons_motion_and_not_its_position() -> None:

@@ -61,9 +61,9 @@ def flow_forms() -> dict[str, Any]:
         "by volume": flow.FLOW_FORM,
         "by mass": flow.MASS_FLOW_FORM,
         "held": flow.HELD_FLOW_FORM,
-        "completed": completed_flow.completed(flow.FLOW_FORM),
-        "completed by mass": completed_flow.completed(flow.MASS_FLOW_FORM),
-        "relieving": flow.relieving(flow.FLOW_FORM),
+        "completed": completed_flow.completed_flow_form(flow.FLOW_FORM),
+        "completed by mass": completed_flow.completed_flow_form(flow.MASS_FLOW_FORM),
+        "relieving": flow.form_with_relief(flow.FLOW_FORM),
     }
     for name, form in forms.items():
         told[name] = {
@@ -239,7 +239,7 @@ def process_forms() -> dict[str, Any]:
         told[f"{model.name}, observed"] = dict(model.observe((0.01, 0.02, 2e6, 2e8), PAPER))
         told[f"{model.name}, steps"] = [model.substeps(t) for t in (5e-5, 1e-4, 1.5e-4, 1e-3)]
     unknown = {"motor_speed_rad_s": np.array([1.0, 4.0]), "position_m": np.array([1e-8, 0.0])}
-    variance, slopes = eha_forms.volume_left_open(PAPER, unknown, 2e-3)
+    variance, slopes = eha_forms.undetermined_volume(PAPER, unknown, 2e-3)
     told["left open"] = [variance, dict(slopes)]
     model = chambers.CHAMBERS
     belief = chambers.chamber_belief(PAPER, 1e6, 2e8)

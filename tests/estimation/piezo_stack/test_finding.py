@@ -10,7 +10,7 @@ from estimation.finding import Outcome
 from estimation.piezo_stack import finding
 from estimation.piezo_stack.estimate import StackEstimate, stack_bounds
 from estimation.piezo_stack.finding import (
-    BY_CHANCE,
+    CHANCE_ALLOWANCE,
     MOST_DEVIATION,
     MOST_MISFIT,
     SMALLEST_FAULT,
@@ -25,7 +25,7 @@ from plant.piezo_stack.run import sine_drive
 
 HEALTHY = PiezoStackParameters()
 SAMPLES = 10_000
-MOST = MOST_MISFIT + BY_CHANCE / SAMPLES**0.5
+MOST = MOST_MISFIT + CHANCE_ALLOWANCE / SAMPLES**0.5
 SIZES = {"coulomb_friction": SMALLEST_FAULT["coulomb_friction"], "air_fraction": HEALTHY.air_fraction}
 
 

@@ -11,9 +11,9 @@ from estimation.piezo_stack import bouc_wen, estimate
 from estimation.piezo_stack.bouc_wen import LOOP, fit_stack_loop, loop_bounds
 from estimation.piezo_stack.bouc_wen_printed import printed_fit
 from estimation.piezo_stack.estimate import StackEstimate, covariance, estimate_stack, stack_bounds
-from estimation.piezo_stack.finding import missed, stack_quantities
-from estimation.piezo_stack.runs import STACK_CHANNELS, prepared
-from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, changed, told
+from estimation.piezo_stack.finding import stack_quantities, undescribed_channels
+from estimation.piezo_stack.runs import STACK_CHANNELS, prepared_runs
+from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, changed_actuator, reported_value
 from plant.log.record import Record
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import BENCH_SENSORS, simulate_stack, sine_drive
@@ -34,22 +34,22 @@ def log() -> Record:
 
 @NUMBERS.case()
 def unknowns_and_starts() -> dict[str, Any]:
-    moved = {name: changed(HEALTHY, {name: 0.4}) for name in UNKNOWNS}
+    moved = {name: changed_actuator(HEALTHY, {name: 0.4}) for name in UNKNOWNS}
     return {
         "changed": {
             name: {one: getattr(moved[name], one) for one in unknown.names} for name, unknown in UNKNOWNS.items()
         },
         "scales": {name: one.scale for name, one in UNKNOWNS.items()},
         "told": {
-            name: list(told(moved[name], HEALTHY, name, 0.1))
+            name: list(reported_value(moved[name], HEALTHY, name, 0.1))
             if not UNKNOWNS[name].scale
             else {
-                "value": told(moved[name], HEALTHY, name, 0.1)[0],
-                "deviation": told(moved[name], HEALTHY, name, 0.1)[1],
+                "value": reported_value(moved[name], HEALTHY, name, 0.1)[0],
+                "deviation": reported_value(moved[name], HEALTHY, name, 0.1)[1],
             }
             for name in UNKNOWNS
         },
-        "far": [changed(HEALTHY, {"air_fraction": one}).air_fraction for one in (-9.0, 9.0)],
+        "far": [changed_actuator(HEALTHY, {"air_fraction": one}).air_fraction for one in (-9.0, 9.0)],
         "unless asked": list(DEFAULT_UNKNOWNS),
         "starts": [dict(one) for one in STARTS],
     }
@@ -57,17 +57,19 @@ def unknowns_and_starts() -> dict[str, Any]:
 
 @NUMBERS.case(relative=1e-4)
 def runs_beside_a_log() -> dict[str, Any]:
-    runs = prepared(log(), HEALTHY, ("chamber_leakage", "coulomb_friction"), STACK_CHANNELS)
+    runs = prepared_runs(log(), HEALTHY, ("chamber_leakage", "coulomb_friction"), STACK_CHANNELS)
     measured = runs.measured
     theta = np.array([0.3, 0.2])
-    base, slopes = runs.around(theta)
-    coarse, steep = runs.around(theta, 5e-6, 2e-2)
+    base, slopes = runs.linearised_at(theta)
+    coarse, steep = runs.linearised_at(theta, 5e-6, 2e-2)
     guesses, beside = runs.first(STARTS)
     order = [guesses[place] for place in np.argsort(np.sum((beside - measured) ** 2, axis=1), kind="stable")]
     lost = runs.scaled([np.array([0.0, np.nan])])
 
     def refused(**of: Any) -> Any:
-        return or_refused(lambda: prepared(log().replace(**of), HEALTHY, ("chamber_leakage",), STACK_CHANNELS).measured)
+        return or_refused(
+            lambda: prepared_runs(log().replace(**of), HEALTHY, ("chamber_leakage",), STACK_CHANNELS).measured
+        )
 
     return {
         "channels": list(runs.noise),
@@ -85,7 +87,7 @@ def runs_beside_a_log() -> dict[str, Any]:
             refused(**dict.fromkeys(STACK_CHANNELS)),
             refused(position_m=np.where(np.arange(120) == 4, np.nan, 0.0)),
         ],
-        "an unknown unknown": or_refused(lambda: prepared(log(), HEALTHY, ("x",), STACK_CHANNELS)),
+        "an unknown unknown": or_refused(lambda: prepared_runs(log(), HEALTHY, ("x",), STACK_CHANNELS)),
         "no start": or_refused(lambda: runs.first(({"air_fraction": 0.1},))),
     }
 
@@ -119,7 +121,7 @@ def what_a_run_says() -> dict[str, Any]:
             stack_bounds(WORN, DRIVE, T, channels=("position_m",), unknowns=("air_fraction", "crossport_leakage"))
         ),
         "covariance": [covariance(slopes[:, :2])[0], covariance(slopes)[2, 2]],
-        "share of a change": estimate._share(np.array([0.1, -0.6]), np.diag([0.01, 0.04])),  # pyright: ignore[reportPrivateUsage]
+        "share of a change": estimate._largest_relative_change(np.array([0.1, -0.6]), np.diag([0.01, 0.04])),  # pyright: ignore[reportPrivateUsage]
         "spread": estimate._Optimum(np.zeros(2), np.arange(9.0), np.zeros((9, 2))).spread,  # pyright: ignore[reportPrivateUsage]
         "quantities": {
             name: {"value": one.value, "std": one.std, "unit": one.unit}
@@ -141,7 +143,7 @@ def misfits_and_quantities() -> dict[str, Any]:
     )
 
     def misses(one: float) -> list[str]:
-        return list(missed(replace(made, misfit={"position_m": one, "stack_force_n": 1.0})))
+        return list(undescribed_channels(replace(made, misfit={"position_m": one, "stack_force_n": 1.0})))
 
     def given(value: float, std: float, name: str = "coulomb_friction") -> bool:
         return (
@@ -187,8 +189,8 @@ def loops_of_a_stack() -> dict[str, Any]:
         "gone round before": {"values": dict(again.values), "error": again.error, "condition": again.condition},
         "bounds": dict(loop_bounds(p, voltage, 2e-8)),
         "bounds of one cycle from rest": dict(loop_bounds(p, voltage[:201], 2e-8)),
-        "averaged": [len(bouc_wen._averaged(long[:count])) for count in (201, 4999, 5001, 9999, 10001, 20001)],  # pyright: ignore[reportPrivateUsage]
-        "means": bouc_wen._averaged(long)[[0, 1, -2, -1]],  # pyright: ignore[reportPrivateUsage]
+        "averaged": [len(bouc_wen._averaged_loop(long[:count])) for count in (201, 4999, 5001, 9999, 10001, 20001)],  # pyright: ignore[reportPrivateUsage]
+        "means": bouc_wen._averaged_loop(long)[[0, 1, -2, -1]],  # pyright: ignore[reportPrivateUsage]
         "short": [refused(voltage[:count], rest[:count]) for count in (49,)],
         "gap to": edge(
             lambda one: isinstance(

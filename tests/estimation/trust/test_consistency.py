@@ -16,7 +16,7 @@ from estimation.models.eha_forms import BULK_MODULUS, FORMS, PRESSURE_FORM
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from estimation.notes import ChannelCode, EstimateCode
-from estimation.trust.consistency import consistency_gate, describes, mean_chi_square_bounds, nees, wander
+from estimation.trust.consistency import consistency_gate, describes_log, mean_chi_square_bounds, nees, wander
 from estimation.trust.whiteness import SETTLING
 from faults.conditions import CONDITIONS, parameters_for
 from plant.arrays import Array
@@ -281,4 +281,4 @@ def test_a_model_fails_to_describe_a_log_beyond_ten_deviations_or_at_a_bound(lin
     first = replace(linear.states[0], lower=-1.0, upper=1.0)
     bounded = replace(linear, states=(first, *linear.states[1:]))
     for value, nis, described in ((0.5, 99.0, True), (0.5, 101.0, False), (1.0, 1.0, False), (-1.0, 1.0, False)):
-        assert describes(constant(bounded, np.full(1001, value), nis), "position_m") is described
+        assert describes_log(constant(bounded, np.full(1001, value), nis), "position_m") is described

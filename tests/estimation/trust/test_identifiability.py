@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.trust.card import Card, percent, rank_drives, sentences
-from estimation.trust.identifiability import SENSED, identifiability_card
+from estimation.trust.identifiability import CARD_CHANNELS, identifiability_card
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.arrays import Array
 from plant.eha.drives import make_drive
@@ -18,7 +18,7 @@ from tests.estimation.tuning.likelihood_fit import fit_likelihood
 from tests.thinned import thinned
 
 RIG = EhaParameters()
-MOTION = SENSED[:2]
+MOTION = CARD_CHANNELS[:2]
 EVERY_CONDITION = pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
 
 

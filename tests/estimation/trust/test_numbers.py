@@ -14,7 +14,7 @@ from estimation.models.gaussian import Gaussian
 from estimation.trust.bounds import at_bulk_modulus, bulk_modulus_bound, posterior_bound
 from estimation.trust.card import Card, percent, rank_drives, sentences
 from estimation.trust.chi_square import chi_square_quantile, chi_square_tail
-from estimation.trust.consistency import consistency_gate, describes, mean_chi_square_bounds, nees, wander
+from estimation.trust.consistency import consistency_gate, describes_log, mean_chi_square_bounds, nees, wander
 from estimation.trust.identifiability import UNKNOWN, identifiability_card
 from estimation.trust.whiteness import quantum, whiteness
 from plant.arrays import Array
@@ -158,7 +158,7 @@ def _of_gate(found: Estimate, log: Record | None = None) -> dict[str, Any]:
         "reasons": {str(one.code): dict(one.data) for one in gate.reasons},
         "stretched by": gate.inflation,
         "wander": wander(found, BULK_MODULUS),
-        "describes": describes(found, BULK_MODULUS),
+        "describes": describes_log(found, BULK_MODULUS),
     }
 
 

@@ -13,7 +13,7 @@ from estimation.trust.whiteness import (
     SETTLING,
     Whiteness,
     _autocorrelations,
-    _explained,
+    _coherent_share,
     _ljung_box,
     quantum,
     whiteness,
@@ -175,7 +175,7 @@ def test_the_share_that_the_drive_explains_is_unbiased(driven: float, share: flo
     found: list[float] = []
     for _ in range(20):
         push, own = rng.standard_normal((2, SEGMENTS * 250))
-        found.append(_explained(driven * push + own, push, 250))
+        found.append(_coherent_share(driven * push + own, push, 250))
     assert np.mean(found) == pytest.approx(share, abs=0.02)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from estimation.engine.contract import FilterProblem
 from estimation.engine.layout import layout
-from estimation.engine.runner import aligned, constant_row
+from estimation.engine.runner import aligned_array, constant_row
 from estimation.filters.ekf import EKF, ekf
 from estimation.filters.run import filter_problem
 from estimation.log_checks.first_belief import first_belief
@@ -77,7 +77,7 @@ def innovations_and_their_slopes() -> dict[str, Any]:
             state.name: one for state, one in zip(PRESSURE_FORM.states, np.diag(trace.covariance), strict=True)
         },
         "counts": trace.count,
-        "aligned": [aligned(3, 5).ctypes.data % 64, *aligned(3, 5).shape],
+        "aligned": [aligned_array(3, 5).ctypes.data % 64, *aligned_array(3, 5).shape],
     }
 
 
@@ -85,8 +85,8 @@ def innovations_and_their_slopes() -> dict[str, Any]:
 def coordinates_of_noise() -> dict[str, Any]:
     made = noise_coordinates(task(), log(), RIG)
     begun, guessed = tuning._likeliest_start(task(), made)
-    paper = tuning._published(task())
-    continued, moved = tuning._continued(task(), ekf(task()))
+    paper = tuning._task_with_published_noise(task())
+    continued, moved = tuning._task_with_found_constants(task(), ekf(task()))
     return {
         "coordinates": {
             one.name: {"place": one.place, "guess": one.guess, "floor": one.floor, "spread": one.spread} for one in made
@@ -131,7 +131,7 @@ def where_the_search_ends() -> dict[str, Any]:
         "log-likelihood": tuned.tuned.log_likelihood,
         "spreads": {name: Roughly(one, 0.1) for name, one in tuned.spread.items()},
         "prior [Pa]": Roughly(float(tuned.prior.mean[-1]), 0.02),
-        "limits": [tuning.NOISE_SPREAD, tuning.ROUNDS, tuning.MOVED],
+        "limits": [tuning.NOISE_SPREAD, tuning.ROUNDS, tuning.LARGEST_CONSTANT_MOVE],
     }
 
 

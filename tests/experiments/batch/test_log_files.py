@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.batch.log_files import matching
+from experiments.batch.log_files import matching_files
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def logs(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("pattern", ["**/*.csv", "*.csv", "**", "*/**/*.csv", "**/run/**/c.*", "run/b.csv", "none/**"])
 def test_a_pattern_finds_the_same_files_as_glob(logs: Path, pattern: str) -> None:
     wanted = [path for path in glob(f"{logs}/{pattern}", recursive=True) if Path(path).is_file()]  # noqa: PTH207
-    assert matching(f"{logs}/{pattern}") == sorted(wanted)
+    assert matching_files(f"{logs}/{pattern}") == sorted(wanted)
 
 
 def test_circular_links_are_followed_to_each_folder_only_once(logs: Path, tmp_path: Path) -> None:
@@ -34,10 +34,10 @@ def test_circular_links_are_followed_to_each_folder_only_once(logs: Path, tmp_pa
     (logs / "linked").symlink_to(tmp_path / "elsewhere")
     (logs / "f.csv").symlink_to("a.csv")
     os.mkfifo(logs / "pipe.csv")
-    found = [Path(path).relative_to(logs).as_posix() for path in matching(f"{logs}/**/*.csv")]
+    found = [Path(path).relative_to(logs).as_posix() for path in matching_files(f"{logs}/**/*.csv")]
     assert found == ["a.csv", "f.csv", "linked/e.csv", "run/[1]/c.csv", "run/b.csv"]
 
 
 def test_a_folder_that_is_a_link_is_searched(logs: Path, tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(logs)
-    assert len(matching(f"{tmp_path}/link/**/*.csv")) == 3
+    assert len(matching_files(f"{tmp_path}/link/**/*.csv")) == 3

@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from experiments.batch.pages import _or_dash, _quantities, _times, one_row_a_log, render_batch_report
 from experiments.batch.rows import SCHEMA
-from experiments.batch.standing import standing_in_words, standing_of
+from experiments.batch.standing import logs_by_standing, standing_in_words
 from experiments.batch.summary import frame_of, summary_tables
 from experiments.page.numbers import MISSING
 from tests.experiments.fleet.conftest import store_row
@@ -92,7 +92,7 @@ def test_a_report_of_logs_opens_with_the_worst_and_lists_them_first() -> None:
     rows = [store_row(f"/home/ann/{name}.csv", leakage) for name, leakage in (("a", 1.0), ("b", 5.0), ("c", 3.1))]
     rows.append({**store_row("/home/ann/d.csv", 1.0), "outcome": "failed", "quantities": None, "found_condition": None})
     table = pa.Table.from_pylist([{"plant": "log", **row} for row in rows], schema=SCHEMA)
-    worst = standing_of(table)
+    worst = logs_by_standing(table)
     others = "1 probably past one, 1 within limits, 1 could not be read"
     said = (f"1 of 4 logs is past a limit; {others}.", "Start with b.csv, c.csv.")
     assert standing_in_words(worst) == said

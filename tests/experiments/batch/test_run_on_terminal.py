@@ -23,7 +23,7 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def test_a_store_of_other_package_versions_is_reported_with_those_versions(said: list[str]) -> None:
     old = {"versions": {"numpy": "1.0", "scipy": "2.0"}, "commit": "0123456789abcdef"}
-    run_on_terminal._say_differences(old, {"versions": {"numpy": "1.1", "scipy": "2.0"}, "commit": "fedcba"})
+    run_on_terminal._warn_of_differences(old, {"versions": {"numpy": "1.1", "scipy": "2.0"}, "commit": "fedcba"})
     (one,) = said
     assert "numpy 1.0, commit 0123456789;" in one
     assert "scipy" not in one
@@ -31,7 +31,7 @@ def test_a_store_of_other_package_versions_is_reported_with_those_versions(said:
 
 def test_a_store_of_since_edited_code_is_reported(said: list[str]) -> None:
     old = {"versions": {}, "commit": "a", "sources": "one"}
-    run_on_terminal._say_differences(old, {**old, "sources": "two"})
+    run_on_terminal._warn_of_differences(old, {**old, "sources": "two"})
     (one,) = said
     assert "other code in plant, estimation, faults; --no-resume" in one
 
@@ -53,13 +53,13 @@ def test_the_hash_of_the_sources_changes_with_models_and_numbers_but_not_with_pa
 
 @pytest.mark.parametrize("old", [None, {"versions": {"numpy": "1.0"}, "commit": "a"}])
 def test_the_same_software_or_a_new_store_is_not_reported(old: Any, said: list[str]) -> None:
-    run_on_terminal._say_differences(old, {"versions": {"numpy": "1.0"}, "commit": "a"})
+    run_on_terminal._warn_of_differences(old, {"versions": {"numpy": "1.0"}, "commit": "a"})
     assert said == []
 
 
 def test_only_the_first_failures_are_named(said: list[str]) -> None:
     failures = [Failure(f"case {k}", "filter", "no log") for k in range(run_on_terminal.MOST_NAMED + 3)]
-    with run_on_terminal._shown(len(failures), 0) as advance:
+    with run_on_terminal._show_progress(len(failures), 0) as advance:
         advance(len(failures), SimpleNamespace(failures=failures))  # type: ignore[arg-type]
     named = [one for one in said if one.startswith("case ")]
     assert named == [f"case {k} (filter): no log" for k in range(run_on_terminal.MOST_NAMED)]
@@ -68,7 +68,7 @@ def test_only_the_first_failures_are_named(said: list[str]) -> None:
 
 def test_an_unreadable_log_is_reported_once_with_all_its_verbs(said: list[str]) -> None:
     failures = [Failure("a.csv", verb, "it is empty") for verb in ("diagnose", "estimate", "estimate")]
-    with run_on_terminal._shown(4, 0) as advance:
+    with run_on_terminal._show_progress(4, 0) as advance:
         advance(4, SimpleNamespace(failures=[*failures, Failure("b.csv", "estimate", "no time")]))  # type: ignore[arg-type]
     assert said == ["a.csv (diagnose, estimate): it is empty", "b.csv (estimate): no time"]
 

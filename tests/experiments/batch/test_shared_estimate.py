@@ -47,13 +47,13 @@ def rows_of(plan: Plan, places: list[int]) -> pa.Table:
 def test_cases_that_share_an_estimate_get_the_same_rows_as_alone(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     alone = pa.concat_tables([rows_of(plan, [place]) for place in range(len(METHODS))])
     made: list[int] = []
-    usual = work.estimated
+    usual = work.checked_estimate
 
     def counted(*given: object) -> object:
         made.append(1)
         return usual(*given)  # pyright: ignore[reportArgumentType] -- as it came
 
-    monkeypatch.setattr(work, "estimated", counted)
+    monkeypatch.setattr(work, "checked_estimate", counted)
     for order in ([0, 1, 2], [1, 0, 2]):
         assert rows_of(plan, order).equals(alone.take(order).combine_chunks())
     assert len(made) == 2

@@ -13,7 +13,7 @@ from experiments.batch import work
 from experiments.batch.cases import Plan, Task, plan_study
 from experiments.batch.series import Group
 from experiments.batch.study_file import parse_study
-from experiments.batch.work import DRAWN_ONCE, Part, lost_task, run_task
+from experiments.batch.work import DETERMINISTIC_DRIVES, Part, lost_task, run_task
 from experiments.cli import app
 from plant.eha.drives import DRIVES
 from plant.eha.model import EhaParameters
@@ -95,7 +95,7 @@ def test_a_log_that_was_changed_after_the_study_began_fails(tmp_path: Path) -> N
 def test_exactly_the_drives_drawn_once_are_the_same_for_every_seed() -> None:
     for name, drive in DRIVES.items():
         one, other = (drive(1.0, 1e-3, EhaParameters(), np.random.default_rng(seed)) for seed in (1, 2))
-        assert np.array_equal(one, other) == (name in DRAWN_ONCE), name
+        assert np.array_equal(one, other) == (name in DETERMINISTIC_DRIVES), name
 
 
 def test_a_filter_without_lanes_gives_the_same_estimate() -> None:
@@ -197,7 +197,7 @@ def test_a_method_that_fails_on_a_log_is_a_failed_row_and_the_others_are_run(
         raise ZeroDivisionError("by nothing")
 
     (tmp_path / "a.csv").write_text(log_of(), encoding="utf-8")
-    monkeypatch.setattr(work, "diagnosed", broken)
+    monkeypatch.setattr(work, "diagnose_to_row", broken)
     rows = rows_of(logs_plan(tmp_path, {"verb": "diagnose"}, FILTER))
     outcomes = {row["verb"]: row["outcome"] for row in rows}
     assert outcomes == {"diagnose": "failed", "filter": "ok"}

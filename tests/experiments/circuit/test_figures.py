@@ -12,8 +12,8 @@ from experiments.circuit.figures import CIRCUIT_FIGURES
 from experiments.circuit.study import CIRCUIT, circuit_studies
 from experiments.page.figure_files import figure_files
 from experiments.page.render import render_page
-from experiments.page.style import styled
-from experiments.running.study import Seeded
+from experiments.page.style import project_style
+from experiments.running.study import SeedSettings
 from plant.eha.circuit_parameters import CircuitParameters
 
 UNIT = re.compile(r"\[[^\[\]]+\]")
@@ -64,7 +64,7 @@ def _singular_values() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def drawn(tables: Mapping[str, pd.DataFrame]) -> Mapping[str, Figure]:
-    with styled():
+    with project_style():
         return {name: draw(tables) for name, draw in CIRCUIT_FIGURES.items()}
 
 
@@ -118,7 +118,7 @@ def test_the_page_contains_every_figure_and_loads_nothing(
     one = "figure_11"
     drawings = {name: lambda _, name=name: drawn[name] if name == one else Figure((1.0, 1.0)) for name in drawn}
     figures = figure_files(drawings, tables)
-    page = render_page(CIRCUIT.template, {**tables, "settings": Seeded(7)}, CIRCUIT.columns, figures)
+    page = render_page(CIRCUIT.template, {**tables, "settings": SeedSettings(7)}, CIRCUIT.columns, figures)
     assert page.count("data:image/svg+xml;base64,") == len(CIRCUIT_FIGURES)
     assert not re.search(r"""(src|href)=["'](?!data:|#)""", page)
     assert all(f'id="{name}"' in page for name in CIRCUIT_FIGURES)

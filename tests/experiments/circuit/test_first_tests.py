@@ -6,7 +6,7 @@ import pytest
 
 from experiments.circuit.first_tests import (
     BREAK_MEANS_V,
-    WITHIN_DOUBTS,
+    UNCERTAIN_BREAK_ROWS,
     break_frequency,
     dead_time,
     dead_zone,
@@ -52,7 +52,7 @@ def test_figure_5_is_not_reproduced_since_the_break_frequency_falls_with_the_mea
 
 
 def test_no_parameters_within_their_uncertainty_give_figure_5(table: pd.DataFrame) -> None:
-    found, measured = of(table, WITHIN_DOUBTS)["value"], of(table, "break frequency")["value"]
+    found, measured = of(table, UNCERTAIN_BREAK_ROWS)["value"], of(table, "break frequency")["value"]
     assert measured["mean 7 V"] < found["mean 7 V, highest"] < 0.9 * 25.0
     assert 1.5 < found["mean 2 V over mean 7 V, least"] < measured["mean 2 V"] / measured["mean 7 V"] + 0.2
 

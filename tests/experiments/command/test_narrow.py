@@ -6,8 +6,8 @@ import pytest
 from rich.table import Table
 
 from experiments.command import terminal
-from experiments.command.narrow import as_lines, narrowed
-from experiments.command.terminal import rendered, table
+from experiments.command.narrow import as_lines, fit_to_width
+from experiments.command.terminal import render_text, table
 
 
 def shown() -> Table:
@@ -21,7 +21,7 @@ def shown() -> Table:
 def test_every_number_and_verdict_is_shown_complete_at_any_width(monkeypatch: pytest.MonkeyPatch, width: int) -> None:
     monkeypatch.setattr(terminal.sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("COLUMNS", str(width))
-    text = re.sub("\x1b\\[[0-9;]*m", "", rendered(shown()))
+    text = re.sub("\x1b\\[[0-9;]*m", "", render_text(shown()))
     # a row given as lines keeps a name without blanks in one piece
     assert max(map(len, text.splitlines())) <= max(width, 54)
     for whole in ("206.0", "1207.1", "0.3", "observable", "ok"):
@@ -30,12 +30,12 @@ def test_every_number_and_verdict_is_shown_complete_at_any_width(monkeypatch: py
 
 
 def test_headings_are_broken_into_lines_before_the_table_is_given_up() -> None:
-    wide, narrow = narrowed(shown(), 100), narrowed(shown(), 78)
+    wide, narrow = fit_to_width(shown(), 100), fit_to_width(shown(), 78)
     assert wide is not None
     assert str(wide.columns[1].header) == "bulk modulus [MPa]"
     assert narrow is not None
     assert str(narrow.columns[1].header) == "bulk\nmodulus\n[MPa]"
-    assert narrowed(shown(), 60) is None
+    assert fit_to_width(shown(), 60) is None
 
 
 def test_a_row_shown_as_lines_omits_empty_cells_and_indents_further_lines() -> None:

@@ -4,17 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from experiments.command.output_paths import own_paths, page_place, require_folder, require_place, with_page_ending
+from experiments.command.output_paths import page_place, paths_by_owner, require_folder, require_place, with_page_ending
 from plant.errors import HydrostateError
 
 
 def test_without_an_output_option_no_log_has_an_output_file() -> None:
-    assert own_paths(None, [Path("run.csv")]) == {}
+    assert paths_by_owner(None, [Path("run.csv")]) == {}
 
 
 def test_the_output_of_one_log_has_the_given_name() -> None:
-    assert own_paths(Path("fit.png"), [Path("run.csv")]) == {Path("run.csv"): Path("fit.png")}
-    assert own_paths(Path("fit.png"), [Path("run.csv")] * 2) == {Path("run.csv"): Path("fit.png")}
+    assert paths_by_owner(Path("fit.png"), [Path("run.csv")]) == {Path("run.csv"): Path("fit.png")}
+    assert paths_by_owner(Path("fit.png"), [Path("run.csv")] * 2) == {Path("run.csv"): Path("fit.png")}
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ def test_the_output_of_one_log_has_the_given_name() -> None:
     ],
 )
 def test_outputs_of_logs_with_equal_names_have_different_paths(logs: list[str], files: list[str] | None) -> None:
-    found = own_paths(Path("out/p.html"), [Path(log) for log in logs])
+    found = paths_by_owner(Path("out/p.html"), [Path(log) for log in logs])
     assert list(found) == [Path(log) for log in logs]
     assert len({str(path).casefold() for path in found.values()}) == len(logs)
     if files is not None:
@@ -37,14 +37,14 @@ def test_outputs_of_logs_with_equal_names_have_different_paths(logs: list[str], 
 
 
 def test_names_of_outputs_become_valid_file_names_and_equal_ones_are_numbered() -> None:
-    found = own_paths(Path("s.csv"), ["flow [l/min]", "flow (l/min)", "p.1", "p.2"])
+    found = paths_by_owner(Path("s.csv"), ["flow [l/min]", "flow (l/min)", "p.1", "p.2"])
     names = [path.name for path in found.values()]
     assert names == ["s-flow_l_min.csv", "s-flow_l_min-2.csv", "s-p.1.csv", "s-p.2.csv"]
 
 
 def test_several_files_keep_the_ending_of_the_given_name() -> None:
-    assert own_paths(Path("fit"), ["a", "b"])["a"] == Path("fit-a")
-    assert own_paths(Path("fit.csv"), ["a", "b"])["a"] == Path("fit-a.csv")
+    assert paths_by_owner(Path("fit"), ["a", "b"])["a"] == Path("fit-a")
+    assert paths_by_owner(Path("fit.csv"), ["a", "b"])["a"] == Path("fit-a.csv")
 
 
 def test_the_path_of_a_page_ends_in_html_with_any_given_ending(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.core import TyperGroup
 
-from experiments.command.plain_values import take_plainly
+from experiments.command.plain_values import accept_plain_values
 from experiments.command.terminal import HydrostateGroup
 
 GIVEN: list[dict[str, Any]] = []
@@ -73,7 +73,7 @@ def test_a_command_gets_the_same_values_as_from_typer(tmp_path: Path, words: Seq
 def test_parameters_of_an_unknown_typer_version_are_left_unchanged(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "typer._coercion", None)
     command = typer.main.get_command(taking(TyperGroup))
-    take_plainly(command.params)
+    accept_plain_values(command.params)
     assert all(one._runtime_param is None for one in command.params)  # pyright: ignore
 
 

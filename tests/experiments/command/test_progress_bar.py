@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from estimation.progress import tell
+from estimation.progress import report_progress
 from experiments.command.progress_bar import progress
 
 
@@ -25,7 +25,7 @@ def test_a_single_task_shows_a_bar_once_it_reports_a_trial(monkeypatch: pytest.M
     with progress(1, "identifying") as advance:
         assert terminal.getvalue() == ""
         for _ in range(3):
-            tell("linear models")
+            report_progress("linear models")
         advance()
     assert "identifying: linear models, 3 tried" in terminal.getvalue()
 
@@ -33,15 +33,15 @@ def test_a_single_task_shows_a_bar_once_it_reports_a_trial(monkeypatch: pytest.M
 def test_with_several_tasks_the_trials_of_each_are_counted_separately(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = shown_on(monkeypatch)
     with progress(2, "identifying") as advance:
-        tell("linear models")
+        report_progress("linear models")
         advance()
-        tell("polynomial models")
+        report_progress("polynomial models")
     assert "identifying: polynomial models, 1 tried" in terminal.getvalue()
     assert "1/2" in terminal.getvalue()
 
 
 def test_no_progress_is_shown_if_standard_error_is_not_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     with progress(2, "identifying") as advance:
-        tell("linear models")
+        report_progress("linear models")
         advance()
     assert capsys.readouterr().err == ""

@@ -6,7 +6,7 @@ import pytest
 import typer
 
 from experiments.command import terminal
-from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, guarded, rendered
+from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, render_text, run_guarded
 from plant.compiled.expression import symbol
 from plant.errors import HydrostateError
 
@@ -15,7 +15,7 @@ def raising(error: BaseException) -> int:
     def run() -> None:
         raise error
 
-    return guarded(run)
+    return run_guarded(run)
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_the_traceback_of_an_internal_error_is_printed_on_request(
 def test_a_model_that_cannot_be_compiled_is_a_usage_error(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert guarded(lambda: symbol("x") ** 0.5) == USAGE
+    assert run_guarded(lambda: symbol("x") ** 0.5) == USAGE
     said = capsys.readouterr().err
     assert "write exp(power * log(x))" in said
     assert "internal error" not in said
@@ -84,10 +84,10 @@ def test_compiling_is_announced_once_and_every_warning_is_printed(monkeypatch: p
 
 def test_long_lines_are_wrapped_between_words_on_a_terminal_and_not_in_a_pipe(monkeypatch: pytest.MonkeyPatch) -> None:
     line = "  reliable  " + "yes: a circuit reproduces the log; " * 8
-    assert rendered(line).splitlines() == [line.rstrip()]
+    assert render_text(line).splitlines() == [line.rstrip()]
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     monkeypatch.setenv("COLUMNS", "60")
-    first, *others = rendered(line).splitlines()
+    first, *others = render_text(line).splitlines()
     assert others
     assert max(map(len, (first, *others))) <= 60
     assert all(other.startswith(" " * 12) and other[12] != " " for other in others)
@@ -98,6 +98,6 @@ def test_control_characters_in_file_names_are_escaped_on_the_terminal() -> None:
     name = "a\x1b[31m\x9b\u202evsc.\u2066\n.csv"
     shown = terminal.table(name, title=name)
     shown.add_row(*terminal.short_names([{"file": name}]))
-    said = rendered(f"{name}: healthy", shown)
+    said = render_text(f"{name}: healthy", shown)
     assert not {"\x1b", "\x9b", "\u202e", "\u2066"} & set(said)
     assert "a\\x1b[31m\\x9b\\u202evsc.\\u2066\\x0a.csv" in said

@@ -12,13 +12,13 @@ from experiments.diaphragm_motor.quoted import ML_MIN
 from experiments.diaphragm_motor.study import RIG, SWEEPS
 from experiments.diaphragm_motor.sweeps import FREQUENCIES, PEAK, PUBLISHED_FLOW, SHARES, SWINGS, blocking_force
 from experiments.page.frames import Tables
-from experiments.page.style import styled
+from experiments.page.style import project_style
 from plant.diaphragm_motor.flow import operate
 
 
 @pytest.fixture(scope="module")
 def drawn(motor_tables: Tables) -> Mapping[str, Figure]:
-    with styled():
+    with project_style():
         return {name: draw(motor_tables) for name, draw in MOTOR_FIGURES.items()}
 
 

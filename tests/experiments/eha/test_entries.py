@@ -12,8 +12,8 @@ from estimation.finding import Finding, Gate, Outcome, Quantity
 from estimation.notes import EstimateCode, RigCode, SensorCode
 from experiments.command.json_output import plain
 from experiments.eha.entries import (
-    COSTS,
-    NO_CLASS,
+    COST_CODES,
+    NO_CLASS_CODES,
     NO_DIAGNOSIS,
     NO_ESTIMATE,
     costs,
@@ -66,7 +66,7 @@ def codes(entries: dict[str, object]) -> list[str]:
 
 def test_the_codes_in_the_tables_of_entries_exist() -> None:
     known: set[Code] = {*EstimateCode, *ClassCode}
-    assert set(COSTS) | set(NO_CLASS) <= {str(code) for code in known}
+    assert set(COST_CODES) | set(NO_CLASS_CODES) <= {str(code) for code in known}
 
 
 def test_an_estimate_has_exactly_the_documented_entries() -> None:

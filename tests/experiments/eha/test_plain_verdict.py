@@ -5,8 +5,14 @@ from typing import Any
 import pytest
 
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
-from experiments.eha.plain_verdict import reasons_apart, sureness, verdict, what_to_do, work_on
-from experiments.eha.verdict_words import believed
+from experiments.eha.plain_verdict import (
+    checks_on_actuator,
+    confidence_cost_onset,
+    separate_reasons,
+    verdict,
+    what_to_do,
+)
+from experiments.eha.verdict_words import reliability_text
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode
 from plant.notes import Note
@@ -81,14 +87,16 @@ def test_a_fault_between_the_nine_sizes_is_in_the_verdict_and_the_work(
     assert verdict(result).startswith(said)
     fits = leakage > 0.0 or friction > 0.0
     assert (
-        sureness(result).startswith("The size is none of those of the nine conditions: to the nearest quarter, it is ")
+        confidence_cost_onset(result).startswith(
+            "The size is none of those of the nine conditions: to the nearest quarter, it is "
+        )
         is fits
     )
     first = "If rig file and sensors are right: plan a check"
-    assert all(one.startswith(first) for one in work_on(result))
-    assert bool(work_on(result)) is fits
-    assert any("pump and piston seal" in one for one in work_on(result)) is (leakage > 0.0)
-    assert any("guides and alignment" in one for one in work_on(result)) is (friction > 0.0)
+    assert all(one.startswith(first) for one in checks_on_actuator(result))
+    assert bool(checks_on_actuator(result)) is fits
+    assert any("pump and piston seal" in one for one in checks_on_actuator(result)) is (leakage > 0.0)
+    assert any("guides and alignment" in one for one in checks_on_actuator(result)) is (friction > 0.0)
     assert "to the nearest quarter" in str(note)
 
 
@@ -96,16 +104,18 @@ def test_a_circuit_outside_the_nine_is_described_by_its_levels_and_the_part_that
     note = AgainstCode.OUTSIDE_CONDITIONS.note(leakage=1.25, friction=0.0, part="flow bias", ratio=0.19)
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
     assert verdict(result) == "The actuator leaks more inside than a healthy one, or the rig file or a sensor is wrong."
-    assert "leakage is 1.25 and friction 0 " in sureness(result)
-    assert sureness(result).endswith("but flow bias is 0.19 times what it should be at these levels.")
-    assert work_on(result)[0].startswith("If rig file and sensors are right: plan a check of pump and piston seal.")
+    assert "leakage is 1.25 and friction 0 " in confidence_cost_onset(result)
+    assert confidence_cost_onset(result).endswith("but flow bias is 0.19 times what it should be at these levels.")
+    assert checks_on_actuator(result)[0].startswith(
+        "If rig file and sensors are right: plan a check of pump and piston seal."
+    )
 
 
 def test_an_intermediate_size_beside_another_reason_leads_to_no_work() -> None:
     note = AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.0)
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note), "the pressure froze"])
-    assert work_on(result) == []
-    assert "do not rely on the numbers" in sureness(result)
+    assert checks_on_actuator(result) == []
+    assert "do not rely on the numbers" in confidence_cost_onset(result)
 
 
 def test_a_named_fault_takes_precedence_over_an_intermediate_size() -> None:
@@ -120,16 +130,16 @@ def test_reasons_that_may_follow_from_a_frozen_sensor_are_omitted() -> None:
     notes: list[Any] = [one.to_dict() for one in (follows, froze)]
     reasons: list[Any] = [str(follows), str(froze)]
     result = said_of("normal", unknown=True, notes=notes, reasons=reasons, not_told=[])
-    assert sureness(result) == f"Do not rely on anything on this page: {froze}."
-    assert reasons_apart(result) == []
-    assert believed(result) == f"no: {froze}; 1 more in --json, which may follow from this"
-    assert believed({**result, "notes": notes[:1], "reasons": reasons[:1]}) == f"no: {follows}"
+    assert confidence_cost_onset(result) == f"Do not rely on anything on this page: {froze}."
+    assert separate_reasons(result) == []
+    assert reliability_text(result) == f"no: {froze}; 1 more in --json, which may follow from this"
+    assert reliability_text({**result, "notes": notes[:1], "reasons": reasons[:1]}) == f"no: {follows}"
 
 
 def test_several_reasons_against_a_verdict_are_a_list() -> None:
     result = said_of("normal", unknown=True, notes=[], reasons=["one does not fit", "nor does another"])
-    assert sureness(result) == "Do not rely on anything on this page:"
-    assert reasons_apart(result) == ["One does not fit.", "Nor does another."]
+    assert confidence_cost_onset(result) == "Do not rely on anything on this page:"
+    assert separate_reasons(result) == ["One does not fit.", "Nor does another."]
 
 
 def test_soft_oil_is_in_the_verdict_and_is_never_nothing_to_repair() -> None:
@@ -137,37 +147,43 @@ def test_soft_oil_is_in_the_verdict_and_is_never_nothing_to_repair() -> None:
     assert "softer than its limit; leakage and friction are normal" in verdict(said_of("normal", **soft))
     assert verdict(said_of("minor_leakage", **soft)).endswith("; its oil is softer than its limit.")
     assert what_to_do(said_of("normal", **soft)) == ["Log again."]
-    assert sureness(said_of("normal", **soft)) == "The verdict on leakage and friction is certain (over 99 %)."
+    assert (
+        confidence_cost_onset(said_of("normal", **soft))
+        == "The verdict on leakage and friction is certain (over 99 %)."
+    )
 
 
 def test_the_verdict_is_called_certain_only_above_99_percent() -> None:
-    assert sureness(said_of("minor_leakage", 0.999)).startswith("This is certain (over 99 %).")
-    assert sureness(said_of("minor_leakage", 0.9)).startswith("This is probable (90 %).")
-    assert "several explanations (55 %)" in sureness(said_of("minor_leakage", 0.55))
+    assert confidence_cost_onset(said_of("minor_leakage", 0.999)).startswith("This is certain (over 99 %).")
+    assert confidence_cost_onset(said_of("minor_leakage", 0.9)).startswith("This is probable (90 %).")
+    assert "several explanations (55 %)" in confidence_cost_onset(said_of("minor_leakage", 0.55))
 
 
 def test_a_fault_is_described_with_its_loss_of_speed_and_its_begin() -> None:
-    assert "28 % slower" in sureness(said_of("minor_leakage"))
-    assert "The fault was there before the log began." in sureness(said_of("minor_leakage"))
+    assert "28 % slower" in confidence_cost_onset(said_of("minor_leakage"))
+    assert "The fault was there before the log began." in confidence_cost_onset(said_of("minor_leakage"))
     changed = said_of("minor_leakage", since_s=2.5, since_ci95_s=[2.4, 2.6], condition_before="normal")
-    assert "The condition changed 2.50 s into the log (2.40 to 2.60 s); until then it was normal." in sureness(changed)
-    assert "slower" not in sureness(said_of("normal"))
+    assert (
+        "The condition changed 2.50 s into the log (2.40 to 2.60 s); until then it was normal."
+        in confidence_cost_onset(changed)
+    )
+    assert "slower" not in confidence_cost_onset(said_of("normal"))
     open_friction = {"normal": 0.3, "minor_friction": 0.35, "major_friction": 0.35}
-    assert "fault" not in sureness(said_of("major_friction", probabilities=open_friction))
+    assert "fault" not in confidence_cost_onset(said_of("major_friction", probabilities=open_friction))
 
 
 def test_an_unknown_log_gets_reasons_but_no_verdict_and_no_work() -> None:
     result = said_of("minor_leakage", unknown=True, reasons=["motor speed reads wrong by 3 rad/s"])
     assert verdict(result).startswith("No verdict")
     assert what_to_do(result) == ["Log again."]
-    assert "motor speed reads wrong by 3 rad/s" in sureness(result)
+    assert "motor speed reads wrong by 3 rad/s" in confidence_cost_onset(result)
 
 
 def test_a_named_fault_outside_the_nine_is_the_verdict_and_the_numbers_are_doubted() -> None:
     note = RigCode.MAKEUP_BLOCKED.note(side="B").to_dict()
     result = said_of("major_friction", unknown=True, reasons=[note["text"]], notes=[note])
     assert verdict(result) == "A make-up valve is stuck shut."
-    assert "do not rely on the numbers below: the make-up valve of chamber B" in sureness(result)
+    assert "do not rely on the numbers below: the make-up valve of chamber B" in confidence_cost_onset(result)
 
 
 def test_friction_that_a_log_does_not_determine_is_not_called_normal() -> None:
@@ -175,7 +191,7 @@ def test_friction_that_a_log_does_not_determine_is_not_called_normal() -> None:
     result = said_of("minor_leakage", probabilities=even)
     told = "The actuator leaks inside more than it should (minor leakage); friction cannot be told from this log."
     assert verdict(result) == told
-    assert sureness(result).startswith("The verdict on leakage is certain (over 99 %).")
+    assert confidence_cost_onset(result).startswith("The verdict on leakage is certain (over 99 %).")
     assert what_to_do(result)[0].startswith("Plan a check of pump and piston seal.")
     assert not any("guides" in one for one in what_to_do(result))
 
@@ -202,4 +218,4 @@ def test_an_actuator_with_undetermined_friction_is_not_called_healthy() -> None:
     nothing = said_of("normal", probabilities=dict.fromkeys(CONDITIONS, 1 / 9))
     assert verdict(worn) == verdict(nothing)
     assert verdict(nothing) == "Leakage cannot be told from this log; friction cannot be told from this log."
-    assert sureness(nothing).startswith("The log leaves several conditions possible.")
+    assert confidence_cost_onset(nothing).startswith("The log leaves several conditions possible.")

@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from experiments.command.terminal import rendered
+from experiments.command.terminal import render_text
 from experiments.eha.entries import NO_DIAGNOSIS, NO_ESTIMATE
 from experiments.eha.screens import MOST_MESSAGES, MOST_TABLES, diagnoses_shown, estimates_shown
-from experiments.eha.verdict_words import SHOWN
+from experiments.eha.verdict_words import SEVERITY_NAMES
 
 
 def estimate(number: int, passed: bool = True, **changes: Any) -> dict[str, Any]:
@@ -17,7 +17,7 @@ def estimate(number: int, passed: bool = True, **changes: Any) -> dict[str, Any]
 
 
 def shown(results: list[dict[str, Any]]) -> str:
-    return rendered(*estimates_shown(results, {}))
+    return render_text(*estimates_shown(results, {}))
 
 
 def test_a_value_has_both_intervals_in_megapascals_and_its_verdict() -> None:
@@ -70,11 +70,11 @@ def diagnosis(number: int, **changes: Any) -> dict[str, Any]:
 
 
 def found_severity() -> dict[str, Any]:
-    return {name: {"value": None, "unit": "1", "ci95": [None, None]} for name in SHOWN}
+    return {name: {"value": None, "unit": "1", "ci95": [None, None]} for name in SEVERITY_NAMES}
 
 
 def diagnosed(results: list[dict[str, Any]], **options: Any) -> str:
-    return rendered(*diagnoses_shown(results, {"scores": False, "transfer_functions": None, **options}))
+    return render_text(*diagnoses_shown(results, {"scores": False, "transfer_functions": None, **options}))
 
 
 def test_an_empty_line_separates_logs_from_each_other_and_from_notes() -> None:

@@ -10,17 +10,17 @@ from experiments.eha.entries import diagnosis_entries
 from experiments.eha.plain_verdict import verdict
 from experiments.eha.verdict_words import (
     NEXT_LINE,
-    SHOWN,
-    amount,
-    believed,
+    SEVERITY_NAMES,
     headline,
     library_sentence,
     models_sentence,
     next_step,
-    since,
+    onset_clause,
+    reliability_text,
+    severity_text,
     verdict_lines,
 )
-from experiments.page.condition_names import in_words
+from experiments.page.condition_names import condition_in_words
 from experiments.page.sentences import sentence
 from faults.conditions import CONDITIONS
 from faults.diagnosis.diagnose import EhaEvidence
@@ -66,16 +66,16 @@ def test_a_fault_without_a_change_is_dated_before_the_log_began() -> None:
 
 
 def test_a_healthy_actuator_has_a_date_only_if_a_fault_came_before() -> None:
-    assert since(diagnosis_entries(found_as("normal"))) == ""
+    assert onset_clause(diagnosis_entries(found_as("normal"))) == ""
     mended = diagnosis_entries(found_as("normal", Change(2.0, (1.9, 2.2), "minor_friction")))
-    assert since(mended).endswith("minor friction before")
+    assert onset_clause(mended).endswith("minor friction before")
     assert "since" not in headline(diagnosis_entries(found_as("normal")))
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
 def test_a_headline_begins_with_the_condition(condition: str) -> None:
     entries = diagnosis_entries(found_as(condition))
-    assert headline(entries).startswith(in_words(condition))
+    assert headline(entries).startswith(condition_in_words(condition))
     assert entries["message"] == headline(entries)
 
 
@@ -122,11 +122,11 @@ def test_normal_leakage_with_undetermined_friction_is_not_dated_as_a_fault() -> 
 def test_a_verdict_with_reasons_against_it_begins_with_unknown_and_lists_them() -> None:
     entries = diagnosis_entries(found_as("minor_leakage", against=AGAINST))
     assert headline(entries).startswith("UNKNOWN: none of the nine conditions fits; the nearest is minor leakage")
-    assert believed(entries) == "no: " + NEXT_LINE.join(map(str, AGAINST))
+    assert reliability_text(entries) == "no: " + NEXT_LINE.join(map(str, AGAINST))
     assert next_step(entries) == sentence(str(AdviceCode.CHECK_RIG.note()))
     sound = diagnosis_entries(found_as("minor_leakage"))
-    assert believed(sound).startswith("yes: ")
-    assert believed(sound).endswith(str(ClassCode.BULK_MODULUS_NOT_VISIBLE.note()))
+    assert reliability_text(sound).startswith("yes: ")
+    assert reliability_text(sound).endswith(str(ClassCode.BULK_MODULUS_NOT_VISIBLE.note()))
 
 
 @pytest.mark.parametrize(("against", "begins"), [((), "minor_leakage, by a wide margin"), (AGAINST, "UNKNOWN")])
@@ -148,15 +148,15 @@ def test_a_severity_without_a_value_is_called_not_determined() -> None:
         "ci95": [None, None],
         "ci95_total": [None, None],
     }
-    assert amount(entries["severity"]["entrained_air"]) == "not determined"
-    assert amount(entries["severity"]["leakage_flow"]) == "1.00 L/min (0.90 to 1.10)"
+    assert severity_text(entries["severity"]["entrained_air"]) == "not determined"
+    assert severity_text(entries["severity"]["leakage_flow"]) == "1.00 L/min (0.90 to 1.10)"
 
 
 def with_library(found: Finding, best: str) -> Finding:
     """Return the same finding, with a library in which one condition has the smallest error."""
     errors = {name: 1e-3 if name == best else 2e-3 for name in CONDITIONS}
     scores = Scores(errors, {"velocity_m_s": errors})
-    unknown = dict.fromkeys(SHOWN, Quantity(None, "1"))
+    unknown = dict.fromkeys(SEVERITY_NAMES, Quantity(None, "1"))
     evidence = replace(found.evidence, transfer_functions=scores)
     return replace(found, severities={**unknown, **found.severities}, evidence=evidence)
 
@@ -202,7 +202,7 @@ def test_a_bulk_modulus_that_the_gate_refuses_is_doubted_beside_a_reliable_condi
     found = found_as("normal")
     severities = {**found.severities, "bulk_modulus": Quantity.normal(shown, 1e6, "Pa")}
     entries = diagnosis_entries(replace(found, gate=Gate(False, (small,)), severities=severities))
-    assert (f"do not rely on bulk modulus: {small}" in believed(entries)) is said
+    assert (f"do not rely on bulk modulus: {small}" in reliability_text(entries)) is said
 
 
 def test_the_library_of_transfer_functions_agrees_or_disagrees_without_changing_the_verdict() -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.fleet.naming import UNNAMED, Named, by_dates, by_pattern, by_table, place_of
+from experiments.fleet.naming import UNNAMED, ActuatorAndDate, by_dates, by_pattern, by_table, place_of
 from plant.errors import HydrostateError
 
 
@@ -47,10 +47,10 @@ def test_a_later_date_has_a_larger_place_in_every_date_format() -> None:
 
 
 def test_a_date_is_shown_in_iso_form_and_another_number_unchanged() -> None:
-    named = [Named("P-1", date, place_of(date, "log")) for date in ("20261122_143000", "2026-11-22", "812.5")]
+    named = [ActuatorAndDate("P-1", date, place_of(date, "log")) for date in ("20261122_143000", "2026-11-22", "812.5")]
     assert [one.shown for one in named] == ["2026-11-22 14:30", "2026-11-22", "812.5"]
     assert [one.day for one in named] == ["2026-11-22", "2026-11-22", "812.5"]
-    assert [one.in_days for one in named] == [True, True, False]
+    assert [one.has_calendar_date for one in named] == [True, True, False]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.fleet.actuator_page import actuator_page, followed
+from experiments.fleet.actuator_page import actuator_page, segment_levels
 from experiments.fleet.actuators import ActuatorRow, actuator_rows
 from experiments.fleet.naming import by_pattern
 from experiments.fleet.outlook import outlook_of, read_maintenance
@@ -98,7 +98,7 @@ def test_the_trend_line_follows_a_lasting_change_from_its_first_log() -> None:
     assert outlook is not None
     # up to two logs after the change, it might be chance
     assert [trend.begin for trend in outlook.course][-5:] == [0, 0, 6, 6, 6]
-    levels = np.array(followed(outlook))[:, 0]
+    levels = np.array(segment_levels(outlook))[:, 0]
     np.testing.assert_allclose(levels, [1.0] * 6 + [2.0] * 5, atol=0.15)
     assert levels[-1] == outlook.trend.level[0]
 

@@ -53,7 +53,7 @@ def test_a_log_between_two_conditions_is_at_most_probably_past_a_limit() -> None
         store_row("c.csv", 9.0, **doubt),
     ]
     found = log_rows(rows, {}, {})
-    assert [(one.state, one.told) for one in found] == [("open", True), ("likely", True), ("unknown", False)]
+    assert [(one.state, one.has_verdict) for one in found] == [("open", True), ("likely", True), ("unknown", False)]
 
 
 def test_a_circuit_outside_the_nine_has_no_verdict_but_is_named_if_few_actuators_are() -> None:
@@ -65,7 +65,7 @@ def test_a_circuit_outside_the_nine_has_no_verdict_but_is_named_if_few_actuators
         return actuator_rows(log_rows(sick, by_pattern(files, "{actuator}_{date}.csv"), {}))
 
     (row,) = fleet(rows[-5:])
-    assert (row.state, row.last.told, row.last.shown) == ("unknown", False, True)
+    assert (row.state, row.last.has_verdict, row.last.shows_severities) == ("unknown", False, True)
     assert row_cells(row)[2:6] == [
         "leakage between minor and major, if the rig file is right",
         "leakage 4.00 L/min",
@@ -85,7 +85,7 @@ def test_a_circuit_outside_the_nine_has_no_verdict_but_is_named_if_few_actuators
 def test_an_intermediate_log_with_a_further_reason_against_it_is_unknown() -> None:
     against = json.dumps([*json.loads(between(0.5, 0.0)), {"code": "oil_soft", "data": {}}])
     (row,) = log_rows([store_row("a.csv", 9.0, outcome="mismatch", against=against)], {}, {})
-    assert (row.state, row.told) == ("unknown", False)
+    assert (row.state, row.has_verdict) == ("unknown", False)
 
 
 def test_a_log_with_an_unreadable_date_has_its_own_row_and_keeps_its_verdict() -> None:

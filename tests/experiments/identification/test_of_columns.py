@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import hydrostate as hs
-from benchmarks.identification.bent_inputs import PLANTED, logged
+from benchmarks.identification.bent_inputs import PLANTED_NONLINEARITIES, draw_log
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from experiments.cli import app
@@ -246,7 +246,7 @@ def test_a_frequency_response_of_two_inputs_is_refused(logs: list[Path], tmp_pat
 
 
 def test_a_backlash_is_reported_with_the_interval_of_its_half_width(tmp_path: Path) -> None:
-    data = logged(PLANTED[2], 1)
+    data = draw_log(PLANTED_NONLINEARITIES[2], 1)
     table = pd.DataFrame({"u": data.u[0][:, 0], "y": data.y[0]}, index=0.01 * np.arange(data.y[0].size))
     table.to_csv(tmp_path / "play.csv", index_label="time_s")
     arguments = ("--input", "u", "--output", "y", "--structure", "hammerstein", "--order", 2, "--delay", 1)

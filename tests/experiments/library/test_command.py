@@ -21,7 +21,7 @@ from experiments.library.tables import library_table, response_table, root_table
 from experiments.page.figure_files import figure_files
 from experiments.page.render import render_page
 from experiments.published.library import read_library
-from experiments.running.study import Seeded, run_study
+from experiments.running.study import SeedSettings, run_study
 from faults.conditions import CONDITIONS
 from plant.eha.circuit_parameters import CircuitParameters
 
@@ -92,7 +92,7 @@ def test_the_sentences_quote_the_table_of_structures(tables: Mapping[str, pd.Dat
 
 def test_the_page_contains_every_figure_and_loads_nothing(tables: Mapping[str, pd.DataFrame]) -> None:
     figures = figure_files(LIBRARY_FIGURES, tables)
-    facts = {**tables, **LIBRARY.facts(tables, Seeded(7)), "settings": Seeded(7)}
+    facts = {**tables, **LIBRARY.facts(tables, SeedSettings(7)), "settings": SeedSettings(7)}
     page = render_page(LIBRARY.template, facts, LIBRARY.columns, figures)
     assert page.count("data:image/svg+xml;base64,") == len(LIBRARY_FIGURES)
     assert not re.search(r"""(src|href)=["'](?!data:|#)""", page)
@@ -103,7 +103,7 @@ def test_the_page_contains_every_figure_and_loads_nothing(tables: Mapping[str, p
 
 @pytest.mark.slow
 def test_the_study_writes_a_valid_library_and_its_report(tmp_path: Path) -> None:
-    report = run_study(LIBRARY, Seeded(2024), tmp_path / "library", Console(stderr=True, quiet=True))
+    report = run_study(LIBRARY, SeedSettings(2024), tmp_path / "library", Console(stderr=True, quiet=True))
     models = read_library(report.with_name("library.json"))
     assert list(models) == list(CONDITIONS)
     structures = pd.read_csv(report.parent / "tables" / "structures.csv").set_index("structure")

@@ -19,7 +19,7 @@ from experiments.published.library import FORMAT, VERSION, read_library
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.rmse import score_transfer_functions
-from faults.eha.inject import spread
+from faults.eha.inject import varied_actuator
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -126,7 +126,7 @@ def test_the_library_classifies_at_least_85_percent_of_circuit_logs(drive: str) 
     for seed in range(3):
         for name, condition in CONDITIONS.items():
             rng = stream(777, drive, name, seed)
-            p = spread(parameters_for(condition, EhaParameters()), rng)
+            p = varied_actuator(parameters_for(condition, EhaParameters()), rng)
             log = simulate(CIRCUIT, make_drive(drive, 20.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
             right.append(score_transfer_functions(log, library).condition == name)
     assert np.mean(right) >= 0.85  # 108 of 108 and 101 of 108 were measured over twelve seeds

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from experiments.log_pages.comparison import compare_view, compared, plain_words, quantities_of
+from experiments.log_pages.comparison import compare_view, comparison_rows, plain_words, quantities_of
 from experiments.serve.fleet_view import actuator_view, fleet_view
 from faults.notes import AgainstCode
 
@@ -21,7 +21,7 @@ def result(value: float | None, half: float | None, **more: Any) -> dict[str, An
 def test_a_quantity_has_changed_if_the_interval_of_the_difference_excludes_zero(
     second: float, half: float, changed: bool
 ) -> None:
-    (row,) = compared(result(10.0, 1.0), result(second, half))
+    (row,) = comparison_rows(result(10.0, 1.0), result(second, half))
     assert row["difference"] == pytest.approx(second - 10.0)
     wide = (1.0 + half**2) ** 0.5
     assert row["interval"] == pytest.approx([second - 10.0 - wide, second - 10.0 + wide])
@@ -31,15 +31,15 @@ def test_a_quantity_has_changed_if_the_interval_of_the_difference_excludes_zero(
 def test_an_asymmetric_interval_gives_an_asymmetric_interval_of_the_difference() -> None:
     """Before, leakage of 6 L/min (3 to 16) less one of 6.04 was said to be between -7 and 6."""
     wide = {"value": 6.0, "std": None, "ci95": [3.0, 16.0], "unit": "N"}
-    (row,) = compared(result(6.0, 0.02), {"file": "b", "message": "so", "severity": {"added_friction": wide}})
+    (row,) = comparison_rows(result(6.0, 0.02), {"file": "b", "message": "so", "severity": {"added_friction": wide}})
     assert row["interval"] == pytest.approx([-3.0, 10.0], abs=0.01)
-    (back,) = compared({"file": "b", "message": "so", "severity": {"added_friction": wide}}, result(6.0, 0.02))
+    (back,) = comparison_rows({"file": "b", "message": "so", "severity": {"added_friction": wide}}, result(6.0, 0.02))
     assert back["interval"] == pytest.approx([-10.0, 3.0], abs=0.01)
 
 
 @pytest.mark.parametrize("second", [result(None, None), result(12.0, None), {"file": "b", "message": "no"}])
 def test_a_quantity_without_both_intervals_has_not_changed(second: dict[str, Any]) -> None:
-    (row,) = compared(result(10.0, 1.0), second)
+    (row,) = comparison_rows(result(10.0, 1.0), second)
     assert (row["interval"], row["changed"]) == (None, False)
 
 
@@ -163,7 +163,7 @@ def test_a_quantity_without_a_value_has_no_difference_and_other_entries_are_omit
         "severity": {"added_friction": {"value": None, "unit": "N"}, "note": "x"},
     }
     second = result(12.0, 1.0)
-    (row,) = compared(first, second)
+    (row,) = comparison_rows(first, second)
     assert (row["difference"], row["changed"]) == (None, False)
     page = compare_view(first, second)
     assert "12.0 (11.0 to 13.0)" in page

@@ -7,7 +7,7 @@ import pytest
 from estimation.finding import Finding, Gate, Outcome, Quantity
 from estimation.notes import ChannelCode, EstimateCode
 from experiments.log_pages.entries import message_of
-from experiments.log_pages.finding_page import _beyond, _row, _shortened, _title
+from experiments.log_pages.finding_page import _message_rest, _row, _title, _with_first_reason
 
 PASSED, DOUBTED = Gate(True, ()), Gate(False, (EstimateCode.DIVERGED.note(),))
 
@@ -52,11 +52,13 @@ def test_the_title_states_result_gate_and_outcome(changes: dict[str, object], ti
 
 def test_the_opening_sentence_gives_the_first_reason_and_counts_the_others() -> None:
     whole = "Bulk modulus 144 MPa; do not rely on it: A is off; B is off; C is off"
-    assert _shortened(whole, ["A is off.", "B is off", "C is off"]).endswith("A is off; 2 more reasons stand below")
-    assert _shortened("do not rely on it: A is off; B is off", ["A is off", "B is off"]).endswith(
+    assert _with_first_reason(whole, ["A is off.", "B is off", "C is off"]).endswith(
+        "A is off; 2 more reasons stand below"
+    )
+    assert _with_first_reason("do not rely on it: A is off; B is off", ["A is off", "B is off"]).endswith(
         "1 more reason stands below"
     )
-    assert _shortened("do not rely on it: A is off", ["A is off"]) == "do not rely on it: A is off"
+    assert _with_first_reason("do not rely on it: A is off", ["A is off"]) == "do not rely on it: A is off"
 
 
 def test_a_condition_that_the_gate_doubts_is_reported_with_the_reason() -> None:
@@ -78,9 +80,9 @@ def test_bulk_modulus_is_shown_in_mpa_and_numbers_contain_no_breaking_space() ->
 
 
 def test_the_part_of_the_message_that_the_title_gives_is_not_repeated() -> None:
-    assert _beyond("Air in the oil: 4.9 %.", "air in the oil: 4.9 %; leakage is normal") == "leakage is normal"
-    assert _beyond("Found: minor leakage.", "minor leakage; it grows") == "minor leakage; it grows"
-    assert _beyond("No fault.", "no fault") == ""
+    assert _message_rest("Air in the oil: 4.9 %.", "air in the oil: 4.9 %; leakage is normal") == "leakage is normal"
+    assert _message_rest("Found: minor leakage.", "minor leakage; it grows") == "minor leakage; it grows"
+    assert _message_rest("No fault.", "no fault") == ""
 
 
 def test_a_fraction_is_shown_in_percent() -> None:

@@ -21,7 +21,14 @@ from experiments.identification.entries import linear_entries
 from experiments.log_pages.identified_charts import MeasuredCurve, bode_charts, measured_curve, step_charts
 from experiments.log_pages.identified_page import control_text, identified_page
 from experiments.log_pages.identified_view import IdentifiedView, view_of_channels
-from experiments.log_pages.identified_words import answer_of, chance, is_usable, title_of, told_band, uses_of
+from experiments.log_pages.identified_words import (
+    answer_of,
+    determined_band,
+    is_usable,
+    p_value_text,
+    title_of,
+    uses_of,
+)
 from plant.log.files import write_record
 from plant.log.record import Record
 
@@ -107,12 +114,8 @@ def test_failed_residual_tests_and_an_uncertain_gain_restrict_the_use_of_the_mod
     view = seen(validation=tests, dc_gain={"value": 1e-4, "std": 1e-4, "ci95": (-1e-4, 3e-4)})
     _, bad = uses_of(view, None)
     assert any(said.startswith("Steady gain") for said in bad)
-    assert any(
-        said.startswith(
-            f"Conclusions about order and poles of the plant: the residual still follows the input ({chance(0.0)})"
-        )
-        for said in bad
-    )
+    follows = f"the residual still follows the input ({p_value_text(0.0)})"
+    assert any(said.startswith(f"Conclusions about order and poles of the plant: {follows}") for said in bad)
 
 
 def test_the_known_band_of_a_response_excludes_lines_of_noise() -> None:
@@ -122,9 +125,9 @@ def test_the_known_band_of_a_response_excludes_lines_of_noise() -> None:
     response = np.where(frequency < 20.0, 10.0 + 0.0j, noise)
     measured = MeasuredCurve(frequency, response, np.full(1000, 2.0))
     assert (np.abs(noise) > 2.0).sum() > 50
-    low, high = told_band(measured) or (0.0, 0.0)
+    low, high = determined_band(measured) or (0.0, 0.0)
     assert (low, high) == (pytest.approx(0.1), pytest.approx(20.0, rel=0.1))
-    assert told_band(MeasuredCurve(frequency, noise, np.full(1000, 2.0))) is None
+    assert determined_band(MeasuredCurve(frequency, noise, np.full(1000, 2.0))) is None
 
 
 def taken(page: str) -> dict[str, str]:

@@ -8,13 +8,13 @@ import numpy as np
 
 from estimation.log_checks.notes import GuessCode
 from experiments.log_pages.inspect_page import inspect_page
-from experiments.log_pages.inspected import GUESSED, block_of, looked_into, without_unit
+from experiments.log_pages.inspected import GUESSED_UNIT_COMMENT, columns_block, guessed_units, inspect_log
 
 
 def page_of(folder: Path, names: str, *columns: np.ndarray) -> str:
     path = folder / "E9_1.csv"
     np.savetxt(path, np.column_stack(columns), header=names, delimiter=",", comments="")
-    found, tables = looked_into(path, None)
+    found, tables = inspect_log(path, None)
     return inspect_page({"file": path.name, **found}, tables)
 
 
@@ -45,7 +45,7 @@ def test_columns_of_a_log_with_dates_are_drawn_over_seconds_since_the_first_row(
     path = tmp_path / "dated.csv"
     rows = (f"2026-03-01 12:00:00.{k:03d},{value}" for k, value in enumerate(SPEED))
     path.write_text("\n".join(["time,motor_speed_rad_s", *rows]))
-    found, tables = looked_into(path, None)
+    found, tables = inspect_log(path, None)
     drawn = drawing(inspect_page({"file": path.name, **found}, tables))
     assert "<!-- time since the first row [s] -->" in drawn
     assert "<!-- row -->" not in drawn
@@ -94,7 +94,7 @@ def test_a_guessed_unit_in_the_block_is_marked_only_for_its_own_column() -> None
         {"columns": [{"channel": "position_m", "name": "Weg", "why": why}]},
         {"columns": [{"channel": "position_m", "name": "Hub", "why": why}]},
     ]
-    guessed = without_unit(tables)
+    guessed = guessed_units(tables)
     assert guessed == [("position_m", "Weg"), ("position_m", "Hub")]
     for spec, marked in (("Weg:mm", True), ("Hub", True), ("Position:mm", False), ("Wegmesser:mm", False)):
-        assert (GUESSED in block_of({"position_m": spec}, guessed)) is marked
+        assert (GUESSED_UNIT_COMMENT in columns_block({"position_m": spec}, guessed)) is marked

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from experiments.log_pages.screens import MOST_REASONS, messages_shown, quantities_shown, told_in_lines
+from experiments.log_pages.screens import MOST_REASONS, message_in_lines, messages_shown, quantities_shown
 
 
 def shown(said: dict[str, Any] | None = None, **entry: Any) -> str:
@@ -79,7 +79,7 @@ def test_a_file_name_with_a_line_break_is_shown_on_one_line() -> None:
 def test_each_reason_has_one_line_and_reasons_beyond_the_maximum_are_counted() -> None:
     many = [f"reason {number}" for number in range(MOST_REASONS + 2)]
     told = {"message": "; ".join(["no value", *many, "nothing else"]), "gate": {"reasons": many}, "reasons": many[:1]}
-    first, *lines = told_in_lines(told, "run.csv").splitlines()
+    first, *lines = message_in_lines(told, "run.csv").splitlines()
     assert first == "run.csv: no value; nothing else"
     assert [line.removeprefix("  reasons ").strip() for line in lines] == [
         *many[:MOST_REASONS],
@@ -89,6 +89,6 @@ def test_each_reason_has_one_line_and_reasons_beyond_the_maximum_are_counted() -
 
 def test_a_message_with_one_reason_alone_is_one_line() -> None:
     alone = {"message": "the sign is wrong", "gate": {"reasons": ["the sign is wrong."]}}
-    assert told_in_lines(alone, "run.csv") == "run.csv: the sign is wrong"
+    assert message_in_lines(alone, "run.csv") == "run.csv: the sign is wrong"
     both = {"message": "the sign is wrong; it lags", "gate": {"reasons": ["the sign is wrong", "it lags"]}}
-    assert told_in_lines(both, "run.csv").splitlines()[0] == "run.csv: no result"
+    assert message_in_lines(both, "run.csv").splitlines()[0] == "run.csv: no result"

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from experiments.motor_paper.sensing import FAULTS
 from experiments.motor_paper.study import MOTOR_PAPER_FIGURES
 from experiments.page.frames import Tables
-from experiments.page.style import styled
+from experiments.page.style import project_style
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +19,7 @@ def tables(motor_paper_tables: Tables) -> Tables:
 
 @pytest.fixture(scope="module")
 def drawn(tables: Tables) -> Mapping[str, Figure]:
-    with styled():
+    with project_style():
         return {name: draw(tables) for name, draw in MOTOR_PAPER_FIGURES.items()}
 
 

@@ -15,8 +15,8 @@ from experiments.nine_conditions.convergence import draw_convergence
 from experiments.nine_conditions.estimates import draw_estimates, draw_forms
 from experiments.nine_conditions.figures import FIGURES
 from experiments.nine_conditions.identification import draw_order
-from experiments.page.style import spread_out, styled
-from experiments.running.study import Found
+from experiments.page.style import project_style, spread_offsets
+from experiments.running.study import StudyResult
 from faults.conditions import CONDITIONS
 from tests.experiments.conftest import SMALL
 from tests.thinned import thinned
@@ -78,8 +78,8 @@ def test_convergence_shows_every_first_guess_in_every_condition(drawn: Mapping[s
         assert firsts == starts
 
 
-def test_the_convergence_figure_draws_the_given_experiment(study: Found) -> None:
-    with styled():
+def test_the_convergence_figure_draws_the_given_experiment(study: StudyResult) -> None:
+    with project_style():
         figure = draw_convergence(OURS, study.series["convergence"], 2.07e8)
     line = max(figure.axes[0].lines, key=lambda curve: len(curve.get_xdata()))
     curves = study.series["convergence"]
@@ -99,24 +99,24 @@ def _only(estimates: pd.DataFrame, **changes: object) -> pd.DataFrame:
     return estimates[chosen].assign(**changes)
 
 
-def test_estimates_that_are_not_observable_are_labelled_in_words(study: Found) -> None:
+def test_estimates_that_are_not_observable_are_labelled_in_words(study: StudyResult) -> None:
     rows = _only(study.tables["bulk_modulus"], outcome="not_observable", value_pa=np.nan, error_percent=np.nan)
-    with styled():
+    with project_style():
         assert _texts(draw_estimates(rows, 2.07e8)).count("not observable") == len(CONDITIONS)
 
 
-def test_an_estimate_off_the_axis_is_labelled_with_its_error(study: Found) -> None:
+def test_an_estimate_off_the_axis_is_labelled_with_its_error(study: StudyResult) -> None:
     rows = _only(study.tables["bulk_modulus"], outcome="ok", value_pa=0.2e8, error_percent=-90.0)
-    with styled():
+    with project_style():
         assert _texts(draw_estimates(rows, 2.07e8)).count("off the axis: -90 %") == len(CONDITIONS)
 
 
-def test_figures_are_drawn_even_if_every_filter_diverged(study: Found) -> None:
+def test_figures_are_drawn_even_if_every_filter_diverged(study: StudyResult) -> None:
     table = study.tables["bulk_modulus"]
     rows = table[(table["plant"] == PRESSURE_SINE.plant) & (table["drive"] == PRESSURE_SINE.drive)].assign(
         outcome="diverged", value_pa=np.nan, error_percent=np.nan, filter_settled_at_pa=np.nan
     )
-    with styled():
+    with project_style():
         draw_forms(rows, 2.07e8).draw_without_rendering()
         figure = draw_estimates(rows, 2.07e8)
         figure.draw_without_rendering()
@@ -128,22 +128,24 @@ def test_the_confusion_figure_writes_counts_and_accuracy() -> None:
     matrix = pd.DataFrame(np.diag(np.arange(1, 10)), index=list(CONDITIONS), columns=list(CONDITIONS))
     matrix.iloc[2, 5] = 17
     summary = pd.DataFrame({"bank": ["a"], "variant": ["nominal"], "accuracy": [0.5]})
-    with styled():
+    with project_style():
         figure = draw_confusions({("a", "nominal"): matrix}, summary)
     assert sorted(_texts(figure), key=int) == [*map(str, range(1, 10)), "17"]
     assert "50.0 % right" in figure.axes[0].get_title(loc="left")
 
 
-def test_the_scores_figure_frames_the_smallest_score_of_each_row(study: Found, drawn: Mapping[str, Figure]) -> None:
+def test_the_scores_figure_frames_the_smallest_score_of_each_row(
+    study: StudyResult, drawn: Mapping[str, Figure]
+) -> None:
     axis = drawn["scores"].axes[0]
     framed = [(round(patch.get_y() + 0.5), round(patch.get_x() + 0.5)) for patch in axis.patches]
     assert framed == list(enumerate(study.tables["score_example"].to_numpy().argmin(axis=1)))
 
 
-def test_each_panel_of_singular_values_counts_those_above_its_noise(study: Found) -> None:
+def test_each_panel_of_singular_values_counts_those_above_its_noise(study: StudyResult) -> None:
     order = study.series["order"]
     edges = {"hankel_floor": order["hankel"].nlargest(3).iloc[-1], "projected_floor": order["projected"].max() / 2.0}
-    with styled():
+    with project_style():
         hankel, projected = draw_order(order.assign(**edges)).axes
     above = int((order["projected"] > edges["projected_floor"]).sum())
     assert [axis.get_title(loc="left").split(": ")[1] for axis in (hankel, projected)] == [
@@ -152,22 +154,22 @@ def test_each_panel_of_singular_values_counts_those_above_its_noise(study: Found
     ]
 
 
-def test_drawing_figures_does_not_change_the_tables(study: Found) -> None:
+def test_drawing_figures_does_not_change_the_tables(study: StudyResult) -> None:
     rows = _only(study.tables["bulk_modulus"])
     before = rows.copy(deep=True)
-    with styled():
+    with project_style():
         draw_estimates(rows, 2.07e8)
     pd.testing.assert_frame_equal(rows, before)
 
 
-def test_the_truth_is_the_simulated_parameter(study: Found) -> None:
+def test_the_truth_is_the_simulated_parameter(study: StudyResult) -> None:
     parameters = study.tables["parameters"]
     other = parameters.assign(value=parameters["value"].where(parameters["parameter"] != "bulk_modulus", 1.5e8))
-    with styled():
+    with project_style():
         figure = FIGURES["forms_on_sticking_plant"]({**study.frames, "parameters": other})
     assert "truth 150" in _texts(figure)
 
 
 def test_marks_in_one_row_are_spread_evenly_around_it() -> None:
-    assert spread_out(1, 0.5) == [0.0]
-    assert sum(spread_out(7, 0.5)) == pytest.approx(0.0)
+    assert spread_offsets(1, 0.5) == [0.0]
+    assert sum(spread_offsets(7, 0.5)) == pytest.approx(0.0)

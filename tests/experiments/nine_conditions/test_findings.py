@@ -6,7 +6,7 @@ import pandas as pd
 from experiments.nine_conditions.bulk_modulus import POSITION_SINE, PRESSURE_SINE, PRESSURE_STEPS
 from experiments.nine_conditions.findings import class_accuracies, recoveries
 from experiments.nine_conditions.sentences import verdict
-from experiments.running.study import Found
+from experiments.running.study import StudyResult
 
 
 def _estimates(errors: dict[str, list[float | None]], outcome: str = "ok") -> pd.DataFrame:
@@ -54,7 +54,7 @@ def test_a_diverged_estimate_counts_as_missed_and_is_named() -> None:
     assert found.missed == ("normal (diverged, 0.1 % off)",)
 
 
-def test_the_most_frequent_confusion_is_named(study: Found) -> None:
+def test_the_most_frequent_confusion_is_named(study: StudyResult) -> None:
     tables = dict(study.tables)
     confusion = tables["confusion transfer functions nominal"].copy()
     confusion.loc["minor_leakage", "major_friction"] = 12
@@ -65,12 +65,12 @@ def test_the_most_frequent_confusion_is_named(study: Found) -> None:
     assert entry.likeliest_error.startswith("minor leakage taken for major friction, 12 of 1")
 
 
-def test_the_classification_accuracies_are_taken_from_the_table(study: Found) -> None:
+def test_the_classification_accuracies_are_taken_from_the_table(study: StudyResult) -> None:
     shares = [entry.percent / 100.0 for entry in class_accuracies(study.tables)]
     assert np.allclose(shares, study.tables["classification"]["accuracy"])
 
 
-def test_the_verdict_quotes_the_tables(study: Found) -> None:
+def test_the_verdict_quotes_the_tables(study: StudyResult) -> None:
     estimates = study.tables["bulk_modulus"]
     found = recoveries(estimates)
     bulk, classes, limits = verdict(study.frames)

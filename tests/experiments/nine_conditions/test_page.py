@@ -11,7 +11,7 @@ from experiments.nine_conditions.findings import recoveries
 from experiments.nine_conditions.sentences import verdict
 from experiments.page.errata import ERRATA
 from experiments.page.numbers import exact, number
-from experiments.running.study import Found, versions
+from experiments.running.study import StudyResult, versions
 from tests.experiments.conftest import SMALL
 
 SECTIONS = (
@@ -73,13 +73,13 @@ def test_the_page_contains_every_figure(page: str) -> None:
     assert all(f'id="figure-{name}"' in page for name in FIGURES)
 
 
-def test_the_verdict_opens_the_page(page: str, study: Found) -> None:
+def test_the_verdict_opens_the_page(page: str, study: StudyResult) -> None:
     places = [page.index(sentence.replace("'", "&#39;")) for sentence in verdict(study.frames)]
     assert places == sorted(places)
     assert places[-1] < page.index("<figure")
 
 
-def test_the_page_shows_the_velocity_errors_of_the_table(page: str, study: Found) -> None:
+def test_the_page_shows_the_velocity_errors_of_the_table(page: str, study: StudyResult) -> None:
     for row in study.tables["validation_rmse"].itertuples():
         cells = [
             number(1e3 * value, digits)
@@ -93,14 +93,14 @@ def test_the_page_shows_the_velocity_errors_of_the_table(page: str, study: Found
         assert "".join(f'<td class="number">{cell}</td>' for cell in cells) in page
 
 
-def test_the_page_lists_transfer_functions_beside_the_published_ones(page: str, study: Found) -> None:
+def test_the_page_lists_transfer_functions_beside_the_published_ones(page: str, study: StudyResult) -> None:
     for row in study.tables["transfer_functions"].to_dict("records"):
         names = ("b0", "b1", "b2", "a1", "a2")
         assert "".join(f'<td class="number">{number(row[name])}</td>' for name in names) in page
         assert "".join(f'<td class="number">{exact(row[f"published_{name}"])}</td>' for name in names) in page
 
 
-def test_the_page_lists_scalars_with_their_notes_and_bulk_modulus_in_mpa(page: str, study: Found) -> None:
+def test_the_page_lists_scalars_with_their_notes_and_bulk_modulus_in_mpa(page: str, study: StudyResult) -> None:
     for row in study.tables["scalars"].to_dict("records"):
         assert row["note"].split(" (errata")[0].replace("'", "&#39;") in page
     first = study.tables["scalars"].iloc[0]
@@ -111,13 +111,13 @@ def test_the_page_lists_scalars_with_their_notes_and_bulk_modulus_in_mpa(page: s
     )  # bulk modulus has one unit, in text and tables
 
 
-def test_the_page_shows_the_recovered_conditions_and_worst_errors_of_the_table(page: str, study: Found) -> None:
+def test_the_page_shows_the_recovered_conditions_and_worst_errors_of_the_table(page: str, study: StudyResult) -> None:
     for found in recoveries(study.tables["bulk_modulus"]).values():
         assert f"{found.recovered} of {found.conditions}" in page
         assert number(found.worst_error_percent, 2) in page
 
 
-def test_every_parameter_is_listed_with_unit_and_source(page: str, study: Found) -> None:
+def test_every_parameter_is_listed_with_unit_and_source(page: str, study: StudyResult) -> None:
     for row in study.tables["parameters"].to_dict("records"):
         assert f"<code>{row['parameter']}</code>" in page
         assert exact(float(row["value"])) in page

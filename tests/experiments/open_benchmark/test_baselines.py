@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from experiments.open_benchmark.baselines import LEARNT, forest_on_features, ridge_classifier
+from experiments.open_benchmark.baselines import LEARNERS, forest_on_features, ridge_classifier
 from experiments.open_benchmark.features import simple_features
-from experiments.open_benchmark.study import BASELINES, STRANGE, BaselineSettings, right_shares
-from experiments.running.study import Found, write_result
+from experiments.open_benchmark.study import BASELINES, TEST_KINDS, BaselineSettings, right_shares
+from experiments.running.study import StudyResult, write_result
 from plant.arrays import Array
 from plant.errors import HydrostateError
 
@@ -32,11 +32,11 @@ def waves(seed: int, each: int = 12) -> tuple[Array, NDArray[np.str_]]:
     return np.array(logs), np.array(names)
 
 
-@pytest.mark.parametrize("name", LEARNT)
+@pytest.mark.parametrize("name", LEARNERS)
 def test_every_learner_separates_two_kinds_of_logs(name: str) -> None:
     if "forest" in name:
         pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra learn)")
-    verdicts = LEARNT[name](*waves(0))
+    verdicts = LEARNERS[name](*waves(0))
     series, wanted = waves(1)
     assert np.mean(verdicts(series) == wanted) >= 0.9
 
@@ -67,8 +67,8 @@ def test_a_verdict_counts_as_right_if_the_truth_accepts_it(tmp_path: Path) -> No
 
 
 def test_the_page_has_a_row_for_each_method_and_the_number_of_each_kind(tmp_path: Path) -> None:
-    table = pd.DataFrame([{"method": "hydrostate diagnose", **dict.fromkeys(STRANGE, 50.0)}])
-    write_result(BASELINES, BaselineSettings(9, 1), Found({"baselines": table}), tmp_path / "page")
+    table = pd.DataFrame([{"method": "hydrostate diagnose", **dict.fromkeys(TEST_KINDS, 50.0)}])
+    write_result(BASELINES, BaselineSettings(9, 1), StudyResult({"baselines": table}), tmp_path / "page")
     page = (tmp_path / "page" / "report.html").read_text("utf-8")
     assert "hydrostate diagnose" in page
     assert "worn pump: 80" in page.replace("\N{NO-BREAK SPACE}", " ")

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
+from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, names_cause
 from experiments.open_benchmark.score import coverage, summary
 
 TRUTH = {"beta_lo": "2e8", "beta_hi": "2.1e8", "accept": "normal;unknown"}
@@ -77,9 +77,9 @@ def test_the_date_of_a_condition_is_right_false_or_missing_against_the_truth(
 
 
 def test_a_cause_counts_as_named_in_any_message_or_warning() -> None:
-    assert named("", {"message": "lag"}) is None
-    assert named(r"\blag", {"message": "ok", "warnings": ["pressure lags by 2 ms"]}) is True
-    assert named(r"\blag", {"message": "ok"}, {"reasons": ["the flag is set"]}) is False
+    assert names_cause("", {"message": "lag"}) is None
+    assert names_cause(r"\blag", {"message": "ok", "warnings": ["pressure lags by 2 ms"]}) is True
+    assert names_cause(r"\blag", {"message": "ok"}, {"reasons": ["the flag is set"]}) is False
 
 
 def test_the_summary_counts_logs_by_set_and_sensors() -> None:

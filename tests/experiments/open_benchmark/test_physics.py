@@ -6,7 +6,7 @@ import pytest
 from experiments.open_benchmark.equations import rates, stop_force
 from experiments.open_benchmark.flows import check_flow, filling, leakage_flow, orifice_flow, pump_flow
 from experiments.open_benchmark.friction import SLIPS, friction_force, steady_friction
-from experiments.open_benchmark.logger import PLAIN, Logger
+from experiments.open_benchmark.logger import PLAIN_CHANNELS, Logger
 from experiments.open_benchmark.machine import ATMOSPHERE, Machine
 from experiments.open_benchmark.oil import specific_volume, stiffness
 from experiments.open_benchmark.run import RECORD, TICK, at_rest, run
@@ -156,7 +156,7 @@ def test_end_stops_only_push_the_piston_inwards() -> None:
 
 def test_a_run_that_diverged_is_refused_as_a_log() -> None:
     states = run(Machine(), course(50.0, 0.2))
-    logger = Logger(sample_time=1e-3, channels=PLAIN)
+    logger = Logger(sample_time=1e-3, channels=PLAIN_CHANNELS)
     assert len(logger.log(states, np.random.default_rng(0))) > 0
     states[-1, 2] = np.nan
     with pytest.raises(HydrostateError, match="must stay finite, got one that ran away"):

@@ -8,9 +8,9 @@ import pytest
 from experiments.open_benchmark.draws import draw_plain
 from experiments.open_benchmark.kinds import KINDS
 from experiments.open_benchmark.logger import PRESSURES
-from experiments.open_benchmark.score import OF_PRESSURE, without_pressure
+from experiments.open_benchmark.score import PRESSURE_PREFIX, without_pressure
 
-NAMES = [name for name in KINDS if name.startswith(OF_PRESSURE)]
+NAMES = [name for name in KINDS if name.startswith(PRESSURE_PREFIX)]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -20,9 +20,9 @@ from experiments.nine_conditions.study import NINE_CONDITIONS
 from experiments.nine_conditions.transfer_functions import identification_study
 from experiments.page import folder
 from experiments.page.figure_files import figure_files
-from experiments.page.folder import check_target, held
+from experiments.page.folder import check_target, folder_lock
 from experiments.running import study as runner
-from experiments.running.study import Found, write_result
+from experiments.running.study import StudyResult, write_result
 from experiments.streams.endings import stop_at_signals
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
@@ -37,12 +37,12 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def short(study: Found) -> Found:
+def short(study: StudyResult) -> StudyResult:
     """Return one table of the small study and its files; it is written like the whole study."""
-    return Found({"bulk modulus": study.tables["bulk_modulus"]}, {}, study.files)
+    return StudyResult({"bulk modulus": study.tables["bulk_modulus"]}, {}, study.files)
 
 
-def write_study(found: Found, folder: Path) -> Path:
+def write_study(found: StudyResult, folder: Path) -> Path:
     """Write a part of the small study, and return its report."""
     write_result(replace(NINE_CONDITIONS, facts=lambda *_: {}), SMALL, found, folder)
     return folder / "report.html"
@@ -52,7 +52,7 @@ def _listing(folder: Path) -> list[str]:
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
 
 
-def test_the_folder_contains_all_figures_tables_series_and_the_manifest(written: Path, study: Found) -> None:
+def test_the_folder_contains_all_figures_tables_series_and_the_manifest(written: Path, study: StudyResult) -> None:
     present = _listing(written)
     for name in FIGURES:
         assert {f"figures/{name}.png", f"figures/{name}.svg"} <= set(present)
@@ -62,7 +62,7 @@ def test_the_folder_contains_all_figures_tables_series_and_the_manifest(written:
     assert json.loads((written / "manifest.json").read_text(encoding="utf-8"))["files"] == present
 
 
-def test_tables_are_read_back_as_they_were(written: Path, study: Found) -> None:
+def test_tables_are_read_back_as_they_were(written: Path, study: StudyResult) -> None:
     found = pd.read_csv(written / "tables/bulk_modulus.csv", keep_default_na=True)
     wanted = study.tables["bulk_modulus"]
     np.testing.assert_array_equal(found["value_pa"], wanted["value_pa"].astype(float))
@@ -79,13 +79,13 @@ def test_transfer_functions_keep_every_digit(written: Path) -> None:
         np.testing.assert_array_equal(found.covariance, model.covariance)
 
 
-def test_figures_are_the_same_at_every_run(written: Path, study: Found) -> None:
+def test_figures_are_the_same_at_every_run(written: Path, study: StudyResult) -> None:
     again = figure_files({WRITTEN: FIGURES[WRITTEN]}, study.frames)
     assert again[f"figures/{WRITTEN}.svg"] == (written / f"figures/{WRITTEN}.svg").read_bytes()
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_an_earlier_study_is_replaced_completely(short: Found, tmp_path: Path) -> None:
+def test_an_earlier_study_is_replaced_completely(short: StudyResult, tmp_path: Path) -> None:
     target = tmp_path / "out"
     write_study(short, target)
     (target / "tables/bulk_modulus.csv").write_text("stale", encoding="utf-8")
@@ -97,7 +97,7 @@ def test_an_earlier_study_is_replaced_completely(short: Found, tmp_path: Path) -
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("failure", [HydrostateError("no report"), KeyboardInterrupt(), OSError(28, "No space left")])
 def test_a_failure_while_writing_keeps_the_earlier_result(
-    short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException
+    short: StudyResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException
 ) -> None:
     target = tmp_path / "out"
     write_study(short, target)
@@ -120,7 +120,7 @@ def test_a_failure_while_writing_keeps_the_earlier_result(
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_failed_exchange_of_folders_restores_the_earlier_result(
-    short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    short: StudyResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "out"
     write_study(short, target)
@@ -131,7 +131,7 @@ def test_a_failed_exchange_of_folders_restores_the_earlier_result(
             raise PermissionError(13, "Permission denied")
         return rename(path, new)
 
-    monkeypatch.setattr(folder, "_exchanged", lambda *_: False)  # as on a system that cannot exchange two folders
+    monkeypatch.setattr(folder, "_exchange_names", lambda *_: False)  # as on a system that cannot exchange two folders
     monkeypatch.setattr(Path, "rename", second_fails)
     with pytest.raises(HydrostateError, match="can be written, got: Permission denied"):
         write_study(short, target)
@@ -156,7 +156,7 @@ def test_a_manifest_of_something_else_is_refused(tmp_path: Path, manifest: str) 
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_study_folder_with_a_foreign_file_is_not_overwritten(short: Found, tmp_path: Path) -> None:
+def test_a_study_folder_with_a_foreign_file_is_not_overwritten(short: StudyResult, tmp_path: Path) -> None:
     target = tmp_path / "out"
     write_study(short, target)
     (target / "tables/annotated.png").write_bytes(b"x")
@@ -167,7 +167,7 @@ def test_a_study_folder_with_a_foreign_file_is_not_overwritten(short: Found, tmp
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_study_is_written_to_an_empty_folder_and_below_missing_parents(short: Found, tmp_path: Path) -> None:
+def test_a_study_is_written_to_an_empty_folder_and_below_missing_parents(short: StudyResult, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     assert write_study(short, tmp_path / "empty") == tmp_path / "empty/report.html"
     assert write_study(short, tmp_path / "a/b/c").is_file()
@@ -196,20 +196,20 @@ def test_a_target_without_write_permission_is_refused(tmp_path: Path, monkeypatc
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_path_too_long_for_the_file_system_is_refused(short: Found, tmp_path: Path) -> None:
+def test_a_path_too_long_for_the_file_system_is_refused(short: StudyResult, tmp_path: Path) -> None:
     with pytest.raises(HydrostateError, match="result folder"):
         write_study(short, tmp_path / ("x" * 300))
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_temporary_folders_of_a_killed_run_are_removed_and_the_earlier_result_is_restored(
-    short: Found, tmp_path: Path
+    short: StudyResult, tmp_path: Path
 ) -> None:
     write_study(short, tmp_path / "out")
     (tmp_path / "out").rename(tmp_path / ".out.0123abcd.old")  # the run was killed before the new result took the name
     for name in (".out.89abcdef.tmp", ".out.ffff0000.tmp", ".out.mine.tmp"):
         (tmp_path / name).mkdir()
-    with held(tmp_path / ".out.ffff0000.tmp") as free:  # another study is at work
+    with folder_lock(tmp_path / ".out.ffff0000.tmp") as free:  # another study is at work
         assert free
         check_target(tmp_path / "out")
     assert (tmp_path / "out/manifest.json").is_file()
@@ -220,7 +220,7 @@ def test_temporary_folders_of_a_killed_run_are_removed_and_the_earlier_result_is
 @pytest.mark.skipif(sys.platform != "linux", reason="the system has no call that exchanges two names")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_a_study_ended_while_replacing_another_leaves_a_complete_result(
-    short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+    short: StudyResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
     write_study(short, target := tmp_path / "out")
     ended, remove = iter([number]), shutil.rmtree
@@ -238,7 +238,7 @@ def test_a_study_ended_while_replacing_another_leaves_a_complete_result(
         monkeypatch.setattr(Path, "rename", never)
         monkeypatch.setattr(shutil, "rmtree", end_first)
         try:
-            write_study(Found({"of the second": short.tables["bulk modulus"]}, {}, short.files), target)
+            write_study(StudyResult({"of the second": short.tables["bulk modulus"]}, {}, short.files), target)
         except KeyboardInterrupt:
             os._exit(130)
         os._exit(1)
@@ -252,7 +252,7 @@ def test_a_study_ended_while_replacing_another_leaves_a_complete_result(
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_result_that_another_study_writes_meanwhile_is_replaced(
-    short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    short: StudyResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_study(short, target := tmp_path / "out")
     rename, others = Path.rename, iter([b"another"])
@@ -264,7 +264,7 @@ def test_a_result_that_another_study_writes_meanwhile_is_replaced(
             (target / "report.html").write_bytes(content)
         return moved
 
-    monkeypatch.setattr(folder, "_exchanged", lambda *_: False)
+    monkeypatch.setattr(folder, "_exchange_names", lambda *_: False)
     monkeypatch.setattr(Path, "rename", beaten)
     assert write_study(short, target).read_text() == "report"
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
@@ -272,7 +272,7 @@ def test_a_result_that_another_study_writes_meanwhile_is_replaced(
 
 @pytest.mark.usefixtures("undrawn")
 def test_every_file_of_a_result_is_flushed_to_disk_before_it_is_renamed(
-    short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    short: StudyResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     synced: list[str] = []
     monkeypatch.setattr(os, "fsync", lambda number: synced.append(str(Path(f"/proc/self/fd/{number}").readlink())))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from experiments.page.packed import MISSING, ends_of_stretches, packed, stretch_length
+from experiments.page.packed import MISSING, ends_of_stretches, packed_series, stretch_length
 from plant.arrays import Array
 
 
@@ -23,7 +23,7 @@ def unpacked(one: dict[str, object]) -> Array:
 
 @given(arrays(np.float64, st.integers(1, 300), elements=st.floats(-1e9, 1e9) | st.just(float("nan"))))
 def test_a_packed_series_is_restored_to_within_half_a_quantum_with_its_gaps(values: Array) -> None:
-    one = dict(packed(values))
+    one = dict(packed_series(values))
     back = unpacked(one)
     assert np.array_equal(np.isnan(back), np.isnan(values))
     there = np.isfinite(values)
@@ -32,7 +32,7 @@ def test_a_packed_series_is_restored_to_within_half_a_quantum_with_its_gaps(valu
 
 
 def test_a_packed_series_without_values_is_restored_as_gaps() -> None:
-    assert np.all(np.isnan(unpacked(dict(packed(np.full(5, np.nan))))))
+    assert np.all(np.isnan(unpacked(dict(packed_series(np.full(5, np.nan))))))
 
 
 @given(arrays(np.float64, st.integers(1, 2000), elements=st.floats(-1e6, 1e6)), st.integers(2, 200))

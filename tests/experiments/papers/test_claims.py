@@ -9,7 +9,7 @@ import pytest
 
 from experiments.page.errata import ERRATA
 from experiments.papers.claims import DRAWN_BY, PAPERS, read_csv
-from experiments.papers.verdict import Ours, Row, accepted
+from experiments.papers.verdict import OurResult, Row, accepted_range
 
 CLAIMS, FIGURES = read_csv("claims.csv"), read_csv("figures.csv")
 
@@ -37,7 +37,7 @@ def test_every_claim_has_a_tolerance_that_can_be_read_and_errata_that_exist() ->
             assert row["value"], row
             continue
         value = float(row["value"]) if row["value"] else None
-        low, high = accepted(
+        low, high = accepted_range(
             Row(
                 paper=row["paper"],
                 where=row["where"],
@@ -47,7 +47,7 @@ def test_every_claim_has_a_tolerance_that_can_be_read_and_errata_that_exist() ->
                 unit=row["unit"],
                 accept=row["accept"],
                 basis="model",
-                ours=Ours(None),
+                ours=OurResult(None),
                 shown_by="",
             )
         )

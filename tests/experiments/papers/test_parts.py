@@ -12,12 +12,12 @@ from experiments.nine_conditions.printed_equations import printed_equations
 from experiments.page.frames import Tables
 from experiments.papers import parts
 from experiments.papers.claims import figure_table, row_table
-from experiments.papers.parts import PapersSettings, gather, quick_papers, read_tables
+from experiments.papers.parts import PapersSettings, gather_tables, quick_papers, read_tables
 from experiments.papers.study import papers_study
-from experiments.papers.verdict import Ours, Row
+from experiments.papers.verdict import OurResult, Row
 from experiments.piezo_stack.left_out import figure_12_left_out
-from experiments.running.progress import Track, untracked
-from experiments.running.study import Found, run_study
+from experiments.running.progress import Track, without_progress
+from experiments.running.study import StudyResult, run_study
 from faults.conditions import CONDITIONS
 
 QUICK = quick_papers(7)
@@ -48,17 +48,17 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, stop_at: str = "") -> list[str]:
 def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = stand_in(monkeypatch, stop_at="three")
     with pytest.raises(Stop):
-        gather(tmp_path, QUICK, untracked)
+        gather_tables(tmp_path, QUICK, without_progress)
     assert made == ["one", "two"]
     made = stand_in(monkeypatch)
-    found = gather(tmp_path, QUICK, untracked)
+    found = gather_tables(tmp_path, QUICK, without_progress)
     assert made == ["three"]
     assert list(found) == ["one", "two", "three"]
 
 
 def test_a_table_is_read_back_unchanged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stand_in(monkeypatch)
-    table = gather(tmp_path, QUICK, untracked)["two"]["a_table_named"]
+    table = gather_tables(tmp_path, QUICK, without_progress)["two"]["a_table_named"]
     assert table.to_dict("records") == [{"level": "none", "value": 0.1 + 0.2, "seed": 7}]
 
 
@@ -67,20 +67,20 @@ def test_a_part_is_run_again_after_a_change_of_sources_settings_or_files(
     change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stand_in(monkeypatch)
-    gather(tmp_path, QUICK, untracked)
+    gather_tables(tmp_path, QUICK, without_progress)
     made = stand_in(monkeypatch)
     if change == "sources":
         monkeypatch.setattr(parts, "sources_digest", lambda: "another")
     if change == "a file":
         (tmp_path / "two" / "tables" / "a_table_named.csv").unlink()
-    gather(tmp_path, quick_papers(8) if change == "settings" else QUICK, untracked)
+    gather_tables(tmp_path, quick_papers(8) if change == "settings" else QUICK, without_progress)
     assert made == (["two"] if change == "a file" else ["one", "two", "three"])
 
 
 def test_a_claim_counts_for_each_figure_that_it_names() -> None:
     def row(where: str, ours: float) -> Row:
         words = {"paper": "002", "where": where, "claim": "a claim", "printed": "1", "unit": "", "accept": "digits"}
-        return Row(**words, value=1.0, basis="model", ours=Ours(ours), shown_by="hydrostate circuit")
+        return Row(**words, value=1.0, basis="model", ours=OurResult(ours), shown_by="hydrostate circuit")
 
     rows = row_table([row("section 4, Figure 5", 3.0), row("section 4, Figure 6", 1.0), row("Figures 9 to 10", 9.0)])
     drawn = figure_table(rows).set_index(["paper", "figure"])["drawn"]["gear-pump EHA (002)"]
@@ -130,7 +130,7 @@ def test_every_claim_on_the_page_of_the_papers_has_a_verdict(tmp_path: Path) -> 
 def test_every_claim_has_a_verdict_with_tables_of_the_other_studies(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    study: Found,
+    study: StudyResult,
     stack_tables: Tables,
     motor_tables: Tables,
     motor_paper_tables: Tables,

@@ -3,15 +3,24 @@ import math
 import pytest
 
 from experiments.page.numbers import MINUS, TIMES
-from experiments.papers.study import _ours, _tolerance
-from experiments.papers.verdict import Basis, Ours, Row, accepted, agrees, drawn_as, excluded, verdict_of
+from experiments.papers.study import _our_cell, _tolerance
+from experiments.papers.verdict import (
+    Basis,
+    OurResult,
+    Row,
+    accepted_range,
+    agrees,
+    exclusion_sentence,
+    figure_status,
+    verdict_of,
+)
 from experiments.published.digits import digits_half
 from plant.errors import HydrostateError
 
 
 def row(
     value: float | str | None = 2.0,
-    ours: Ours = Ours(2.0),  # noqa: B008 - frozen
+    ours: OurResult = OurResult(2.0),  # noqa: B008 - frozen
     *,
     printed: str = "2.0",
     accept: str = "digits",
@@ -42,23 +51,23 @@ def test_the_verdict_on_an_agreeing_value_follows_from_its_basis(basis: Basis, v
 
 
 def test_a_disagreeing_value_is_an_erratum_only_if_one_is_cited() -> None:
-    assert verdict_of(row(ours=Ours(2.06))) == "not reproduced"
-    assert verdict_of(row(ours=Ours(2.06), errata="E7")) == "erratum"
-    assert verdict_of(row(ours=Ours(None), errata="E7")) == "erratum"
-    assert verdict_of(row(ours=Ours(math.nan), basis="target")) == "not reproduced"
+    assert verdict_of(row(ours=OurResult(2.06))) == "not reproduced"
+    assert verdict_of(row(ours=OurResult(2.06), errata="E7")) == "erratum"
+    assert verdict_of(row(ours=OurResult(None), errata="E7")) == "erratum"
+    assert verdict_of(row(ours=OurResult(math.nan), basis="target")) == "not reproduced"
 
 
 def test_the_tolerance_digits_is_half_a_unit_of_the_last_printed_digit() -> None:
-    assert agrees(row(ours=Ours(2.05)))
-    assert not agrees(row(ours=Ours(2.0501)))
-    assert not agrees(row(ours=Ours(2.05), printed="2.00"))
+    assert agrees(row(ours=OurResult(2.05)))
+    assert not agrees(row(ours=OurResult(2.0501)))
+    assert not agrees(row(ours=OurResult(2.05), printed="2.00"))
     assert digits_half("-7.440e3") == 0.5
 
 
 def test_an_interval_agrees_if_it_overlaps_the_tolerance() -> None:
-    assert agrees(row(ours=Ours(3.0, 2.04, 3.96)))
-    assert not agrees(row(ours=Ours(3.0, 2.06, 3.94)))
-    assert not agrees(row(ours=Ours(1.0, 0.0, 1.94)))
+    assert agrees(row(ours=OurResult(3.0, 2.04, 3.96)))
+    assert not agrees(row(ours=OurResult(3.0, 2.06, 3.94)))
+    assert not agrees(row(ours=OurResult(1.0, 0.0, 1.94)))
 
 
 @pytest.mark.parametrize(
@@ -72,7 +81,7 @@ def test_an_interval_agrees_if_it_overlaps_the_tolerance() -> None:
     ],
 )
 def test_every_form_of_tolerance_is_read(accept: str, limits: tuple[float, float]) -> None:
-    assert accepted(row(accept=accept)) == pytest.approx(limits)
+    assert accepted_range(row(accept=accept)) == pytest.approx(limits)
 
 
 @pytest.mark.parametrize("accept", ["near", "± 10 per cent of it", "", "±"])
@@ -87,16 +96,16 @@ def test_a_relative_tolerance_without_a_printed_number_is_refused() -> None:
 
 
 def test_words_are_compared_exactly() -> None:
-    assert agrees(row("Brass", Ours("Brass"), accept="same"))
-    assert not agrees(row("Brass", Ours("brass"), accept="same"))
-    assert not agrees(row("never falls", Ours(9.7), accept="same"))
+    assert agrees(row("Brass", OurResult("Brass"), accept="same"))
+    assert not agrees(row("Brass", OurResult("brass"), accept="same"))
+    assert not agrees(row("never falls", OurResult(9.7), accept="same"))
 
 
 def test_a_figure_with_a_claim_that_is_not_reproduced_is_drawn_with_a_difference() -> None:
-    assert drawn_as(True, "", ["predicted", "not reproduced"]) == "drawn with a difference"
-    assert drawn_as(True, "signs mended", ["predicted"]) == "drawn with a difference"
-    assert drawn_as(True, "", []) == "drawn"
-    assert drawn_as(False, "a photograph", ["predicted"]) == "cannot be drawn"
+    assert figure_status(True, "", ["predicted", "not reproduced"]) == "drawn with a difference"
+    assert figure_status(True, "signs mended", ["predicted"]) == "drawn with a difference"
+    assert figure_status(True, "", []) == "drawn"
+    assert figure_status(False, "a photograph", ["predicted"]) == "cannot be drawn"
 
 
 @pytest.mark.parametrize(
@@ -113,10 +122,10 @@ def test_a_tolerance_is_shown_in_words_with_four_digits(accept: str, said: str) 
 
 
 def test_an_interval_that_excludes_the_printed_value_is_detected() -> None:
-    assert excluded(row(2.0, Ours(2.5, 2.4, 2.6)))
-    assert not excluded(row(2.0, Ours(2.1, 1.9, 2.3)))
-    assert not excluded(row(2.0, Ours(2.5)))
-    assert not excluded(row(None, Ours(0.5, 0.4, 0.6), accept="at least 1"))
+    assert exclusion_sentence(row(2.0, OurResult(2.5, 2.4, 2.6)))
+    assert not exclusion_sentence(row(2.0, OurResult(2.1, 1.9, 2.3)))
+    assert not exclusion_sentence(row(2.0, OurResult(2.5)))
+    assert not exclusion_sentence(row(None, OurResult(0.5, 0.4, 0.6), accept="at least 1"))
 
 
 @pytest.mark.parametrize(
@@ -128,5 +137,5 @@ def test_an_interval_that_excludes_the_printed_value_is_detected() -> None:
     ],
 )
 def test_our_value_is_shown_with_the_power_of_ten_of_the_printed_one(printed: str, value: float, shown: str) -> None:
-    cell = _ours({"ours": value, "printed": printed})
+    cell = _our_cell({"ours": value, "printed": printed})
     assert shown in str(getattr(cell, "text", cell))

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from experiments.page.frames import Tables
-from experiments.page.style import styled
+from experiments.page.style import project_style
 from experiments.piezo_stack.card import SENSOR_SETS
 from experiments.piezo_stack.figures import STACK_FIGURES
 from experiments.piezo_stack.flow import LIMITS, LOOP_FREQUENCIES, best_points
@@ -16,7 +16,7 @@ from plant.units import LITRE_PER_MINUTE
 
 @pytest.fixture(scope="module")
 def drawn(stack_tables: Tables) -> Mapping[str, Figure]:
-    with styled():
+    with project_style():
         return {name: draw(stack_tables) for name, draw in STACK_FIGURES.items()}
 
 

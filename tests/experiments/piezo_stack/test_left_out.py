@@ -36,8 +36,8 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def test_the_calibration_uses_only_runs_at_the_higher_voltage_and_recovers_the_rig(seen: list[float]) -> None:
-    start = left_out.changed(RIG, np.where(np.arange(len(left_out.FREED)) == 0, 0.3, 0.2))
-    found = left_out.calibrated(start)
+    start = left_out.with_factors(RIG, np.where(np.arange(len(left_out.FREED)) == 0, 0.3, 0.2))
+    found = left_out.calibrate(start)
     assert set(seen) == {HIGH_VOLTAGE}
     assert found.piston_area == pytest.approx(RIG.piston_area, rel=0.05)
     assert found.line_area == pytest.approx(RIG.line_area, rel=0.05)
@@ -51,7 +51,7 @@ def test_figure_12_is_predicted_by_rigs_calibrated_without_it(seen: list[float])
 
 
 def test_parameters_of_one_group_change_by_one_factor() -> None:
-    one = left_out.changed(RIG, np.log(np.full(len(left_out.FREED), 1.1)))
+    one = left_out.with_factors(RIG, np.log(np.full(len(left_out.FREED), 1.1)))
     for name in ("outlet_reed_stiffness", "inlet_reed_stiffness", "return_length", "air_fraction"):
         assert getattr(one, name) == pytest.approx(1.1 * getattr(RIG, name))
     assert one.stack_stiffness == RIG.stack_stiffness

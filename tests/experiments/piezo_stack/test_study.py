@@ -6,7 +6,7 @@ import pytest
 
 from experiments.piezo_stack import flow
 from experiments.piezo_stack.study import PIEZO_STACK
-from experiments.running.progress import untracked
+from experiments.running.progress import without_progress
 from tests.experiments.conftest import STACK
 
 
@@ -20,5 +20,5 @@ def test_an_operating_point_of_several_figures_is_run_once(monkeypatch: pytest.M
 
     monkeypatch.setattr(flow, "sweep", sweep)
     with pytest.raises(InterruptedError):
-        PIEZO_STACK.find(STACK, untracked)
+        PIEZO_STACK.find(STACK, without_progress)
     assert len(set(asked)) == len(asked) > 100

@@ -133,7 +133,7 @@ def test_a_full_queue_refuses_a_log_with_a_retry_time(served: Served) -> None:
 
 def test_simultaneous_uploads_and_open_views_are_limited(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server, "MOST_UPLOADS", 0)
-    monkeypatch.setattr(server, "MOST_LOOKING", 0)
+    monkeypatch.setattr(server, "MOST_STREAM_VIEWS", 0)
     monkeypatch.setattr("experiments.serve.live.Stream.start", lambda _: None)
     client = served(streams={"bench": "tcp://127.0.0.1:1"})
     answers = [
@@ -203,7 +203,7 @@ def test_two_logs_can_be_compared_and_the_fleet_follows_uploads_and_deletions(
         result = {"file": task.name, "outcome": "ok", "message": "it is so", "severity": severity}
         return LogResult(result, row)
 
-    monkeypatch.setattr("experiments.serve.jobs.work_on", stand_in)
+    monkeypatch.setattr("experiments.serve.jobs.process_log", stand_in)
     client = served(pattern="{actuator}_{date}.csv")
     pair = [dropped(client, name, b"a", "diagnose")["id"] for name in ("A_1.csv", "<b>_2.csv")]
     (row,) = client.get("/api/compare", params={"first": pair[0], "second": pair[1]}).json()["differences"]
@@ -284,7 +284,7 @@ def test_the_page_of_an_actuator_is_served(served: Served, monkeypatch: pytest.M
     row = {"outcome": "ok", "found_condition": "normal"}
     said = "the verdict of its page"
     monkeypatch.setattr(
-        "experiments.serve.jobs.work_on",
+        "experiments.serve.jobs.process_log",
         lambda task: LogResult({"file": task.name, "outcome": "ok", "message": "it is so"}, row, said),
     )
     client = served(pattern="{actuator}_{date}.csv")

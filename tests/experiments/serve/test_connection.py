@@ -9,7 +9,7 @@ from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from experiments.serve import connection
-from experiments.serve.connection import FULL, LATE, PatientProtocol
+from experiments.serve.connection import FULL_RESPONSE, TIMEOUT_RESPONSE, PatientProtocol
 
 SOON = 0.02
 """Time limit in these tests [s]."""
@@ -55,8 +55,8 @@ async def answers(_: Any, receive: Any, send: Any) -> None:
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection, "HEADERS_IN", SOON)
-    monkeypatch.setattr(connection, "READ_IN", SOON)
+    monkeypatch.setattr(connection, "HEADERS_TIMEOUT", SOON)
+    monkeypatch.setattr(connection, "READ_TIMEOUT", SOON)
 
 
 def connected(app: App = answers) -> tuple[PatientProtocol, Wire]:
@@ -89,7 +89,7 @@ def test_a_client_that_does_not_complete_its_headers_in_time_is_refused() -> Non
 
     wire = asyncio.run(said())
     assert wire.closed
-    assert wire.written == LATE
+    assert wire.written == TIMEOUT_RESPONSE
 
 
 def test_an_answer_may_take_longer_than_the_time_limit_for_headers() -> None:
@@ -131,7 +131,7 @@ def test_a_connection_beyond_the_maximum_is_refused_at_once(monkeypatch: pytest.
 
     wire = asyncio.run(said())
     assert wire.closed
-    assert wire.written == FULL
+    assert wire.written == FULL_RESPONSE
 
 
 @pytest.mark.parametrize("reads", [False, True])

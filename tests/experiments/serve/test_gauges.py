@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.serve import gauges
-from experiments.serve.gauges import EVERY, Gauges, StreamTask, watch_stream
+from experiments.serve.gauges import GAUGE_INTERVAL, Gauges, StreamTask, watch_stream
 from faults.watch.events import Alarm
 
 HEADER = "time_s,motor_speed_rad_s,velocity_m_s\n"
@@ -44,10 +44,10 @@ def watching(sent: list[Any]) -> Gauges:
 
 def test_gauges_are_sent_at_most_once_per_interval_and_keep_the_extremes(sent: list[Any], clock: Clock) -> None:
     found = watching(sent)
-    found.saw({"a": np.array([1.0])}, 0.1, False)
+    found.process_samples({"a": np.array([1.0])}, 0.1, False)
     for seconds, value in ((0.2, 9.0), (0.6, -9.0), (1.01, 0.0)):
-        clock.now = 100.0 + seconds * EVERY
-        found.saw({"a": np.array([value])}, 0.2, False)
+        clock.now = 100.0 + seconds * GAUGE_INTERVAL
+        found.process_samples({"a": np.array([value])}, 0.2, False)
     assert [entries["rows"] for _, entries in sent] == [1, 4]
     last = sent[-1][1]
     assert (last["low"], last["high"], last["values"]) == ({"a": -9.0}, {"a": 9.0}, {"a": 0.0})
@@ -56,15 +56,15 @@ def test_gauges_are_sent_at_most_once_per_interval_and_keep_the_extremes(sent: l
 def test_the_score_of_an_alarm_is_sent_even_if_its_balance_is_reset(sent: list[Any], clock: Clock) -> None:
     found = watching(sent)
     found.events([Alarm(6.9, "flow", 6.5, (6.4, 6.6), 4.3, 4.0)])
-    found.saw({"a": np.array([1.0])}, 7.0, False)
-    clock.now += EVERY
-    found.saw({"a": np.array([1.0])}, 7.3, False)
+    found.process_samples({"a": np.array([1.0])}, 7.0, False)
+    clock.now += GAUGE_INTERVAL
+    found.process_samples({"a": np.array([1.0])}, 7.3, False)
     assert [told["scores"] for kind, told in sent if kind == "gauges"] == [{"flow": 4.3}, {"flow": 1.0}]
 
 
 def test_a_channel_without_values_has_no_range_and_its_rows_are_not_counted(sent: list[Any], clock: Clock) -> None:
     del clock
-    watching(sent).saw({"a": np.array([np.nan, np.nan]), "b": np.array([1.0, 2.0])}, 0.1, False)
+    watching(sent).process_samples({"a": np.array([np.nan, np.nan]), "b": np.array([1.0, 2.0])}, 0.1, False)
     ((_, told),) = sent
     assert (told["low"], told["high"], told["rows"]) == ({"b": 1.0}, {"b": 2.0}, 0)
     assert told["values"] == {"a": None, "b": 2.0}
@@ -72,7 +72,7 @@ def test_a_channel_without_values_has_no_range_and_its_rows_are_not_counted(sent
 
 def test_no_gauges_are_sent_before_the_watch_begins(sent: list[Any], clock: Clock) -> None:
     del clock
-    Gauges(SimpleNamespace(send=sent.append)).saw({"a": np.array([1.0])}, 0.1, False)  # type: ignore[arg-type]
+    Gauges(SimpleNamespace(send=sent.append)).process_samples({"a": np.array([1.0])}, 0.1, False)  # type: ignore[arg-type]
     assert sent == []
 
 

@@ -42,10 +42,10 @@ def test_a_refused_body_leaves_no_file(
 
 
 def test_a_body_that_stops_or_is_too_slow_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limits, "IDLE", 0.05)
+    monkeypatch.setattr(limits, "IDLE_TIME", 0.05)
     with pytest.raises(RefusedError, match="stopped coming"):
         received(chunks(b"a", b"b", pause=0.2), tmp_path / "a")
-    monkeypatch.setattr(limits, "IDLE", 60.0)  # on a busy machine, much time may pass between two bytes
+    monkeypatch.setattr(limits, "IDLE_TIME", 60.0)  # on a busy machine, much time may pass between two bytes
     monkeypatch.setattr(limits, "GRACE", 0.05)
     with pytest.raises(RefusedError, match="too slowly"):
         received(chunks(*[b"a"] * 20, pause=0.02), tmp_path / "a")

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.server.server_trials import feeding
+from benchmarks.server.server_trials import send_rows
 from experiments.serve import gauges as module
 from experiments.serve import live
 from experiments.serve.events import event_stream
 from experiments.serve.gauges import Gauges
-from experiments.serve.live import KEPT, Stream, Streams
+from experiments.serve.live import MOST_GAUGES, Stream, Streams
 from experiments.serve.settings import Settings
 from experiments.serve.store import Store
 
@@ -55,12 +55,12 @@ def heard(stream: Stream, *messages: tuple[str, dict[str, Any]]) -> None:
 def test_gauges_contain_the_range_since_the_previous_ones_and_the_number_of_whole_rows(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "EVERY", 0.0)
+    monkeypatch.setattr(module, "GAUGE_INTERVAL", 0.0)
     sent: list[Any] = []
     found = Gauges(SimpleNamespace(send=sent.append))  # type: ignore[arg-type]
     found.watch = SimpleNamespace(balances=("flow",), scores=(1.0,), thresholds=(np.inf,), unlearnt=87.0)  # type: ignore[assignment]
-    found.saw({"a": np.array([1.0, np.nan, -2.0]), "b": np.array([5.0, 5.0, 5.0])}, 0.3, False)
-    found.saw({"a": np.array([4.0]), "b": np.array([6.0])}, 0.4, True)
+    found.process_samples({"a": np.array([1.0, np.nan, -2.0]), "b": np.array([5.0, 5.0, 5.0])}, 0.3, False)
+    found.process_samples({"a": np.array([4.0]), "b": np.array([6.0])}, 0.4, True)
     (_, first), (_, second) = sent
     assert (first["rows"], second["rows"], second["gaps"]) == (2, 3, 1)
     assert (first["low"], first["high"]) == ({"a": -2.0, "b": 5.0}, {"a": 1.0, "b": 5.0})
@@ -69,10 +69,10 @@ def test_gauges_contain_the_range_since_the_previous_ones_and_the_number_of_whol
 
 
 def test_a_reconnected_view_gets_the_missed_messages_up_to_the_number_kept(stream: Stream) -> None:
-    heard(stream, *[("gauges", {"time_s": float(k)}) for k in range(KEPT + 5)])
-    assert [one["number"] for one in stream.since(KEPT + 3)] == [KEPT + 4, KEPT + 5]
-    assert len(stream.since(0)) == KEPT
-    assert stream.since(KEPT + 5) == []
+    heard(stream, *[("gauges", {"time_s": float(k)}) for k in range(MOST_GAUGES + 5)])
+    assert [one["number"] for one in stream.since(MOST_GAUGES + 3)] == [MOST_GAUGES + 4, MOST_GAUGES + 5]
+    assert len(stream.since(0)) == MOST_GAUGES
+    assert stream.since(MOST_GAUGES + 5) == []
 
 
 def test_the_state_of_a_stream_follows_its_last_event_and_events_are_stored(stream: Stream) -> None:
@@ -108,7 +108,7 @@ def test_a_stream_without_a_process_fails_with_the_reason_and_is_retried(
         raise OSError(errno.EMFILE, "Too many open files", str(duplex))
 
     monkeypatch.setattr(live, "multiprocessing", SimpleNamespace(get_context=lambda _: SimpleNamespace(Pipe=pipe)))
-    monkeypatch.setattr(live, "AGAIN_AFTER", 0.01)
+    monkeypatch.setattr(live, "RETRY_DELAY", 0.01)
     stream.start()
     stream._thread.join(10.0)
     assert tried == ["", "it cannot be watched: Too many open files"]
@@ -122,7 +122,7 @@ def test_a_stream_without_its_rig_file_fails_with_the_reason_and_is_retried(
     store = Store(tmp_path / "a.sqlite")
     one = Stream("bench", "tcp://127.0.0.1:1", Settings(folder=tmp_path, rigs=tmp_path), store)
     failed = threading.Event()
-    monkeypatch.setattr(live, "AGAIN_AFTER", 0.01)
+    monkeypatch.setattr(live, "RETRY_DELAY", 0.01)
     monkeypatch.setattr(
         one, "_fail", lambda said: failed.set() if "no rig file: the actuator is 'bench'" in said else 0
     )
@@ -136,7 +136,7 @@ def test_a_stream_without_its_rig_file_fails_with_the_reason_and_is_retried(
 
 
 def test_a_view_gets_the_history_and_then_new_messages(stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.serve.events.EVERY", 0.0)
+    monkeypatch.setattr("experiments.serve.events.GAUGE_INTERVAL", 0.0)
     heard(stream, ("gauges", {"time_s": 1.0}))
     streams = SimpleNamespace(looking=0)
     looks = iter([False, False, True])
@@ -195,7 +195,7 @@ def test_a_stream_that_ended_is_watched_again_and_its_hung_process_is_killed(
 
     context = SimpleNamespace(Pipe=multiprocessing.Pipe, Process=Hangs)
     monkeypatch.setattr(live, "multiprocessing", SimpleNamespace(get_context=lambda _: context))
-    monkeypatch.setattr(live, "AGAIN_AFTER", 0.05)
+    monkeypatch.setattr(live, "RETRY_DELAY", 0.05)
     stream.start()
     assert stream._closed.wait(10.0)
     stream.close()
@@ -204,8 +204,8 @@ def test_a_stream_that_ended_is_watched_again_and_its_hung_process_is_killed(
 
 
 def test_a_quiet_stream_sends_keep_alive_comments(stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.serve.events.EVERY", 0.0)
-    monkeypatch.setattr("experiments.serve.events.ALIVE", -1.0)
+    monkeypatch.setattr("experiments.serve.events.GAUGE_INTERVAL", 0.0)
+    monkeypatch.setattr("experiments.serve.events.KEEP_ALIVE_INTERVAL", -1.0)
     looks = iter([False, False, True])
 
     async def gone() -> bool:
@@ -253,7 +253,7 @@ def test_closing_the_server_ends_the_process_of_every_stream_and_starts_no_new_o
 
     context = SimpleNamespace(Pipe=multiprocessing.Pipe, Process=Watches)
     monkeypatch.setattr(live, "multiprocessing", SimpleNamespace(get_context=lambda _: context))
-    monkeypatch.setattr(live, "AGAIN_AFTER", 10.0)
+    monkeypatch.setattr(live, "RETRY_DELAY", 10.0)
     store = Store(tmp_path / "a.sqlite")
     streams = Streams(Settings(folder=tmp_path, streams={"bench": "tcp://a:1", "press": "tcp://b:2"}), store)
     streams.start()
@@ -267,7 +267,7 @@ def test_closing_the_server_ends_the_process_of_every_stream_and_starts_no_new_o
 @pytest.mark.slow
 def test_a_stream_is_watched_in_a_process_up_to_its_end(tmp_path: Path) -> None:
     store = Store(tmp_path / "a.sqlite")
-    with feeding(3.0, 1000.0) as (address, sent):
+    with send_rows(3.0, 1000.0) as (address, sent):
         streams = Streams(Settings(folder=tmp_path, streams={"bench": address}), store)
         streams.start()
         (one,) = streams.by_name.values()

@@ -24,4 +24,4 @@ def test_a_process_uses_one_thread_by_default_and_ends_with_its_server(monkeypat
     (asked,) = begun
     assert asked["daemon"]
     asked["target"](*asked["args"])
-    assert (slept, ended) == ([process.LOOKED_AFTER] * 2, [1])
+    assert (slept, ended) == ([process.CHECK_INTERVAL] * 2, [1])

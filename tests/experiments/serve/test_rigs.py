@@ -12,7 +12,7 @@ from experiments.serve.fleet_view import fleet_view
 from experiments.serve.pages import home_page
 from experiments.serve.rigs import load_actuator_of_log, require_rigs, rig_of, rig_of_stream
 from experiments.serve.settings import Settings
-from experiments.serve.work import Task, work_on
+from experiments.serve.work import Task, process_log
 from plant.errors import HydrostateError
 
 
@@ -107,7 +107,7 @@ def test_a_log_is_processed_with_the_current_rig_file_and_errors_show_no_folder(
     log.write_bytes(b"\x00")  # not a log: the result names the rig even so
 
     def rig_of_work(name: str) -> str:
-        return work_on(task(log, tmp_path, name)).result["rig"]
+        return process_log(task(log, tmp_path, name)).result["rig"]
 
     assert rig_of_work("P-1_2026-11-22.csv") == "small"
     assert rig_of_work("P-2_2026-11-22.csv") == "large"
@@ -117,11 +117,11 @@ def test_a_log_is_processed_with_the_current_rig_file_and_errors_show_no_folder(
     assert rig_of_work("P-1_2026-11-22.csv") == "mended"
     changed.write_text("[parameters]\npiston_area = -1\n")
     os.utime(changed, ns=(2, 2))
-    wrong = work_on(task(log, tmp_path, "P-1_2026-11-22.csv")).result
+    wrong = process_log(task(log, tmp_path, "P-1_2026-11-22.csv")).result
     assert wrong["outcome"] == "failed"
     assert "P-1.toml" in wrong["message"]
     assert str(rig_folder) not in wrong["message"]
-    other = work_on(task(log, tmp_path, "P-3_2026-11-22.csv"))
+    other = process_log(task(log, tmp_path, "P-3_2026-11-22.csv"))
     assert "o rig file: the actuator is 'P-3'" in other.said
 
 

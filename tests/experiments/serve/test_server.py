@@ -14,7 +14,7 @@ import pytest
 
 from benchmarks.server.hostile_client import MIX, server_errors
 from benchmarks.server.server_process import Server
-from benchmarks.server.server_trials import attack, feeding, kill, settled, stream
+from benchmarks.server.server_trials import attack, kill, last_gauges, send_rows, stream
 from experiments.page.numbers import MINUS
 
 pytestmark = pytest.mark.slow
@@ -67,7 +67,7 @@ def test_generated_requests_are_answered_as_the_openapi_schema_says(tmp_path: Pa
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with (
-        feeding(1800.0, 500.0) as (address, _),  # longer than all tests on these pages take
+        send_rows(1800.0, 500.0) as (address, _),  # longer than all tests on these pages take
         Server(tmp_path_factory.mktemp("served") / "kept", "--watch", f"bench={address}") as server,
     ):
         yield server
@@ -77,7 +77,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def paths(served: Server, log: bytes) -> dict[str, str]:
     both = [served.drop(name, log, "diagnose") for name in ("one.csv", "two.csv")]
     assert [served.finished(one)["state"] for one in both] == ["done", "done"]
-    settled(served, 1)
+    last_gauges(served, 1)
     return {
         "home": "/",
         "log": f"/logs/{both[0]}",

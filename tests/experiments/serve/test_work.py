@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from experiments.cli import app
 from experiments.serve import gauges, work
-from experiments.serve.work import Task, work_on
+from experiments.serve.work import Task, process_log
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def task(log: Path, folder: Path, **changes: Any) -> Task:
 
 
 def test_a_log_of_the_stack_gets_a_condition_a_page_and_a_row(stack_log: Path, tmp_path: Path) -> None:
-    found = work_on(task(stack_log, tmp_path))
+    found = process_log(task(stack_log, tmp_path))
     assert (found.result["outcome"], found.result["condition"]) == ("ok", "major_leakage")
     assert found.entries is not None
     assert found.entries["found_condition"] == "major_leakage"
@@ -40,14 +40,14 @@ def test_the_page_contains_the_notes_of_reading_the_log(tmp_path: Path) -> None:
     words = ["simulate", "--duration", "0.5", "--sample-time", "0.001", "--out", str(log)]
     assert CliRunner().invoke(app, words).exit_code == 0
     log.write_text(log.read_text().replace("differential_pressure_pa", "x").replace("pressure_b_pa", "y"))
-    found = work_on(task(log, tmp_path, plant="eha", verb="estimate"))
+    found = process_log(task(log, tmp_path, plant="eha", verb="estimate"))
     assert [one["code"] for one in found.result["notes"]].count("chamber_alone") == 1
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "differential pressure also needs pressure_b_pa.</li>" in page
 
 
 def test_an_estimate_has_no_row_and_its_result_names_no_path_of_the_server(stack_log: Path, tmp_path: Path) -> None:
-    found = work_on(task(stack_log, tmp_path, verb="estimate"))
+    found = process_log(task(stack_log, tmp_path, verb="estimate"))
     assert found.entries is None
     assert "crossport_leakage" in found.result["quantities"]
     assert stack_log.name not in json.dumps(found.result)
@@ -58,7 +58,7 @@ def test_an_estimate_has_no_row_and_its_result_names_no_path_of_the_server(stack
 def test_a_file_that_is_not_a_log_fails_without_the_server_s_file_name(verb: str, tmp_path: Path) -> None:
     log = tmp_path / "kept-under-a-number.csv"
     log.write_bytes(b"\x00\x01\x02")
-    found = work_on(task(log, tmp_path, verb=verb))
+    found = process_log(task(log, tmp_path, verb=verb))
     assert found.result["outcome"] == "failed"
     assert found.result["message"]
     assert "kept-under-a-number" not in json.dumps(found.result)
@@ -73,22 +73,22 @@ def test_the_message_on_wrong_columns_contains_no_command_line_options(
 ) -> None:
     log = tmp_path / "odd.csv"
     log.write_text("time_s,Druck\n" + "".join(f"{0.01 * k:.2f},{k}\n" for k in range(100)))
-    found = work_on(task(log, tmp_path, plant="eha", columns=columns))
+    found = process_log(task(log, tmp_path, plant="eha", columns=columns))
     said = found.result["message"]
     assert "the log has 'time_s', 'Druck'" in said.replace("\u00a0", " ")
-    assert work.OTHER_NAMES in said
+    assert work.OTHER_NAMES_ADVICE in said
     assert "--" not in said
     assert "hydrostate inspect" not in said
-    inspected = work_on(task(log, tmp_path, plant="eha", verb="inspect"))
-    assert inspected.said == work.GUESSED[False]
+    inspected = process_log(task(log, tmp_path, plant="eha", verb="inspect"))
+    assert inspected.said == work.INSPECTION_MESSAGES[False]
 
 
 def test_an_internal_error_is_a_failed_result(stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(_: Task) -> None:
         raise ZeroDivisionError("by nothing")
 
-    monkeypatch.setattr(work, "_found", broken)
-    found = work_on(task(stack_log, tmp_path))
+    monkeypatch.setattr(work, "_analyse", broken)
+    found = process_log(task(stack_log, tmp_path))
     assert found.result["outcome"] == "failed"
     assert "internal error" in found.result["message"]
 
@@ -105,10 +105,10 @@ def test_a_log_that_needs_too_much_memory_ends_the_process_with_a_special_code(
     def greedy(_: Task) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(work, "_found", greedy)
+    monkeypatch.setattr(work, "_analyse", greedy)
     monkeypatch.setattr(work, "os", SimpleNamespace(_exit=end))
     with pytest.raises(Ended) as ended:
-        work_on(task(stack_log, tmp_path))
+        process_log(task(stack_log, tmp_path))
     assert ended.value.args == (work.NO_MEMORY,)
 
 
@@ -148,7 +148,7 @@ def test_a_worker_ends_with_its_server_and_has_a_memory_limit(monkeypatch: pytes
 
 
 def test_an_inspected_log_gets_a_page_with_its_columns_and_original_name(stack_log: Path, tmp_path: Path) -> None:
-    found = work_on(task(stack_log, tmp_path, verb="inspect"))
+    found = process_log(task(stack_log, tmp_path, verb="inspect"))
     assert found.result["outcome"] == "ok"
     assert found.result["reads"] is True
     assert found.entries is None
@@ -162,7 +162,7 @@ def test_a_log_of_the_gear_pump_actuator_gets_the_row_of_a_batch(tmp_path: Path)
     words = ["simulate", "--duration", "2", "--sample-time", "1e-3", "--condition", "major_leakage"]
     made = CliRunner().invoke(app, [*words, "--out", str(out)])
     assert made.exit_code == 0, made.output
-    found = work_on(task(out, tmp_path, plant=None))
+    found = process_log(task(out, tmp_path, plant=None))
     assert found.entries is not None
     assert found.result["plant"] == "eha"
     assert found.entries["found_condition"] == found.result["condition"]
@@ -172,7 +172,7 @@ def test_a_log_of_the_gear_pump_actuator_gets_the_row_of_a_batch(tmp_path: Path)
 def test_a_rig_that_cannot_be_read_fails_a_log_with_its_reason(stack_log: Path, tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text("moving_mass = 'heavy'")
-    found = work_on(task(stack_log, tmp_path, rig=rig))
+    found = process_log(task(stack_log, tmp_path, rig=rig))
     assert found.entries is not None
     assert found.result["outcome"] == found.entries["outcome"] == "failed"
     assert "rig.toml" in found.result["message"]
@@ -192,6 +192,6 @@ def test_a_log_deleted_while_its_page_is_written_leaves_no_page(
         return "<p>page</p>"
 
     monkeypatch.setattr(inspect_page, "inspect_page", deleted)
-    work_on(task(log, tmp_path, verb="inspect"))
+    process_log(task(log, tmp_path, verb="inspect"))
     assert not log.exists()
     assert [one.name for one in tmp_path.iterdir()] == ["phase"]

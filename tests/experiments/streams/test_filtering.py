@@ -9,7 +9,7 @@ import pytest
 from estimation.eha import online
 from estimation.eha.online import StreamFilterOptions
 from estimation.trust.consistency import LARGEST_NIS, MISMATCH_NIS
-from experiments.streams.filtering import FEWEST, Filtering
+from experiments.streams.filtering import FEWEST_ROWS, Filtering
 from experiments.streams.state_file import SAVED_EVERY
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
@@ -55,13 +55,13 @@ def estimates(told: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def test_a_stream_with_fewer_rows_than_a_filter_starts_from_is_still_filtered(bench: Record) -> None:
-    lines = lines_of(bench)[: FEWEST // 2 + 1]
+    lines = lines_of(bench)[: FEWEST_ROWS // 2 + 1]
     told, one = filtered(lines)
     assert [event["event"] for event in told] == ["start", "estimate"]
-    assert told[-1]["samples"] == FEWEST // 2
-    assert told[-1]["time_s"] == pytest.approx(T * (FEWEST // 2 - 1))
+    assert told[-1]["samples"] == FEWEST_ROWS // 2
+    assert told[-1]["time_s"] == pytest.approx(T * (FEWEST_ROWS // 2 - 1))
     one.end("ok", "")
-    assert told[-1]["message"] == f"{FEWEST // 2} samples filtered"
+    assert told[-1]["message"] == f"{FEWEST_ROWS // 2} samples filtered"
 
 
 def test_the_end_of_a_stream_gives_exactly_one_estimate(bench: Record) -> None:
@@ -76,7 +76,7 @@ def test_too_few_rows_before_a_gap_are_left_out_with_a_warning(
     bench: Record, capsys: pytest.CaptureFixture[str]
 ) -> None:
     header, *rows = lines_of(bench)
-    told, one = filtered([header, *rows[: FEWEST // 2], *rows[600:1200]])
+    told, one = filtered([header, *rows[: FEWEST_ROWS // 2], *rows[600:1200]])
     said = capsys.readouterr().err
     assert "too few rows before a gap" in said
     assert told[0]["event"] == "start"

@@ -16,8 +16,8 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from experiments.streams.metrics_endpoint import endpoint, metrics_offered
-from experiments.streams.watch_view import drawn, viewed
+from experiments.streams.metrics_endpoint import endpoint, serve_metrics
+from experiments.streams.watch_view import show_view, view_frame
 from experiments.streams.watched import Watched
 from plant.errors import HydrostateError
 
@@ -35,7 +35,7 @@ def watching() -> Watched:
     """Return a watch that has learnt, has received two samples, and has raised an alarm."""
     told = Watched("bench\x1b[2J.csv")
     told.start("bench", OneBalance(), "paper", 1.0)  # type: ignore[arg-type]
-    told.saw({"position_m": np.array([0.1, 0.25]), "velocity_m_s": np.array([0.0, np.nan])}, 5.0, gap=True)
+    told.process_samples({"position_m": np.array([0.1, 0.25]), "velocity_m_s": np.array([0.0, np.nan])}, 5.0, gap=True)
     told.alarms += 1
     return told
 
@@ -104,7 +104,7 @@ def test_a_broker_that_does_not_answer_is_named() -> None:
 
 
 def test_metrics_contain_the_alarm_share_of_each_learnt_balance() -> None:
-    with metrics_offered("0", watching()) as port:
+    with serve_metrics("0", watching()) as port:
         kind, text = asked(port)
         with pytest.raises(urllib.error.HTTPError, match="404"):
             asked(port, "/etc/passwd")
@@ -131,13 +131,13 @@ def test_a_port_that_is_taken_is_named() -> None:
         held.bind(("127.0.0.1", 0))
         held.listen()
         port = str(held.getsockname()[1])
-        with pytest.raises(HydrostateError, match=f"--metrics {port}: "), metrics_offered(port, watching()):
+        with pytest.raises(HydrostateError, match=f"--metrics {port}: "), serve_metrics(port, watching()):
             pass
 
 
 def test_the_view_shows_gauges_values_and_events_without_control_characters() -> None:
     page = io.StringIO()
-    Console(file=page, width=100, force_terminal=False).print(drawn(watching()))
+    Console(file=page, width=100, force_terminal=False).print(view_frame(watching()))
     shown = page.getvalue()
     assert "watching, 5.0 s of the stream, 2 rows, 1 alarm" in shown
     assert re.search(r"flow +#{8}\.{22} +25", shown)
@@ -150,7 +150,7 @@ def test_the_view_shows_gauges_values_and_events_without_control_characters() ->
 
 def test_the_view_shows_the_end_of_the_stream_last() -> None:
     page, told = io.StringIO(), watching()
-    with viewed(told, Console(file=page, width=100, force_terminal=True)):
+    with show_view(told, Console(file=page, width=100, force_terminal=True)):
         told.end("ok", "")
     assert "ended" in page.getvalue().rsplit("watching", 1)[-1]
 

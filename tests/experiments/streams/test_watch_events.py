@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from experiments.streams.heartbeat import beating
+from experiments.streams.heartbeat import report_alive
 from experiments.streams.watch_events import WatchEvents
-from faults.watch.events import SLOW, Alarm, Change
+from faults.watch.events import LOSS_BALANCE, Alarm, Change
 
 
 def told(*events: Any) -> list[dict[str, Any]]:
@@ -22,7 +22,7 @@ def alarm(balance: str) -> Alarm:
 
 
 def test_a_sudden_change_is_dated_and_a_slow_one_reported_as_growth() -> None:
-    (sudden,), (slow,) = told(alarm("flow")), told(alarm(SLOW))
+    (sudden,), (slow,) = told(alarm("flow")), told(alarm(LOSS_BALANCE))
     assert sudden["message"] == (
         "the flow balance changed at 11.25 s of the stream: "
         "the piston gets a different share of the pump's flow than before"
@@ -65,7 +65,7 @@ def test_the_end_event_counts_the_alarms_unless_the_watch_failed(outcome: str, w
 def test_a_heartbeat_interval_of_thousands_of_years_raises_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
     failed: list[object] = []
     monkeypatch.setattr(threading, "excepthook", failed.append)
-    with beating(WatchEvents(lambda _: None), 1e20):
+    with report_alive(WatchEvents(lambda _: None), 1e20):
         pass
     assert failed == []
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.streams import watching
-from experiments.streams.rows import warn_of_lost
+from experiments.streams.rows import warn_of_lost_batches
 from experiments.streams.state_file import SAVED_EVERY
 from experiments.streams.watch_events import WatchEvents
 from experiments.streams.watching import WatchSettings, watch_rows
@@ -217,13 +217,13 @@ def test_a_healthy_log_without_the_pressure_of_the_stream_is_refused(tmp_path: P
 
 
 def test_lost_late_and_dropped_batches_are_counted_separately(capsys: pytest.CaptureFixture[str]) -> None:
-    warn_of_lost("mqtt://bench/press", BatchCounts(batches=7, late=1, lost=2, dropped=3))
+    warn_of_lost_batches("mqtt://bench/press", BatchCounts(batches=7, late=1, lost=2, dropped=3))
     assert capsys.readouterr().err.splitlines() == [
         "mqtt://bench/press: warning: 2 batches never came beside 7 that were read",
         "mqtt://bench/press: warning: 1 batches came late or twice beside 7 that were read",
         "mqtt://bench/press: warning: 3 batches found no room to wait beside 7 that were read",
     ]
-    warn_of_lost("mqtt://bench/press", BatchCounts(batches=7))
+    warn_of_lost_batches("mqtt://bench/press", BatchCounts(batches=7))
     assert capsys.readouterr().err == ""
 
 

@@ -16,7 +16,7 @@ from faults.diagnosis.circuits.class_regions import (
     ClassFits,
     fit_classes,
 )
-from faults.eha.inject import abrupt
+from faults.eha.inject import abrupt_fault
 from plant.arrays import Array
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -50,7 +50,7 @@ def log(
     speed = make_drive(drive, seconds, 2e-3, PAPER, rng)
     first = circuit_of(parameters_for(CONDITIONS[condition]))
     later = circuit_of(parameters_for(CONDITIONS[after])) if after else first
-    return simulate(CIRCUIT, speed, 2e-3, abrupt(first, later, share * seconds), sensors=RIG, rng=rng)
+    return simulate(CIRCUIT, speed, 2e-3, abrupt_fault(first, later, share * seconds), sensors=RIG, rng=rng)
 
 
 @cache

@@ -8,7 +8,7 @@ import pytest
 from estimation.finding import Quantity
 from estimation.notes import EstimateCode, RigCode, SensorCode
 from faults.conditions import CONDITIONS
-from faults.diagnosis.advice import advice_for, oil_advice, rig_advice, speeds_held
+from faults.diagnosis.advice import advice_for, held_speed_count, oil_advice, rig_advice
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -53,40 +53,40 @@ def codes(notes: tuple[Note, ...]) -> list[str]:
     ],
 )
 def test_held_speeds_are_counted(levels: list[float], count: int, sample_time: float, noise: float) -> None:
-    assert speeds_held(staircase(levels, sample_time=sample_time, noise=noise)) == count
+    assert held_speed_count(staircase(levels, sample_time=sample_time, noise=noise)) == count
 
 
 def test_a_drive_that_never_settles_and_a_motor_at_rest_hold_no_speed() -> None:
     time = 1e-3 * np.arange(5000)
-    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": 100.0 * np.sin(2.0 * np.pi * 5.0 * time)})) == 0
-    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": np.zeros(5000)})) == 0
-    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": 100.0 * np.ones(3)})) == 0
-    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": np.full(100, np.nan)})) == 0
+    assert held_speed_count(Record(1e-3, {"motor_speed_rad_s": 100.0 * np.sin(2.0 * np.pi * 5.0 * time)})) == 0
+    assert held_speed_count(Record(1e-3, {"motor_speed_rad_s": np.zeros(5000)})) == 0
+    assert held_speed_count(Record(1e-3, {"motor_speed_rad_s": 100.0 * np.ones(3)})) == 0
+    assert held_speed_count(Record(1e-3, {"motor_speed_rad_s": np.full(100, np.nan)})) == 0
 
 
 def test_held_speeds_are_counted_despite_gaps_slow_sensors_and_long_logs() -> None:
     record = staircase([40.0, -80.0, 120.0, 80.0], dwell=1.0, noise=0.05)
-    assert speeds_held(drop_samples(record, 0.05, np.random.default_rng(1))) == 3
+    assert held_speed_count(drop_samples(record, 0.05, np.random.default_rng(1))) == 3
     slow = np.where(np.arange(len(record)) % 10 == 3, record["motor_speed_rad_s"], np.nan)
-    assert speeds_held(record.replace(motor_speed_rad_s=slow)) == 3
-    assert speeds_held(staircase([40.0, 80.0] * 100, dwell=0.15)) == 2
+    assert held_speed_count(record.replace(motor_speed_rad_s=slow)) == 3
+    assert held_speed_count(staircase([40.0, 80.0] * 100, dwell=0.15)) == 2
 
 
 def test_a_slow_log_shows_a_held_speed_by_four_samples() -> None:
     speed = np.tile(np.repeat([100.0, 60.0], 4), 5)
-    assert speeds_held(Record(0.05, {"motor_speed_rad_s": speed})) == 2
-    assert speeds_held(Record(0.05, {"motor_speed_rad_s": np.tile(np.repeat([100.0, 60.0], 2), 10)})) == 0
+    assert held_speed_count(Record(0.05, {"motor_speed_rad_s": speed})) == 2
+    assert held_speed_count(Record(0.05, {"motor_speed_rad_s": np.tile(np.repeat([100.0, 60.0], 2), 10)})) == 0
 
 
 def test_a_slow_ramp_counts_as_two_held_speeds() -> None:
     ramp = np.linspace(0.0, 100.0, 20_000)
-    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": ramp})) == 2
+    assert held_speed_count(Record(1e-3, {"motor_speed_rad_s": ramp})) == 2
 
 
 def test_the_published_sine_holds_one_speed_at_most_and_steps_hold_several() -> None:
     rng = np.random.default_rng(2)
     held = {
-        name: speeds_held(Record(1e-3, {"motor_speed_rad_s": make_drive(name, 10.0, 1e-3, HEALTHY, rng)}))
+        name: held_speed_count(Record(1e-3, {"motor_speed_rad_s": make_drive(name, 10.0, 1e-3, HEALTHY, rng)}))
         for name in ("sine", "prbs", "steps")
     }
     assert held["sine"] <= 1
@@ -101,7 +101,7 @@ def test_closer_speeds_are_advised_for_a_log_with_two_or_more_held_speeds(seed: 
     count = int(rng.integers(2, 12))
     levels = rng.permutation(np.linspace(1.0, 0.15, count)) * rng.choice([-1.0, 1.0], count) * 120.0
     record = staircase(list(levels), float(rng.uniform(0.2, 1.5)), sample_time, float(rng.choice([0.0, 0.05, 1.0])))
-    assert speeds_held(record) >= 2
+    assert held_speed_count(record) >= 2
     for shares in (SURE, UNSURE):
         (first, *_) = advice_for(record, shares, (), ALIKE, ALL)
         assert first.code == AdviceCode.CLOSER_SPEEDS

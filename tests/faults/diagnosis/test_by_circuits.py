@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.diagnosis.population import OUT_OF_MODEL, TEST, Drawn, draw_logs
+from benchmarks.diagnosis.population import OUT_OF_MODEL, TEST, DrawnLog, draw_logs
 from benchmarks.diagnosis.scores import calibration_error, share_interval
 from estimation.log_checks.clean import clean_log
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import wear
 from faults.diagnosis.beyond_nine.left_open import DELIVERIES
-from faults.diagnosis.beyond_nine.other_faults import Outside
+from faults.diagnosis.beyond_nine.other_faults import OutsideFaults
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -40,12 +40,12 @@ def diagnosed(record: Record, *, pressure: bool = True) -> Diagnosis:
 
 
 @pytest.fixture(scope="module")
-def population() -> list[Drawn]:
+def population() -> list[DrawnLog]:
     return list(draw_logs([TEST]))
 
 
 @pytest.fixture(scope="module")
-def verdicts(population: list[Drawn]) -> Mapping[bool, list[Diagnosis]]:
+def verdicts(population: list[DrawnLog]) -> Mapping[bool, list[Diagnosis]]:
     """Return the verdicts on the logs, by whether pressure is logged."""
     return {pressure: [diagnosed(log.record, pressure=pressure) for log in population] for pressure in (True, False)}
 
@@ -53,7 +53,7 @@ def verdicts(population: list[Drawn]) -> Mapping[bool, list[Diagnosis]]:
 @pytest.mark.slow
 @PRESSURES
 def test_every_log_of_a_seed_gets_its_class_and_none_is_flagged(
-    population: list[Drawn], verdicts: Mapping[bool, list[Diagnosis]], *, pressure: bool
+    population: list[DrawnLog], verdicts: Mapping[bool, list[Diagnosis]], *, pressure: bool
 ) -> None:
     found = verdicts[pressure]
     assert [one.condition for one in found] == [log.condition for log in population]
@@ -90,7 +90,7 @@ def test_an_actuator_with_coulomb_friction_only_gets_its_class_and_severities(co
 @pytest.mark.slow
 @PRESSURES
 def test_intervals_of_severities_cover_the_truth_in_over_85_percent(
-    population: list[Drawn], verdicts: Mapping[bool, list[Diagnosis]], *, pressure: bool
+    population: list[DrawnLog], verdicts: Mapping[bool, list[Diagnosis]], *, pressure: bool
 ) -> None:
     covered: list[bool] = []
     for log, found in zip(population, verdicts[pressure], strict=True):
@@ -104,7 +104,7 @@ SATURATED = "pressure saturates at 60 %"
 
 
 @pytest.mark.slow
-def test_a_saturated_pressure_is_left_out_and_named_and_the_class_is_right(population: list[Drawn]) -> None:
+def test_a_saturated_pressure_is_left_out_and_named_and_the_class_is_right(population: list[DrawnLog]) -> None:
     for log in population[:18:6]:
         cleaned = clean_log(OUT_OF_MODEL[SATURATED](log), HEALTHY)
         assert [note.code for note in cleaned.left_out] == [SensorCode.SENSOR_CLIPPED]
@@ -114,7 +114,7 @@ def test_a_saturated_pressure_is_left_out_and_named_and_the_class_is_right(popul
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [kind for kind in OUT_OF_MODEL if kind != SATURATED])
-def test_logs_out_of_the_model_are_called_unknown_with_a_reason(kind: str, population: list[Drawn]) -> None:
+def test_logs_out_of_the_model_are_called_unknown_with_a_reason(kind: str, population: list[DrawnLog]) -> None:
     found = [diagnosed(OUT_OF_MODEL[kind](log)) for log in population[:18:6]]
     assert sum(one.unknown for one in found) >= len(found) - 1
     assert all(bool(one.against) == one.unknown for one in found)
@@ -186,7 +186,7 @@ def test_without_pressure_classes_are_summed_over_deliveries_of_the_pump(monkeyp
     worn = np.full((1 + len(DELIVERIES), 9), -30.0)
     worn[0, place] = 0.0
     worn[1 + DELIVERIES.index(0.8), other] = 3.7  # a pump at 80 % explains the log better, in another condition
-    monkeypatch.setattr(wear, "faults_outside", lambda *_: Outside(worn=worn))
+    monkeypatch.setattr(wear, "faults_outside", lambda *_: OutsideFaults(worn_scores=worn))
     found = diagnosed(record, pressure=False)
     assert sound.probabilities[sound.condition] > 0.99 * sum(sound.probabilities.values())
     assert 0.05 < found.probabilities[sound.condition] < 0.9

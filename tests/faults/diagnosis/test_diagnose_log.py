@@ -7,7 +7,7 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
-from estimation.eha.result import BulkModulusEstimate, too_wide, without_number
+from estimation.eha.result import BulkModulusEstimate, wide_bound_note, without_number
 from estimation.finding import Finding, Gate, Outcome
 from estimation.log_checks.clean import clean_log
 from estimation.notes import ChannelCode, EstimateCode, RigCode
@@ -90,7 +90,7 @@ def test_a_channel_with_a_wrong_sign_gives_no_probabilities_and_advice_on_the_co
 
 def test_a_refused_fit_makes_the_class_unknown_for_the_same_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     why = EstimateCode.BOUND_TOO_WIDE.note()
-    monkeypatch.setattr(diagnose, "refused", lambda _: (why,))
+    monkeypatch.setattr(diagnose, "rejection_notes", lambda _: (why,))
     found = diagnose_log(log(), RIG)
     assert found.unknown
     assert found.against[0] == why
@@ -106,7 +106,7 @@ def test_an_objection_of_nominal_models_counts_only_beside_another_objection(mon
 
     monkeypatch.setattr(diagnose, "models_verdict", objecting)
     assert not diagnose_log(log(), RIG).unknown
-    monkeypatch.setattr(diagnose, "refused", lambda _: (EstimateCode.BOUND_TOO_WIDE.note(),))
+    monkeypatch.setattr(diagnose, "rejection_notes", lambda _: (EstimateCode.BOUND_TOO_WIDE.note(),))
     assert poor in diagnose_log(log(), RIG).against
 
 
@@ -165,12 +165,12 @@ def test_nominal_models_of_a_plain_log_are_started_before_the_estimate(monkeypat
         found = work()
         return lambda: found
 
-    for name in ("estimated", "score_mathematical"):
+    for name in ("checked_estimate", "score_mathematical"):
         noted(name)
-    monkeypatch.setattr(diagnose, "begun", at_once)
+    monkeypatch.setattr(diagnose, "start_if_idle", at_once)
     found, usual = diagnose_log(log(), RIG), plain()
     assert (found.probabilities, found.severities) == (usual.probabilities, usual.severities)
-    assert order == ["score_mathematical", "estimated"]
+    assert order == ["score_mathematical", "checked_estimate"]
 
 
 def test_nominal_models_are_run_again_for_a_corrected_log() -> None:
@@ -221,7 +221,7 @@ def test_a_log_without_motion_has_no_note_on_pump_wear() -> None:
     still = {name: size * rng.standard_normal(count) for name, size in noise.items()}
     still["motor_speed_rad_s"] += 2.0 * np.sin(2.0 * np.pi * 2e-3 * np.arange(count))  # 0.1 mm of piston travel
     record, wear = Record(1e-3, still), RigCode.WEAR_NOT_EXCLUDED.note(percent=30.0, half_width=30.0)
-    unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(0.5),), "flow", ("position_m", PRESSURE), 0.5)
+    unseen = without_number(Outcome.NOT_OBSERVABLE, (wide_bound_note(0.5),), "flow", ("position_m", PRESSURE), 0.5)
     found = diagnose_log(record, RIG, (clean_log(record, HEALTHY), replace(unseen, remarks=(wear,))))
     assert found.outcome is Outcome.NOT_OBSERVABLE
     assert RigCode.WEAR_NOT_EXCLUDED not in codes(found)
@@ -246,9 +246,9 @@ def test_bulk_modulus_is_noted_as_not_visible_unless_the_flow_balance_gives_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     for module in (by_circuits, known_losses):
-        monkeypatch.setattr(module, "what_is_not_told", lambda *_, **__: [ClassCode.BULK_MODULUS_NOT_VISIBLE.note()])
+        monkeypatch.setattr(module, "not_told_notes", lambda *_, **__: [ClassCode.BULK_MODULUS_NOT_VISIBLE.note()])
     record = log(duration=1.0)
-    unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(0.1),), "flow", ("position_m", PRESSURE), 0.1)
+    unseen = without_number(Outcome.NOT_OBSERVABLE, (wide_bound_note(0.1),), "flow", ("position_m", PRESSURE), 0.1)
     refused = diagnose_log(record, RIG, (clean_log(record, HEALTHY), unseen))
     assert ClassCode.BULK_MODULUS_NOT_VISIBLE in {note.code for note in refused.not_told}
     assert refused.severities["bulk_modulus"].value is None

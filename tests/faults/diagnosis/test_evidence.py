@@ -12,7 +12,14 @@ from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_regions import is_stuck
-from faults.diagnosis.evidence import FARTHEST, Scoreboard, bounded, friction_left_open, weigh, within_reach
+from faults.diagnosis.evidence import (
+    FARTHEST,
+    Scoreboard,
+    bounded_log_odds,
+    friction_left_open,
+    limited_by_separation,
+    weigh_evidence,
+)
 from faults.diagnosis.rmse import score_transfer_functions
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -72,13 +79,13 @@ def test_a_single_evidence_names_its_likeliest_condition() -> None:
 
 def test_scores_of_an_evidence_are_bounded_and_keep_their_order() -> None:
     scores = np.array([0.0, -1.0, -50.0, -1e6, np.nan])
-    found = bounded(scores)
+    found = bounded_log_odds(scores)
     assert found[0] == 0.0
     assert found[1] == pytest.approx(-1.0, abs=0.05)
     assert np.all(np.diff(found[:4]) < 0.0)
     assert np.all(found >= -FARTHEST)
     assert found[4] == -FARTHEST
-    assert bounded(np.full(3, -np.inf)).tolist() == [0.0, 0.0, 0.0]
+    assert bounded_log_odds(np.full(3, -np.inf)).tolist() == [0.0, 0.0, 0.0]
 
 
 RESTING = np.exp(ACTUATOR.conditions[:, COORDINATES.index("friction_rest")]) / ACTUATOR.circuit.piston_area
@@ -124,7 +131,7 @@ def test_a_library_adds_the_evidence_of_its_transfer_functions() -> None:
         name: LinearModel([0.0, (1.0 + 0.2 * k) * 6e-6], [1.0, -0.98], 2e-3, "motor_speed_rad_s", "velocity_m_s")
         for k, name in enumerate(NAMES)
     }
-    without, found = weigh(record, ACTUATOR), weigh(record, ACTUATOR, library)
+    without, found = weigh_evidence(record, ACTUATOR), weigh_evidence(record, ACTUATOR, library)
     assert list(without.log_odds) == ["models", "innovations", "parameters"]
     assert list(found.log_odds) == ["transfer_functions", "models", "innovations", "parameters"]
     errors = score_transfer_functions(record, library).by_condition
@@ -134,7 +141,7 @@ def test_a_library_adds_the_evidence_of_its_transfer_functions() -> None:
 
 
 def test_no_evidence_determines_the_friction_level_of_a_stuck_piston() -> None:
-    found = weigh(driven("sine", "major_friction"), ACTUATOR)
+    found = weigh_evidence(driven("sine", "major_friction"), ACTUATOR)
     assert is_stuck(found.blocks, ACTUATOR)
     for odds in found.log_odds.values():
         for level in ("none", "minor", "major"):
@@ -145,21 +152,21 @@ def test_no_evidence_determines_the_friction_level_of_a_stuck_piston() -> None:
 def test_scores_of_nominal_circuits_are_limited_by_the_distances_of_conditions() -> None:
     scores = np.array([-5.0, 0.0, -40.0])
     apart = np.array([[0.0, 2.0, 60.0], [2.0, 0.0, 60.0], [60.0, 60.0, 0.0]])
-    assert within_reach(scores, apart).tolist() == [-2.0, 0.0, -40.0]
-    assert within_reach(scores, 1e9 * (1.0 - np.eye(3))).tolist() == scores.tolist()
+    assert limited_by_separation(scores, apart).tolist() == [-2.0, 0.0, -40.0]
+    assert limited_by_separation(scores, 1e9 * (1.0 - np.eye(3))).tolist() == scores.tolist()
     # a condition is no farther below another than the log separates the two
     chain = np.array([[0.0, 50.0, 1.0], [50.0, 0.0, 50.0], [1.0, 50.0, 0.0]])
-    assert within_reach(scores, chain).tolist() == [-5.0, 0.0, -6.0]
-    assert within_reach(np.array([-np.inf, 0.0]), np.array([[0.0, 3.0], [3.0, 0.0]])).tolist() == [-3.0, 0.0]
+    assert limited_by_separation(scores, chain).tolist() == [-5.0, 0.0, -6.0]
+    assert limited_by_separation(np.array([-np.inf, 0.0]), np.array([[0.0, 3.0], [3.0, 0.0]])).tolist() == [-3.0, 0.0]
 
 
 def test_only_fitted_circuits_count_if_the_log_separates_no_conditions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     record = driven("prbs", "normal")
-    told = weigh(record, ACTUATOR)
-    monkeypatch.setattr("faults.diagnosis.circuits.class_regions.ClassFits.apart", lambda *_: np.zeros((9, 9)))
-    blind = weigh(record, ACTUATOR)
+    told = weigh_evidence(record, ACTUATOR)
+    monkeypatch.setattr("faults.diagnosis.circuits.class_regions.ClassFits.separations", lambda *_: np.zeros((9, 9)))
+    blind = weigh_evidence(record, ACTUATOR)
     for name in ("models", "innovations"):
         assert np.ptp(told.log_odds[name]) > 1.0
         assert np.ptp(blind.log_odds[name]) == 0.0

@@ -16,7 +16,7 @@ from faults.diagnosis import failed_search
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.evidence import Scoreboard
-from faults.diagnosis.failed_search import doubts_after, values_of
+from faults.diagnosis.failed_search import doubts_after_fit, motion_form_values
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from tests.faults.diagnosis.circuits.test_rivals import leaving, log
@@ -38,7 +38,7 @@ def left(
     """
     one = log(pressure=False)
     per_speed = PAPER.pump_displacement / PAPER.piston_area
-    one = replace(one, speed=np.full_like(one.speed, pump * float(one.sizes[0]) / per_speed))
+    one = replace(one, speed=np.full_like(one.speed, pump * float(one.rms[0]) / per_speed))
     fits = cast("Any", type("Fits", (), {"best": leaving(noises, 1.0, one)}))
     board = Scoreboard({}, one, fits, Record(1e-3, {"motor_speed_rad_s": np.zeros(2)}), None)
     estimate = BulkModulusEstimate(
@@ -46,7 +46,7 @@ def left(
     )
     clean = cast("CleanLog", type("Log", (), {"record": board.window, "variances": {"motor_speed_rad_s": 1e-4}}))
     monkeypatch.setattr(failed_search, "share_at", lambda *_: share)
-    return doubts_after((FAR, LAWS, FROZE), estimate, clean, PAPER, board)
+    return doubts_after_fit((FAR, LAWS, FROZE), estimate, clean, PAPER, board)
 
 
 @pytest.mark.parametrize(("share", "kept"), [(0.09, False), (0.11, True), (np.inf, True), (np.nan, True)])
@@ -59,7 +59,7 @@ def test_a_failed_motion_fit_is_not_an_objection_if_the_circuits_values_leave_ha
 def test_a_failed_motion_fit_is_an_objection_if_the_circuits_values_leave_too_much(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(failed_search, "LESS", 100.0)
+    monkeypatch.setattr(failed_search, "FAILED_RATIO", 100.0)
     assert left(monkeypatch, 0.11) == (FROZE,)
     assert left(monkeypatch, 0.13) == (FAR, LAWS, FROZE)
 
@@ -81,7 +81,7 @@ def test_a_circuit_gives_values_for_the_unknowns_of_the_motion_form() -> None:
     at = list(CONDITIONS).index("normal")
     one = log(pressure=False)
     fit = leaving(1.0, 1.0, one)
-    values = values_of(fit, ACTUATOR)
+    values = motion_form_values(fit, ACTUATOR)
     assert set(values) == set(UNKNOWNS) - {"speed_lead", "bristle_damping"}
     assert values["leakage_coefficient"] == pytest.approx(PAPER.leakage_coefficient)
     assert values["friction_linear"] == pytest.approx(PAPER.friction_linear)

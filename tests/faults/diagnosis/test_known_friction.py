@@ -74,7 +74,7 @@ def test_a_moving_mass_off_by_a_tenth_does_not_bias_friction() -> None:
 def test_an_unknown_shape_of_the_friction_law_widens_the_covariance() -> None:
     found = friction_by_forces(record(), RIG, RATED)
     assert found is not None
-    assert np.all(np.diag(found.bent) > np.diag(found.covariance))
+    assert np.all(np.diag(found.bent_covariance) > np.diag(found.covariance))
 
 
 def test_no_friction_is_returned_if_the_law_fails_or_the_log_does_not_show_it() -> None:

@@ -12,7 +12,7 @@ from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Gate, Outcome, Quantity
 from estimation.fits.hypothesis_search.explanation import Explanation
 from faults.diagnosis.circuit_verdict import Diagnosis
-from faults.diagnosis.known_losses import by_the_balance, known_losses
+from faults.diagnosis.known_losses import known_losses, with_balance_severities
 from faults.diagnosis.severity import severities
 from faults.notes import ClassCode
 from plant.log.record import Record
@@ -43,7 +43,11 @@ def estimate(**changed: Any) -> BulkModulusEstimate:
 
 def diagnosis(**changed: Any) -> Diagnosis:
     known, told_by = fits(NARROW), partial(severities, fits(NARROW), ACTUATOR, {}, ())
-    whole = {"onset": None, "drift": None, "blocks": SimpleNamespace(course=None, earlier=None)} | changed
+    whole = {
+        "onset": None,
+        "drift": None,
+        "blocks": SimpleNamespace(leakage_course=None, earlier_circuit=None),
+    } | changed
     board = cast(Any, SimpleNamespace(fits=known, **whole))
     return Diagnosis({}, (), told_by(None, None), {}, {}, (), board, told_by)
 
@@ -53,7 +57,7 @@ def explained(**delays: float) -> Explanation:
 
 
 def told(one: Diagnosis, by: BulkModulusEstimate, log: Record = NOTHING) -> Diagnosis:
-    return by_the_balance(one, by, log, RIG)
+    return with_balance_severities(one, by, log, RIG)
 
 
 def test_leakage_is_that_of_the_flow_balance_and_friction_that_of_the_circuit() -> None:
@@ -84,14 +88,14 @@ def test_the_force_balance_gives_friction_beside_another_cause_but_not_with_late
 
 def test_the_circuits_friction_is_kept_if_the_force_balance_has_no_steady_state() -> None:
     one = diagnosis()
-    assert one.told_by is not None
-    by_circuit = one.told_by
+    assert one.severities_given is not None
+    by_circuit = one.severities_given
 
     def without(losses: Any, rubbing: Any) -> Any:
         found = dict(by_circuit(losses, rubbing))
         return found if rubbing is None else found | {"velocity_lost": Quantity(None, "%")}
 
-    found = told(replace(one, told_by=without), estimate(), sliding()).severity
+    found = told(replace(one, severities_given=without), estimate(), sliding()).severity
     assert found == by_circuit(known_losses(estimate()), None)
 
 

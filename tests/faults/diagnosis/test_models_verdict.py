@@ -7,7 +7,7 @@ import pytest
 
 from estimation.finding import Outcome
 from faults.conditions import CONDITIONS
-from faults.diagnosis.models_verdict import margin, models_verdict, ranked
+from faults.diagnosis.models_verdict import error_margin, models_verdict, ranked_conditions
 from faults.diagnosis.rmse import Scores
 from faults.notes import AgainstCode, ClassCode
 from plant.log.record import Record
@@ -25,7 +25,7 @@ def scored(*least: float, channels: int = 1, rest: float = 0.09) -> Scores:
 
 
 def test_models_are_ranked_by_error_with_diverged_models_last() -> None:
-    order = ranked(scored(0.02, math.inf, 0.01))
+    order = ranked_conditions(scored(0.02, math.inf, 0.01))
     assert [name for name, _ in order[:2]] == [list(CONDITIONS)[2], next(iter(CONDITIONS))]
     assert order[-1][0] == list(CONDITIONS)[1]
 
@@ -37,7 +37,7 @@ def test_models_are_ranked_by_error_with_diverged_models_last() -> None:
 def test_the_margin_is_the_error_of_the_runner_up_over_that_of_the_best(
     least: tuple[float, float], wanted: float
 ) -> None:
-    assert margin(scored(*least)) == pytest.approx(wanted)
+    assert error_margin(scored(*least)) == pytest.approx(wanted)
 
 
 def test_the_outcome_is_diverged_if_every_model_diverged() -> None:

@@ -8,8 +8,8 @@ import pytest
 from estimation.finding import Quantity
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_fit import WEAK
-from faults.diagnosis.not_told import stands_still, what_is_not_told, without_undetermined
+from faults.diagnosis.circuits.class_fit import WEAK_PRIOR
+from faults.diagnosis.not_told import not_told_notes, standstill_notes, without_undetermined
 from faults.diagnosis.severity import severities
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.steady_state import steady_state
@@ -19,7 +19,7 @@ from tests.faults.diagnosis.test_severity import ACTUATOR, NARROW, RIG, fits
 
 def not_told(spread: np.ndarray, condition: str = "normal", *, pressure: bool = True) -> set[str]:
     found = fits(spread, list(CONDITIONS).index(condition))
-    return {note.code.name for note in what_is_not_told(found, severities(found, ACTUATOR), pressure=pressure)}
+    return {note.code.name for note in not_told_notes(found, severities(found, ACTUATOR), pressure=pressure)}
 
 
 FRICTION = ("friction_rest", "friction_quadratic", "friction_rated")
@@ -27,7 +27,7 @@ FRICTION = ("friction_rest", "friction_quadratic", "friction_rated")
 
 def blind(*names: str) -> np.ndarray:
     """Return a covariance that is the prior's in some coordinates and narrow in all others."""
-    sizes = np.array([WEAK[i, i] * 50.0 if name in names else 1e-4 for i, name in enumerate(COORDINATES)])
+    sizes = np.array([WEAK_PRIOR[i, i] * 50.0 if name in names else 1e-4 for i, name in enumerate(COORDINATES)])
     return np.diag(sizes)
 
 
@@ -69,7 +69,7 @@ def test_a_piston_that_does_not_move_for_an_unknown_reason_has_no_condition(
 ) -> None:
     time = 1e-3 * np.arange(2000)
     turning = {"motor_speed_rad_s": 100.0 * np.sign(np.sin(3.0 * time)), "position_m": travel * np.sin(3.0 * time)}
-    found = stands_still(Record(1e-3, turning), RIG, [code.note() for code in said])
+    found = standstill_notes(Record(1e-3, turning), RIG, [code.note() for code in said])
     assert [note.code for note in found] == ([AgainstCode.STUCK_OR_LEAKS] if doubted else [])
 
 
@@ -84,9 +84,9 @@ def test_without_position_velocity_shows_that_a_piston_does_not_move(
     if pressure is not None:
         record = record.replace(differential_pressure_pa=pressure * sign)
     said = [ClassCode.ONE_SCALE.note()] if pressure is None else []
-    assert [note.code for note in stands_still(record, RIG, said)] == [reason]
+    assert [note.code for note in standstill_notes(record, RIG, said)] == [reason]
     moving = record.replace(velocity_m_s=noise + 0.01 * np.sin(3.0 * time))
-    assert stands_still(moving, RIG, said) == ()
+    assert standstill_notes(moving, RIG, said) == ()
 
 
 @pytest.mark.parametrize(("pressure", "travel", "blocked"), [(3e6, 1e-5, True), (3e5, 1e-5, False), (3e6, 5e-3, False)])
@@ -97,7 +97,7 @@ def test_a_piston_held_against_a_pressure_beyond_the_friction_of_the_nine_is_blo
     sign = np.sign(np.sin(3.0 * time))
     turning = {"motor_speed_rad_s": 100.0 * sign, "position_m": travel * np.sin(3.0 * time)}
     record = Record(1e-3, {**turning, "differential_pressure_pa": pressure * sign})
-    found = stands_still(record, RIG, [ClassCode.FRICTION_NOT_VISIBLE.note()])
+    found = standstill_notes(record, RIG, [ClassCode.FRICTION_NOT_VISIBLE.note()])
     assert [note.code for note in found] == ([AgainstCode.ROD_BLOCKED] if blocked else [])
 
 
@@ -105,7 +105,7 @@ def test_a_velocity_lost_without_a_number_or_an_interval_is_not_noted() -> None:
     found = fits(NARROW)
     known = severities(found, ACTUATOR)
     for lost in (Quantity(None, "%"), replace(known["velocity_lost"], ci95=None)):
-        said = what_is_not_told(found, {**known, "velocity_lost": lost}, pressure=False)
+        said = not_told_notes(found, {**known, "velocity_lost": lost}, pressure=False)
         assert [note.code for note in said] == [ClassCode.ONE_SCALE]
 
 
@@ -113,7 +113,7 @@ def test_the_velocity_lost_is_noted_with_its_interval() -> None:
     found = fits(NARROW)
     known = severities(found, ACTUATOR)
     (said,) = (
-        note for note in what_is_not_told(found, known, pressure=False) if note.code is ClassCode.VELOCITY_LOST_TOLD
+        note for note in not_told_notes(found, known, pressure=False) if note.code is ClassCode.VELOCITY_LOST_TOLD
     )
     lost = known["velocity_lost"]
     assert lost.ci95 is not None

@@ -10,10 +10,10 @@ from estimation.finding import Quantity
 from faults.conditions import CONDITIONS
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
-from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_fit import (
-    WEAK,
-    WITHIN,
+    CONDITION_SPREAD,
+    WEAK_PRIOR,
     PointFit,
     fit_freely,
     least_scales,
@@ -22,13 +22,13 @@ from faults.diagnosis.circuits.class_fit import (
     scales_of,
 )
 from faults.diagnosis.circuits.class_regions import (
-    believed_information,
+    credible_information,
     is_stuck,
     lasting_misfit,
     spread_of,
 )
 from faults.diagnosis.circuits.region_scores import region_scores
-from faults.diagnosis.not_told import what_is_not_told
+from faults.diagnosis.not_told import not_told_notes
 from faults.diagnosis.severity import limits_of, severities, severities_at, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from plant.eha.circuit_parameters import CircuitParameters
@@ -98,8 +98,8 @@ def conditions_as_coordinates() -> dict[str, Any]:
         "of another rig": coordinates_of(SHORT.circuit, 0.05),
         "rows": [dict(zip(names, row, strict=True)) for row in rows],
         "of another rig's": dict(zip(names, parameter_rows(points[:1], SHORT.circuit, SHORT.rated)[0], strict=True)),
-        "prior of a class": WITHIN[np.triu_indices(7)],
-        "prior of a circuit": WEAK[np.triu_indices(7)],
+        "prior of a class": CONDITION_SPREAD[np.triu_indices(7)],
+        "prior of a circuit": WEAK_PRIOR[np.triu_indices(7)],
     }
 
 
@@ -110,20 +110,20 @@ def predictions_of_circuits() -> dict[str, Any]:
     course = np.linspace(1.0, 2.0, len(one.speed))
     ways = {
         "plain": one,
-        "another before": replace(one, earlier=(300, rows[1])),
-        "leakage grows": replace(one, course=course),
+        "another before": replace(one, earlier_circuit=(300, rows[1])),
+        "leakage grows": replace(one, leakage_course=course),
         "stops within reach": replace(one, stop=0.6 * one.reach),
         "without pressure": replace(one, pressure=None),
     }
     told: dict[str, Any] = {}
     for name, way in ways.items():
-        runs = predicted(way, rows)
+        runs = predicted_outputs(way, rows)
         told[name] = {
             "velocity [m/s]": runs[:, [20, 70, -1], 0],
             **({"pressure [Pa]": runs[:, [20, 70, -1], 1]} if runs.shape[2] > 1 else {}),
         }
     near = replace(ACTUATOR.circuit, stroke=2.0 * one.reach * 1.01)
-    told["stops where the log's reach shows them"] = predicted(
+    told["stops where the log's reach shows them"] = predicted_outputs(
         one, parameter_rows(ACTUATOR.conditions[:1], near, ACTUATOR.rated)
     )[0, [20, 70, -1], 0]
     return told
@@ -145,7 +145,7 @@ def misfits_of_the_nominal_circuits() -> dict[str, Any]:
 
 
 def _known(fit: PointFit) -> dict[str, Any]:
-    deviations = np.sqrt(np.diag(np.linalg.inv(fit.information + np.linalg.inv(WEAK))))
+    deviations = np.sqrt(np.diag(np.linalg.inv(fit.information + np.linalg.inv(WEAK_PRIOR))))
     return {
         name: Found(float(x), float(std)) for name, x, std in zip(COORDINATES, fit.coordinates, deviations, strict=True)
     }
@@ -167,7 +167,7 @@ def fitted_circuits() -> dict[str, Any]:
             "nominal misfit": found.nominal[:3],
             "nominal scales": found.nominal_scales[:3],
             "lasting": found.lasting,
-            "told of leakage": float(found.told[0, 0]),
+            "told of leakage": float(found.discounted_information[0, 0]),
         }
     from_afar = fit_freely(blocks(), ACTUATOR, "normal", ACTUATOR.conditions[8] + 0.4)
     told["from afar"] = _known(from_afar)
@@ -181,11 +181,11 @@ def regions_of_the_classes() -> dict[str, Any]:
     for name, pressure in (("with pressure", True), ("without", False)):
         one = blocks(pressure=pressure)
         fit = made_fit(OFF, 3.0 * one.noise, INFORMATION, one)
-        known = believed_information(fit, one)
+        known = credible_information(fit, one)
         told[name] = {
             "believed": known[np.triu_indices(7)],
-            "believed of a piston that stands": believed_information(fit, one, stuck=True)[np.triu_indices(7)],
-            "believed of a good fit": believed_information(replace(fit, scales=one.noise), one)[0],
+            "believed of a piston that stands": credible_information(fit, one, stuck=True)[np.triu_indices(7)],
+            "believed of a good fit": credible_information(replace(fit, scales=one.noise), one)[0],
             "scores": region_scores(fit, INFORMATION, ACTUATOR),
             "spread": spread_of(fit, INFORMATION, one, ACTUATOR.conditions[1])[np.triu_indices(7)],
             "lasting misfit": lasting_misfit(fit.fitted, one),
@@ -238,7 +238,7 @@ def what_a_log_does_not_tell() -> dict[str, Any]:
         information = np.diag(known * np.array([4.0, 4.0, 11.1, 11.1, 3.4, 11.1, 1.0]))
         fits = replace(made_classes(OFF, blocks()), information=information)
         told[f"known {known:g} times as well as believed"] = {
-            name: noted(what_is_not_told(fits, found, pressure=pressure))
+            name: noted(not_told_notes(fits, found, pressure=pressure))
             for name, pressure in (("with pressure", True), ("without", False))
         }
     for name, flow, speed in (
@@ -247,7 +247,7 @@ def what_a_log_does_not_tell() -> dict[str, Any]:
         ("both vague", (0.2, 0.5), (5.0, 20.0)),
     ):
         some = {**found, "leakage_flow": Quantity(0.35, "L/min", flow), "velocity_lost": Quantity(12.0, "%", speed)}
-        told[name] = noted(what_is_not_told(made_classes(OFF, blocks()), some, pressure=True))
+        told[name] = noted(not_told_notes(made_classes(OFF, blocks()), some, pressure=True))
     return told
 
 

@@ -9,21 +9,21 @@ import pytest
 
 from estimation.eha.result import BulkModulusEstimate
 from faults.conditions import severity
-from faults.diagnosis.advice import advice_for, speeds_held
+from faults.diagnosis.advice import advice_for, held_speed_count
 from faults.diagnosis.beyond_nine.force_balance import force_balance
-from faults.diagnosis.beyond_nine.load import first_guesses, under_load
+from faults.diagnosis.beyond_nine.load import first_guesses, with_rod_load
 from faults.diagnosis.calibration import shipped_calibration
-from faults.diagnosis.changes.end_stop import _stands, stopped
-from faults.diagnosis.changes.onset import find_onset, part_of, parted
+from faults.diagnosis.changes.end_stop import _rests_at_end, with_end_stop
+from faults.diagnosis.changes.onset import find_onset, part_of, two_parts
 from faults.diagnosis.changes.split import likeliest_split
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
-from faults.diagnosis.circuits.class_regions import fit_classes, how_near
+from faults.diagnosis.circuits.class_regions import fit_classes, nearest_score
 from faults.diagnosis.circuits.out_of_model import reasons_against
-from faults.diagnosis.circuits.two_sensors import sensors_disagree
-from faults.diagnosis.evidence import Scoreboard, bounded, friction_left_open, weigh
+from faults.diagnosis.circuits.two_sensors import sensor_disagreements
+from faults.diagnosis.evidence import Scoreboard, bounded_log_odds, friction_left_open, weigh_evidence
 from faults.diagnosis.innovation_bank import innovation_scores
-from faults.diagnosis.models_verdict import margin, models_verdict
+from faults.diagnosis.models_verdict import error_margin, models_verdict
 from faults.diagnosis.rmse import Scores, measured_velocity, score_mathematical
 from faults.eha.bank import mathematical_bank
 from faults.notes import AgainstCode, ClassCode
@@ -108,7 +108,7 @@ def biases_of_sensors_and_pump() -> dict[str, Any]:
     for name, record in logs.items():
         one = blocks_of(record)
         fits = fit_classes(one, ACTUATOR)
-        told[name] = noted(reasons_against(one, fits, how_near(fits, one, ACTUATOR), ACTUATOR))
+        told[name] = noted(reasons_against(one, fits, nearest_score(fits, one, ACTUATOR), ACTUATOR))
     return told
 
 
@@ -118,7 +118,7 @@ def sensors_that_disagree() -> dict[str, Any]:
     told: dict[str, Any] = {}
     for share in (1.0, 1.04, 1.06, 0.5):
         wrong = record.replace(velocity_m_s=share * record["velocity_m_s"])
-        told[f"velocity times {share:g}"] = noted(sensors_disagree(wrong, blocks_of(wrong)))
+        told[f"velocity times {share:g}"] = noted(sensor_disagreements(wrong, blocks_of(wrong)))
     return told
 
 
@@ -133,7 +133,7 @@ def onsets_within_a_log() -> dict[str, Any]:
     }.items():
         one = blocks(condition, after, pressure=pressure, seconds=4.0)
         fits = fit_classes(one, ACTUATOR)
-        found = None if (two := parted(one, fits, ACTUATOR)) is None else find_onset(one, two, ACTUATOR)
+        found = None if (two := two_parts(one, fits, ACTUATOR)) is None else find_onset(one, two, ACTUATOR)
         told[name] = {"likeliest split, block": getattr(likeliest_split(one, fits.best), "place", None)}
         if found is not None:
             change, rest, later = found
@@ -152,7 +152,7 @@ def onsets_within_a_log() -> dict[str, Any]:
 
 @NUMBERS.case(relative=0.01)
 def evidence_for_conditions() -> dict[str, Any]:
-    board = weigh(log(), ACTUATOR)
+    board = weigh_evidence(log(), ACTUATOR)
     calibration = shipped_calibration()
     stuck = replace(blocks(), velocity=1e-4 * blocks().velocity)
     reached = {
@@ -183,8 +183,8 @@ def evidence_for_conditions() -> dict[str, Any]:
         "friction left open without pressure": friction_left_open(
             np.linspace(-8.0, 0.0, 9), replace(stuck, pressure=None), ACTUATOR
         ),
-        "bounded": bounded(np.array([-3.0, 0.0, -40.0, -1e9, np.nan])),
-        "bounded, none finite": bounded(np.full(3, np.nan)),
+        "bounded": bounded_log_odds(np.array([-3.0, 0.0, -40.0, -1e9, np.nan])),
+        "bounded, none finite": bounded_log_odds(np.full(3, np.nan)),
     }
 
 
@@ -215,14 +215,14 @@ def pistons_at_their_ends() -> dict[str, Any]:
     ended = simulate(CIRCUIT, speed, 2e-3, replace(circuit_of(PAPER), stroke=0.03), sensors=RIG, rng=rng)
     one = blocks_of(ended)
     fits = fit_classes(one, ACTUATOR)
-    with_stop, again = stopped(one, fits, ACTUATOR)
-    free, same = stopped(blocks(), classes(), ACTUATOR)
+    with_stop, again = with_end_stop(one, fits, ACTUATOR)
+    free, same = with_end_stop(blocks(), classes(), ACTUATOR)
     return {
         "reach and stop [m]": [one.reach, with_stop.stop],
         "scales before and after": [fits.best.scales, again.best.scales],
         "free": [free.stop, same is classes()],
         "stands": {
-            f"{reach:g} mm away for {rest:g} s": _stands(resting(1e-3 * reach, rest)) for reach, rest in STANDING
+            f"{reach:g} mm away for {rest:g} s": _rests_at_end(resting(1e-3 * reach, rest)) for reach, rest in STANDING
         },
     }
 
@@ -245,9 +245,9 @@ def loads_that_are_tried() -> dict[str, Any]:
     short = replace(blocks(), pressure=np.array([1e5, np.nan, 3e5]))
     standing = replace(blocks(), velocity=np.zeros_like(blocks().velocity))
     calls: list[float] = []
-    found = under_load(lambda asked, _: verdict_of(asked, calls, standing), PAPER, none)
+    found = with_rod_load(lambda asked, _: verdict_of(asked, calls, standing), PAPER, none)
     endless: list[float] = []
-    first = under_load(lambda asked, _: verdict_of(replace(asked, piston_area=1e9), endless, standing), PAPER, none)
+    first = with_rod_load(lambda asked, _: verdict_of(replace(asked, piston_area=1e9), endless, standing), PAPER, none)
     shown = force_balance(blocks(), PAPER)
     assert shown is not None
     return {
@@ -272,7 +272,7 @@ def errors_of_the_models() -> dict[str, Any]:
         "scores": dict(both.by_condition),
         "errors": {channel: dict(errors) for channel, errors in both.rmse.items()},
         "without pressure": dict(one.by_condition),
-        "margin": [margin(both), margin(one)],
+        "margin": [error_margin(both), error_margin(one)],
         "velocity [m/s]": measured_velocity(record)[[3, 100, 400]],
         "velocity from position [m/s]": measured_velocity(record.replace(velocity_m_s=None))[[0, 3, 100, 400]],
     }
@@ -335,7 +335,7 @@ def advice() -> dict[str, Any]:
     alike = [ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(), ClassCode.FRICTION_NOT_VISIBLE.note()]
     both = ("velocity_m_s", PRESSURE)
     return {
-        "speeds held": {name: speeds_held(record) for name, record in speeds.items()},
+        "speeds held": {name: held_speed_count(record) for name, record in speeds.items()},
         "sure": noted(advice_for(short, sure, [], [], both)),
         "unsure of a short log": noted(advice_for(short, unsure, [], [], both)),
         "unsure of a long log": noted(advice_for(long, unsure, [], [], both)),

@@ -11,7 +11,7 @@ from estimation.identification.model.linear_model import LinearModel
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.rmse import Scores, measured_velocity, rmse, score_mathematical, score_transfer_functions
 from faults.eha.bank import identify_bank, mathematical_bank
-from faults.eha.inject import spread
+from faults.eha.inject import varied_actuator
 from faults.scores import accuracy, confusion_matrix
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -31,7 +31,7 @@ def bench_log(name: str, seed: int, drive: str = "steps", varied: bool = False) 
     rng = np.random.default_rng(seed)
     parameters = parameters_for(CONDITIONS[name])
     if varied:
-        parameters = spread(parameters, rng)
+        parameters = varied_actuator(parameters, rng)
     speed = make_drive(drive, DURATION, 1e-3, parameters, rng)
     return simulate(LUMPED, speed, 1e-3, parameters, sensors=BENCH, rng=rng)
 

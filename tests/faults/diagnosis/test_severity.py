@@ -13,7 +13,7 @@ from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of
 from faults.diagnosis.circuits.class_fit import PointFit
 from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.severity import (
-    OF_KIND,
+    KIND_SPREAD,
     UNITS,
     healthy_severities,
     limits_of,
@@ -95,7 +95,7 @@ def ratio(one: Quantity) -> float:
 def test_a_bent_friction_law_widens_the_total_intervals_of_friction_and_pressure_rise() -> None:
     moved = np.zeros((7, 1))
     moved[COORDINATES.index("friction_rated")] = 0.3
-    straight, bent = (severities(one, ACTUATOR) for one in (fits(NARROW), replace(fits(NARROW), moved=moved)))
+    straight, bent = (severities(one, ACTUATOR) for one in (fits(NARROW), replace(fits(NARROW), bend_shifts=moved)))
     for name in ("added_friction", "pressure_rise"):
         low, high = bent[name].ci95_total or (0.0, 0.0)
         assert bent[name].ci95 == straight[name].ci95
@@ -148,7 +148,7 @@ def soft(share: float, width: float) -> Quantity:
 
 def test_air_is_certain_only_in_oil_softer_than_any_sound_oil_of_its_kind() -> None:
     plain = severities(fits(NARROW), ACTUATOR)
-    sure, unsure = (with_bulk_modulus(plain, soft(share, 0.02), ACTUATOR) for share in (0.5, 0.95 - OF_KIND + 0.08))
+    sure, unsure = (with_bulk_modulus(plain, soft(share, 0.02), ACTUATOR) for share in (0.5, 0.95 - KIND_SPREAD + 0.08))
     assert sure["bulk_modulus"].value == 0.5 * RIG.bulk_modulus
     assert sure["entrained_air"].ci95 is not None
     assert sure["entrained_air"].ci95[0] > 0.0

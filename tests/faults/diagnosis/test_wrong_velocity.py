@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from estimation.eha.estimate import EstimateOptions, estimated
+from estimation.eha.estimate import EstimateOptions, checked_estimate
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Gate
 from estimation.log_checks.clean import CleanLog, clean_log
@@ -38,7 +38,7 @@ def log() -> Record:
 
 @cache
 def seen() -> tuple[CleanLog, BulkModulusEstimate]:
-    return estimated(clean_log(log(), RIG.parameters), RIG, EstimateOptions())
+    return checked_estimate(clean_log(log(), RIG.parameters), RIG, EstimateOptions())
 
 
 def diagnosed(velocity: Array) -> Finding:

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from estimation.diaphragm_motor.signature import logged_signature
-from faults.diaphragm_motor.diagnose import TOLD_APART, MotorDiagnosis, _calibrated, diagnose_motor, separations
+from faults.diaphragm_motor.diagnose import (
+    LEAST_SEPARATION,
+    MotorDiagnosis,
+    _converted_to_model,
+    diagnose_motor,
+    separations,
+)
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, motor_with_fault
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import BENCH_SENSORS, SAMPLE_TIME, motor_drive, simulate_motor
@@ -106,7 +112,9 @@ def test_faults_with_similar_signatures_are_reported_as_lookalikes(name: str, se
 @pytest.mark.slow
 def test_only_friction_and_load_are_indistinguishable() -> None:
     apart = separations(MOTOR, 480.0, 200.0, {**SINGLE, "friction": 8.0, "load": 8.0, "soft_clamp": 0.2})
-    close = {(first, other) for first, others in apart.items() for other, far in others.items() if far < TOLD_APART}
+    close = {
+        (first, other) for first, others in apart.items() for other, far in others.items() if far < LEAST_SEPARATION
+    }
     assert close == {("friction", "load"), ("load", "friction")}
 
 
@@ -132,9 +140,9 @@ def test_a_healthy_run_under_another_drive_is_refused() -> None:
 
 @pytest.mark.slow
 def test_95_percent_of_faults_are_named_on_motors_within_tolerance() -> None:
-    from benchmarks.plants.diaphragm_faults import isolate
+    from benchmarks.plants.diaphragm_faults import isolation_shares
 
-    share, unknown, *_ = isolate(4, 1.0, calibrated=False)
+    share, unknown, *_ = isolation_shares(4, 1.0, calibrated=False)
     assert share >= 0.95
     assert unknown <= 0.05
 
@@ -143,7 +151,7 @@ def test_a_healthy_run_under_another_drive_or_of_a_faulty_motor_is_refused() -> 
     seen = logged_signature(log_of(MOTOR))
     for swing in (180.0, 220.0):
         with pytest.raises(LogError, match="the healthy run must be under the log's drive"):
-            _calibrated(seen, logged_signature(log_of(MOTOR, swing=swing)), MOTOR)
+            _converted_to_model(seen, logged_signature(log_of(MOTOR, swing=swing)), MOTOR)
     dead = replace(seen, values=np.where(np.arange(len(seen.values)) % 7 == 3, 0.01, seen.values))
     with pytest.raises(LogError, match="it is not of a healthy motor"):
-        _calibrated(seen, dead, MOTOR)
+        _converted_to_model(seen, dead, MOTOR)

@@ -9,7 +9,13 @@ from estimation.finding import Outcome
 from faults.diaphragm_motor import finding
 from faults.diaphragm_motor.diagnose import Match
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS
-from faults.diaphragm_motor.finding import STANDING, MotorFaultCode, _against, _remedy, motor_fault_finding
+from faults.diaphragm_motor.finding import (
+    STANDSTILL_VELOCITY,
+    MotorFaultCode,
+    _objections,
+    _remedy,
+    motor_fault_finding,
+)
 
 
 def diagnosis(velocity: float, *, unknown: bool) -> Any:
@@ -17,16 +23,16 @@ def diagnosis(velocity: float, *, unknown: bool) -> Any:
     return SimpleNamespace(unknown=unknown, best=best, freedom=12, signature=SimpleNamespace(velocity=velocity))
 
 
-@pytest.mark.parametrize("velocity", [2.0 * STANDING, -2.0 * STANDING])
+@pytest.mark.parametrize("velocity", [2.0 * STANDSTILL_VELOCITY, -2.0 * STANDSTILL_VELOCITY])
 def test_a_moving_rod_with_a_fitting_fault_has_no_objection(velocity: float) -> None:
-    assert _against(diagnosis(velocity, unknown=False)) == ()
+    assert _objections(diagnosis(velocity, unknown=False)) == ()
 
 
 def test_a_poorly_fitting_nearest_fault_and_a_stationary_rod_are_objections() -> None:
-    misses, stands = _against(diagnosis(-0.5 * STANDING, unknown=True))
+    misses, stands = _objections(diagnosis(-0.5 * STANDSTILL_VELOCITY, unknown=True))
     assert misses == MotorFaultCode.NEAREST_MISSES.note(fault="valve_1_leak", chi_square=40.0, freedom=12)
     assert stands.code is MotorFaultCode.ROD_STANDS
-    assert stands.data["velocity_mm_s"] == pytest.approx(-500.0 * STANDING)
+    assert stands.data["velocity_mm_s"] == pytest.approx(-500.0 * STANDSTILL_VELOCITY)
 
 
 MATCHES = {name: Match(name, 0.5, 0.1, 9.0, 0.3) for name in (HEALTHY, "friction", "valve_1_leak", "load")}

@@ -100,15 +100,15 @@ def where_verdicts_turn() -> dict[str, Any]:
 
     def against(velocity: float) -> int:
         values = np.append(np.zeros(28), velocity)
-        return len(finding._against(replace(made, signature=replace(made.signature, values=values))))  # pyright: ignore[reportPrivateUsage]
+        return len(finding._objections(replace(made, signature=replace(made.signature, values=values))))  # pyright: ignore[reportPrivateUsage]
 
     return {
         "unknown from [V]": edge(bent, 1e-4, 3.0, 12),
         "no longer healthy from": edge(healthy, 0.0, 0.3, 10),
         "named together": [one.name for one in made.group],
         "standing from [m/s]": edge(against, 1e-6, 1e-2),
-        "unknown is said": len(finding._against(replace(made, unknown=True))),  # pyright: ignore[reportPrivateUsage]
-        "said": [dict(finding._fault(one).data) for one in match[:2]],  # pyright: ignore[reportPrivateUsage]
+        "unknown is said": len(finding._objections(replace(made, unknown=True))),  # pyright: ignore[reportPrivateUsage]
+        "said": [dict(finding._fault_note(one).data) for one in match[:2]],  # pyright: ignore[reportPrivateUsage]
         "severity": [severity_of(match[0]).value, severity_of(match[0]).std, severity_of(match[0]).unit],
     }
 
@@ -121,7 +121,7 @@ def calibrated_signatures() -> dict[str, Any]:
         diaphragm_compliance=1.01 * MOTOR.diaphragm_compliance,
     )
     healthy, worn = signature(own), signature(motor_with_fault(own, "valve_4_leak", 0.1))
-    of = diagnose._calibrated  # pyright: ignore[reportPrivateUsage]
+    of = diagnose._converted_to_model  # pyright: ignore[reportPrivateUsage]
     found = of(worn, healthy, MOTOR)
 
     def refused(frequency: float = 480.0, swing: float = 200.0, tone: float = 1.0) -> bool:

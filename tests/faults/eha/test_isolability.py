@@ -3,10 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.trust.identifiability import SENSED
+from estimation.trust.identifiability import CARD_CHANNELS
 from faults.conditions import CONDITIONS
 from faults.eha.bank import mathematical_bank, predict_run
-from faults.eha.isolability import SPREAD, condition_distances, overdetermined, structural_isolability, wrong_verdicts
+from faults.eha.isolability import (
+    SPREAD,
+    condition_distances,
+    overdetermined_equations,
+    structural_isolability,
+    wrong_verdicts,
+)
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
@@ -23,13 +29,13 @@ def _drive(name: str) -> np.ndarray:
 
 
 def test_pressure_makes_friction_structurally_isolable_from_leakage() -> None:
-    assert structural_isolability(SENSED)["friction"] == ()
-    assert structural_isolability(SENSED)["leakage"] == ("air", "speed sensor")
+    assert structural_isolability(CARD_CHANNELS)["friction"] == ()
+    assert structural_isolability(CARD_CHANNELS)["leakage"] == ("air", "speed sensor")
     assert "friction" in (structural_isolability(WITHOUT_PRESSURE)["leakage"] or ())
 
 
 def test_without_redundant_equations_no_fault_is_detectable() -> None:
-    assert overdetermined({"flow balance", "force balance", "kinematics"}) == set()
+    assert overdetermined_equations({"flow balance", "force balance", "kinematics"}) == set()
     assert set(structural_isolability(()).values()) == {None}
 
 
@@ -38,7 +44,7 @@ def test_faults_of_absent_sensors_are_left_out() -> None:
 
 
 def test_more_sensors_never_make_a_fault_harder_to_isolate() -> None:
-    fewer, more = structural_isolability(("position_m",)), structural_isolability(SENSED)
+    fewer, more = structural_isolability(("position_m",)), structural_isolability(CARD_CHANNELS)
     for fault, rivals in fewer.items():
         assert set(more[fault] or ()) <= set(rivals or ())
 

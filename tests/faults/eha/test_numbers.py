@@ -9,9 +9,9 @@ import pytest
 from faults.conditions import CONDITIONS, parameters_for
 from faults.eha import bank, isolability
 from faults.eha.bank import identification_run, mathematical_bank, predict_run, predict_runs
-from faults.eha.inject import abrupt, growing, spread
+from faults.eha.inject import abrupt_fault, growing_fault, varied_actuator
 from faults.eha.isolability import Distances, condition_distances, structural_isolability, wrong_verdicts
-from faults.eha.physical import THROTTLE_A, THROTTLE_B, aerated, drifted_relief, throttled
+from faults.eha.physical import THROTTLE_A, THROTTLE_B, aerated, with_drifted_relief, with_throttles
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -33,15 +33,15 @@ def physical_faults() -> dict[str, Any]:
     volts = [(10.0, 0.0), (2.0, 2.5), (1.9, 1.0), (1.5, 2.4), (1.75, 5.0), (0.0, 10.0), (6.0, 2.3)]
     calls: dict[str, Any] = {
         "air": lambda one: aerated(CIRCUIT, one),
-        "relief": lambda one: drifted_relief(CIRCUIT, one),
-        "throttle A": lambda one: throttled(CIRCUIT, one, 0.0),
-        "throttle B": lambda one: throttled(CIRCUIT, 10.0, one),
+        "relief": lambda one: with_drifted_relief(CIRCUIT, one),
+        "throttle A": lambda one: with_throttles(CIRCUIT, one, 0.0),
+        "throttle B": lambda one: with_throttles(CIRCUIT, 10.0, one),
     }
     sizes = (-0.1, 0.0, 1e-9, 0.4, 0.5, 0.51, 0.999, 1.0, 2.0, 2.01, 10.0, 10.1, np.inf)
     return {
-        **{f"throttles at {a:g} and {b:g} V": differs(throttled(CIRCUIT, a, b), CIRCUIT) for a, b in volts},
+        **{f"throttles at {a:g} and {b:g} V": differs(with_throttles(CIRCUIT, a, b), CIRCUIT) for a, b in volts},
         "air": differs(aerated(CIRCUIT, 0.03), CIRCUIT),
-        "relief": differs(drifted_relief(CIRCUIT, 0.7), CIRCUIT),
+        "relief": differs(with_drifted_relief(CIRCUIT, 0.7), CIRCUIT),
         "throttle B's areas [m^2]": [THROTTLE_B.at(one) for one in (0.0, 1.0, 2.3, 2.5, 8.0, 10.0)],
         "throttle A": [
             list(one) for one in zip(*(THROTTLE_A.at(volts) for volts in (1.75, 2.0, 5.0, 10.0)), strict=True)
@@ -56,21 +56,22 @@ def physical_faults() -> dict[str, Any]:
 @NUMBERS.case()
 def injected_faults() -> dict[str, Any]:
     faulty = parameters_for(CONDITIONS["major_leakage_major_friction"])
-    other = spread(P, np.random.default_rng(3))
+    other = varied_actuator(P, np.random.default_rng(3))
     return {
-        "abrupt": abrupt(P, faulty, 2.0).sample(np.array([0.0, 1.9, 2.0, 9.0]))[:, [5, 6, 7]].T,
-        "growing": growing(P, faulty, 1.0, 3.0).sample(np.array([0.0, 1.0, 1.5, 3.0, 9.0]))[:, [5, 6, 7]].T,
+        "abrupt": abrupt_fault(P, faulty, 2.0).sample(np.array([0.0, 1.9, 2.0, 9.0]))[:, [5, 6, 7]].T,
+        "growing": growing_fault(P, faulty, 1.0, 3.0).sample(np.array([0.0, 1.0, 1.5, 3.0, 9.0]))[:, [5, 6, 7]].T,
         "times": [
-            isinstance(or_refused(lambda one=one: abrupt(P, faulty, one)), str) for one in (-1.0, 0.0, 1e-9, np.inf)
+            isinstance(or_refused(lambda one=one: abrupt_fault(P, faulty, one)), str)
+            for one in (-1.0, 0.0, 1e-9, np.inf)
         ],
         "spans": [
-            isinstance(or_refused(lambda one=one: growing(P, faulty, *one)), str)
+            isinstance(or_refused(lambda one=one: growing_fault(P, faulty, *one)), str)
             for one in ((1.0, 1.0), (1.0, 0.9), (1.0, 1.1), (np.nan, 1.0), (0.0, np.inf))
         ],
         "spread": differs(other, P),
-        "a spread of one": differs(spread(P, np.random.default_rng(3), 0.0, 0.0, 0.5), P),
+        "a spread of one": differs(varied_actuator(P, np.random.default_rng(3), 0.0, 0.0, 0.5), P),
         "widths": [
-            isinstance(or_refused(lambda one=one: spread(P, np.random.default_rng(3), **one)), str)
+            isinstance(or_refused(lambda one=one: varied_actuator(P, np.random.default_rng(3), **one)), str)
             for one in ({"leakage": -0.01}, {"friction": 0.0}, {"bulk_modulus": 0.99}, {"leakage": 1.0})
         ],
     }
@@ -129,7 +130,7 @@ def how_far_conditions_are_apart() -> dict[str, Any]:
             )
         },
         "overdetermined": sorted(
-            isolability.overdetermined(
+            isolability.overdetermined_equations(
                 {"flow balance", "force balance", "motor_speed_rad_s", "position_m", "differential_pressure_pa"}
             )
         ),

@@ -12,7 +12,7 @@ from tests.numbers import Numbers, or_refused
 pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra learn)")
 
 from faults.own_classes import classifier, features
-from faults.own_classes.calibration import Calibration, calibrated, log_loss
+from faults.own_classes.calibration import Calibration, fit_calibration, log_loss
 from faults.own_classes.classifier import Classifier
 from faults.own_classes.discriminant import learn
 from faults.own_classes.features import Recipe, channel_features
@@ -63,7 +63,7 @@ def features_of_runs() -> dict[str, Any]:
         "what is nothing": channel_features(["p", "q", "c"], [small], 1.0, Recipe(parts=1, octaves=1)).to_numpy()[
             0, :7
         ],
-        "inside": [features._inside(np.array([1.0, 1.0 + 5e-10, 2.0, 2.0 + 1e-9, 2.0 + 4e-9]), (1.0, 2.0))],  # pyright: ignore[reportPrivateUsage]
+        "inside": [features._is_inside_band(np.array([1.0, 1.0 + 5e-10, 2.0, 2.0 + 1e-9, 2.0 + 4e-9]), (1.0, 2.0))],  # pyright: ignore[reportPrivateUsage]
     }
 
 
@@ -132,9 +132,9 @@ def probabilities_that_hold() -> dict[str, Any]:
     scores = rng.standard_normal((80, 3)) * 6.0 + 8.0 * np.eye(2)[true][:, [0, 1, 1]]
     merged = np.array([0, 1, 1])
     scores[3, 2] = -np.inf
-    found = calibrated(scores, merged, true)
-    crude = calibrated(40.0 * scores, merged, true)
-    sure = calibrated(np.eye(2)[true][:, [0, 1, 1]] * 0.1, merged, true)
+    found = fit_calibration(scores, merged, true)
+    crude = fit_calibration(40.0 * scores, merged, true)
+    sure = fit_calibration(np.eye(2)[true][:, [0, 1, 1]] * 0.1, merged, true)
     return {
         "probabilities": [Calibration(t, s).probabilities(scores[:5], merged) for t, s in ((1.0, 0.0), (5.0, 0.1))],
         "far scores": Calibration().probabilities(np.array([[0.0, -900.0, -600.0]]), merged),
@@ -186,7 +186,7 @@ def classifiers() -> dict[str, Any]:
         "merged": [
             [list(map(str, names)), list(places)]
             for names, places in (
-                classifier._merged(np.array(["a", "b"]), merge) for merge in (None, {"a": "b"}, str.upper)
+                classifier._merged_classes(np.array(["a", "b"]), merge) for merge in (None, {"a": "b"}, str.upper)
             )
         ],  # pyright: ignore[reportPrivateUsage]
         "shares": [refused(unknown=one) for one in (0.0, 1e-9, 0.999, 1.0)],

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from faults.own_classes.calibration import Calibration, calibrated
+from faults.own_classes.calibration import Calibration, fit_calibration
 from faults.own_classes.verdicts import Verdicts
 
 
@@ -27,7 +27,7 @@ def test_calibration_corrects_overconfident_scores() -> None:
     truth = rng.uniform(-4.0, 4.0, 4000)
     true = (rng.uniform(size=4000) < 1.0 / (1.0 + np.exp(-truth))).astype(np.int64)
     scores = np.column_stack([np.zeros(4000), 7.0 * truth])
-    found = calibrated(scores, np.arange(2), true)
+    found = fit_calibration(scores, np.arange(2), true)
     assert found.temperature == pytest.approx(7.0, rel=0.1)
     assert found.spread < 0.02
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from faults.piezo_stack.diagnose import StackFaultCode, _fault, _level
+from faults.piezo_stack.diagnose import StackFaultCode, _fault_note, _level
 from plant.piezo_stack.parameters import PiezoStackParameters
 
 HEALTHY = PiezoStackParameters()
@@ -38,9 +38,9 @@ def test_a_fault_is_reported_only_if_it_is_large_and_certain(
 ) -> None:
     base = 1.0 if name == "polarisation" else getattr(HEALTHY, name)
     size = abs(faulty - base)
-    assert _fault(name, found(name, healthy, 0.01 * size), HEALTHY) is None
-    assert _fault(name, found(name, faulty, 0.4 * size), HEALTHY) is None
-    note = _fault(name, found(name, faulty, 0.3 * size), HEALTHY)
+    assert _fault_note(name, found(name, healthy, 0.01 * size), HEALTHY) is None
+    assert _fault_note(name, found(name, faulty, 0.4 * size), HEALTHY) is None
+    note = _fault_note(name, found(name, faulty, 0.3 * size), HEALTHY)
     assert note is not None
     assert note.code == code
 
@@ -54,7 +54,7 @@ def test_the_nearest_level_is_given_unless_the_deviation_is_too_large() -> None:
 
 def test_a_reed_gap_is_a_fault_by_its_increase_over_the_healthy_gap() -> None:
     healthy = replace(HEALTHY, inlet_reed_gap=3e-6)
-    assert _fault("inlet_reed_gap", found("inlet_reed_gap", 7e-6, 1e-8), healthy) is None
-    note = _fault("inlet_reed_gap", found("inlet_reed_gap", 9e-6, 1e-8), healthy)
+    assert _fault_note("inlet_reed_gap", found("inlet_reed_gap", 7e-6, 1e-8), healthy) is None
+    note = _fault_note("inlet_reed_gap", found("inlet_reed_gap", 9e-6, 1e-8), healthy)
     assert note is not None
     assert dict(note.data) == {"reed": "inlet", "gap_um": pytest.approx(9.0)}

@@ -9,7 +9,7 @@ import pytest
 from estimation.piezo_stack.estimate import StackEstimate
 from faults.conditions import CONDITIONS
 from faults.piezo_stack import diagnose
-from faults.piezo_stack.diagnose import CALIBRATED, SELDOM, calibrated_stack, diagnose_stack
+from faults.piezo_stack.diagnose import CALIBRATED, SELDOM_UNKNOWNS, calibrated_stack, diagnose_stack
 from faults.piezo_stack.faults import ADDED_FRICTION, CROSSPORT_LEAKAGE, STACK_FAULTS, stack_with_fault
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import BENCH_SENSORS, simulate_stack, sine_drive
@@ -37,11 +37,11 @@ def estimate(**of: tuple[float, float]) -> StackEstimate:
 @NUMBERS.case()
 def where_faults_are_named() -> dict[str, Any]:
     def named(name: str, value: float, std: float = 0.0) -> Any:
-        note = diagnose._fault(name, estimate(**{name: (value, std)}), HEALTHY)  # pyright: ignore[reportPrivateUsage]
+        note = diagnose._fault_note(name, estimate(**{name: (value, std)}), HEALTHY)  # pyright: ignore[reportPrivateUsage]
         return None if note is None else str(note.code)
 
     def data(name: str, value: float) -> Any:
-        note = diagnose._fault(name, estimate(**{name: (value, 0.0)}), HEALTHY)  # pyright: ignore[reportPrivateUsage]
+        note = diagnose._fault_note(name, estimate(**{name: (value, 0.0)}), HEALTHY)  # pyright: ignore[reportPrivateUsage]
         return None if note is None else dict(note.data)
 
     def level(value: float, std: float = 0.0, name: str = "coulomb_friction") -> Any:
@@ -75,7 +75,7 @@ def where_faults_are_named() -> dict[str, Any]:
         "major leakage from": edge(lambda one: level(one, 0.0, "crossport_leakage"), 5e-12, 2e-11),
         "friction known to [N]": edge(lambda one: level(0.0, one), 1.0, 99.0),
         "what is calibrated": list(CALIBRATED),
-        "tried where all else misses": {names[0]: [dict(one) for one in starts] for names, starts in SELDOM},
+        "tried where all else misses": {names[0]: [dict(one) for one in starts] for names, starts in SELDOM_UNKNOWNS},
     }
 
 

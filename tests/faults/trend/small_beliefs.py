@@ -4,8 +4,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from faults.trend.kalman import GROSS, Belief, Settings, predict
-from faults.trend.kalman_loops import take_in
+from faults.trend.kalman import CLIP_DEVIATIONS, Belief, Settings, predict
+from faults.trend.kalman_loops import update_belief
 
 
 def one_setting(**values: float) -> Settings:
@@ -17,5 +17,5 @@ def next_belief(now: Belief, step: float, value: float, std: float, grid: Settin
     """Return the belief after one more log; in a series, all logs are processed together."""
     found = predict(now, step, grid)
     evidence = now.evidence.copy()
-    take_in(found.mean, found.covariance, evidence, value, std, GROSS, grid.scatter)
+    update_belief(found.mean, found.covariance, evidence, value, std, CLIP_DEVIATIONS, grid.scatter)
     return Belief(found.mean, found.covariance, evidence)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from faults.trend.changes import jumps, stretches
-from faults.trend.crossing import HORIZON, QUANTILES, Crossing, _drawn, crossing  # pyright: ignore[reportPrivateUsage]
+from faults.trend.crossing import HORIZON, QUANTILES, Crossing, _drawn_states, crossing  # pyright: ignore[reportPrivateUsage]
 from faults.trend.kalman import (
     Belief,
     Settings,
@@ -205,7 +205,7 @@ def futures_that_are_drawn() -> dict[str, Any]:
 def cloud_of_a_belief() -> dict[str, Any]:
     covariance = np.array([[0.04, 0.01, 0.002], [0.01, 0.02, 0.004], [0.002, 0.004, 0.01]])
     belief = Belief(np.array([[0.5, 0.3, 0.2]]), covariance[None], np.zeros(1))
-    drawn = _drawn(belief, np.zeros(20000, dtype=np.int64), np.random.default_rng(2))
+    drawn = _drawn_states(belief, np.zeros(20000, dtype=np.int64), np.random.default_rng(2))
     return {"mean": drawn.mean(axis=1), "variances": drawn.var(axis=1), "covariance": [float(np.cov(drawn)[0, 1])]}
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.special import chdtri
 
-from faults.watch.events import LIKELY, change_time
+from faults.watch.events import INTERVAL_DROP, change_time
 
 
 def test_the_change_time_is_the_start_of_the_raised_scores() -> None:
@@ -21,10 +21,10 @@ def test_the_change_time_maximizes_the_likelihood_and_its_interval_contains_simi
         gains.append(scores[:n] @ scores[:n] - risen @ risen)
     found, (least, most) = change_time(scores)
     assert found == int(np.argmax(gains)) + 1
-    likely = np.flatnonzero(np.array(gains) >= max(gains) - 2.0 * LIKELY) + 1
+    likely = np.flatnonzero(np.array(gains) >= max(gains) - 2.0 * INTERVAL_DROP) + 1
     assert (least, most) == (likely[0], likely[-1])
     assert most > least
 
 
 def test_the_limit_of_the_95_percent_interval_follows_from_chi_square() -> None:
-    assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == LIKELY
+    assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == INTERVAL_DROP

@@ -5,7 +5,7 @@ import pytest
 
 from plant.compiled.expression import Expression, node, symbol
 from plant.compiled.functions import absolute, sqrt, tanh, where
-from plant.compiled.late_last import CALL, LATENCY, late_last
+from plant.compiled.late_last import CALL_LATENCY, LATENCY, late_last
 from tests.kernels import computed
 
 X, Y, Z, W = (symbol(name) for name in "xyzw")
@@ -43,7 +43,7 @@ def test_terms_that_cancel_are_not_computed() -> None:
 
 def test_a_late_condition_adds_no_latency_and_a_call_adds_its_own() -> None:
     _, times = late_last({"chosen": where(X > Y, Y, Z), "called": tanh(X), "root": sqrt(X)}, {"x": 5.0})
-    assert times == {"chosen": -np.inf, "called": 5.0 + CALL, "root": 5.0 + LATENCY["sqrt"]}
+    assert times == {"chosen": -np.inf, "called": 5.0 + CALL_LATENCY, "root": 5.0 + LATENCY["sqrt"]}
 
 
 def test_a_product_shared_by_two_outputs_stays_shared() -> None:

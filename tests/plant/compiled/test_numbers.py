@@ -16,8 +16,8 @@ from plant.compiled.c99.precision import DOUBLE, FLOAT
 from plant.compiled.elimination import eliminated_jacobian
 from plant.compiled.expression import Expression, jacobian, symbol
 from plant.compiled.functions import absolute, log, maximum, sign, sqrt, tanh, where
-from plant.compiled.gather import gathered
-from plant.compiled.hints import following, frozen, late_in, waypoint
+from plant.compiled.gather import gather_factors
+from plant.compiled.hints import affine_form, frozen, waypoint, with_derivatives
 from plant.compiled.hoist import hoisted
 from plant.compiled.late_last import late_last
 from plant.compiled.native.program import Module
@@ -61,7 +61,7 @@ def formulas_rewritten() -> dict[str, Any]:
     constants, rest = hoisted(FORMULAS, {"x", "y"}, "c")
     return {
         "as they stand": text(FORMULAS),
-        "gathered": text(gathered(FORMULAS, {"k", "m"})),
+        "gathered": text(gather_factors(FORMULAS, {"k", "m"})),
         "simplified": text(simplified(FORMULAS, {"k", "m"})),
         "fused": text(fused(simplified(FORMULAS, {"k", "m"}))),
         "reciprocals": text(share_reciprocals(FORMULAS, {"k", "m"})),
@@ -101,7 +101,7 @@ def what_comes_late() -> dict[str, Any]:
         {"text": text(made), "times": times}
         for made, times in (late_last(lone, arrival) for arrival in ({"x": 0.0}, {"k": 2.0, "y": 4.0}))
     ]
-    told["affine"] = text({"y": late_in((X - K) * M + X * 2.0 - (Y - X / M), X)})
+    told["affine"] = text({"y": affine_form((X - K) * M + X * 2.0 - (Y - X / M), X)})
     return told
 
 
@@ -111,7 +111,7 @@ def slopes() -> dict[str, Any]:
     outputs = [
         *list(FORMULAS.values())[:4],
         tanh(X * Y) * log(K) - maximum(X, Y * K) / (X * X + 1.0),
-        following(sqrt(X * X + K), (X * X + K - frozen(sqrt(X * X + K)) ** 2, 0.5 / sqrt(X * X + K))) * Y,
+        with_derivatives(sqrt(X * X + K), (X * X + K - frozen(sqrt(X * X + K)) ** 2, 0.5 / sqrt(X * X + K))) * Y,
         waypoint(X * Y) + waypoint(X * Y) * K,
     ]
 
@@ -133,11 +133,11 @@ def loops_in_c() -> dict[str, Any]:
     for precision in (DOUBLE, FLOAT):
         functions = {one.__name__: one for one in (spread, work, doubled)}
         written = Translation(functions, {"SHIFT": 2}, {}, precision, "mine")
-        entered = written.entered("work", GIVEN)
+        translate = written.translate("work", GIVEN)
         told[precision.name] = {
             "text": written.text.splitlines(),
-            "operations": dict(sorted(entered.operations.items())),
-            "written": list(entered.written),
+            "operations": dict(sorted(translate.operations.items())),
+            "written": list(translate.written),
             "numbers": [precision.literal(one) for one in (0.0, -1.5, 1e30, 1.0 / 3.0, float("-inf"), float("nan"))],
         }
     return told

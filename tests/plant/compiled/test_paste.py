@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature
-from plant.compiled.paste import bare_text, kernel_text, pasted
+from plant.compiled.paste import bare_text, functions_text, kernel_text
 
 LIMIT = 3.0
 
@@ -31,7 +31,9 @@ def test_pasted_text_has_no_annotations_docstrings_or_comments() -> None:
 
 
 def test_a_pasted_function_computes_what_the_function_does() -> None:
-    text = kernel_text("a sum", pasted(clipped, inlined=True, constants={"LIMIT": LIMIT}), pasted(total))
+    text = kernel_text(
+        "a sum", functions_text(clipped, inlined=True, constants={"LIMIT": LIMIT}), functions_text(total)
+    )
     values = np.array([0.5, 4.0, 16.0])
     kernel = load_native("pasted_sum", text, {"total": signature("values : ndarray, shape (n,)")})
     assert kernel.total(values) == total(values)
@@ -39,4 +41,4 @@ def test_a_pasted_function_computes_what_the_function_does() -> None:
 
 def test_only_functions_written_with_def_can_be_pasted() -> None:
     with pytest.raises(TypeError, match="written with def"):
-        pasted(Path)
+        functions_text(Path)

@@ -2,11 +2,18 @@
 
 import pytest
 
-from plant.components.directional_valve import SHUT, fed_pressure, pressure_after_return, return_flow, tank_openings
+from plant.components.directional_valve import (
+    SHUT_OPENING,
+    fed_pressure,
+    pressure_after_return,
+    return_flow,
+    tank_openings,
+)
 
 
 @pytest.mark.parametrize(
-    ("spool", "fed", "openings"), [(1.0, 5.0, (SHUT, 1.0)), (0.0, 0.0, (SHUT, SHUT)), (-1.0, 2.0, (1.0, SHUT))]
+    ("spool", "fed", "openings"),
+    [(1.0, 5.0, (SHUT_OPENING, 1.0)), (0.0, 0.0, (SHUT_OPENING, SHUT_OPENING)), (-1.0, 2.0, (1.0, SHUT_OPENING))],
 )
 def test_the_side_that_is_not_fed_is_connected_to_tank(spool: float, fed: float, openings: tuple[float, float]) -> None:
     assert float(fed_pressure(spool, 5.0, 2.0)) == fed

@@ -20,11 +20,11 @@ from plant.diaphragm_motor.model import (
     MotorRow,
     at_rest,
     deflections,
-    gathered,
     motor_derivative,
     motor_row,
+    reassemble_rows,
 )
-from plant.diaphragm_motor.parameters import DiaphragmMotorParameters, changed
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters, with_changed_value
 from plant.diaphragm_motor.run import (
     BENCH_SENSORS,
     ELECTRODES,
@@ -138,9 +138,9 @@ def test_a_cycle_of_the_valve_brings_the_rod_back() -> None:
 def test_each_fault_costs_at_least_three_percent_of_the_velocity() -> None:
     healthy = operate(HEALTHY, PEAK, SWING).velocity
     faults = (
-        replace(HEALTHY, valve_leak=changed(HEALTHY.valve_leak, 4, 1.0)),
-        replace(HEALTHY, valve_lift=changed(HEALTHY.valve_lift, 4, 0.1)),
-        replace(HEALTHY, polarisation=changed(HEALTHY.polarisation, 4, 0.0)),
+        replace(HEALTHY, valve_leak=with_changed_value(HEALTHY.valve_leak, 4, 1.0)),
+        replace(HEALTHY, valve_lift=with_changed_value(HEALTHY.valve_lift, 4, 0.1)),
+        replace(HEALTHY, polarisation=with_changed_value(HEALTHY.polarisation, 4, 0.0)),
         replace(HEALTHY, gas_fraction=(2e-2,) * 7),
         replace(HEALTHY, crossport_leakage=1e-11),
         replace(HEALTHY, port_area=0.7 * HEALTHY.port_area),
@@ -219,7 +219,7 @@ def test_impossible_parameters_are_refused(name: str, value: float | tuple[float
 
 def test_a_place_out_of_range_is_refused() -> None:
     with pytest.raises(RigError, match="a place from 1 to 8 is needed, got 9"):
-        changed(HEALTHY.valve_leak, 9, 1.0)
+        with_changed_value(HEALTHY.valve_leak, 9, 1.0)
 
 
 def test_a_schedule_that_does_not_start_at_zero_is_refused() -> None:
@@ -244,7 +244,7 @@ def test_flow_and_deflections_follow_a_stiff_solver() -> None:
     scale = np.array([2e4] * 7 + [10.0] + [2e-6] * 8 + [1.0] * 8 + [1e4, 1e4, 5e-3, 1e-4])
 
     def rates(state: tuple[Any, ...], slope: Any, flat: Any) -> tuple[Any, ...]:
-        return motor_derivative(state, slope, gathered(flat))
+        return motor_derivative(state, slope, reassemble_rows(flat))
 
     wanted = reference_trajectory(rates, start, rate, row, step, scale=scale, relative_tolerance=1e-7)
     ours = run_motor(HEALTHY, drive, step, start=start)

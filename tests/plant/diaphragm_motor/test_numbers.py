@@ -15,7 +15,15 @@ from plant.diaphragm_motor.composite_plate import (
     plate_modes,
 )
 from plant.diaphragm_motor.flow import operate, pump_alone, tone
-from plant.diaphragm_motor.model import STATES, at_rest, deflections, gathered, motor_derivative, motor_row, motor_step
+from plant.diaphragm_motor.model import (
+    STATES,
+    at_rest,
+    deflections,
+    motor_derivative,
+    motor_row,
+    motor_step,
+    reassemble_rows,
+)
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import (
     BENCH_SENSORS,
@@ -101,7 +109,7 @@ def rows_rest_and_deflections() -> dict[str, Any]:
     one = np.array([states()["running"], states()["at an end"]])
     return {
         "row": motor_row(VARIED),
-        "gathered lift": list(gathered(gathered_flat(VARIED)).valve_lift),
+        "gathered lift": list(reassemble_rows(gathered_flat(VARIED)).valve_lift),
         "at rest": at_rest(VARIED),
         "deflections [m]": deflections(one, np.array([40.0, -60.0]), VARIED),
     }

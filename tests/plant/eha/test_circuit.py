@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faults.conditions import CONDITIONS, Condition, parameters_for
-from faults.eha.physical import throttled
+from faults.eha.physical import with_throttles
 from plant.arrays import Array
 from plant.components.oil import effective_bulk_modulus
 from plant.eha.circuit import (
@@ -179,7 +179,7 @@ def test_the_piston_stops_at_the_end_of_its_stroke() -> None:
 
 
 def test_the_relief_valve_holds_the_pressure_at_its_setting() -> None:
-    p = replace(throttled(PAPER, 10.0, 3.0), relief_pressure=2e6)
+    p = replace(with_throttles(PAPER, 10.0, 3.0), relief_pressure=2e6)
     record = simulate(CIRCUIT, np.full(10_000, 251.0), 1e-4, p)
     assert record["differential_pressure_pa"][-1] == pytest.approx(2e6, rel=0.02)
 
@@ -212,7 +212,7 @@ DRIVES = st.lists(st.floats(-10.0, 10.0), min_size=4, max_size=10)
 def test_pressures_stay_finite_and_above_vapour_pressure_with_any_throttles_air_and_drive(
     a_volts: float, b_volts: float, air: float, levels: list[float], lag: float
 ) -> None:
-    p = throttled(replace(PAPER, air_fraction=air, motor_lag=lag), a_volts, b_volts)
+    p = with_throttles(replace(PAPER, air_fraction=air, motor_lag=lag), a_volts, b_volts)
     speed = np.repeat(np.array(levels) * PAPER.motor_speed_limit, 20)
     record = simulate(CIRCUIT, speed, 1e-3 if b_volts < 5.0 else 1e-4, p)
     for name in ("pressure_a_pa", "pressure_b_pa"):

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.peers.stiff_solvers import Method, reference_trajectory
 from faults.conditions import CONDITIONS, parameters_for
-from faults.eha.physical import throttled
+from faults.eha.physical import with_throttles
 from plant.arrays import Array
 from plant.eha.circuit import circuit_derivative, circuit_scales
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
@@ -89,7 +89,7 @@ def test_cavitation_costs_little_accuracy() -> None:
 
 
 def test_an_almost_shut_throttle_costs_no_accuracy() -> None:
-    p = throttled(PAPER, 10.0, 5.0)
+    p = with_throttles(PAPER, 10.0, 5.0)
     speed = make_drive("prbs", 0.2, 1e-4, p, np.random.default_rng(5))
     assert error(run(p, speed), run(p, speed, tolerance=1e-9), p) < 1e-4
 

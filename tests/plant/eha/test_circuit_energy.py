@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from faults.eha.physical import throttled
+from faults.eha.physical import with_throttles
 from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE, NUCLEI, specific_volume
 from plant.eha.circuit import chamber_volumes, circuit_pressures
@@ -74,7 +74,7 @@ PRESSURES = st.floats(3e3, 5e6)
 def test_stored_energy_never_rises_with_the_pump_stopped(
     a: float, b: float, x: float, v: float, air: float, volts: tuple[float, float]
 ) -> None:
-    p = throttled(CircuitParameters(air_fraction=air), *volts)
+    p = with_throttles(CircuitParameters(air_fraction=air), *volts)
     row = parameter_row(p)
     run = compile_trajectory(CIRCUIT.name, CIRCUIT.step, 7, CircuitParameters)
     states = run(at_pressures(a, b, x, v, p), np.zeros(3_000), row[None], 1e-4, CIRCUIT.substeps)

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.eha.inject import abrupt, growing
-from faults.eha.physical import throttled
+from faults.eha.inject import abrupt_fault, growing_fault
+from faults.eha.physical import with_throttles
 from plant.eha.circuit import circuit_breaches
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.circuit_start import at_rest
@@ -72,7 +72,7 @@ def test_sensors_without_pressure_log_no_pressure_channel() -> None:
 
 def test_an_abrupt_leak_slows_the_piston() -> None:
     leaking = parameters_for(CONDITIONS["major_leakage"], RIG)
-    velocity = simulate(CIRCUIT, CONSTANT, 1e-3, abrupt(RIG, leaking, at=1.5))["velocity_m_s"]
+    velocity = simulate(CIRCUIT, CONSTANT, 1e-3, abrupt_fault(RIG, leaking, at=1.5))["velocity_m_s"]
     healthy = simulate(CIRCUIT, CONSTANT, 1e-3, RIG)["velocity_m_s"]
     np.testing.assert_allclose(velocity[:1_501], healthy[:1_501], rtol=0.0, atol=1e-6 * np.max(healthy))
     assert velocity[-1] < 0.6 * healthy[-1]
@@ -80,12 +80,12 @@ def test_an_abrupt_leak_slows_the_piston() -> None:
 
 def test_growing_leakage_slows_the_piston_continuously() -> None:
     leaking = parameters_for(CONDITIONS["major_leakage"], RIG)
-    velocity = simulate(CIRCUIT, CONSTANT, 1e-3, growing(RIG, leaking, 1.0, 3.0))["velocity_m_s"]
+    velocity = simulate(CIRCUIT, CONSTANT, 1e-3, growing_fault(RIG, leaking, 1.0, 3.0))["velocity_m_s"]
     assert np.all(np.diff(velocity[1_200:2_900:100]) < 0.0)
 
 
 def test_an_almost_shut_throttle_is_simulated_without_instability() -> None:
-    p = throttled(RIG, 10.0, 6.0)
+    p = with_throttles(RIG, 10.0, 6.0)
     record = simulate(CIRCUIT, np.full(300, p.rated_speed), 1e-3, p)
     assert np.max(np.abs(record["velocity_m_s"])) < 2e-3
 

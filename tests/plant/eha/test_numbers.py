@@ -22,7 +22,7 @@ from plant.eha.circuit import (
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of, circuit_values, longest_stroke, oil_demand
 from plant.eha.circuit_start import at_rest
 from plant.eha.cylinder_sizing import BORES_MM, RODS_MM, Duty, buckling_rod, cylinder_circuit, size_cylinder
-from plant.eha.doubts import DOUBTS, spreads_of
+from plant.eha.doubts import DEFAULT_UNCERTAINTIES, spreads_of
 from plant.eha.drives import chirp, make_drive, multisine, nine_steps, prbs, sine
 from plant.eha.model import (
     EhaParameters,
@@ -73,9 +73,11 @@ def parameters_of_the_papers_tables() -> dict[str, Any]:
 @NUMBERS.case()
 def how_well_entries_are_known_unless_told() -> dict[str, Any]:
     return {
-        "of a catalogue, down and up": {name: list(one.usual) for name, one in DOUBTS.items()},
-        "measured, down and up": {name: list(one.measured) for name, one in DOUBTS.items()},
-        "of a rig file": {n: list(s) for n, s in spreads_of(DOUBTS, {"moving_mass": 0.07}, ["piston_area"]).items()},
+        "of a catalogue, down and up": {name: list(one.usual) for name, one in DEFAULT_UNCERTAINTIES.items()},
+        "measured, down and up": {name: list(one.measured) for name, one in DEFAULT_UNCERTAINTIES.items()},
+        "of a rig file": {
+            n: list(s) for n, s in spreads_of(DEFAULT_UNCERTAINTIES, {"moving_mass": 0.07}, ["piston_area"]).items()
+        },
     }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plant.eha.circuit_parameters import CircuitParameters
-from plant.eha.one_sided import ONE_SIDED, OneSidedParameters, as_wide, circuit_plant, one_sided
+from plant.eha.one_sided import ONE_SIDED, OneSidedParameters, circuit_plant, padded_row, with_make_up_faults
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.errors import RigError
 from plant.log.record import Record
@@ -17,7 +17,7 @@ DRIVE = np.repeat([110.0, -110.0, 90.0, -90.0], 250)
 
 
 def run(sign: float = 1.0, /, **faults: float) -> Record:
-    return simulate(ONE_SIDED, sign * DRIVE, 2e-3, one_sided(PAPER, **faults))
+    return simulate(ONE_SIDED, sign * DRIVE, 2e-3, with_make_up_faults(PAPER, **faults))
 
 
 def lowest(record: Record) -> tuple[float, float]:
@@ -55,14 +55,14 @@ def test_a_leaking_seat_slows_the_piston_while_its_chamber_pushes(side: str, sig
 
 
 def test_the_length_of_a_row_selects_the_circuit_and_a_widened_row_has_no_faults() -> None:
-    short, long = parameter_row(PAPER), parameter_row(one_sided(PAPER))
+    short, long = parameter_row(PAPER), parameter_row(with_make_up_faults(PAPER))
     assert circuit_plant(len(short)) is CIRCUIT
     assert circuit_plant(len(long)) is ONE_SIDED
-    assert as_wide(short, len(long)).tolist() == long.tolist()
-    assert as_wide(short, len(short)).tolist() == short.tolist()
+    assert padded_row(short, len(long)).tolist() == long.tolist()
+    assert padded_row(short, len(short)).tolist() == short.tolist()
 
 
 def test_the_shut_share_of_a_valve_is_at_most_one() -> None:
-    assert one_sided(PAPER, makeup_shut_a=1.0).makeup_shut_a == 1.0
+    assert with_make_up_faults(PAPER, makeup_shut_a=1.0).makeup_shut_a == 1.0
     with pytest.raises(RigError, match="makeup_shut_b must be at most 1"):
         replace(OneSidedParameters(), makeup_shut_b=1.2)

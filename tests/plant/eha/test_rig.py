@@ -6,7 +6,7 @@ import pytest
 
 from plant.eha.circuit import chamber_volumes
 from plant.eha.circuit_parameters import circuit_of
-from plant.eha.doubts import DOUBTS, Spread
+from plant.eha.doubts import DEFAULT_UNCERTAINTIES, Spread
 from plant.eha.model import EhaParameters, piston_areas
 from plant.eha.rig import Rig, read_rig, rig_template, write_rig_template
 from plant.errors import RigError
@@ -65,27 +65,31 @@ def test_a_rig_file_overrides_only_the_parameters_that_it_gives(tmp_path: Path) 
 
 def test_the_template_states_the_uncertainty_of_each_entry_and_its_reason() -> None:
     text = rig_template()
-    for name, doubt in DOUBTS.items():
+    for name, doubt in DEFAULT_UNCERTAINTIES.items():
         assert f"# {name}: " in text
         assert doubt.reason in text
     assert "# moving_mass: 0.1 down, 0.4 up, 0.05 if measured;" in text
 
 
 def test_uncertainties_are_the_usual_ones_unless_stated_or_measured(tmp_path: Path) -> None:
-    assert rig_of(tmp_path, "").spreads == Rig().spreads == {name: one.usual for name, one in DOUBTS.items()}
+    assert (
+        rig_of(tmp_path, "").spreads
+        == Rig().spreads
+        == {name: one.usual for name, one in DEFAULT_UNCERTAINTIES.items()}
+    )
     rig = rig_of(tmp_path, 'measured = ["chamber_volume"]\n[uncertainty]\npressure_gain = 0.0\nrelief_pressure = 0.1\n')
     assert rig.measured == ("chamber_volume",)
     assert rig.spreads["chamber_volume"] == Spread(0.05, 0.05)
     assert rig.spreads["pressure_gain"] == Spread(0.0, 0.0)
     assert rig.spreads["relief_pressure"] == Spread(0.1, 0.1)
-    assert rig.spreads["moving_mass"] == DOUBTS["moving_mass"].usual
+    assert rig.spreads["moving_mass"] == DEFAULT_UNCERTAINTIES["moving_mass"].usual
 
 
 def test_measured_entries_are_less_uncertain_and_no_entry_is_more_uncertain_downward() -> None:
-    for doubt in DOUBTS.values():
+    for doubt in DEFAULT_UNCERTAINTIES.values():
         assert max(doubt.measured) < max(doubt.usual) <= 0.4
         assert doubt.usual.down <= doubt.usual.up
-    assert DOUBTS["moving_mass"].usual.up > DOUBTS["moving_mass"].usual.down
+    assert DEFAULT_UNCERTAINTIES["moving_mass"].usual.up > DEFAULT_UNCERTAINTIES["moving_mass"].usual.down
 
 
 @pytest.mark.parametrize("field", [field.name for field in fields(EhaParameters)])

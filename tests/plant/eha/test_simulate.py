@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.eha.inject import abrupt, growing
+from faults.eha.inject import abrupt_fault, growing_fault
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, REDUCED, simulate
@@ -52,7 +52,7 @@ def test_the_record_states_its_plant_parameters_and_sensors() -> None:
 
 
 def test_an_abrupt_leak_changes_the_record_only_from_its_start() -> None:
-    record = simulate(LUMPED, CONSTANT, 1e-3, abrupt(RIG, LEAKING, at=1.5))
+    record = simulate(LUMPED, CONSTANT, 1e-3, abrupt_fault(RIG, LEAKING, at=1.5))
     healthy, leaking = (simulate(LUMPED, CONSTANT, 1e-3, p)["velocity_m_s"][-1] for p in (RIG, LEAKING))
     velocity = record["velocity_m_s"]
     np.testing.assert_array_equal(velocity[:1_501], simulate(LUMPED, CONSTANT, 1e-3, RIG)["velocity_m_s"][:1_501])
@@ -62,7 +62,7 @@ def test_an_abrupt_leak_changes_the_record_only_from_its_start() -> None:
 
 
 def test_a_growing_leak_slows_the_piston_steadily() -> None:
-    velocity = simulate(LUMPED, CONSTANT, 1e-3, growing(RIG, LEAKING, start=1.0, end=2.8))["velocity_m_s"]
+    velocity = simulate(LUMPED, CONSTANT, 1e-3, growing_fault(RIG, LEAKING, start=1.0, end=2.8))["velocity_m_s"]
     during = velocity[1_000:2_800:100]
     assert np.all(np.diff(during) < 0.0)
     steps = np.diff(during)[2:]

@@ -21,7 +21,7 @@ import scipy.io
 
 from experiments.command.logs import read_log
 from plant.errors import LogError, LogWarning
-from plant.log.checks import trusted
+from plant.log.checks import checked_log
 from plant.log.files import read_record
 from plant.log.notes import LogCode
 from tests.log_formats.written import SI, mdf4
@@ -67,7 +67,7 @@ from plant.log.files import read_record
 from plant.log.formats.detect import READERS, import_module
 for reader in READERS.values():
     import_module(reader.partition(":")[0])
-packed.ALWAYS = 1 << 20
+packed.ALWAYS_ALLOWED = 1 << 20
 
 def peak():
     return int(Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0])
@@ -188,7 +188,7 @@ def test_many_small_packed_vectors_are_refused_for_their_total_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     h5py = pytest.importorskip("h5py")
-    monkeypatch.setattr("plant.log.formats.packed.ALWAYS", 1 << 20)
+    monkeypatch.setattr("plant.log.formats.packed.ALWAYS_ALLOWED", 1 << 20)
     with h5py.File(tmp_path / "bomb.h5", "w") as file:
         for place in range(60):
             file.create_dataset(f"c{place}", data=np.zeros(100_000), compression="gzip")
@@ -208,9 +208,9 @@ def test_an_overlong_row_of_a_sheet_is_refused(tmp_path: Path, monkeypatch: pyte
 def test_the_unused_end_of_preallocated_arrays_is_left_out_with_a_note() -> None:
     ended = np.concatenate((np.ones(N), np.full(300, np.nan)))
     channels = {name: scale * ended for name, scale in (("motor_speed_rad_s", 9.0), ("velocity_m_s", 0.1))}
-    checked = trusted({"time_s": 1e-3 * np.arange(N + 300) * ended, **channels}, source="a.csv")
+    checked = checked_log({"time_s": 1e-3 * np.arange(N + 300) * ended, **channels}, source="a.csv")
     assert checked.notes[0].code == LogCode.END_LEFT_OUT
     assert len(checked.channels["velocity_m_s"]) == N
     channels["velocity_m_s"][-1] = 0.1  # now the end contains a measured value
     with pytest.raises(LogError, match="time_s is missing in 300 of 700 samples"):
-        trusted({"time_s": 1e-3 * np.arange(N + 300) * ended, **channels}, source="a.csv")
+        checked_log({"time_s": 1e-3 * np.arange(N + 300) * ended, **channels}, source="a.csv")

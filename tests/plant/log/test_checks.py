@@ -3,7 +3,7 @@ import pytest
 from numpy.typing import NDArray
 
 from plant.errors import LogError, NoChannelError
-from plant.log.checks import Checked, Clock, trusted
+from plant.log.checks import CheckedLog, Clock, checked_log
 from plant.log.notes import LogCode
 
 Values = NDArray[np.float64]
@@ -13,9 +13,9 @@ SPEED = 100.0 * np.sin(2.0 * np.pi * 2.0 * TIME)
 VELOCITY = 0.03 * np.sin(2.0 * np.pi * 2.0 * TIME)
 
 
-def check(time: Values = TIME, **changes: Values) -> Checked:
+def check(time: Values = TIME, **changes: Values) -> CheckedLog:
     log = {"time_s": time, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY, **changes}
-    return trusted(log, source="a.csv")
+    return checked_log(log, source="a.csv")
 
 
 def with_gaps(values: Values, *rows: int) -> Values:
@@ -100,7 +100,8 @@ def test_gaps_between_jittering_stamps_stay_gaps() -> None:
     keep = np.ones(N, dtype=bool)
     keep[[300, 301, 302, 700, 701]] = False
     time = (TIME + 1e-3 * np.random.default_rng(1).uniform(-0.2, 0.2, N))[keep]
-    checked = trusted({"time_s": time, "motor_speed_rad_s": SPEED[keep], "velocity_m_s": VELOCITY[keep]}, source="a")
+    log = {"time_s": time, "motor_speed_rad_s": SPEED[keep], "velocity_m_s": VELOCITY[keep]}
+    checked = checked_log(log, source="a")
     assert np.flatnonzero(np.isnan(checked.channels["velocity_m_s"])).tolist() == [300, 301, 302, 700, 701]
 
 
@@ -123,7 +124,8 @@ def test_gaps_between_rounded_stamps_stay_gaps() -> None:
     keep = np.ones(N, dtype=bool)
     keep[[300, 301]] = False
     time = np.round(np.arange(N)[keep] / 3000.0, 5)
-    checked = trusted({"time_s": time, "motor_speed_rad_s": SPEED[keep], "velocity_m_s": VELOCITY[keep]}, source="a")
+    log = {"time_s": time, "motor_speed_rad_s": SPEED[keep], "velocity_m_s": VELOCITY[keep]}
+    checked = checked_log(log, source="a")
     assert np.flatnonzero(np.isnan(checked.channels["velocity_m_s"])).tolist() == [300, 301]
 
 
@@ -152,7 +154,7 @@ def test_a_row_with_a_repeated_time_stamp_becomes_a_missing_sample() -> None:
 def test_duplicate_rows_are_removed_and_no_sample_is_missing(rows: NDArray[np.int64]) -> None:
     twice = np.sort(np.concatenate([np.arange(N), rows]))
     copied = {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
-    checked = trusted({name: values[twice] for name, values in copied.items()}, source="a.csv")
+    checked = checked_log({name: values[twice] for name, values in copied.items()}, source="a.csv")
     assert [note.code for note in checked.notes] == [LogCode.TIME_REPEATS]
     np.testing.assert_array_equal(checked.channels["velocity_m_s"], VELOCITY)
 
@@ -160,7 +162,7 @@ def test_duplicate_rows_are_removed_and_no_sample_is_missing(rows: NDArray[np.in
 def test_rows_absent_from_a_log_become_missing_samples_at_their_times() -> None:
     keep = np.ones(N, dtype=bool)
     keep[[100, 101, 600]] = False
-    checked = trusted(
+    checked = checked_log(
         {"time_s": TIME[keep], "motor_speed_rad_s": SPEED[keep], "velocity_m_s": VELOCITY[keep]},
         source="a.csv",
     )
@@ -181,7 +183,7 @@ def test_more_than_five_percent_left_out_is_refused() -> None:
     keep[100:151] = False
     log = {"time_s": TIME[keep], "motor_speed_rad_s": SPEED[keep], "velocity_m_s": VELOCITY[keep]}
     with pytest.raises(LogError, match="leaves out 51 of 1000 samples"):
-        trusted(log, source="a.csv")
+        checked_log(log, source="a.csv")
 
 
 def every_tenth(values: Values, first: int) -> Values:
@@ -249,7 +251,7 @@ def test_channels_with_different_time_stamps_are_resampled_to_those_of_the_faste
         "velocity_m_s": np.concatenate([VELOCITY, none]),
         "differential_pressure_pa": np.concatenate([nothing, ramp]),
     }
-    checked = trusted({name: values[rows] for name, values in log.items()}, source="a.csv")
+    checked = checked_log({name: values[rows] for name, values in log.items()}, source="a.csv")
     pressure = checked.channels["differential_pressure_pa"]
     np.testing.assert_array_equal(checked.channels["velocity_m_s"], VELOCITY)
     assert np.flatnonzero(np.isfinite(pressure)).tolist() == list(range(5, N, 10))
@@ -271,7 +273,7 @@ def test_a_clock_shift_of_less_than_a_sample_is_corrected_in_a_log_with_missing_
 def test_fewer_than_ten_samples_are_refused(count: int) -> None:
     part = {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
     with pytest.raises(LogError, match=f"at least 10 samples are needed, got {count}"):
-        trusted({name: values[:count] for name, values in part.items()}, source="a.csv")
+        checked_log({name: values[:count] for name, values in part.items()}, source="a.csv")
 
 
 @pytest.mark.parametrize("lost", ["time_s", "motor_speed_rad_s"])
@@ -279,12 +281,12 @@ def test_a_missing_required_column_is_named(lost: str) -> None:
     log = {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
     del log[lost]
     with pytest.raises(LogError, match=rf"a\.csv: column {lost} is missing; the log has {', '.join(log)}$"):
-        trusted(log, source="a.csv")
+        checked_log(log, source="a.csv")
 
 
 def test_a_log_with_neither_position_nor_velocity_is_refused() -> None:
     with pytest.raises(LogError, match="position_m or velocity_m_s is missing"):
-        trusted({"time_s": TIME, "motor_speed_rad_s": SPEED}, source="a.csv")
+        checked_log({"time_s": TIME, "motor_speed_rad_s": SPEED}, source="a.csv")
 
 
 def test_differential_pressure_is_derived_from_both_port_pressures() -> None:
@@ -301,9 +303,9 @@ def test_differential_pressure_is_derived_from_both_port_pressures() -> None:
 
 def test_the_clock_in_the_metadata_is_used_only_if_the_time_stamps_agree() -> None:
     log = {"time_s": 0.1 + TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
-    same = trusted(log, source="a.csv", clock=Clock(1e-3, 0.1))
+    same = checked_log(log, source="a.csv", clock=Clock(1e-3, 0.1))
     assert (same.sample_time, same.start_time) == (1e-3, 0.1)
-    other = trusted(log, source="a.csv", clock=Clock(2e-3, 0.1))
+    other = checked_log(log, source="a.csv", clock=Clock(2e-3, 0.1))
     assert other.sample_time == pytest.approx(1e-3, rel=1e-9)
 
 
@@ -315,16 +317,16 @@ def test_rows_without_a_time_are_left_out_up_to_five_percent() -> None:
         check(with_gaps(TIME, *range(60)))
     short = {"time_s": with_gaps(TIME[:10], 3), "motor_speed_rad_s": SPEED[:10], "velocity_m_s": VELOCITY[:10]}
     with pytest.raises(LogError, match="time_s is missing in 1 of 10 samples"):
-        trusted(short, source="a.csv")
+        checked_log(short, source="a.csv")
 
 
 def test_a_log_without_a_sufficiently_sampled_channel_beside_time_is_refused() -> None:
     with pytest.raises(NoChannelError, match="at least one channel is needed beside time_s"):
-        trusted({"time_s": TIME}, source="a.csv", required=())
+        checked_log({"time_s": TIME}, source="a.csv", required=())
     hardly = np.where(np.random.default_rng(1).random(N) < 0.5, SPEED, np.nan)
     with pytest.raises(LogError, match="no channel has 95 % of its samples"):
-        trusted({"time_s": TIME, "motor_speed_rad_s": hardly}, source="a.csv", required=())
-    kept = trusted(
+        checked_log({"time_s": TIME, "motor_speed_rad_s": hardly}, source="a.csv", required=())
+    kept = checked_log(
         {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY, "position_m": hardly * np.nan},
         source="a.csv",
     )

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from plant.log import any_columns
-from plant.log.columns import check_columns, listed, parse_columns, resolve_columns
+from plant.log.columns import check_columns, list_in_words, parse_columns, resolve_columns
 from plant.log.guess import NAMES, guess_by_name, hint_of, missing_channels, points_by_name
 from plant.log.headings import Heading, is_unit
-from plant.log.plausibility import LIMITS, implausible, require_measurable
+from plant.log.plausibility import LIMITS, implausibility_notes, require_measurable
 from plant.log.table import table_of
 from tests.edges import edge
 from tests.numbers import Numbers, or_refused
@@ -73,8 +73,8 @@ def channels_of_headings() -> dict[str, Any]:
         ],
         "missing": str(missing_channels(["time_s", "position_m or velocity_m_s"], headings[:4], "a")),
         "units": [is_unit(one) for one in ("mm", "kPa", "l/min", "foo", "[bar]", "9", "°C", "%", "m m", "kg*m/s^2")],
-        "listed": [listed([f"a{k}" for k in range(count)], 3) for count in (0, 2, 3, 4, 9)],
-        "a long name": listed(["x" * 50]),
+        "listed": [list_in_words([f"a{k}" for k in range(count)], 3) for count in (0, 2, 3, 4, 9)],
+        "a long name": list_in_words(["x" * 50]),
     }
 
 
@@ -131,7 +131,7 @@ def usual_sizes() -> dict[str, Any]:
     told: dict[str, Any] = {}
 
     def notes(sample_time: float = 1e-3, **channels: Any) -> list[str]:
-        return [f"{one.code} {one.data.get('channel', '')}" for one in implausible(sample_time, channels)]
+        return [f"{one.code} {one.data.get('channel', '')}" for one in implausibility_notes(sample_time, channels)]
 
     for name, limits in LIMITS.items():
         told[name] = [
@@ -141,7 +141,7 @@ def usual_sizes() -> dict[str, Any]:
         told[f"{name}, data"] = [
             dict(one.data)
             for size in (1e-9 * limits.least, 1e3 * limits.most)
-            for one in implausible(1e-3, {name: size * wave})
+            for one in implausibility_notes(1e-3, {name: size * wave})
         ]
     motion = {"position_m": 0.05 * wave, "velocity_m_s": 0.05 * 20.0 * np.cos(0.02 * np.arange(700.0))}
     told["position over velocity"] = [
@@ -216,8 +216,8 @@ def columns_of_anything() -> dict[str, Any]:
     def named(name: str) -> Any:
         return or_refused(
             lambda: {
-                "at": any_columns._named(headings, name, "a").position,
-                "factor": any_columns._named(headings, name, "a").factor,
+                "at": any_columns._column_named(headings, name, "a").position,
+                "factor": any_columns._column_named(headings, name, "a").factor,
             }
         )  # pyright: ignore[reportPrivateUsage]
 
@@ -237,16 +237,16 @@ def columns_of_anything() -> dict[str, Any]:
     )
     dates: Any = np.array(["2026-03-01T00:00:00", "NaT", "2026-03-01T00:00:02.5"], dtype="datetime64[ns]")
     dated = table_of("a", {"t": dates})
-    wanted = any_columns._wanted(table, headings, None, ["x", "position_m", "x"], "a")  # pyright: ignore[reportPrivateUsage]
+    wanted = any_columns._wanted_columns(table, headings, None, ["x", "position_m", "x"], "a")  # pyright: ignore[reportPrivateUsage]
     return {
         "named": {name: named(name) for name in ("x", "X", "position_m", "velocity_m_s", "noet", "zzz")},
         "time columns": [
             None if (one := any_columns._time_column([Heading(unit)])) is None else [one.factor, one.channel]
             for unit in units
         ],  # pyright: ignore[reportPrivateUsage]
-        "every": list(any_columns._every(table, headings, None)),  # pyright: ignore[reportPrivateUsage]
+        "every": list(any_columns._all_columns(table, headings, None)),  # pyright: ignore[reportPrivateUsage]
         "wanted": {name: values[:3] for name, values in wanted.items()},
-        "text": or_refused(lambda: any_columns._wanted(table, headings, None, ["note"], "a")),  # pyright: ignore[reportPrivateUsage]
+        "text": or_refused(lambda: any_columns._wanted_columns(table, headings, None, ["note"], "a")),  # pyright: ignore[reportPrivateUsage]
         "seconds": any_columns._seconds(
             dates, any_columns._time_column(list(dated.headings)) or any_columns.Column(0, "t", "time_s")
         ),  # pyright: ignore[reportPrivateUsage]

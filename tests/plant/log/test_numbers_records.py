@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.log.checks import trusted
+from plant.log.checks import checked_log
 from plant.log.inspection import clock_facts, inspect_table
 from plant.log.record import Record
 from plant.log.table import table_of
@@ -26,7 +26,7 @@ def logs_that_are_trusted() -> dict[str, Any]:
         columns |= more
 
         def made() -> Any:
-            found = trusted(columns, source="a.csv")
+            found = checked_log(columns, source="a.csv")
             return {"channels": list(found.channels), "sample time [s]": found.sample_time, "notes": told(found.notes)}
 
         return or_refused(made)
@@ -46,7 +46,7 @@ def logs_that_are_trusted() -> dict[str, Any]:
         "of ten": {
             str(count): or_refused(
                 lambda count=count: len(
-                    trusted(
+                    checked_log(
                         {
                             "time_s": T * np.arange(count),
                             "motor_speed_rad_s": np.arange(count) + 1.0,
@@ -61,12 +61,12 @@ def logs_that_are_trusted() -> dict[str, Any]:
         "chambers": log({}, **pressure),
         "pressure and chambers": log({}, differential_pressure_pa=2e5 * NOISE, **pressure),
         "infinite": log({}, position_m=np.where(TICKS == 7.0, np.inf, 0.0)),
-        "time alone": or_refused(lambda: trusted({"time_s": TICKS}, source="a", required=())),
-        "nothing": or_refused(lambda: trusted({}, source="a")),
+        "time alone": or_refused(lambda: checked_log({"time_s": TICKS}, source="a", required=())),
+        "nothing": or_refused(lambda: checked_log({}, source="a")),
         **{
             f"nine times of {count}": or_refused(
                 lambda count=count: (
-                    trusted(
+                    checked_log(
                         {
                             "time_s": np.where(np.arange(count) < count - 1, T * np.arange(count), np.nan),
                             "position_m": np.ones(count),

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from plant.errors import LogError
-from plant.log.columns import TRUTH
+from plant.log.columns import TRUTH_PREFIX
 from plant.log.notes import LogCode
-from plant.log.plausibility import implausible, require_measurable
+from plant.log.plausibility import implausibility_notes, require_measurable
 
 T = 1e-3
 TIME = T * np.arange(4000)
@@ -25,13 +25,13 @@ AT_ODDS = {LogCode.POSITION_AND_VELOCITY_UNITS, LogCode.TRAVEL_UNITS}
 
 
 def test_a_plausible_log_gives_no_note() -> None:
-    assert implausible(T, LOG) == []
+    assert implausibility_notes(T, LOG) == []
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
 @pytest.mark.parametrize("name", list(LOG))
 def test_a_channel_wrong_by_a_thousand_is_noticed(name: str, factor: float) -> None:
-    notes = implausible(T, {**LOG, name: factor * LOG[name]})
+    notes = implausibility_notes(T, {**LOG, name: factor * LOG[name]})
     assert notes
     assert {note.code for note in notes} <= OUT_OF_RANGE | AT_ODDS
     assert all(note.data["channel"] == name for note in notes if note.code in OUT_OF_RANGE)
@@ -41,27 +41,27 @@ def test_a_channel_wrong_by_a_thousand_is_noticed(name: str, factor: float) -> N
 @pytest.mark.parametrize("name", ["position_m", "velocity_m_s"])
 def test_a_unit_error_of_position_or_velocity_is_noticed_without_the_other_channel(name: str, factor: float) -> None:
     slipped = {"motor_speed_rad_s": SPEED, name: factor * LOG[name]}
-    (note,) = implausible(T, slipped)
+    (note,) = implausibility_notes(T, slipped)
     assert note.code in OUT_OF_RANGE | {LogCode.TRAVEL_UNITS}
     assert note.data["channel"] == name
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
 def test_a_sample_time_wrong_by_a_thousand_is_noticed(factor: float) -> None:
-    (note,) = implausible(factor * T, LOG)
+    (note,) = implausibility_notes(factor * T, LOG)
     assert note.code == (LogCode.SAMPLE_TIME_LONG if factor > 1.0 else LogCode.SAMPLE_TIME_SHORT)
     assert note.data["sample_time_s"] == factor * T
 
 
 @pytest.mark.parametrize("factor", [50.0, 0.02])
 def test_a_sample_time_within_bounds_that_contradicts_the_motion_is_noticed(factor: float) -> None:
-    (note,) = implausible(factor * T, LOG)
+    (note,) = implausibility_notes(factor * T, LOG)
     assert note.code == LogCode.POSITION_AND_VELOCITY_UNITS
     assert note.data["ratio"] == pytest.approx(1.0 / factor, rel=0.02)
 
 
 def test_a_note_gives_the_value_the_usual_limit_and_the_likely_unit_error() -> None:
-    (note,) = implausible(T, {**LOG, "position_m": 1e3 * LOG["position_m"]})
+    (note,) = implausibility_notes(T, {**LOG, "position_m": 1e3 * LOG["position_m"]})
     assert note.code == LogCode.CHANNEL_LARGE
     assert (note.data["channel"], note.data["limit"]) == ("position_m", 5.0)
     assert note.data["size"] == pytest.approx(12.73, abs=0.01)
@@ -75,39 +75,41 @@ def test_sensor_noise_on_a_stuck_piston_is_not_taken_for_a_unit_error(seed: int)
     noisy = 1e-3 * rng.standard_normal(len(TIME)) + 2e-4
     for velocity in (noisy, np.gradient(position, T)):
         stuck = {**LOG, "position_m": position, "velocity_m_s": velocity}
-        assert implausible(T, stuck) == []
+        assert implausibility_notes(T, stuck) == []
 
 
 def test_a_stuck_piston_measured_with_fine_resolution_is_not_taken_for_a_unit_error() -> None:
     position = 1e-8 * np.random.default_rng(2).standard_normal(len(TIME))
-    assert implausible(T, {"motor_speed_rad_s": SPEED, "position_m": position}) == []
+    assert implausibility_notes(T, {"motor_speed_rad_s": SPEED, "position_m": position}) == []
 
 
 def test_a_log_in_which_nothing_moves_says_so() -> None:
     still = np.zeros(len(TIME))
-    (note,) = implausible(T, {**LOG, "position_m": still, "velocity_m_s": still})
+    (note,) = implausibility_notes(T, {**LOG, "position_m": still, "velocity_m_s": still})
     assert note.code == LogCode.NOTHING_MOVES
     assert note.data["channels"] == "position_m and velocity_m_s"
-    (note,) = implausible(T, {**LOG, "motor_speed_rad_s": still})
+    (note,) = implausibility_notes(T, {**LOG, "motor_speed_rad_s": still})
     assert note.code == LogCode.SPEED_CONSTANT
-    (note,) = implausible(T, dict.fromkeys(LOG, still))
+    (note,) = implausibility_notes(T, dict.fromkeys(LOG, still))
     assert note.code == LogCode.NOTHING_MEASURED
 
 
 def test_missing_samples_do_not_hide_a_unit_error() -> None:
     position = 1e3 * LOG["position_m"] / 4.0
     position[100:150] = np.nan
-    (note,) = implausible(T, {**LOG, "position_m": position})
+    (note,) = implausibility_notes(T, {**LOG, "position_m": position})
     assert note.code == LogCode.POSITION_AND_VELOCITY_UNITS
     assert note.data["ratio"] == pytest.approx(250.0, rel=0.02)
 
 
 def test_motor_speed_alone_gives_no_note_on_units() -> None:
-    assert implausible(T, {"motor_speed_rad_s": SPEED}) == []
+    assert implausibility_notes(T, {"motor_speed_rad_s": SPEED}) == []
 
 
 def test_values_beyond_any_sensor_are_refused_but_not_missing_or_simulated_true_values() -> None:
-    require_measurable({"position_m": np.full(3, np.nan), f"{TRUTH}x": np.array([1e300]), "force_n": np.zeros(2)}, "a")
+    require_measurable(
+        {"position_m": np.full(3, np.nan), f"{TRUTH_PREFIX}x": np.array([1e300]), "force_n": np.zeros(2)}, "a"
+    )
     for size, said in (
         (1e16, r"reaches 1e\+16, no sensor gives more than"),
         (1e-31, "reaches only 1e-31, no sensor gives less"),

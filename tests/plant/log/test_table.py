@@ -28,7 +28,7 @@ def test_running_out_of_memory_is_refused_and_not_taken_for_a_text_column(
 
 def test_a_table_with_too_many_values_is_refused_after_its_first_column(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tables, "MOST_VALUES", 1000)
-    monkeypatch.setattr(tables, "FEW", 3)
+    monkeypatch.setattr(tables, "ALWAYS_HELD", 3)
     read: list[int] = []
 
     def values(place: int) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 from plant.errors import LogError, MissingColumnError
 from plant.log.notes import LogCode
 from plant.log.table import Table, table_of
-from plant.log.tables import gathered, resolve_tables
+from plant.log.tables import gather_channels, resolve_tables
 
 TIME = 0.01 * np.arange(50)
 NOON = np.datetime64("2026-03-01T12:00:00", "ns")
@@ -20,7 +20,7 @@ def table(label: str, more: Mapping[str, Any] | None = None, **columns: Any) -> 
 
 
 def of(*tables: Table, mapping: Mapping[str, str] | None = None, sample_time: float | None = None) -> Mapping[str, Any]:
-    found = gathered(tables, mapping, (), "log", sample_time)
+    found = gather_channels(tables, mapping, (), "log", sample_time)
     return {**found.columns, "began": found.began}
 
 
@@ -56,7 +56,7 @@ def test_the_refusal_of_two_tests_in_one_file_names_all_ambiguous_channels() -> 
 @pytest.mark.parametrize(("unit", "per_s"), [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("d", 1.0 / 86_400.0)])
 def test_a_time_without_unit_is_read_in_the_unit_that_makes_its_values_dates(unit: str, per_s: float) -> None:
     first = 46_085.5 if unit == "d" else 1_772_625_600.0 * per_s
-    found = gathered([table("rod", Time=first + per_s * TIME, position_m=TIME)], None, (), "log")
+    found = gather_channels([table("rod", Time=first + per_s * TIME, position_m=TIME)], None, (), "log")
     np.testing.assert_allclose(np.diff(found.columns["time_s"]), 0.01, rtol=1e-3)
     assert found.notes == (LogCode.TIME_IS_DATES.note(column="Time", unit=unit, began="2026-03-04T12:00:00"),)
 
@@ -134,4 +134,4 @@ def test_a_mapping_to_an_absent_column_of_a_group_or_to_another_dimension_is_ref
 
 def test_the_refusal_of_a_log_without_a_required_channel_names_it() -> None:
     with pytest.raises(LogError, match="motor_speed_rad_s"):
-        gathered([table("rod", time_s=TIME, position_m=TIME)], {}, ("motor_speed_rad_s",), "log")
+        gather_channels([table("rod", time_s=TIME, position_m=TIME)], {}, ("motor_speed_rad_s",), "log")

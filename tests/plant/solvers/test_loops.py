@@ -13,8 +13,8 @@ from plant.compiled.functions import Scalar, absolute
 from plant.solvers import adaptive_kernel, fixed_step_kernel, trajectory
 from plant.solvers.adaptive import MEANS, SAMPLES, STRAIGHT
 from plant.solvers.adaptive_kernel import compile_adaptive
-from plant.solvers.adaptive_loop import growth, run_controlled, within
-from plant.solvers.drive_pieces import smooth
+from plant.solvers.adaptive_loop import run_controlled, step_growth, step_within_piece
+from plant.solvers.drive_pieces import parabolic_piece
 from plant.solvers.fixed_step_kernel import compile_fixed_step
 from plant.solvers.fixed_step_loops import run_alone, run_side_by_side
 from plant.solvers.steps import rk4_step
@@ -160,18 +160,18 @@ def test_a_run_that_turns_nan_ends_and_does_not_affect_runs_beside_it(lost: tupl
 def test_a_piece_of_the_drive_extends_as_far_as_one_parabola_fits() -> None:
     line = np.concatenate([np.arange(10.0), np.full(5, 9.0)])
     rows = np.zeros((1, 1, 1))
-    assert smooth(line, rows, 0, 1e-3, STRAIGHT) == (9, 0.0, 1.0, 0.0)
-    end, lift, ramp, curvature = smooth(0.5 * np.arange(6.0) ** 2, rows, 0, 0.1, STRAIGHT)
+    assert parabolic_piece(line, rows, 0, 1e-3, STRAIGHT) == (9, 0.0, 1.0, 0.0)
+    end, lift, ramp, curvature = parabolic_piece(0.5 * np.arange(6.0) ** 2, rows, 0, 0.1, STRAIGHT)
     assert (end, lift, ramp, curvature) == (5, pytest.approx(1.0 / 12.0), 2.5, 1.0)
     changing = np.repeat(np.array([0.0, 1.0]), [4, 11])[:, None, None]
-    assert smooth(line, changing, 0, 1e-3, STRAIGHT)[0] == 4
+    assert parabolic_piece(line, changing, 0, 1e-3, STRAIGHT)[0] == 4
 
 
 def volumes(drive: np.ndarray, bend: float, bulge: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the samples at which the pieces of a drive end, and the integral of the drive up to each."""
     ends, sums, rows = [0], [0.0], np.zeros((1, 1, 1))
     while ends[-1] < len(drive) - 1:
-        end, lift, ramp, curvature = smooth(drive, rows, ends[-1], bend, bulge)
+        end, lift, ramp, curvature = parabolic_piece(drive, rows, ends[-1], bend, bulge)
         length = end - ends[-1]
         sums.append(sums[-1] + length * (lift + 0.5 * ramp * length - curvature * length**2 / 12.0))
         ends.append(end)
@@ -203,13 +203,13 @@ def test_a_piece_of_a_curve_ends_one_sample_before_a_corner() -> None:
 
 
 def test_a_step_ends_with_its_piece_or_leaves_enough_for_another_step() -> None:
-    assert within(3.0, 3.0, 20.0, 0.1) == 3.0
-    assert within(2.0, 3.0, 20.0, 0.1) == 1.5
-    assert within(1.0, 3.0, 20.0, 0.1) == 1.0
-    assert within(50.0, 99.0, 20.0, 0.1) == 20.0
-    assert within(3.0, 0.0, 20.0, 0.1) == 0.1
+    assert step_within_piece(3.0, 3.0, 20.0, 0.1) == 3.0
+    assert step_within_piece(2.0, 3.0, 20.0, 0.1) == 1.5
+    assert step_within_piece(1.0, 3.0, 20.0, 0.1) == 1.0
+    assert step_within_piece(50.0, 99.0, 20.0, 0.1) == 20.0
+    assert step_within_piece(3.0, 0.0, 20.0, 0.1) == 0.1
 
 
 def test_the_smaller_the_error_the_longer_the_next_step() -> None:
-    factors = [growth(error) for error in (0.0, 1e-3, 0.02, 0.1, 0.3, 0.8)]
+    factors = [step_growth(error) for error in (0.0, 1e-3, 0.02, 0.1, 0.3, 0.8)]
     assert factors == [4.0, 2.0, 1.6, 1.25, 1.0, 0.9]

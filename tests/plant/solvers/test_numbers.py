@@ -9,7 +9,7 @@ import pytest
 from plant.compiled.functions import Scalar, absolute
 from plant.errors import HydrostateError
 from plant.solvers.adaptive import STRAIGHT, ErrorControl, controlled_groups, controlled_run
-from plant.solvers.adaptive_loop import along, growth, same, smooth, within
+from plant.solvers.adaptive_loop import are_equal, drive_along_step, parabolic_piece, step_growth, step_within_piece
 from plant.solvers.block_means import block_means
 from plant.solvers.fixed_step_kernel import compile_fixed_step
 from plant.solvers.steps import parameter_row, rate_driven_step, rk4_step, ros2_step, solve_linear
@@ -114,7 +114,7 @@ def pieces_and_steps() -> dict[str, Any]:
     rows = np.zeros((1, 1, 1))
 
     def piece(drive: np.ndarray, begin: int = 0, bend: float = 1e-3) -> tuple[int, float, float, float]:
-        return smooth(drive, rows, begin, bend, STRAIGHT)
+        return parabolic_piece(drive, rows, begin, bend, STRAIGHT)
 
     curve = 0.2 * np.arange(14.0) ** 2 + 1e-3 * np.sin(np.arange(14.0))
     cubic = 0.01 * np.arange(14.0) ** 3
@@ -129,11 +129,11 @@ def pieces_and_steps() -> dict[str, Any]:
             lambda one: piece(np.where(np.arange(9) < 5, 0.0, one * (np.arange(9.0) - 4.0)))[0], 1e-6, 1.0
         ),
         "a straight bend from": edge(lambda one: piece(one * np.arange(9.0) ** 2)[0], 1e-6, 1.0),
-        "changing": [list(smooth(curve, changing, begin, 1.0, STRAIGHT)) for begin in (0, 7)],
+        "changing": [list(parabolic_piece(curve, changing, begin, 1.0, STRAIGHT)) for begin in (0, 7)],
         "the last": list(piece(curve, 12, 1.0)),
-        "same": [same(np.ones((2, 2)), np.array([[1.0, 1.0], [1.0, one]])) for one in (1.0, 1.0 + 1e-15)],
+        "same": [are_equal(np.ones((2, 2)), np.array([[1.0, 1.0], [1.0, one]])) for one in (1.0, 1.0 + 1e-15)],
         "within": [
-            within(*one)
+            step_within_piece(*one)
             for one in (
                 (3.0, 3.0, 20.0, 0.1),
                 (2.9999971, 3.0, 20.0, 0.1),
@@ -144,10 +144,14 @@ def pieces_and_steps() -> dict[str, Any]:
                 (3.0, 0.0, 20.0, 0.1),
             )
         ],
-        "along": [list(along(1.0, 0.5, 0.2, place, 6.0, size)) for place, size in ((0.0, 1.0), (2.5, 0.7), (5.0, 1.0))],
-        "growth": [growth(error) for error in (0.0, 1e-3, 0.02, 0.1, 0.3, 0.8)],
+        "along": [
+            list(drive_along_step(1.0, 0.5, 0.2, place, 6.0, size))
+            for place, size in ((0.0, 1.0), (2.5, 0.7), (5.0, 1.0))
+        ],
+        "growth": [step_growth(error) for error in (0.0, 1e-3, 0.02, 0.1, 0.3, 0.8)],
         "growth turns at": [
-            edge(growth, low, high) for low, high in ((1e-5, 5e-3), (5e-3, 0.02), (0.02, 0.1), (0.1, 0.3), (0.3, 0.9))
+            edge(step_growth, low, high)
+            for low, high in ((1e-5, 5e-3), (5e-3, 0.02), (0.02, 0.1), (0.1, 0.3), (0.3, 0.9))
         ],
     }
 

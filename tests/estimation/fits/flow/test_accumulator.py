@@ -13,7 +13,7 @@ from estimation.fits.flow.accumulator import (
     MOST_GAS,
     gas_contradicted,
     is_far_stiffer,
-    oil_taken,
+    oil_exchange,
     presumed_stiffness,
 )
 from estimation.fits.flow.fit import fit_flow
@@ -47,13 +47,13 @@ def test_a_stated_gas_volume_sets_the_presumed_stiffness_with_its_uncertainty() 
 
 def test_an_unstated_gas_volume_is_presumed_from_the_oil_that_the_accumulator_exchanges() -> None:
     value, spread = presumed_stiffness(PAPER, {})[STIFFNESS]
-    gas = np.array([LEAST_GAS, MOST_GAS]) * oil_taken(PAPER)
+    gas = np.array([LEAST_GAS, MOST_GAS]) * oil_exchange(PAPER)
     assert np.abs(np.log(value * gas / PAPER.accumulator_pressure)).max() < 2.0 * spread
 
 
 def test_the_accumulator_of_a_single_rod_also_exchanges_the_volume_of_its_rod() -> None:
     single = replace(PAPER, area_difference=0.2, stroke=0.3)
-    assert oil_taken(single) - oil_taken(PAPER) == pytest.approx(4.0 * 0.1 * single.piston_area * 0.3)
+    assert oil_exchange(single) - oil_exchange(PAPER) == pytest.approx(4.0 * 0.1 * single.piston_area * 0.3)
 
 
 def test_an_accumulator_is_far_stiffer_than_presumed_beyond_a_limit_in_deviations() -> None:

@@ -32,7 +32,7 @@ from estimation.fits.hypotheses import (
     ZERO_HIDDEN,
     Hypothesis,
 )
-from estimation.fits.hypothesis_search.fit_objections import DOUBTED, QUIET
+from estimation.fits.hypothesis_search.fit_objections import DOUBTED_CHI_SQUARE, QUIET
 from estimation.fits.hypothesis_search.not_excluded import OPEN_DELIVERY
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain
 from estimation.fits.hypothesis_search.wide_problem import widest_makeup
@@ -50,7 +50,7 @@ from tests.estimation.fits.test_numbers_wide import all_promise
 def test_residuals_above_sensor_noise_have_every_hypothesis_tested() -> None:
     """The gate would pass such a fit: bulk modulus of a single rod was 39 % too low in one."""
     plain, sound = seen(log(6.0)), made_fit(400.0, 2e8, 1e5)
-    doubted = replace(sound, chi_square=(0.5 * (DOUBTED + LARGEST_CHI_SQUARE),))
+    doubted = replace(sound, chi_square=(0.5 * (DOUBTED_CHI_SQUARE + LARGEST_CHI_SQUARE),))
     with all_promise(PredictedGain(0.0, 0.0, 2.0 * OPEN_DELIVERY)):
         asked, remarks = hypotheses_asked(plain, PAPER, doubted, doubted, loaded=False, moving=False)
         assert asked == HYPOTHESES

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from estimation.fits.flow.belief import likelier, nearly_explained
+from estimation.fits.flow.belief import likelier_of, nearly_explained
 from estimation.fits.hypothesis_search.explanation import Explanation
 from tests.estimation.fits.short_logs import made_fit
 
@@ -17,12 +17,12 @@ def explanation(name: str, cost: float) -> Explanation:
 def test_unlike_gauge_gains_are_accepted_only_if_no_other_explanation_is_as_likely() -> None:
     """Tested together with all others, they absorbed 1.8 rad/s of a speed offset of 2 rad/s."""
     offset, gauges = explanation("pressure_offset", 2585.0), explanation("pressure_sides", 2731.0)
-    assert likelier(offset, gauges) is offset
-    assert likelier(explanation("delivery", 2731.0), gauges) is not gauges
-    assert likelier(explanation("delivery", 2731.1), gauges) is gauges
-    assert likelier(None, gauges) is gauges
-    assert likelier(offset, None) is offset
-    assert likelier(None, None) is None
+    assert likelier_of(offset, gauges) is offset
+    assert likelier_of(explanation("delivery", 2731.0), gauges) is not gauges
+    assert likelier_of(explanation("delivery", 2731.1), gauges) is gauges
+    assert likelier_of(None, gauges) is gauges
+    assert likelier_of(offset, None) is offset
+    assert likelier_of(None, None) is None
 
 
 @pytest.mark.parametrize(("chi", "left"), [(1.1, 0.1), (9.0, 8.0), (12.0, None)])

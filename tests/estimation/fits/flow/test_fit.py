@@ -9,7 +9,7 @@ import pytest
 
 from estimation.eha.bulk_modulus import LEAST_SQUARES, estimate_bulk_modulus
 from estimation.fits.flow import fit as flow_fit
-from estimation.fits.flow.belief import told_by
+from estimation.fits.flow.belief import explanation_test
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import speed_gaps
 from estimation.fits.flow.misread import CorrectedLogs
@@ -69,7 +69,7 @@ def test_a_hypothesis_about_the_start_of_a_log_must_leave_only_noise_unless_it_i
     fit = made_fit(50.0, 2e8, 1e5, chi=chi)
     fit = replace(fit, values={**fit.values, **({"pressure_offset": 1e5} if offset else {})}, seen=10_000.0)
     plain: Any = SimpleNamespace(log=SimpleNamespace(passes_on=False), explains=lambda fit: fit.chi_square[0] < 1.44)
-    assert told_by(plain, begun=begun)(fit) is explained
+    assert explanation_test(plain, begun=begun)(fit) is explained
 
 
 @pytest.mark.slow

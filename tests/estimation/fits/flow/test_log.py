@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.eha.explanation_notes import lateness
+from estimation.eha.explanation_notes import total_delay
 from estimation.fits.flow.fit import fit_flow
-from estimation.fits.flow.log import _swept_share, carried, flow_log, speed_gaps, without_strays
+from estimation.fits.flow.log import _swept_share, flow_log, speed_gaps, with_random_walk, without_strays
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.problem import Problem
-from estimation.log_checks.measurement_noise import struck_variance
+from estimation.log_checks.measurement_noise import excited_noise_variance
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
@@ -93,7 +93,7 @@ def test_a_lagging_position_sensor_is_identified_and_bulk_modulus_is_right(condi
     assert fit.explanation is not None
     assert fit.explanation.names == ("position_late",)
     kept = np.exp(-1.0 / 3.0)  # share kept in each step of 1 ms: a slow signal is late by kept / (1 - kept) steps
-    assert lateness(fit.explanation, "position_m") == pytest.approx(1e-3 * kept / (1.0 - kept), abs=1e-4)
+    assert total_delay(fit.explanation, "position_m") == pytest.approx(1e-3 * kept / (1.0 - kept), abs=1e-4)
     value, std = fit.parameters["bulk_modulus"]
     assert value == pytest.approx(HEALTHY.bulk_modulus, abs=3.0 * std)
 
@@ -129,7 +129,7 @@ def test_passed_on_position_noise_scales_with_modulus_over_volume_and_decays_wit
 
     def passed(modulus: float, volume: float = 1.0, leakage: float = 1e-10, case: float = 0.0) -> float:
         values = {"bulk_modulus": modulus, "leakage_coefficient": leakage, "case_leakage": case}
-        return noise.passing({**values, "chamber_volume": volume * HEALTHY.chamber_volume})[0]
+        return noise.passed_noise({**values, "chamber_volume": volume * HEALTHY.chamber_volume})[0]
 
     assert passed(2e8, leakage=0.0) == pytest.approx(2e8 * noise.passed_on)
     assert passed(4e8, 2.0) == pytest.approx(passed(2e8))
@@ -181,15 +181,17 @@ def test_speed_noise_accumulates_in_stiff_oil_that_hardly_leaks() -> None:
     seen = flow_log(*_sound(record))
     found = {"bulk_modulus": 50.0 * true, "leakage_coefficient": HEALTHY.leakage_coefficient}
     stiff, stiffer = (
-        carried(seen, HEALTHY, {**found, "bulk_modulus": times * true}).noise[0] for times in (50.0, 100.0)
+        with_random_walk(seen, HEALTHY, {**found, "bulk_modulus": times * true}).noise[0] for times in (50.0, 100.0)
     )
     kept = 50.0 * true / HEALTHY.chamber_volume * HEALTHY.pump_displacement
-    noise = min(seen.drive_std[0] ** 2, struck_variance(seen.drives[:, 0]))
+    noise = min(seen.drive_std[0] ** 2, excited_noise_variance(seen.drives[:, 0]))
     assert stiff.walk == pytest.approx(kept**2 * noise * seen.sample_time)
     assert stiffer.walk == pytest.approx(4.0 * stiff.walk)
-    assert carried(seen, HEALTHY, {**found, "bulk_modulus": 1e3 * true}, stiffest=50.0 * true).noise[0] == stiff
+    assert (
+        with_random_walk(seen, HEALTHY, {**found, "bulk_modulus": 1e3 * true}, stiffest=50.0 * true).noise[0] == stiff
+    )
     assert replace(stiff, walk=0.0) == seen.noise[0]
-    assert carried(seen, HEALTHY, {**found, "leakage_coefficient": 1e4 * HEALTHY.leakage_coefficient}) is seen
+    assert with_random_walk(seen, HEALTHY, {**found, "leakage_coefficient": 1e4 * HEALTHY.leakage_coefficient}) is seen
 
 
 def test_speeds_missing_at_an_end_of_a_log_are_uncertain_by_half_the_adjacent_slope() -> None:

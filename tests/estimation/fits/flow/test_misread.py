@@ -70,7 +70,7 @@ def test_slips_are_tested_once_and_first_on_the_log_up_to_two_seconds_of_pump_mo
 
     monkeypatch.setattr(misread_module, "SLIPS", SLIPS[:1])
     monkeypatch.setattr(misread_module, "_rough_misfit", lambda *_: 1.0)
-    monkeypatch.setattr(misread_module, "_right_with", right_with)
+    monkeypatch.setattr(misread_module, "_fit_if_corrected", right_with)
     speed, position = np.ones(5000), np.zeros(5000)
     speed[:rests], position[:missing] = 0.0, np.nan
     record = Record(1e-3, {SPEED: speed, POSITION: position, PRESSURE: np.arange(5000.0)})
@@ -87,21 +87,21 @@ def test_a_log_that_is_fitted_again_is_tested_for_slips_again(monkeypatch: pytes
     plains = [SimpleNamespace(best=best, explains=lambda _: True) for best in ("kin", "foreign")]
     nothing: Any = None
     monkeypatch.setattr(flow_fit, "plain_fits", lambda *_: plains.pop(0))
-    monkeypatch.setattr(flow_fit, "stiffer", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "with_stiff_oil", lambda *_: None)
     monkeypatch.setattr(flow_fit, "with_implicit_steps", lambda *_: None)
-    monkeypatch.setattr(flow_fit, "by_course", lambda _, plain: plain)
+    monkeypatch.setattr(flow_fit, "with_motor_course", lambda _, plain: plain)
     monkeypatch.setattr(flow_fit, "with_open_turns", lambda _, plain: plain)
-    monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, *_: (plain, strange))
+    monkeypatch.setattr(flow_fit, "settled_offset", lambda plain, strange, *_: (plain, strange))
     monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY,), ()))
     monkeypatch.setattr(flow_fit, "_ask", lambda *_: ("a lower valley", ()))
-    monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: FitStart(RIG, 2e8))
+    monkeypatch.setattr(flow_fit, "_plain_start", lambda *_: FitStart(RIG, 2e8))
     corrected: Any = SimpleNamespace(
         logged=nothing,
         is_kin=lambda _, found: found == "kin",
         is_sound=lambda *_: True,
         misread=lambda _, found, **_named: found == "foreign" or None,
     )
-    answer = flow_fit._answered(corrected, FitStart(RIG, 2e8), nothing, nothing, Work())
+    answer = flow_fit._answer(corrected, FitStart(RIG, 2e8), nothing, nothing, Work())
     assert (answer.plain.best, answer.asked, plains) == ("foreign", (), [])
 
 
@@ -114,19 +114,19 @@ def test_slips_are_tested_before_every_hypothesis_except_a_pressure_offset(
     strange: Any = SimpleNamespace(names=(named,), fit="kin")
     nothing: Any = None
     monkeypatch.setattr(flow_fit, "plain_fits", lambda *_: plain)
-    monkeypatch.setattr(flow_fit, "stiffer", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "with_stiff_oil", lambda *_: None)
     monkeypatch.setattr(flow_fit, "with_implicit_steps", lambda *_: None)
-    monkeypatch.setattr(flow_fit, "by_course", lambda _, plain: plain)
+    monkeypatch.setattr(flow_fit, "with_motor_course", lambda _, plain: plain)
     monkeypatch.setattr(flow_fit, "with_open_turns", lambda _, plain: plain)
-    monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, *_: (plain, strange))
+    monkeypatch.setattr(flow_fit, "settled_offset", lambda plain, strange, *_: (plain, strange))
     monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY, OFFSET), ()))
     by_offset = named == OFFSET.name
     monkeypatch.setattr(flow_fit, "_ask", lambda _, asked, *__: (strange if by_offset or len(asked) > 1 else None, ()))
-    monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: None)
-    monkeypatch.setattr(flow_fit, "quieter", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "_plain_start", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "quieter_start", lambda *_: None)
     monkeypatch.setattr(CorrectedLogs, "is_kin", lambda _, __, found: found == "kin")
     monkeypatch.setattr(CorrectedLogs, "misread", lambda *_, **_named: True)
-    answer = flow_fit._answered(CorrectedLogs(nothing, RIG), FitStart(RIG, 2e8), nothing, nothing, Work())
+    answer = flow_fit._answer(CorrectedLogs(nothing, RIG), FitStart(RIG, 2e8), nothing, nothing, Work())
     assert (answer.strange is strange) == by_offset
 
 
@@ -161,7 +161,7 @@ def test_soft_oil_in_a_short_log_is_not_reported_as_a_misread_channel(softer: fl
 def test_a_fit_is_foreign_to_the_rig_if_its_oil_or_pump_losses_are_surely_out_of_range(
     times: float, std: float, lost: float, explained: bool, kin: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(CorrectedLogs, "_beyond", 0.0)
+    monkeypatch.setattr(CorrectedLogs, "_sliding_excess", 0.0)
     assert KIN < FOREIGN
     modulus = times * RIG.bulk_modulus
     values = {"bulk_modulus": modulus, "leakage_coefficient": 4e-12, "flow_bias": lost * RIG.flow_bias}
@@ -217,8 +217,10 @@ def test_two_slips_together_and_unit_factors_within_the_range_of_oils_are_identi
 @pytest.mark.usefixtures("_strange_rigs_are_searched_for")
 def test_slips_that_a_rough_search_refutes_are_not_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
     fitted: list[tuple[Slip, ...]] = []
-    whole = misread_module._right_with
-    monkeypatch.setattr(misread_module, "_right_with", lambda slips, *rest: fitted.append(slips) or whole(slips, *rest))
+    whole = misread_module._fit_if_corrected
+    monkeypatch.setattr(
+        misread_module, "_fit_if_corrected", lambda slips, *rest: fitted.append(slips) or whole(slips, *rest)
+    )
     read = log().replace(**{PRESSURE: -log()[PRESSURE]})
     assert not estimate_bulk_modulus(read, RIG).gate.passed
     assert [slips[0].factor for slips in fitted if slips[0].channel == PRESSURE] == [-1.0]
@@ -245,6 +247,6 @@ def test_among_equally_good_units_the_one_whose_pressure_suits_the_rigs_friction
     right = log()
     wrong = right.replace(**{PRESSURE: right[PRESSURE] * 1e5 / PSI})
     read = Logged(wrong, {PRESSURE: 1e6, POSITION: 1e-12, SPEED: 1e-2})
-    hopeful = misread_module._hopeful([(one,) for one in pressures], read, RIG)
+    hopeful = misread_module._hopeful_slips([(one,) for one in pressures], read, RIG)
     assert len(hopeful) == MOST_FITTED
     assert hopeful[0][0].said == "psi read as bar"

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits.flow.offset_beside import offset_settled
+from estimation.fits.flow.offset_beside import settled_offset
 from estimation.fits.flow.plain import FitStart, PlainFits
 from estimation.fits.greybox.pump_ripple import ShownOffset, Turning, with_ripple
-from estimation.fits.hypotheses import BEGUN, DELIVERY, ENCODER_ZERO, HYPOTHESES, OFFSET, Hypothesis
+from estimation.fits.hypotheses import BEGUN_UNDER_LOAD, DELIVERY, ENCODER_ZERO, HYPOTHESES, OFFSET, Hypothesis
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT, OFFSET_SETTLED, OFFSET_WORTH, told_offset
+from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT_GAIN, OFFSET_SETTLED, OFFSET_WORTH, offset_note
 from estimation.fits.hypothesis_search.speed_offset import MOST_SHARE
 from estimation.notes import RigCode
 from tests.estimation.fits.short_logs import PAPER, log, made_fit, seen
@@ -23,7 +23,7 @@ def told(offset: float) -> PlainFits:
     """Return plain fits with an offset of speed [rad/s] subtracted."""
     bare, fit = seen(log(0.2)), made_fit(900.0, 2e8, 1e5)
     turned = with_ripple(bare, (), offset)
-    notes = told_offset(offset, STD)
+    notes = offset_note(offset, STD)
     start = FitStart(PAPER, PAPER.bulk_modulus)
     return PlainFits(start, (), lambda _: [fit], bare, turned, [fit], lambda _: True, notes, (), Turning((), offset))
 
@@ -57,7 +57,7 @@ def test_the_log_is_explained_again_with_the_speed_offset_that_remains(
         assert raw - other.log.drives[:, 0] == pytest.approx(left)
         return again
 
-    found, strange = offset_settled(plain, first, HYPOTHESES, explained)
+    found, strange = settled_offset(plain, first, HYPOTHESES, explained)
     assert found.turning.offset == found.log.speed_offset == pytest.approx(left)
     assert strange is (first if left == taken else again)
     assert [note.code for note in found.teeth] == [RigCode.SPEED_OFFSET] * (left != 0.0)
@@ -65,23 +65,23 @@ def test_the_log_is_explained_again_with_the_speed_offset_that_remains(
 
 def test_the_speed_offset_is_kept_if_a_new_one_gains_less_than_predicted() -> None:
     plain, first = told(0.2), explanation(500.0, -0.2, 80.0)
-    for again in (None, explanation(501.0 - KEPT * 80.0), replace(explanation(100.0), names=("volume",))):
-        assert offset_settled(plain, first, HYPOTHESES, lambda *_, again=again: again) == (plain, first)
-    assert offset_settled(plain, None, (), lambda *_: None) == (plain, None)
+    for again in (None, explanation(501.0 - KEPT_GAIN * 80.0), replace(explanation(100.0), names=("volume",))):
+        assert settled_offset(plain, first, HYPOTHESES, lambda *_, again=again: again) == (plain, first)
+    assert settled_offset(plain, None, (), lambda *_: None) == (plain, None)
 
 
 def test_the_same_pair_of_hypotheses_is_tested_again_and_accepted_in_either_order() -> None:
     """The hypothesis for a log that begins in motion has the same name as the one for other logs."""
     plain = told(0.2)
-    first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, BEGUN.name))
+    first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, BEGUN_UNDER_LOAD.name))
     heard: list[Sequence[Hypothesis]] = []
 
     def explained(_: PlainFits, asked: Sequence[Hypothesis]) -> Explanation:
         heard.append(asked)
-        return replace(explanation(420.0), names=(BEGUN.name, OFFSET.name))
+        return replace(explanation(420.0), names=(BEGUN_UNDER_LOAD.name, OFFSET.name))
 
-    found, strange = offset_settled(plain, first, (BEGUN, OFFSET, ENCODER_ZERO), explained)
-    assert heard == [[BEGUN, OFFSET]]
+    found, strange = settled_offset(plain, first, (BEGUN_UNDER_LOAD, OFFSET, ENCODER_ZERO), explained)
+    assert heard == [[BEGUN_UNDER_LOAD, OFFSET]]
     assert (found.turning.offset, strange and strange.fit.cost) == (0.0, 420.0)
 
 
@@ -90,7 +90,7 @@ def test_with_another_offset_only_fewer_of_the_hypotheses_or_a_worn_pump_are_acc
     plain = told(0.2)
     first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, ENCODER_ZERO.name))
     fewer, others = explanation(400.0), replace(explanation(400.0), names=("volume",))
-    assert offset_settled(plain, first, HYPOTHESES, lambda *_: fewer)[1] is fewer
+    assert settled_offset(plain, first, HYPOTHESES, lambda *_: fewer)[1] is fewer
     worn = replace(explanation(400.0), names=(DELIVERY.name,))
-    assert offset_settled(plain, first, HYPOTHESES, lambda *_: worn)[1] is worn
-    assert offset_settled(plain, first, HYPOTHESES, lambda *_: others)[1] is first
+    assert settled_offset(plain, first, HYPOTHESES, lambda *_: worn)[1] is worn
+    assert settled_offset(plain, first, HYPOTHESES, lambda *_: others)[1] is first

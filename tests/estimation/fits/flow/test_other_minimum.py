@@ -15,8 +15,8 @@ from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
 from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.flow.log import flow_log, without_strays
-from estimation.fits.flow.other_minimum import lower_minimum, nearest
-from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.other_minimum import lower_end, lower_minimum
+from estimation.fits.flow.search import balance_fits, flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
@@ -43,7 +43,7 @@ def seen() -> GreyBoxLog:
 
 @cache
 def right() -> Sequence[GreyBoxFit]:
-    return balanced(seen(), PAPER, STARTS)
+    return balance_fits(seen(), PAPER, STARTS)
 
 
 def best() -> GreyBoxFit:
@@ -92,9 +92,9 @@ def test_no_lower_minimum_is_sought_in_a_log_with_gaps() -> None:
 
 def test_a_search_that_is_given_a_lower_minimum_ends_there(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = best()  # fitted before the search is patched, as other tests use it too
-    monkeypatch.setattr("estimation.fits.flow.search._finished", unmoved)
-    lost = balanced(seen(), PAPER, STARTS)
-    led = balanced(seen(), PAPER, STARTS, {**sound.values, "bulk_modulus": 1.001 * sound.values["bulk_modulus"]})
+    monkeypatch.setattr("estimation.fits.flow.search._final_optimum", unmoved)
+    lost = balance_fits(seen(), PAPER, STARTS)
+    led = balance_fits(seen(), PAPER, STARTS, {**sound.values, "bulk_modulus": 1.001 * sound.values["bulk_modulus"]})
     assert min(fit.cost for fit in lost) > sound.cost + 1.0
     assert min(fit.cost for fit in led) == pytest.approx(sound.cost, abs=0.5)  # fitted without cracking pressures
 
@@ -118,7 +118,7 @@ def test_a_failed_search_restarts_from_one_that_lost_its_leakage_with_leakage_re
         else problem.at(MASS_FLOW_FORM.theta(known))
     )
     bounds = flow_bounds(MASS_FLOW_FORM, [far.theta], seen())
-    point = nearest((problem, far, bounds), (problem, ended, bounds), STARTS[0])
+    point = lower_end((problem, far, bounds), (problem, ended, bounds), STARTS[0])
     values = MASS_FLOW_FORM.values(point.theta)
     assert (point is not far) == lost
     assert values["leakage_coefficient"] > 1e-13
@@ -160,7 +160,7 @@ def test_a_hypothesis_is_accepted_only_if_it_gains_over_the_plain_form_in_its_mi
 
     fit = replace(best(), cost=best().cost + cost)
     explanation = Explanation(("port_a_drains",), found(), {}, (fit,), (), 1e6)
-    monkeypatch.setattr(plain_flow, "balanced", lost)
+    monkeypatch.setattr(plain_flow, "balance_fits", lost)
     monkeypatch.setattr(flow_fit, "hypotheses_asked", asked)
     monkeypatch.setattr(flow_fit, "explain", lambda *_, **__: explanation)
     answer = flow_fit.fit_flow(log(1.0), PAPER, PAPER.bulk_modulus)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from estimation.fits.flow.plain import FitStart, fills_within_a_step, quieter
+from estimation.fits.flow.plain import FitStart, fills_within_a_step, quieter_start
 from plant.eha.model import EhaParameters
 
 START = FitStart(EhaParameters(), 2e8)
@@ -29,8 +29,8 @@ def test_a_log_is_fitted_again_if_its_noise_was_that_of_far_stiffer_oil(heard: f
         log=SimpleNamespace(noise=(SimpleNamespace(variance=1e8, walk=walk),), sample_time=1e-3, block=5e-3),
     )
     strange: Any = SimpleNamespace(values={"bulk_modulus": 2e8})
-    start = quieter(plain, strange)
+    start = quieter_start(plain, strange)
     assert (start is not None) == again
     assert start is None or start.stiffest == 2e8
     plain.start = replace(START, stiffest=2e8)
-    assert quieter(plain, strange) is None
+    assert quieter_start(plain, strange) is None

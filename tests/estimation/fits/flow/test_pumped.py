@@ -7,7 +7,7 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.fits.flow.log import flow_log
-from estimation.fits.flow.pumped import pumped_evenly_at
+from estimation.fits.flow.pumped import with_pump_correction_at
 from estimation.fits.greybox.block_averages import block_means
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.pump_ripple import Ripple, with_ripple
@@ -56,7 +56,7 @@ def test_straight_lines_between_means_pump_the_same_volume_as_the_motor(bias: fl
 def test_a_fitted_flow_bias_replaces_that_of_the_rig_file() -> None:
     found = {"flow_bias": 6.0 * P.flow_bias}
     wanted = seen(SAMPLE, replace(P, **found)).drives
-    np.testing.assert_allclose(pumped_evenly_at(seen(SAMPLE), P, found).drives, wanted, atol=1e-12)
+    np.testing.assert_allclose(with_pump_correction_at(seen(SAMPLE), P, found).drives, wanted, atol=1e-12)
     assert np.std(wanted - seen(SAMPLE).drives) > 1e-8
 
 
@@ -64,7 +64,7 @@ def test_ripple_added_to_mean_speeds_is_not_cancelled_by_corrected_positions() -
     """`logged_at_5_kHz`, validation 25301: ripple of 2.7 % gained 3 of a predicted 36, and the log was refused."""
     found, means = {"flow_bias": 6.0 * P.flow_bias}, seen(SAMPLE)
     rippled = with_ripple(means, [Ripple(12, 0.1, 0.0)])
-    moved = (pumped_evenly_at(one, P, found).drives[:, 1] - one.drives[:, 1] for one in (rippled, means))
+    moved = (with_pump_correction_at(one, P, found).drives[:, 1] - one.drives[:, 1] for one in (rippled, means))
     more = np.subtract(*moved)
     speed = rippled.drives[:, 0] - means.drives[:, 0]
     teeth = (
@@ -75,4 +75,4 @@ def test_ripple_added_to_mean_speeds_is_not_cancelled_by_corrected_positions() -
 
 def test_a_log_that_is_not_averaged_is_unchanged() -> None:
     assert np.all(drives(1e-3)[:, 1] == 0.0)
-    assert np.all(pumped_evenly_at(seen(1e-3), P, {"flow_bias": 6.0 * P.flow_bias}).drives[:, 1] == 0.0)
+    assert np.all(with_pump_correction_at(seen(1e-3), P, {"flow_bias": 6.0 * P.flow_bias}).drives[:, 1] == 0.0)

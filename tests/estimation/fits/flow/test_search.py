@@ -10,10 +10,10 @@ from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log
 from estimation.fits.flow.other_minimum import Found
-from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.search import balance_fits, flow_starts
 from estimation.fits.flow.wide_valves import outruns_pump
 from estimation.fits.greybox.descent import Point
-from estimation.fits.greybox.fit import GreyBoxFit, concluded, roughly
+from estimation.fits.greybox.fit import GreyBoxFit, coarse_optimum, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
@@ -23,7 +23,7 @@ from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import MASS_FLOW_FORM
-from experiments.open_benchmark.logger import PLAIN, Logger
+from experiments.open_benchmark.logger import PLAIN_CHANNELS, Logger
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import TICK, run
 from faults.conditions import CONDITIONS, parameters_for
@@ -56,9 +56,9 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def counted(problem: object, guesses: Sequence[object], *others: object, **more: object) -> object:
         counts.append(len(guesses))
-        return roughly(problem, guesses, *others, **more)  # pyright: ignore[reportArgumentType] -- as it came
+        return coarse_optimum(problem, guesses, *others, **more)  # pyright: ignore[reportArgumentType] -- as it came
 
-    monkeypatch.setattr(rough_search, "roughly", counted)
+    monkeypatch.setattr(rough_search, "coarse_optimum", counted)
     return counts
 
 
@@ -67,10 +67,10 @@ def test_a_search_from_the_likeliest_guess_alone_finds_the_fit_of_one_from_every
     condition: str, tried: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = seen(recorded(condition))
-    quick = balanced(log, HEALTHY, STARTS)
+    quick = balance_fits(log, HEALTHY, STARTS)
     assert max(tried) == 1
     monkeypatch.setattr(rough_search, "_explains", lambda _: False)
-    whole = balanced(log, HEALTHY, STARTS)
+    whole = balance_fits(log, HEALTHY, STARTS)
     assert max(tried) > len(STARTS)
     assert len(quick) == len(whole)
     for one, other in zip(quick, whole, strict=True):
@@ -91,10 +91,10 @@ def test_valve_values_of_the_mass_balance_save_model_runs_of_the_volume_balance(
 
     evaluated = Problem.at
     monkeypatch.setattr(Problem, "at", counted)
-    led = balanced(log, HEALTHY, STARTS)
+    led = balance_fits(log, HEALTHY, STARTS)
     spared = len(runs)
     monkeypatch.setattr(flow_search, "VALVES", ())
-    alone = balanced(log, HEALTHY, STARTS)
+    alone = balance_fits(log, HEALTHY, STARTS)
     assert spared < len(runs) - spared
     for one, other in zip(led, alone, strict=True):
         assert one.cost < other.cost + 0.02
@@ -109,14 +109,16 @@ def test_cracking_pressures_are_fitted_in_a_log_with_missing_speeds() -> None:
     speed[int(np.argmax(np.abs(np.diff(speed))))] = np.nan
     gapped = seen(record.replace(motor_speed_rad_s=speed))
     assert gapped.gaps.size
-    likeliest = min(balanced(gapped, HEALTHY, STARTS), key=lambda fit: fit.cost)
+    likeliest = min(balance_fits(gapped, HEALTHY, STARTS), key=lambda fit: fit.cost)
     assert set(CRACKS) <= likeliest.values.keys()
 
 
 def test_a_log_that_no_guess_explains_is_searched_from_every_start(tried: list[int]) -> None:
     record = recorded("normal")
     drift = np.linspace(0.0, 3e5, len(record))
-    balanced(seen(record.replace(differential_pressure_pa=record["differential_pressure_pa"] + drift)), HEALTHY, STARTS)
+    balance_fits(
+        seen(record.replace(differential_pressure_pa=record["differential_pressure_pa"] + drift)), HEALTHY, STARTS
+    )
     assert max(tried) > len(STARTS)
 
 
@@ -126,12 +128,12 @@ def test_a_guess_that_leads_into_a_wrong_valley_is_not_followed_over_the_whole_l
     rng = np.random.default_rng(1)
     drive = make_drive("multisine", 6.0, 1e-3, HEALTHY, rng)
     log = seen(simulate(LUMPED, drive, 1e-3, HEALTHY, sensors=BENCH, rng=rng))
-    quick = balanced(log, HEALTHY, STARTS)
+    quick = balance_fits(log, HEALTHY, STARTS)
     assert tried == [len(STARTS), 1, 1]
     tried.clear()
-    guess = rough_search._guess  # pyright: ignore[reportPrivateUsage]
-    monkeypatch.setattr(rough_search, "_guess", lambda *given: (guess(*given)[0], True))
-    followed = balanced(log, HEALTHY, STARTS)
+    guess = rough_search._optimum_from_guess  # pyright: ignore[reportPrivateUsage]
+    monkeypatch.setattr(rough_search, "_optimum_from_guess", lambda *given: (guess(*given)[0], True))
+    followed = balance_fits(log, HEALTHY, STARTS)
     assert tried == [1, 1, 1, len(STARTS) + 1, 1, 1]
     for one, other in zip(quick, followed, strict=True):
         assert one.values == pytest.approx(other.values)
@@ -142,7 +144,7 @@ def test_a_log_that_rests_for_long_before_it_moves_is_explained_by_the_plain_for
     rng, p = np.random.default_rng(0), parameters_for(CONDITIONS["minor_leakage"])
     strokes = [np.repeat([share, 0.0], 1000) for share in (0.5, -0.5, 0.9, -0.9)]
     drive = p.rated_speed * np.concatenate([np.zeros(6000), *strokes])
-    fits = balanced(seen(simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)), HEALTHY, STARTS)
+    fits = balance_fits(seen(simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)), HEALTHY, STARTS)
     likeliest = min(fits, key=lambda fit: fit.cost)
     assert likeliest.chi_square[0] < 1.1
     assert likeliest.values["bulk_modulus"] == pytest.approx(p.bulk_modulus, rel=0.01)
@@ -157,7 +159,7 @@ def test_a_balance_far_behind_one_that_leaves_noise_alone_is_given_up(
         return [volume, replace(mass, point=replace(mass.point, cost=volume.point.cost + behind))]
 
     monkeypatch.setattr(flow_search, "rough_optima", left_behind)
-    fits = balanced(seen(recorded("normal")), HEALTHY, STARTS)
+    fits = balance_fits(seen(recorded("normal")), HEALTHY, STARTS)
     assert len(fits) == forms
 
 
@@ -173,15 +175,15 @@ def test_reported_fits_use_short_steps_even_if_less_drain_was_found_with_long_on
 
     def recording(problem: Problem, point: Point, *, asked: bool, **given: Any) -> GreyBoxFit:
         told.extend([int(problem.log.steps.sum())] * asked)
-        return concluded(problem, point, asked=asked, **given)
+        return fit_at_solution(problem, point, asked=asked, **given)
 
     for name, stand_in in (
         ("_one_sided", lambda _: True),
         ("_with_less_drain", drained_less),
-        ("concluded", recording),
+        ("fit_at_solution", recording),
     ):
         monkeypatch.setattr(flow_search, name, stand_in)
-    balanced(log, HEALTHY, STARTS)
+    balance_fits(log, HEALTHY, STARTS)
     assert set(told) == {int(log.steps.sum())}
 
 
@@ -190,7 +192,7 @@ def test_less_drain_is_searched_for_only_if_the_log_determines_the_drain(
     monkeypatch: pytest.MonkeyPatch, deviation: float, asked: bool
 ) -> None:
     """A lumped plant has no make-up valve that a drain could open, yet half of its search was spent on less drain."""
-    fit = by_mass(balanced(seen(recorded("normal")), HEALTHY, STARTS))
+    fit = by_mass(balance_fits(seen(recorded("normal")), HEALTHY, STARTS))
     problem, ways = FreedProblem.of(fit.model, seen(recorded("normal"))), list[Array]()
     point, along = problem.at(fit.theta), np.eye(len(fit.theta))[fit.model.unknowns.index("case_leakage")]
     spread = float(along @ np.linalg.inv(point.gram) @ along)
@@ -212,14 +214,14 @@ def by_mass(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
 
 def test_the_predicted_gain_of_a_worn_pump_depends_on_the_balance_of_the_plain_fit() -> None:
     log = seen(recorded("minor_friction", 10.0, 2e-3))
-    plain = by_mass(balanced(log, HEALTHY, STARTS)).values
+    plain = by_mass(balance_fits(log, HEALTHY, STARTS)).values
     assert predicted_gain(log, HEALTHY, plain, DELIVERY, by_mass=True)[0] < 10.0
     assert predicted_gain(log, HEALTHY, plain, DELIVERY, by_mass=False)[0] > 100.0
 
 
 def test_gains_predicted_together_equal_those_predicted_one_by_one() -> None:
     log = seen(recorded("minor_friction", 10.0, 2e-3))
-    plain = balanced(log, HEALTHY, STARTS)[0].values
+    plain = balance_fits(log, HEALTHY, STARTS)[0].values
     together = predicted_gains(log, HEALTHY, plain, (DELIVERY, ENCODER_ZERO))
     for one, told in zip((DELIVERY, ENCODER_ZERO), together, strict=True):
         assert tuple(told) == pytest.approx(tuple(predicted_gain(log, HEALTHY, plain, one)), rel=1e-4)
@@ -227,7 +229,7 @@ def test_gains_predicted_together_equal_those_predicted_one_by_one() -> None:
 
 def test_slopes_of_the_fit_predict_the_same_gains_as_slopes_computed_anew() -> None:
     log = seen(recorded("minor_friction"))
-    fit = by_mass(balanced(log, HEALTHY, STARTS))
+    fit = by_mass(balance_fits(log, HEALTHY, STARTS))
     slopes = dict(zip(fit.model.unknowns, fit.slopes.T, strict=True))
     anew, known = (
         predicted_gains(log, HEALTHY, fit.values, (DELIVERY, ENCODER_ZERO), by_mass=True, slopes=one)
@@ -245,8 +247,8 @@ def test_make_up_valves_with_different_cracking_pressures_do_not_bias_bulk_modul
     course[:, 0] = np.repeat(rng.choice((-1.0, 1.0), 60) * rng.uniform(60.0, 125.0, 60), 100)
     course[:, [1, 2, 4]] = 1.0
     log = Logger().log(run(machine, course), rng)
-    record = Record(1e-3, {name: log[name].to_numpy() for name in PLAIN})
-    fit = by_mass(balanced(seen(record), HEALTHY, STARTS))
+    record = Record(1e-3, {name: log[name].to_numpy() for name in PLAIN_CHANNELS})
+    fit = by_mass(balance_fits(seen(record), HEALTHY, STARTS))
     assert fit.values["crack_a"] - fit.values["crack_b"] == pytest.approx(3e3, abs=1e3)
     assert abs(fit.values["bulk_modulus"] - machine.bulk_modulus) < 2.0 * fit.std["bulk_modulus"]
     assert fit.std["bulk_modulus"] < 2e-3 * machine.bulk_modulus
@@ -260,8 +262,8 @@ def pulled(load: float) -> Record:
     course[:, 0] = HEALTHY.rated_speed
     course[len(course) // 2 :, 0] = -0.5 * HEALTHY.rated_speed
     course[:, [1, 2, 4]] = 1.0
-    logged = Logger(channels=PLAIN).log(run(machine, course), rng)
-    return Record(1e-3, {name: logged[name].to_numpy() for name in PLAIN})
+    logged = Logger(channels=PLAIN_CHANNELS).log(run(machine, course), rng)
+    return Record(1e-3, {name: logged[name].to_numpy() for name in PLAIN_CHANNELS})
 
 
 def test_make_up_valves_act_as_orifices_if_a_load_pulls_the_piston_ahead_of_the_pump(
@@ -270,12 +272,12 @@ def test_make_up_valves_act_as_orifices_if_a_load_pulls_the_piston_ahead_of_the_
     free, loaded = seen(pulled(0.0)), seen(pulled(1.5e3))
     assert not outruns_pump(free, HEALTHY)
     assert outruns_pump(loaded, HEALTHY)
-    assert all("makeup_bend" not in fit.values for fit in balanced(free, HEALTHY, STARTS))
-    bent = min(balanced(loaded, HEALTHY, STARTS), key=lambda fit: fit.cost)
+    assert all("makeup_bend" not in fit.values for fit in balance_fits(free, HEALTHY, STARTS))
+    bent = min(balance_fits(loaded, HEALTHY, STARTS), key=lambda fit: fit.cost)
     assert bent.values["makeup_bend"] > 1e-5
     assert bent.values["bulk_modulus"] == pytest.approx(Machine().bulk_modulus, rel=0.004)
     monkeypatch.setattr(flow_search, "opens_wide", lambda *_: False)
-    assert min(fit.cost for fit in balanced(loaded, HEALTHY, STARTS)) > bent.cost + 30.0
+    assert min(fit.cost for fit in balance_fits(loaded, HEALTHY, STARTS)) > bent.cost + 30.0
 
 
 def test_make_up_valves_that_act_as_orifices_are_not_mistaken_for_a_sensor_fault() -> None:

@@ -11,8 +11,8 @@ from estimation.fits.flow import shut_valves as of_valves
 from estimation.fits.flow.log import without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.plain import FitStart, Logged, plain_fits
-from estimation.fits.flow.shut_valves import BEHIND, shut_valves
-from estimation.fits.hypothesis_search.explain import WORTH
+from estimation.fits.flow.shut_valves import LEAST_LEAD, shut_valves
+from estimation.fits.hypothesis_search.explain import REQUIRED_GAIN
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import HELD_FLOW_FORM
 from estimation.notes import RigCode
@@ -30,18 +30,18 @@ def fits(makeup: float = 1e-29, std: float = np.inf, held: float = np.inf) -> An
 @pytest.mark.parametrize(
     ("plain", "traits", "sound", "said"),
     [
-        (fits(), AT_REST, 1.1 * WORTH, [RigCode.MAKEUP_BLOCKED]),
-        (fits(), AT_REST, 0.9 * WORTH, [RigCode.MAKEUP_UNSEEN]),  # the log does not decide
-        (fits(std=900.0), AT_REST, 1.1 * WORTH, []),
-        (fits(makeup=1e-8), AT_REST, 1.1 * WORTH, [RigCode.MAKEUP_UNSEEN]),
-        (fits(held=100.0 + 0.9 * BEHIND), AT_REST, 1.1 * WORTH, []),  # a lumped plant has no make-up valves
-        (fits(), LogTraits(moving=True), 1.1 * WORTH, []),
+        (fits(), AT_REST, 1.1 * REQUIRED_GAIN, [RigCode.MAKEUP_BLOCKED]),
+        (fits(), AT_REST, 0.9 * REQUIRED_GAIN, [RigCode.MAKEUP_UNSEEN]),  # the log does not decide
+        (fits(std=900.0), AT_REST, 1.1 * REQUIRED_GAIN, []),
+        (fits(makeup=1e-8), AT_REST, 1.1 * REQUIRED_GAIN, [RigCode.MAKEUP_UNSEEN]),
+        (fits(held=100.0 + 0.9 * LEAST_LEAD), AT_REST, 1.1 * REQUIRED_GAIN, []),  # a lumped plant has no make-up valves
+        (fits(), LogTraits(moving=True), 1.1 * REQUIRED_GAIN, []),
     ],
 )
 def test_missing_make_up_flow_is_a_stuck_valve_only_if_the_log_contradicts_sound_valves(
     plain: Any, traits: LogTraits, sound: float, said: list[RigCode], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(of_valves, "cost_of_sound_ones", lambda *_: sound)
+    monkeypatch.setattr(of_valves, "cost_of_sound_valves", lambda *_: sound)
     notes = shut_valves(plain, traits)
     assert [note.code for note in notes] == said
 
@@ -49,4 +49,4 @@ def test_missing_make_up_flow_is_a_stuck_valve_only_if_the_log_contradicts_sound
 def test_searches_with_sound_valves_explain_a_sound_log_as_well_as_its_fit() -> None:
     record, variances = without_strays(log(2.0))
     plain = plain_fits(Logged(record, variances), FitStart(WORN, WORN.bulk_modulus))
-    assert of_valves.cost_of_sound_ones(plain, plain.best, plain.best.values[of_valves.MAKEUP]) < 1.0
+    assert of_valves.cost_of_sound_valves(plain, plain.best, plain.best.values[of_valves.MAKEUP]) < 1.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.flow.plain import Logged
-from estimation.fits.flow.slips import PAIRS, SLIPS, Slip, set_right
+from estimation.fits.flow.slips import PAIRS, SLIPS, Slip, with_slips_corrected
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from plant.log.record import Record
 
@@ -20,7 +20,7 @@ LOGGED = Logged(
 
 
 def test_two_slips_are_corrected_together_with_their_noise_variances() -> None:
-    right = set_right([slip(SPEED, "wrong sign"), slip(PRESSURE, "psi read as kPa")], LOGGED)
+    right = with_slips_corrected([slip(SPEED, "wrong sign"), slip(PRESSURE, "psi read as kPa")], LOGGED)
     assert right is not None
     assert list(right.record[SPEED]) == [0.0, -1.0, -2.0, -3.0]
     assert right.record[PRESSURE] == pytest.approx(6.894757)
@@ -29,11 +29,11 @@ def test_two_slips_are_corrected_together_with_their_noise_variances() -> None:
 
 def test_a_channel_in_the_place_of_another_brings_its_noise_variance_and_must_be_logged() -> None:
     misplaced = [slip(POSITION, VELOCITY)]
-    right = set_right(misplaced, LOGGED)
+    right = with_slips_corrected(misplaced, LOGGED)
     assert right is not None
     assert right.variances[POSITION] == 4.0
     assert list(right.record[POSITION]) == list(LOGGED.record[VELOCITY])
-    assert set_right(misplaced, Logged(LOGGED.record.replace(**{VELOCITY: None}), LOGGED.variances)) is None
+    assert with_slips_corrected(misplaced, Logged(LOGGED.record.replace(**{VELOCITY: None}), LOGGED.variances)) is None
 
 
 def test_pairs_of_slips_are_in_two_channels_and_not_two_wrong_signs() -> None:

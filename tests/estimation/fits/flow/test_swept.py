@@ -5,7 +5,7 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.fits.flow.log import flow_log
-from estimation.fits.flow.swept import swept_evenly
+from estimation.fits.flow.swept import with_sweep_correction
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
@@ -23,7 +23,7 @@ def seen(values: dict[str, float]) -> Array:
     }
     record = Record(SAMPLE, channels)
     log = flow_log(record, P, {}, dict.fromkeys(channels, 1e-12))
-    return swept_evenly(log, P, values).drives[:, 1]
+    return with_sweep_correction(log, P, values).drives[:, 1]
 
 
 def emptied(position: Array) -> Array:

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from estimation.eha.rig_share import fitted_responses
-from estimation.fits.flow.told_volume import RATIO, bound_told, is_told, ratio_doubt
+from estimation.fits.flow.told_volume import RATIO_ENTRIES, determines_volume, explained_bound, ratio_doubt
 from estimation.fits.hypotheses import VOLUME
-from plant.eha.doubts import DOUBTS, PRESSURE_GAIN
+from plant.eha.doubts import DEFAULT_UNCERTAINTIES, PRESSURE_GAIN
 
 SLOPES = {"pump_displacement": {"bulk_modulus": 4e9}, "chamber_volume": {"bulk_modulus": 2e8}}
 
@@ -20,13 +20,13 @@ def explained(*names: str, deviation: float = 1e-3, std: float = 1e7, slopes: An
 
 def test_the_bound_of_a_log_that_shows_chamber_volume_is_that_with_a_known_volume() -> None:
     known: Any = SimpleNamespace(values={"bulk_modulus": 2e8}, std={"bulk_modulus": 1e5})
-    assert bound_told(explained(VOLUME.name), known) == pytest.approx(5e-4)
-    assert bound_told(explained("encoder_zero"), known) == pytest.approx(0.05)
-    assert not is_told(None)
+    assert explained_bound(explained(VOLUME.name), known) == pytest.approx(5e-4)
+    assert explained_bound(explained("encoder_zero"), known) == pytest.approx(0.05)
+    assert not determines_volume(None)
 
 
 def test_the_remaining_doubt_of_displacement_over_area_is_in_the_interval() -> None:
-    usual = {name: DOUBTS[name].usual.up for name in RATIO}
+    usual = {name: DEFAULT_UNCERTAINTIES[name].usual.up for name in RATIO_ENTRIES}
     assert ratio_doubt(explained(VOLUME.name), usual) == pytest.approx(20.0 * 1e-3)
     for file in (usual, {"pump_displacement": 0.1}, {"piston_area": 0.02}):
         doubt = sum(one**2 for one in file.values()) ** 0.5

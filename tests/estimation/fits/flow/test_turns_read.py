@@ -9,8 +9,8 @@ import pytest
 
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
-from estimation.fits.flow.asked_hypotheses import worth_in
-from estimation.fits.flow.turns_read import turned_beside, with_turns_read
+from estimation.fits.flow.asked_hypotheses import wanted_gain_at_turns
+from estimation.fits.flow.turns_read import turn_beyond_line, with_turns_read
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.intersample_doubt import IntersampleDoubt
 from estimation.fits.greybox.log import GreyBoxLog
@@ -40,7 +40,7 @@ def off(sample_time: float, lag: float) -> tuple[float, float]:
     speed, angle = turned(time, lag)
     logged = speed + np.random.default_rng(1).normal(0.0, 0.05, len(time))
     straight = np.diff(angle, prepend=0.0) - np.append(0.0, 0.5 * sample_time * (speed[1:] + speed[:-1]))
-    read = straight - turned_beside(logged, sample_time, 0.05)
+    read = straight - turn_beyond_line(logged, sample_time, 0.05)
     return float(np.linalg.norm(straight)), float(np.linalg.norm(read))
 
 
@@ -60,7 +60,7 @@ def test_a_turn_that_another_command_follows_at_once_is_left_as_it_is() -> None:
     time = np.arange(0.0, 4.5, 0.01)
     hurried = np.sort(np.append(COMMANDS, COMMANDS[5] + 0.012))
     speed, _ = turned(time, 4e-3, hurried)
-    beside, at = turned_beside(speed, 0.01, 1e-3), int(COMMANDS[5] / 0.01)
+    beside, at = turn_beyond_line(speed, 0.01, 1e-3), int(COMMANDS[5] / 0.01)
     assert np.any(beside)
     assert not np.any(beside[at - 2 : at + 8])
 
@@ -88,11 +88,11 @@ def test_the_gain_required_in_a_slow_log_grows_with_its_turns_and_its_residuals(
     """A gain of 76 at nine turns wrongly showed a pump that compresses its oil, with leakage 66 % low."""
     log = seen(slow())
     turning = replace(log, course=IntersampleDoubt(np.where(np.arange(len(log.drives)) % 30 < 2, 1e6, 0.0)))
-    assert worth_in(log) == 10.0
-    assert worth_in(turning) == pytest.approx(10.0 * turning.passes)
-    assert turning.passes > 10.0
-    assert worth_in(turning, 0.25) == pytest.approx(2.5 * turning.passes)
-    assert worth_in(turning, 1.1) == worth_in(turning)
+    assert wanted_gain_at_turns(log) == 10.0
+    assert wanted_gain_at_turns(turning) == pytest.approx(10.0 * turning.turn_count)
+    assert turning.turn_count > 10.0
+    assert wanted_gain_at_turns(turning, 0.25) == pytest.approx(2.5 * turning.turn_count)
+    assert wanted_gain_at_turns(turning, 1.1) == wanted_gain_at_turns(turning)
 
 
 @pytest.mark.parametrize("gains", [True, False])
@@ -112,7 +112,7 @@ def test_a_hypothesis_is_accepted_only_if_it_also_gains_with_turns_read(
             (PUMP_COMPRESSES.name,), values, {}, (replace(sound, cost=100.0 if gains else 395.0),), (), 1e6
         )
 
-    monkeypatch.setattr(plain_flow, "balanced", fitted)
+    monkeypatch.setattr(plain_flow, "balance_fits", fitted)
     monkeypatch.setattr(plain_flow, "with_course", lambda log, fitted, *_, **__: (fitted(log), log)[1])
     monkeypatch.setattr(flow_fit, "hypotheses_asked", lambda *_, **__: ((PUMP_COMPRESSES,), ()))
     monkeypatch.setattr(flow_fit, "explain", explain)
@@ -127,4 +127,4 @@ def test_a_hypothesis_is_accepted_only_if_it_also_gains_with_turns_read(
 
 def test_a_turn_that_the_next_samples_reverse_is_not_read() -> None:
     rises = [0.0, 0.0, 100.0, 50.0, 25.0, 12.5, *4 * [0.0], 100.0, -50.0, -25.0, -12.0, *4 * [0.0]]
-    assert not turned_beside(np.cumsum(rises), 0.01, 0.01)[9:].any()
+    assert not turn_beyond_line(np.cumsum(rises), 0.01, 0.01)[9:].any()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.flow.fit import fit_flow
-from estimation.fits.greybox.block_averages import averaged
+from estimation.fits.greybox.block_averages import averaged_log
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -31,7 +31,7 @@ def fast(samples: int = 100) -> GreyBoxLog:
 
 
 def test_averages_keep_straight_lines_and_reduce_noise() -> None:
-    log = averaged(fast(), 2.5e-4)
+    log = averaged_log(fast(), 2.5e-4)
     time = log.sample_time * np.arange(len(log.drives))
     assert log.sample_time == pytest.approx(5.0 * SAMPLE)
     np.testing.assert_allclose(log.drives, np.column_stack([3.0 + 2.0 * time, -time]), atol=1e-12)
@@ -44,14 +44,14 @@ def test_averages_keep_straight_lines_and_reduce_noise() -> None:
 
 def test_a_log_at_5_khz_is_averaged_by_threes() -> None:
     """An even count has no middle sample, so such a log was not averaged, and 20 s of it were tested for nothing."""
-    log = averaged(replace(fast(), sample_time=2e-4), 1.0)
+    log = averaged_log(replace(fast(), sample_time=2e-4), 1.0)
     assert log.sample_time == pytest.approx(6e-4)
 
 
 def test_a_block_with_a_sample_missing_is_missing() -> None:
     log = fast()
     log.measured[50] = np.nan
-    assert np.flatnonzero(np.isnan(averaged(log, 1.0).measured[:, 0])).tolist() == [0, 10]
+    assert np.flatnonzero(np.isnan(averaged_log(log, 1.0).measured[:, 0])).tolist() == [0, 10]
 
 
 @pytest.mark.parametrize("case", ["slow", "gaps", "every second sample missing", "every tenth sample alone there"])
@@ -66,7 +66,7 @@ def test_a_log_that_would_lose_information_is_not_averaged(case: str) -> None:
             log.measured[::2] = np.nan
         case _:
             log.measured[np.arange(len(log.measured)) % 10 != 0] = np.nan
-    assert averaged(log, 1.0) is log
+    assert averaged_log(log, 1.0) is log
 
 
 def test_bulk_modulus_of_a_fast_log_is_that_of_the_plant() -> None:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits.greybox.chance import alike_by_chance, largest_chi_square
-from estimation.fits.greybox.fit import concluded, explained
+from estimation.fits.greybox.chance import correlation_by_chance, largest_chi_square
+from estimation.fits.greybox.fit import explains_log, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.hypothesis_search.fit_objections import fit_explains, fit_explains_all
 from estimation.log_checks.measurement_noise import measurement_variances
@@ -28,7 +28,7 @@ def test_few_short_logs_of_pure_noise_exceed_the_limits_of_the_gate() -> None:
     assert np.sum(np.array(left) > 1.2) > 40
     assert np.sum(np.array(left) > largest_chi_square(ROWS)) < 30
     assert np.sum(np.array(alike) > 0.1) > 80
-    assert np.sum(np.array(alike) > alike_by_chance(ROWS)) < 10
+    assert np.sum(np.array(alike) > correlation_by_chance(ROWS)) < 10
 
 
 @pytest.mark.parametrize(("chi", "correlated"), [(1.3, 0.0), (1.0, 0.14), (1.0, -0.14)])
@@ -52,7 +52,7 @@ def test_a_search_in_a_short_log_ends_once_its_residuals_are_within_chance() -> 
     point = one.at(usual(one))
     for share, ends in ((0.99, True), (1.01, False)):
         cost = 0.5 * share * largest_chi_square(one.blocks) * one.blocks
-        assert explained(one, replace(point, cost=cost)) == ends
+        assert explains_log(one, replace(point, cost=cost)) == ends
     assert largest_chi_square(one.blocks) > 1.3
 
 
@@ -61,5 +61,5 @@ def test_a_fit_counts_only_the_residuals_of_logged_samples() -> None:
     pressure = record[PRESSURE].copy()
     pressure[::4] = np.nan
     one = FreedProblem.of(FLOW_FORM, seen(record.replace(**{PRESSURE: pressure})))
-    fit = concluded(one, one.at(usual(one)), disturbed=False)
+    fit = fit_at_solution(one, one.at(usual(one)), disturbed=False)
     assert fit.seen == np.count_nonzero(np.isfinite(pressure))

@@ -1,6 +1,6 @@
 import numpy as np
 
-from estimation.fits.greybox.descent import Point, descend, descend_together, remembered
+from estimation.fits.greybox.descent import Point, cached_cost, descend, descend_together
 
 FAR = np.full(3, 10.0)
 
@@ -56,7 +56,7 @@ def test_a_second_search_from_the_same_start_evaluates_only_new_points() -> None
         tried.append(x)
         return bowl(x)
 
-    at, start = remembered(counted), np.array([-5.0, 4.0, 1.5])
+    at, start = cached_cost(counted), np.array([-5.0, 4.0, 1.5])
     short = descend(at, start, 2, (-FAR, FAR), 1e-12, radius=1.0)
     assert len(tried) == 2
     long = descend(at, start, 5, (-FAR, FAR), 1e-12, radius=1.0)

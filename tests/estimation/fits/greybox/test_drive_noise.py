@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox import drive_noise, freed_problem
-from estimation.fits.greybox.drive_noise import drive_covariance, moved_by_drives
+from estimation.fits.greybox.drive_noise import drive_covariance, effect_of_drive_noise
 from estimation.models.flow import MASS_FLOW_FORM
 from tests.estimation.fits.short_logs import problem, usual
 
@@ -29,7 +29,7 @@ def test_a_run_without_noise_takes_no_kernel_of_its_own(monkeypatch: pytest.Monk
     bread = np.asarray(np.linalg.inv(slopes.T @ slopes + np.eye(len(theta))), dtype=np.float64)
     given = drive_covariance(one, theta, bread, slopes, one.coarse.residuals(theta))
     monkeypatch.setattr(
-        freed_problem, "_by_itself", lambda *_: pytest.fail("this kernel would be compiled for one run")
+        freed_problem, "_run_alone", lambda *_: pytest.fail("this kernel would be compiled for one run")
     )
     found = drive_covariance(one.on(one.log), theta, bread, slopes)
     np.testing.assert_allclose(found, given, rtol=1e-6, atol=1e-6 * float(np.max(given)))
@@ -42,6 +42,6 @@ def test_the_effect_of_drive_noise_on_one_balance_serves_for_another() -> None:
     bread = np.asarray(np.linalg.inv(slopes.T @ slopes + np.eye(len(theta))), dtype=np.float64)
     own, shared = (
         np.diag(drive_covariance(other, theta, bread, slopes, moved=moved))
-        for moved in (None, moved_by_drives(one, usual(one)))
+        for moved in (None, effect_of_drive_noise(one, usual(one)))
     )
     np.testing.assert_allclose(shared, own, rtol=0.1)

@@ -48,7 +48,7 @@ def test_a_speed_turns_if_its_second_difference_exceeds_noise() -> None:
 
 @pytest.mark.parametrize(("turned", "passes"), [([0.0, 5.0, 5.0, 0.01, 0.01, 3.0, 3.0], 2.0), ([0.0, 0.1], 1.0)])
 def test_a_turn_between_two_samples_counts_once_if_it_exceeds_noise(turned: list[float], passes: float) -> None:
-    assert IntersampleDoubt(np.array(turned)).passes(0.2) == pytest.approx(passes, rel=0.15)
+    assert IntersampleDoubt(np.array(turned)).turn_count(0.2) == pytest.approx(passes, rel=0.15)
 
 
 def test_the_variance_of_a_block_sums_those_of_its_samples() -> None:
@@ -88,8 +88,8 @@ def test_bulk_modulus_of_a_log_of_200_hz_is_within_its_interval(seed: int) -> No
 
 def test_cost_differences_between_balances_count_less_in_a_slow_log() -> None:
     slow, fast = (fitted(rate, 0)[1] for rate in (200, 1000))
-    assert fast == fit.SURER
-    assert slow > 5.0 * fit.SURER
+    assert fast == fit.BALANCE_TEMPER
+    assert slow > 5.0 * fit.BALANCE_TEMPER
 
 
 def test_a_steady_curvature_of_speed_is_not_a_turn() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.intersample_doubt import IntersampleDoubt
-from estimation.fits.greybox.intersample_noise import likeliest, restricted
+from estimation.fits.greybox.intersample_noise import likeliest_noise, restricted_likelihood_noise
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
 from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
@@ -35,7 +35,7 @@ def test_lasting_and_passing_effects_of_turns_are_distinguished(staying: float, 
     beside = rng.standard_normal(samples) * course.beside(samples, 1) ** 0.5
     log.measured[:, 0] = walked + beside + 5e3 * rng.standard_normal(samples)
     problem = FreedProblem(replace(FLOW_FORM, unknowns=(), linear=()), log, (), {})
-    assert likeliest(problem, np.empty(0), course) == pytest.approx((staying, passing, 1.0), rel=0.6, abs=0.01)
+    assert likeliest_noise(problem, np.empty(0), course) == pytest.approx((staying, passing, 1.0), rel=0.6, abs=0.01)
 
 
 def test_the_share_of_few_turns_that_unknowns_absorb_is_included() -> None:
@@ -46,8 +46,8 @@ def test_the_share_of_few_turns_that_unknowns_absorb_is_included() -> None:
     for _ in range(8):
         made = np.cumsum(0.1 * np.sqrt(walk) * rng.standard_normal(samples)) + 5e3 * rng.standard_normal(samples)
         left = made - columns @ (columns.T @ made)
-        found.append(restricted(left, columns, 25e6, walk, np.zeros(samples))[0])
-        without.append(restricted(left, columns[:, :0], 25e6, walk, np.zeros(samples))[0])
+        found.append(restricted_likelihood_noise(left, columns, 25e6, walk, np.zeros(samples))[0])
+        without.append(restricted_likelihood_noise(left, columns[:, :0], 25e6, walk, np.zeros(samples))[0])
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(0.1, rel=0.3)
     assert np.sqrt(np.mean(np.square(without))) < 0.75 * np.sqrt(np.mean(np.square(found)))
 
@@ -60,10 +60,15 @@ def test_effects_of_turns_that_leak_off_are_distinguished_from_lasting_ones() ->
         leaking[k] = kept * leaking[k - 1] + 0.1 * gained[k] ** 0.5 * rng.standard_normal()
     noise, none = OutputNoise(25e6), np.zeros((samples, 0))
     left = leaking + 5e3 * rng.standard_normal(samples)
-    assert restricted(left, none, 25e6, gained, np.zeros(samples), kept)[0] == pytest.approx(0.1, rel=0.5)
+    assert restricted_likelihood_noise(left, none, 25e6, gained, np.zeros(samples), kept)[0] == pytest.approx(
+        0.1, rel=0.5
+    )
     log = replace(still(samples, 5e3), measured=left[:, None], noise=(noise,))
     form = replace(FLOW_FORM, unknowns=(), linear=())
-    assert likeliest(FreedProblem(form, log, (), {}), np.empty(0), IntersampleDoubt(gained**0.5, kept=kept))[2] == kept
+    assert (
+        likeliest_noise(FreedProblem(form, log, (), {}), np.empty(0), IntersampleDoubt(gained**0.5, kept=kept))[2]
+        == kept
+    )
     alike = dict[float, float]()
     for each in (1.0, kept):
         course = IntersampleDoubt(gained**0.5, 0.1, 0.0, each)

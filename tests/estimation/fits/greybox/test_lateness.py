@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from estimation.eha.explanation_notes import notes_of, set_right
+from estimation.eha.explanation_notes import corrected_log, notes_of
 from estimation.fits.flow.fit import fit_flow
-from estimation.fits.greybox.lateness import LEAST_LATE, most_late
+from estimation.fits.greybox.lateness import LEAST_LATE, latest_channel
 from estimation.fits.hypotheses import LATEST
 from estimation.log_checks.clean import clean_log
 from estimation.notes import RigCode
@@ -14,10 +14,10 @@ from tests.estimation.fits.strange_logs import HEALTHY, SPEED, explained, log
 
 def test_the_latest_channel_is_the_one_that_gains_most_if_its_delay_is_plausible() -> None:
     late = {"motor_speed_rad_s": (-3e-3, 12.0), "position_m": (1e-3, 9.0)}
-    assert most_late(late) == ("motor_speed_rad_s", -3e-3, 12.0)
-    assert most_late({}) == ("", 0.0, 0.0)
+    assert latest_channel(late) == ("motor_speed_rad_s", -3e-3, 12.0)
+    assert latest_channel({}) == ("", 0.0, 0.0)
     for behind, gain in ((0.9 * LEAST_LATE, 0.0), (1.1 * LEAST_LATE, 30.0), (-0.9 * LATEST, 30.0), (1.1 * LATEST, 0.0)):
-        assert most_late({"position_m": (behind, 30.0)}) == ("position_m", behind, gain)
+        assert latest_channel({"position_m": (behind, 30.0)}) == ("position_m", behind, gain)
 
 
 def test_a_speed_ahead_of_position_and_pressure_is_identified_and_shifted_back() -> None:
@@ -29,7 +29,7 @@ def test_a_speed_ahead_of_position_and_pressure_is_identified_and_shifted_back()
     (note,) = notes_of(found, HEALTHY)
     assert note.code is RigCode.INPUT_EARLY
     assert note.data["early_ms"] == pytest.approx(3.0, abs=0.1)
-    back = set_right(clean_log(given, HEALTHY), found).record[SPEED]
+    back = corrected_log(clean_log(given, HEALTHY), found).record[SPEED]
     assert np.std((back - record[SPEED])[:-3]) < 0.1 * np.std(ahead - record[SPEED])
 
 

@@ -24,7 +24,7 @@ def spread(errors: Array, lost: float, samples: int, every: int = 1) -> float:
 @pytest.mark.parametrize("samples", [1, 5])
 @pytest.mark.parametrize("lost", [0.03, 0.3, 1.0, 4.0])
 def test_the_predicted_deviation_of_means_of_leaking_white_noise_is_right(lost: float, samples: int) -> None:
-    told, _ = white_noise(samples).kept(lost)
+    told, _ = white_noise(samples).remaining_noise(lost)
     assert spread(RNG.standard_normal(200_000), lost, samples) == pytest.approx(told, rel=0.03)
 
 
@@ -32,9 +32,9 @@ def test_the_predicted_deviation_of_means_of_leaking_white_noise_is_right(lost: 
 @pytest.mark.parametrize("lost", [0.03, 0.13, 1.0])
 def test_leakage_removes_less_noise_from_the_means_of_a_thinned_output(lost: float, every: int) -> None:
     """For a thinned pressure of a small chamber 55 % of the encoder's noise was predicted, and 90 % remain."""
-    told, _ = white_noise(24, every).kept(lost)
+    told, _ = white_noise(24, every).remaining_noise(lost)
     assert spread(RNG.standard_normal(400_000), lost, 24, every) == pytest.approx(told, rel=0.04)
-    assert told > 1.05 * white_noise(24).kept(lost)[0]
+    assert told > 1.05 * white_noise(24).remaining_noise(lost)[0]
 
 
 def read(per_sample: float, blur: float) -> tuple[Array, Array, LeakedNoise]:
@@ -51,14 +51,14 @@ def test_encoder_errors_are_correlated_at_a_steady_speed(lost: float) -> None:
     """At 8.99 steps per sample each error is nearly the one before; white noise would be half as large or less."""
     errors, _, told = read(8.99, 0.0)
     found = spread(errors, lost, SAMPLES)
-    assert told.kept(lost)[0] == pytest.approx(found, rel=0.3)
-    assert white_noise(SAMPLES).kept(lost)[0] < 0.85 * found
+    assert told.remaining_noise(lost)[0] == pytest.approx(found, rel=0.3)
+    assert white_noise(SAMPLES).remaining_noise(lost)[0] < 0.85 * found
 
 
 def test_errors_of_an_encoder_with_a_flickering_reading_are_white() -> None:
     errors, _, told = read(8.99, 0.6)
-    assert told.kept(0.3)[0] == pytest.approx(spread(errors, 0.3, SAMPLES), rel=0.08)
-    assert told.kept(0.3)[0] == pytest.approx(white_noise(SAMPLES).kept(0.3)[0], rel=0.05)
+    assert told.remaining_noise(0.3)[0] == pytest.approx(spread(errors, 0.3, SAMPLES), rel=0.08)
+    assert told.remaining_noise(0.3)[0] == pytest.approx(white_noise(SAMPLES).remaining_noise(0.3)[0], rel=0.05)
 
 
 def test_uncorrelated_errors_count_as_white_noise_in_means_of_samples() -> None:
@@ -66,24 +66,24 @@ def test_uncorrelated_errors_count_as_white_noise_in_means_of_samples() -> None:
     _, course, _ = read(8.99, 0.6)
     position = course + STEP * RNG.standard_normal(len(course))
     of_means = encoder_noise(position, course, STEP**2, 5, SAMPLES // 5)
-    assert of_means.kept(0.3) == pytest.approx(white_noise(SAMPLES // 5).kept(0.3), rel=1e-3)
+    assert of_means.remaining_noise(0.3) == pytest.approx(white_noise(SAMPLES // 5).remaining_noise(0.3), rel=1e-3)
 
 
 @pytest.mark.parametrize("told", [white_noise(5), read(8.99, 0.0)[2]], ids=["white", "alike"])
 @pytest.mark.parametrize("lost", [1e-5, 0.2, 3.0, 600.0, 1e6])
 def test_the_slope_of_leaked_noise_is_that_of_its_logarithm(lost: float, told: LeakedNoise) -> None:
-    above, below = (math.log(told.kept(lost * factor)[0]) for factor in (1.001, 1.0 / 1.001))
-    assert told.kept(lost)[1] == pytest.approx((above - below) / (2.0 * math.log(1.001)), abs=1e-4)
+    above, below = (math.log(told.remaining_noise(lost * factor)[0]) for factor in (1.001, 1.0 / 1.001))
+    assert told.remaining_noise(lost)[1] == pytest.approx((above - below) / (2.0 * math.log(1.001)), abs=1e-4)
 
 
 def test_all_noise_is_kept_without_leakage() -> None:
-    assert white_noise(5).kept(0.0) == pytest.approx((1.0, 0.0), abs=1e-5)
+    assert white_noise(5).remaining_noise(0.0) == pytest.approx((1.0, 0.0), abs=1e-5)
 
 
 def test_encoder_noise_in_a_short_or_resting_log_is_taken_as_white() -> None:
     for position in (np.zeros(5000), STEP * np.arange(20.0)):
         told = encoder_noise(position, position, STEP**2, 1, SAMPLES)
-        assert told.kept(0.3) == white_noise(SAMPLES).kept(0.3)
+        assert told.remaining_noise(0.3) == white_noise(SAMPLES).remaining_noise(0.3)
 
 
 def test_missing_samples_do_not_hide_the_correlation_of_encoder_errors() -> None:
@@ -92,4 +92,4 @@ def test_missing_samples_do_not_hide_the_correlation_of_encoder_errors() -> None
     position = course + errors
     position[5000:5050] = np.nan
     holed = encoder_noise(position, 2.0 * course, STEP**2 / 12.0, 1, SAMPLES)
-    assert holed.kept(0.3)[0] == pytest.approx(told.kept(0.3)[0], rel=0.05)
+    assert holed.remaining_noise(0.3)[0] == pytest.approx(told.remaining_noise(0.3)[0], rel=0.05)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from estimation.fits.greybox.normal_loops import fill_differences, fill_weighed
-from estimation.fits.greybox.problem import OUTLIER, STRAIGHT, weighed
+from estimation.fits.greybox.normal_loops import fill_differences, fill_quadratic
+from estimation.fits.greybox.problem import OUTLIER, STRAIGHT, quadratic
 
 RNG = np.random.default_rng(3)
 ERRORS = RNG.normal(0.0, 2.5, (2, 40))
@@ -20,7 +20,7 @@ def test_differences_are_taken_from_the_first_lane_and_spare_lanes_are_ignored(f
     np.testing.assert_allclose(slopes, SLOPES, rtol=1e-11, atol=1e-11)
 
 
-@pytest.mark.parametrize("fill", [fill_weighed, fill_weighed.__wrapped__])
+@pytest.mark.parametrize("fill", [fill_quadratic, fill_quadratic.__wrapped__])
 def test_a_residual_beyond_the_limit_counts_linearly(fill: object) -> None:
     errors = np.array([1.0, -2.0 * OUTLIER])
     squares, pulling, bent = np.empty(2), np.empty(2), np.empty((2, 1))
@@ -31,7 +31,7 @@ def test_a_residual_beyond_the_limit_counts_linearly(fill: object) -> None:
 
 
 def test_cost_and_gradient_are_those_of_their_formula() -> None:
-    cost, gradient, gram = weighed(ERRORS, SLOPES)
+    cost, gradient, gram = quadratic(ERRORS, SLOPES)
     sizes, columns = np.abs(ERRORS), SLOPES.reshape(-1, 3)
     huber = np.where(sizes < OUTLIER, 0.5 * ERRORS**2, OUTLIER * (sizes - 0.5 * OUTLIER))
     assert cost == pytest.approx(float(np.sum(huber)), rel=1e-12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.parallel_descents import ABREAST, Way, descend_in_turn
+from estimation.fits.greybox.parallel_descents import PARALLEL_SEARCHES, Way, descend_in_turn
 
 FAR = np.full(3, 10.0)
 
@@ -51,6 +51,6 @@ def test_parallel_searches_end_at_the_points_of_sequential_searches(share: float
     for one, other in zip(found, alone, strict=True):
         np.testing.assert_array_equal(one.theta, other.theta)
     assert asked == [*range(len(starts))]
-    assert max(together) == ABREAST
+    assert max(together) == PARALLEL_SEARCHES
     assert len(together) < 0.5 * waited
     assert sum(together) == waited if share == np.inf else sum(together) > waited  # some searches went on in vain

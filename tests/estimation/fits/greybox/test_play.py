@@ -16,7 +16,7 @@ from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
 from estimation.fits.flow.asked_hypotheses import ALWAYS_ASKED
 from estimation.fits.flow.fit import fit_flow
-from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.search import balance_fits, flow_starts
 from estimation.fits.greybox.play import (
     NO_PLAY,
     PLAY_BELIEVED,
@@ -26,11 +26,11 @@ from estimation.fits.greybox.play import (
     PLAY_STRUCTURE,
     ShownPlay,
     crossings,
-    play_left,
+    omitted_play_note,
     sensed_play,
 )
 from estimation.fits.hypotheses import PLAY, Hypothesis
-from estimation.fits.hypothesis_search.fit_objections import DOUBTED
+from estimation.fits.hypothesis_search.fit_objections import DOUBTED_CHI_SQUARE
 from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain
 from estimation.notes import EstimateCode, RigCode
@@ -124,7 +124,7 @@ def logged(condition: str, drive: str, play: float) -> Record:
 
 
 def shown(record: Record) -> ShownPlay:
-    fits = balanced(seen(record), PAPER, flow_starts(PAPER, PAPER.bulk_modulus))
+    fits = balance_fits(seen(record), PAPER, flow_starts(PAPER, PAPER.bulk_modulus))
     return max((fit.play for fit in fits), key=lambda one: one.gain)
 
 
@@ -249,7 +249,7 @@ def concluded(
         assert not paired
         return explanation
 
-    monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [fit])
+    monkeypatch.setattr(plain_flow, "balance_fits", lambda *_, **__: [fit])
     monkeypatch.setattr(
         asked_hypotheses, "predicted_gains", lambda *_, **__: len(ALWAYS_ASKED) * [PredictedGain(0.0, 0.0, 0.01)]
     )
@@ -273,7 +273,7 @@ def test_a_play_that_residuals_show_is_tested_and_accepted_if_only_noise_remains
 
 
 def test_a_play_that_is_shown_and_not_found_shuts_the_gate(monkeypatch: pytest.MonkeyPatch) -> None:
-    unexplained = concluded(monkeypatch, PLAY_BELIEVED + 0.1, 0.0, chi=DOUBTED + 0.01)
+    unexplained = concluded(monkeypatch, PLAY_BELIEVED + 0.1, 0.0, chi=DOUBTED_CHI_SQUARE + 0.01)
     assert unexplained.explanation is None
     assert [(note.code, note.data["play_um"]) for note in unexplained.reasons] == [(EstimateCode.PLAY_LEFT, 30.0)]
     another = concluded(monkeypatch, PLAY_SHOWN + 0.1, PLAY_BELIEVED + 0.1)
@@ -281,12 +281,12 @@ def test_a_play_that_is_shown_and_not_found_shuts_the_gate(monkeypatch: pytest.M
 
 
 def test_a_play_that_residuals_may_show_by_chance_widens_the_interval(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = concluded(monkeypatch, PLAY_SHOWN - 0.1, 0.0, chi=DOUBTED + 0.01)
-    doubtful = concluded(monkeypatch, PLAY_BELIEVED - 0.1, 0.0, chi=DOUBTED + 0.01)
+    sound = concluded(monkeypatch, PLAY_SHOWN - 0.1, 0.0, chi=DOUBTED_CHI_SQUARE + 0.01)
+    doubtful = concluded(monkeypatch, PLAY_BELIEVED - 0.1, 0.0, chi=DOUBTED_CHI_SQUARE + 0.01)
     assert not doubtful.reasons
     assert doubtful.explanation is None
     assert doubtful.parameters["bulk_modulus"][0] == sound.parameters["bulk_modulus"][0]
-    moved = 0.02  # the shift that `concluded` sets
+    moved = 0.02  # the shift that `fit_at_solution` sets
     assert doubtful.parameters["bulk_modulus"][1] == pytest.approx(np.hypot(PLAY_STRUCTURE, moved) * 2e8, rel=0.01)
     assert sound.parameters["bulk_modulus"][1] < 0.2 * doubtful.parameters["bulk_modulus"][1]
     assert RigCode.PLAY_NOT_EXCLUDED in [note.code for note in doubtful.remarks]
@@ -296,7 +296,7 @@ def test_a_play_that_residuals_may_show_by_chance_widens_the_interval(monkeypatc
 def test_a_play_that_a_velocity_sensor_shows_is_tested_too(monkeypatch: pytest.MonkeyPatch) -> None:
     record = logged("normal", "prbs", 5e-5)
     assert concluded(monkeypatch, 0.0, 0.0, record=record).explanation is not None
-    (note,) = concluded(monkeypatch, 0.0, 0.0, chi=DOUBTED + 0.01, record=record).reasons
+    (note,) = concluded(monkeypatch, 0.0, 0.0, chi=DOUBTED_CHI_SQUARE + 0.01, record=record).reasons
     assert note.code is EstimateCode.PLAY_LEFT
     assert note.data["play_um"] == pytest.approx(1e6 * sensed_play(record).size)
 
@@ -322,7 +322,7 @@ def test_a_fitted_play_below_the_smallest_size_is_not_accepted(monkeypatch: pyte
 def test_only_a_significant_play_of_sufficient_size_shuts_the_gate(
     shown: ShownPlay, sensed: ShownPlay, shut: bool
 ) -> None:
-    assert bool(play_left(shown, sensed)) is shut
+    assert bool(omitted_play_note(shown, sensed)) is shut
 
 
 def test_motion_within_the_resolution_of_a_sound_encoder_shows_no_play() -> None:

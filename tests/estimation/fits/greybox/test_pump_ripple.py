@@ -9,14 +9,14 @@ import pytest
 
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, without_strays
-from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.search import balance_fits, flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.pump_ripple import COUNTS, LIKELIEST, Ripple, ShownRipple, with_ripple
+from estimation.fits.greybox.pump_ripple import LIKELIEST, TOOTH_COUNTS, Ripple, ShownRipple, with_ripple
 from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.fits.hypothesis_search.pump_ripple_fits import TEETH_WORTH, RippleFits, with_pump_ripple
 from estimation.notes import RigCode
-from experiments.open_benchmark.logger import PLAIN, Logger
+from experiments.open_benchmark.logger import PLAIN_CHANNELS, Logger
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import run
 from plant.arrays import Array
@@ -80,7 +80,7 @@ def logged(ripple: float, overtone: float = 0.0) -> Record:
     course[:, 0] = 60.0 * np.sin(np.pi * time) + 40.0 * np.sin(2.6 * np.pi * time)
     course[:, 3] = 0.0
     log = Logger().log(run(machine, course), np.random.default_rng(5))
-    record = Record(SAMPLE, {name: log[name].to_numpy() for name in PLAIN})
+    record = Record(SAMPLE, {name: log[name].to_numpy() for name in PLAIN_CHANNELS})
     return record if not overtone else with_overtone(record, overtone)
 
 
@@ -96,12 +96,12 @@ def seen(record: Record) -> GreyBoxLog:
 
 
 def fits_of(log: GreyBoxLog) -> Sequence[GreyBoxFit]:
-    return balanced(log, PAPER, flow_starts(PAPER, PAPER.bulk_modulus))
+    return balance_fits(log, PAPER, flow_starts(PAPER, PAPER.bulk_modulus))
 
 
 @cache
 def likeliest(ripple: float) -> GreyBoxFit:
-    log = replace(seen(logged(ripple)), counts=COUNTS)
+    log = replace(seen(logged(ripple)), counts=TOOTH_COUNTS)
     return min(fits_of(log), key=lambda fit: fit.cost)
 
 
@@ -178,7 +178,9 @@ def shifted(ripple: float) -> Record:
 
 
 def test_a_ripple_whose_phase_a_speed_offset_shifts_is_found_only_together_with_it() -> None:
-    held = with_ripple(replace(seen(shifted(0.1)), counts=COUNTS), (), 0.7 * OFFSET)  # a part of the offset is left
+    held = with_ripple(
+        replace(seen(shifted(0.1)), counts=TOOTH_COUNTS), (), 0.7 * OFFSET
+    )  # a part of the offset is left
     best = most(min(fits_of(held), key=lambda fit: fit.cost))
     assert best.teeth.count == 11
     assert best.offset == pytest.approx(0.3 * OFFSET, abs=0.3 * 2.0 * np.pi / (11 * 4.0))
@@ -188,7 +190,7 @@ def test_a_ripple_whose_phase_a_speed_offset_shifts_is_found_only_together_with_
 
 
 def test_a_speed_offset_is_estimated_from_the_residuals_and_adds_to_the_deviation() -> None:
-    plain = replace(seen(shifted(0.0)), counts=COUNTS)
+    plain = replace(seen(shifted(0.0)), counts=TOOTH_COUNTS)
     first = min(fits_of(plain), key=lambda fit: fit.cost)
     assert first.speed_offset.gain > 100.0
     assert first.speed_offset.value == pytest.approx(OFFSET, rel=0.3)

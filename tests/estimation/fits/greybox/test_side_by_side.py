@@ -14,11 +14,11 @@ from estimation.fits.greybox.log import greybox_log
 from estimation.fits.greybox.loops import RUNAWAY
 from estimation.fits.greybox.nudges import NUDGE
 from estimation.fits.greybox.problem import OUTLIER, Problem
-from estimation.fits.greybox.side_by_side import LANES, MANY, compile_side_by_side
+from estimation.fits.greybox.side_by_side import LANES, MOST_LANES, compile_side_by_side
 from estimation.fits.greybox.side_by_side_loops import residuals_side_by_side
 from estimation.fits.hypotheses import HYPOTHESES
-from estimation.fits.hypothesis_search.wide_log import usual_values, widened
-from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.fits.hypothesis_search.wide_log import usual_values, widened_log
+from estimation.fits.hypothesis_search.wide_problem import hypothesis_problem
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from estimation.models.greybox import GreyBoxModel
@@ -43,7 +43,7 @@ def problem() -> FreedProblem:
     record = record.replace(differential_pressure_pa=pressure)
     log = greybox_log(FLOW_FORM, record, flow_parameters(HEALTHY), longest_step=2.5e-4, variances=VARIANCES)
     both_sides = [one for one in HYPOTHESES if one.name != "single_rod"]  # its slopes use a longer step
-    return freed(widened(replace(log, presumed=presumed_stiffness(HEALTHY, {})), HEALTHY), both_sides)
+    return hypothesis_problem(widened_log(replace(log, presumed=presumed_stiffness(HEALTHY, {})), HEALTHY), both_sides)
 
 
 def points(problem: FreedProblem, count: int) -> np.ndarray:
@@ -141,7 +141,7 @@ def test_costs_without_slopes_are_those_with_them(problem: FreedProblem) -> None
     assert problem.costs(thetas) == pytest.approx([problem.at(theta).cost for theta in thetas], rel=1e-9)
 
 
-@pytest.mark.parametrize("count", [LANES - 1, LANES + 3, MANY + 2])
+@pytest.mark.parametrize("count", [LANES - 1, LANES + 3, MOST_LANES + 2])
 def test_any_number_of_points_is_run(problem: FreedProblem, count: int) -> None:
     thetas = [*points(problem, count)]
     together = problem.costs(thetas)
@@ -288,12 +288,12 @@ def test_disturbed_drives_use_the_kernel_of_the_slopes(problem: FreedProblem, mo
     values = {**vars(flow_parameters(HEALTHY)), "case_leakage": 1e-13, "speed_lead": 1e-5, "makeup_opening": 1e3}
     theta = HELD_FLOW_FORM.theta({**values, "accumulator_stiffness": 1e8})
     assert len(theta) < LANES
-    drives = log.drives[..., None] * (1.0 + 1e-3 * np.arange(MANY))
+    drives = log.drives[..., None] * (1.0 + 1e-3 * np.arange(MOST_LANES))
     asked = asked_for(monkeypatch)
     held.at(theta)
     found = held.disturbed_together(theta, drives)
     assert asked == [LANES]
-    for place in (0, LANES, MANY - 1):
+    for place in (0, LANES, MOST_LANES - 1):
         one = held.residuals(theta, drives=np.ascontiguousarray(drives[..., place]))
         np.testing.assert_allclose(found[..., place], one, rtol=1e-7, atol=1e-7)
 
@@ -309,7 +309,7 @@ def test_slopes_beside_known_ones_use_the_kernel_of_all_slopes(
     known = dict(zip(own.model.unknowns, slopes.T, strict=True))
     del known[own.model.unknowns[2]]
     beside = own.at_beside(theta, known)
-    assert asked == [MANY]
+    assert asked == [MOST_LANES]
     assert beside.cost == pytest.approx(whole.cost, rel=1e-12)
     assert beside.gradient == pytest.approx(whole.gradient, rel=1e-9, abs=1e-9 * np.max(np.abs(whole.gradient)))
 
@@ -340,7 +340,7 @@ def test_a_model_is_traced_once_for_kernels_of_all_widths(monkeypatch: pytest.Mo
     form = replace(FLOW_FORM, name="another_name")
     texts = [
         text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(form, LANES)),
-        text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(form, MANY)),
+        text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(form, MOST_LANES)),
     ]
     assert traced == [form]
     assert texts[0] != texts[1]

@@ -9,8 +9,8 @@ from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.greybox.pump_ripple import LEAST_TEETH, Ripple, ShownRipple
 from estimation.fits.greybox.small_pump_ripple import SMALL_STD, small_pump_ripple, with_shifts
-from estimation.fits.hypothesis_search.pump_ripple_fits import asked_for_ripple
-from experiments.open_benchmark.logger import PLAIN, Logger
+from estimation.fits.hypothesis_search.pump_ripple_fits import with_ripple_test
+from experiments.open_benchmark.logger import PLAIN_CHANNELS, Logger
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import run
 from plant.log.record import Record
@@ -73,7 +73,7 @@ def logged(ripple: float) -> Record:
     course[:, 0] = 60.0 * np.sin(np.pi * time) + 40.0 * np.sin(2.6 * np.pi * time)
     course[:, 3] = 0.0
     log = Logger(sample_time=5e-4).log(run(machine, course), np.random.default_rng(5))
-    return Record(5e-4, {name: log[name].to_numpy() for name in PLAIN})
+    return Record(5e-4, {name: log[name].to_numpy() for name in PLAIN_CHANNELS})
 
 
 def test_small_ripple_does_not_bias_bulk_modulus(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,9 +88,9 @@ def test_small_ripple_does_not_bias_bulk_modulus(monkeypatch: pytest.MonkeyPatch
 def test_ripple_is_not_tested_in_a_log_with_gaps_in_speed() -> None:
     sound, variances = without_strays(logged(0.0))
     log = flow_log(sound, PAPER, {}, variances)
-    assert asked_for_ripple(log).counts
+    assert with_ripple_test(log).counts
     speed = logged(0.0)["motor_speed_rad_s"].copy()
     speed[2000:2400] = np.nan
     gone = flow_log(sound.replace(motor_speed_rad_s=speed), PAPER, {}, variances)
     assert gone.gaps.size
-    assert not asked_for_ripple(gone).counts
+    assert not with_ripple_test(gone).counts

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from estimation.fits.flow import search
-from estimation.fits.flow.search import balanced
+from estimation.fits.flow.search import balance_fits
 from estimation.fits.greybox.descent import LEAST_GAIN
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.spared_steps import sparing_steps, with_steps
+from estimation.fits.greybox.spared_steps import steps_where_needed, with_steps
 from plant.arrays import Array
 from tests.estimation.fits.flow.test_search import HEALTHY, STARTS, recorded, seen
 
@@ -35,9 +35,9 @@ def steps_taken(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_short_steps_at_few_samples_suffice_for_the_misfit(log: GreyBoxLog) -> None:
-    best = min(balanced(log, HEALTHY, STARTS), key=lambda fit: fit.cost)
+    best = min(balance_fits(log, HEALTHY, STARTS), key=lambda fit: fit.cost)
     problem = FreedProblem.of(best.model, log)
-    steps = sparing_steps(problem, best.theta)
+    steps = steps_where_needed(problem, best.theta)
     assert 0.0 < np.mean(steps > 1) < 0.3
     assert np.all((steps == 1) | (steps == log.steps))
     here, spared, long = (with_steps(problem, each).at(best.theta) for each in (log.steps, steps, np.ones_like(steps)))
@@ -53,11 +53,11 @@ def test_short_steps_at_few_samples_suffice_for_the_misfit(log: GreyBoxLog) -> N
 def test_a_search_with_fewer_steps_reaches_the_fit_of_one_with_all_short_steps(
     log: GreyBoxLog, steps_taken: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    quick = balanced(log, HEALTHY, STARTS)
+    quick = balance_fits(log, HEALTHY, STARTS)
     fewer = sum(steps_taken)
     steps_taken.clear()
-    monkeypatch.setattr(search, "sparing_steps", lambda problem, _: problem.log.steps)
-    whole = balanced(log, HEALTHY, STARTS)
+    monkeypatch.setattr(search, "steps_where_needed", lambda problem, _: problem.log.steps)
+    whole = balance_fits(log, HEALTHY, STARTS)
     assert fewer < 0.75 * sum(steps_taken)
     told, other = (min(fits, key=lambda fit: fit.cost) for fits in (quick, whole))
     assert told.cost == pytest.approx(other.cost, abs=2.0 * LEAST_GAIN)
@@ -67,8 +67,8 @@ def test_a_search_with_fewer_steps_reaches_the_fit_of_one_with_all_short_steps(
 
 
 def test_no_steps_are_spared_across_gaps_or_with_one_step_per_sample(log: GreyBoxLog) -> None:
-    fit = balanced(log, HEALTHY, STARTS)[0]
+    fit = balance_fits(log, HEALTHY, STARTS)[0]
     for other in (log.coarsened(), replace(log, gaps=np.array([[10.0, 12.0, 1e6]]))):
         problem = FreedProblem.of(fit.model, other)
-        assert sparing_steps(problem, fit.theta) is other.steps
+        assert steps_where_needed(problem, fit.theta) is other.steps
         assert with_steps(problem, other.steps) is problem

@@ -12,11 +12,11 @@ from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import AIR_MIDWAY, HYPOTHESES
 from estimation.fits.hypothesis_search.lost_flow import NO_CHANGE, likeliest_entry, likeliest_step
-from estimation.fits.hypothesis_search.predicted_gains import AIRED, by_predicted_gain
-from estimation.fits.hypothesis_search.wide_log import usual_values, widened
+from estimation.fits.hypothesis_search.predicted_gains import AIR_SHARE, by_predicted_gain
+from estimation.fits.hypothesis_search.wide_log import usual_values, widened_log
 from estimation.log_checks.clean import clean_log
 from estimation.notes import RigCode
-from experiments.open_benchmark.logger import PLAIN, Logger
+from experiments.open_benchmark.logger import PLAIN_CHANNELS, Logger
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import run
 from plant.eha.model import EhaParameters
@@ -34,24 +34,24 @@ def logged(air: float, *, at: float = 2.0, lasting: float = 0.5) -> Record:
     course[:, 0] = 110.0 * np.sin(2.0 * np.pi * time) + 60.0 * np.sin(5.2 * np.pi * time)
     course[:, 3] = air * np.clip((time - at) / lasting, 0.0, 1.0)
     frame = Logger().log(run(MACHINE, course), np.random.default_rng(3))
-    return Record(1e-3, {name: frame[name].to_numpy() for name in PLAIN})
+    return Record(1e-3, {name: frame[name].to_numpy() for name in PLAIN_CHANNELS})
 
 
 def seen(record: Record) -> GreyBoxLog:
     sound, variances = without_strays(record)
-    return widened(flow_log(sound, PAPER, {}, variances), PAPER)
+    return widened_log(flow_log(sound, PAPER, {}, variances), PAPER)
 
 
 def test_lost_flow_shows_when_air_enters() -> None:
     entry = likeliest_entry(seen(logged(0.03)))
-    assert entry.share > AIRED
+    assert entry.share > AIR_SHARE
     assert entry.at == pytest.approx(0.45, abs=0.06)  # the middle of an entry that lasts half a second
 
 
 @pytest.mark.parametrize("course", ["none", "throughout"])
 def test_oil_with_constant_air_content_shows_no_air_entry(course: str) -> None:
     log = logged(0.0) if course == "none" else logged(0.02, at=-1.0)
-    assert likeliest_entry(seen(log)).share < AIRED
+    assert likeliest_entry(seen(log)).share < AIR_SHARE
 
 
 def test_a_dead_pressure_sensor_shows_no_change() -> None:

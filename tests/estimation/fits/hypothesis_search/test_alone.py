@@ -12,14 +12,14 @@ import pytest
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import DELIVERY, OFFSET, Hypothesis
 from estimation.fits.hypothesis_search import explain
-from estimation.fits.hypothesis_search.decimation import FAINT, FEW, Decimation
+from estimation.fits.hypothesis_search.decimation import FAINT, SHORT_LOG, Decimation
 from estimation.fits.hypothesis_search.explanation import Trial
-from estimation.fits.hypothesis_search.final_fits import WORTH
+from estimation.fits.hypothesis_search.final_fits import REQUIRED_GAIN
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
 
 COST = attrgetter("cost")
 
-LONG: Any = SimpleNamespace(drives=np.zeros((FEW, 1)), sample_time=1e-3)
+LONG: Any = SimpleNamespace(drives=np.zeros((SHORT_LOG, 1)), sample_time=1e-3)
 
 
 def hypothesis(name: str, *, far: bool = False) -> Hypothesis:
@@ -50,14 +50,14 @@ def test_poor_and_duplicate_starts_are_dropped_if_the_misfit_is_small(
 
     ends = {"a": tried(800.0), "the same": tried(800.0, 0.1), "elsewhere": tried(9e3, 3.0)}
     monkeypatch.setattr(explain, "screen", lambda _, __, starts, **___: [ends[one] for one in starts])
-    monkeypatch.setattr(explain, "nearing", nearing)
+    monkeypatch.setattr(explain, "screened_hypotheses", nearing)
     monkeypatch.setattr(explain, "ranked_optima", lambda *_, **__: [tried(800.0)])
-    monkeypatch.setattr(explain, "refined", lambda *_, **__: [tried(800.0)])
-    monkeypatch.setattr(explain, "likeliest", lambda *_, **__: [])
+    monkeypatch.setattr(explain, "refined_sets", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "likeliest_sets", lambda *_, **__: [])
     monkeypatch.setattr(explain, "cost_over_noise", lambda *_: 1.5)
     starts: Any = [*ends]
     spared = Decimation(1, left, starts)
-    explain._alone(LONG, 1000.0, [LIKELY], [FAR, SOME], spared, lambda _: False)  # pyright: ignore[reportPrivateUsage]
+    explain._single_hypotheses(LONG, 1000.0, [LIKELY], [FAR, SOME], spared, lambda _: False)  # pyright: ignore[reportPrivateUsage]
     assert told == [["a"] if left < FAINT else [*ends]]
 
 
@@ -75,12 +75,12 @@ def test_more_hypotheses_are_tested_if_an_explanation_leaves_more_than_noise_or_
         return [[tried(700.0)]]
 
     monkeypatch.setattr(explain, "screen", lambda *_, **__: [tried(800.0)])
-    monkeypatch.setattr(explain, "nearing", nearing)
+    monkeypatch.setattr(explain, "screened_hypotheses", nearing)
     monkeypatch.setattr(explain, "ranked_optima", lambda *_, **__: [tried(800.0)])
-    monkeypatch.setattr(explain, "refined", lambda *_, **__: [replace(tried(800.0), fits=(LONG,))])
-    monkeypatch.setattr(explain, "likeliest", lambda *_, **__: [tried(700.0)])
+    monkeypatch.setattr(explain, "refined_sets", lambda *_, **__: [replace(tried(800.0), fits=(LONG,))])
+    monkeypatch.setattr(explain, "likeliest_sets", lambda *_, **__: [tried(700.0)])
     monkeypatch.setattr(explain, "cost_over_noise", lambda *_: left)
-    found = explain._alone(LONG, plain, [LIKELY], [FAR, SOME], Decimation(1, left, [{}]), lambda _: True)  # pyright: ignore[reportPrivateUsage]
+    found = explain._single_hypotheses(LONG, plain, [LIKELY], [FAR, SOME], Decimation(1, left, [{}]), lambda _: True)  # pyright: ignore[reportPrivateUsage]
     assert told == asked
     assert [one.cost for one in found] == ([700.0, 800.0] if asked else [800.0])
 
@@ -93,18 +93,20 @@ def pairing(monkeypatch: pytest.MonkeyPatch) -> Pairing:
     """Return a search for pairs beside a hypothesis of cost 5,000, with given trials and fits; noise costs 1,000."""
 
     def paired(every: int, screened: Any, led_on: Any, rivalled: float = np.inf) -> list[Trial]:
-        monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+        monkeypatch.setattr(explain, "without_delays", lambda log, _: log)
         monkeypatch.setattr(explain, "by_predicted_gain", lambda *_: ([LIKELY], [FAR, SOME, NONE], {}))
         monkeypatch.setattr(explain, "own_starts", lambda *_: [{}])
-        monkeypatch.setattr(explain, "_begun_again", lambda *_: {"from": 1.0})
+        monkeypatch.setattr(explain, "_restart_values", lambda *_: {"from": 1.0})
         monkeypatch.setattr(explain, "decimation_for", lambda *_: every)
         monkeypatch.setattr(explain, "cost_over_noise", lambda _, cost: cost / 1000.0)
         monkeypatch.setattr(explain, "screen", screened)
         monkeypatch.setattr(explain, "ranked_optima", lambda _, ways, *__: [min(way, key=COST) for way in ways])
-        monkeypatch.setattr(explain, "refined", led_on)
-        monkeypatch.setattr(explain, "likeliest", lambda log, ways, *_: led_on(log, [next(iter(way)) for way in ways]))
+        monkeypatch.setattr(explain, "refined_sets", led_on)
+        monkeypatch.setattr(
+            explain, "likeliest_sets", lambda log, ways, *_: led_on(log, [next(iter(way)) for way in ways])
+        )
         first = tried(5000.0, together=(hypothesis("first"),))
-        return explain._paired(LONG, first, {}, lambda _: False, rivalled=rivalled)  # pyright: ignore[reportPrivateUsage]
+        return explain._hypothesis_pairs(LONG, first, {}, lambda _: False, rivalled=rivalled)  # pyright: ignore[reportPrivateUsage]
 
     return paired
 
@@ -121,16 +123,16 @@ def test_a_pair_beside_a_rival_must_gain_over_the_best_known_pair(pairing: Pairi
 
     assert [one.cost for one in pairing(2, screened, led_on, 1461.0)] == [1450.0] * 4
     assert not pairing(2, screened, led_on, 1459.0)
-    assert useful == [1461.0 - WORTH, 1459.0 - WORTH]
+    assert useful == [1461.0 - REQUIRED_GAIN, 1459.0 - REQUIRED_GAIN]
 
 
 def test_a_late_and_an_early_speed_with_the_same_optimum_count_as_one() -> None:
     late, early = (Hypothesis(name, ("speed_lag",)) for name in ("speed_late", "speed_early"))
     one = tried(800.0, together=(late,))
     again = replace(tried(800.0, 0.1, together=(early,)), delays={"motor_speed_rad_s": 0.0})
-    assert explain._same(one, again)  # pyright: ignore[reportPrivateUsage]
-    assert not explain._same(one, replace(again, delays={"motor_speed_rad_s": -1e-3}))  # pyright: ignore[reportPrivateUsage]
-    assert not explain._same(one, replace(again, together=(OFFSET,)))  # pyright: ignore[reportPrivateUsage]
+    assert explain._is_same_fit(one, again)  # pyright: ignore[reportPrivateUsage]
+    assert not explain._is_same_fit(one, replace(again, delays={"motor_speed_rad_s": -1e-3}))  # pyright: ignore[reportPrivateUsage]
+    assert not explain._is_same_fit(one, replace(again, together=(OFFSET,)))  # pyright: ignore[reportPrivateUsage]
 
 
 @pytest.mark.parametrize(
@@ -141,4 +143,4 @@ def test_a_worn_pump_does_not_suffice_by_itself_if_another_volume_would_gain_muc
 ) -> None:
     monkeypatch.setattr(explain, "is_explained", lambda *_: True)
     monkeypatch.setattr(explain, "predicted_gain_beside", lambda *_: PredictedGain(gain, 1.0, 1.0))
-    assert explain._by_itself(LONG, tried(9.0, together=(one,)), lambda _: True) is alone  # pyright: ignore[reportPrivateUsage]
+    assert explain._explains_by_itself(LONG, tried(9.0, together=(one,)), lambda _: True) is alone  # pyright: ignore[reportPrivateUsage]

@@ -7,7 +7,7 @@ import pytest
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import ENCODER_ZERO
-from estimation.fits.hypothesis_search.coarse_search import unless_quiet
+from estimation.fits.hypothesis_search.coarse_search import void_if_quiet
 from estimation.fits.hypothesis_search.decimation import cost_over_noise
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.fit_objections import QUIET
@@ -21,4 +21,4 @@ def test_residuals_far_below_position_noise_are_no_explanation(passed_on: float,
     log = replace(log, noise=tuple(replace(one, passed_on=passed_on) for one in log.noise))
     cost = left * QUIET / cost_over_noise(log, 1.0)
     tried = Trial((ENCODER_ZERO,), Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), {}, {}, {})
-    assert unless_quiet(log, tried).cost == (np.inf if void else cost)
+    assert void_if_quiet(log, tried).cost == (np.inf if void else cost)

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from estimation.fits.hypotheses import BEGUN, DELIVERY, ENCODER_ZERO, OFFSET, VOLUME
+from estimation.fits.hypotheses import BEGUN_UNDER_LOAD, DELIVERY, ENCODER_ZERO, OFFSET, VOLUME
 from estimation.fits.hypothesis_search import commonly_hidden
-from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, rig_and_load, with_delivery, with_zero
+from estimation.fits.hypothesis_search.commonly_hidden import fit_of_delivery, rig_and_load, with_delivery, with_zero
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
 
@@ -34,8 +34,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         return [tried(40.0, *together)]
 
     monkeypatch.setattr(commonly_hidden, "screen", screened)
-    monkeypatch.setattr(commonly_hidden, "likeliest", lambda _, ways, *__: ways[0])
-    monkeypatch.setattr(commonly_hidden, "delayed", lambda log, _: log)
+    monkeypatch.setattr(commonly_hidden, "likeliest_sets", lambda _, ways, *__: ways[0])
+    monkeypatch.setattr(commonly_hidden, "without_delays", lambda log, _: log)
     return found
 
 
@@ -50,7 +50,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 def test_another_delivery_is_searched_further_only_if_nothing_explains_the_log(
     first: Trial, sought: bool, asked: list[Any]
 ) -> None:
-    assert bool(delivery_followed(LOG, [first], SPARED, explains)) == bool(asked) == sought
+    assert bool(fit_of_delivery(LOG, [first], SPARED, explains)) == bool(asked) == sought
 
 
 def test_an_encoder_zero_is_tested_with_the_likeliest_hypothesis_unless_that_explains_the_log(asked: list[Any]) -> None:
@@ -66,10 +66,10 @@ def test_an_encoder_zero_is_tested_with_the_likeliest_hypothesis_unless_that_exp
 def test_delivery_volume_and_load_are_tested_together_only_if_nothing_explains_the_log(
     asked: list[Any],
 ) -> None:
-    assert rig_and_load(LOG, BEGUN, tried(40.0, OFFSET), SPARED, explains) == asked == []
-    (three,) = rig_and_load(LOG, BEGUN, tried(90.0, OFFSET), SPARED, explains)
-    assert three.together == (DELIVERY, VOLUME, BEGUN)
-    assert rig_and_load(LOG, BEGUN, tried(90.0, OFFSET), SPARED, lambda fit: fit.cost < 1.0) == []
+    assert rig_and_load(LOG, BEGUN_UNDER_LOAD, tried(40.0, OFFSET), SPARED, explains) == asked == []
+    (three,) = rig_and_load(LOG, BEGUN_UNDER_LOAD, tried(90.0, OFFSET), SPARED, explains)
+    assert three.together == (DELIVERY, VOLUME, BEGUN_UNDER_LOAD)
+    assert rig_and_load(LOG, BEGUN_UNDER_LOAD, tried(90.0, OFFSET), SPARED, lambda fit: fit.cost < 1.0) == []
 
 
 @pytest.mark.parametrize(

@@ -11,18 +11,24 @@ from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypothesis_search import final_fits, ranking
-from estimation.fits.hypothesis_search.coarse_search import coarsened
-from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimated, decimation_for
+from estimation.fits.hypothesis_search.coarse_search import coarse_log
+from estimation.fits.hypothesis_search.decimation import (
+    SHORT_LOG,
+    Decimation,
+    cost_over_noise,
+    decimated,
+    decimation_for,
+)
 from estimation.fits.hypothesis_search.explanation import Trial
-from estimation.fits.hypothesis_search.wide_log import usual_values, widened
-from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.fits.hypothesis_search.wide_log import usual_values, widened_log
+from estimation.fits.hypothesis_search.wide_problem import hypothesis_problem
 from tests.estimation.fits.short_logs import PAPER, log
 
 
 def seen() -> GreyBoxLog:
     """Return a log of 3 s for the wide form."""
     record, variances = without_strays(log(3.0))
-    return widened(flow_log(record, PAPER, {}, variances), PAPER)
+    return widened_log(flow_log(record, PAPER, {}, variances), PAPER)
 
 
 @pytest.mark.parametrize("every", [2, 4])
@@ -76,7 +82,7 @@ def test_decimation_keeps_the_cost_if_residuals_far_exceed_noise() -> None:
     whole = seen()
     costs = []
     for every in (1, 2, 4):
-        problem = freed(coarsened(whole, {}, (), every), ())
+        problem = hypothesis_problem(coarse_log(whole, {}, (), every), ())
         theta = problem.model.theta({**usual_values(whole), **flow_starts(PAPER, 1.2e8)[0]})
         costs.append(problem.at(theta).cost)
         assert problem.costs([theta])[0] == pytest.approx(costs[-1])
@@ -85,7 +91,7 @@ def test_decimation_keeps_the_cost_if_residuals_far_exceed_noise() -> None:
 
 
 def test_a_long_log_is_decimated_more_the_larger_its_residuals() -> None:
-    long: Any = replace(seen(), drives=np.zeros((FEW, 1)))
+    long: Any = replace(seen(), drives=np.zeros((SHORT_LOG, 1)))
     assert [decimation_for(long, left) for left in (1.5, 5.0, 50.0)] == [1, 2, 4]
     assert decimation_for(replace(long, sample_time=2e-4), 50.0) == 20
     assert decimation_for(replace(long, sample_time=1e-2), 50.0) == 1
@@ -102,16 +108,16 @@ def test_the_best_set_on_a_decimated_log_is_searched_again_with_all_samples(monk
         led.append(one.cost)
         return replace(one, point=replace(one.point, cost=5.0 if one is begun else one.cost))
 
-    problem = freed(coarsened(seen(), {}, ()), ())
+    problem = hypothesis_problem(coarse_log(seen(), {}, ()), ())
     monkeypatch.setattr(ranking, "search_coarsely", settled)
     monkeypatch.setattr(ranking, "screen", lambda *_: [begun])
-    monkeypatch.setattr(ranking, "freed", lambda *_: problem)
+    monkeypatch.setattr(ranking, "hypothesis_problem", lambda *_: problem)
     monkeypatch.setattr(ranking, "cost_over_noise", lambda _, cost: cost)
     spared = Decimation(4, 1000.0, ())
-    (found,) = ranking._with_all(seen(), [tried], np.inf, spared)  # pyright: ignore[reportPrivateUsage]
+    (found,) = ranking._searched_on_all_samples(seen(), [tried], np.inf, spared)  # pyright: ignore[reportPrivateUsage]
     assert (found.cost, led) == (5.0, [90.0, 80.0])
     led.clear()
-    (kept,) = ranking._with_all(seen(), [tried], np.inf, spared._replace(left=100.0))  # pyright: ignore[reportPrivateUsage]
+    (kept,) = ranking._searched_on_all_samples(seen(), [tried], np.inf, spared._replace(left=100.0))  # pyright: ignore[reportPrivateUsage]
     assert (kept.cost, led) == (90.0, [])
 
 
@@ -120,25 +126,25 @@ def test_a_set_with_larger_residuals_on_all_samples_is_searched_again(
     monkeypatch: pytest.MonkeyPatch, ended: float, anew: bool
 ) -> None:
     tried = Trial((), Point(np.zeros(1), 1.1, np.zeros(1), np.eye(1)), flow_starts(PAPER, 2e8)[0], {}, {})
-    problem = freed(coarsened(seen(), {}, ()), ())
+    problem = hypothesis_problem(coarse_log(seen(), {}, ()), ())
     asked: list[Any] = []
     monkeypatch.setattr(
         ranking, "search_coarsely", lambda _, one, *__: replace(one, point=replace(one.point, cost=ended))
     )
     monkeypatch.setattr(ranking, "screen", lambda *_: asked.append(1) or [])
-    monkeypatch.setattr(ranking, "freed", lambda *_: problem)
+    monkeypatch.setattr(ranking, "hypothesis_problem", lambda *_: problem)
     monkeypatch.setattr(ranking, "cost_over_noise", lambda _, cost: cost)
-    (found,) = ranking._with_all(seen(), [tried], np.inf, Decimation(4, 1000.0, ()))  # pyright: ignore[reportPrivateUsage]
+    (found,) = ranking._searched_on_all_samples(seen(), [tried], np.inf, Decimation(4, 1000.0, ()))  # pyright: ignore[reportPrivateUsage]
     assert (found.cost, bool(asked)) == (ended, anew)  # no start leads elsewhere
 
 
 def test_a_set_with_far_too_large_residuals_is_not_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     finished: list[float] = []
     monkeypatch.setattr(ranking, "search_coarsely", lambda _, one, *__: one)
-    monkeypatch.setattr(final_fits, "FEW", 0)
+    monkeypatch.setattr(final_fits, "SHORT_LOG", 0)
     monkeypatch.setattr(ranking, "final_fit", lambda _, one, __: finished.append(one.cost) or one)
     monkeypatch.setattr(final_fits, "cost_over_noise", lambda _, cost: cost)
     for cost in (9.0, 11.0):
         tried = Trial((), Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), {}, {}, {})
-        ranking.likeliest(seen(), [[tried]])
+        ranking.likeliest_sets(seen(), [[tried]])
     assert finished == [9.0]

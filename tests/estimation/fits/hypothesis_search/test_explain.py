@@ -12,9 +12,9 @@ from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
 from estimation.fits.hypothesis_search import coarse_search, conclusion, explain, final_fits, ranking, screening
 from estimation.fits.hypothesis_search.explanation import Trial
-from estimation.fits.hypothesis_search.final_fits import CLOSE, NEVER, ROUNDS
+from estimation.fits.hypothesis_search.final_fits import RIVAL_DISTANCE, ROUNDS, UNBELIEVABLE_COST
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN
-from estimation.fits.hypothesis_search.pump_delivery import contradicted
+from estimation.fits.hypothesis_search.pump_delivery import delivery_objection
 from plant.eha.model import EhaParameters
 from tests.estimation.fits.short_logs import made_fit
 
@@ -39,22 +39,22 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
         made.append(costs[len(made)])
         return SimpleNamespace(cost=made[-1], point=SimpleNamespace(theta=np.zeros(1)))
 
-    monkeypatch.setattr(final_fits, "descended", descended)
+    monkeypatch.setattr(final_fits, "after_descent", descended)
     monkeypatch.setattr(final_fits, "cost_over_noise", lambda *_: 1.0)
-    monkeypatch.setattr(final_fits, "spared", lambda one, _: one)
+    monkeypatch.setattr(final_fits, "with_steps_where_needed", lambda one, _: one)
     problem: Any = SimpleNamespace(log=SimpleNamespace(drives=(), steps=None))
     begun: Any = SimpleNamespace(cost=np.inf)
-    return final_fits._led_on(problem, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
+    return final_fits._search_with_short_steps(problem, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
 
 
 def test_a_search_continues_while_it_gains_enough_to_distinguish_hypotheses(monkeypatch: pytest.MonkeyPatch) -> None:
-    costs = [9.0 * CLOSE, 6.0 * CLOSE, 4.5 * CLOSE, 4.0 * CLOSE, 0.0]
-    assert ended(costs, monkeypatch) == (4.0 * CLOSE, 4)
+    costs = [9.0 * RIVAL_DISTANCE, 6.0 * RIVAL_DISTANCE, 4.5 * RIVAL_DISTANCE, 4.0 * RIVAL_DISTANCE, 0.0]
+    assert ended(costs, monkeypatch) == (4.0 * RIVAL_DISTANCE, 4)
 
 
 def test_a_search_without_a_gain_keeps_its_result_and_its_rounds_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert ended([3.0 * CLOSE, 3.5 * CLOSE], monkeypatch) == (3.0 * CLOSE, 2)
-    assert ended([-2.0 * CLOSE * i for i in range(ROUNDS + 3)], monkeypatch)[1] == ROUNDS
+    assert ended([3.0 * RIVAL_DISTANCE, 3.5 * RIVAL_DISTANCE], monkeypatch) == (3.0 * RIVAL_DISTANCE, 2)
+    assert ended([-2.0 * RIVAL_DISTANCE * i for i in range(ROUNDS + 3)], monkeypatch)[1] == ROUNDS
 
 
 def test_the_most_promising_set_is_searched_even_if_all_of_its_starts_are_void(
@@ -68,10 +68,10 @@ def test_the_most_promising_set_is_searched_even_if_all_of_its_starts_are_void(
     monkeypatch.setattr(ranking, "final_fit", lambda _, one, __: one)
     monkeypatch.setattr(ranking, "is_hopeless", lambda *_: False)
     nothing: Any = SimpleNamespace(drives=())
-    found = ranking.likeliest(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])
+    found = ranking.likeliest_sets(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])
     assert [one.cost for one in found] == [9.0]
     assert settled == [np.inf, 9.0, 10.0]
-    alone = ranking.likeliest(nothing, [[tried(np.inf)]])
+    alone = ranking.likeliest_sets(nothing, [[tried(np.inf)]])
     assert [one.cost for one in alone] == [np.inf]
 
 
@@ -95,19 +95,19 @@ def test_a_low_relief_setting_is_void_if_too_high_undetermined_or_with_too_small
 ) -> None:
     problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
     fit = replace(made_fit(50.0, 2e8, 1e5, chi=left), std={"bulk_modulus": 1e5, "relief_pressure": std})
-    monkeypatch.setattr(final_fits, "delayed", lambda log, _: log)
-    monkeypatch.setattr(final_fits, "balanced_by", lambda log, _: log)
-    monkeypatch.setattr(final_fits, "freed", lambda *_: problem)
+    monkeypatch.setattr(final_fits, "without_delays", lambda log, _: log)
+    monkeypatch.setattr(final_fits, "with_balance", lambda log, _: log)
+    monkeypatch.setattr(final_fits, "hypothesis_problem", lambda *_: problem)
     monkeypatch.setattr(final_fits, "usual_values", lambda _: {})
-    monkeypatch.setattr(final_fits, "_to_its_end", lambda _, tried, *__, **___: tried)
+    monkeypatch.setattr(final_fits, "_completed_search", lambda _, tried, *__, **___: tried)
     monkeypatch.setattr(final_fits, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
-    monkeypatch.setattr(final_fits, "concluded", lambda *_, **__: fit)
-    monkeypatch.setattr(final_fits, "coarsened", lambda *_: None)
+    monkeypatch.setattr(final_fits, "fit_at_solution", lambda *_, **__: fit)
+    monkeypatch.setattr(final_fits, "coarse_log", lambda *_: None)
     monkeypatch.setattr(final_fits, "balances_mass", lambda _: False)
     noisy: Any = SimpleNamespace(passes_on=True)
     found = final_fits.final_fit(noisy, relieved(setting))
     assert found.cost == (np.inf if void else 50.0)
-    assert found.fit.cost == (NEVER if void else 50.0)
+    assert found.fit.cost == (UNBELIEVABLE_COST if void else 50.0)
     assert found.void is void
 
 
@@ -141,7 +141,7 @@ def test_all_other_pairs_are_tested_if_the_likely_ones_do_not_explain_the_log(
         point, void = Point(np.zeros(1), one.cost, np.zeros(1), np.eye(1)), False
         return _Made(one.together, point, {}, {"late": 1e-3}, {}, (made_fit(one.cost, 2e8, 1e5),), void)
 
-    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+    monkeypatch.setattr(explain, "without_delays", lambda log, _: log)
     monkeypatch.setattr(explain, "by_predicted_gain", lambda *_: ([likely], [far, hidden], {}))
     monkeypatch.setattr(explain, "own_starts", lambda *_: [{"offset": 1e5}])
     monkeypatch.setattr(
@@ -160,7 +160,7 @@ def test_all_other_pairs_are_tested_if_the_likely_ones_do_not_explain_the_log(
     first = _Made(
         (hypothesis("first"),), place, at_end, {"speed": 2e-3}, {}, (made_fit(100.0, 2e8, 1e5),), coarse=coarse
     )
-    found = explain._paired(nothing, first, {"leakage_coefficient": 2e-12}, lambda _: explains)  # pyright: ignore[reportPrivateUsage]
+    found = explain._hypothesis_pairs(nothing, first, {"leakage_coefficient": 2e-12}, lambda _: explains)  # pyright: ignore[reportPrivateUsage]
     assert [name for name, _ in begun] == asked.split()
     # starts: the end of its search with long steps, with leakage restored, and the start of that search
     revived = {"leakage_coefficient": 5e-12, "flow_bias": 3e-6, "offset": 4e4, **FED}
@@ -201,21 +201,21 @@ def test_pairs_are_also_tested_with_a_nearly_equally_good_hypothesis(
         own = [tried(50.0, "relief", "late")] if asked[-1] == "relief" else [tried(48.0, "worn", "late")]
         return [*own, tried(51.0, *(["relief", "worn"] if asked[-1] == "relief" else ["worn", "relief"]))]
 
-    monkeypatch.setattr(explain, "widened", lambda *_: None)
-    monkeypatch.setattr(explain, "balanced_by", lambda *_: None)
+    monkeypatch.setattr(explain, "widened_log", lambda *_: None)
+    monkeypatch.setattr(explain, "with_balance", lambda *_: None)
     monkeypatch.setattr(explain, "by_predicted_gain", lambda *_: ([], [], {}))
-    monkeypatch.setattr(explain, "_alone", lambda *_, **__: [tried(100.0, "relief"), tried(second, "worn")])
+    monkeypatch.setattr(explain, "_single_hypotheses", lambda *_, **__: [tried(100.0, "relief"), tried(second, "worn")])
     monkeypatch.setattr(explain, "_plain_point", lambda *_: Point(np.zeros(1), 1.0, np.zeros(1), np.eye(1)))
     monkeypatch.setattr(explain, "decimation_for", lambda *_: 1)
     monkeypatch.setattr(explain, "cost_over_noise", lambda *_: chi)
-    monkeypatch.setattr(explain, "_paired", paired)
+    monkeypatch.setattr(explain, "_hypothesis_pairs", paired)
     monkeypatch.setattr(explain, "with_delivery", lambda *_: [])
-    monkeypatch.setattr(explain, "delivery_followed", lambda *_: [])
-    monkeypatch.setattr(explain, "without_idle", lambda _, tried: tried)
-    monkeypatch.setattr(conclusion, "weighed", lambda *_, **__: {})
+    monkeypatch.setattr(explain, "fit_of_delivery", lambda *_: [])
+    monkeypatch.setattr(explain, "without_vanished_effect", lambda _, tried: tried)
+    monkeypatch.setattr(conclusion, "likelihood_mean", lambda *_, **__: {})
     monkeypatch.setattr(conclusion, "usual_pressure", lambda *_: 0.0)
     monkeypatch.setattr(conclusion, "delivery_beside", lambda *_: NO_GAIN)
-    monkeypatch.setattr(explain, "ALIKE", 4.0)
+    monkeypatch.setattr(explain, "EQUAL_DISTANCE", 4.0)
     nothing: Any = None
     found = explain.explain(nothing, nothing, [{}], lambda fit: fit.cost < least, hopeless=hopeless)
     assert found is not None
@@ -232,10 +232,10 @@ def test_pairs_are_also_tested_with_a_nearly_equally_good_hypothesis(
 def test_a_delivery_beyond_wear_and_rounding_of_the_rig_file_is_objected_to(share: float, said: bool) -> None:
     displacement = share * HEALTHY.pump_displacement
     found: Any = SimpleNamespace(values={"pump_displacement": (displacement, 0.01 * displacement)})
-    objections = contradicted(found, HEALTHY)
+    objections = delivery_objection(found, HEALTHY)
     assert [note.data["percent"] for note in objections] == pytest.approx([100.0 * share] * said)
     other: Any = SimpleNamespace(values={"pressure_offset": (1e5, 1e3)})
-    assert contradicted(other, HEALTHY) == ()
+    assert delivery_objection(other, HEALTHY) == ()
 
 
 def test_a_smaller_set_of_hypotheses_replaces_all_larger_sets_that_contain_it() -> None:
@@ -249,7 +249,7 @@ def test_a_smaller_set_of_hypotheses_replaces_all_larger_sets_that_contain_it() 
     air, leak, late = HYPOTHESES[:3]
     finished = [ended(100.0, air, leak), ended(101.0, air, late), ended(130.0, leak)]
     fewer = ended(105.0, air)
-    leaner = explain._leaner  # pyright: ignore[reportPrivateUsage]
+    leaner = explain._with_smaller_set  # pyright: ignore[reportPrivateUsage]
     assert leaner(fewer, finished, lambda _: True) == [fewer, finished[2]]
     assert leaner(fewer, finished, lambda _: False) == finished
     assert leaner(finished[0], finished, lambda _: True) == finished

@@ -11,7 +11,7 @@ from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import AIR, AIR_MIDWAY, CHECKS_CRACK, MAKEUP_BLOCKED, OFFSET
 from estimation.fits.hypothesis_search import final_fits
 from estimation.fits.hypothesis_search.explanation import Trial
-from estimation.fits.hypothesis_search.final_fits import ALIKE, CLOSE, FAR_BEHIND
+from estimation.fits.hypothesis_search.final_fits import EQUAL_DISTANCE, FAR_BEHIND, RIVAL_DISTANCE
 from estimation.models.completed_flow import CRACKS
 from tests.estimation.fits.short_logs import made_fit
 
@@ -27,30 +27,30 @@ def test_a_set_is_fitted_first_by_the_balance_of_its_search_and_the_other_must_b
         return replace(tried, point=replace(tried.point, cost=50.0 * len(led)))
 
     model = SimpleNamespace(theta=lambda _: np.zeros(1))
-    monkeypatch.setattr(final_fits, "delayed", lambda log, _: log)
-    monkeypatch.setattr(final_fits, "coarsened", lambda *_: None)
+    monkeypatch.setattr(final_fits, "without_delays", lambda log, _: log)
+    monkeypatch.setattr(final_fits, "coarse_log", lambda *_: None)
     monkeypatch.setattr(final_fits, "balances_mass", lambda _: by_mass)
-    monkeypatch.setattr(final_fits, "balanced_by", lambda _, share: share)
-    monkeypatch.setattr(final_fits, "freed", lambda share, *_: SimpleNamespace(model=model, share=share))
+    monkeypatch.setattr(final_fits, "with_balance", lambda _, share: share)
+    monkeypatch.setattr(final_fits, "hypothesis_problem", lambda share, *_: SimpleNamespace(model=model, share=share))
     monkeypatch.setattr(final_fits, "usual_values", lambda _: {})
-    monkeypatch.setattr(final_fits, "_to_its_end", to_its_end)
+    monkeypatch.setattr(final_fits, "_completed_search", to_its_end)
     monkeypatch.setattr(final_fits, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
-    monkeypatch.setattr(final_fits, "concluded", lambda *_, **__: made_fit(50.0, 2e8, 1e5))
+    monkeypatch.setattr(final_fits, "fit_at_solution", lambda *_, **__: made_fit(50.0, 2e8, 1e5))
     nothing: Any = SimpleNamespace(passes_on=False)
     begun = Trial((), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {})
     assert final_fits.final_fit(nothing, begun).cost == 50.0
-    assert led == [(order[0], np.inf), (order[1], 50.0 + ALIKE)]
+    assert led == [(order[0], np.inf), (order[1], 50.0 + EQUAL_DISTANCE)]
 
 
 @pytest.mark.parametrize(("cost", "searches"), [(0.9, 2), (1.1, 1)])
 def test_a_set_far_behind_the_best_is_given_up(cost: float, searches: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    useful = 100.0 * CLOSE
+    useful = 100.0 * RIVAL_DISTANCE
     costs = [cost * FAR_BEHIND * useful] * 2
 
     def descended(*_: Any, **__: Any) -> Any:
         return SimpleNamespace(cost=costs.pop(), point=SimpleNamespace(theta=np.zeros(1)))
 
-    monkeypatch.setattr(final_fits, "descended", descended)
+    monkeypatch.setattr(final_fits, "after_descent", descended)
     nothing: Any = SimpleNamespace(drives=(), steps=None)
     begun: Any = SimpleNamespace(cost=np.inf)
     ended: list[Any] = []
@@ -60,11 +60,11 @@ def test_a_set_far_behind_the_best_is_given_up(cost: float, searches: int, monke
         return SimpleNamespace(theta=theta)
 
     problem: Any = SimpleNamespace(log=nothing, model=SimpleNamespace(values=lambda _: {}), at="all short steps")
-    monkeypatch.setattr(final_fits, "spared", lambda one, _: one)
+    monkeypatch.setattr(final_fits, "with_steps_where_needed", lambda one, _: one)
     monkeypatch.setattr(final_fits, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
     monkeypatch.setattr(final_fits, "descend", to_all_short_steps)
     monkeypatch.setattr(final_fits, "replace", lambda one, **_: one)
-    final_fits._to_its_end(problem, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
+    final_fits._completed_search(problem, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
     assert len(costs) == 2 - searches
     assert ended == [problem.at]
 
@@ -123,5 +123,5 @@ def test_a_hypothesis_whose_effect_vanished_is_dropped_from_a_pair(
 
     monkeypatch.setattr(final_fits, "final_fit", fewer)
     nothing: Any = None
-    told = final_fits.without_idle(nothing, both)
+    told = final_fits.without_vanished_effect(nothing, both)
     assert told.together == ((AIR,) if alone else (AIR, MAKEUP_BLOCKED))

@@ -17,7 +17,7 @@ def test_no_pairs_are_tested_on_a_log_with_varying_noise(monkeypatch: pytest.Mon
     calm = log(0.5)
     noise = np.random.default_rng(5).normal(0.0, 2e4, len(calm))
     noise[np.arange(len(calm)) % 7 > 0] = 0.0
-    monkeypatch.setattr(explain, "_paired", never)
+    monkeypatch.setattr(explain, "_hypothesis_pairs", never)
     assert fit_flow(calm.replace(**{PRESSURE: calm[PRESSURE] + noise}), PAPER, PAPER.bulk_modulus).reasons
 
 

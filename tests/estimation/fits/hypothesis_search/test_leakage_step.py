@@ -9,13 +9,13 @@ import pytest
 from estimation.eha.explanation_notes import notes_of
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, without_strays
-from estimation.fits.greybox.fit import concluded
+from estimation.fits.greybox.fit import fit_at_solution
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import LEAKAGE_STEP
 from estimation.fits.hypothesis_search.lost_flow import likeliest_step
-from estimation.fits.hypothesis_search.predicted_gains import STEPPED
-from estimation.fits.hypothesis_search.wide_log import widened
-from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.fits.hypothesis_search.predicted_gains import STEP_SHARE
+from estimation.fits.hypothesis_search.wide_log import widened_log
+from estimation.fits.hypothesis_search.wide_problem import hypothesis_problem
 from estimation.log_checks.clean import clean_log
 from estimation.models.completed_flow import CRACKS
 from estimation.models.wide_flow import WideFlowParameters, stepped_leakage
@@ -43,12 +43,12 @@ def stepping(factor: float, at: float = 2.0, before: float = 1.0) -> Record:
 
 def seen(record: Record) -> GreyBoxLog:
     sound, variances = without_strays(record)
-    return widened(flow_log(sound, HEALTHY, {}, variances), HEALTHY)
+    return widened_log(flow_log(sound, HEALTHY, {}, variances), HEALTHY)
 
 
 def test_lost_flow_shows_the_time_and_size_of_a_leakage_step() -> None:
     step = likeliest_step(seen(stepping(6.0)))
-    assert step.share > STEPPED
+    assert step.share > STEP_SHARE
     assert step.at == pytest.approx(0.4, abs=0.01)
     assert step.before / step.after == pytest.approx(1.0 / 6.0, abs=0.3)
     assert step.after == pytest.approx(6.0 * HEALTHY.leakage_coefficient, rel=0.1)
@@ -60,7 +60,7 @@ def test_apparently_negative_leakage_before_a_step_counts_as_a_tight_seal() -> N
     parameters = log.parameters.copy()
     parameters[parameter_names(WideFlowParameters).index("pump_displacement")] *= 0.7
     step = likeliest_step(replace(log, parameters=parameters))
-    assert step.share > STEPPED
+    assert step.share > STEP_SHARE
     assert step.at == pytest.approx(0.4, abs=0.01)
     assert step.before == 0.0
 
@@ -74,7 +74,7 @@ def test_a_gap_in_pressure_does_not_shift_the_time_of_a_leakage_step() -> None:
 
 
 def test_constant_leakage_shows_no_step() -> None:
-    assert likeliest_step(seen(stepping(1.0))).share < STEPPED
+    assert likeliest_step(seen(stepping(1.0))).share < STEP_SHARE
 
 
 def test_a_failing_seal_is_identified_and_bulk_modulus_is_right() -> None:
@@ -100,8 +100,8 @@ def test_cracking_pressures_widen_the_interval_of_bulk_modulus_beside_a_leakage_
     values |= {"leakage_coefficient": 6.0 * HEALTHY.leakage_coefficient}
     stds: list[float] = []
     for one in (LEAKAGE_STEP, replace(LEAKAGE_STEP, beside=())):
-        problem = freed(log, (one,))
-        fit = concluded(problem, problem.at(problem.model.theta(values)), disturbed=False)
+        problem = hypothesis_problem(log, (one,))
+        fit = fit_at_solution(problem, problem.at(problem.model.theta(values)), disturbed=False)
         stds.append(fit.std["bulk_modulus"])
     assert stds[0] > 1.2 * stds[1]
 

@@ -15,7 +15,7 @@ from estimation.fits.hypothesis_search.loss_regressors import (
     WIDEST_TOOTH,
     LossRegressor,
     LossSignals,
-    shifted,
+    shifted_regressor,
 )
 
 SEEN = LossSignals(
@@ -49,7 +49,7 @@ def test_the_regressor_of_each_loss_has_the_course_of_its_cause(course: LossRegr
 
 
 def test_every_kind_of_loss_is_tried_within_the_range_of_the_log() -> None:
-    tried = SEEN.tried()
+    tried = SEEN.regressors_tried()
     assert {one.kind for one in tried} == {BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR}
     assert all(0.0 <= one.at <= 0.03 for one in tried if one.kind == BORE)
     assert all(0.0 < one.at < 100.0 for one in tried if one.kind == FILLING)
@@ -58,17 +58,17 @@ def test_every_kind_of_loss_is_tried_within_the_range_of_the_log() -> None:
 
 def test_no_scored_bore_is_tried_if_the_piston_hardly_moves() -> None:
     still = SEEN._replace(position=1e-4 * SEEN.position)
-    assert all(one.kind != BORE for one in still.tried())
+    assert all(one.kind != BORE for one in still.regressors_tried())
 
 
 def test_losses_with_a_threshold_are_not_tried_with_dead_pressure_and_a_motor_at_rest() -> None:
     still = SEEN._replace(speed=np.zeros(4), pressure=np.zeros(4), steady=np.zeros(4))
-    assert not {FILLING, LIFTING} & {course.kind for course in still.tried()}
+    assert not {FILLING, LIFTING} & {course.kind for course in still.regressors_tried()}
 
 
 def test_each_kind_of_loss_varies_only_its_own_parameters() -> None:
     assert {
-        kind: tuple(SEEN.moves(LossRegressor(kind, 1.0, 0.1)))
+        kind: tuple(SEEN.field_steps(LossRegressor(kind, 1.0, 0.1)))
         for kind in (BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR)
     } == {
         BORE: ("at", "width"),
@@ -81,8 +81,8 @@ def test_each_kind_of_loss_varies_only_its_own_parameters() -> None:
 
 
 def test_a_width_stays_within_its_bounds() -> None:
-    assert shifted(LossRegressor(BORE, 0.0, NARROWEST), {"width": -1.0}, 1.0).width == NARROWEST
-    assert shifted(LossRegressor(TOOTH, 0.0, 0.8), {"width": 5.0}, 1.0).width == WIDEST_TOOTH
-    assert shifted(LossRegressor(BORE, 0.0, 0.004), {"width": 5.0}, 1.0).width == 0.008
-    assert shifted(LossRegressor(LIFTING, 1e5, 1.0), {"width": -5.0}, 1.0).width == LEAST_POWER
-    assert shifted(LossRegressor(FILLING, 50.0), {"at": -80.0}, 1.0).at == 25.0
+    assert shifted_regressor(LossRegressor(BORE, 0.0, NARROWEST), {"width": -1.0}, 1.0).width == NARROWEST
+    assert shifted_regressor(LossRegressor(TOOTH, 0.0, 0.8), {"width": 5.0}, 1.0).width == WIDEST_TOOTH
+    assert shifted_regressor(LossRegressor(BORE, 0.0, 0.004), {"width": 5.0}, 1.0).width == 0.008
+    assert shifted_regressor(LossRegressor(LIFTING, 1e5, 1.0), {"width": -5.0}, 1.0).width == LEAST_POWER
+    assert shifted_regressor(LossRegressor(FILLING, 50.0), {"at": -80.0}, 1.0).at == 25.0

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.eha.rig_share import delivery_left_open
+from estimation.eha.rig_share import undetermined_delivery
 from estimation.fits.hypothesis_search.not_excluded import OPEN_DELIVERY, open_wear_note, share_lost, unseen_valve_note
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain
 from estimation.notes import RigCode
@@ -69,5 +69,5 @@ def test_wear_explains_no_more_flow_than_the_losses_of_the_fit() -> None:
     assert open_wear_note(slopes, most) == ()
     (noted,) = open_wear_note(slopes, 0.2)
     assert noted.data["percent"] == pytest.approx(20.0)
-    assert delivery_left_open((noted,)) == (pytest.approx(-0.12), pytest.approx(0.12), pytest.approx(-0.2))
-    assert delivery_left_open(open_wear_note(slopes, 0.5)) == delivery_left_open(open_wear_note(slopes))
+    assert undetermined_delivery((noted,)) == (pytest.approx(-0.12), pytest.approx(0.12), pytest.approx(-0.2))
+    assert undetermined_delivery(open_wear_note(slopes, 0.5)) == undetermined_delivery(open_wear_note(slopes))

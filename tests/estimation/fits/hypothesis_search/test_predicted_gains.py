@@ -11,7 +11,7 @@ from estimation.fits.hypotheses import AIR, DELIVERY, MAKEUP_BLOCKED, MAY_HIDE, 
 from estimation.fits.hypothesis_search import conclusion, predicted_gains
 from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain, predicted_gain_beside
 from estimation.fits.hypothesis_search.wide_log import balances_mass
-from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.fits.hypothesis_search.wide_problem import hypothesis_problem
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import QUICK_FLOW_FORM, QUICKNESS
@@ -56,10 +56,10 @@ def test_gains_beside_air_are_predicted_with_the_bubbles_of_the_fit(
     asked = list[object]()
 
     def noted(*given: object) -> object:
-        asked.append(problem := freed(*given))  # type: ignore[arg-type]
+        asked.append(problem := hypothesis_problem(*given))  # type: ignore[arg-type]
         return problem
 
-    monkeypatch.setattr(predicted_gains, "freed", noted)
+    monkeypatch.setattr(predicted_gains, "hypothesis_problem", noted)
     predicted_gain_beside(wide(), (AIR,), {**FOUND, "air_softness": 2e3, QUICKNESS: 0.2}, DELIVERY)
     assert all(one.model.rates is QUICK_FLOW_FORM.rates for one in asked)  # type: ignore[attr-defined]
     assert all(QUICKNESS in one.model.unknowns for one in asked)  # type: ignore[attr-defined]

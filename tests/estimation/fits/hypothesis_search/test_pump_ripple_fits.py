@@ -13,12 +13,12 @@ from estimation.fits.flow.asked_hypotheses import ALWAYS_ASKED
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.pump_ripple import COUNTS, MOST_OFFSET, Ripple, ShownOffset, ShownRipple
+from estimation.fits.greybox.pump_ripple import MOST_OFFSET, TOOTH_COUNTS, Ripple, ShownOffset, ShownRipple
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
 from estimation.fits.hypothesis_search.pump_ripple_fits import (
     BY_CHANCE,
     CHANCE,
-    KEPT,
+    KEPT_GAIN,
     LEAST_OFFSET,
     LEAST_TEETH,
     MOST_LINEAR,
@@ -30,7 +30,7 @@ from estimation.fits.hypothesis_search.pump_ripple_fits import (
     ROUNDS,
     SETTLED,
     STANDS_OUT,
-    SURE,
+    SURE_SHARE,
     SURELY_WORTH,
     TEETH_WORTH,
     RippleFits,
@@ -85,7 +85,7 @@ def test_ripple_is_corrected_until_none_remains() -> None:
     rounds = [fit(500.0, shown(12, 200.0, 0.10)), fit(300.0, shown(12, 5.0, 0.02)), fit(290.0, shown(12, 0.1, 0.001))]
     fitted, asked = told(*rounds)
     found = with_pump_ripple(PLAIN, fitted, well)
-    assert asked == [(COUNTS, ()), ((12, 24), (12,)), ((12, 24), (12,))]
+    assert asked == [(TOOTH_COUNTS, ()), ((12, 24), (12,)), ((12, 24), (12,))]
     assert found.fits[0].cost == 290.0
     assert noted(found.remarks) == [
         {
@@ -209,7 +209,7 @@ def test_remaining_ripple_shuts_the_gate_if_nothing_else_does(
     monkeypatch: pytest.MonkeyPatch, chi: float, code: str
 ) -> None:
     shows = replace(fit(500.0, shown(12, 50.0), shown(13, 40.0)), chi_square=(chi,))
-    monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [shows])
+    monkeypatch.setattr(plain_flow, "balance_fits", lambda *_, **__: [shows])
     monkeypatch.setattr(flow_fit, "with_implicit_steps", lambda _: None)
     wear = (RigCode.WEAR_NOT_EXCLUDED.note(percent=3.0),)
     monkeypatch.setattr(flow_fit, "hypotheses_asked", lambda *_, **__: ((), wear))
@@ -219,7 +219,7 @@ def test_remaining_ripple_shuts_the_gate_if_nothing_else_does(
 
 
 def test_a_sound_log_has_no_remaining_ripple(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [fit(500.0, shown(12, 3.0))])
+    monkeypatch.setattr(plain_flow, "balance_fits", lambda *_, **__: [fit(500.0, shown(12, 3.0))])
     gains = len(ALWAYS_ASKED) * [PredictedGain(0.0, 0.0, 0.01)]
     monkeypatch.setattr(asked_hypotheses, "predicted_gains", lambda *_, **__: gains)
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
@@ -229,7 +229,7 @@ def test_a_sound_log_has_no_remaining_ripple(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_the_limits_for_ripple_have_their_stated_rates_of_false_alarms() -> None:
     """Twice the gain of a cosine and a sine is chi-square distributed with two degrees of freedom."""
-    assert np.exp(TEETH_WORTH) / len(COUNTS) == pytest.approx(1500.0, rel=0.03)
+    assert np.exp(TEETH_WORTH) / len(TOOTH_COUNTS) == pytest.approx(1500.0, rel=0.03)
     assert np.exp(OVERTONE_WORTH) == pytest.approx(150.0, rel=0.02)
 
 
@@ -245,7 +245,7 @@ def test_a_speed_offset_is_subtracted_corrected_and_reported_if_this_explains_th
     ]
     fitted, asked = told(*rounds)
     found = with_pump_ripple(PLAIN, fitted, lambda one: one.cost < 900.0)
-    assert asked == 3 * [(COUNTS, ())]
+    assert asked == 3 * [(TOOTH_COUNTS, ())]
     assert subtracted(found) == pytest.approx(0.24)
     assert found.log.speed_offset == pytest.approx(0.24)
     assert not found.log.counts  # hypotheses on this log do not test for ripple again
@@ -264,8 +264,8 @@ def test_a_speed_offset_is_subtracted_corrected_and_reported_if_this_explains_th
     [
         ([fit(900.0, off=(0.2, OFFSET_WORTH - 0.1))], True),
         ([fit(900.0, off=(1.01 * MOST_OFFSET, 500.0))], True),
-        ([fit(900.0, off=(0.2, 500.0)), fit(900.0 - KEPT * 500.0 + 0.1)], True),
-        ([fit(900.0, off=(0.2, 500.0)), fit(900.0 - KEPT * 500.0 - 0.1)], False),
+        ([fit(900.0, off=(0.2, 500.0)), fit(900.0 - KEPT_GAIN * 500.0 + 0.1)], True),
+        ([fit(900.0, off=(0.2, 500.0)), fit(900.0 - KEPT_GAIN * 500.0 - 0.1)], False),
     ],
 )
 def test_an_offset_that_gains_too_little_or_leaves_the_log_unexplained_is_not_subtracted(
@@ -279,7 +279,7 @@ def test_an_offset_that_gains_too_little_or_leaves_the_log_unexplained_is_not_su
 
 def test_an_offset_that_leaves_residuals_above_sensor_noise_is_not_subtracted() -> None:
     """A single rod looks like an offset, and its log passed with bulk modulus 39 % too low."""
-    most = SURE * 0.2 + CHANCE * np.sqrt(2.0 / len(PLAIN.drives))
+    most = SURE_SHARE * 0.2 + CHANCE * np.sqrt(2.0 / len(PLAIN.drives))
     for left, taken in ((0.95 * most, True), (1.05 * most, False)):
         after = replace(fit(400.0), chi_square=(1.0 + left,))
         found = with_pump_ripple(PLAIN, told(fit(900.0, off=(0.2, 500.0)), after)[0], well, 1.2)
@@ -321,7 +321,7 @@ def test_ripple_is_tested_after_the_offset_is_subtracted_and_corrects_the_offset
     ]
     fitted, asked = told(*rounds)
     found = with_pump_ripple(PLAIN, fitted, lambda one: one.cost < 600.0)
-    assert asked == [(COUNTS, ()), (COUNTS, ()), ((12, 24), (12,)), ((12, 24), (12,))]
+    assert asked == [(TOOTH_COUNTS, ()), (TOOTH_COUNTS, ()), ((12, 24), (12,)), ((12, 24), (12,))]
     assert found.log.speed_offset == pytest.approx(0.24)
     assert noted(found.remarks)[1] == {
         "code": "speed_offset",

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.diagnosis.rig_draws import draw_bench, wrong_file
+from benchmarks.diagnosis.rig_draws import draw_bench, wrong_rig_file
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log_traits import LogTraits
 from estimation.log_checks.clean import clean_log
@@ -11,7 +11,7 @@ from estimation.log_checks.clean import clean_log
 @pytest.mark.slow
 def test_a_wrong_pump_wrong_chambers_and_a_load_are_found_together() -> None:
     bench = draw_bench(1307)  # a sine of 11 s; the file's chambers are 10 % too small, pump over area 2 %
-    rig = wrong_file(bench.healthy, 1307)
+    rig = wrong_rig_file(bench.healthy, 1307)
     clean = clean_log(bench.record, rig)
     fit = fit_flow(clean.record, rig, rig.bulk_modulus, {}, clean.variances, LogTraits(loaded=True))
     assert fit.explanation is not None

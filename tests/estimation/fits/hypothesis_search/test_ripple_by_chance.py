@@ -7,8 +7,8 @@ import pytest
 
 from estimation.fits.greybox.pump_ripple import Ripple, ShownOffset, ShownRipple
 from estimation.fits.hypothesis_search.pump_ripple_fits import (
-    CONTRADICTS,
-    KEPT,
+    CONTRADICTING_DEVIATIONS,
+    KEPT_GAIN,
     LEAST_TEETH,
     ONE_SIDED_95,
     SURELY_WORTH,
@@ -24,9 +24,9 @@ LARGEST_SMALL = LEAST_TEETH + ONE_SIDED_95 * STD
 @pytest.mark.parametrize(
     ("size", "flow", "std", "left"),
     [
-        (LARGEST_SMALL - 1e-4, 1.0 - KEPT - 1e-3, 1e-3, False),  # the flow has another offset: chance
-        (LARGEST_SMALL - 1e-4, KEPT + 1e-3, 1e-3, True),  # nearly the same offset
-        (LARGEST_SMALL - 1e-4, 0.0, 1.01 / CONTRADICTS, True),  # the flow does not decide
+        (LARGEST_SMALL - 1e-4, 1.0 - KEPT_GAIN - 1e-3, 1e-3, False),  # the flow has another offset: chance
+        (LARGEST_SMALL - 1e-4, KEPT_GAIN + 1e-3, 1e-3, True),  # nearly the same offset
+        (LARGEST_SMALL - 1e-4, 0.0, 1.01 / CONTRADICTING_DEVIATIONS, True),  # the flow does not decide
         (LARGEST_SMALL - 1e-4, 0.0, np.inf, True),
         (LARGEST_SMALL + 1e-4, 0.0, 1e-3, True),  # not small, so not chance
     ],
@@ -46,9 +46,9 @@ def test_small_ripple_with_a_speed_offset_that_the_flow_contradicts_does_not_shu
     ("promised", "gained", "left"),
     [
         (TEETH_WORTH + 0.5, TEETH_WORTH - 1.0, False),  # this made a simulated chirp unknown
-        (SURELY_WORTH - 0.5, KEPT * TEETH_WORTH, False),
+        (SURELY_WORTH - 0.5, KEPT_GAIN * TEETH_WORTH, False),
         (SURELY_WORTH + 0.5, TEETH_WORTH - 1.0, False),
-        (SURELY_WORTH + 0.5, KEPT * SURELY_WORTH, True),  # the search with ripple ended too early
+        (SURELY_WORTH + 0.5, KEPT_GAIN * SURELY_WORTH, True),  # the search with ripple ended too early
         (10.0 * TEETH_WORTH, TEETH_WORTH - 1.0, True),
     ],
 )

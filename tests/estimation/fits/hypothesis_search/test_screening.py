@@ -8,8 +8,8 @@ import pytest
 from estimation.fits.hypotheses import DELIVERY, VOLUME
 from estimation.fits.hypothesis_search import screening
 from estimation.fits.hypothesis_search.coarse_search import SLIGHT
-from estimation.fits.hypothesis_search.screening import nearing, screen
-from estimation.fits.hypothesis_search.wide_log import widened
+from estimation.fits.hypothesis_search.screening import screen, screened_hypotheses
+from estimation.fits.hypothesis_search.wide_log import widened_log
 from estimation.models.flow import STIFFNESS
 from tests.estimation.fits.short_logs import PAPER, at_one_speed, lost_in_bias, seen
 
@@ -17,7 +17,10 @@ from tests.estimation.fits.short_logs import PAPER, at_one_speed, lost_in_bias, 
 def test_a_worn_pump_at_one_speed_is_found_sooner_from_a_start_with_healthy_flow_bias(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    log, plain = widened(seen(at_one_speed()), PAPER, {STIFFNESS: 1.0}), lost_in_bias()  # practically no accumulator
+    log, plain = (
+        widened_log(seen(at_one_speed()), PAPER, {STIFFNESS: 1.0}),
+        lost_in_bias(),
+    )  # practically no accumulator
     (from_worn,) = screen(log, (DELIVERY,), [plain])
     monkeypatch.setattr(screening, "worn_start", lambda *_: ())
     (from_sound,) = screen(log, (DELIVERY,), [plain])
@@ -27,7 +30,7 @@ def test_a_worn_pump_at_one_speed_is_found_sooner_from_a_start_with_healthy_flow
 def test_a_screening_ends_once_a_step_predicts_less_than_the_error_of_long_steps(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    log, descend_in_turn = widened(seen(at_one_speed()), PAPER), screening.descend_in_turn
+    log, descend_in_turn = widened_log(seen(at_one_speed()), PAPER), screening.descend_in_turn
     counted: list[int] = []
 
     def counting(ways: Any, *given: Any, **options: Any) -> Any:
@@ -62,5 +65,5 @@ def test_other_hypotheses_begin_at_the_start_from_which_a_far_one_reached_the_lo
     far, some = (SimpleNamespace(far=far) for far in (True, False))
     starts: Any = ["a", "b", "c"]
     nothing: Any = None
-    assert len([*nearing(nothing, [some, far], starts, ["a", "c"], 100.0, 2)]) == 2  # pyright: ignore[reportArgumentType]
+    assert len([*screened_hypotheses(nothing, [some, far], starts, ["a", "c"], 100.0, 2)]) == 2  # pyright: ignore[reportArgumentType]
     assert asked == [starts, begun]

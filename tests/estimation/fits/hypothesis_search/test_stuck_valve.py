@@ -37,9 +37,9 @@ def stuck(
     monkeypatch: pytest.MonkeyPatch, cost: float, later: float, *beside: Hypothesis, crack: Hypothesis = CHECKS_CRACK
 ) -> list[tuple[Hypothesis, ...]]:
     """Return the sets that replace a late valve of cost 1000, if a stuck one has the given cost."""
-    monkeypatch.setattr(stuck_valve, "delayed", lambda log, _: log)
+    monkeypatch.setattr(stuck_valve, "without_delays", lambda log, _: log)
     monkeypatch.setattr(stuck_valve, "screen", lambda _, together, *__, **___: iter([trial(together, cost)]))
-    monkeypatch.setattr(stuck_valve, "likeliest", lambda _, tried, *__: [way for one in tried for way in one])
+    monkeypatch.setattr(stuck_valve, "likeliest_sets", lambda _, tried, *__: [way for one in tried for way in one])
     best = trial([crack, *beside], 1000.0, later)
     return [one.together for one in stuck_valve.stuck_instead(NOTHING, best, NO_DECIMATION)]
 

@@ -121,8 +121,8 @@ def test_a_loss_that_leaves_far_more_than_noise_is_not_fitted_with_short_steps(
     log: Any = SimpleNamespace(drives=np.zeros(samples), measured=np.zeros((samples, 1)), block=1e-3, sample_time=1e-3)
     course, fit = SimpleNamespace(kind="bore"), SimpleNamespace(cost=0.0)
     search = SimpleNamespace(
-        promising=lambda *_: [(course, 1.0)],
-        followed_from=lambda *_: (course, SimpleNamespace(cost=0.5 * left * samples)),
+        promising_regressors=lambda *_: [(course, 1.0)],
+        best_of_searches=lambda *_: (course, SimpleNamespace(cost=0.5 * left * samples)),
         concluded=lambda *_: concluded.append(left) or SimpleNamespace(size=1.0, fit=fit, course=course),
     )
     monkeypatch.setattr(module, "_Search", lambda *_: search)

@@ -10,10 +10,10 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.fits.flow.accumulator import presumed_stiffness
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import nudges
-from estimation.fits.greybox.deviations import believed
+from estimation.fits.greybox.deviations import prior_precision
 from estimation.fits.greybox.log import greybox_log
 from estimation.fits.hypotheses import (
-    BEGUN,
+    BEGUN_UNDER_LOAD,
     ENCODER_ZERO,
     HYPOTHESES,
     LIMITS,
@@ -22,19 +22,19 @@ from estimation.fits.hypotheses import (
     VOLUME,
     Hypothesis,
 )
-from estimation.fits.hypothesis_search.wide_log import START_LEVEL, usual_values, widened
+from estimation.fits.hypothesis_search.wide_log import START_LEVEL, usual_values, widened_log
 from estimation.fits.hypothesis_search.wide_problem import (
     LEAST_SETTING,
     MOST_WORN,
     POSITION_ZERO,
     flow_bounds,
     flow_speed,
-    freed,
+    hypothesis_problem,
     misread_start,
     own_starts,
     worn_start,
 )
-from estimation.models.flow import FLOW_FORM, relieving
+from estimation.models.flow import FLOW_FORM, form_with_relief
 from estimation.models.flow_parameters import flow_parameters
 from estimation.models.wide_flow import grown_leakage
 from faults.conditions import CONDITIONS, parameters_for
@@ -52,8 +52,8 @@ VARIANCES = {"differential_pressure_pa": 1e6}
 def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_finite_values(one: Hypothesis) -> None:
     still = dict.fromkeys((*FLOW_FORM.drives, *FLOW_FORM.outputs), np.zeros(20))
     seen_log = greybox_log(FLOW_FORM, Record(1e-3, still), flow_parameters(RIG), longest_step=1e-3, variances=VARIANCES)
-    log = widened(replace(seen_log, presumed=presumed_stiffness(RIG, {})), RIG)
-    model = freed(log, (one,)).model
+    log = widened_log(replace(seen_log, presumed=presumed_stiffness(RIG, {})), RIG)
+    model = hypothesis_problem(log, (one,)).model
     known = dict.fromkeys(model.unknowns, 1.0)
     for start in own_starts(log, one):
         assert np.all(np.isfinite(model.theta({**known, **start})))
@@ -74,7 +74,7 @@ def test_leakage_that_grows_with_time_squared_is_within_bounds(factor: float) ->
 @pytest.mark.parametrize("share", [0.98, 1.1])
 def test_the_bounds_of_the_relief_setting_follow_the_peak_pressure_of_the_log(share: float) -> None:
     """A search stepped to a setting that pressure never reached, from where no slope leads back."""
-    peak, form = share * RIG.relief_pressure, relieving(FLOW_FORM)
+    peak, form = share * RIG.relief_pressure, form_with_relief(FLOW_FORM)
     reached = replace(seen(log(0.2)), measured=np.full((200, 1), -peak))
     place = form.unknowns.index("relief_pressure")
     least, most = (np.exp(end[place]) for end in flow_bounds(form, [form.theta(flow_starts(RIG, 2e8)[0])], reached))
@@ -98,7 +98,7 @@ def test_the_start_of_an_offset_at_rest_is_the_pressure_that_is_read_there() -> 
 
 
 def test_the_start_of_a_worn_pump_attributes_excess_flow_bias_to_wear() -> None:
-    log = widened(seen(at_one_speed()), PAPER)
+    log = widened_log(seen(at_one_speed()), PAPER)
     assert flow_speed(log) == pytest.approx(100.0, rel=3e-2)  # computed from means about each sample
     (start,) = worn_start(log, lost_in_bias())
     assert start["pump_displacement"] == pytest.approx(0.85 * PAPER.pump_displacement, rel=1e-2)
@@ -118,7 +118,7 @@ def test_slopes_of_the_widest_make_up_valve_do_not_chatter(
     modulus: float, opening: float, implicit: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = replace(wide(), stiff=implicit)
-    problem = freed(log, (BEGUN,))
+    problem = hypothesis_problem(log, (BEGUN_UNDER_LOAD,))
     values = {**usual_values(log), "bulk_modulus": modulus, "makeup_opening": opening, "case_leakage": 1e-13}
     theta = problem.model.theta({**values, "leakage_coefficient": 2e-11, "speed_lead": 1e-5})
     place = problem.model.unknowns.index("makeup_conductance")
@@ -126,7 +126,7 @@ def test_slopes_of_the_widest_make_up_valve_do_not_chatter(
 
     def effects(nudge: float) -> np.ndarray:
         monkeypatch.setattr(nudges, "NUDGE", nudge)
-        slopes = freed(log, (BEGUN,)).linearised(theta)[1]
+        slopes = hypothesis_problem(log, (BEGUN_UNDER_LOAD,)).linearised(theta)[1]
         return np.sqrt(np.einsum("ij,ij->j", slopes, slopes))
 
     # a valve that opens within 100 Pa has a corner narrower than a nudge of 1e-3; chatter would grow tenfold here
@@ -141,12 +141,12 @@ def test_the_start_of_an_offset_at_rest_is_zero_without_pressure() -> None:
 
 def test_the_prior_of_the_initial_pressure_level_reaches_up_to_half_of_the_peak_pressure() -> None:
     log = wide()
-    problem, most = freed(log, (BEGUN,)), 0.5 * float(np.max(np.abs(log.measured)))
+    problem, most = hypothesis_problem(log, (BEGUN_UNDER_LOAD,)), 0.5 * float(np.max(np.abs(log.measured)))
     place = problem.model.unknowns.index(START_LEVEL)
     known = dict.fromkeys(problem.model.unknowns, 1.0)
     unit = problem.model.values(problem.model.theta(known) + 1.0)[START_LEVEL] - 1.0
     levels = np.linspace(0.0, most, 1001)
-    assert unit * believed(problem)[place] ** -0.5 == pytest.approx(np.sqrt(np.mean(levels**2)), rel=1e-3)
+    assert unit * prior_precision(problem)[place] ** -0.5 == pytest.approx(np.sqrt(np.mean(levels**2)), rel=1e-3)
 
 
 def test_bulk_modulus_is_right_in_a_log_that_begins_with_both_chambers_shut_in() -> None:
@@ -172,7 +172,7 @@ def test_an_uncertain_initial_pressure_level_is_in_the_deviation_of_bulk_modulus
 @pytest.mark.parametrize(("length", "starts"), [(1.4, (-0.06, 0.06)), (0.05, (-0.015, 0.015))])
 def test_a_search_for_an_encoders_zero_begins_within_the_chambers(length: float, starts: tuple[float, float]) -> None:
     rig = replace(PAPER, chamber_volume=0.5 * length * PAPER.piston_area)
-    begun = own_starts(widened(seen(log(0.5)), rig), ENCODER_ZERO)
+    begun = own_starts(widened_log(seen(log(0.5)), rig), ENCODER_ZERO)
     assert [one[POSITION_ZERO] for one in begun[:2]] == pytest.approx(starts)
 
 
@@ -180,8 +180,8 @@ def test_the_start_of_a_pressure_drift_explains_most_beside_the_first_guess() ->
     """A stepwise search reached a twentieth of 1.8 bar, and the log was refused at 17 times the noise."""
     record = log()
     drifts = record.replace(**{PRESSURE: record[PRESSURE] + np.linspace(0.0, 1.8e5, len(record))})
-    wide_log = widened(seen(drifts), PAPER)
-    problem = freed(wide_log, (PRESSURE_DRIFT,))
+    wide_log = widened_log(seen(drifts), PAPER)
+    problem = hypothesis_problem(wide_log, (PRESSURE_DRIFT,))
     rough = {**usual_values(wide_log), **flow_starts(PAPER, PAPER.bulk_modulus)[0]}
     guess = problem.model.theta(rough)
     (begun,) = misread_start(problem, guess, PRESSURE_DRIFT)
@@ -189,4 +189,4 @@ def test_the_start_of_a_pressure_drift_explains_most_beside_the_first_guess() ->
     assert moved == ["pressure_drift"]
     assert problem.model.values(begun)["pressure_drift"] == pytest.approx(1.8e5, rel=0.2)
     assert problem.at(begun).cost < 0.5 * problem.at(guess).cost
-    assert not misread_start(freed(wide_log, (VOLUME,)), guess, VOLUME)
+    assert not misread_start(hypothesis_problem(wide_log, (VOLUME,)), guess, VOLUME)

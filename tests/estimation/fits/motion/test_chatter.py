@@ -7,7 +7,7 @@ import pytest
 
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.motion import fit as motion_fit
-from estimation.fits.motion.chatter import MOST_SHORTENED, QUICKEST, STIFFEST, followed, without_chatter
+from estimation.fits.motion.chatter import MOST_SHORTENED, QUICKEST, STIFFEST, bristle_limits, without_chatter
 from estimation.fits.motion.fit import fit_motion
 from estimation.fits.motion.search import MotionSearch
 from estimation.log_checks.measurement_noise import measurement_variances
@@ -31,7 +31,7 @@ def at(problem: FreedProblem, stiffness: float) -> np.ndarray:
 
 
 def test_the_largest_followed_bristle_stiffness_and_damping_match_the_model_steps(search: MotionSearch) -> None:
-    limits = followed(search.whole.log, parameter_names(MOTION_FORMS[0].parameters))
+    limits = bristle_limits(search.whole.log, parameter_names(MOTION_FORMS[0].parameters))
     assert np.sqrt(limits["bristle_stiffness"][1] / MASS) == pytest.approx(STIFFEST)
     assert limits["bristle_damping"][1] / MASS == pytest.approx(QUICKEST)
 

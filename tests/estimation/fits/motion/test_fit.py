@@ -11,7 +11,7 @@ from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion import search as motion_search
 from estimation.fits.motion.fit import fit_motion
-from estimation.fits.motion.search import Begun, Ended, MotionSearch, likeliest
+from estimation.fits.motion.search import MotionSearch, SearchResult, SharedState, search_results
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.models.motion import MOTION_FORMS, UNKNOWNS
 from estimation.notes import EstimateCode
@@ -73,7 +73,7 @@ def test_two_seconds_without_pressure_give_the_bulk_modulus(healthy: FormFit) ->
 def test_the_deviation_includes_noise_and_the_error_of_the_friction_law(healthy: FormFit) -> None:
     value, std = healthy.parameters["bulk_modulus"]
     least = np.hypot(healthy.bound, motion_fit.STRUCTURE)
-    assert least <= std / value <= np.hypot(least, motion_fit.MOST_MOVED)
+    assert least <= std / value <= np.hypot(least, motion_fit.LARGEST_UNSEEN_SHIFT)
 
 
 def test_the_slope_of_bulk_modulus_by_an_uncertain_piston_area_is_returned(healthy: FormFit) -> None:
@@ -113,7 +113,7 @@ def test_a_long_log_is_searched_on_its_beginning_and_fitted_as_a_whole(
     monkeypatch.setattr(motion_search, "SCREENED", 0.5)
     monkeypatch.setattr(motion_search, "SEARCHED", 1.0)
     searches = searches_of(log)
-    ended = likeliest(searches)
+    ended = search_results(searches)
     first = next(one for one in ended if one.explains)
     assert first.point.cost == first.search.part.at(first.point.theta).cost
     assert len(first.search.part.log.measured) == 1000
@@ -126,13 +126,13 @@ def test_a_long_log_is_searched_on_its_beginning_and_fitted_as_a_whole(
 def test_starts_that_fail_under_larger_noise_or_reach_the_same_point_are_left_out(
     wanted: float, alike: float, brought: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(motion_search, "explained", lambda _: wanted)
+    monkeypatch.setattr(motion_search, "explained_cost", lambda _: wanted)
     monkeypatch.setattr(motion_search, "SAME_COST", alike)
     monkeypatch.setattr(motion_search, "SAME_MODULUS", alike)
-    search, begun = searches_of(seen(short_log(0.2)))[0], Begun()
+    search, begun = searches_of(seen(short_log(0.2)))[0], SharedState()
     lower, upper = search.bounds
     for rank in range(2):
-        near = list(search.brought_near(rank, begun, lambda: True))
+        near = list(search.ends_of_approach(rank, begun, lambda: True))
         assert len(near) == brought
         assert all(np.all((lower <= theta) & (theta <= upper)) for theta in near)
         best = min(search.short.at(theta).cost for theta in near)
@@ -161,13 +161,13 @@ def test_a_log_without_position_is_refused_and_the_missing_channel_named() -> No
 def test_speed_noise_is_estimated_from_the_log_if_no_variance_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
     record, walks, guesses = short_log(0.3), list[float](), list[float]()
 
-    def ended(searches: list[MotionSearch]) -> list[Ended]:
+    def ended(searches: list[MotionSearch]) -> list[SearchResult]:
         whole = searches[0].whole
         walks.append(whole.log.noise[0].walk)
         guesses.append(whole.model.values(searches[0].guesses[0])["bulk_modulus"])
         return []
 
-    monkeypatch.setattr(motion_fit, "likeliest", ended)
+    monkeypatch.setattr(motion_fit, "search_results", ended)
     monkeypatch.setattr(motion_fit, "_fitted", lambda *_, **__: ([found(2e8), found(2e8)], [], False))
     read = measurement_variances(record, ("motor_speed_rad_s",))
     for variances in (None, read, {"motor_speed_rad_s": 4.0 * read["motor_speed_rad_s"]}):
@@ -231,11 +231,11 @@ def found(bulk_modulus: float, cost: float = 50.0, chi_square: float = 1.0) -> G
 
 
 def test_equally_good_friction_laws_that_disagree_are_objected_to() -> None:
-    fits = [found(2.0e8), found(2.3e8, 50.0 + 0.9 * motion_fit.ALIKE)]
+    fits = [found(2.0e8), found(2.3e8, 50.0 + 0.9 * motion_fit.EQUAL_DIFFERENCE)]
     (note,) = motion_fit._objections(fits, fits[0], [], 0.01)
     assert note.code == EstimateCode.FRICTION_LAWS_DISAGREE
     assert note.data == {"least_pa": 2.0e8, "most_pa": 2.3e8}
-    worse = found(2.3e8, 50.0 + 1.1 * motion_fit.ALIKE)
+    worse = found(2.3e8, 50.0 + 1.1 * motion_fit.EQUAL_DIFFERENCE)
     assert motion_fit._objections([fits[0], worse], fits[0], [], 0.01) == ()
 
 
@@ -264,8 +264,8 @@ def test_the_other_friction_law_is_fitted_to_the_whole_log_from_the_better_point
 
     monkeypatch.setattr(motion_fit, "descend", noted)
     ended = [
-        Ended(second, second.part.at(own), explains=False),
-        Ended(first, first.part.at(there), explains=True),
+        SearchResult(second, second.part.at(own), explains=False),
+        SearchResult(first, first.part.at(there), explains=True),
     ]
     fits, _, _ = motion_fit._fitted(ended)
     assert [fit.model for fit in fits] == [first.whole.model, second.whole.model]
@@ -284,12 +284,12 @@ def test_an_unexplained_log_is_fitted_further_and_tried_on_other_scales_if_that_
     there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
     there[UNKNOWNS.index("bulk_modulus")] += 0.01
     ended = [
-        Ended(first, first.part.at(first.guesses[-1]), explains=False),
-        Ended(second, second.part.at(there), explains=False),
+        SearchResult(first, first.part.at(first.guesses[-1]), explains=False),
+        SearchResult(second, second.part.at(there), explains=False),
     ]
-    monkeypatch.setattr(motion_fit, "rescaled", lambda _, best, __: (best, [9e7]))
+    monkeypatch.setattr(motion_fit, "optimum_on_other_scales", lambda _, best, __: (best, [9e7]))
     if not late:
-        monkeypatch.setattr(motion_fit, "explained", lambda _: 0.0)
+        monkeypatch.setattr(motion_fit, "explained_cost", lambda _: 0.0)
     fits, others, _ = motion_fit._fitted(ended)
     assert others == ([9e7] if late else [])
     assert fits[0].cost < second.whole.at(there).cost
@@ -301,15 +301,15 @@ def test_a_fit_that_explains_only_the_whole_log_is_tried_on_other_scales_too(
 ) -> None:
     first, second = fine_searches(monkeypatch)
     there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
-    ended = [Ended(one, one.part.at(there), explains=False) for one in (first, second)]
+    ended = [SearchResult(one, one.part.at(there), explains=False) for one in (first, second)]
     asked: list[object] = []
 
     def rescaled(problem: object, best: Point, _: object) -> tuple[Point, list[float]]:
         asked.append(problem)
         return best, [9e7]
 
-    monkeypatch.setattr(motion_fit, "rescaled", rescaled)
-    monkeypatch.setattr(motion_fit, "explained", lambda problem: np.inf if problem in wholes else 0.0)
+    monkeypatch.setattr(motion_fit, "optimum_on_other_scales", rescaled)
+    monkeypatch.setattr(motion_fit, "explained_cost", lambda problem: np.inf if problem in wholes else 0.0)
     wholes = (first.whole, second.whole)
     assert motion_fit._fitted(ended)[1] == [9e7]
     assert len(asked) == 1
@@ -322,8 +322,8 @@ def test_the_other_friction_law_is_not_fitted_if_force_scales_disagree(
 ) -> None:
     first, second = fine_searches(monkeypatch)
     there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
-    ended = [Ended(one, one.part.at(there), explains=one is first) for one in (first, second)]
-    monkeypatch.setattr(motion_fit, "rescaled", lambda _, best, __: (best, [9e7] if disagreeing else []))
+    ended = [SearchResult(one, one.part.at(there), explains=one is first) for one in (first, second)]
+    monkeypatch.setattr(motion_fit, "optimum_on_other_scales", lambda _, best, __: (best, [9e7] if disagreeing else []))
     fits, others, _ = motion_fit._fitted(ended)
     assert len(fits) == (1 if disagreeing else 2)
     assert others == ([9e7] if disagreeing else [])
@@ -335,7 +335,7 @@ def test_an_unexplained_log_is_fitted_by_one_friction_law_and_only_roughly(
 ) -> None:
     first, second = fine_searches(monkeypatch)
     there = first.whole.model.theta({name: 1.01 * healthy.parameters[name][0] for name in UNKNOWNS})
-    ended = [Ended(one, one.part.at(there), explains=False) for one in (first, second)]
+    ended = [SearchResult(one, one.part.at(there), explains=False) for one in (first, second)]
     shares: list[float] = []
 
     def noted(at: Any, start: Array, *others: Any, least_share: float = 0.0, **named: Any) -> Point:
@@ -343,7 +343,7 @@ def test_an_unexplained_log_is_fitted_by_one_friction_law_and_only_roughly(
         return descend(at, start, *others, least_share=least_share, **named)
 
     monkeypatch.setattr(motion_fit, "descend", noted)
-    monkeypatch.setattr(motion_fit, "explained", lambda _: 0.0)
+    monkeypatch.setattr(motion_fit, "explained_cost", lambda _: 0.0)
     fits, others, _ = motion_fit._fitted(ended)
     assert len(fits) == 1
     assert others == []

@@ -11,7 +11,7 @@ import pytest
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.motion import force_scale
-from estimation.fits.motion.force_scale import Way, disagree, rescaled
+from estimation.fits.motion.force_scale import Way, disagree, optimum_on_other_scales
 from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
 
 MODEL = replace(MOTION_FORMS[0], unknowns=UNKNOWNS, linear=tuple(LINEAR.items()))
@@ -36,7 +36,7 @@ def searched(
         return points
 
     problem = problem_of(at_each, duration)
-    return *rescaled(problem, at(HERE), Way(problem, 12, 0.01, 25, 0.1, (-FAR, FAR), explained)), seen
+    return *optimum_on_other_scales(problem, at(HERE), Way(problem, 12, 0.01, 25, 0.1, (-FAR, FAR), explained)), seen
 
 
 def valleys(scale: float, lower: float) -> Callable[[np.ndarray], Point]:
@@ -115,7 +115,7 @@ def test_further_rounds_need_a_distinct_optimum_which_may_be_nearer_in_short_log
     moved: float, duration: float, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(force_scale, "SCALES", ())
-    monkeypatch.setattr(force_scale, "STIFFENED", (1.0 - moved,))
+    monkeypatch.setattr(force_scale, "STIFFNESS_SCALES", (1.0 - moved,))
     best, _, _ = searched(flat(lambda theta: 2000.0 * theta[0]), explained=-np.inf, duration=duration)
     assert best.theta[0] - HERE[0] == pytest.approx(rounds * np.log(1.0 - moved))
 
@@ -148,6 +148,6 @@ def test_a_search_that_ends_close_by_is_continued_before_it_counts_as_disagreein
         return problem_of(lambda thetas: [at(one) for one in thetas])
 
     way = Way(each(flat(lambda _: 0.0)), 12, 0.01, 25, 0.1, (-FAR, FAR), np.inf)
-    _, others = rescaled(each(slow), slow(HERE), way)
+    _, others = optimum_on_other_scales(each(slow), slow(HERE), way)
     assert len(others) == 4
     assert not disagree([2e8, *others])

@@ -33,7 +33,7 @@ def problem(asked: list[str]) -> Any:
         return valley(theta, rough=log == "own")
 
     soft = SimpleNamespace(at=lambda theta: at(theta, "softened"))
-    return SimpleNamespace(at=at, log=SimpleNamespace(softened=softened), on=lambda _: soft)
+    return SimpleNamespace(at=at, log=SimpleNamespace(with_larger_noise=softened), on=lambda _: soft)
 
 
 def test_a_local_minimum_is_left_for_the_global_one_which_is_not_left_again() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.motion import search as motion_search
-from estimation.fits.motion.fit import unseen
+from estimation.fits.motion.fit import unseen_shift
 from estimation.fits.motion.search import (
     FINALISTS,
     FOREIGN,
@@ -17,10 +17,10 @@ from estimation.fits.motion.search import (
     MOST_WORK,
     SLIGHT_SHARE,
     WAYS,
-    Begun,
     MotionSearch,
-    explained,
-    likeliest,
+    SharedState,
+    explained_cost,
+    search_results,
 )
 from tests.estimation.fits.motion.test_fit import searches_of, seen, short_log
 
@@ -42,14 +42,14 @@ class Search:
         def at(theta: np.ndarray) -> Point:
             return Point(theta, 0.5 * samples * misfit(float(theta[0])), np.zeros(1), np.eye(1))
 
-        log = SimpleNamespace(measured=np.zeros((samples, 1)), steps=[self._steps], softened=lambda *_: None)
+        log = SimpleNamespace(measured=np.zeros((samples, 1)), steps=[self._steps], with_larger_noise=lambda *_: None)
         return SimpleNamespace(at=at, log=log, on=lambda _: SimpleNamespace(at=at, log=log))
 
-    def same_pit(self, one: Point, other: Point) -> bool:
+    def is_same_basin(self, one: Point, other: Point) -> bool:
         return bool(one.theta[0] == other.theta[0])
 
-    def brought_near(self, rank: int, begun: Begun, worth: Callable[[], bool]) -> Iterator[np.ndarray]:
-        assert isinstance(begun, Begun)
+    def ends_of_approach(self, rank: int, begun: SharedState, worth: Callable[[], bool]) -> Iterator[np.ndarray]:
+        assert isinstance(begun, SharedState)
         self._asked.append(f"{self._name}{rank}")
         for way in range(len(WAYS)):
             if rank + way > 0 and not worth():
@@ -57,10 +57,10 @@ class Search:
             yield np.array([float(len(WAYS) * rank + way)])
 
 
-def ended(*misfits: Misfit, steps: int = 1) -> tuple[list[motion_search.Ended], list[str]]:
+def ended(*misfits: Misfit, steps: int = 1) -> tuple[list[motion_search.SearchResult], list[str]]:
     asked: list[str] = []
     searches = [Search(misfit, name, asked, steps) for misfit, name in zip(misfits, "ab", strict=True)]
-    return likeliest(cast("list[MotionSearch]", searches)), asked
+    return search_results(cast("list[MotionSearch]", searches)), asked
 
 
 def test_the_second_structure_is_tried_before_the_less_likely_starts_of_the_first() -> None:
@@ -158,11 +158,11 @@ def test_a_result_is_not_annealed_if_the_misfit_of_the_longer_part_is_too_large(
     monkeypatch: pytest.MonkeyPatch, factor: float, left: bool
 ) -> None:
     def of_part(problem: SimpleNamespace) -> float:
-        here = explained(cast("motion_search.FreedProblem", problem))
+        here = explained_cost(cast("motion_search.FreedProblem", problem))
         return here * 2.0 / (1.1 * factor * FOREIGN) if len(problem.log.measured) == PART else here
 
     ends: list[Point] = []
-    monkeypatch.setattr(motion_search, "explained", of_part)
+    monkeypatch.setattr(motion_search, "explained_cost", of_part)
     monkeypatch.setattr(motion_search, "annealed", lambda _, point, *__: ends.append(point) or point)
     ended(lambda _: 2.0, lambda _: 2.5)
     assert bool(ends) is left
@@ -170,22 +170,22 @@ def test_a_result_is_not_annealed_if_the_misfit_of_the_longer_part_is_too_large(
 
 def test_a_result_that_explains_only_the_first_seconds_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     def longer(problem: SimpleNamespace) -> float:
-        return explained(cast("motion_search.FreedProblem", problem)) * (
+        return explained_cost(cast("motion_search.FreedProblem", problem)) * (
             0.5 if len(problem.log.measured) == PART else 1.0
         )
 
-    monkeypatch.setattr(motion_search, "explained", longer)
+    monkeypatch.setattr(motion_search, "explained_cost", longer)
     found, _ = ended(lambda _: 1.0, lambda _: 1.0)
     assert not any(one.explains for one in found)
 
 
 def test_the_allowance_for_an_undetected_misfit_grows_with_the_residuals() -> None:
-    assert unseen(0.9, 20_000) == pytest.approx((1.0 + 200.0) ** 0.5)
-    assert unseen(1.05, 20_000) == pytest.approx((1.0 + 200.0 + 1000.0) ** 0.5)
+    assert unseen_shift(0.9, 20_000) == pytest.approx((1.0 + 200.0) ** 0.5)
+    assert unseen_shift(1.05, 20_000) == pytest.approx((1.0 + 200.0 + 1000.0) ** 0.5)
 
 
 def test_only_the_likeliest_start_is_tried_once_the_work_limit_is_reached() -> None:
-    search, begun = searches_of(seen(short_log(0.2)))[0], Begun()
-    assert len(list(search.brought_near(0, begun, lambda: False))) == 1
+    search, begun = searches_of(seen(short_log(0.2)))[0], SharedState()
+    assert len(list(search.ends_of_approach(0, begun, lambda: False))) == 1
     assert set(begun.screened) == {0}
-    assert list(search.brought_near(1, begun, lambda: False)) == []
+    assert list(search.ends_of_approach(1, begun, lambda: False)) == []

@@ -8,8 +8,8 @@ import pytest
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.motion import fit as motion_fit
-from estimation.fits.motion.fit import BEGINNING, SPARED_NIS, SPARED_SHARE
-from estimation.fits.motion.search import EXPLAINED, SCREENED, Ended
+from estimation.fits.motion.fit import BEGINNING_SHARE, SPARED_NIS, SPARED_SHARE
+from estimation.fits.motion.search import EXPLAINED, SCREENED, SearchResult
 
 LONG = round(1e3 * SCREENED) + 1
 
@@ -22,7 +22,7 @@ def problem_of(chi_square: float, samples: int) -> Any:
     return SimpleNamespace(log=SimpleNamespace(measured=np.zeros((samples, 1)), sample_time=1e-3), at=lambda _: point)
 
 
-@pytest.mark.parametrize("counts", [1.0, BEGINNING])
+@pytest.mark.parametrize("counts", [1.0, BEGINNING_SHARE])
 @pytest.mark.parametrize(
     ("large", "far", "samples", "ends"),
     [
@@ -37,7 +37,7 @@ def test_a_search_of_a_long_log_may_end_early_if_its_residuals_rule_out_no_class
 ) -> None:
     problem = problem_of(large * counts * SPARED_NIS, samples)
     monkeypatch.setattr(motion_fit, "share_of_motion", lambda *_: far * counts * SPARED_SHARE)
-    found = motion_fit._wanted(problem, BEGUN, counts)
+    found = motion_fit._wanted_cost(problem, BEGUN, counts)
     assert found == pytest.approx(0.5 * EXPLAINED * samples if ends else np.inf)
 
 
@@ -62,9 +62,9 @@ def searched(part: Any, whole: Any, monkeypatch: pytest.MonkeyPatch) -> list[boo
 
     monkeypatch.setattr(motion_fit, "descend", noted)
     monkeypatch.setattr(motion_fit, "share_of_motion", lambda *_: 1.0)
-    monkeypatch.setattr(motion_fit, "concluded", lambda *_: "concluded")
-    monkeypatch.setattr(motion_fit, "_rival", lambda *_, **__: [])
+    monkeypatch.setattr(motion_fit, "fit_at_solution", lambda *_: "concluded")
+    monkeypatch.setattr(motion_fit, "_rival_fits", lambda *_, **__: [])
     search: Any = SimpleNamespace(part=part, whole=whole, bounds=None)
-    ended = [Ended(search, BEGUN, explains=False)] * 2
+    ended = [SearchResult(search, BEGUN, explains=False)] * 2
     assert motion_fit._fitted(ended) == (["concluded"], [], False)
     return asked

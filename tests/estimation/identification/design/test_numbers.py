@@ -16,7 +16,7 @@ from estimation.identification.design.input_design import (
     rank_inputs,
     violations,
 )
-from estimation.identification.design.sticking import rest_shares, rests
+from estimation.identification.design.sticking import is_sticking, rest_shares
 from estimation.identification.model.linear_model import LinearModel
 from plant.arrays import Array
 from tests.numbers import Numbers, refused, some
@@ -122,8 +122,10 @@ def pistons_that_rest() -> dict[str, Any]:
         lost = np.where(np.arange(1500) % 13 == 5, np.nan, y)
         for sample_time in (0.001, 0.004, 0.02):
             shares = rest_shares(u, lost, sample_time)
-            told[f"{name}, at {sample_time:g} s"] = [*shares, rests(*shares)]
-    told["rests"] = [rests(*pair) for pair in ((0.02, 0.01), (0.021, 0.01), (0.12, 0.1), (0.126, 0.1), (0.0099, 0.0))]
+            told[f"{name}, at {sample_time:g} s"] = [*shares, is_sticking(*shares)]
+    told["rests"] = [
+        is_sticking(*pair) for pair in ((0.02, 0.01), (0.021, 0.01), (0.12, 0.1), (0.126, 0.1), (0.0099, 0.0))
+    ]
     return told
 
 

@@ -87,7 +87,7 @@ def test_an_unstable_model_is_refused_for_free_runs() -> None:
     unstable: Any = SimpleNamespace(is_stable=False, structure="arx")
     data: Any = SimpleNamespace(output="speed")
     with pytest.raises(HydrostateError, match="the arx model of 'speed' is unstable and does not run free: use"):
-        other_structures._dynamics(unstable, data, data)
+        other_structures._free_run_dynamics(unstable, data, data)
 
 
 def test_swapped_input_and_output_are_noted_and_the_model_is_not_sound() -> None:

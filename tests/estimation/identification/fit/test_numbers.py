@@ -296,7 +296,7 @@ def intervals_of_the_gain() -> dict[str, Any]:
         told[name] = [list(dc_gain_interval(model, u, y, level=level)) for level in (0.5, 0.95)]
     u, y = records()["coloured"]
     robust = fit_output_error(u, y, 0.01, **FORM, covariance="coloured")
-    told["coloured"] = [list(dc_gain_interval(robust, u, y)), profile_interval._stretch(robust)]
+    told["coloured"] = [list(dc_gain_interval(robust, u, y)), profile_interval._variance_ratio(robust)]
     rest = fit_output_error(U, answer(), 0.01, **FORM, estimate_initial_state=False)
     told["at rest"] = list(dc_gain_interval(rest, U, answer(), estimate_initial_state=False))
     arx = fit_arx(U, answer(), 0.01, **FORM)
@@ -315,7 +315,7 @@ def intervals_of_the_gain() -> dict[str, Any]:
     data = experiments_from(U, answer(), ("u", "y"), n_excited=4, n_wanted=20).scaled()
     form, start = Structure(2, 2, 1), np.array([0.3, -0.1, -1.5, 0.7, 0.0, 0.0])
     for gain in (0.9, 1.05):
-        cost, theta = profile_interval._forced(form, data, start, gain)
+        cost, theta = profile_interval._fit_with_gain(form, data, start, gain)
         told[f"forced to {gain:g}"] = [cost, float(theta[:2].sum() / (1.0 + theta[2:4].sum()))]
     return told
 

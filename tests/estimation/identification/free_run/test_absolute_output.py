@@ -7,7 +7,7 @@ import pytest
 
 from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamics
 from estimation.identification.free_run.absolute_output import AbsoluteProblem, lagged, signs_at_first
-from estimation.identification.free_run.choose_absolute import from_zero, may_lack_sign
+from estimation.identification.free_run.choose_absolute import may_lack_sign, relative_to_zero
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.linear_problem import Form
@@ -81,7 +81,7 @@ def test_a_lag_behind_the_absolute_value_is_found() -> None:
 
 def test_derivatives_are_exact_if_no_sample_changes_its_sign() -> None:
     data, by = scaled(channels(4))
-    problem = AbsoluteProblem(Form(2, (1,), (1,)), from_zero(data, by))
+    problem = AbsoluteProblem(Form(2, (1,), (1,)), relative_to_zero(data, by))
     theta = np.array([0.3, 0.5, *F[1:], 0.2, 0.4, -0.1])
     output, jacobian = problem.jacobian(theta)
     for k in range(theta.size):
@@ -95,7 +95,7 @@ def test_derivatives_are_exact_if_no_sample_changes_its_sign() -> None:
 def test_signs_are_estimated_from_the_square_of_the_output() -> None:
     data, by = scaled(channels(5))
     truth = np.sign(filtered(np.array([0.0, 0.2]), F, logged(5)[0]))
-    agree = [abs(float(np.mean(one * truth))) for one in signs_at_first(from_zero(data, by))[1:]]
+    agree = [abs(float(np.mean(one * truth))) for one in signs_at_first(relative_to_zero(data, by))[1:]]
     assert max(agree) > 0.8
 
 

@@ -14,7 +14,7 @@ from estimation.identification.free_run.choose_hammerstein import (
     _bic,
     chosen_hammerstein,
 )
-from estimation.identification.free_run.choose_linear import CLEARLY
+from estimation.identification.free_run.choose_linear import CLEAR_GAIN
 from estimation.identification.free_run.linear_problem import Form
 
 NONE: Any = None
@@ -26,8 +26,8 @@ def candidate(held_back: float, bic: float, doubt: str = "") -> HammersteinCandi
 
 def test_the_lowest_bic_among_candidates_nearly_as_good_as_the_best_is_chosen() -> None:
     best = candidate(0.1, 50.0)
-    near = candidate(0.1 * (1.0 + 0.99 * CLEARLY), 40.0)
-    far = candidate(0.1 * (1.0 + 1.01 * CLEARLY), 30.0)
+    near = candidate(0.1 * (1.0 + 0.99 * CLEAR_GAIN), 40.0)
+    far = candidate(0.1 * (1.0 + 1.01 * CLEAR_GAIN), 30.0)
     assert chosen_hammerstein([best, far]) is best
     assert chosen_hammerstein([best, near, far]) is near
     doubted = candidate(0.01, 10.0, "cancelling")

@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 
 from estimation.identification.free_run import choose_polynomial
-from estimation.identification.free_run.choose_polynomial import _best_grown, _dense, _fitted, _with_friction
-from estimation.identification.free_run.dense_polynomial import Asked, Recipe
+from estimation.identification.free_run.choose_polynomial import (
+    _best_grown,
+    _dense_candidates,
+    _fitted,
+    _growths_with_friction,
+)
+from estimation.identification.free_run.dense_polynomial import Recipe, RequestedSizes
 from estimation.identification.free_run.linear_problem import Form
 
 DATA: Any = SimpleNamespace(n_samples=400, y=(np.zeros(400),), without=lambda mask: mask)
@@ -33,7 +38,7 @@ def rubs(
 
     monkeypatch.setattr(choose_polynomial, "fit_with_friction", rubbing)
     monkeypatch.setattr(choose_polynomial, "_Growth", lambda whole, *_: whole)
-    return asked, _with_friction(models, DATA)
+    return asked, _growths_with_friction(models, DATA)
 
 
 def test_friction_is_tried_on_the_best_two_models_of_orders_1_to_3_and_position_friction_from_order_2(
@@ -70,7 +75,7 @@ class Growing:
         self.most.append(most)
         return self.runs
 
-    def finished(self) -> float:
+    def finished_candidate(self) -> float:
         return self.errors[1]
 
 
@@ -97,7 +102,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch, error: Callable[[int], float]) -> l
         )
 
     every = [judged(rank, small if rank % 2 else large) for rank in range(60, 0, -1)]
-    monkeypatch.setattr(choose_polynomial, "forms_tried", lambda *_: [small])
+    monkeypatch.setattr(choose_polynomial, "tried_forms", lambda *_: [small])
     monkeypatch.setattr(choose_polynomial, "judged_recipes", lambda *_: every)
     monkeypatch.setattr(choose_polynomial, "is_wild", lambda fit, _: fit.wild)
     monkeypatch.setattr(choose_polynomial, "disagreement", lambda *_: 0.25)
@@ -108,7 +113,7 @@ def test_the_best_sixteen_dense_models_and_six_larger_ones_are_kept_except_wild_
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     made_up(monkeypatch, lambda rank: 1.0 + 1e-6 * rank)
-    found = _dense(DATA, [], (1,), Asked(), np.inf)
+    found = _dense_candidates(DATA, [], (1,), RequestedSizes(), np.inf)
     ranks = sorted((*range(1, 33, 2), *range(2, 14, 2)))
     assert [one.held_back for one in found] == [1.0 + 1e-6 * rank for rank in ranks if rank not in (3, 5)]
     assert found[0].price == pytest.approx(np.hypot(1.0, 0.25), abs=1e-5)
@@ -119,10 +124,12 @@ def test_a_model_that_can_no_longer_be_the_best_is_not_fitted_to_all_data(
 ) -> None:
     # the price of the first model is 1.031 with its spread of 0.25: the fifth has a larger held-back error
     fitted = made_up(monkeypatch, lambda rank: 0.99 + 0.01 * rank)
-    assert [one.held_back for one in _dense(DATA, [], (1,), Asked(), np.inf)] == pytest.approx([1.0, 1.01, 1.03])
+    assert [one.held_back for one in _dense_candidates(DATA, [], (1,), RequestedSizes(), np.inf)] == pytest.approx(
+        [1.0, 1.01, 1.03]
+    )
     assert fitted == [1, 2, 3, 4]
     fitted.clear()
-    assert [one.held_back for one in _dense(DATA, [], (1,), Asked(), 1.005)] == pytest.approx([1.0])
+    assert [one.held_back for one in _dense_candidates(DATA, [], (1,), RequestedSizes(), 1.005)] == pytest.approx([1.0])
     assert fitted == [1]
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from estimation.identification.free_run.data import Channels, channels_from, scaled
-from estimation.identification.free_run.dead_times import estimate_delays, late_answers
+from estimation.identification.free_run.dead_times import estimate_delays, late_response_notes
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form, Problem
 from estimation.identification.state_space.fit import fit_state_space
-from estimation.identification.state_space.joint import Joint, joined
+from estimation.identification.state_space.joint import Joint, joined_outputs
 from estimation.identification.state_space.problem import Size
 from estimation.identification.state_space.starts import subspace_starts
 from plant.errors import LogWarning
@@ -127,28 +127,28 @@ def test_a_run_is_constant_during_its_dead_time() -> None:
 
 
 def test_a_state_space_fit_leaves_out_outputs_that_respond_to_inputs_before_the_log() -> None:
-    late = joined([scaled(late_plant(80))[0]]).delayed((79,))
+    late = joined_outputs([scaled(late_plant(80))[0]]).delayed((79,))
     assert late.slices == [slice(79, 700)]
     fit = fit_state_space(Size(2, 1, 1, direct=False), late)
     assert np.sqrt(fit.noise[0, 0]) == pytest.approx(NOISE, rel=0.1)
     assert np.isnan(late.y[0][:79]).all()
     assert np.isfinite(late.y[0][79:]).all()
-    assert np.isfinite(joined([scaled(late_plant(80))[0]]).delayed((20,)).y[0]).all()
+    assert np.isfinite(joined_outputs([scaled(late_plant(80))[0]]).delayed((20,)).y[0]).all()
 
 
 def test_a_dead_time_beyond_the_searched_range_is_noted() -> None:
     data = scaled(late_plant(200, 600))[0]
-    (note,) = late_answers(data, rmse=0.9)
+    (note,) = late_response_notes(data, rmse=0.9)
     assert note.code == "answers_late"
     assert 195 <= note.data["samples"] <= 201
     assert note.data["left"] < 0.05
-    assert late_answers(data, rmse=0.4) == []  # a model that explains most of the output has found the response
+    assert late_response_notes(data, rmse=0.4) == []  # a model that explains most of the output has found the response
 
 
 def test_neither_a_dead_time_in_the_searched_range_nor_unrelated_noise_is_noted() -> None:
-    assert late_answers(scaled(late_plant(80, 600))[0], rmse=0.9) == []
+    assert late_response_notes(scaled(late_plant(80, 600))[0], rmse=0.9) == []
     noise = np.random.default_rng(0).standard_normal((2, 300))
-    assert late_answers(channels_from([noise[0][:, None]], [noise[1]], 0.1, ["u"], "y"), rmse=0.99) == []
+    assert late_response_notes(channels_from([noise[0][:, None]], [noise[1]], 0.1, ["u"], "y"), rmse=0.99) == []
 
 
 def test_a_model_is_not_sound_if_the_dead_time_is_beyond_the_searched_range() -> None:

@@ -9,11 +9,17 @@ from estimation.arrays import Array
 from estimation.identification.free_run.choose_linear import linear_candidates
 from estimation.identification.free_run.choose_polynomial import polynomial_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
-from estimation.identification.free_run.dense_polynomial import Asked, Recipe, every_term, forms_tried, judged_recipes
+from estimation.identification.free_run.dense_polynomial import (
+    Recipe,
+    RequestedSizes,
+    every_term,
+    judged_recipes,
+    tried_forms,
+)
 from estimation.identification.free_run.held_back import BLOCKS
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_problem import Form
-from estimation.identification.free_run.other_orders import disagreement, reordered
+from estimation.identification.free_run.other_orders import disagreement, reordered_channels
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs
 
@@ -81,10 +87,10 @@ def test_too_few_samples_give_no_model() -> None:
 
 
 def test_requested_sizes_are_kept() -> None:
-    assert {form.order for form in forms_tried((5,), Asked())} == {1, 2, 3}
-    assert {form.delays for form in forms_tried((5,), Asked())} == {(0,), (1,), (5,)}
-    assert forms_tried((5, 1), Asked(order=4, delay=2)) == [Form(4, (4, 4), (2, 2))]
-    assert forms_tried((5,), Asked(order=2, delay=2, n_numerator=7)) == [Form(2, (7,), (2,))]
+    assert {form.order for form in tried_forms((5,), RequestedSizes())} == {1, 2, 3}
+    assert {form.delays for form in tried_forms((5,), RequestedSizes())} == {(0,), (1,), (5,)}
+    assert tried_forms((5, 1), RequestedSizes(order=4, delay=2)) == [Form(4, (4, 4), (2, 2))]
+    assert tried_forms((5,), RequestedSizes(order=2, delay=2, n_numerator=7)) == [Form(2, (7,), (2,))]
 
 
 def late_product(n: int = 500) -> Channels:
@@ -140,7 +146,7 @@ def test_the_effect_of_inputs_before_the_log_on_a_run_decays() -> None:
 def test_requested_lags_do_not_grow() -> None:
     data = late_product()
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
-    found = judged_recipes(data, parts, [Form(1, (3,), (0,))], Asked(order=1, n_numerator=3))
+    found = judged_recipes(data, parts, [Form(1, (3,), (0,))], RequestedSizes(order=1, n_numerator=3))
     assert {one.recipe.form for one in found} == {Form(1, (3,), (0,))}
 
 
@@ -152,7 +158,7 @@ def test_every_product_occurs_once() -> None:
 
 def test_reordered_inputs_have_the_same_values() -> None:
     data = log()
-    others = list(reordered(data))
+    others = list(reordered_channels(data))
     assert all(sorted(one.u[0][:, 0]) == sorted(data.u[0][:, 0]) for one in others)
     assert not any(np.array_equal(one.u[0], data.u[0]) for one in others)
 
@@ -170,7 +176,9 @@ def test_fits_agree_with_many_clean_samples_and_disagree_with_few_noisy_ones() -
 
 def test_the_price_of_a_model_includes_the_disagreement_of_its_fits() -> None:
     data = log()
-    every = polynomial_candidates(linear_candidates(data, [1], (1,)), data, Asked(order=1, delay=1, n_numerator=1))
+    every = polynomial_candidates(
+        linear_candidates(data, [1], (1,)), data, RequestedSizes(order=1, delay=1, n_numerator=1)
+    )
     assert len(every) > 1
     for one in every:
         assert one.price == pytest.approx(np.hypot(one.held_back, one.spread))

@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 from estimation.identification.free_run.data import Channels, Scaling, channels_from
-from estimation.identification.free_run.doubtful_channels import inputs_alike, more_than_noise, outputs_that_stand_out
+from estimation.identification.free_run.doubtful_channels import (
+    dependent_input_notes,
+    outlier_notes,
+    residual_notes,
+)
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.input_range import doubts_about_inputs
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
@@ -37,7 +41,7 @@ def test_an_input_that_is_an_exact_combination_of_others_is_noted() -> None:
 
     def told(third: np.ndarray) -> list[tuple[object, object]]:
         data = Channels(names, "y", 1.0, (np.column_stack([u[:, :2], third]),), (u[:, 0],))
-        return [(note.data["channel"], note.data["others"]) for note in inputs_alike(data)]
+        return [(note.data["channel"], note.data["others"]) for note in dependent_input_notes(data)]
 
     assert told(u[:, 0] - 2.0 * u[:, 1] + 5.0) == [("sum", "'a' and 'b'")]
     assert told(3.0 * u[:, 1]) == [("sum", "'b'")]
@@ -61,7 +65,7 @@ def test_output_peaks_caused_by_the_input_are_not_taken_for_outliers(model: Free
     u = 0.01 * data.u[0]
     u[[50, 200, 310]] = 40.0
     y = model.simulate(u) + 0.01 * data.y[0]
-    assert outputs_that_stand_out(model, replace(data, u=(u,), y=(y,))) == []
+    assert outlier_notes(model, replace(data, u=(u,), y=(y,))) == []
 
 
 def test_a_log_no_longer_than_the_dead_time_has_no_fit_and_a_note_with_the_reason(model: FreeRunModel) -> None:
@@ -119,9 +123,9 @@ def test_the_check_for_more_than_noise_uses_present_samples_after_the_dead_time_
     y[np.arange(2000) % every != 0] = np.nan
     form, by = Form(1, (1,), (100,)), Scaling(np.zeros(1), np.ones(1), 0.0, 1.0)
     model = FreeRunModel(("u",), "y", 0.01, "output-error", by, LinearDynamics(form, np.array([1.0, 0.0, 0.0])))
-    assert more_than_noise(model, Channels(("u",), "y", 0.01, (u[:, None],), (y,))) == []
+    assert residual_notes(model, Channels(("u",), "y", 0.01, (u[:, None],), (y,))) == []
     bent = y + 0.5 * np.abs(np.concatenate([np.zeros(100), u[:-100]]))
-    assert more_than_noise(model, Channels(("u",), "y", 0.01, (u[:, None],), (bent,))) != []
+    assert residual_notes(model, Channels(("u",), "y", 0.01, (u[:, None],), (bent,))) != []
 
 
 def test_an_absolute_value_that_is_also_cut_off_is_noted_and_not_sound() -> None:

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.identification.free_run.believable import believable
+from estimation.identification.free_run.believable import believable_candidate
 from estimation.identification.free_run.choose_linear import Candidate, candidate
 from estimation.identification.free_run.data import Channels, Scaling, channels_from, scaled
-from estimation.identification.free_run.excited_band import band_end, rings_beyond
+from estimation.identification.free_run.excited_band import band_end, rings_above_band
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit
@@ -52,12 +52,12 @@ def test_the_band_ends_at_the_highest_frequency_that_an_input_excites(
 def test_a_slowly_decaying_pole_above_the_band_rings_beyond_it(slow: tuple[Channels, Scaling, Candidate]) -> None:
     data, _, plain = slow
     end, wild = band_end(data), rings(plain, -0.999, (0.1,) * 4)
-    assert not rings_beyond(plain, data, end)
-    assert rings_beyond(wild, data, end)
-    assert not rings_beyond(wild, data, np.pi)
+    assert not rings_above_band(plain, data, end)
+    assert rings_above_band(wild, data, end)
+    assert not rings_above_band(wild, data, np.pi)
     # a pole that decays within a block does not count, and neither does a slow one within the band
-    assert not rings_beyond(rings(plain, -0.98, (0.1,) * 4), data, end)
-    assert not rings_beyond(rings(plain, 0.999, (0.1,) * 4), data, end)
+    assert not rings_above_band(rings(plain, -0.98, (0.1,) * 4), data, end)
+    assert not rings_above_band(rings(plain, 0.999, (0.1,) * 4), data, end)
     # the two models agree on the measured input, but not on one that goes beyond its band
     u, quick = data.u[0], np.random.default_rng(3).normal(size=(N, 1))
     for inputs, alike in ((u, True), (quick, False)):
@@ -78,9 +78,9 @@ def test_a_model_that_rings_above_the_band_is_taken_only_if_it_is_clearly_better
 ) -> None:
     data, by, plain = slow
     models = {"plain": plain, "wild": rings(plain, -0.999, errors)}
-    assert rings_beyond(models["wild"], data, band_end(data))
-    assert believable(list(models.values()), data, by)[0] is models[taken]
-    assert believable([models["wild"]], data, by)[0] is models["wild"]
+    assert rings_above_band(models["wild"], data, band_end(data))
+    assert believable_candidate(list(models.values()), data, by)[0] is models[taken]
+    assert believable_candidate([models["wild"]], data, by)[0] is models["wild"]
 
 
 def test_a_constant_input_does_not_affect_the_band() -> None:

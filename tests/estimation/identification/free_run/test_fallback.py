@@ -12,7 +12,7 @@ from estimation.identification.free_run.data import Channels, Scaling, channels_
 from estimation.identification.free_run.fallback import Fallback, jackknife
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.identify import Identified, identify_channels
-from estimation.identification.free_run.input_range import linear_instead
+from estimation.identification.free_run.input_range import linear_fallback_notes
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
@@ -91,7 +91,7 @@ def test_the_held_back_error_of_a_nonlinearity_adds_to_its_uncertainty(
     again = FreeRunModel.from_dict(json.loads(json.dumps(model.to_dict())))
     assert again.simulate(u) == pytest.approx(run)
     near = 1.0 + 1e-3 * np.arange(20.0)
-    notes = linear_instead(again, channels_from([near[:, None]], [near], 1.0, ["u"], "y"))
+    notes = linear_fallback_notes(again, channels_from([near[:, None]], [near], 1.0, ["u"], "y"))
     assert [note.code for note in notes] == ([] if taken == "own" else ["linear_stands_in"])
     assert all("--structure hammerstein" in str(note) for note in notes)
     # a model that was requested is run as it is
@@ -170,7 +170,7 @@ def test_products_are_extrapolated_beyond_the_fitted_range_if_all_fits_agree(
     assert run[1:] == pytest.approx(np.full(8, wanted))
     assert errors is not None
     assert errors[0] < errors[1]
-    assert whole.variables.released().limits[1] == pytest.approx([-2.0, 2.0])
+    assert whole.variables.with_wider_clipping().limits[1] == pytest.approx([-2.0, 2.0])
     # a model that was requested has no other fits to decide this by
     asked = replace(whole, fallback=None).run(np.full((9, 1), u), np.full(9, wanted))
     assert asked[1:] == pytest.approx(np.full(8, 0.5 * min(u, 1.0) ** 2))
@@ -211,12 +211,12 @@ def test_the_linear_model_runs_between_two_fitted_levels_if_the_nonlinear_fits_d
     assert isinstance(dynamics, PolynomialDynamics)
     assert dynamics.fallback is not None
     assert found.quality.fit_percent > 90.0
-    assert linear_instead(found.model, data) == []
+    assert linear_fallback_notes(found.model, data) == []
     spread = replace(
         dynamics.fallback, parts=tuple(_bent(one, 0.3 * k) for k, one in enumerate(dynamics.fallback.parts))
     )
     torn = replace(found.model, dynamics=replace(dynamics, fallback=spread))
-    (note,) = linear_instead(torn, between)
+    (note,) = linear_fallback_notes(torn, between)
     assert note.code == "linear_stands_in"
     assert note.data["undetermined"] > note.data["linear"]
     straight = replace(found.model, dynamics=dynamics.fallback.linear)
@@ -236,4 +236,4 @@ def test_a_requested_polynomial_model_has_no_linear_fallback(between: Channels) 
     found = identify_channels(between, structure="narx", order=1, delay=1).model
     assert isinstance(found.dynamics, PolynomialDynamics)
     assert found.dynamics.fallback is None
-    assert linear_instead(found, between) == []
+    assert linear_fallback_notes(found, between) == []

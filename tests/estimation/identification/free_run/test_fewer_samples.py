@@ -7,8 +7,8 @@ import pytest
 
 from estimation.identification.free_run import identify
 from estimation.identification.free_run.choose_linear import linear_candidates
-from estimation.identification.free_run.data import Channels, channels_from, scaled, section
-from estimation.identification.free_run.fewer_samples import on_fewer
+from estimation.identification.free_run.data import Channels, channels_from, liveliest_sections, scaled
+from estimation.identification.free_run.fewer_samples import on_fewer_samples
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 
@@ -28,14 +28,14 @@ def test_linear_models_are_judged_again_on_fewer_samples_and_keep_their_doubts()
     linear = linear_candidates(whole, [1, 2], (1,))
     linear[1] = replace(linear[1], doubt="time_constant")
     best = replace(linear[1], doubt="")  # a model that is believed to integrate
-    fewer = section(whole, 200)
-    data, judged, own = on_fewer(linear, best, whole, fewer)
+    fewer = liveliest_sections(whole, 200)
+    data, judged, own = on_fewer_samples(linear, best, whole, fewer)
     assert data is fewer
     assert [one.form for one in judged] == [one.form for one in linear]
     assert [one.doubt for one in judged] == [one.doubt for one in linear]
     assert (own.form, own.doubt) == (linear[1].form, "")
     assert own.held_back == judged[1].held_back != linear[1].held_back
-    assert on_fewer(linear, best, whole, whole) == (whole, linear, best)
+    assert on_fewer_samples(linear, best, whole, whole) == (whole, linear, best)
 
 
 def test_structures_are_compared_on_at_least_one_period(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,22 +7,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.identification.bent_inputs import PLANTED, Planted, logged
+from benchmarks.identification.bent_inputs import PLANTED_NONLINEARITIES, PlantedNonlinearity, draw_log
 from estimation.identification.free_run import choose_hammerstein
 from estimation.identification.free_run.choose_hammerstein import (
     ORDERS,
     HammersteinCandidate,
     _bases,
-    _doubt,
+    _cancellation_doubt,
     chosen_hammerstein,
     hammerstein_candidates,
-    worthwhile,
+    worthwhile_candidate,
 )
 from estimation.identification.free_run.choose_linear import linear_candidates
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import HammersteinFit, HammersteinProblem, fit_hammerstein
-from estimation.identification.free_run.held_back import BLOCKS, pooled
+from estimation.identification.free_run.held_back import BLOCKS, pooled_error
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES, play
 from estimation.identification.free_run.linear_problem import Form, LinearFit
@@ -34,17 +34,17 @@ def identified(data: Channels) -> Identified:
     return identify_channels(data, structure="hammerstein", order=2, delay=1)
 
 
-@pytest.fixture(scope="module", params=PLANTED, ids=lambda one: one.kind)
-def planted(request: pytest.FixtureRequest) -> Planted:
+@pytest.fixture(scope="module", params=PLANTED_NONLINEARITIES, ids=lambda one: one.kind)
+def planted(request: pytest.FixtureRequest) -> PlantedNonlinearity:
     return request.param
 
 
 @pytest.fixture(scope="module")
-def found(planted: Planted) -> Identified:
-    return identified(logged(planted, 1))
+def found(planted: PlantedNonlinearity) -> Identified:
+    return identified(draw_log(planted, 1))
 
 
-def test_the_true_nonlinearity_is_found_within_its_interval(planted: Planted, found: Identified) -> None:
+def test_the_true_nonlinearity_is_found_within_its_interval(planted: PlantedNonlinearity, found: Identified) -> None:
     assert found.sound
     assert found.model.structure == "hammerstein"
     assert isinstance(found.model.dynamics, HammersteinDynamics)
@@ -60,8 +60,8 @@ def test_the_true_nonlinearity_is_found_within_its_interval(planted: Planted, fo
     assert planted.kind in kinds <= set(NONLINEARITIES)
 
 
-def test_a_saved_model_simulates_the_same_output(planted: Planted, found: Identified) -> None:
-    data, model = logged(planted, 2), found.model
+def test_a_saved_model_simulates_the_same_output(planted: PlantedNonlinearity, found: Identified) -> None:
+    data, model = draw_log(planted, 2), found.model
     again = FreeRunModel.from_dict(json.loads(json.dumps(model.to_dict())))
     np.testing.assert_array_equal(again.simulate(data.u[0], data.y[0]), model.simulate(data.u[0], data.y[0]))
     assert isinstance(again.dynamics, HammersteinDynamics)
@@ -70,14 +70,16 @@ def test_a_saved_model_simulates_the_same_output(planted: Planted, found: Identi
         model.to_control()
 
 
-def test_a_free_run_without_measured_outputs_follows_the_plant(planted: Planted, found: Identified) -> None:
-    data, model = logged(planted, 3), found.model
+def test_a_free_run_without_measured_outputs_follows_the_plant(planted: PlantedNonlinearity, found: Identified) -> None:
+    data, model = draw_log(planted, 3), found.model
     left = (model.simulate(data.u[0]) - data.y[0])[200:]
     assert left.std() < 0.1 * data.y[0].std()
 
 
-def test_derivatives_are_exact_if_no_sample_changes_its_branch_of_the_nonlinearity(planted: Planted) -> None:
-    data, by = scaled(logged(planted, 4))
+def test_derivatives_are_exact_if_no_sample_changes_its_branch_of_the_nonlinearity(
+    planted: PlantedNonlinearity,
+) -> None:
+    data, by = scaled(draw_log(planted, 4))
     problem = HammersteinProblem(planted.kind, Form(2, (2,), (1,)), data)
     values = np.array(list(planted.values.values())) - (by.u_mean[0] if NONLINEARITIES[planted.kind].level else 0.0)
     starts = np.full(problem.n_starts, data.u[0][0, 0])
@@ -99,7 +101,7 @@ def test_a_linear_plant_gets_a_linear_model() -> None:
 
 
 def test_a_nonlinearity_is_found_in_several_logs_with_gaps() -> None:
-    parts = [logged(PLANTED[2], seed) for seed in (6, 7)]
+    parts = [draw_log(PLANTED_NONLINEARITIES[2], seed) for seed in (6, 7)]
     outputs = [np.array(one.y[0]) for one in parts]
     outputs[0][300:350] = np.nan
     both = channels_from([one.u[0] for one in parts], outputs, 0.01, ["u"], "y")
@@ -131,10 +133,13 @@ def test_backlash_follows_at_half_its_width_and_is_constant_in_between() -> None
 
 @pytest.mark.parametrize(
     "bent",
-    [pytest.param(one, id=one.kind, marks=() if one.kind == "saturation" else pytest.mark.slow) for one in PLANTED],
+    [
+        pytest.param(one, id=one.kind, marks=() if one.kind == "saturation" else pytest.mark.slow)
+        for one in PLANTED_NONLINEARITIES
+    ],
 )  # a test above covers that each kind is found
-def test_auto_takes_a_nonlinearity_that_is_best_on_held_back_blocks(bent: Planted) -> None:
-    found = identify_channels(logged(bent, 5), structure="auto", order=2, delay=1)
+def test_auto_takes_a_nonlinearity_that_is_best_on_held_back_blocks(bent: PlantedNonlinearity) -> None:
+    found = identify_channels(draw_log(bent, 5), structure="auto", order=2, delay=1)
     assert found.model.structure == "hammerstein"
     assert isinstance(found.model.dynamics, HammersteinDynamics)
     assert found.model.dynamics.at_input == bent.kind
@@ -175,7 +180,7 @@ def test_a_denominator_with_a_doubtful_time_constant_is_a_start_only_without_oth
 
     monkeypatch.setattr(choose_hammerstein, "fit_hammerstein", fit)
     slow = candidate(1, 0.2, doubt="time_constant", f=-1.0)
-    data = scaled(logged(PLANTED[0], 1))[0]
+    data = scaled(draw_log(PLANTED_NONLINEARITIES[0], 1))[0]
     assert hammerstein_candidates([slow, candidate(1, 0.3), candidate(2, 0.4, f=-0.9)], data) == []
     assert given == [[-0.5], [-0.9]] * len(NONLINEARITIES)
     given.clear()
@@ -186,7 +191,7 @@ def test_a_denominator_with_a_doubtful_time_constant_is_a_start_only_without_oth
 def test_the_best_nonlinear_fit_of_each_kind_and_order_is_judged_on_held_back_blocks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    data = scaled(logged(PLANTED[0], 3))[0]
+    data = scaled(draw_log(PLANTED_NONLINEARITIES[0], 3))[0]
     linear = linear_candidates(data, [1, 2, 3], (1,))
     hopeful = hammerstein_candidates(linear, data)
     # a saturation leaves more of the fitted data than a linear model leaves of held-back data
@@ -203,7 +208,7 @@ def test_the_best_nonlinear_fit_of_each_kind_and_order_is_judged_on_held_back_bl
 
 @pytest.mark.parametrize(("pole", "doubt"), [(0.999, "cancelling"), (0.99, "")])
 def test_a_pole_slower_than_a_block_and_cancelled_by_a_zero_is_doubtful(pole: float, doubt: str) -> None:
-    data = scaled(logged(PLANTED[0], 3))[0]
+    data = scaled(draw_log(PLANTED_NONLINEARITIES[0], 3))[0]
     b, f = 0.3 * np.array([1.0, -pole]), np.convolve([1.0, -0.8], [1.0, -pole])
     fit = HammersteinFit(
         "dead-zone",
@@ -211,7 +216,7 @@ def test_a_pole_slower_than_a_block_and_cancelled_by_a_zero_is_doubtful(pole: fl
         np.empty(0),
         LinearFit(Form(2, (2,), (1,)), np.array([*b, *f[1:], 0, 0, 0]), 1),
     )
-    assert _doubt(fit, data) == doubt
+    assert _cancellation_doubt(fit, data) == doubt
 
 
 def test_a_doubtful_nonlinearity_is_taken_only_if_all_are_doubtful() -> None:
@@ -230,7 +235,7 @@ def bent(blocks: tuple[float, ...]) -> HammersteinCandidate:
 
 
 def straight(blocks: tuple[float, ...]) -> Any:
-    return SimpleNamespace(held_back=pooled(blocks), block_errors=blocks)
+    return SimpleNamespace(held_back=pooled_error(blocks), block_errors=blocks)
 
 
 def test_a_nonlinearity_that_was_not_requested_must_gain_more_than_the_scatter_of_blocks() -> None:
@@ -238,26 +243,26 @@ def test_a_nonlinearity_that_was_not_requested_must_gain_more_than_the_scatter_o
     even, chance = bent((0.28, 0.29, 0.28, 0.29)), bent((0.31, 0.32, 0.31, 0.10))
     assert chance.held_back < even.held_back < 0.98 * best.held_back
     for asked in (True, False):
-        assert worthwhile([even], [best], best, surely=not asked) is even
+        assert worthwhile_candidate([even], [best], best, surely=not asked) is even
         as_good = straight((0.285,) * 4)
-        assert worthwhile([even], [best, as_good], best, surely=not asked) is None
-        assert worthwhile([], [best], best, surely=not asked) is None
-    assert worthwhile([chance], [best], best, surely=True) is None  # it is better in only one block of four
-    assert worthwhile([chance], [best], best, surely=False) is chance
+        assert worthwhile_candidate([even], [best, as_good], best, surely=not asked) is None
+        assert worthwhile_candidate([], [best], best, surely=not asked) is None
+    assert worthwhile_candidate([chance], [best], best, surely=True) is None  # it is better in only one block of four
+    assert worthwhile_candidate([chance], [best], best, surely=False) is chance
     halfway = bent((0.2, 0.2, 0.29, 0.31))  # better on two blocks of four, and on all together by 1.7 standard errors
-    assert worthwhile([halfway], [best], best, surely=True) is None
+    assert worthwhile_candidate([halfway], [best], best, surely=True) is None
 
 
 def test_the_chosen_nonlinear_fit_is_repeated_only_if_it_was_judged_on_fewer_samples(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    data, again = logged(PLANTED[0], 1), list[int]()
+    data, again = draw_log(PLANTED_NONLINEARITIES[0], 1), list[int]()
 
     def refit(fit: HammersteinFit, part: Channels) -> HammersteinFit:
         again.append(part.n_samples)
         return fit
 
-    monkeypatch.setattr("estimation.identification.free_run.identify.refitted", refit)
+    monkeypatch.setattr("estimation.identification.free_run.identify.refitted_hammerstein", refit)
     identified(data)
     assert again == []
     monkeypatch.setattr("estimation.identification.free_run.identify.MOST_COMPARED", data.n_samples - 1)
@@ -271,17 +276,17 @@ def test_only_auto_requires_a_significant_advantage_of_a_nonlinearity(monkeypatc
     def none(*_: Any, surely: bool) -> None:
         asked.append(surely)
 
-    monkeypatch.setattr("estimation.identification.free_run.identify.worthwhile", none)
+    monkeypatch.setattr("estimation.identification.free_run.identify.worthwhile_candidate", none)
     monkeypatch.setattr("estimation.identification.free_run.identify.hammerstein_candidates", lambda *_: [])
     monkeypatch.setattr("estimation.identification.free_run.identify.polynomial_candidates", lambda *_: [])
     for structure in ("auto", "hammerstein"):
-        identify_channels(logged(PLANTED[0], 1), structure=structure, order=2, delay=1)
+        identify_channels(draw_log(PLANTED_NONLINEARITIES[0], 1), structure=structure, order=2, delay=1)
     assert asked == [True, False]
 
 
 def test_without_a_fitted_nonlinearity_the_model_is_linear_with_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("estimation.identification.free_run.identify.hammerstein_candidates", lambda *_: [])
-    found = identified(logged(PLANTED[0], 1))
+    found = identified(draw_log(PLANTED_NONLINEARITIES[0], 1))
     assert found.model.structure == "output-error"
     assert "no_nonlinearity" in {str(note.code) for note in found.notes}
 

@@ -8,7 +8,7 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run import identify, linear_comparison
 from estimation.identification.free_run.data import Channels, channels_from, scaled
-from estimation.identification.free_run.integrating import RECORDS, fit_integrating, refitted_linear
+from estimation.identification.free_run.integrating import POLE_RECORDS, fit_integrating, refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.model.recursion import filtered
@@ -43,7 +43,7 @@ def test_an_integrating_fit_keeps_the_initial_level_over_twenty_records(data: Ch
     assert 0.95 * noise < fit.cost * by.y_std**2 < noise
     poles = np.sort(np.roots(fit.f))
     assert poles[0] == pytest.approx(0.8, abs=0.03)
-    assert poles[1] == pytest.approx(1.0 - 1.0 / (RECORDS * N), abs=1e-9)
+    assert poles[1] == pytest.approx(1.0 - 1.0 / (POLE_RECORDS * N), abs=1e-9)
     # a run over twenty records from the true start: with a time constant of three records, the start would be lost
     u = levels(9, 20 * N)
     y = (driven(u, 0.0) - by.y_mean) / by.y_std

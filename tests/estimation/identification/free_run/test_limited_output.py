@@ -9,7 +9,7 @@ import pytest
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.limited_dynamics import LimitedDynamics
-from estimation.identification.free_run.limited_output import LimitedProblem, Limits, limits_of, stopped
+from estimation.identification.free_run.limited_output import LimitedProblem, Limits, hold_between_stops, limits_of
 from estimation.identification.free_run.linear_comparison import Task
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
@@ -176,7 +176,7 @@ def test_a_model_with_stops_follows_an_integrating_output_that_leaves_them_at_on
 def test_an_output_between_stops_has_the_increments_of_the_free_series() -> None:
     free = np.array([0.0, 2.0, 3.0, 2.5, -4.0, -3.0])
     output, left = np.empty(6), np.empty(6, dtype=np.int64)
-    stopped(free, -1.0, 1.0, output, left)
+    hold_between_stops(free, -1.0, 1.0, output, left)
     assert output.tolist() == [0.0, 1.0, 1.0, 0.5, -1.0, 0.0]
     assert left.tolist() == [-1, 1, 2, 2, 4, 4]
 

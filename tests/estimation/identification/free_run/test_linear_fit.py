@@ -9,13 +9,13 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.fit.output_error import screened
 from estimation.identification.free_run import linear_fit
-from estimation.identification.free_run.choose_linear import _forms, candidate, chosen, linear_candidates
+from estimation.identification.free_run.choose_linear import _forms, candidate, chosen_linear, linear_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows, settles
 from estimation.identification.free_run.linear_problem import Form, Problem
-from estimation.identification.free_run.other_structures import adopt
+from estimation.identification.free_run.other_structures import fit_other_structure
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.search.criterion import Structure
@@ -151,7 +151,7 @@ def test_a_drift_is_not_taken_for_a_time_constant_longer_than_the_record() -> No
     u = steps(400, 3, hold=5)
     y = filtered([0.0, 0.4], [1.0, -0.6], u) + 1e-2 * np.cumsum(rng.normal(size=400))
     candidates = linear_candidates(scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))[0], [1, 2, 3], (1,))
-    best = chosen(candidates)
+    best = chosen_linear(candidates)
     poles = np.abs(np.roots(best.fit.f))
     assert not best.doubt
     assert (-1.0 / np.log(poles) <= 400).all()
@@ -182,7 +182,7 @@ def test_of_equally_good_models_the_lowest_bic_is_taken_and_a_dead_time_counts_a
         "worse": replace(one, block_errors=(0.1020,), bic=-2000.0),
         "beyond": replace(one, block_errors=(0.0500,), bic=-3000.0, doubt="time_constant"),
     }
-    assert chosen(list(tried.values())) is tried["probable"]
+    assert chosen_linear(list(tried.values())) is tried["probable"]
     late, theta = fit_linear(Form(1, (1,), (3,)), data), one.fit.theta.size
     n = data.n_samples
     assert candidate(late, data).bic == pytest.approx(n * np.log(late.cost / n) + (theta + 1) * np.log(n))
@@ -311,7 +311,7 @@ def with_a_gap(log: Channels) -> Channels:
 def test_a_log_unsuitable_for_a_structure_is_refused(structure: str, log: Channels, said: str) -> None:
     by = scaled(log)[1]
     with pytest.raises(HydrostateError, match=said):
-        adopt(structure, Form(2, (2,), (1,)), log, by)
+        fit_other_structure(structure, Form(2, (2,), (1,)), log, by)
 
 
 def test_each_order_is_tried_with_the_estimated_dead_times_and_with_none_or_one_sample() -> None:

@@ -10,7 +10,7 @@ from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.linear_problem import Form, Problem
-from estimation.identification.free_run.log_offsets import levelled
+from estimation.identification.free_run.log_offsets import logs_at_one_offset
 from plant.errors import LogWarning
 from tests.thinned import thinned
 
@@ -55,15 +55,15 @@ def test_different_offsets_cause_a_warning() -> None:
 
 
 def test_logs_with_the_same_offset_get_one_offset() -> None:
-    assert levelled(logs((2.0, 2.0, 2.0)), [1]) is None
-    assert levelled(logs((2.0,)), [1]) is None
+    assert logs_at_one_offset(logs((2.0, 2.0, 2.0)), [1]) is None
+    assert logs_at_one_offset(logs((2.0,)), [1]) is None
     assert identified(logs((2.0, 2.0))).notes == ()
 
 
 def test_logs_without_outputs_or_without_changes_get_no_separate_offsets() -> None:
     data = logs((2.0, 3.0))
-    assert levelled(replace(data, y=(data.y[0], np.full(N, np.nan))), [1]) is None
-    assert levelled(replace(data, y=(np.zeros(N), np.ones(N))), [1]) is None
+    assert logs_at_one_offset(replace(data, y=(data.y[0], np.full(N, np.nan))), [1]) is None
+    assert logs_at_one_offset(replace(data, y=(np.zeros(N), np.ones(N))), [1]) is None
 
 
 def test_derivatives_with_respect_to_offsets_equal_numerical_ones() -> None:

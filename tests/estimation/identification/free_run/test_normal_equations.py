@@ -67,7 +67,7 @@ def followed_freely(runs: Runs, theta: Array) -> tuple[Array, Array]:
     """Return outputs and their derivatives by all values; at the limits, the direct effect of the terms remains."""
     k, n, n_rub, outs, rows = len(runs.terms), runs.variables.n_start, runs.variables.n_friction, [], []
     for index, begin in enumerate(runs.begins):
-        out = runs.begun(theta, index)
+        out = runs.outputs_before_run(theta, index)
         moved = np.zeros((out.size, theta.size))
         moved[begin - n + np.arange(n), k + index * n + np.arange(n)] = 1.0
         for t in range(begin, out.size):
@@ -132,7 +132,7 @@ def test_slopes_with_respect_to_first_outputs_equal_those_of_the_full_jacobian(
 def test_a_diverging_run_has_no_outputs() -> None:
     runs, theta = made("", ())
     theta[1] = 1e4
-    away: Any = SimpleNamespace(**{**vars(runs), "begun": runs.begun})
+    away: Any = SimpleNamespace(**{**vars(runs), "outputs_before_run": runs.outputs_before_run})
     assert NormalEquations(away, np.array([-np.inf, np.inf])).outputs(theta) is None
 
 

@@ -23,7 +23,7 @@ from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 from estimation.identification.free_run.model import FreeRunModel, _fit
-from estimation.identification.free_run.other_structures import adopt
+from estimation.identification.free_run.other_structures import fit_other_structure
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.search import criterion
 from tests.estimation.identification.free_run.made_channels import NOISE, N, U, answer, channels
@@ -67,10 +67,10 @@ def problems() -> dict[str, Any]:
     told["lagged beyond the log"] = linear_fit.columns_of(Form(1, (3,), (2,)), U[:3, :1])
     told["no inputs"] = list(linear_fit.columns_of(Form(1, (), ()), U[:3, :0]).shape)
     told["inside"] = [
-        criterion.held_within(np.poly(roots), 100, 0.95)
+        criterion.with_bounded_roots(np.poly(roots), 100, 0.95)
         for roots in ((0.9, 0.5), (0.97, 0.5), (1.3, 0.2), (-0.99, 0.1))
     ]
-    told["longest pole"] = [linear_fit.longest_pole(n) for n in (10, 1000)]
+    told["longest pole"] = [linear_fit.record_length_pole(n) for n in (10, 1000)]
     told["least squares"] = [*least_squares(np.column_stack([U[:9], np.zeros(9)]), NOISE[:9])]
     return told
 
@@ -102,8 +102,8 @@ def fits() -> dict[str, Any]:
     one = scaled(slow())[0]
     free, held = (fit_linear(Form(1, (1,), (1,)), one, bounded=bounded) for bounded in (False, True))
     told["slow"] = [told_of(free), told_of(held)]
-    told["extended"] = linear_fit.extended(free)
-    told["unsearched"] = [len(linear_fit._searched(Problem(FORMS["two inputs"], data(2))))]
+    told["extended"] = linear_fit.extended_denominators(free)
+    told["unsearched"] = [len(linear_fit._searched_denominators(Problem(FORMS["two inputs"], data(2))))]
     problem = Problem(FORMS["one input"], data(lost=True))
     start = np.concatenate([[0.1, 0.1, -1.0, 0.3], np.zeros(problem.n_parameters - 4)])
     told["descended"] = told_of(problem.descend(start))
@@ -133,7 +133,10 @@ def choices() -> dict[str, Any]:
         told[f"{name}, errors"] = [
             [Found(one.held_back, 1e-3), Found(one.bic, 1.0), Found(one.aic, 1.0)] for one in found
         ]
-        told[f"{name}, chosen"] = [choose_linear.chosen(found).form.order, choose_linear.chosen(found).price]
+        told[f"{name}, chosen"] = [
+            choose_linear.chosen_linear(found).form.order,
+            choose_linear.chosen_linear(found).price,
+        ]
     told["sizes that are given"] = [one.form.sizes for one in choose_linear.linear_candidates(data(), [2], (1,), 3)]
     fit = fit_linear(FORMS["one input"], data(lost=True))
     told["blocks"] = list(held_back.held_back_blocks(fit, data(lost=True)))
@@ -151,7 +154,7 @@ def choices() -> dict[str, Any]:
         for late, size in (((0,), None), ((1,), None), ((3,), None), ((3,), 4))
     ]
     told["chosen"] = [
-        choose_linear.chosen(rows).bic
+        choose_linear.chosen_linear(rows).bic
         for rows in (
             [made(1.0, 3.0), made(1.009, 2.0), made(1.011, 1.0)],
             [made(1.0, 3.0, late=2), made(1.02, 2.0), made(1.05, 1.0)],
@@ -168,7 +171,7 @@ def choices() -> dict[str, Any]:
         )
     ]
     told["doubts without poles"] = choose_linear.doubt_of(LinearFit(Form(0, (1,), (1,)), np.zeros(2), 1.0), base)
-    told["pooled"] = [held_back.pooled(one) for one in ([3.0, 4.0, np.nan], [], [np.nan])]
+    told["pooled"] = [held_back.pooled_error(one) for one in ([3.0, 4.0, np.nan], [], [np.nan])]
     none = held_back.block_error(np.ones(3), np.zeros(3, dtype=bool))
     told["block errors"] = [held_back.block_error(np.array([3.0, 4.0, 9.0]), np.array([True, True, False])), none]
     return told
@@ -193,15 +196,17 @@ def believed() -> dict[str, Any]:
     }
     told: dict[str, Any] = {}
     for name, given in rows.items():
-        best, notes = believable.believable(given, base, by)
+        best, notes = believable.believable_candidate(given, base, by)
         told[name] = [best.held_back, best.doubt, best.fit.bounded, [[str(one.code), dict(one.data)] for one in notes]]
     cancelled = fit_linear(Form(3, (3,), (1,)), base)
     clean = fit_linear(Form(2, (2,), (1,)), base)
     for name, error in (("as good", 1.019), ("not as good", 1.021)):
         given = [made(1.0, -9.0, fit=cancelled, form=cancelled.form), made(error, 0.0, fit=clean, form=clean.form)]
-        best, notes = believable.believable(given, base, by)
+        best, notes = believable.believable_candidate(given, base, by)
         told[f"simpler, {name}"] = [best.form.order, [[str(one.code), dict(one.data)] for one in notes]]
-    told["undetermined"] = [believable._undetermined(made(1.0, 0.0, fit=one), base, by) for one in (cancelled, clean)]
+    told["undetermined"] = [
+        believable._is_undetermined(made(1.0, 0.0, fit=one), base, by) for one in (cancelled, clean)
+    ]
     return told
 
 
@@ -215,7 +220,7 @@ def fed_back() -> dict[str, Any]:
         logs = [slice(0, 60), slice(60, N)]
         one = channels_from([fed[log, :inputs] for log in logs], [NOISE[log] for log in logs], 0.1, "ab"[:inputs], "y")
         model = FreeRunModel(one.inputs, "y", 0.1, "", scaled(one)[1], body)
-        told[name] = [dict(note.data) for note in linear_comparison.fed_back(model, one)]
+        told[name] = [dict(note.data) for note in linear_comparison.closed_loop_notes(model, one)]
     return told
 
 
@@ -262,19 +267,19 @@ def adopted() -> dict[str, Any]:
     one = channels_from([U[:, :1]], [answer(two=False)], 0.1, ("a",), "y")
     by = scaled(one)[1]
     for name in ("arx", "armax", "box-jenkins", "instrumental", "subspace", "continuous"):
-        body, model, held_back = adopt(name, FORMS["one input"], one, by)
+        body, model, held_back = fit_other_structure(name, FORMS["one input"], one, by)
         told[name] = [
             [Found(float(v), 1e-2) for v in body.theta],
             Found(model.offset, 1e-2),
             Found(held_back, 1e-2),
             [body.form.order, list(body.form.sizes), list(body.form.delays)],
         ]
-    arx = partial(adopt, "arx", FORMS["one input"])
+    arx = partial(fit_other_structure, "arx", FORMS["one input"])
     told["two logs"] = Found(arx(channels(lost=True), by)[2], 1e-2)
     told["refused"] = [
         refused(lambda: arx(channels(2), by)),
-        refused(lambda: adopt("subspace", FORMS["one input"], channels(), by)),
-        refused(lambda: adopt("instrumental", FORMS["one input"], channels(lost=True), by)),
+        refused(lambda: fit_other_structure("subspace", FORMS["one input"], channels(), by)),
+        refused(lambda: fit_other_structure("instrumental", FORMS["one input"], channels(lost=True), by)),
     ]
     return told
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.identification.free_run import from_records
-from estimation.identification.free_run.data import blocks, channels_from, in_scale, scaled, section
+from estimation.identification.free_run.data import blocks, channels_from, in_scale, liveliest_sections, scaled
 from plant.log.record import Record
 from tests.estimation.identification.free_run.made_channels import NOISE, N, U, answer, channels
 from tests.numbers import Numbers, refused, some, warned
@@ -32,7 +32,7 @@ def data_that_are_cut() -> dict[str, Any]:
         "blocks of few": [mask.tolist() for masks in blocks(few, 2) for mask in masks],
     }
     for most in (100, 299, 300, 3):
-        part = section(lively, most)
+        part = liveliest_sections(lively, most)
         told[f"section of {most}"] = [[u[0, 0], len(u)] for u in part.u]
     make = partial(channels_from, sample_time=0.1, inputs=("a",), output="y")
     calls: dict[str, Callable[[], Any]] = {
@@ -72,7 +72,7 @@ def logs_with_gaps() -> dict[str, Any]:
             record = Record(0.1, {"a": u, "y": answer(two=False)})
             parts = from_records.pieces(record, ["a"])
             told[f"{name}, {which}"] = [[round(part.start_time, 6), len(part)] for part in parts]
-            told[f"{name}, {which}, unknown"] = int(from_records._unknown(u).sum())
+            told[f"{name}, {which}, unknown"] = int(from_records._unbridged_samples(u).sum())
     u = np.where((np.arange(N) > 99) & (np.arange(N) < 130), np.nan, wave)
     record = Record(0.1, {"a": u, "y": answer(two=False)})
     found = from_records.channels_of([record], ["a"], "y", split=True)
@@ -81,8 +81,8 @@ def logs_with_gaps() -> dict[str, Any]:
     told["at another time"] = [
         from_records.channels_of([record], ["a"], "y", wanted).u[0].size for wanted in (0.1, 0.10009, 0.1002, 0.2)
     ]
-    told["spoilt"] = [from_records._spoilt(wave, length) for length in (1, 3, 20, 298, 299, 400)]
-    told["spoilt, a constant"] = from_records._spoilt(np.ones(9), 2)
+    told["spoilt"] = [from_records._bridging_error(wave, length) for length in (1, 3, 20, 298, 299, 400)]
+    told["spoilt, a constant"] = from_records._bridging_error(np.ones(9), 2)
     told["warns"] = [
         warned(partial(from_records.channels_of, [record], ["a"], "y", split=split)) for split in (True, False)
     ]

@@ -19,12 +19,12 @@ from estimation.identification.free_run.candidate_rows import hammerstein_row, l
 from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
-from estimation.identification.free_run.dense_polynomial import Asked, JudgedRecipe, Recipe
+from estimation.identification.free_run.dense_polynomial import JudgedRecipe, Recipe, RequestedSizes
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import HammersteinProblem, fit_hammerstein
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES, _inner, _outer, _widths, play
-from estimation.identification.free_run.input_range import inputs_beyond
+from estimation.identification.free_run.input_range import input_range_notes
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.model import FreeRunModel
@@ -59,10 +59,10 @@ def data(lost: bool = False) -> Channels:
 
 @cache
 def grown(count: int = 1) -> PolynomialFit:
-    fit = polynomial_terms.begun(fit_linear(Form(2, (1,), (1,)), data()), data())
+    fit = polynomial_terms.polynomial_of_linear(fit_linear(Form(2, (1,), (1,)), data()), data())
     assert fit is not None
     for _ in range(count):
-        fit = polynomial_terms.one_more(fit, polynomial_terms.candidate_terms(fit.variables), data())
+        fit = polynomial_terms.with_best_product(fit, polynomial_terms.candidate_terms(fit.variables), data())
         assert fit is not None
     return fit
 
@@ -111,7 +111,7 @@ def runs_of_products() -> dict[str, Any]:
             told[f"{most} steps of small products"] = None if fit is None else [fit.theta, fit.cost]
         told["no fit"] = runs.fit(np.concatenate([900.0 * COEFFICIENTS, np.zeros(4)]), 3) is None
     told["variables"] = [one.variables.source, one.variables.lag, one.variables.limits, one.variables.ends]
-    told["around"] = [one.variables.around(share) for share in (0.0, 0.2)]
+    told["around"] = [one.variables.extended_ends(share) for share in (0.0, 0.2)]
     told["starts"] = [runs.start_values(), one.variables.n_start, first_values(np.array([np.nan, 2.0, 3.0]), 2)]
     told["no starts"] = first_values(np.full(3, np.nan), 2)
     return told
@@ -134,7 +134,7 @@ def products_that_are_chosen() -> dict[str, Any]:
     both = own.T @ answer(), every.T @ answer()
     told["gains"] = polynomial_terms._gains(own.T @ own, own.T @ every, square, *both)
     told["without"] = ended(polynomial_terms.without_term(one, 4, data()))
-    told["nothing more"] = polynomial_terms.one_more(one, np.array([[0, 0, -1]]), data()) is None
+    told["nothing more"] = polynomial_terms.with_best_product(one, np.array([[0, 0, -1]]), data()) is None
     told["pruned"] = len(choose_polynomial._pruned(grown(2), data()).terms)
     told["criterion"] = choose_polynomial._bic(replace(one, cost=3.0), data(lost=True))
     told["criterion of what leaves nothing"] = choose_polynomial._bic(replace(one, cost=0.0), data())
@@ -148,7 +148,7 @@ def products_that_are_chosen() -> dict[str, Any]:
         other_orders.disagreement([grown(0)], one, data()),
         other_orders.disagreement([replace(one, theta=900.0 * one.theta)], one, data()),
     ]
-    told["reordered"] = [some(other.u[1][:, 0], 3) for other in other_orders.reordered(data())]
+    told["reordered"] = [some(other.u[1][:, 0], 3) for other in other_orders.reordered_channels(data())]
     return told
 
 
@@ -162,19 +162,19 @@ def every_product() -> dict[str, Any]:
         "cubes": Recipe(Form(1, (1,), (1,)), 3, 1e-4, (1e-1, 1e-2)),
     }.items():
         told[name] = ended(recipe.fit(data(lost=True)))
-        judged = dense_polynomial._judged(recipe, data(), parts)
+        judged = dense_polynomial._judged_recipe(recipe, data(), parts)
         told[f"{name}, judged"] = None if judged is None else [Found(judged.held_back, 1e-3), len(judged.fits)]
     begun = Recipe(Form(1, (1,), (1,)), 2, 1e-4, (1e-1,)).fit(data())
     told["taken on"] = ended(Recipe(Form(1, (1,), (1,)), 2, 1e-4, (1e-1, 1e-2)).fit(data(), begun))
     short = replace(data(), u=(data().u[0][:9],), y=(data().y[0][:9],))
     told["too few"] = [Recipe(Form(1, (1,), (1,)), degree, 1e-3).fit(short) is None for degree in (2, 3)]
     told["forms"] = [
-        [[one.order, one.sizes, one.delays] for one in dense_polynomial.forms_tried(delays, asked)]
+        [[one.order, one.sizes, one.delays] for one in dense_polynomial.tried_forms(delays, asked)]
         for delays, asked in (
-            ((4,), Asked()),
-            ((1,), Asked(order=2)),
-            ((1,), Asked(order=7)),
-            ((1, 2), Asked(delay=0, n_numerator=2)),
+            ((4,), RequestedSizes()),
+            ((1,), RequestedSizes(order=2)),
+            ((1,), RequestedSizes(order=7)),
+            ((1, 2), RequestedSizes(delay=0, n_numerator=2)),
         )
     ]
     told["terms"] = [len(dense_polynomial.every_term(n, degree)) for n in (1, 4, 7) for degree in (2, 3)]
@@ -207,12 +207,12 @@ def choices_of_polynomials() -> dict[str, Any]:
     told["bases of many"] = [[one.form.order, one.form.delays[0]] for one in choose_polynomial._bases(rows)]
     doubtful = [made(1, 1, 1.0, "no_fit"), made(2, 1, 0.5, "no_fit")]
     told["bases of doubtful ones"] = len(choose_polynomial._bases(doubtful))
-    whole = polynomial_terms.begun(base.fit, data())
+    whole = polynomial_terms.polynomial_of_linear(base.fit, data())
     assert whole is not None
     growth = choose_polynomial._Growth(whole, choose_polynomial._from_linear(base.fit), data())
     told["grows"] = growth.advance(2)
     told["growth"] = [Found(one, 1e-3) for one in growth.errors]
-    done = growth.finished()
+    done = growth.finished_candidate()
     told["finished"] = [
         len(done.fit.terms),
         Found(done.held_back, 1e-3),
@@ -260,7 +260,7 @@ def polynomial_bodies() -> dict[str, Any]:
         "above": np.where(np.arange(N) < 5, limits[1] + 0.1, np.clip(U, *limits)),
         "below": np.where(np.arange(N) < 5, limits[0] - 0.1, np.clip(U, *limits)),
     }.items():
-        found = inputs_beyond(model, replace(whole, u=(inputs[:, None],)))
+        found = input_range_notes(model, replace(whole, u=(inputs[:, None],)))
         told[f"inputs {name}"] = [dict(note.data) for note in found]
     return told
 
@@ -292,7 +292,7 @@ def bent_inputs() -> dict[str, Any]:
     for kind in NONLINEARITIES:
         values = np.array([-0.6, 0.7]) if NONLINEARITIES[kind].level else np.array([0.3])
         problem = HammersteinProblem(kind, form, data(lost=True))
-        starts = hammerstein_fit._first(problem)
+        starts = hammerstein_fit._first_inputs(problem)
         theta = np.concatenate([values, starts, [0.3, -0.6, 0.1, 0.2, -0.1]])
         output, slopes = problem.jacobian(theta)
         told[f"{kind}, output"] = some(output, 7)
@@ -302,9 +302,9 @@ def bent_inputs() -> dict[str, Any]:
         told[kind] = [[Found(float(v), 1e-2) for v in found.theta], Roughly(found.cost, 1e-4), len(found.starts)]
         spread = hammerstein_fit.deviations(found, data())
         told[f"{kind}, deviations"] = [Roughly(float(one), 1e-2) for one in spread]
-        again = hammerstein_fit.refitted(found, data(lost=True))
+        again = hammerstein_fit.refitted_hammerstein(found, data(lost=True))
         told[f"{kind}, refitted"] = Roughly(again.cost, 1e-4)
-        left, bic = choose_hammerstein._held_back(found, data()), choose_hammerstein._bic(found, data())
+        left, bic = choose_hammerstein._held_back_errors(found, data()), choose_hammerstein._bic(found, data())
         one = choose_hammerstein.HammersteinCandidate(found, block_errors=left, bic=bic)
         told[f"{kind}, judged"] = [Found(one.held_back, 1e-3), Found(one.bic, 1.0), hammerstein_row(one)["order"]]
         body = HammersteinDynamics.of(found, spread)
@@ -319,7 +319,7 @@ def bent_inputs() -> dict[str, Any]:
     exact = replace(found, linear=replace(found.linear, cost=0.0))
     told["criterion of what leaves nothing"] = choose_hammerstein._bic(exact, data())
     ranked = [(float(k), np.array([float(k // 2)]), np.ones(2)) for k in range(12)]
-    told["apart"] = [one[0] for one in hammerstein_fit._apart(ranked)]
+    told["apart"] = [one[0] for one in hammerstein_fit._distinct_starts(ranked)]
     told["bases"] = [one.form.order for one in choose_hammerstein._bases(linear())]
     base = choose_hammerstein.HammersteinCandidate(found, block_errors=(1.0,), bic=3.0)
     rows = [base, replace(base, block_errors=(1.009,), bic=2.0), replace(base, block_errors=(1.011,), bic=1.0)]

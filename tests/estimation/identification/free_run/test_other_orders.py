@@ -5,8 +5,14 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.other_orders import PIECES, REORDERED, disagreement, is_wild, reordered
-from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit
+from estimation.identification.free_run.other_orders import (
+    MOST_REORDERED,
+    PIECES,
+    disagreement,
+    is_wild,
+    reordered_channels,
+)
+from estimation.identification.free_run.polynomial_fit import OUTPUT_MARGIN, PolynomialFit
 from estimation.identification.free_run.polynomial_variables import Variables
 
 
@@ -24,8 +30,8 @@ def moves(gain: float, square: float = 0.0, level: float = 0.0) -> PolynomialFit
 
 def test_pieces_of_the_inputs_are_permuted_and_some_are_reversed() -> None:
     u = np.arange(200.0)
-    found = [one.u[0][:, 0] for one in reordered(channels(u))]
-    assert len(found) == REORDERED
+    found = [one.u[0][:, 0] for one in reordered_channels(channels(u))]
+    assert len(found) == MOST_REORDERED
     backwards: list[float] = []
     for k, one in enumerate(found):
         assert np.array_equal(np.sort(one), u)
@@ -37,7 +43,7 @@ def test_pieces_of_the_inputs_are_permuted_and_some_are_reversed() -> None:
 
 
 def test_a_model_is_wild_if_it_leaves_its_range_in_more_than_three_samples_of_a_thousand() -> None:
-    low, high = moves(1.0).variables.around(FARTHEST)
+    low, high = moves(1.0).variables.extended_ends(OUTPUT_MARGIN)
     quiet = np.zeros(1000)
     for end in (low, high):
         for count, wild in ((0, False), (2, False), (5, True)):

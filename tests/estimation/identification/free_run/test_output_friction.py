@@ -17,7 +17,7 @@ from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.normal_equations import NormalEquations
-from estimation.identification.free_run.output_friction import continued, fit_with_friction
+from estimation.identification.free_run.output_friction import continued_fit, fit_with_friction
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs
 from plant.errors import HydrostateError
@@ -130,7 +130,7 @@ def test_a_friction_fit_continues_on_a_part_of_the_data() -> None:
     fit = fit_with_friction(fit_linear(Form(1, (1,), (1,)), data), "velocity", data)
     assert fit is not None
     masks = [np.arange(data.y[0].size) > 350]
-    part = continued(fit, data.without(masks))
+    part = continued_fit(fit, data.without(masks))
     assert part is not None
     assert not np.array_equal(part.theta, fit.theta)
     assert part.friction[:2] * by.y_std / STEP == pytest.approx([FRICTION, FRICTION], rel=0.1)

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.normal_equations import NormalEquations
-from estimation.identification.free_run.polynomial_dynamics import SMOOTHED, START_STEPS, PolynomialDynamics
+from estimation.identification.free_run.polynomial_dynamics import SMOOTHING_SAMPLES, START_STEPS, PolynomialDynamics
 from estimation.identification.free_run.polynomial_variables import Variables
 
 U = np.random.default_rng(4).uniform(-1.0, 1.0, (60, 1))
@@ -57,7 +57,7 @@ def test_the_search_of_a_start_ends_if_a_step_gains_nothing(monkeypatch: pytest.
     one = body()
     found = one.run(U, run_by_hand(0.7) + 0.1 * np.sin(np.arange(60.0)))
     # a linear start is found in one step, and the next step gains nothing; smoothed ones are run once each
-    assert 2 + 2 * len(SMOOTHED) <= len(asked) <= 4 + 2 * len(SMOOTHED) < START_STEPS
+    assert 2 + 2 * len(SMOOTHING_SAMPLES) <= len(asked) <= 4 + 2 * len(SMOOTHING_SAMPLES) < START_STEPS
     assert found[1:] == pytest.approx(0.6 * found[:-1] + 0.5 * U[:-1, 0])
 
 
@@ -121,5 +121,5 @@ def test_noise_in_the_first_outputs_does_not_make_the_run_of_a_softening_spring_
     seen = truth.copy()
     seen[:2] += [-0.15, 0.15]
     assert np.abs(pit.run(u, seen) - truth).max() < 0.03
-    monkeypatch.setattr(f"{PolynomialDynamics.__module__}.SMOOTHED", ())
+    monkeypatch.setattr(f"{PolynomialDynamics.__module__}.SMOOTHING_SAMPLES", ())
     assert not np.abs(pit.run(u, seen) - truth).max() < 1.0  # with the measured first outputs only

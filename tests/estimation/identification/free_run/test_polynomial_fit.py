@@ -12,7 +12,7 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run import identify
 from estimation.identification.free_run.choose_polynomial import _pruned
-from estimation.identification.free_run.data import Channels, channels_from, scaled, section
+from estimation.identification.free_run.data import Channels, channels_from, liveliest_sections, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form
@@ -22,11 +22,11 @@ from estimation.identification.free_run.other_orders import is_wild
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_terms import (
+    MOST_TRIED,
     STEPS,
-    TRIED,
-    begun,
     candidate_terms,
-    one_more,
+    polynomial_of_linear,
+    with_best_product,
 )
 from estimation.identification.free_run.polynomial_variables import products, write_products
 from estimation.identification.free_run.saved import load_models, save_models
@@ -51,7 +51,7 @@ def log(n: int = 400, seed: int = 1) -> Channels:
 def grown(of: Channels) -> tuple[Channels, PolynomialFit]:
     """Return scaled data, and the polynomial model that starts from a linear model of them."""
     data, _ = scaled(of)
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    start = polynomial_of_linear(fit_linear(Form(2, (1,), (1,)), data), data)
     assert start is not None
     return data, start
 
@@ -59,14 +59,14 @@ def grown(of: Channels) -> tuple[Channels, PolynomialFit]:
 def test_a_polynomial_fit_begins_with_the_error_of_its_linear_model() -> None:
     data, _ = scaled(log())
     linear = fit_linear(Form(2, (1,), (1,)), data)
-    start = begun(linear, data)
+    start = polynomial_of_linear(linear, data)
     assert start is not None
     assert start.cost == pytest.approx(linear.cost, rel=1e-2)
 
 
 def test_sensitivities_are_the_derivatives_of_the_free_run() -> None:
     data, start = grown(log(150))
-    fit = one_more(start, candidate_terms(start.variables), data)
+    fit = with_best_product(start, candidate_terms(start.variables), data)
     assert fit is not None
     runs = Runs(fit.variables, fit.terms, data)
     equations = NormalEquations(runs, runs.ends)
@@ -82,7 +82,7 @@ def test_sensitivities_are_the_derivatives_of_the_free_run() -> None:
 
 def test_the_product_in_the_plant_is_the_first_one_added() -> None:
     data, start = grown(log())
-    fit = one_more(start, candidate_terms(start.variables), data)
+    fit = with_best_product(start, candidate_terms(start.variables), data)
     assert fit is not None
     lags = [(int(fit.variables.source[v]), int(fit.variables.lag[v])) for v in fit.terms[-1]]
     assert {source for source, _ in lags} == {0}  # the cube of the output; its lags depend on the noise
@@ -125,7 +125,7 @@ def test_a_saved_model_simulates_the_same_output(tmp_path: object) -> None:
 
 def test_a_model_that_leaves_its_range_with_reordered_inputs_is_wild() -> None:
     data, start = grown(log())
-    fit = one_more(start, candidate_terms(start.variables), data)
+    fit = with_best_product(start, candidate_terms(start.variables), data)
     assert fit is not None
     assert not is_wild(fit, data)
     theta = fit.theta.copy()
@@ -149,7 +149,7 @@ def test_factors_of_products_are_clipped_to_the_fitted_range_and_single_terms_ar
 
 def test_pruning_removes_a_product_without_effect_and_keeps_that_of_the_plant() -> None:
     data, start = grown(log())
-    own = one_more(start, candidate_terms(start.variables), data)
+    own = with_best_product(start, candidate_terms(start.variables), data)
     assert own is not None
     assert np.array_equal(_pruned(own, data).terms, own.terms)
     idle = next(term for term in candidate_terms(start.variables) if {start.variables.source[v] for v in term} == {1})
@@ -203,7 +203,7 @@ def test_a_diverging_fit_is_wild_gets_no_product_and_predicts_nan() -> None:
     runs = Runs(away.variables, away.terms, data)
     assert runs.outputs(away.theta) is None
     assert runs.fit(away.theta, 10) is None
-    assert one_more(away, candidate_terms(away.variables), data) is None
+    assert with_best_product(away, candidate_terms(away.variables), data) is None
     assert is_wild(away, data)
     body = PolynomialDynamics.of(away)
     assert np.isnan(body.run(data.u[0], data.y[0])).all()
@@ -215,11 +215,11 @@ def test_no_product_is_added_if_none_reduces_the_error_or_every_free_run_diverge
     data, start = grown(log())
     pool = candidate_terms(start.variables)
     explained = replace(start, cost=1e9 * start.cost)
-    assert one_more(explained, pool, data) is None
+    assert with_best_product(explained, pool, data) is None
     tried: list[tuple[int, int]] = []
     monkeypatch.setattr(Runs, "fit", lambda _, theta, steps: tried.append((theta.size, steps)))
-    assert one_more(start, pool, data) is None
-    assert tried == [(start.theta.size + 1, STEPS)] * TRIED
+    assert with_best_product(start, pool, data) is None
+    assert tried == [(start.theta.size + 1, STEPS)] * MOST_TRIED
 
 
 def test_a_requested_polynomial_model_is_refused_if_none_runs_freely(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -233,8 +233,8 @@ def test_the_section_of_a_long_log_is_its_most_excited_part() -> None:
     quiet, u = np.zeros((1000, 1)), np.zeros((3000, 1))
     u[1200:1500, 0] = np.sin(np.arange(300.0))
     data = channels_from([u, quiet], [np.arange(3000.0), np.arange(1000.0)], 1.0, ["u"], "y")
-    assert section(data, 4000) is data
-    part = section(data, 400)
+    assert liveliest_sections(data, 4000) is data
+    part = liveliest_sections(data, 400)
     assert [len(one) for one in part.y] == [300, 100]
     first = int(part.y[0][0])
     np.testing.assert_array_equal(part.u[0], u[first : first + 300])

@@ -9,7 +9,7 @@ from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.output_friction import _first_outputs
 from estimation.identification.free_run.polynomial_fit import Runs, first_values, variables_of
-from estimation.identification.free_run.polynomial_variables import BEYOND, Variables
+from estimation.identification.free_run.polynomial_variables import SIGNAL_MARGIN, Variables
 
 SIZES = (60, 90)
 
@@ -70,9 +70,9 @@ def test_ranges_are_the_measured_ones_widened_by_a_share() -> None:
     seen = np.concatenate(data.y)
     low, high = float(seen.min()), float(seen.max())
     assert variables.ends == pytest.approx([low, high])
-    assert variables.around(0.25) == pytest.approx([1.25 * low - 0.25 * high, 1.25 * high - 0.25 * low])
+    assert variables.extended_ends(0.25) == pytest.approx([1.25 * low - 0.25 * high, 1.25 * high - 0.25 * low])
     u = np.concatenate(data.u)[:, 0]
-    reach = BEYOND * (u.max() - u.min())
+    reach = SIGNAL_MARGIN * (u.max() - u.min())
     assert variables.limits[2:] == pytest.approx(np.array([[u.min() - reach, u.max() + reach]] * 2))
 
 

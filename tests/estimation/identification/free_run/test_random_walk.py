@@ -11,19 +11,19 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run import identify
 from estimation.identification.free_run.data import Channels, channels_from, scaled
-from estimation.identification.free_run.dense_polynomial import Asked
+from estimation.identification.free_run.dense_polynomial import RequestedSizes
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.linear_comparison import Task
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.random_walk import (
-    COMES_BACK,
-    at_levels,
+    LARGEST_WALK_STATISTIC,
     changes_of,
-    followed_walk,
-    remembers,
-    returns,
-    wandering,
+    dickey_fuller_statistic,
+    fit_of_levels,
+    has_long_memory,
+    walk_followed_notes,
+    walk_model,
 )
 from estimation.identification.state_space.identify import identify_outputs
 from plant.errors import LogWarning
@@ -75,14 +75,14 @@ def first(data: Channels, count: int) -> Channels:
 @pytest.mark.parametrize(("seed", "noise"), [(16802, 0.1), (16804, 0.1), (16807, 0.0)])
 def test_a_random_walk_is_found_in_few_samples_with_large_chance_correlations(seed: int, noise: float) -> None:
     data = scaled(first(log(seed, noise=noise), 260))[0]
-    assert wandering(data, data, [1], (1,), None) is not None
+    assert walk_model(data, data, [1], (1,), None) is not None
 
 
 def test_a_followed_walk_is_noted_for_a_random_walk_and_not_for_white_noise() -> None:
     data, noisy = (scaled(first(one, 300))[0] for one in (log(16801), log(16801, 0.0, 0.3)))
-    (note,) = followed_walk(data, data, [1], "narx")
+    (note,) = walk_followed_notes(data, data, [1], "narx")
     assert note.code == "walk_followed"
-    assert followed_walk(noisy, noisy, [1], "narx") == []
+    assert walk_followed_notes(noisy, noisy, [1], "narx") == []
 
 
 @pytest.mark.parametrize("structure", ["hammerstein", "state-space"])
@@ -116,7 +116,7 @@ def test_auto_prefers_a_nonlinear_model_of_levels_only_if_its_error_is_clearly_s
     share = (left or 0.1) * (100.0 - walk.held_back_percent)
     other = replace(walk, model=replace(walk.model, structure=structure), held_back_percent=100.0 - share)
     monkeypatch.setattr(identify, "_nonlinear_or_linear", lambda *_: other)
-    found = identify._or_nonlinear(walk, cast(Any, None), "output-error" if left is None else "auto")
+    found = identify._clearly_better_nonlinear(walk, cast(Any, None), "output-error" if left is None else "auto")
     assert found is {"other": other, "walk": walk}[taken]
 
 
@@ -127,10 +127,10 @@ def test_a_random_walk_at_a_given_order_must_be_found_at_other_orders_too(
     """The residual of missing poles may look like a walk."""
     data = log(16801)
     whole, by = scaled(data)
-    walk = wandering(whole, whole, [1], (1,), None)
-    monkeypatch.setattr(identify, "wandering", lambda _data, _part, orders, *_: walk if orders == [1] else None)
-    task = Task(data, whole, by, whole, Asked(order), [1], None)
-    assert (identify._of_changes(task) is not None) is told
+    walk = walk_model(whole, whole, [1], (1,), None)
+    monkeypatch.setattr(identify, "walk_model", lambda _data, _part, orders, *_: walk if orders == [1] else None)
+    task = Task(data, whole, by, whole, RequestedSizes(order), [1], None)
+    assert (identify._identified_from_changes(task) is not None) is told
     free = replace(task, orders=[5]).free
     assert told if free is None else free.orders == [1, 2, 3, 4, 5], "each order's starts come from one less"
 
@@ -151,26 +151,26 @@ def test_a_random_walk_is_found_in_two_logs_with_gaps_and_two_inputs() -> None:
 
 def test_a_random_walk_that_is_small_beside_the_output_is_ignored() -> None:
     whole, _ = scaled(log(16801, 0.003))
-    assert wandering(whole, whole, [1], (1,), None) is None
+    assert walk_model(whole, whole, [1], (1,), None) is None
 
 
 def test_an_integrating_plant_is_not_taken_for_a_random_walk() -> None:
     one = log(16805, 0.0, 0.05)
     summed = replace(one, y=(np.cumsum(0.1 * one.y[0]) + np.random.default_rng(1).standard_normal(N),))
     whole, _ = scaled(summed)
-    assert wandering(whole, whole, [2], (1,), None) is None
+    assert walk_model(whole, whole, [2], (1,), None) is None
 
 
 def test_random_walks_are_distinguished_from_returning_sums_and_smooth_changes() -> None:
     white = np.random.default_rng(16806).standard_normal((40, 600))
-    walks = np.array([returns(one) > COMES_BACK for one in white])
-    noise = np.array([returns(np.diff(one)) > COMES_BACK for one in white])
+    walks = np.array([dickey_fuller_statistic(one) > LARGEST_WALK_STATISTIC for one in white])
+    noise = np.array([dickey_fuller_statistic(np.diff(one)) > LARGEST_WALK_STATISTIC for one in white])
     assert walks.sum() >= 37
     assert noise.sum() == 0
     smooth = white[:, 2:] + white[:, 1:-1] + white[:, :-2]
     beside = white[:, 1:] + 2.0 * np.diff(np.random.default_rng(16807).standard_normal((40, 600)))
-    assert sum(map(remembers, smooth)) == 40
-    assert sum(map(remembers, white)) + sum(map(remembers, beside)) <= 1
+    assert sum(map(has_long_memory, smooth)) == 40
+    assert sum(map(has_long_memory, white)) + sum(map(has_long_memory, beside)) <= 1
 
 
 def test_a_fit_to_changes_is_converted_to_one_of_levels() -> None:
@@ -178,7 +178,7 @@ def test_a_fit_to_changes_is_converted_to_one_of_levels() -> None:
     whole, _ = scaled(plain)
     changed, by = scaled(changes_of(whole))
     fit = fit_linear(Form(1, (1,), (1,)), changed)
-    found = at_levels(fit, whole, by)
+    found = fit_of_levels(fit, whole, by)
     assert found.cost < 1e-9
     assert found.f[1] == pytest.approx(-POLE, abs=1e-6)
 
@@ -189,7 +189,7 @@ def test_an_output_with_constant_changes_or_without_any_has_no_random_walk(gaps:
     if gaps:
         ramp[::2] = np.nan
     whole, _ = scaled(channels_from([LEVELS[:, None]], [ramp], 0.1, ["u"], "y"))
-    assert wandering(whole, whole, [1], None, None) is None
+    assert walk_model(whole, whole, [1], None, None) is None
 
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
@@ -198,7 +198,7 @@ def test_feedback_from_the_noise_is_noted_and_not_taken_for_a_random_walk() -> N
     loop = closed_loop(0)
     data = channels_from([loop["u"][:, None]], [loop["y"]], 0.01, ["u"], "y")
     whole, _ = scaled(data)
-    assert wandering(whole, whole, [1], (1,), None) is not None
+    assert walk_model(whole, whole, [1], (1,), None) is not None
     said = [str(note.code) for note in identify_channels(data, order=1, delay=1).notes]
     assert "feedback" in said
     assert "random_walk" not in said

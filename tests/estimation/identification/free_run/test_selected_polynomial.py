@@ -7,15 +7,15 @@ from estimation.arrays import Array
 from estimation.identification.free_run import choose_polynomial
 from estimation.identification.free_run.choose_linear import linear_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
-from estimation.identification.free_run.dense_polynomial import Asked
+from estimation.identification.free_run.dense_polynomial import RequestedSizes
 from estimation.identification.free_run.held_back import BLOCKS
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.selected_polynomial import (
-    COUNTS,
+    TERM_COUNTS,
     Selection,
-    best_first,
+    best_regressors,
     forms_selected,
     judged_selections,
 )
@@ -56,7 +56,7 @@ def test_each_regressor_is_rated_by_its_contribution_beyond_those_already_select
     columns = rng.normal(size=(200, 4))
     columns = np.column_stack([columns, columns[:, 0] + columns[:, 1]])
     wanted = columns[:, 0] + 2.0 * columns[:, 1] + 0.1 * columns[:, 2]
-    found = best_first(columns.T @ columns, columns.T @ wanted, 5)
+    found = best_regressors(columns.T @ columns, columns.T @ wanted, 5)
     # the sum explains most; one of its parts is then added, after which the other part adds nothing
     assert found[0] == 4
     assert found[1] in (0, 1)
@@ -80,7 +80,7 @@ def test_a_held_back_block_does_not_affect_the_selection_of_terms() -> None:
 def test_selections_are_refined_and_judged_by_their_free_run() -> None:
     data = sparse(noise=0.05)
     judged = judged_selections(data, [data.without(mask) for mask in blocks(data, BLOCKS)], [FORM])
-    assert {one.recipe.count for one in judged} == set(COUNTS)
+    assert {one.recipe.count for one in judged} == set(TERM_COUNTS)
     best = min(judged, key=lambda one: one.held_back)
     assert best.recipe.descended, "noise at the output biases one step"
     assert best.held_back == pytest.approx(0.05, rel=0.15)
@@ -102,9 +102,9 @@ def test_too_few_samples_give_no_model() -> None:
 
 
 def test_requested_sizes_are_kept() -> None:
-    assert {one.order for one in forms_selected((5,), Asked())} == {2, 3, 4}
-    assert {one.delays for one in forms_selected((5,), Asked())} == {(0,), (1,), (5,)}
-    assert forms_selected((5, 1), Asked(order=7, delay=2, n_numerator=3)) == [Form(7, (3, 3), (2, 2))]
+    assert {one.order for one in forms_selected((5,), RequestedSizes())} == {2, 3, 4}
+    assert {one.delays for one in forms_selected((5,), RequestedSizes())} == {(0,), (1,), (5,)}
+    assert forms_selected((5, 1), RequestedSizes(order=7, delay=2, n_numerator=3)) == [Form(7, (3, 3), (2, 2))]
 
 
 def test_selected_terms_fit_a_short_log_of_a_sparse_plant_better_than_all_products(
@@ -114,8 +114,8 @@ def test_selected_terms_fit_a_short_log_of_a_sparse_plant_better_than_all_produc
     raw = channels_from([u], [y], 1.0, ["u", "v"], "y")
     data, by = scaled(raw)
     linear, left = linear_candidates(data, [1, 2], (1, 1)), list[float]()
-    for kept in (choose_polynomial._selected, lambda *_: []):
-        monkeypatch.setattr(choose_polynomial, "_selected", kept)
+    for kept in (choose_polynomial._selected_candidates, lambda *_: []):
+        monkeypatch.setattr(choose_polynomial, "_selected_candidates", kept)
         best = min(choose_polynomial.polynomial_candidates(linear, data), key=lambda one: one.price)
         model = FreeRunModel(("u", "v"), "y", 1.0, "narx", by, PolynomialDynamics.of(best.fit))
         left.append(model.quality([test_u], [test_y]).fit_percent)

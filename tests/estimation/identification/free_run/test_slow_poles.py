@@ -7,11 +7,11 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.identification.free_run import believable as module
-from estimation.identification.free_run.believable import believable
+from estimation.identification.free_run.believable import believable_candidate
 from estimation.identification.free_run.choose_linear import (
     Candidate,
     candidate,
-    chosen,
+    chosen_linear,
     doubt_of,
     linear_candidates,
     slowest_pole,
@@ -75,10 +75,10 @@ def test_a_slow_pole_is_taken_only_if_its_gain_exceeds_the_scatter_of_blocks(
     models = {"quick": with_pole(one, 0.7, (0.1,) * 4), "slow": with_pole(one, 0.998, slow)}
     models["slow"] = replace(models["slow"], bic=one.bic - 100.0)
     _, by = scaled(data)
-    assert believable(list(models.values()), data, by)[0] is models[taken]
+    assert believable_candidate(list(models.values()), data, by)[0] is models[taken]
     # the slow model is taken if no quicker one may be
     doubted = replace(models["quick"], doubt="no_fit")
-    assert believable([doubted, models["slow"]], data, by)[0] is models["slow"]
+    assert believable_candidate([doubted, models["slow"]], data, by)[0] is models["slow"]
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_a_slow_pole_is_taken_only_if_its_error_on_blocks_and_halves_is_no_large
     models["slow"] = replace(models["slow"], bic=one.bic - 100.0)
     told = dict(zip((0.998, 0.7), errors, strict=True))
     monkeypatch.setattr(module, "halves_error", lambda fit, _: told[round(-float(fit.f[1]), 3)])
-    assert believable(list(models.values()), data, scaled(data)[1])[0] is models[taken]
+    assert believable_candidate(list(models.values()), data, scaled(data)[1])[0] is models[taken]
 
 
 def test_each_half_is_simulated_by_a_fit_to_the_other_half(plain: tuple[Channels, Candidate]) -> None:
@@ -118,7 +118,7 @@ def test_rejected_models_with_a_time_constant_beyond_the_record_are_noted(plain:
     data, one = plain
     beyond = with_pole(one, 0.9999, (0.09,) * 4, "time_constant")
     slow, quick = with_pole(one, 0.998, (0.07, 0.1, 0.1, 0.115)), with_pole(one, 0.7, (0.1,) * 4)
-    found, notes = believable([beyond, slow, quick], data, scaled(data)[1])
+    found, notes = believable_candidate([beyond, slow, quick], data, scaled(data)[1])
     assert found is quick
     assert [note.code for note in notes] == [IdentificationCode.SLOW_MODELS_PASSED_OVER]
 
@@ -130,8 +130,8 @@ def test_the_drift_of_one_record_is_not_taken_for_a_slow_pole() -> None:
     drift = filtered([1.0], [1.0, -0.98], rng.normal(size=400))
     data, by = scaled(channels(y + 0.25 * y.std() / drift.std() * drift, u))
     candidates = linear_candidates(data, [1, 2, 3], (1,))
-    assert chosen(candidates).outlasts_block(data), "held-back blocks alone want the slow pole"
-    assert believable(candidates, data, by)[0].fit.f == pytest.approx([1.0, -0.7], abs=0.03)
+    assert chosen_linear(candidates).outlasts_block(data), "held-back blocks alone want the slow pole"
+    assert believable_candidate(candidates, data, by)[0].fit.f == pytest.approx([1.0, -0.7], abs=0.03)
 
 
 def test_a_fit_to_an_output_without_spread_is_doubtful() -> None:
@@ -157,11 +157,11 @@ def test_a_dead_time_is_taken_only_if_its_gain_exceeds_the_scatter_of_blocks(
     later = LinearFit(Form(1, (1,), (5,)), models["late"].fit.theta, one.fit.cost)
     models["late"] = replace(models["late"], fit=later)
     by = scaled(data)[1]
-    assert believable(list(models.values()), data, by)[0] is models[taken]
+    assert believable_candidate(list(models.values()), data, by)[0] is models[taken]
     # neither a slow model nor one that may not be taken replaces a dead time
     slow = with_pole(one, 0.9995, (0.1,) * 4)
     for other in (slow, replace(models["prompt"], doubt="no_fit")):
-        assert believable([other, models["late"]], data, by)[0] is models["late"]
+        assert believable_candidate([other, models["late"]], data, by)[0] is models["late"]
 
 
 def test_a_time_constant_between_input_period_and_record_length_is_not_noted_as_integrating(
@@ -169,7 +169,7 @@ def test_a_time_constant_between_input_period_and_record_length_is_not_noted_as_
 ) -> None:
     u = np.tile(steps(3)[: N // 4], 4)
     data = channels(filtered([0.0, 0.3], [1.0, -0.7], u), u)
-    assert data.told == N // 4
+    assert data.informative_samples == N // 4
     within, beyond = (with_pole(plain[1], float(np.exp(-1.0 / length)), (0.1,)) for length in (0.9 * N, 1.1 * N))
     note = module._slow_note(within, data)
     assert note.code == IdentificationCode.SLOWER_THAN_PERIOD
@@ -187,5 +187,5 @@ def test_an_integrating_model_is_rejected_if_a_settling_one_has_a_lower_bic(
     settled = replace(one, block_errors=(0.02, 0.02, 0.02, 0.2))
     other = with_pole(one, 1.0, (0.02, 0.02, 0.02, 0.02), "time_constant")
     integrating = replace(other, fit=replace(other.fit, integrates=True), bic=one.bic + gained)
-    best, _ = believable([settled, integrating], data, scaled(data)[1])
+    best, _ = believable_candidate([settled, integrating], data, scaled(data)[1])
     assert best.fit is {"settled": settled, "integrates": integrating}[taken].fit

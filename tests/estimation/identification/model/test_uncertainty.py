@@ -9,7 +9,7 @@ from scipy.io import loadmat
 
 from estimation.arrays import Array
 from estimation.identification import LinearModel, dc_gain_interval, fit_output_error
-from estimation.identification.fit.profile_interval import _stretch
+from estimation.identification.fit.profile_interval import _variance_ratio
 from estimation.identification.model.uncertainty import _deviations, response_band
 from estimation.identification.notes import IdentificationCode
 from plant.errors import CovarianceWarning, HydrostateError
@@ -99,7 +99,7 @@ def test_a_profile_interval_is_widened_by_the_ratio_of_coloured_to_white_gain_va
         return np.array([[variance, 0.0], [0.0, 0.0]])
 
     model = LinearModel([0.4], [1.0, -0.6], 0.02, "u", "y", covariance=spread(gain), covariance_white=spread(white))
-    assert _stretch(model) == pytest.approx(stretched)
+    assert _variance_ratio(model) == pytest.approx(stretched)
 
 
 def test_a_profile_interval_requires_an_output_error_fit(table6: dict[str, LinearModel]) -> None:

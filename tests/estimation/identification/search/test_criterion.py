@@ -1,7 +1,14 @@
 import numpy as np
 import pytest
 
-from estimation.identification.search.criterion import Structure, is_stable, predict, profile, sensitivities, stabilised
+from estimation.identification.search.criterion import (
+    Structure,
+    is_stable,
+    predict,
+    profile,
+    sensitivities,
+    stabilised_denominator,
+)
 
 THETA = np.array([0.3, -0.2, 0.1, -1.5, 0.6, 0.05, -0.4])
 
@@ -48,13 +55,13 @@ def test_linear_parameters_are_solved_exactly() -> None:
 
 
 def test_unstable_roots_are_reflected_and_stable_ones_kept() -> None:
-    reflected = stabilised(np.poly([2.0, 0.5]), 100)
+    reflected = stabilised_denominator(np.poly([2.0, 0.5]), 100)
     np.testing.assert_allclose(np.sort(np.roots(reflected)), [0.5, 0.5], atol=1e-6)
     stable = np.poly([0.9, 0.5])
-    assert stabilised(stable, 100) is stable
+    assert stabilised_denominator(stable, 100) is stable
 
 
 @pytest.mark.parametrize("roots", [[1.0, 0.5], [-1.0, 0.5], [1.0 + 1e-12, 0.5], [1j, -1j]])
 def test_roots_on_the_circle_move_inside(roots: list[complex]) -> None:
     assert not is_stable(np.real(np.poly([1.0, 0.5])))
-    assert np.abs(np.roots(stabilised(np.real(np.poly(roots)), 1000))).max() < 1.0
+    assert np.abs(np.roots(stabilised_denominator(np.real(np.poly(roots)), 1000))).max() < 1.0

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from estimation.identification import LinearModel, fit_output_error
-from estimation.identification.search.experiments import _excited, experiments_from
+from estimation.identification.search.experiments import _excitation_order, experiments_from
 from plant.errors import HydrostateError
 
 WANTED = {"names": ("u", "y"), "n_excited": 2, "n_wanted": 10}
@@ -39,8 +39,8 @@ def test_outputs_are_advanced_by_the_dead_time_within_each_experiment() -> None:
     for moved, part in zip(late.slices, data.slices, strict=True):
         np.testing.assert_array_equal(late.u[moved], data.u[part][:-3])
         np.testing.assert_array_equal(late.y[moved], data.y[part][3:])
-    assert data.goes_on_behind(19)
-    assert not data.goes_on_behind(20)
+    assert data.has_outputs_after(19)
+    assert not data.has_outputs_after(20)
 
 
 def test_different_numbers_of_inputs_and_outputs_are_refused() -> None:
@@ -71,5 +71,5 @@ def test_an_input_with_a_weak_effect_is_not_refused() -> None:
 
 def test_a_log_too_short_for_the_wanted_parameters_excites_none() -> None:
     u = np.random.default_rng(1).normal(size=9)
-    assert [_excited(u, wanted) for wanted in (4, 5)] == [4, 0]
-    assert _excited(np.sin(np.arange(50.0)), 4) == 2
+    assert [_excitation_order(u, wanted) for wanted in (4, 5)] == [4, 0]
+    assert _excitation_order(np.sin(np.arange(50.0)), 4) == 2

@@ -15,7 +15,7 @@ from estimation.identification.search.criterion import (
     profile,
     sensitivities,
 )
-from estimation.identification.search.experiments import data_hash, experiments_from, listed
+from estimation.identification.search.experiments import data_hash, experiments_from, signal_list
 from estimation.identification.search.noise_model import noise_start
 from tests.estimation.identification.search.made_answers import NOISE, WEIGHT, F, U, answer
 from tests.kernels import loops_in_python
@@ -137,7 +137,7 @@ def experiments() -> dict[str, Any]:
         "scales": [scaled.u_scale, scaled.y_scale, some(scaled.u, 3), some(scaled.y, 3)],
         "bridged": [some(one, 12) for _, one in two.bridged()],
         "hashes": [data_hash(two, 0.01), data_hash(experiments_from(U, y, names, n_excited=1, n_wanted=1), 0.02)],
-        "listed": [len(listed(U)), len(listed([U, U])), len(listed([1.0, 2.0])), len(listed([]))],
+        "listed": [len(signal_list(U)), len(signal_list([U, U])), len(signal_list([1.0, 2.0])), len(signal_list([]))],
     }
     sine = np.sin(0.3 * np.arange(200.0))
     tiny = sine + 3e-9 * NOISE

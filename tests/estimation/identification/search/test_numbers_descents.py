@@ -9,7 +9,7 @@ import pytest
 from estimation.identification.search import pole_search
 from estimation.identification.search.criterion import (
     is_stable,
-    stabilised,
+    stabilised_denominator,
 )
 from estimation.identification.search.descent import CHUNK, descend, normal_equations, solve_damped, stable
 from estimation.identification.search.levenberg import levenberg
@@ -41,7 +41,7 @@ def stability() -> dict[str, Any]:
         }
     told = {"by roots": [is_stable(np.array([1.0, f])) for f in (-1.0, -0.99, 1.01, np.inf)]}
     for name, roots in {"one outside": (1.5, 0.5), "on the circle": (1.0, 0.3), "beyond it": (-2.0, 1.001)}.items():
-        told[f"reflected, {name}"] = stabilised(np.poly(roots), 50).tolist()
+        told[f"reflected, {name}"] = stabilised_denominator(np.poly(roots), 50).tolist()
     reflected = pole_search.reflected([np.poly((1.5, 0.5)), np.poly((1.0, 0.3)), np.poly((0.2, 0.3))])
     return {**rows, **told, "kept inside": reflected}
 

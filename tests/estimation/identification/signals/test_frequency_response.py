@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from benchmarks.identification.frequency_response import DAMPED, NUMERATOR, PERIOD, PERIODS, bent, multisine, odd_lines
+from benchmarks.identification.frequency_response import (
+    DAMPED,
+    NUMERATOR,
+    PERIOD,
+    PERIODS,
+    multisine,
+    odd_lines,
+    plant_output,
+)
 from estimation.identification.model.recursion import filtered
 from estimation.identification.signals.distortion import best_linear_approximation
 from estimation.identification.signals.local_polynomial import local_polynomial_response
@@ -45,7 +53,7 @@ def test_leakage_is_modelled() -> None:
 def log() -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
     rng = np.random.default_rng(3)
     u = np.tile(multisine(odd_lines(rng), rng), PERIODS)
-    return u, bent(u, DAMPED) + 0.02 * rng.normal(size=len(u))
+    return u, plant_output(u, DAMPED) + 0.02 * rng.normal(size=len(u))
 
 
 def test_noise_and_odd_and_even_distortion_are_separated(log: tuple[np.ndarray, np.ndarray]) -> None:  # type: ignore[type-arg]
@@ -123,7 +131,7 @@ def test_the_interval_of_a_distortion_level_matches_its_scatter_between_multisin
     for seed in range(30):
         rng = np.random.default_rng([11, seed])
         u = np.tile(multisine(odd_lines(rng), rng), 3)
-        told = best_linear_approximation(u, bent(u, DAMPED) + 0.02 * rng.normal(size=len(u)), 1.0)
+        told = best_linear_approximation(u, plant_output(u, DAMPED) + 0.02 * rng.normal(size=len(u)), 1.0)
         every.append((told.level(odd=True), *told.level_interval(odd=True)))
     level, low, high = np.array(every).T
     mean = level.mean()
@@ -142,10 +150,10 @@ def test_a_distortion_level_has_no_interval_if_the_lines_do_not_determine_its_sc
     rng = np.random.default_rng(2)
     every = multisine(np.arange(1, 3200), rng)
     u = np.tile(every, 3)
-    told = best_linear_approximation(u, bent(u, DAMPED), 1.0)
+    told = best_linear_approximation(u, plant_output(u, DAMPED), 1.0)
     assert np.isnan(told.level_interval(odd=True)).all()
     assert told.period_wanted(odd=True) is None
-    found = measured_response(u, bent(u, DAMPED), 1.0).to_dict()
+    found = measured_response(u, plant_output(u, DAMPED), 1.0).to_dict()
     assert found["odd_power_interval"] is None
     # lines far apart on a sharp resonance: the residual of a smooth response is not distortion there
     lines = 64 * np.arange(1, 50, 2) - 1

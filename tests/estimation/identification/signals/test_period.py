@@ -41,7 +41,7 @@ def test_a_block_is_the_same_part_of_every_period() -> None:
         ]
     # inputs contain no more information than one period, and halves of a log would hold back nothing
     data = channels_from([u[:, None], u[:250, None]], [u, u[:250]], 1.0, ["u"], "y")
-    assert (data.longest, data.told) == (600, 200)
+    assert (data.longest, data.informative_samples) == (600, 200)
     assert [[half[:, 0].tolist() for half in one.u] for one in halves(data)] == [
         [u[400:500].tolist(), u[50:150].tolist()],
         [u[500:].tolist(), u[150:250].tolist()],

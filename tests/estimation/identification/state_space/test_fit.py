@@ -9,8 +9,8 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run.data import channels_from, scaled
 from estimation.identification.state_space import fit
-from estimation.identification.state_space.fit import Effort, _chart
-from estimation.identification.state_space.joint import joined
+from estimation.identification.state_space.fit import Effort, _minimum_near
+from estimation.identification.state_space.joint import joined_outputs
 from estimation.identification.state_space.problem import Problem, Size
 
 
@@ -19,7 +19,8 @@ def problem() -> Problem:
     u = rng.normal(size=(80, 1))
     y = [np.convolve(u[:, 0], one ** np.arange(30.0))[:80] for one in (0.6, 0.3)]
     return Problem(
-        Size(2, 1, 2, direct=False), joined([scaled(channels_from([u], [one], 0.1, ("u",), "y"))[0] for one in y])
+        Size(2, 1, 2, direct=False),
+        joined_outputs([scaled(channels_from([u], [one], 0.1, ("u",), "y"))[0] for one in y]),
     )
 
 
@@ -35,7 +36,7 @@ def test_a_step_is_allowed_as_long_as_all_poles_stay_within_the_unit_circle(monk
         return 0.0, begin
 
     monkeypatch.setattr(fit, "levenberg", captured)
-    assert np.array_equal(_chart(one, theta, np.eye(2), Effort(1, 1, 1, 1e-3))[1], theta)
+    assert np.array_equal(_minimum_near(one, theta, np.eye(2), Effort(1, 1, 1, 1e-3))[1], theta)
     basis, seen = one.directions(theta), set[bool]()
     for direction in np.eye(basis.shape[1]):
         for length in (0.1, 0.3, 1.0, 3.0, 10.0):

@@ -11,9 +11,9 @@ from estimation.identification.free_run.data import Channels, blocks, channels_f
 from estimation.identification.state_space import choose, fit, identify, starts
 from estimation.identification.state_space.dynamics import StateSpaceDynamics, system_in_units
 from estimation.identification.state_space.fit import Effort, StateSpaceFit, fit_state_space, system_of
-from estimation.identification.state_space.identify import _judged, identify_outputs, identify_state_space
-from estimation.identification.state_space.joint import Joint, delayed, joined
-from estimation.identification.state_space.kernel import answers, run_states
+from estimation.identification.state_space.identify import _judged_output, identify_outputs, identify_state_space
+from estimation.identification.state_space.joint import Joint, delayed_inputs, joined_outputs
+from estimation.identification.state_space.kernel import run_states, state_responses
 from estimation.identification.state_space.problem import Problem, Size
 from estimation.identification.state_space.system import StateSpace
 from plant.arrays import Array
@@ -50,7 +50,7 @@ def channels(lost: bool = False, late: int = 0) -> list[Channels]:
 
 
 def joint(lost: bool = False) -> Joint:
-    return joined([scaled(one)[0] for one in channels(lost)])
+    return joined_outputs([scaled(one)[0] for one in channels(lost)])
 
 
 def theta_of(size: Size, logs: int = 2) -> Array:
@@ -64,7 +64,7 @@ def loops() -> dict[str, Any]:
     states, out = np.empty((40, 2)), np.empty((40, 4))
     with loops_in_python():
         run_states(A, U[:40] @ B.T, np.array([0.3, -0.2]), states)
-        answers(A, C, np.ascontiguousarray(U[:40, 0]), np.zeros((4, 2)), out)
+        state_responses(A, C, np.ascontiguousarray(U[:40, 0]), np.zeros((4, 2)), out)
     return {"states": [some(one, 7) for one in states.T], "answers": [some(one, 7) for one in out.T]}
 
 
@@ -101,12 +101,12 @@ def data_side_by_side() -> dict[str, Any]:
         "slices": [[part.start, part.stop] for part in one.slices],
         "samples": one.n_samples,
         "delayed": [some(part, 9) for part in late.u],
-        "later than the log": delayed(U[:3], (5, 1)),
+        "later than the log": delayed_inputs(U[:3], (5, 1)),
         "held back": [int(np.isnan(part).sum()) for part in one.without(masks[1]).y],
         "refused": [
-            refused(lambda: joined([first, replace(second, u=second.u[::-1])])),
-            refused(lambda: joined([first, replace(second, inputs=("a", "c"))])),
-            refused(lambda: joined([first, replace(second, u=second.u[:1], y=second.y[:1])])),
+            refused(lambda: joined_outputs([first, replace(second, u=second.u[::-1])])),
+            refused(lambda: joined_outputs([first, replace(second, inputs=("a", "c"))])),
+            refused(lambda: joined_outputs([first, replace(second, u=second.u[:1], y=second.y[:1])])),
         ],
     }
 
@@ -128,8 +128,8 @@ def starts_of_searches() -> dict[str, Any]:
     told["Hankel"] = [starts._hankel(np.arange(12.0).reshape(6, 2), 1, 2), list(starts._hankel(U[:3], 0, 2).shape)]
     turn = np.array([[1.0, 0.4], [0.2, 1.0]])
     for name, poles in {"inside": (0.9, 0.5), "outside": (1.25, 0.5), "at the limit": (0.995, 1.001)}.items():
-        told[f"poles {name}"] = starts._inside(turn @ np.diag(poles) @ np.linalg.inv(turn), 100)
-    told["a pair"] = starts._inside(1.2 * np.array([[0.6, 0.8], [-0.8, 0.6]]), 100)
+        told[f"poles {name}"] = starts._stable_transition(turn @ np.diag(poles) @ np.linalg.inv(turn), 100)
+    told["a pair"] = starts._stable_transition(1.2 * np.array([[0.6, 0.8], [-0.8, 0.6]]), 100)
     return told
 
 
@@ -163,8 +163,8 @@ def fits() -> dict[str, Any]:
     problem = Problem(size, joint(lost=True))
     noise = fit._noise(problem, begun)
     told["noise"] = [noise, fit._whitener(problem, noise), fit._whitener(Problem(size, joint()), noise)]
-    told["left"] = some(fit._left(problem, begun))
-    alike = joined([scaled(one)[0] for one in (channels()[0], replace(channels()[0], output="other"))])
+    told["left"] = some(fit._residual(problem, begun))
+    alike = joined_outputs([scaled(one)[0] for one in (channels()[0], replace(channels()[0], output="other"))])
     told["noise of one output twice"] = fit._noise(Problem(size, alike), np.zeros(begun.size))
     told["residuals that follow an order too low"] = told_of(
         fit_state_space(Size(1, 2, 2, direct=False), joint(), effort=Effort(3, 2, 10, 1e-6))
@@ -295,7 +295,7 @@ def what_is_identified() -> dict[str, Any]:
     ):
         theta = np.concatenate([[radius], best.fit.theta[1:]])
         one = replace(best, doubt=doubt, fit=replace(best.fit, theta=theta))
-        judged = _judged(model, data, one, held, ())
+        judged = _judged_output(model, data, one, held, ())
         told[f"judged, {name}"] = [judged.sound, judged.held_back_percent, [dict(note.data) for note in judged.notes]]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(identify, "state_candidates", _asked)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from estimation.identification.free_run.choose_linear import CLEARLY
+from estimation.identification.free_run.choose_linear import CLEAR_GAIN
 from estimation.identification.free_run.identify import Identified
 from estimation.identification.state_space import identify
 from estimation.identification.state_space.identify import identify_outputs
@@ -25,8 +25,8 @@ def found(name: str, left: float, n_values: int, *, sound: bool = True) -> Ident
     [
         (0.999 * LEFT, 19, True),  # fewer values than both separate models have together
         (1.001 * LEFT, 19, False),
-        ((1.0 - 0.9 * CLEARLY) * LEFT, 20, False),  # as many values: it must be better by a hundredth
-        ((1.0 - 1.1 * CLEARLY) * LEFT, 20, True),
+        ((1.0 - 0.9 * CLEAR_GAIN) * LEFT, 20, False),  # as many values: it must be better by a hundredth
+        ((1.0 - 1.1 * CLEAR_GAIN) * LEFT, 20, True),
     ],
 )
 def test_a_shared_model_without_fewer_parameters_must_be_better_by_one_percent(

@@ -7,27 +7,34 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.identification.state_space import A, bound, identified, logged, plant, told
+from benchmarks.identification.state_space import (
+    A,
+    draw_log,
+    identified_model,
+    model_values,
+    plant,
+    with_covariance_bound,
+)
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.saved import load_models, save_models
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.state_space import choose, identify
 from estimation.identification.state_space.choose import chosen_state, state_candidates
-from estimation.identification.state_space.identify import _judged, identify_outputs, identify_state_space
-from estimation.identification.state_space.joint import joined
+from estimation.identification.state_space.identify import _judged_output, identify_outputs, identify_state_space
+from estimation.identification.state_space.joint import joined_outputs
 from estimation.identification.state_space.problem import Problem, Size
 from estimation.identification.state_space.starts import subspace_starts
 from plant.errors import HydrostateError, LogWarning
 
 
 def in_scale(samples: int = 200, seed: int = 1) -> list[Channels]:
-    return [scaled(one)[0] for one in logged(seed, samples)]
+    return [scaled(one)[0] for one in draw_log(seed, samples)]
 
 
 def test_sensitivities_are_the_derivatives_of_the_outputs() -> None:
     size = Size(3, 2, 2, direct=True)
-    problem = Problem(size, joined(in_scale(60)))
+    problem = Problem(size, joined_outputs(in_scale(60)))
     theta = 0.3 * np.random.default_rng(2).normal(size=size.n_matrices + size.n)
     _, slopes = problem.jacobian(theta)
     for k in range(theta.size):
@@ -39,7 +46,7 @@ def test_sensitivities_are_the_derivatives_of_the_outputs() -> None:
 
 def test_a_change_of_the_state_basis_changes_no_output_and_is_excluded_from_the_search() -> None:
     size = Size(3, 2, 2, direct=False)
-    problem = Problem(size, joined(in_scale(60)))
+    problem = Problem(size, joined_outputs(in_scale(60)))
     theta = 0.3 * np.random.default_rng(3).normal(size=size.n_matrices + size.n)
     turned = problem.balanced(theta)
     assert problem.outputs(problem.unpacked(turned)) == pytest.approx(problem.outputs(problem.unpacked(theta)))
@@ -50,28 +57,28 @@ def test_a_change_of_the_state_basis_changes_no_output_and_is_excluded_from_the_
 
 
 def test_the_subspace_start_has_nearly_the_true_poles() -> None:
-    starts = subspace_starts(joined(in_scale(600)), 3)
+    starts = subspace_starts(joined_outputs(in_scale(600)), 3)
     wanted = np.sort_complex(np.linalg.eigvals(A))
     distance = [float(np.abs(np.sort_complex(np.linalg.eigvals(a)) - wanted).max()) for a, _ in starts]
     assert min(distance) < 0.05
 
 
 def test_deviations_from_one_log_equal_the_cramer_rao_bound_and_errors_are_consistent_with_it() -> None:
-    data = logged(0, 500)
-    (values, deviations), limit = told(identified(data, 3)), told(bound(data))[1]
+    data = draw_log(0, 500)
+    (values, deviations), limit = model_values(identified_model(data, 3)), model_values(with_covariance_bound(data))[1]
     free = limit > 1e-9
     assert deviations[free] == pytest.approx(limit[free], rel=0.5)
     assert np.mean(deviations[free] / limit[free]) == pytest.approx(1.0, abs=0.1)
-    assert np.sqrt(np.mean(((values - told(plant())[0])[free] / limit[free]) ** 2)) < 2.0
+    assert np.sqrt(np.mean(((values - model_values(plant())[0])[free] / limit[free]) ** 2)) < 2.0
 
 
 @pytest.mark.slow
 def test_errors_over_eight_logs_equal_the_cramer_rao_bound_and_the_deviations() -> None:
-    truth, errors, own = told(plant())[0], [], []
+    truth, errors, own = model_values(plant())[0], [], []
     for seed in range(8):
-        data = logged(seed, 500)
-        values, deviations = told(identified(data, 3))
-        limit = told(bound(data))[1]
+        data = draw_log(seed, 500)
+        values, deviations = model_values(identified_model(data, 3))
+        limit = model_values(with_covariance_bound(data))[1]
         free = limit > 1e-9
         errors.append(((values - truth)[free] / limit[free]) ** 2)
         own.append(((values - truth)[free] / deviations[free]) ** 2)
@@ -104,7 +111,7 @@ def test_dead_times_are_estimated_once_and_not_for_each_order(monkeypatch: pytes
 def test_outputs_share_one_model_that_simulates_the_same_after_loading(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
-    data = logged(3, 400)
+    data = draw_log(3, 400)
     found = identify_state_space(data, order=3, delay=1)
     path = tmp_path_factory.mktemp("saved") / "model.json"
     save_models([one.model for one in found], path)
@@ -131,7 +138,7 @@ def test_dead_times_as_states_give_the_same_response_as_delayed_inputs() -> None
 
 @pytest.mark.slow  # kept numbers test this with smaller logs
 def test_one_model_is_fitted_to_several_logs_with_missing_samples() -> None:
-    first, second = logged(5, 300), logged(6, 300)
+    first, second = draw_log(5, 300), draw_log(6, 300)
     both = [
         channels_from([*a.u, *b.u], [*a.y, np.where(np.arange(300) % 7 == k, np.nan, b.y[0])], 0.01, ["a", "b"], name)
         for k, (a, b, name) in enumerate(zip(first, second, "yz", strict=True))
@@ -142,7 +149,7 @@ def test_one_model_is_fitted_to_several_logs_with_missing_samples() -> None:
 
 @pytest.mark.slow  # kept numbers test this with a smaller log
 def test_auto_takes_the_state_space_if_outputs_share_their_dynamics() -> None:
-    shared = identify_outputs(logged(7, 300), structure="auto", order=3, delay=1)
+    shared = identify_outputs(draw_log(7, 300), structure="auto", order=3, delay=1)
     assert {one.model.structure for one in shared} == {"state-space"}
     compared = {row["structure"] for row in shared[0].candidates}
     assert compared >= {"state-space", "output-error"}
@@ -160,7 +167,7 @@ def test_outputs_without_common_dynamics_keep_separate_models() -> None:
 
 
 def test_too_high_an_order_a_numerator_size_and_different_inputs_are_refused() -> None:
-    data = logged(9, 40)
+    data = draw_log(9, 40)
     with pytest.raises(HydrostateError, match="give a lower order"):
         identify_state_space(data, order=12)
     with pytest.raises(HydrostateError, match="no numerator of its own"):
@@ -190,11 +197,11 @@ def test_a_time_constant_too_long_for_the_log_is_noted_in_seconds(
     best: Any = SimpleNamespace(doubt="time_constant", fit=SimpleNamespace(a=a, size=SimpleNamespace(n=2)))
     data: Any = SimpleNamespace(u=[], y=[], sample_time=0.02, duration=5.0, output="y")
     model: Any = SimpleNamespace(quality=lambda *_: SimpleNamespace(fit_percent=90.0))
-    found = _judged(model, data, best, 0.1, ())
+    found = _judged_output(model, data, best, 0.1, ())
     (note,) = found.notes
     assert note.code == IdentificationCode.TIME_CONSTANT_BEYOND_RECORD
     assert note.data["time_constant_s"] == pytest.approx(slowest)
     assert (note.data["duration_s"], note.data["order"], found.held_back_percent) == (5.0, 2, pytest.approx(90.0))
     best.doubt = ""
-    assert _judged(model, data, best, 0.1, ()).notes == ()
-    assert [one.code for one in _judged(model, data, best, 1.0, ()).notes] == [IdentificationCode.NO_FIT]
+    assert _judged_output(model, data, best, 0.1, ()).notes == ()
+    assert [one.code for one in _judged_output(model, data, best, 1.0, ()).notes] == [IdentificationCode.NO_FIT]

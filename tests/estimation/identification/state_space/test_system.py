@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.identification.state_space.starts import _hankel, _inside, subspace_starts
+from estimation.identification.state_space.starts import _hankel, _stable_transition, subspace_starts
 from estimation.identification.state_space.system import StateSpace
-from tests.estimation.identification.state_space.test_state_space import in_scale, joined
+from tests.estimation.identification.state_space.test_state_space import in_scale, joined_outputs
 
 N, M, P = 3, 2, 2
 RNG = np.random.default_rng(4)
@@ -59,8 +59,8 @@ def test_deviations_of_a_frequency_response_equal_its_spread_over_draws_from_the
 
 def test_poles_outside_the_circle_are_reflected_and_those_within_stay() -> None:
     sound = np.array([[0.5, 0.4], [-0.4, 0.5]])
-    np.testing.assert_array_equal(_inside(sound, 100), sound)
-    turned = np.linalg.eigvals(_inside(2.0 * np.linalg.inv(sound), 100))
+    np.testing.assert_array_equal(_stable_transition(sound, 100), sound)
+    turned = np.linalg.eigvals(_stable_transition(2.0 * np.linalg.inv(sound), 100))
     assert np.abs(turned).max() < 1.0
     np.testing.assert_allclose(np.sort(np.angle(turned)), np.sort(np.angle(np.linalg.eigvals(np.linalg.inv(sound)))))
 
@@ -68,7 +68,7 @@ def test_poles_outside_the_circle_are_reflected_and_those_within_stay() -> None:
 def test_a_log_that_is_too_short_gives_no_start() -> None:
     assert _hankel(np.zeros((9, 2)), 0, 5).shape == (10, 0)
     assert _hankel(np.arange(10.0)[:, None], 0, 5).tolist() == [[0.0], [1.0], [2.0], [3.0], [4.0]]
-    assert subspace_starts(joined(in_scale(20)), 3) == []
+    assert subspace_starts(joined_outputs(in_scale(20)), 3) == []
 
 
 def test_steady_outputs_and_their_deviations_are_converted_from_scaled_to_physical_units() -> None:

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from faults.diagnosis.beyond_nine.accumulator import fed_otherwise, whatever_accumulator
+from faults.diagnosis.beyond_nine.accumulator import fit_accumulator, with_fitted_accumulator
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
-from faults.diagnosis.circuits.out_of_model import unexplained
+from faults.diagnosis.circuits.out_of_model import unexplained_notes
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import chirp
 from plant.eha.simulate import CIRCUIT, simulate
@@ -36,21 +36,21 @@ def of_rod() -> tuple[Blocks, Actuator, ClassFits]:
 
 def test_the_gas_volume_of_a_single_rods_accumulator_is_estimated_from_its_log() -> None:
     log, actuator, fits = of_rod()
-    assert unexplained(log, fits, actuator)
-    fed = fed_otherwise(log, fits, actuator)
+    assert unexplained_notes(log, fits, actuator)
+    fed = fit_accumulator(log, fits, actuator)
     assert fed is not None
     assert fed.accumulator_gas == pytest.approx(LITTLE.accumulator_gas, rel=0.1)
     assert replace(fed, accumulator_gas=1e-3) == actuator.circuit
-    assert fed_otherwise(replace(log, pressure=None), fits, actuator) is None
+    assert fit_accumulator(replace(log, pressure=None), fits, actuator) is None
 
 
 def test_no_other_gas_volume_is_proposed_for_a_log_that_the_rig_file_explains() -> None:
-    assert fed_otherwise(blocks(), classes(), ACTUATOR) is None
+    assert fit_accumulator(blocks(), classes(), ACTUATOR) is None
 
 
 def test_the_gas_volume_is_refitted_only_for_an_unexplained_log_of_a_single_rod() -> None:
     log, actuator, fits = of_rod()
-    left = tuple(unexplained(log, fits, actuator))
+    left = tuple(unexplained_notes(log, fits, actuator))
     board: Any = SimpleNamespace(blocks=log, fits=fits)
 
     def found(against: tuple[Any, ...], parameters: Any) -> Any:
@@ -61,7 +61,7 @@ def test_the_gas_volume_is_refitted_only_for_an_unexplained_log_of_a_single_rod(
         return found((), parameters)
 
     followed, alike, asked = found((), actuator.circuit), found(left, ACTUATOR.circuit), found(left, actuator.circuit)
-    assert whatever_accumulator(followed, again) is followed
-    assert whatever_accumulator(alike, again) is alike
-    assert whatever_accumulator(asked, again).diagnosis.against == ()
-    assert whatever_accumulator(asked, lambda _: found(left, actuator.circuit)) is asked
+    assert with_fitted_accumulator(followed, again) is followed
+    assert with_fitted_accumulator(alike, again) is alike
+    assert with_fitted_accumulator(asked, again).diagnosis.against == ()
+    assert with_fitted_accumulator(asked, lambda _: found(left, actuator.circuit)) is asked

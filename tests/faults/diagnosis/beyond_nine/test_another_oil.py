@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
-from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.beyond_nine.another_oil import with_stiffer_oil
+from faults.diagnosis.beyond_nine.load import LoadedDiagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.diagnose import diagnose_log
@@ -31,7 +31,7 @@ BIASED = AgainstCode.SPEED_BIAS.note(bias_rad_s=3.0)
 
 def asked_of(
     against: tuple[Note, ...], fitted: float = 1.0, again: tuple[Note, ...] = ()
-) -> tuple[Loaded, list[float]]:
+) -> tuple[LoadedDiagnosis, list[float]]:
     """Return the diagnosis of a log, and the bulk moduli around which it was made, relative to the rig file's.
 
     The first circuit has ``fitted`` times the rig file's bulk modulus; ``again`` are the objections to the second one.
@@ -45,7 +45,7 @@ def asked_of(
         said = against if len(asked) == 1 else again
         return SimpleNamespace(against=said, unknown=bool(said), doubt=doubt, scoreboard=board)
 
-    return whatever_the_oil(diagnosed, HEALTHY), asked
+    return with_stiffer_oil(diagnosed, HEALTHY), asked
 
 
 @pytest.mark.parametrize(

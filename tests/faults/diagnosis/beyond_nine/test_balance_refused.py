@@ -10,8 +10,8 @@ from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Gate, Outcome
 from estimation.notes import EstimateCode, RigCode
 from faults.diagnosis.beyond_nine import balance_refused
-from faults.diagnosis.beyond_nine.balance_refused import CLOSELY, MOST_GAINED, class_without_balance
-from faults.diagnosis.beyond_nine.other_faults import EARLY, SOUND, STUCK, WORN, gains_of_others
+from faults.diagnosis.beyond_nine.balance_refused import CLOSE_RESIDUALS, LARGEST_GAINS, class_without_balance
+from faults.diagnosis.beyond_nine.other_faults import EARLY, SOUND, STUCK, WORN, gains_of_other_circuits
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard
@@ -40,7 +40,7 @@ def stands(
     fits = cast("Any", type("Fits", (), {"best": leaving(noises, 1.0, one)}))
     board = Scoreboard({}, one, fits, Record(1e-3, {"motor_speed_rad_s": np.zeros(2)}), None)
     estimate = BulkModulusEstimate(Outcome.OK, 1e9, 1e7, 0.01, Gate(False, doubts), form, ("position_m",), {}, {})
-    monkeypatch.setattr(balance_refused, "gains_of_others", lambda *_: gains)
+    monkeypatch.setattr(balance_refused, "gains_of_other_circuits", lambda *_: gains)
     return class_without_balance(doubts, Diagnosis({}, against, {}, {}, {}, (), board), estimate, ACTUATOR)
 
 
@@ -50,7 +50,7 @@ def test_a_refused_balance_keeps_its_class_if_a_circuit_follows_closely_and_no_f
     said = stands(monkeypatch)
     assert said is not None
     assert said.code is ClassCode.BALANCE_REFUSED
-    assert 0.0 < said.data["velocity_percent"] < 100.0 * CLOSELY[0]
+    assert 0.0 < said.data["velocity_percent"] < 100.0 * CLOSE_RESIDUALS[0]
 
 
 @pytest.mark.parametrize(
@@ -78,6 +78,6 @@ def test_a_refused_balance_loses_its_class_if_one_requirement_is_missing(
 @pytest.mark.parametrize(("fault", "name"), [(None, ""), ("valve A", STUCK), ("pump", WORN)])
 def test_with_pressure_gains_of_circuits_identify_a_stuck_valve_and_a_worn_pump(fault: str | None, name: str) -> None:
     one = log_of(FAULTS[fault][0], pressure=True) if fault else log_of(pressure=True)
-    gains = gains_of_others(one, fit_classes(one, ACTUATOR), ACTUATOR)
-    speaks = {other for other, gain in gains.items() if gain > MOST_GAINED.get(other, 0.0)}
+    gains = gains_of_other_circuits(one, fit_classes(one, ACTUATOR), ACTUATOR)
+    speaks = {other for other, gain in gains.items() if gain > LARGEST_GAINS.get(other, 0.0)}
     assert name in speaks if fault else not speaks

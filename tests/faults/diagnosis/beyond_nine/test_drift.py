@@ -13,8 +13,8 @@ from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import drift
-from faults.diagnosis.beyond_nine.drift import over_drift, weighed
-from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.beyond_nine.drift import averaged_over_drift, averaged_probabilities
+from faults.diagnosis.beyond_nine.load import LoadedDiagnosis
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -54,13 +54,13 @@ def warming(condition: str, first: float) -> CleanLog:
     return replace(found, record=found.record.replace(**{LEAKAGE_COURSE: course}))
 
 
-def diagnosed(log: CleanLog) -> Loaded:
-    return Loaded(diagnose_clean(log, ACTUATOR), HEALTHY)
+def diagnosed(log: CleanLog) -> LoadedDiagnosis:
+    return LoadedDiagnosis(diagnose_clean(log, ACTUATOR), HEALTHY)
 
 
 @cache
 def weighed_over_drift(condition: str, first: float) -> Diagnosis:
-    return over_drift(diagnosed, warming(condition, first), DRIFTS).diagnosis
+    return averaged_over_drift(diagnosed, warming(condition, first), DRIFTS).diagnosis
 
 
 @pytest.mark.parametrize("condition", thinned(["minor_leakage", "major_leakage"], ["major_leakage"]))
@@ -94,13 +94,13 @@ def test_a_log_that_does_not_drift_is_diagnosed_once() -> None:
     asked: list[CleanLog] = []
     log: Any = SimpleNamespace()
 
-    def once(one: CleanLog) -> Loaded:
+    def once(one: CleanLog) -> LoadedDiagnosis:
         asked.append(one)
         steady: Any = SimpleNamespace(scoreboard=SimpleNamespace(drift=None))
-        return Loaded(steady, HEALTHY)
+        return LoadedDiagnosis(steady, HEALTHY)
 
     grows = RigCode.LEAKAGE_GROWS.note(factor=5.0, first=1e-11, last=5e-11)
-    assert over_drift(once, log, (grows,)).parameters is HEALTHY
+    assert averaged_over_drift(once, log, (grows,)).parameters is HEALTHY
     assert asked == [log]
 
 
@@ -110,8 +110,10 @@ def test_a_drifting_log_keeps_an_objection_only_if_every_place_in_the_drift_has_
 
     def against(*each: tuple[Any, ...]) -> tuple[Any, ...]:
         left = iter(each)
-        return over_drift(
-            lambda _: Loaded(replace(first, against=next(left)), HEALTHY), warming("minor_leakage", 1.0), DRIFTS
+        return averaged_over_drift(
+            lambda _: LoadedDiagnosis(replace(first, against=next(left)), HEALTHY),
+            warming("minor_leakage", 1.0),
+            DRIFTS,
         ).diagnosis.against
 
     assert against((outside,), (outside,), ()) == ()
@@ -129,7 +131,7 @@ def test_places_count_by_evidence_less_if_no_circuit_follows_to_noise_and_alike_
     fits = replace(one.scoreboard.fits, scores=one.scoreboard.fits.scores - less)
     worse = replace(one.scoreboard, fits=fits)
     two = replace(one, probabilities=sure), replace(one, probabilities=other, scoreboard=worse)
-    found = weighed(two, calibration)
+    found = averaged_probabilities(two, calibration)
     assert found["normal"] / found["major_friction"] == pytest.approx(np.exp(2.0))
     # residuals of twice the noise are a wrong model's error: 5 looks at it in the whole log, in place of its blocks
     blocks, scales = one.scoreboard.blocks, 2.0 * NOISE_ALONE * least_scales(one.scoreboard.blocks)
@@ -138,11 +140,11 @@ def test_places_count_by_evidence_less_if_no_circuit_follows_to_noise_and_alike_
         for each, board in ((each, each.scoreboard) for each in two)
     ]
     looks = LASTING / (LASTING + 0.75 * np.max(blocks.counts) / 5.0)
-    found = weighed(rough, calibration)
+    found = averaged_probabilities(rough, calibration)
     assert found["normal"] / found["major_friction"] == pytest.approx(np.exp(2.0 * looks))
     cut = replace(one.scoreboard.blocks, velocity=one.scoreboard.blocks.velocity * np.nan)
     elsewhere = replace(two[1], scoreboard=replace(worse, blocks=cut))
-    assert weighed((two[0], elsewhere), calibration)["normal"] == pytest.approx(0.5)
+    assert averaged_probabilities((two[0], elsewhere), calibration)["normal"] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("pressure", [True, False])
@@ -162,7 +164,7 @@ def test_a_refit_from_another_place_starts_at_its_scaled_leakage_with_widths_for
     monkeypatch.setattr(drift, "misfit", lambda *_: next(misfits))
     monkeypatch.setattr(drift, "fit_classes", fitted)
     monkeypatch.setattr(drift, "severities", lambda _, __, widths: {"widths": widths})
-    assert drift._followed([here, here], [1.0, 2.0], ACTUATOR, calibration).severity == {"widths": pressure}
+    assert drift._refitted_from_best([here, here], [1.0, 2.0], ACTUATOR, calibration).severity == {"widths": pressure}
     moved = starts[0] - one.scoreboard.fits.best.coordinates
     wanted = np.zeros(len(drift.COORDINATES))
     # leakage at the end of the log over that at the other place

@@ -7,11 +7,11 @@ import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine.force_balance import (
-    BROKEN_LOOSE,
-    LAGGING,
+    BREAKAWAY_TRAVEL,
+    HIDDEN_INERTIA,
     Loads,
     force_balance,
-    friction_believed,
+    friction_prior,
     sliding_blocks,
 )
 from faults.diagnosis.circuits.blocks import Blocks
@@ -56,29 +56,29 @@ def seen(blocks: Blocks, p: EhaParameters = PAPER) -> Loads:
 def test_force_spring_and_inertia_are_estimated_together_within_their_intervals() -> None:
     true = {"load_force": -700.0, "load_stiffness": 9e3, "moving_mass": 250.0}
     found = seen(blocks_under(PAPER, to_and_fro(), *true.values()))
-    assert found.believed == tuple(true)
+    assert found.significant == tuple(true)
     for name, value in true.items():
         got, std = found.of(name)
         assert abs(got - value) < 2.0 * std
     assert found.of("load_force")[1] < 10.0
     assert found.of("load_stiffness")[1] < 0.2 * true["load_stiffness"]
-    assert LAGGING < found.of("moving_mass")[1] < 0.2 * true["moving_mass"]
+    assert HIDDEN_INERTIA < found.of("moving_mass")[1] < 0.2 * true["moving_mass"]
 
 
 def test_the_force_balance_shows_no_load_on_a_rod_without_one() -> None:
     found = seen(blocks_under(PAPER, to_and_fro()))
-    assert found.sure == ()
+    assert found.certain == ()
     assert abs(found.of("load_force")[0]) < 5.0
 
 
 def test_a_significant_but_small_load_is_not_accepted() -> None:
     found = seen(blocks_under(PAPER, to_and_fro(), force=20.0))
-    assert (found.sure, found.believed) == (("load_force",), ())
+    assert (found.certain, found.significant) == (("load_force",), ())
 
 
 def test_the_rig_files_load_and_two_piston_areas_are_not_reported_as_a_load() -> None:
     rig = replace(PAPER, load_force=400.0, load_stiffness=5e3)
-    assert seen(blocks_under(rig, to_and_fro()), rig).sure == ()
+    assert seen(blocks_under(rig, to_and_fro()), rig).certain == ()
     rod = replace(PAPER, area_difference=0.2)
     one = blocks_under(PAPER, to_and_fro())
     assert one.pressure is not None
@@ -86,7 +86,7 @@ def test_the_rig_files_load_and_two_piston_areas_are_not_reported_as_a_load() ->
     difference = one.pressure - 0.2 * 2.0 * (PAPER.accumulator_pressure - ATMOSPHERE)
     difference = np.where(difference > 0.0, difference / 1.2, difference / 0.8)
     found = seen(replace(one, pressure=difference), rod)
-    assert found.believed == ()
+    assert found.significant == ()
     assert abs(found.of("load_force")[0]) < 5.0
 
 
@@ -94,9 +94,9 @@ def test_a_force_equal_to_that_of_the_precharge_on_unequal_areas_is_not_signific
     rod = replace(PAPER, area_difference=0.2)
     own = PAPER.piston_area * 0.2 * 2.0 * (PAPER.accumulator_pressure - ATMOSPHERE)
     one = blocks_under(PAPER, to_and_fro(), force=own)
-    assert seen(one).sure == ("load_force",)
+    assert seen(one).certain == ("load_force",)
     assert one.pressure is not None
-    assert seen(replace(one, pressure=one.pressure / (1.0 + 0.2 * np.sign(one.pressure))), rod).sure == ()
+    assert seen(replace(one, pressure=one.pressure / (1.0 + 0.2 * np.sign(one.pressure))), rod).certain == ()
     assert seen(one, rod).of("load_force")[1] == pytest.approx(own, rel=0.05)
 
 
@@ -105,9 +105,9 @@ def test_one_way_motion_leaves_the_force_as_uncertain_as_coulomb_friction(condit
     p = parameters_for(CONDITIONS[condition], PAPER)
     found = seen(blocks_under(p, to_and_fro(one_way=True), force=2000.0))
     force, std = found.of("load_force")
-    assert std == pytest.approx(friction_believed(PAPER)[1][0], rel=0.05)
+    assert std == pytest.approx(friction_prior(PAPER)[1][0], rel=0.05)
     assert abs(force - 2000.0) < std
-    assert found.believed == ("load_force",)
+    assert found.significant == ("load_force",)
 
 
 def test_there_is_no_force_balance_without_pressure_or_motion() -> None:
@@ -122,7 +122,7 @@ def test_a_piston_slides_only_after_its_seals_have_broken_loose_behind_a_reversa
     velocity[60] = np.nan
     blocks = Blocks(np.zeros(901), 1e-3, 10, velocity, velocity, NOISE)
     found = sliding_blocks(blocks)
-    strained = round(BROKEN_LOOSE / (0.002 * STEP))
+    strained = round(BREAKAWAY_TRAVEL / (0.002 * STEP))
     assert not np.any(found[: strained + 1])
     assert np.all(found[strained + 1 : 39])
     assert not np.any(found[39 : 40 + strained])

@@ -15,7 +15,7 @@ from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import load
 from faults.diagnosis.beyond_nine.force_balance import Loads
-from faults.diagnosis.beyond_nine.load import Loaded, first_guesses, under_load
+from faults.diagnosis.beyond_nine.load import LoadedDiagnosis, first_guesses, with_rod_load
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.diagnose import diagnose_log
@@ -142,9 +142,9 @@ class Circuits:
 
 def under(
     circuits: Circuits, balance: Loads | None, monkeypatch: pytest.MonkeyPatch, rig: EhaParameters = HEALTHY
-) -> Loaded:
+) -> LoadedDiagnosis:
     monkeypatch.setattr(load, "force_balance", lambda *_: balance)
-    return under_load(circuits, rig, ESTIMATE)
+    return with_rod_load(circuits, rig, ESTIMATE)
 
 
 def test_a_significant_load_is_accepted_and_corrected_until_no_objection_remains(
@@ -230,7 +230,7 @@ def test_a_single_rod_is_recognized_under_a_rig_file_with_its_mean_area() -> Non
 
 
 def test_without_a_force_balance_the_force_is_zero_within_the_limits_of_friction() -> None:
-    rest, spread = (one[0] for one in load.friction_believed(HEALTHY))
-    assert load._force(None, HEALTHY) == (0.0, rest + spread)
+    rest, spread = (one[0] for one in load.friction_prior(HEALTHY))
+    assert load._force_and_std(None, HEALTHY) == (0.0, rest + spread)
     assert rest > 0.0
     assert spread > 0.0

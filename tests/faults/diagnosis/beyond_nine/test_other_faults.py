@@ -9,17 +9,17 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import other_faults
-from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
+from faults.diagnosis.beyond_nine.other_faults import OutsideFaults, faults_outside
 from faults.diagnosis.beyond_nine.sound_circuit import largest_pressure
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
-from plant.eha.one_sided import ONE_SIDED, one_sided
+from plant.eha.one_sided import ONE_SIDED, with_make_up_faults
 from plant.eha.simulate import simulate
 from plant.notes import Code
 from plant.sensors.sensors import RIG
@@ -38,7 +38,7 @@ def log_of(circuit: CircuitParameters = SOUND, condition: str = "minor_friction"
     empty, noise = np.zeros(len(speed) // 5), np.append(NOISE, 2e3) if pressure else NOISE
     blank = Blocks(np.append(speed, speed[-1]), 2e-3, 5, empty, empty if pressure else None, noise)
     place = list(CONDITIONS).index(condition)
-    (found,) = predicted(blank, parameter_rows(ACTUATOR.conditions[[place]], circuit, ACTUATOR.rated))
+    (found,) = predicted_outputs(blank, parameter_rows(ACTUATOR.conditions[[place]], circuit, ACTUATOR.rated))
     found = found + np.random.default_rng(0).normal(size=found.shape) * noise
     return replace(blank, velocity=found[:, 0], pressure=found[:, 1] if pressure else None)
 
@@ -53,10 +53,10 @@ def said(blocks: Blocks) -> tuple[list[tuple[Code, dict[str, object]]], str]:
 
 FAULTS = {
     "pump": (replace(SOUND, pump_displacement=0.8 * SOUND.pump_displacement), AgainstCode.PUMP_DELIVERS_LESS),
-    "valve A": (one_sided(SOUND, makeup_shut_a=1.0), AgainstCode.MAKEUP_STUCK),
-    "valve B": (one_sided(SOUND, makeup_shut_b=1.0), AgainstCode.MAKEUP_STUCK),
-    "throttled valve B": (one_sided(SOUND, makeup_shut_b=0.95), AgainstCode.MAKEUP_STUCK),
-    "seat A": (one_sided(SOUND, seat_leakage_a=0.6 * MAJOR), AgainstCode.MAKEUP_LEAKS),
+    "valve A": (with_make_up_faults(SOUND, makeup_shut_a=1.0), AgainstCode.MAKEUP_STUCK),
+    "valve B": (with_make_up_faults(SOUND, makeup_shut_b=1.0), AgainstCode.MAKEUP_STUCK),
+    "throttled valve B": (with_make_up_faults(SOUND, makeup_shut_b=0.95), AgainstCode.MAKEUP_STUCK),
+    "seat A": (with_make_up_faults(SOUND, seat_leakage_a=0.6 * MAJOR), AgainstCode.MAKEUP_LEAKS),
     "relief": (replace(SOUND, relief_pressure=5.5e5), AgainstCode.RELIEF_EARLY),
 }
 
@@ -129,7 +129,7 @@ def test_no_faulty_circuit_is_fitted_with_pressure_or_to_a_stuck_piston(monkeypa
     fits = [fit_classes(blocks, ACTUATOR) for blocks in (seen, still)]
     monkeypatch.setattr(other_faults, "fit_classes", lambda *_, **__: pytest.fail("a circuit was fitted"))
     for blocks, one in zip((seen, still), fits, strict=True):
-        assert faults_outside(blocks, one, ACTUATOR) == Outside()
+        assert faults_outside(blocks, one, ACTUATOR) == OutsideFaults()
 
 
 @pytest.mark.parametrize("anew", [False, True], ids=["from where the faulty one ended", "anew"])
@@ -159,18 +159,18 @@ def test_a_fault_is_not_named_if_a_second_fit_of_the_sound_circuit_is_as_good(
 def test_without_pressure_a_make_up_valve_stuck_shut_is_diagnosed() -> None:
     rng = np.random.default_rng(2)
     speed = np.repeat(LEVELS, 200)
-    stuck = one_sided(circuit_of(parameters_for(CONDITIONS["minor_leakage"])), makeup_shut_b=1.0)
+    stuck = with_make_up_faults(circuit_of(parameters_for(CONDITIONS["minor_leakage"])), makeup_shut_b=1.0)
     log = simulate(ONE_SIDED, speed, 2e-3, stuck, sensors=RIG, rng=rng).replace(differential_pressure_pa=None)
     found = diagnose_clean(clean_log(log, EhaParameters()), ACTUATOR)
     assert [note.code for note in found.against] == [AgainstCode.MAKEUP_STUCK]
 
 
 def test_the_second_of_two_successive_circuits_may_have_the_fault() -> None:
-    sound, stuck = log_of(), one_sided(SOUND, makeup_shut_b=1.0)
+    sound, stuck = log_of(), with_make_up_faults(SOUND, makeup_shut_b=1.0)
     place = [list(CONDITIONS).index("minor_friction")]
     before, after = (parameter_rows(ACTUATOR.conditions[place], circuit, ACTUATOR.rated) for circuit in (SOUND, stuck))
-    both = predicted(replace(sound, earlier=(100, before[0]), pressure=sound.velocity), after)[0]
-    first, last = (predicted(replace(sound, pressure=sound.velocity), rows)[0] for rows in (before, after))
+    both = predicted_outputs(replace(sound, earlier_circuit=(100, before[0]), pressure=sound.velocity), after)[0]
+    first, last = (predicted_outputs(replace(sound, pressure=sound.velocity), rows)[0] for rows in (before, after))
     assert both[:20] == pytest.approx(first[:20], rel=0.01)
     assert np.max(np.abs(both - first)[20:, 0]) > 1e-3
     assert np.max(np.abs(both - last)[:40, 1]) > 1e3

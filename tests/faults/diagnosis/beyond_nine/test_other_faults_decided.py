@@ -11,8 +11,8 @@ from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS
 from faults.diagnosis import by_circuits
 from faults.diagnosis.beyond_nine import other_faults, sound_circuit, wear
-from faults.diagnosis.beyond_nine.left_open import UNSEEN, WORTH_SAYING
-from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
+from faults.diagnosis.beyond_nine.left_open import LEAST_REPORTED, STUCK_VALVE_PRIOR
+from faults.diagnosis.beyond_nine.other_faults import OutsideFaults, faults_outside
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
@@ -35,7 +35,7 @@ def fits(score: float) -> Any:
 
 
 def made_fit_at(place: Any) -> PointFit:
-    return PointFit(place, 0.0, np.eye(7), 0.05 * LOG.sizes, LOG.outputs, np.zeros((7, *LOG.outputs.shape)))
+    return PointFit(place, 0.0, np.eye(7), 0.05 * LOG.rms, LOG.outputs, np.zeros((7, *LOG.outputs.shape)))
 
 
 def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, list[tuple[Any, bool]]]:
@@ -46,7 +46,7 @@ def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, li
 
 def looked(
     monkeypatch: pytest.MonkeyPatch, score: Score, pressure: float = 1e6
-) -> tuple[Outside, list[tuple[Any, bool]]]:
+) -> tuple[OutsideFaults, list[tuple[Any, bool]]]:
     asked: list[tuple[Any, bool]] = []
 
     def fitted(_: Any, actuator: Any, *, runs: Any, start: Any = None, **_limits: float) -> Any:  # noqa: ARG001
@@ -110,10 +110,10 @@ def test_scores_with_worn_pumps_are_returned_only_if_wear_is_not_excluded(
     found, _ = looked(monkeypatch, lambda one: scores[worn(one)] if type(one) is type(SOUND) else 1.0)
     assert "a make-up valve that leaks" in found.open[0].data["faults"]
     if open_:
-        assert found.worn is not None
-        assert found.worn.tolist() == [[score - 9.0, score] for score in (0.0, -8.0, -7.0, best, -6.0, -5.0)]
+        assert found.worn_scores is not None
+        assert found.worn_scores.tolist() == [[score - 9.0, score] for score in (0.0, -8.0, -7.0, best, -6.0, -5.0)]
     else:
-        assert found.worn is None
+        assert found.worn_scores is None
 
 
 @pytest.mark.parametrize("gain", [-2.9, -1.0, 1.0, 3.0])
@@ -126,14 +126,14 @@ def test_a_well_worn_pump_that_is_not_excluded_takes_its_probability_from_the_co
     odds = 0.5 * float(np.sum(np.exp(gains - 0.5 * (np.log([0.7, 0.75, 0.8]) / 0.15) ** 2)))
     share = odds / (1.0 + odds)
     assert found.faulty == pytest.approx(share)
-    percent = f" ({100.0 * share:.0f} %)" if share > WORTH_SAYING else ""
+    percent = f" ({100.0 * share:.0f} %)" if share > LEAST_REPORTED else ""
     assert found.open[0].data["faults"] == f"a worn pump{percent}"
     monkeypatch.setattr(wear, "faults_outside", lambda *_: found)
     nothing = {name: np.zeros(9) for name in ("models", "innovations", "parameters")}
     board = Scoreboard(nothing, LOG, SimpleNamespace(), None, None)  # type: ignore[arg-type]
     told = Diagnosis({}, (), {}, {}, {}, (), board)
     monkeypatch.setattr(wear, "summed_over_wear", lambda *_: {"normal": 0.75, "minor_leakage": 0.25})
-    probabilities = wear.whatever_fault(told, ACTUATOR, shipped_calibration()).probabilities
+    probabilities = wear.with_other_faults(told, ACTUATOR, shipped_calibration()).probabilities
     assert probabilities == pytest.approx({"normal": 0.75 * (1.0 - share), "minor_leakage": 0.25 * (1.0 - share)})
 
 
@@ -148,7 +148,7 @@ def test_a_stuck_valve_that_is_not_excluded_has_even_odds_at_the_gain_that_names
         return gain if stuck else 0.0 if type(one) is type(SOUND) and worn(one) == 1.0 else -9.0
 
     found, _ = looked(monkeypatch, score, np.nan)
-    odds = max(np.exp(gain - 4.0), np.exp(min(gain, 0.0)) * UNSEEN / (1.0 - UNSEEN))
+    odds = max(np.exp(gain - 4.0), np.exp(min(gain, 0.0)) * STUCK_VALVE_PRIOR / (1.0 - STUCK_VALVE_PRIOR))
     assert found.faulty == pytest.approx(odds / (1.0 + odds))
     said = f" ({100.0 * found.faulty:.0f} %)" if gain >= 0.0 else ""
     assert found.open[0].data["faults"] == f"a make-up valve that is stuck shut{said}"
@@ -199,7 +199,7 @@ def test_the_search_for_a_fault_ends_if_it_cannot_come_within_twenty_of_the_soun
         monkeypatch.setattr(module, "fit_classes", fitted)
     faults_outside(LOG, fits(0.0), ACTUATOR)
     # five pumps twice, two relief settings, and for each make-up valve four blocked shares and two seat leakages
-    assert len(wanted) == 10 + 2 + 2 * (len(other_faults.SHUT) + 2)
+    assert len(wanted) == 10 + 2 + 2 * (len(other_faults.SHUT_SHARES) + 2)
     assert set(wanted) == {30.0 * (20.0 - 3.0)}
 
 
@@ -213,8 +213,8 @@ def test_a_worn_pump_is_compared_with_the_refitted_sound_pump(monkeypatch: pytes
         return 3.0 if worn(one) == 1.0 and 0.9 in asked else scores[worn(one)]
 
     found, _ = looked(monkeypatch, score, np.nan)
-    assert found.worn is not None
-    assert found.worn[:, 1].tolist() == [3.0, -9.0, -9.0, 5.0, -9.0, -9.0]
+    assert found.worn_scores is not None
+    assert found.worn_scores[:, 1].tolist() == [3.0, -9.0, -9.0, 5.0, -9.0, -9.0]
     odds = 0.5 * np.exp(2.0 - 0.5 * (np.log(0.8) / 0.15) ** 2)
     assert found.faulty == pytest.approx(odds / (1.0 + odds), rel=1e-3)
 
@@ -292,11 +292,11 @@ def test_the_objection_outside_conditions_is_dropped_if_lasting_errors_explain_i
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     data = {AgainstCode.BETWEEN_CONDITIONS: {"leakage": 0.5, "friction": 0.0}, AgainstCode.NONE_FITS: {"percent": 90.0}}
-    monkeypatch.setattr(wear, "faults_outside", lambda *_: Outside(() if found is None else (found.note(),)))
-    monkeypatch.setattr(wear, "lies_beside", lambda *_: lies)
+    monkeypatch.setattr(wear, "faults_outside", lambda *_: OutsideFaults(() if found is None else (found.note(),)))
+    monkeypatch.setattr(wear, "is_outside_conditions", lambda *_: lies)
     board = Scoreboard({}, LOG, SimpleNamespace(), None, None)  # type: ignore[arg-type]
     told = Diagnosis({"normal": 1.0}, (said.note(**data.get(said, {})),), {}, {}, {}, (), board)
-    after = wear.whatever_fault(told, ACTUATOR, shipped_calibration())
+    after = wear.with_other_faults(told, ACTUATOR, shipped_calibration())
     assert [note.code for note in after.against] == left
 
 
@@ -304,8 +304,8 @@ def test_the_objection_outside_conditions_is_dropped_if_lasting_errors_explain_i
 def test_a_diagnosis_flags_a_log_as_outside_if_every_circuit_is_far_from_the_conditions(
     near: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(by_circuits, "how_near", lambda *_: near)
-    monkeypatch.setattr(by_circuits, "whatever_fault", lambda found, *_: found)
+    monkeypatch.setattr(by_circuits, "nearest_score", lambda *_: near)
+    monkeypatch.setattr(by_circuits, "with_other_faults", lambda found, *_: found)
     clean = clean_log(log().replace(**{PRESSURE: None}), PAPER)
     codes = {note.code for note in by_circuits.diagnose_clean(clean, ACTUATOR).against}
     assert bool(codes & {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}) == (near < -100.0)

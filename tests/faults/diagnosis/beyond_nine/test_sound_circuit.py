@@ -8,12 +8,18 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from experiments.open_benchmark.kinds import make
 from faults.diagnosis.beyond_nine import sound_circuit as subject
-from faults.diagnosis.beyond_nine.sound_circuit import WIDER, Tried, another_sound_circuit, likely, sound_circuit
+from faults.diagnosis.beyond_nine.sound_circuit import (
+    MAKEUP_FACTOR,
+    Trial,
+    another_sound_circuit,
+    log_likelihood,
+    sound_circuit,
+)
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits import yielding
 from faults.diagnosis.circuits.class_fit import LASTING, nominal_runs
 from faults.diagnosis.circuits.class_regions import fit_classes
-from faults.diagnosis.circuits.out_of_model import unexplained
+from faults.diagnosis.circuits.out_of_model import unexplained_notes
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes
@@ -28,13 +34,13 @@ def test_the_rig_files_circuit_has_the_best_score_for_its_own_log() -> None:
 
 
 def test_circuits_that_follow_a_log_to_half_a_percent_explain_it_equally_well() -> None:
-    def tried(score: float, share: float) -> Tried:
-        best = replace(FITS.best, scales=share * LOG.sizes)
-        return Tried(ACTUATOR, replace(FITS, best=best, scores=np.full(9, score)))
+    def tried(score: float, share: float) -> Trial:
+        best = replace(FITS.best, scales=share * LOG.rms)
+        return Trial(ACTUATOR, replace(FITS, best=best, scores=np.full(9, score)))
 
     gained = float(LOG.counts[0]) / LASTING * np.log(2.5)
-    assert likely(LOG, tried(gained, 0.002)) == pytest.approx(likely(LOG, tried(0.0, 0.005)), abs=1e-9)
-    assert likely(LOG, tried(3.0, 0.01)) == 3.0
+    assert log_likelihood(LOG, tried(gained, 0.002)) == pytest.approx(log_likelihood(LOG, tried(0.0, 0.005)), abs=1e-9)
+    assert log_likelihood(LOG, tried(3.0, 0.01)) == 3.0
 
 
 def test_another_sound_circuit_is_accepted_only_if_it_follows_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -46,8 +52,8 @@ def test_another_sound_circuit_is_accepted_only_if_it_follows_the_log(monkeypatc
     found = another_sound_circuit(LOG, asked, other)
     assert found is not None
     assert found.circuit == best.actuator.circuit
-    assert best.actuator.circuit.makeup_conductance == pytest.approx(WIDER * narrow.makeup_conductance)
-    monkeypatch.setattr(subject, "unexplained", lambda *_: ["left"])
+    assert best.actuator.circuit.makeup_conductance == pytest.approx(MAKEUP_FACTOR * narrow.makeup_conductance)
+    monkeypatch.setattr(subject, "unexplained_notes", lambda *_: ["left"])
     assert another_sound_circuit(LOG, asked, other) is None
 
 
@@ -62,7 +68,7 @@ def test_a_plain_log_that_wider_valves_explain_gets_its_class(monkeypatch: pytes
     The piston moves so little that yielding seals could explain that much. Here they may not, since otherwise nothing
     would be unexplained.
     """
-    monkeypatch.setattr(yielding, "YIELDING", 0.0)
+    monkeypatch.setattr(yielding, "YIELDING_SHARE", 0.0)
     log = make("plain", "training", 9753).log
     record = Record(1e-3, {name: log[name].to_numpy() for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
     clean = clean_log(record, EhaParameters())
@@ -71,7 +77,7 @@ def test_a_plain_log_that_wider_valves_explain_gets_its_class(monkeypatch: pytes
     assert found.condition == "major_leakage_minor_friction"
     board = found.scoreboard
     rigs = fit_classes(board.blocks, ACTUATOR)
-    assert unexplained(board.blocks, rigs, ACTUATOR)
+    assert unexplained_notes(board.blocks, rigs, ACTUATOR)
 
 
 @pytest.mark.parametrize(("pressure", "opened"), [(0.99, False), (1.01, True)])
@@ -82,9 +88,9 @@ def test_a_refit_starts_at_the_scale_of_the_run_if_the_relief_valve_opened_in_it
     setting = ACTUATOR.circuit.relief_pressure
     monkeypatch.setattr(subject, "largest_pressure", lambda *_: pressure * setting)
     fit = FITS.best
-    assert fit.ran is not None
-    expected = fit.ran if opened else fit.coordinates
-    np.testing.assert_array_equal(subject.as_told(LOG, fit, ACTUATOR).coordinates, expected)
+    assert fit.run_coordinates is not None
+    expected = fit.run_coordinates if opened else fit.coordinates
+    np.testing.assert_array_equal(subject.at_determined_scale(LOG, fit, ACTUATOR).coordinates, expected)
     begun: list[np.ndarray] = []
     monkeypatch.setattr(
         subject, "fit_classes", lambda *_, start, **__: begun.append(start) or replace(FITS, scores=FITS.scores - 1.0)

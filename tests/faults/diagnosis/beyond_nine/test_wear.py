@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.eha.rig_share import DELIVERY_ENTRY, delivery_left_open
+from estimation.eha.rig_share import DELIVERY_ENTRY, undetermined_delivery
 from estimation.finding import NORMAL_95, Gate
-from estimation.fits.hypotheses import PRESUMED
+from estimation.fits.hypotheses import PRIOR_SPREADS
 from estimation.notes import RigCode
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
@@ -19,7 +19,7 @@ from faults.diagnosis.beyond_nine.wear import (
     chance_by_conditions,
     chance_of_wear,
     probabilities_over_wear,
-    whatever_the_pump_delivers,
+    with_pump_delivery,
 )
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -27,7 +27,7 @@ from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import LASTING, misfit
 from faults.diagnosis.diagnose import diagnose_log
-from faults.diagnosis.evidence import Scoreboard, bounded, weigh
+from faults.diagnosis.evidence import Scoreboard, bounded_log_odds, weigh_evidence
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -57,7 +57,7 @@ def board() -> Scoreboard:
     worn = circuit_of(replace(minor, **between, pump_displacement=0.9 * minor.pump_displacement))
     rng = np.random.default_rng(5)
     drive = make_drive("prbs", 2.0, 1e-3, HEALTHY, rng)
-    return weigh(simulate(CIRCUIT, drive, 1e-3, worn, sensors=BENCH, rng=rng), ACTUATOR)
+    return weigh_evidence(simulate(CIRCUIT, drive, 1e-3, worn, sensors=BENCH, rng=rng), ACTUATOR)
 
 
 def test_averaging_over_wear_moves_probability_from_major_to_minor_leakage(board: Scoreboard) -> None:
@@ -77,7 +77,7 @@ def test_conditions_are_summed_over_pumps_weighted_by_their_prior(monkeypatch: p
     one = blocks()
     told = {"models": np.linspace(0.0, -6.0, 9), "parameters": np.linspace(-3.0, 0.0, 9)}
     board = Scoreboard(told, one, made_classes(OFF, one), log(), None)
-    scores = {share: np.random.default_rng(round(10.0 * share)).normal(size=9) for share in wear.TRIED}
+    scores = {share: np.random.default_rng(round(10.0 * share)).normal(size=9) for share in wear.TRIED_DELIVERIES}
     best = board.fits.best
 
     def held(there: Any, information: Any, _: Any) -> Any:
@@ -93,8 +93,10 @@ def test_conditions_are_summed_over_pumps_weighted_by_their_prior(monkeypatch: p
     found = probabilities_over_wear(board, RIG, OPEN, shipped_calibration())
     likely, left = np.exp(board.fits.scores), misfit(one, best.fitted, best.scales) / LASTING
     for share, score in scores.items():
-        likely = likely + np.exp(score - left) * np.exp(-(np.log(share) ** 2) / (2.0 * PRESUMED[DELIVERY_ENTRY] ** 2))
-    exact = replace(board, log_odds={**told, "parameters": bounded(np.log(likely))}).probabilities(
+        likely = likely + np.exp(score - left) * np.exp(
+            -(np.log(share) ** 2) / (2.0 * PRIOR_SPREADS[DELIVERY_ENTRY] ** 2)
+        )
+    exact = replace(board, log_odds={**told, "parameters": bounded_log_odds(np.log(likely))}).probabilities(
         shipped_calibration()
     )
     assert found == pytest.approx(dict(exact))
@@ -129,7 +131,7 @@ def test_a_valid_flow_balance_overrules_a_circuits_objections_to_pump_and_speed(
     against = (PUMP.note(percent=-15.0), SPEED.note(bias_rad_s=4.7), others.note())
     found = board.probabilities(shipped_calibration())
     diagnosis = Diagnosis(found, against, {}, {}, {}, (), board)
-    judged = whatever_the_pump_delivers(diagnosis, ACTUATOR, estimate)
+    judged = with_pump_delivery(diagnosis, ACTUATOR, estimate)
     assert [note.code for note in judged.against] == [*kept, others]
     assert judged.probabilities == found
 
@@ -137,7 +139,7 @@ def test_a_valid_flow_balance_overrules_a_circuits_objections_to_pump_and_speed(
 def test_a_circuits_objection_to_the_pump_is_kept_if_the_balance_does_not_exclude_wear(board: Scoreboard) -> None:
     found = board.probabilities(shipped_calibration())
     off = AgainstCode.PUMP_OFF.note(percent=-15.0)
-    judged = whatever_the_pump_delivers(Diagnosis(found, (off,), {}, {}, {}, (), board), ACTUATOR, said(remarks=OPEN))
+    judged = with_pump_delivery(Diagnosis(found, (off,), {}, {}, {}, (), board), ACTUATOR, said(remarks=OPEN))
     assert judged.against == (off,)
     assert judged.probabilities != found
 
@@ -162,14 +164,14 @@ def test_the_probability_of_a_worn_pump_is_taken_from_the_nine_conditions(board:
     found = board.probabilities(shipped_calibration())
     diagnosis = Diagnosis(found, (), {}, {}, {}, (), board)
     near = (RigCode.AREA_TO_DISPLACEMENT.note(percent=91.0, half_width=2.0 * NORMAL_95),)
-    judged = whatever_the_pump_delivers(diagnosis, ACTUATOR, said("delivery"), near)
+    judged = with_pump_delivery(diagnosis, ACTUATOR, said("delivery"), near)
     chance = chance_of_wear(near)
     assert 0.3 < chance < 0.32
     assert judged.probabilities == pytest.approx({name: (1.0 - chance) * one for name, one in found.items()})
     assert [note.code for note in judged.not_told] == [ClassCode.WEAR_NOT_TOLD]
     assert judged.not_told[0].data == {"percent": pytest.approx(100.0 * chance), "limit": pytest.approx(90.0)}
-    open_ = whatever_the_pump_delivers(diagnosis, ACTUATOR, said(remarks=OPEN))
-    left = delivery_left_open(OPEN)
+    open_ = with_pump_delivery(diagnosis, ACTUATOR, said(remarks=OPEN))
+    left = undetermined_delivery(OPEN)
     assert left is not None
     chance = chance_by_conditions(board, ACTUATOR, left, shipped_calibration())
     assert sum(open_.probabilities.values()) == pytest.approx(1.0 - chance)
@@ -177,7 +179,7 @@ def test_the_probability_of_a_worn_pump_is_taken_from_the_nine_conditions(board:
 
 def test_a_worn_pump_is_likelier_the_farther_a_sound_pumps_leakage_is_beyond_the_conditions(board: Scoreboard) -> None:
     """A stuck piston with a pump of 80 % was diagnosed as major leakage at 93 %, with more leakage than that has."""
-    left = delivery_left_open(OPEN)
+    left = undetermined_delivery(OPEN)
     assert left is not None
     best, major = board.fits.best, ACTUATOR.conditions[list(CONDITIONS).index("major_leakage")]
     chances = {}
@@ -194,7 +196,7 @@ def test_a_log_without_evidence_on_conditions_keeps_the_balances_probability_of_
     monkeypatch.setattr(wear, "region_scores", lambda *_: np.zeros(9))
     monkeypatch.setattr(wear, "scores_in_forces", lambda *_: np.zeros(9))
     for note in (*OPEN, RigCode.WEAR_NOT_EXCLUDED.note(percent=20.0, half_width=24.0, likeliest=-11.5, most=20.0)):
-        left = delivery_left_open((note,))
+        left = undetermined_delivery((note,))
         assert left is not None
         found = chance_by_conditions(board, ACTUATOR, left, shipped_calibration())
         assert found == pytest.approx(chance_of_wear((note,)), abs=0.02)
@@ -204,7 +206,7 @@ def test_a_pump_is_not_worn_if_its_delivery_would_imply_negative_leakage(board: 
     """The slopes promised a pump of one third, although no flow was lost: a sound actuator was called worn at 99 %."""
     for likeliest, width in ((-104.0, 5.8), (-104.0, 0.0), (0.0, 5.8)):
         note = RigCode.WEAR_NOT_EXCLUDED.note(percent=3.7, half_width=width, likeliest=likeliest, most=3.7)
-        left = delivery_left_open((note,))
+        left = undetermined_delivery((note,))
         assert left is not None
         assert chance_by_conditions(board, ACTUATOR, left, shipped_calibration()) == chance_of_wear((note,)) == 0.0
 
@@ -213,7 +215,7 @@ def test_conditions_keep_their_order_if_the_balance_is_certain_of_wear(board: Sc
     """A probability of 100 % left nothing for the nine, and the first of them was reported: a healthy actuator."""
     found = board.probabilities(shipped_calibration())
     sure = (RigCode.WEAR_NOT_EXCLUDED.note(percent=42.0, half_width=6.0),)
-    judged = whatever_the_pump_delivers(Diagnosis(found, (), {}, {}, {}, (), board), ACTUATOR, said(remarks=sure))
+    judged = with_pump_delivery(Diagnosis(found, (), {}, {}, {}, (), board), ACTUATOR, said(remarks=sure))
     over = probabilities_over_wear(board, ACTUATOR, sure, shipped_calibration())
     assert over is not None
     assert judged.condition == max(over, key=lambda name: over[name])

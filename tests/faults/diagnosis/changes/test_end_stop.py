@@ -9,10 +9,10 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis.changes import end_stop
-from faults.diagnosis.changes.end_stop import NEAR, RESTS, stopped
+from faults.diagnosis.changes.end_stop import LEAST_REST, NEAR_DISTANCE, with_end_stop
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import ClassCode
@@ -33,7 +33,7 @@ def log_of(stop: float | None, place: int = 0, circuit: CircuitParameters = ACTU
     noise = np.array([4e-5, 2e3])
     blank = Blocks(np.append(OUT_AND_BACK, 0.0), 1e-3, 10, empty, empty, noise, stop=stop)
     rows = parameter_rows(ACTUATOR.conditions[[place]], circuit, ACTUATOR.rated)
-    (found,) = predicted(blank, rows)
+    (found,) = predicted_outputs(blank, rows)
     found = found + np.random.default_rng(0).normal(size=found.shape) * noise
     return replace(blank, velocity=found[:, 0], pressure=found[:, 1], stop=None)
 
@@ -41,7 +41,7 @@ def log_of(stop: float | None, place: int = 0, circuit: CircuitParameters = ACTU
 def test_a_circuit_with_the_end_stop_follows_a_piston_that_runs_into_it() -> None:
     log = log_of(0.02)
     without = fit_classes(log, ACTUATOR)
-    seen, fits = stopped(log, without, ACTUATOR)
+    seen, fits = with_end_stop(log, without, ACTUATOR)
     assert seen.stop == pytest.approx(0.02, abs=2e-4)
     assert np.all(fits.best.scales < 0.3 * without.best.scales)
     assert list(CONDITIONS)[int(np.argmax(fits.scores))] == "normal"
@@ -50,9 +50,9 @@ def test_a_circuit_with_the_end_stop_follows_a_piston_that_runs_into_it() -> Non
 def test_a_compliant_end_stop_is_not_taken_for_friction_or_leakage() -> None:
     soft = replace(ACTUATOR.circuit, end_stop_stiffness=1e7, end_stop_damping=0.0)
     log = log_of(0.02, circuit=soft)
-    seen, fits = stopped(log, fit_classes(log, ACTUATOR), ACTUATOR)
+    seen, fits = with_end_stop(log, fit_classes(log, ACTUATOR), ACTUATOR)
     assert seen.stop is not None
-    stands = np.cumsum(log.velocity) * log.block * log.sample_time > log.reach - NEAR
+    stands = np.cumsum(log.velocity) * log.block * log.sample_time > log.reach - NEAR_DISTANCE
     assert np.all(np.isnan(seen.outputs[stands]))
     assert np.all(np.isfinite(seen.outputs[~stands]))
     off = fits.best.coordinates - ACTUATOR.conditions[0]
@@ -63,9 +63,9 @@ def test_a_compliant_end_stop_is_not_taken_for_friction_or_leakage() -> None:
 def test_no_end_stop_is_found_if_the_drive_stopped_the_piston() -> None:
     log = log_of(None)
     gone = np.cumsum(log.velocity) * log.block * log.sample_time
-    assert np.sum(gone > log.reach - NEAR) * log.block * log.sample_time > RESTS
+    assert np.sum(gone > log.reach - NEAR_DISTANCE) * log.block * log.sample_time > LEAST_REST
     fits = fit_classes(log, ACTUATOR)
-    assert stopped(log, fits, ACTUATOR) == (log, fits)
+    assert with_end_stop(log, fits, ACTUATOR) == (log, fits)
 
 
 @pytest.mark.parametrize(("shares", "sought"), [((0.055, 0.055), False), ((0.065, 0.01), True), ((0.01, 0.065), True)])
@@ -73,7 +73,7 @@ def test_an_end_stop_is_sought_if_a_circuit_leaves_6_percent_of_an_output_unexpl
     shares: tuple[float, float], sought: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = log_of(0.02)
-    left: Any = SimpleNamespace(best=SimpleNamespace(scales=np.array(shares) * log.sizes, fitted=log.outputs))
+    left: Any = SimpleNamespace(best=SimpleNamespace(scales=np.array(shares) * log.rms, fitted=log.outputs))
     asked: list[float | None] = []
 
     def fitted(blocks: Blocks, *_: Any) -> Any:
@@ -81,7 +81,7 @@ def test_an_end_stop_is_sought_if_a_circuit_leaves_6_percent_of_an_output_unexpl
         return left
 
     monkeypatch.setattr(end_stop, "fit_classes", fitted)
-    assert stopped(log, left, ACTUATOR) == (log, left)  # the fit with a stop gains nothing
+    assert with_end_stop(log, left, ACTUATOR) == (log, left)  # the fit with a stop gains nothing
     assert asked == ([log.reach] if sought else [])
 
 
@@ -89,7 +89,7 @@ def test_no_end_stop_is_found_in_a_poor_fit_with_another_cause() -> None:
     log = log_of(None)
     wrong = replace(log, velocity=log.velocity * np.where(np.arange(len(log.velocity)) % 20 < 10, 1.2, 0.8))
     fits = fit_classes(wrong, ACTUATOR)
-    assert stopped(wrong, fits, ACTUATOR)[0].stop is None
+    assert with_end_stop(wrong, fits, ACTUATOR)[0].stop is None
 
 
 def test_a_finding_names_the_end_stop_and_the_right_class() -> None:
@@ -107,7 +107,7 @@ def test_presliding_of_the_seals_is_fitted_without_bias_in_other_coordinates() -
     empty, noise = np.zeros(400), np.array([4e-5, 2e3])
     blank = Blocks(speed, 1e-3, 10, empty, empty, noise)
     point = coordinates_of(RIG, ACTUATOR.rated)
-    (run,) = predicted(blank, parameter_rows(point[None], circuit, ACTUATOR.rated))
+    (run,) = predicted_outputs(blank, parameter_rows(point[None], circuit, ACTUATOR.rated))
     found = fit_classes(replace(blank, velocity=run[:, 0], pressure=run[:, 1]), ACTUATOR).best.coordinates - point
     assert found[-1] == pytest.approx(np.log(3.0), abs=0.1)
     assert np.all(np.abs(found[:-1]) < 0.02)

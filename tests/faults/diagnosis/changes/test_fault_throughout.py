@@ -7,9 +7,9 @@ import pytest
 
 from experiments.open_benchmark.kinds import make
 from faults.diagnosis.changes import fault_throughout as subject
-from faults.diagnosis.changes.change_odds import LIKELIER, gain_of, odds_of_change
+from faults.diagnosis.changes.change_odds import BELIEVED_ODDS, gain_of_parts, odds_of_change
 from faults.diagnosis.changes.fault_throughout import fault_throughout
-from faults.diagnosis.changes.onset import last_part, parted
+from faults.diagnosis.changes.onset import last_part, two_parts
 from faults.diagnosis.circuits.class_regions import ClassFits
 from plant.log.record import Record
 from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes
@@ -21,7 +21,7 @@ CHANGED = blocks("normal", "major_leakage", pressure=False)
 def two() -> Any:
     from faults.diagnosis.circuits.class_regions import fit_classes
 
-    found = parted(CHANGED, fit_classes(CHANGED, ACTUATOR), ACTUATOR)
+    found = two_parts(CHANGED, fit_classes(CHANGED, ACTUATOR), ACTUATOR)
     assert found is not None
     return found
 
@@ -41,17 +41,17 @@ def test_a_change_needs_the_same_odds_against_a_fault_throughout_as_against_no_c
     two: Any, monkeypatch: pytest.MonkeyPatch, beyond: float, throughout: bool
 ) -> None:
     """The circuit with a fault explains no more than the sound one; the prior of the fault varies."""
-    gain = gain_of(two.whole, two.parts, two.fits)
+    gain = gain_of_parts(two.whole, two.parts, two.fits)
     odds = odds_of_change(gain, two.fits, two.whole, CHANGED, ACTUATOR)
     asked: list[float] = []
 
     def one_fault(*args: Any) -> Iterator[tuple[float, ClassFits]]:
         asked.append(args[-1])
-        yield odds - beyond - subject.math.log(LIKELIER), two.whole
+        yield odds - beyond - subject.math.log(BELIEVED_ODDS), two.whole
 
     monkeypatch.setattr(subject, "circuits_with_faults", one_fault)
     assert fault_throughout(CHANGED, two.parts, two.fits, two.whole, ACTUATOR) == throughout
-    assert asked == [pytest.approx(odds - subject.math.log(LIKELIER))]
+    assert asked == [pytest.approx(odds - subject.math.log(BELIEVED_ODDS))]
 
 
 def test_with_pressure_no_circuit_with_a_fault_throughout_is_tried(two: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,20 +18,20 @@ from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.changes import onset
 from faults.diagnosis.changes.onset import (
     MOST_ALARMS,
-    SOFTENED,
+    SOFTENING_GAIN,
     LastPart,
     find_onset,
     last_part,
     part_of,
-    parted,
-    softened,
+    softening_notes,
+    two_parts,
 )
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.class_regions import fit_classes
-from faults.diagnosis.circuits.out_of_model import unexplained
-from faults.eha.inject import abrupt
+from faults.diagnosis.circuits.out_of_model import unexplained_notes
+from faults.eha.inject import abrupt_fault
 from faults.notes import AgainstCode
 from faults.watch.events import Alarm, Event, Ready
 from plant.eha.circuit_parameters import circuit_of
@@ -56,7 +56,7 @@ def diagnosed(record: Record) -> Diagnosis:
 def changed(condition: str, drive: str, *, pressure: bool, start: float = 0.0) -> Diagnosis:
     rng = np.random.default_rng(11)
     speed = make_drive(drive, 6.0, 1e-3, EhaParameters(), rng)
-    path = abrupt(ACTUATOR.circuit, circuit_of(parameters_for(CONDITIONS[condition])), AT)
+    path = abrupt_fault(ACTUATOR.circuit, circuit_of(parameters_for(CONDITIONS[condition])), AT)
     log = replace(simulate(CIRCUIT, speed, 1e-3, path, sensors=RIG, rng=rng), start_time=start)
     return diagnosed(log if pressure else log.replace(differential_pressure_pa=None))
 
@@ -66,7 +66,7 @@ def short_log(condition: str | None, start: float = 0.0) -> Record:
     rng = np.random.default_rng(11)
     speed = make_drive("prbs", 4.0, 2e-3, HEALTHY, rng)
     after = ACTUATOR.circuit if condition is None else circuit_of(parameters_for(CONDITIONS[condition]))
-    path = abrupt(ACTUATOR.circuit, after, 2.2)
+    path = abrupt_fault(ACTUATOR.circuit, after, 2.2)
     return replace(simulate(CIRCUIT, speed, 2e-3, path, sensors=RIG, rng=rng), start_time=start)
 
 
@@ -87,8 +87,8 @@ def test_a_log_is_judged_from_the_onset_of_its_last_condition(condition: str, *,
     assert found.onset.ci95[1] - found.onset.ci95[0] < 0.1
     assert found.record.start_time == pytest.approx(found.onset.since)
     assert len(found.record) == pytest.approx(900, abs=10)
-    assert found.blocks.earlier is not None
-    assert found.blocks.earlier[0] * found.blocks.sample_time == pytest.approx(2.2, abs=0.02)
+    assert found.blocks.earlier_circuit is not None
+    assert found.blocks.earlier_circuit[0] * found.blocks.sample_time == pytest.approx(2.2, abs=0.02)
     assert np.flatnonzero(np.isfinite(found.blocks.velocity))[0] == pytest.approx(220, abs=2)
     assert list(CONDITIONS)[int(np.argmax(found.fits.scores))] == condition
 
@@ -103,18 +103,18 @@ def test_without_pressure_no_onset_is_sought_in_a_log_with_drifting_leakage() ->
 
 def test_oil_that_softens_between_two_parts_is_an_objection_only_without_pressure() -> None:
     blocks = blocks_of(foreign("air_midway", 703).replace(differential_pressure_pa=None))
-    two = parted(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
+    two = two_parts(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
     assert two is not None
-    (note,) = softened(two)
+    (note,) = softening_notes(two)
     assert note.code == AgainstCode.OIL_SOFTENS
     assert note.data["share"] < 0.8
     assert 8.0 < note.data["at_s"] < 12.0
-    assert not softened(two._replace(fits=two.fits[::-1])), "oil that stiffens"
-    assert not softened(two._replace(gain=0.99 * SOFTENED))
-    assert not softened(two._replace(parts=[replace(one, pressure=one.velocity) for one in two.parts]))
+    assert not softening_notes(two._replace(fits=two.fits[::-1])), "oil that stiffens"
+    assert not softening_notes(two._replace(gain=0.99 * SOFTENING_GAIN))
+    assert not softening_notes(two._replace(parts=[replace(one, pressure=one.velocity) for one in two.parts]))
     assert find_onset(blocks, two, ACTUATOR) is None
-    elsewhere = replace(two.fits[1], unbent=np.roll(two.fits[1].of_one_law, 1))
-    assert softened(two._replace(fits=[two.fits[0], elsewhere])), "no condition softens the oil"
+    elsewhere = replace(two.fits[1], unbent_scores=np.roll(two.fits[1].one_law_scores, 1))
+    assert softening_notes(two._replace(fits=[two.fits[0], elsewhere])), "no condition softens the oil"
 
 
 def test_a_log_with_softening_oil_has_an_objection_and_no_onset() -> None:
@@ -128,7 +128,7 @@ def test_a_log_in_one_condition_is_judged_as_a_whole() -> None:
     found = last_part(record, ACTUATOR)
     assert found.onset is None
     assert found.record is record
-    assert found.blocks.earlier is None
+    assert found.blocks.earlier_circuit is None
     assert np.all(np.isfinite(found.blocks.velocity))
 
 
@@ -169,7 +169,7 @@ def test_no_onset_is_found_after_bursts_of_friction_that_no_circuit_follows() ->
     found = last_part(record, ACTUATOR)
     assert found.onset is None
     assert found.record is record
-    assert unexplained(found.blocks, found.fits, ACTUATOR)
+    assert unexplained_notes(found.blocks, found.fits, ACTUATOR)
 
 
 def alarm(since: float) -> Alarm:
@@ -183,15 +183,15 @@ def test_no_onset_is_reported_if_no_circuit_follows_the_part_after_it(
     said = [AgainstCode.UNEXPLAINED.note(percent=20.0, channel="velocity")]
 
     def nothing_follows_the_rest(blocks: Blocks, *_: object) -> list[Note]:
-        return said if blocks.earlier is not None else []
+        return said if blocks.earlier_circuit is not None else []
 
     for logged in (record.replace(differential_pressure_pa=None), record):
         blocks = blocks_of(logged)
-        two = parted(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
+        two = two_parts(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
         assert two is not None
         assert find_onset(blocks, two, ACTUATOR) is not None
         with monkeypatch.context() as patch:
-            patch.setattr(onset, "unexplained", nothing_follows_the_rest)
+            patch.setattr(onset, "unexplained_notes", nothing_follows_the_rest)
             assert find_onset(blocks, two, ACTUATOR) is None
 
 
@@ -208,7 +208,7 @@ def test_stretches_about_the_last_alarms_of_a_long_log_are_searched_until_one_ha
         return LastPart(window, window, nothing, nothing, cast("Any", change))
 
     monkeypatch.setattr(onset, "watch_record", lambda *_, **__: alarms)
-    monkeypatch.setattr(onset, "_last_of", last_of)
+    monkeypatch.setattr(onset, "_last_part_of_window", last_of)
     long = Record(0.02, {"motor_speed_rad_s": np.zeros(5001)}, start_time=500.0)  # 100 s long
     changed = 525.0
     assert last_part(long, ACTUATOR).window.start_time == 525.0
@@ -277,7 +277,7 @@ def test_a_part_keeps_the_whole_drive_and_drops_outputs_outside_it() -> None:
 
 
 def test_the_interval_of_the_onset_covers_95_percent() -> None:
-    assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == onset.LIKELY
+    assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == onset.INTERVAL_DROP
 
 
 @pytest.mark.parametrize(("lasting", "wide"), [(0.3, 4), (1.0, 4), (3.0, 13)])
@@ -288,13 +288,13 @@ def test_lasting_misfit_widens_the_interval_of_the_onset(
     blocks = Blocks(np.zeros(2001), 1e-3, 10, np.zeros(200), None, np.array([1.0]))
 
     def run(changing: Blocks, rows: np.ndarray) -> list[np.ndarray]:
-        assert changing.earlier is not None
-        assert len(rows) == len(np.atleast_1d(changing.earlier[0]))
-        costs = 0.1 * (np.atleast_1d(changing.earlier[0]) / 10 - best) ** 2  # exceeds 1.92 beyond 4.4 blocks
+        assert changing.earlier_circuit is not None
+        assert len(rows) == len(np.atleast_1d(changing.earlier_circuit[0]))
+        costs = 0.1 * (np.atleast_1d(changing.earlier_circuit[0]) / 10 - best) ** 2  # exceeds 1.92 beyond 4.4 blocks
         return [np.full((200, 1), np.sqrt(2.0 * cost / (200 - blocks.first))) for cost in costs]
 
-    monkeypatch.setattr(onset, "predicted", run)
+    monkeypatch.setattr(onset, "predicted_outputs", run)
     monkeypatch.setattr(onset, "least_scales", lambda _: 1.0)
     monkeypatch.setattr(onset, "lasting_misfit", lambda *_: lasting)
     circuits = np.zeros((2, len(onset.COORDINATES)))
-    assert onset._when(blocks, *circuits, place, ACTUATOR) == (best - wide - 1, best, best + wide + 1)
+    assert onset._change_block(blocks, *circuits, place, ACTUATOR) == (best - wide - 1, best, best + wide + 1)

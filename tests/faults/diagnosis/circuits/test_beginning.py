@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from faults.diagnosis.circuits.beginning import FORGOTTEN, REFILLED, SETTLING, Beginning, beginning_of
+from faults.diagnosis.circuits.beginning import SETTLING, SLIDING_SETTLING, TURNING_SETTLING, Beginning, beginning_of
 from faults.diagnosis.circuits.blocks import blocks_of
 from plant.log.record import Record
 from tests.faults.diagnosis.circuits.test_blocks import PRESSURE, running
@@ -12,7 +12,7 @@ from tests.faults.diagnosis.circuits.test_blocks import PRESSURE, running
 @pytest.mark.parametrize(
     ("seconds", "first", "pressure", "settling"),
     [
-        (11.0, 60.0, False, REFILLED),
+        (11.0, 60.0, False, SLIDING_SETTLING),
         (3.0, 60.0, False, 0.9),
         (6.0, 0.0, False, SETTLING),
         (6.0, 60.0, True, SETTLING),
@@ -25,11 +25,11 @@ def test_without_pressure_a_log_that_begins_in_motion_has_a_longer_settling_time
     blocks = blocks_of(log if pressure else log.replace(**{PRESSURE: None}))
     assert blocks.settling == pytest.approx(settling, rel=2e-3)
     assert blocks.first == round(blocks.settling / 0.01)
-    assert blocks.sliding == (0.0 if pressure or not first else blocks.velocity[0])
-    assert len(blocks.seen) == len(blocks.velocity) - blocks.first
+    assert blocks.start_velocity == (0.0 if pressure or not first else blocks.velocity[0])
+    assert len(blocks.valid) == len(blocks.velocity) - blocks.first
 
 
-@pytest.mark.parametrize(("velocity", "settling"), [(0.02, REFILLED), (1e-5, FORGOTTEN)])
+@pytest.mark.parametrize(("velocity", "settling"), [(0.02, SLIDING_SETTLING), (1e-5, TURNING_SETTLING)])
 def test_a_piston_that_rests_while_the_motor_turns_settles_sooner_than_one_that_slides(
     velocity: float, settling: float
 ) -> None:

@@ -9,7 +9,7 @@ from experiments.open_benchmark.kinds import make
 from faults.diagnosis.circuits import out_of_model
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
-from faults.diagnosis.circuits.class_regions import fit_classes, how_near
+from faults.diagnosis.circuits.class_regions import fit_classes, nearest_score
 from faults.diagnosis.circuits.out_of_model import reasons_against
 from faults.notes import AgainstCode
 from plant.eha.model import EhaParameters
@@ -19,7 +19,7 @@ from tests.faults.diagnosis.short_logs import ACTUATOR, blocks
 
 def is_offset(log: Blocks) -> bool:
     fits = fit_classes(log, ACTUATOR)
-    against = reasons_against(log, fits, how_near(fits, log, ACTUATOR), ACTUATOR)
+    against = reasons_against(log, fits, nearest_score(fits, log, ACTUATOR), ACTUATOR)
     return any(note.code in (AgainstCode.SPEED_BIAS, AgainstCode.LOAD_OR_OFFSET) for note in against)
 
 

@@ -7,9 +7,9 @@ from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.beginning import SETTLING
 from faults.diagnosis.circuits.blocks import blocks_of, root_mean_square
-from faults.diagnosis.circuits.circuit_runs import coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import coordinates_of, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_regions import fit_classes
-from faults.diagnosis.circuits.rivals import creeps
+from faults.diagnosis.circuits.rivals import is_followed_roughly
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -33,7 +33,7 @@ def test_a_circuit_started_at_rest_follows_a_running_log_after_the_settling_time
     actuator, blocks = actuator_of(HEALTHY), blocks_of(running(6.0, 60.0).replace(**{PRESSURE: None}))
     fits = fit_classes(blocks, actuator)
     assert list(CONDITIONS)[int(np.argmax(fits.scores))] == "major_friction"
-    assert not creeps(blocks, fits.best)
+    assert not is_followed_roughly(blocks, fits.best)
     begun = blocks.velocity - fits.best.fitted[:, 0]
     assert np.sqrt(np.mean(begun[: blocks.first] ** 2)) > 3.0 * fits.best.scales[0]
 
@@ -68,8 +68,8 @@ def test_a_circuit_follows_its_own_log_if_speed_is_curved_between_samples(
     speed = make_drive(drive, 3.0, sample_time, HEALTHY, np.random.default_rng(0))
     blocks = blocks_of(simulate(CIRCUIT, speed, sample_time, circuit_of(true)))
     rows = parameter_rows(coordinates_of(true, actuator.rated)[None], actuator.circuit, actuator.rated)
-    left = (blocks.outputs - predicted(blocks, rows)[0])[blocks.first :]
-    assert np.all(root_mean_square(left) < np.array(most) * blocks.sizes)
+    left = (blocks.outputs - predicted_outputs(blocks, rows)[0])[blocks.first :]
+    assert np.all(root_mean_square(left) < np.array(most) * blocks.rms)
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,10 @@ from faults.diagnosis.circuits.blocks import BLOCK, Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import (
     COLUMN,
     SOFTEST_END,
-    _between_stops,
+    _with_stops,
     coordinates_of,
     parameter_rows,
-    predicted,
+    predicted_outputs,
 )
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
@@ -57,7 +57,7 @@ def test_a_piston_that_reversed_within_two_percent_of_a_stop_is_assumed_to_have_
     still = np.zeros(20)
     still[5] = 0.03 * (1.0 + beyond) / 0.01  # out to a place near the stop 30 mm away
     log = Blocks(np.zeros(201), 1e-3, 10, still, None, np.ones(1))
-    (row,) = _between_stops(log, parameter_rows(CENTRE[None], replace(ACTUATOR.circuit, stroke=0.06), ACTUATOR.rated))
+    (row,) = _with_stops(log, parameter_rows(CENTRE[None], replace(ACTUATOR.circuit, stroke=0.06), ACTUATOR.rated))
     assert bool(row[COLUMN["stroke"]] == pytest.approx(0.06)) is shown
     assert row[COLUMN["stroke"]] > 0.059
 
@@ -70,9 +70,9 @@ def test_the_stiffness_of_an_end_stop_is_read_from_pressure_and_travel_within_li
     healthy, moved, pressure = replace(ACTUATOR.circuit, stroke=0.06), np.zeros(20), np.zeros(20)
     moved[5], pressure[5:] = 0.0302 / 0.01, 0.0002 * stiffness / healthy.piston_area  # 0.2 mm past the stop
     log = Blocks(np.zeros(201), 1e-3, 10, moved, pressure, np.ones(2))
-    (row,) = _between_stops(log, parameter_rows(CENTRE[None], healthy, ACTUATOR.rated))
+    (row,) = _with_stops(log, parameter_rows(CENTRE[None], healthy, ACTUATOR.rated))
     assert row[COLUMN["end_stop_stiffness"]] == pytest.approx(read)
-    (blind,) = _between_stops(replace(log, pressure=None), parameter_rows(CENTRE[None], healthy, ACTUATOR.rated))
+    (blind,) = _with_stops(replace(log, pressure=None), parameter_rows(CENTRE[None], healthy, ACTUATOR.rated))
     assert blind[COLUMN["end_stop_stiffness"]] == healthy.end_stop_stiffness
 
 
@@ -128,7 +128,7 @@ def test_a_circuit_has_an_end_stop_only_if_the_log_reached_it(stroke: float, giv
     log = simulate(CIRCUIT, speed, 1e-3, EhaParameters(stroke=stroke))
     actuator = actuator_of(EhaParameters(stroke=given))
     blocks = blocks_of(log)
-    (found,) = predicted(blocks, parameter_rows(actuator.conditions[:1], actuator.circuit, actuator.rated))
+    (found,) = predicted_outputs(blocks, parameter_rows(actuator.conditions[:1], actuator.circuit, actuator.rated))
     off = (found - blocks.outputs)[blocks.first :]
     assert np.all(np.sqrt(np.mean(off**2, axis=0)) < 0.05 * np.sqrt(np.mean(blocks.outputs**2, axis=0)))
 
@@ -138,12 +138,12 @@ def test_a_circuit_starts_under_pressure_if_its_log_does() -> None:
     run = simulate(CIRCUIT, np.repeat([100.0, -20.0, 0.0, 15.0], 400), 1e-3, p)
     blocks = blocks_of(run.slice(500, len(run)))
     rows = parameter_rows(coordinates_of(circuit_of(p), ACTUATOR.rated)[None], ACTUATOR.circuit, ACTUATOR.rated)
-    assert blocks.begun is not None
+    assert blocks.start_values is not None
     assert blocks.pressure is not None
     size = np.sqrt(np.mean(blocks.pressure**2))
     left, at_rest = (
-        np.sqrt(np.mean((predicted(one, rows)[0, one.first :, 1] - blocks.pressure[one.first :]) ** 2)) / size
-        for one in (blocks, replace(blocks, begun=None))
+        np.sqrt(np.mean((predicted_outputs(one, rows)[0, one.first :, 1] - blocks.pressure[one.first :]) ** 2)) / size
+        for one in (blocks, replace(blocks, start_values=None))
     )
     assert left < 0.03
     assert at_rest > 0.3
@@ -154,10 +154,10 @@ def test_without_pressure_a_circuit_starts_with_the_pressure_of_its_own_friction
     run = simulate(CIRCUIT, np.repeat([100.0, -20.0, 0.0, 15.0], 400), 1e-3, p)
     blocks = blocks_of(run.slice(350, len(run)).replace(differential_pressure_pa=None))
     rows = parameter_rows(coordinates_of(circuit_of(p), ACTUATOR.rated)[None], ACTUATOR.circuit, ACTUATOR.rated)
-    assert blocks.sliding == blocks.velocity[0]
+    assert blocks.start_velocity == blocks.velocity[0]
     left, at_rest = (
-        np.sqrt(np.mean((velocity_of(one, rows) - one.velocity)[:20] ** 2)) / abs(blocks.sliding)
-        for one in (blocks, replace(blocks, sliding=0.0))
+        np.sqrt(np.mean((velocity_of(one, rows) - one.velocity)[:20] ** 2)) / abs(blocks.start_velocity)
+        for one in (blocks, replace(blocks, start_velocity=0.0))
     )
     assert left < 0.05
     assert at_rest > 0.2
@@ -170,29 +170,29 @@ def test_a_circuit_under_a_load_starts_at_the_position_and_spring_force_of_its_l
     sprung = replace(ACTUATOR.circuit, load_stiffness=2e4)
 
     def first(one: Blocks, circuit: CircuitParameters) -> tuple[float, float]:
-        (found,) = predicted(one, parameter_rows(ACTUATOR.conditions[:1], circuit, ACTUATOR.rated))
+        (found,) = predicted_outputs(one, parameter_rows(ACTUATOR.conditions[:1], circuit, ACTUATOR.rated))
         return float(found[0, 0]), float(found[0, 1])
 
     held = 300.0 / area
     assert first(blocks, loaded)[1] == pytest.approx(held, rel=0.02)  # at rest, pressure holds the load
-    velocity, pressure = first(replace(blocks, opening=(0.0, -0.02)), replace(loaded, load_force=900.0))
+    velocity, pressure = first(replace(blocks, raw_start_values=(0.0, -0.02)), replace(loaded, load_force=900.0))
     assert velocity < -0.01  # the piston gives way until its oil is compressed
     assert pressure < 0.5 * 900.0 / area
-    assert first(replace(blocks, opening=(0.0, -0.02)), ACTUATOR.circuit) == first(blocks, ACTUATOR.circuit)
+    assert first(replace(blocks, raw_start_values=(0.0, -0.02)), ACTUATOR.circuit) == first(blocks, ACTUATOR.circuit)
     assert first(replace(blocks, place=0.015), sprung)[1] == pytest.approx(held, rel=0.02)
     assert first(blocks, sprung)[1] == pytest.approx(0.0, abs=0.02 * held)
     before = parameter_rows(ACTUATOR.conditions[:1], sprung, ACTUATOR.rated)[0]
-    earlier = replace(blocks, place=0.015, earlier=(400, before))
+    earlier = replace(blocks, place=0.015, earlier_circuit=(400, before))
     assert first(earlier, ACTUATOR.circuit)[1] == pytest.approx(held, rel=0.1)
 
 
 def test_a_log_that_begins_at_rest_has_no_initial_pressure() -> None:
     log = simulate(CIRCUIT, SPEED, 1e-3, EhaParameters(), sensors=BENCH, rng=np.random.default_rng(1))
-    assert blocks_of(log).begun is None
+    assert blocks_of(log).start_values is None
 
 
 def velocity_of(blocks: Blocks, rows: np.ndarray) -> np.ndarray:
-    (found,) = predicted(blocks, rows)
+    (found,) = predicted_outputs(blocks, rows)
     return found[:, 0]
 
 
@@ -208,7 +208,7 @@ def test_an_earlier_circuit_runs_up_to_its_sample() -> None:
     place = list(CONDITIONS).index("major_leakage")
     leaking = parameter_rows(ACTUATOR.conditions[[place]], ACTUATOR.circuit, ACTUATOR.rated)
     before = velocity_of(plain, leaking)
-    both = velocity_of(replace(plain, earlier=(500, leaking[0])), rows)
+    both = velocity_of(replace(plain, earlier_circuit=(500, leaking[0])), rows)
     np.testing.assert_array_equal(both[:48], before[:48])
     assert both[-10:] == pytest.approx(velocity_of(plain, rows)[-10:], rel=1e-3)
     assert np.abs(both[-10:] - before[-10:]).min() > 1e-3
@@ -225,15 +225,17 @@ def test_an_earlier_circuit_is_run_once_for_all_later_circuits(monkeypatch: pyte
         return original(starts, speed, *more, **how)
 
     monkeypatch.setattr(circuit_runs, "circuit_groups", counted)
-    changed = replace(plain, earlier=(500, leaking))
-    (first,), (again,) = predicted(changed, rows), predicted(changed, rows)
+    changed = replace(plain, earlier_circuit=(500, leaking))
+    (first,), (again,) = predicted_outputs(changed, rows), predicted_outputs(changed, rows)
     assert asked == [501, 301, 301]
     np.testing.assert_array_equal(first, again)
     # the sample of the change is given for each circuit
-    (whole,) = predicted(replace(plain, earlier=(np.array([500]), leaking)), rows)
+    (whole,) = predicted_outputs(replace(plain, earlier_circuit=(np.array([500]), leaking)), rows)
     size = np.abs(whole).max(axis=0)
     assert np.all(np.abs(first - whole) < (2e-4, 2e-4) * size)
-    (between,) = predicted(replace(plain, earlier=(503, leaking)), rows)  # the change is not at the end of a block
+    (between,) = predicted_outputs(
+        replace(plain, earlier_circuit=(503, leaking)), rows
+    )  # the change is not at the end of a block
     assert asked[-1] == 801
     assert np.all(np.abs(between - first)[:49] < (2e-4, 1e-3) * size)
 
@@ -243,9 +245,9 @@ def test_each_circuit_can_have_its_own_sample_of_change() -> None:
     place = list(CONDITIONS).index("major_leakage")
     (leaking,) = parameter_rows(ACTUATOR.conditions[[place]], ACTUATOR.circuit, ACTUATOR.rated)
     ends = np.array([200, 500, 650])
-    both = predicted(replace(plain, earlier=(ends, leaking)), np.repeat(rows, 3, axis=0))
+    both = predicted_outputs(replace(plain, earlier_circuit=(ends, leaking)), np.repeat(rows, 3, axis=0))
     for end, found in zip(ends, both, strict=True):
-        alone = velocity_of(replace(plain, earlier=(int(end), leaking)), rows)
+        alone = velocity_of(replace(plain, earlier_circuit=(int(end), leaking)), rows)
         assert found[:, 0] == pytest.approx(alone, rel=1e-3, abs=1e-5)
     assert np.abs(both[0, 30:45, 0] - both[1, 30:45, 0]).min() > 1e-3
 
@@ -258,7 +260,7 @@ def test_a_course_of_leakage_raises_all_leakages_and_lowers_viscous_friction() -
         if name.endswith("leakage") or name == "leakage_coefficient":
             warm[:, names.index(name)] *= 3.0
     warm[:, names.index("friction_linear")] /= 3.0
-    course = velocity_of(replace(plain, course=np.full(801, 3.0)), rows)
+    course = velocity_of(replace(plain, leakage_course=np.full(801, 3.0)), rows)
     assert course == pytest.approx(velocity_of(plain, warm), rel=1e-12)
     assert course[30] < velocity_of(plain, rows)[30]
 
@@ -272,7 +274,7 @@ def test_a_known_end_stop_holds_the_piston() -> None:
 
 def test_a_run_settles_at_the_velocity_and_pressure_of_the_steady_state() -> None:
     plain, rows = healthy_blocks()
-    (found,) = predicted(plain, rows)
+    (found,) = predicted_outputs(plain, rows)
     velocity, pressure = steady_state(100.0, circuit_of(EhaParameters()))
     assert found[39, 0] == pytest.approx(velocity, rel=0.01)
     assert found[39, 1] == pytest.approx(pressure, rel=0.02)

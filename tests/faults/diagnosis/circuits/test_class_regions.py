@@ -9,19 +9,19 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits import class_regions
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.circuits.class_fit import WITHIN, PointFit
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted_outputs
+from faults.diagnosis.circuits.class_fit import CONDITION_SPREAD, PointFit
 from faults.diagnosis.circuits.class_regions import (
     ALIKE,
     PRESSURE_SCALE,
-    believed_information,
+    credible_information,
     fit_classes,
-    how_near,
     is_stuck,
     lasting_misfit,
+    nearest_score,
     spread_of,
 )
-from faults.diagnosis.circuits.region_scores import region_scores, told_apart
+from faults.diagnosis.circuits.region_scores import region_scores, separations
 from plant.eha.model import EhaParameters
 
 ACTUATOR = actuator_of(EhaParameters())
@@ -55,9 +55,9 @@ def test_coordinates_without_information_do_not_affect_the_scores() -> None:
 
 
 def test_without_pressure_there_is_no_credible_information_on_the_pressure_scale() -> None:
-    believed = believed_information(fit(0, outputs=1), blocks(pressure=False))
+    believed = credible_information(fit(0, outputs=1), blocks(pressure=False))
     assert float(PRESSURE_SCALE @ believed @ PRESSURE_SCALE) == pytest.approx(0.0, abs=1e-6)
-    assert believed_information(fit(0), blocks(pressure=True)) == pytest.approx(INFORMATION)
+    assert credible_information(fit(0), blocks(pressure=True)) == pytest.approx(INFORMATION)
 
 
 def test_the_spread_is_computed_once_and_only_on_request(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,7 +71,7 @@ def test_the_spread_is_computed_once_and_only_on_request(monkeypatch: pytest.Mon
 
 
 def test_a_model_error_reduces_the_credible_information() -> None:
-    near, far = (believed_information(fit(0, scale), blocks(pressure=True)) for scale in (1e-3, 1e-2))
+    near, far = (credible_information(fit(0, scale), blocks(pressure=True)) for scale in (1e-3, 1e-2))
     assert np.all(np.diag(far) < 0.02 * np.diag(near))
 
 
@@ -81,7 +81,7 @@ def test_a_stuck_piston_gives_no_information_on_friction() -> None:
     assert not is_stuck(blocks(pressure=True), ACTUATOR)
     few = ACTUATOR.circuit.presliding_displacement * np.array([4.0, 6.0])
     assert [is_stuck(blocks(pressure=True, travel=travel), ACTUATOR) for travel in few.tolist()] == [True, False]
-    believed = np.diag(believed_information(fit(0), stuck, stuck=True))
+    believed = np.diag(credible_information(fit(0), stuck, stuck=True))
     assert [name for name, known in zip(COORDINATES, believed, strict=True) if known == 0.0] == [
         "friction_rest",
         "friction_quadratic",
@@ -115,7 +115,7 @@ def _with(left: np.ndarray, *, pressure: bool = True) -> tuple[PointFit, np.ndar
 
 def test_without_pressure_an_atypical_actuator_has_a_wider_spread_of_the_pressure_scale() -> None:
     found, log = residual(np.zeros(100), pressure=False)
-    believed = believed_information(found, log)
+    believed = credible_information(found, log)
     along = PRESSURE_SCALE / np.linalg.norm(PRESSURE_SCALE)
     near, far = (
         float(along @ spread_of(replace(found, coordinates=found.coordinates + off), believed, log, centre) @ along)
@@ -188,9 +188,9 @@ def test_without_pressure_similarity_of_actuators_limits_the_spread_of_the_press
     spread = spread_of(found, np.zeros((7, 7)), log, ACTUATOR.conditions[0])
     known = spread_of(found, INFORMATION, log, ACTUATOR.conditions[0])
     along = PRESSURE_SCALE / np.linalg.norm(PRESSURE_SCALE)
-    assert float(along @ spread @ along) < float(along @ class_regions.WEAK @ along)
+    assert float(along @ spread @ along) < float(along @ class_regions.WEAK_PRIOR @ along)
     assert float(along @ known @ along) < float(along @ spread @ along)
-    assert 0.05**2 < ALIKE * class_regions.WITHIN[0, 0] < 0.1**2
+    assert 0.05**2 < ALIKE * class_regions.CONDITION_SPREAD[0, 0] < 0.1**2
 
 
 @pytest.mark.parametrize("name", [name for name in COORDINATES if name != "presliding"])
@@ -225,7 +225,7 @@ def test_the_pressure_scale_multiplies_pressure_and_leaves_motion_unchanged() ->
         for by in (1.0, -0.5)
     ]
     points = ACTUATOR.conditions[0] + 0.2 * np.vstack([np.zeros(7), PRESSURE_SCALE, others])
-    runs = predicted(log, parameter_rows(points, ACTUATOR.circuit, ACTUATOR.rated))[:, log.first :]
+    runs = predicted_outputs(log, parameter_rows(points, ACTUATOR.circuit, ACTUATOR.rated))[:, log.first :]
     size = np.sqrt(np.mean(runs[0] ** 2, axis=0))
     moved = np.sqrt(np.mean((runs - runs[0])[:, :, 0] ** 2, axis=1)) / size[0]
     assert moved[1] < 0.01
@@ -242,7 +242,7 @@ def test_the_covariance_is_the_weak_prior_without_information_and_vanishes_with_
         for scale in (0.0, 1e9)
     )
     nothing, everything = said
-    np.testing.assert_allclose(nothing, class_regions.WEAK, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(nothing, class_regions.WEAK_PRIOR, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(everything, 1e-9 * np.eye(7), rtol=2e-3, atol=1e-12)
 
 
@@ -266,7 +266,7 @@ def test_after_a_circuit_that_explains_the_log_no_search_starts_elsewhere(monkey
     drive = 100.0 * np.sign(np.sin(2.0 * np.pi * np.arange(3001) / 600.0))
     still = Blocks(drive, 1e-3, 10, np.zeros(300), np.zeros(300), np.array([2e-4, 2e4]))
     truth = 0.5 * ACTUATOR.conditions[0] + 0.5 * ACTUATOR.conditions[3]
-    run = predicted(still, parameter_rows(truth[None], ACTUATOR.circuit, ACTUATOR.rated))[0]
+    run = predicted_outputs(still, parameter_rows(truth[None], ACTUATOR.circuit, ACTUATOR.rated))[0]
     noise = still.noise * np.random.default_rng(2).standard_normal(run.shape)
     log = replace(still, velocity=(run + noise)[:, 0], pressure=(run + noise)[:, 1])
     begun: list[bool] = []
@@ -279,7 +279,7 @@ def test_after_a_circuit_that_explains_the_log_no_search_starts_elsewhere(monkey
     monkeypatch.setattr(class_regions, "fit_freely", counted)
     quick = fit_classes(log, ACTUATOR)
     assert begun.count(True) == 1
-    monkeypatch.setattr(class_regions, "explains", lambda *_: False)
+    monkeypatch.setattr(class_regions, "leaves_only_noise", lambda *_: False)
     whole = fit_classes(log, ACTUATOR)
     assert begun.count(True) > 2
     assert quick.best.cost < whole.best.cost + 0.5
@@ -292,14 +292,14 @@ def test_the_distance_of_conditions_shrinks_with_uncertainty_of_the_coordinates_
     sure, rubs = np.zeros((7, 7)), np.zeros((7, 7))
     for name in ("friction_rest", "friction_quadratic", "friction_rated"):
         rubs[COORDINATES.index(name), COORDINATES.index(name)] = 4.0
-    apart, unsure = told_apart(sure, ACTUATOR), told_apart(rubs, ACTUATOR)
+    apart, unsure = separations(sure, ACTUATOR), separations(rubs, ACTUATOR)
     normal, leaks, rubbing = (list(CONDITIONS).index(one) for one in ("normal", "minor_leakage", "minor_friction"))
     assert np.array_equal(apart, apart.T)
     assert not np.any(apart.diagonal())
     assert unsure[normal, rubbing] < 2.0 < 10.0 < apart[normal, rubbing]
     assert unsure[normal, leaks] == pytest.approx(apart[normal, leaks])
     off = ACTUATOR.conditions[leaks] - ACTUATOR.conditions[normal]
-    assert apart[normal, leaks] == pytest.approx(0.5 * off @ np.linalg.solve(WITHIN, off))
+    assert apart[normal, leaks] == pytest.approx(0.5 * off @ np.linalg.solve(CONDITION_SPREAD, off))
 
 
 @pytest.mark.parametrize("pressure", [True, False])
@@ -318,8 +318,8 @@ def test_without_pressure_a_log_is_outside_only_if_every_circuit_that_follows_it
     ends = iter((outside, inside, inside))
     monkeypatch.setattr(class_regions, "fit_freely", lambda *_: next(ends))
     fits = fit_classes(log, ACTUATOR, runs=np.zeros((9, 100, 1)))
-    alone = float(np.max(region_scores(fits.best, fits.told, ACTUATOR)))
+    alone = float(np.max(region_scores(fits.best, fits.discounted_information, ACTUATOR)))
     assert alone < -10.0
     seen = blocks(pressure=True) if pressure else log
     behind = float(log.counts[0]) / class_regions.LASTING * np.log(1.1)
-    assert how_near(fits, seen, ACTUATOR) == pytest.approx(alone if pressure else -behind)
+    assert nearest_score(fits, seen, ACTUATOR) == pytest.approx(alone if pressure else -behind)

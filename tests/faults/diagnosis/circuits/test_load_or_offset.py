@@ -9,7 +9,7 @@ import pytest
 from faults.diagnosis.circuits import load_or_offset, out_of_model
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.class_fit import fit_freely
-from faults.diagnosis.circuits.class_regions import fit_classes, how_near
+from faults.diagnosis.circuits.class_regions import fit_classes, nearest_score
 from faults.diagnosis.circuits.load_or_offset import load_for_offset
 from faults.diagnosis.circuits.out_of_model import reasons_against
 from faults.notes import AgainstCode
@@ -34,7 +34,7 @@ def log(force: float = 0.0, stiffness: float = 0.0, offset: float = 0.0) -> Bloc
 
 def said_of(blocks: Blocks) -> list[Note]:
     fits = fit_classes(blocks, ACTUATOR)
-    against = reasons_against(blocks, fits, how_near(fits, blocks, ACTUATOR), ACTUATOR)
+    against = reasons_against(blocks, fits, nearest_score(fits, blocks, ACTUATOR), ACTUATOR)
     return [note for note in against if note.code in CODES]
 
 
@@ -46,7 +46,7 @@ def test_a_load_is_named_with_its_rig_file_entry_and_an_offset_of_speed_as_an_of
     assert float(load.data["value"]) == pytest.approx(700.0, rel=0.3)
     (offset,) = said_of(log(offset=6.0))
     assert offset.code is AgainstCode.SPEED_BIAS
-    monkeypatch.setattr(load_or_offset, "APART", 1e4)
+    monkeypatch.setattr(load_or_offset, "NAMED_ALONE_GAIN", 1e4)
     (either,) = said_of(log(offset=6.0))
     assert either.code is AgainstCode.LOAD_OR_OFFSET
     assert float(either.data["bias_rad_s"]) == float(offset.data["bias_rad_s"])
@@ -63,6 +63,6 @@ def test_a_spring_is_distinguished_from_a_constant_load() -> None:
 
 def test_neither_load_nor_offset_is_named_if_no_circuit_follows_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (load_or_offset, out_of_model):
-        monkeypatch.setattr(module, "follows", lambda *_: False)
+        monkeypatch.setattr(module, "follows_velocity", lambda *_: False)
     assert not said_of(log(force=700.0))
     assert not said_of(log(offset=6.0))

@@ -8,26 +8,26 @@ import pytest
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import COLUMN, COORDINATES, parameter_rows, predicted
-from faults.diagnosis.circuits.class_fit import WEAK, PointFit, least_scales
+from faults.diagnosis.circuits.circuit_runs import COLUMN, COORDINATES, parameter_rows, predicted_outputs
+from faults.diagnosis.circuits.class_fit import WEAK_PRIOR, PointFit, least_scales
 from faults.diagnosis.circuits.model_doubt import (
     LOOKS,
     NOISE_ALONE,
-    RIGHT,
+    RIGHT_SHARE,
     SELDOM_KNOWN,
-    doubt_of,
-    left_of,
+    error_moment,
+    local_variance,
     model_error,
-    near_by,
+    residuals_of,
     seldom_known_slopes,
-    spreads_of,
+    seldom_known_spreads,
 )
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 
 ACTUATOR = actuator_of(EhaParameters())
 CENTRE, SURE, ALL = ACTUATOR.conditions[:1], np.zeros(1), np.ones(7)
-SPREADS = spreads_of(ACTUATOR)
+SPREADS = seldom_known_spreads(ACTUATOR)
 NOISE = np.array([1e-4, 1e3])
 
 
@@ -59,12 +59,12 @@ def nothing_seldom(blocks: int) -> np.ndarray:
 
 
 def wrong(fit: PointFit, blocks: Blocks) -> np.ndarray:
-    return model_error(left_of(fit, blocks), blocks)
+    return model_error(residuals_of(fit, blocks), blocks)
 
 
 def variances(blocks: int, share: float = 0.0) -> np.ndarray:
     fit, one = told(blocks, share)
-    return np.diag(doubt_of(fit, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS))
+    return np.diag(error_moment(fit, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS))
 
 
 def test_noise_averages_out_in_a_longer_log_and_a_model_error_does_not() -> None:
@@ -77,7 +77,9 @@ def test_a_model_error_averages_over_ten_looks_and_noise_over_all_blocks() -> No
     seen = blocks - log(blocks).first
     beyond = 1.0 - NOISE_ALONE**2 * (1.0 - share)
     variance = 7.0 / (2.0 * seen) * (1.0 + beyond * seen / LOOKS) / (1.0 - share)
-    assert variances(blocks, share)[0] == pytest.approx(1.0 / (1.0 / variance + np.linalg.inv(WEAK)[0, 0]), rel=0.01)
+    assert variances(blocks, share)[0] == pytest.approx(
+        1.0 / (1.0 / variance + np.linalg.inv(WEAK_PRIOR)[0, 0]), rel=0.01
+    )
 
 
 def test_residuals_within_the_uncertainty_of_the_noise_are_not_a_model_error() -> None:
@@ -96,7 +98,7 @@ def test_noise_of_a_differenced_position_is_anticorrelated_between_blocks(slope:
     weight = slopes[0, one.first :, 0] / NOISE[0]
     drawn = np.var(np.diff(noise, axis=1)[:, one.first :] @ weight / np.sum(weight**2))
     white, differenced = (
-        doubt_of(lone, nothing_seldom(430), blocks, CENTRE, SURE, ALL, SPREADS)[0, 0]
+        error_moment(lone, nothing_seldom(430), blocks, CENTRE, SURE, ALL, SPREADS)[0, 0]
         for blocks in (one, replace(one, differenced=True))
     )
     assert white == pytest.approx(1.0 / np.sum(weight**2), rel=0.02)
@@ -126,7 +128,7 @@ def test_a_fast_log_followed_to_its_noise_shows_no_model_error() -> None:
     assert followed.scales[0] == pytest.approx(NOISE[0], rel=1e-3)
     assert np.array_equal(wrong(followed, quiet), np.zeros(2))
     sure, as_loud = (
-        doubt_of(each, nothing_seldom(14_010), blocks, CENTRE, SURE, ALL, SPREADS)[0, 0]
+        error_moment(each, nothing_seldom(14_010), blocks, CENTRE, SURE, ALL, SPREADS)[0, 0]
         for each, blocks in ((followed, quiet), (fit, one))
     )
     assert sure == pytest.approx(0.3**2 * as_loud, rel=0.01)
@@ -138,7 +140,7 @@ def test_with_a_model_error_the_noise_of_a_position_counts_as_white() -> None:
     up = np.where(np.arange(410) // 2 % 2, 1.0, -1.0)[:, None]
     steady = replace(fit, slopes=fit.slopes + NOISE, fitted=one.outputs - up * fit.scales)
     white, differenced = (
-        doubt_of(steady, nothing_seldom(410), blocks, CENTRE, SURE, ALL, SPREADS)
+        error_moment(steady, nothing_seldom(410), blocks, CENTRE, SURE, ALL, SPREADS)
         for blocks in (one, replace(one, differenced=True))
     )
     np.testing.assert_array_equal(white, differenced)
@@ -153,7 +155,7 @@ def test_a_lasting_error_below_the_noise_of_a_block_is_detected() -> None:
     assert np.array_equal(wrong(alone, one), np.zeros(2))
     assert wrong(lasting, one) == pytest.approx((0.4 * NOISE) ** 2, rel=0.2)
     wide, narrow = (
-        doubt_of(each, nothing_seldom(14_010), one, CENTRE, SURE, ALL, SPREADS) for each in (lasting, alone)
+        error_moment(each, nothing_seldom(14_010), one, CENTRE, SURE, ALL, SPREADS) for each in (lasting, alone)
     )
     assert wide[0, 0] > 20.0 * narrow[0, 0]
 
@@ -162,18 +164,18 @@ def test_a_local_model_error_widens_only_coordinates_that_act_there() -> None:
     left = np.zeros((1_000, 1))
     left[100:200] = 2.0
     seen = np.ones((1_000, 1), dtype=bool)
-    assert near_by(left, seen)[150] == pytest.approx(10.0)
-    assert near_by(left, seen)[300] == 0.0
-    assert np.all(near_by(0.0 * left, seen) == 1.0)
+    assert local_variance(left, seen)[150] == pytest.approx(10.0)
+    assert local_variance(left, seen)[300] == 0.0
+    assert np.all(local_variance(0.0 * left, seen) == 1.0)
     seen[150:160] = False
-    assert near_by(np.where(seen, left, 0.0), seen)[155] == pytest.approx(990 / 90)
+    assert local_variance(np.where(seen, left, 0.0), seen)[155] == pytest.approx(990 / 90)
     blocks = 14_010
     fit, one = told(blocks, 0.5)
     slopes = np.zeros_like(fit.slopes)
     slopes[0, : blocks // 2] = slopes[1, blocks // 2 :] = 30.0 * NOISE
     here = np.where(np.arange(blocks) < blocks // 2, 2.0, 0.0)[:, None] * NOISE * (-1.0) ** np.arange(blocks)[:, None]
     errs = replace(fit, slopes=slopes, fitted=one.outputs - here)
-    found = np.diag(doubt_of(errs, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS))
+    found = np.diag(error_moment(errs, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS))
     assert found[0] > 50.0 * found[1]
 
 
@@ -182,7 +184,7 @@ def test_an_error_in_one_output_leaves_the_information_of_the_other() -> None:
     velocity_off = leaving(fit, one, NOISE * [10.0, 1.0])
     both_off = leaving(fit, one, NOISE * 10.0)
     sure, less, least = (
-        doubt_of(one_fit, nothing_seldom(1_410), one, CENTRE, SURE, ALL, SPREADS)[0, 0]
+        error_moment(one_fit, nothing_seldom(1_410), one, CENTRE, SURE, ALL, SPREADS)[0, 0]
         for one_fit in (fit, velocity_off, both_off)
     )
     assert less == pytest.approx(2.0 * sure, rel=0.1)  # pressure still contributes all its information
@@ -196,11 +198,13 @@ def test_a_rarely_known_parameter_widens_a_coordinate_with_the_same_effect() -> 
     alike[1] = fit.slopes[0]
     apart[1] = fit.slopes[0] * np.where(np.arange(blocks) % 2, 3.0, -1.0)[:, None]
     sure, open_, seen = (
-        np.sqrt(doubt_of(fit, seldom, one, CENTRE, SURE, ALL, SPREADS)[0, 0])
+        np.sqrt(error_moment(fit, seldom, one, CENTRE, SURE, ALL, SPREADS)[0, 0])
         for seldom in (nothing_seldom(blocks), alike, apart)
     )
-    weak, valve = WEAK[0, 0], SELDOM_KNOWN["makeup_opening"] ** 2
-    odds = RIGHT / (1.0 - RIGHT) * np.sqrt((weak + valve) / weak)  # the log agrees with the rig file's valve
+    weak, valve = WEAK_PRIOR[0, 0], SELDOM_KNOWN["makeup_opening"] ** 2
+    odds = (
+        RIGHT_SHARE / (1.0 - RIGHT_SHARE) * np.sqrt((weak + valve) / weak)
+    )  # the log agrees with the rig file's valve
     assert open_**2 == pytest.approx(weak * valve / (weak + valve) / (1.0 + odds), rel=0.03)
     assert sure < seen < 2.0 * sure
 
@@ -212,8 +216,8 @@ def test_residuals_like_the_effect_of_a_rarely_known_parameter_widen_a_coordinat
     seldom[1] = fit.slopes[0] + fit.slopes[1] * 0.5
     rest = seldom[1] - fit.slopes[0]  # the remainder if the first coordinate is free and the second is fixed
     given_way = replace(fit, slopes=fit.slopes * np.array([1, 0, 1, 1, 1, 1, 1])[:, None, None])
-    without = doubt_of(given_way, seldom, one, CENTRE, SURE, ALL, SPREADS)[0, 0]
-    strayed = doubt_of(replace(given_way, fitted=one.outputs - by * rest), seldom, one, CENTRE, SURE, ALL, SPREADS)[
+    without = error_moment(given_way, seldom, one, CENTRE, SURE, ALL, SPREADS)[0, 0]
+    strayed = error_moment(replace(given_way, fitted=one.outputs - by * rest), seldom, one, CENTRE, SURE, ALL, SPREADS)[
         0, 0
     ]
     assert np.sqrt(strayed - without) == pytest.approx(by, rel=0.05)
@@ -223,9 +227,9 @@ def test_the_uncertainty_of_a_force_from_the_log_is_added_in_full() -> None:
     blocks = 1_410
     fit, one = told(blocks)
     force = np.concatenate([nothing_seldom(blocks), fit.slopes[:1]])
-    open_ = doubt_of(fit, force, one, CENTRE, SURE, ALL, np.append(SPREADS, 0.1))[0, 0]
-    sure = doubt_of(fit, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS)[0, 0]
-    assert open_ - sure == pytest.approx(0.1**2 * WEAK[0, 0] / (0.1**2 + WEAK[0, 0]), rel=0.05)
+    open_ = error_moment(fit, force, one, CENTRE, SURE, ALL, np.append(SPREADS, 0.1))[0, 0]
+    sure = error_moment(fit, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS)[0, 0]
+    assert open_ - sure == pytest.approx(0.1**2 * WEAK_PRIOR[0, 0] / (0.1**2 + WEAK_PRIOR[0, 0]), rel=0.05)
 
 
 def test_the_friction_of_a_stuck_piston_has_the_spread_of_all_likely_conditions() -> None:
@@ -236,11 +240,11 @@ def test_the_friction_of_a_stuck_piston_has_the_spread_of_all_likely_conditions(
     two = ACTUATOR.conditions[[0, 4]]
     apart = two[1, rated] - two[0, rated]
     alone, even, unlikely = (
-        doubt_of(fit, nothing_seldom(blocks), one, two, odds, hidden, SPREADS)
+        error_moment(fit, nothing_seldom(blocks), one, two, odds, hidden, SPREADS)
         for odds in (np.array([0.0, -1e3]), np.zeros(2), np.array([0.0, -20.0]))
     )
-    assert alone[rated, rated] == pytest.approx(WEAK[rated, rated], rel=1e-6)
-    assert even[rated, rated] == pytest.approx(WEAK[rated, rated] + 0.5 * apart**2, rel=1e-6)
+    assert alone[rated, rated] == pytest.approx(WEAK_PRIOR[rated, rated], rel=1e-6)
+    assert even[rated, rated] == pytest.approx(WEAK_PRIOR[rated, rated] + 0.5 * apart**2, rel=1e-6)
     assert unlikely[rated, rated] == pytest.approx(alone[rated, rated], rel=1e-3)
     assert even[0, 0] < 0.01 * even[rated, rated]
 
@@ -252,7 +256,7 @@ def fitted(at: int) -> tuple[PointFit, Blocks, np.ndarray]:
     one = Blocks(speed, 1e-3, 10, np.zeros(count), np.zeros(count), NOISE)
     centre = ACTUATOR.conditions[at]
     (row,) = parameter_rows(centre[None], ACTUATOR.circuit, ACTUATOR.rated)
-    (run,) = predicted(one, row[None])
+    (run,) = predicted_outputs(one, row[None])
     return PointFit(centre, 0.0, np.eye(7), NOISE, run, np.zeros((7, count, 2))), one, row
 
 
@@ -260,7 +264,7 @@ def nudged(fit: PointFit, one: Blocks, row: np.ndarray, name: str, by: float) ->
     """Return the change of the outputs for a change of one parameter."""
     other = row.copy()
     other[COLUMN[name]] += by
-    return predicted(one, other[None])[0] - fit.fitted
+    return predicted_outputs(one, other[None])[0] - fit.fitted
 
 
 def same(slope: np.ndarray, expected: np.ndarray) -> bool:

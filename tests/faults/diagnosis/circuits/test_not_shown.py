@@ -4,8 +4,8 @@ import numpy as np
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_fit import WEAK
-from faults.diagnosis.circuits.not_shown import BLIND, FRICTION_LAW, not_shown
+from faults.diagnosis.circuits.class_fit import WEAK_PRIOR
+from faults.diagnosis.circuits.not_shown import BLIND_RATIO, FRICTION_LAW, undetermined_coordinates
 from faults.diagnosis.diagnose import diagnose_log
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -18,10 +18,10 @@ from tests.faults.diagnosis.test_severity import fits
 
 def test_coordinates_that_a_log_hardly_narrows_are_not_shown() -> None:
     narrowed = np.array([20.0 if name.startswith("friction") else 0.2 for name in COORDINATES])
-    found = not_shown(fits(np.diag(narrowed**2 * np.diag(WEAK))))
+    found = undetermined_coordinates(fits(np.diag(narrowed**2 * np.diag(WEAK_PRIOR))))
     assert found >= FRICTION_LAW
     assert all(name.startswith("friction") for name in found)
-    assert not_shown(fits(BLIND**2 * 0.1 * WEAK)) == frozenset()
+    assert undetermined_coordinates(fits(BLIND_RATIO**2 * 0.1 * WEAK_PRIOR)) == frozenset()
 
 
 def test_without_pressure_a_stuck_piston_leaves_bulk_modulus_and_friction_undetermined() -> None:

@@ -8,7 +8,7 @@ import pytest
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.open_classes import OPEN, OpenCircuit, circuits_left_open
+from faults.diagnosis.circuits.open_classes import LEAST_PROBABILITY, OpenCircuit, circuits_left_open
 from faults.diagnosis.severity import severities, severities_at
 from hydrostate import read
 from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes
@@ -23,7 +23,10 @@ def likely(**shares: float) -> dict[str, float]:
 
 def test_only_the_best_circuit_is_kept_if_the_class_is_certain() -> None:
     (only,) = circuits_left_open(
-        blocks(), classes(), ACTUATOR, likely(**{NEAREST: 1.0 - 0.9 * OPEN, OTHER: 0.9 * OPEN})
+        blocks(),
+        classes(),
+        ACTUATOR,
+        likely(**{NEAREST: 1.0 - 0.9 * LEAST_PROBABILITY, OTHER: 0.9 * LEAST_PROBABILITY}),
     )
     assert only.coordinates is classes().best.coordinates
 
@@ -40,7 +43,7 @@ def test_a_second_likely_class_gets_its_best_fitting_circuit() -> None:
 
 def test_the_best_circuit_is_kept_even_if_other_evidence_excludes_its_class() -> None:
     first, second = circuits_left_open(blocks(), classes(), ACTUATOR, likely(**{OTHER: 1.0}))
-    assert (first.probability, second.probability) == (OPEN, 1.0)
+    assert (first.probability, second.probability) == (LEAST_PROBABILITY, 1.0)
 
 
 def test_no_second_circuit_is_kept_without_pressure_or_for_a_stuck_piston() -> None:
@@ -53,7 +56,7 @@ def test_no_second_circuit_is_kept_without_pressure_or_for_a_stuck_piston() -> N
 
 def test_the_interval_spans_all_circuits_and_the_value_is_that_of_the_likeliest() -> None:
     sound, rubbing = (ACTUATOR.conditions[NAMES.index(name)] for name in ("normal", "minor_friction"))
-    known = replace(classes(), best=replace(classes().best, coordinates=sound), spreading=lambda: 1e-8 * np.eye(7))
+    known = replace(classes(), best=replace(classes().best, coordinates=sound), compute_spread=lambda: 1e-8 * np.eye(7))
     exact = {name: severities_at(point, ACTUATOR)["added_friction"] for name, point in (("s", sound), ("r", rubbing))}
     for share, value in ((0.6, "s"), (0.3, "r")):
         both = [OpenCircuit(sound, share), OpenCircuit(rubbing, 1.0 - share)]

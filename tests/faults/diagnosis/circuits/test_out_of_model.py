@@ -8,22 +8,22 @@ from functools import cache
 import numpy as np
 import pytest
 
-from estimation.eha.rig_share import SOFT
+from estimation.eha.rig_share import SOFT_OIL_RATIO
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_fit import PointFit, scales_of
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
 from faults.diagnosis.circuits.out_of_model import (
-    EARLIER,
+    AVERAGING_TIME,
     LEAST_BIAS,
-    STICKS,
+    SEAL_YIELD,
     reasons_against,
-    unexplained,
+    unexplained_notes,
 )
 from faults.diagnosis.circuits.region_scores import region_scores
-from faults.diagnosis.circuits.yielding import UNEXPLAINED, YIELDING
+from faults.diagnosis.circuits.yielding import UNEXPLAINED, YIELDING_SHARE
 from faults.notes import AgainstCode
 from plant.eha.model import EhaParameters
 from plant.notes import Note
@@ -45,7 +45,7 @@ def run_of(place: tuple[float, ...], dwell: int = 1000, pump: float = 1.0) -> Bl
     empty = np.zeros(len(speed) // 10)
     blank = Blocks(np.append(speed, speed[-1]), 1e-3, 10, empty, empty, NOISE)
     circuit = replace(ACTUATOR.circuit, pump_displacement=pump * ACTUATOR.circuit.pump_displacement)
-    (found,) = predicted(blank, parameter_rows(np.array([place]), circuit, ACTUATOR.rated))
+    (found,) = predicted_outputs(blank, parameter_rows(np.array([place]), circuit, ACTUATOR.rated))
     return replace(blank, velocity=found[:, 0], pressure=found[:, 1])
 
 
@@ -54,7 +54,7 @@ def slopes_of(place: tuple[float, ...]) -> np.ndarray:
     """Return the derivatives of a circuit's outputs with respect to its coordinates."""
     point = np.array(place)
     rows = parameter_rows(np.vstack([point, point + 0.02 * np.eye(len(point))]), ACTUATOR.circuit, ACTUATOR.rated)
-    runs = predicted(run_of(place), rows)
+    runs = predicted_outputs(run_of(place), rows)
     return (runs[1:] - runs[0]) / 0.02
 
 
@@ -101,7 +101,7 @@ def test_a_pressure_of_0_throughout_is_wholly_unexplained_without_a_numpy_warnin
     log = healthy()
     dead = replace(log, pressure=np.zeros(len(log.velocity)))
     with warnings.catch_warnings(action="error"):
-        (said,) = unexplained(dead, fitted(dead, ACTUATOR.conditions[0]), ACTUATOR)
+        (said,) = unexplained_notes(dead, fitted(dead, ACTUATOR.conditions[0]), ACTUATOR)
     assert (said.data["channel"], said.data["percent"]) == ("differential pressure", np.inf)
 
 
@@ -137,7 +137,7 @@ def test_an_oil_less_than_half_or_more_than_twice_as_stiff_is_an_objection(share
     assert said[code].data["share"] == pytest.approx(share)
     near = shifted(bulk_modulus=float(np.log(0.75 if share < 1.0 else 1.3)))
     assert not {AgainstCode.OIL_SOFT, AgainstCode.OIL_STIFF} & set(reasons(run_of(tuple(near.tolist())), near))
-    assert 0.4 < SOFT < 0.75
+    assert 0.4 < SOFT_OIL_RATIO < 0.75
 
 
 @pytest.mark.parametrize(("known", "said"), [(0.01, True), (0.3, False)])
@@ -188,19 +188,19 @@ def jumping(jump: float, *, pressure_left: float = 0.0, drift: float = 0.0, pres
 
 
 def test_stick_slip_at_other_times_is_explained_if_its_travel_and_pressure_are_followed() -> None:
-    yielded = STICKS * ACTUATOR.circuit.presliding_displacement
+    yielded = SEAL_YIELD * ACTUATOR.circuit.presliding_displacement
     assert yielded == pytest.approx(54e-6, rel=0.01)
     assert not jumping(1e-4)
     assert jumping(3e-4)
     assert jumping(1e-4, pressure_left=1.2 * UNEXPLAINED[1])
-    assert jumping(1e-4, drift=1.1 * yielded / EARLIER)
+    assert jumping(1e-4, drift=1.1 * yielded / AVERAGING_TIME)
     assert jumping(1e-4, pressure=False)
 
 
 def test_without_pressure_a_log_whose_motion_no_circuit_follows_is_unexplained() -> None:
     place = ACTUATOR.conditions[0]
     log, pump = healthy(), ACTUATOR.circuit.pump_displacement / ACTUATOR.circuit.piston_area
-    left = 0.5 * YIELDING * pump * float(np.sqrt(np.mean(log.speed**2)))
+    left = 0.5 * YIELDING_SHARE * pump * float(np.sqrt(np.mean(log.speed**2)))
     velocity = left * np.where(np.arange(len(log.velocity)) % 20 < 10, 1.0, -1.0)
     alone = replace(log, velocity=velocity, pressure=None, noise=NOISE[:1])
     whole = fitted(log, place)

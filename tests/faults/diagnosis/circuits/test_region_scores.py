@@ -7,8 +7,13 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import PointFit
-from faults.diagnosis.circuits.friction_shape import told_of_bent
-from faults.diagnosis.circuits.region_scores import apart_in_forces, region_scores, scores_in_forces, told_apart
+from faults.diagnosis.circuits.friction_shape import bent_information
+from faults.diagnosis.circuits.region_scores import (
+    region_scores,
+    scores_in_forces,
+    separations,
+    separations_in_forces,
+)
 from plant.eha.model import EhaParameters
 
 ACTUATOR = actuator_of(EhaParameters())
@@ -42,7 +47,7 @@ def test_scores_in_forces_favor_stronger_friction_less_than_logarithmic_scores()
     middle[[QUADRATIC, RATED]] = np.log([quadratic, rated])
     moved = np.zeros((7, 2))
     moved[QUADRATIC, 0] = moved[RATED, 1] = 1.0
-    told = told_of_bent(KNOWN, moved)
+    told = bent_information(KNOWN, moved)
     straight, forces = (scores(at(middle), told, ACTUATOR) for scores in (region_scores, scores_in_forces))
     assert straight[NORMAL] - straight[RUBS] < -1.0
     assert abs(forces[NORMAL] - forces[RUBS]) < abs(straight[NORMAL] - straight[RUBS])
@@ -52,8 +57,8 @@ def test_distances_in_forces_equal_those_in_logarithms_unless_friction_is_uncert
     fit = at(ACTUATOR.conditions[RUBS])
     wide = np.zeros((7, 7))
     wide[QUADRATIC, QUADRATIC] = wide[RATED, RATED] = 4.0
-    apart = apart_in_forces(fit, wide, ACTUATOR)
+    apart = separations_in_forces(fit, wide, ACTUATOR)
     assert np.array_equal(apart, apart.T)
-    assert apart[NORMAL, RUBS] < 1.0 < 10.0 < apart_in_forces(fit, 0.0 * wide, ACTUATOR)[NORMAL, RUBS]
+    assert apart[NORMAL, RUBS] < 1.0 < 10.0 < separations_in_forces(fit, 0.0 * wide, ACTUATOR)[NORMAL, RUBS]
     leaks = list(CONDITIONS).index("minor_leakage_minor_friction")
-    assert apart[RUBS, leaks] == pytest.approx(told_apart(0.0 * wide, ACTUATOR)[RUBS, leaks])
+    assert apart[RUBS, leaks] == pytest.approx(separations(0.0 * wide, ACTUATOR)[RUBS, leaks])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from faults.diagnosis.circuits.blocks import blocks_of
-from faults.diagnosis.circuits.two_sensors import sensors_disagree
+from faults.diagnosis.circuits.two_sensors import sensor_disagreements
 from plant.log.record import Record
 
 
@@ -25,7 +25,7 @@ def with_two_sensors(gain: float, noise: float) -> Record:
 @pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (1.03, False), (1.08, True), (0.9, True), (-1.0, True)])
 def test_velocity_and_the_encoders_slope_may_differ_by_five_percent(gain: float, differs: bool) -> None:
     record = with_two_sensors(gain, 1e-6)
-    assert bool(sensors_disagree(record, blocks_of(record))) == differs
+    assert bool(sensor_disagreements(record, blocks_of(record))) == differs
 
 
 @pytest.mark.parametrize(("gain", "noise", "differs"), [(1.0, 0.05, False), (1.2, 1e-3, True)])
@@ -33,7 +33,7 @@ def test_noise_of_a_velocity_sensor_excuses_only_differences_of_its_size(
     gain: float, noise: float, differs: bool
 ) -> None:
     record = with_two_sensors(gain, noise)
-    assert bool(sensors_disagree(record, blocks_of(record))) == differs
+    assert bool(sensor_disagreements(record, blocks_of(record))) == differs
 
 
 @pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (0.7, True)])
@@ -44,25 +44,25 @@ def test_filtered_noise_alone_does_not_make_the_sensors_disagree(gain: float, di
         noise = np.convolve(noise, np.full(6, 1.0 / 6.0), "same")
     record = with_two_sensors(gain, 1e-6)
     wandering = record.replace(velocity_m_s=record["velocity_m_s"] + noise[: len(record)])
-    assert bool(sensors_disagree(wandering, blocks_of(wandering))) == differs
+    assert bool(sensor_disagreements(wandering, blocks_of(wandering))) == differs
 
 
 def test_a_single_sensor_cannot_disagree() -> None:
     record = with_two_sensors(2.0, 1e-6).replace(position_m=None)
-    assert not sensors_disagree(record, blocks_of(record))
+    assert not sensor_disagreements(record, blocks_of(record))
 
 
 def test_sensors_without_common_samples_do_not_disagree() -> None:
     record = with_two_sensors(2.0, 1e-6)
     early = np.where(np.arange(len(record)) < 60, record["velocity_m_s"], np.nan)
     apart = record.replace(velocity_m_s=early)
-    assert not sensors_disagree(apart, blocks_of(apart))
+    assert not sensor_disagreements(apart, blocks_of(apart))
 
 
 def test_the_noise_of_a_velocity_in_every_other_row_excuses_a_difference() -> None:
     record = with_two_sensors(1.0, 0.05)
     slow = record.replace(velocity_m_s=np.where(np.arange(len(record)) % 2, np.nan, record["velocity_m_s"]))
-    assert not sensors_disagree(slow, blocks_of(slow))
+    assert not sensor_disagreements(slow, blocks_of(slow))
 
 
 @pytest.mark.parametrize("rows", [1, 20])
@@ -74,9 +74,9 @@ def test_a_coarse_log_of_fast_motion_does_not_make_sound_sensors_disagree(rows: 
     position = np.concatenate(([0.0], np.cumsum(velocity[:-1]) * 1e-3))
     channels = {"motor_speed_rad_s": 2e3 * velocity, "position_m": position, "velocity_m_s": velocity}
     record = Record(rows * 1e-3, {name: values[::rows] for name, values in channels.items()})
-    assert not sensors_disagree(record, blocks_of(record))
+    assert not sensor_disagreements(record, blocks_of(record))
     wrong = record.replace(velocity_m_s=-record["velocity_m_s"])
-    assert sensors_disagree(wrong, blocks_of(wrong))
+    assert sensor_disagreements(wrong, blocks_of(wrong))
 
 
 def test_fast_changes_within_a_block_do_not_make_sound_sensors_disagree() -> None:
@@ -89,6 +89,6 @@ def test_fast_changes_within_a_block_do_not_make_sound_sensors_disagree() -> Non
         "velocity_m_s": 0.05 * np.cos(turned),
     }
     record = Record(1e-3, channels)
-    assert not sensors_disagree(record, blocks_of(record))
+    assert not sensor_disagreements(record, blocks_of(record))
     wrong = record.replace(velocity_m_s=1.08 * record["velocity_m_s"])
-    assert sensors_disagree(wrong, blocks_of(wrong))
+    assert sensor_disagreements(wrong, blocks_of(wrong))

@@ -7,7 +7,7 @@ import pytest
 
 from faults.diagnosis.circuits.class_fit import scales_of
 from faults.diagnosis.circuits.out_of_model import reasons_against
-from faults.diagnosis.circuits.yielding import YIELDING
+from faults.diagnosis.circuits.yielding import YIELDING_SHARE
 from faults.notes import AgainstCode
 from tests.faults.diagnosis.circuits.test_out_of_model import ACTUATOR, NOISE, fitted, healthy
 
@@ -34,11 +34,11 @@ def creeping_is_unexplained(share: float, followed: float, *, pressure: bool) ->
 
 @pytest.mark.parametrize("pressure", [True, False])
 def test_a_piston_that_only_yields_on_its_seals_is_explained_by_a_rough_fit(*, pressure: bool) -> None:
-    assert not creeping_is_unexplained(0.7 * YIELDING, 2.0, pressure=pressure)
-    assert creeping_is_unexplained(1.5 * YIELDING, 2.0, pressure=pressure)
+    assert not creeping_is_unexplained(0.7 * YIELDING_SHARE, 2.0, pressure=pressure)
+    assert creeping_is_unexplained(1.5 * YIELDING_SHARE, 2.0, pressure=pressure)
 
 
 def test_without_pressure_a_circuit_must_explain_half_of_a_creeping_motion() -> None:
-    assert creeping_is_unexplained(0.7 * YIELDING, 0.8, pressure=False)
-    assert not creeping_is_unexplained(0.7 * YIELDING, 0.8, pressure=True)
-    assert not creeping_is_unexplained(0.7 * YIELDING, 1.2, pressure=False)
+    assert creeping_is_unexplained(0.7 * YIELDING_SHARE, 0.8, pressure=False)
+    assert not creeping_is_unexplained(0.7 * YIELDING_SHARE, 0.8, pressure=True)
+    assert not creeping_is_unexplained(0.7 * YIELDING_SHARE, 1.2, pressure=False)

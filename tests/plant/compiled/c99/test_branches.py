@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from plant.compiled.c99.branches import LEAST, blocks_of
+from plant.compiled.c99.branches import FEWEST_OPERATIONS, blocks_of
 from plant.compiled.c99.lines import c_lines
 from plant.compiled.c99.precision import DOUBLE
 from plant.compiled.expression import Expression, ordered, select, symbol, unary
@@ -67,7 +67,7 @@ def test_a_choice_with_few_operations_stays_a_conditional_expression() -> None:
     assert found(little) == 0
     assert not any(re.search(r"\bif\b", line) for line in c_lines(little, {"x": "x", "y": "y"}, {"a": "a"}, DOUBLE))
     grown = X
-    for _ in range(LEAST):
+    for _ in range(FEWEST_OPERATIONS):
         grown = unary("abs", grown + 1.0)
     assert found({"a": where(POSITIVE, grown, Y)}) == 1
 

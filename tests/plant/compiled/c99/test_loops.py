@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from plant.arrays import Array
-from plant.compiled.c99.loops import Outside, Translation
+from plant.compiled.c99.loops import ExternalFunction, Translation
 from plant.compiled.c99.precision import DOUBLE
 from plant.compiled.c99.shapes import Block, Scalar, Thing
 from tests.c_compiler import compiled, ran
@@ -79,7 +79,7 @@ int main(void)
 @pytest.mark.parametrize("using", ["gcc", "clang"])
 def test_a_loop_gives_the_same_numbers_in_c_as_in_python(tmp_path: Path, using: str) -> None:
     written = translation()
-    written.entered("work", GIVEN)
+    written.translate("work", GIVEN)
     text = f"#include <math.h>\n#include <stdio.h>\n{written.text}\n{MAIN}"
     out, _ = ran(compiled(tmp_path, {"loops.c": text}, using=using), [""])
     table = np.array([[0.5, 1.5, 4.0], [2.0, -3.0, 1.0], [8.0, 0.25, 0.125]])
@@ -90,22 +90,22 @@ def test_a_loop_gives_the_same_numbers_in_c_as_in_python(tmp_path: Path, using: 
 
 
 def test_an_array_that_is_only_read_is_const() -> None:
-    found = translation().entered("spread", [Block("values", (4,), "values")])
+    found = translation().translate("spread", [Block("values", (4,), "values")])
     assert "const double *values" in found.text
     assert found.written == (False,)
     assert found.results == (False, False)
 
 
 def test_the_largest_operation_count_includes_all_loops_and_called_functions() -> None:
-    counted = translation().entered("spread", [Block("values", (4,), "values")]).operations
+    counted = translation().translate("spread", [Block("values", (4,), "values")]).operations
     assert counted == Counter({"additions": 4 + 8, "divisions": 1, "choices and comparisons": 8})
-    assert translation().entered("work", GIVEN).operations["square roots"] == 1
+    assert translation().translate("work", GIVEN).operations["square roots"] == 1
 
 
 def test_a_function_already_written_in_c_is_called_by_its_c_name() -> None:
-    outside = {"doubled": Outside("theirs", (True, False), Counter({"products": 5}))}
+    outside = {"doubled": ExternalFunction("theirs", (True, False), Counter({"products": 5}))}
     written = Translation({"spread": spread, "work": work}, {"SHIFT": 2}, outside, DOUBLE, "mine")
-    assert written.entered("work", GIVEN).operations["products"] >= 15
+    assert written.translate("work", GIVEN).operations["products"] >= 15
     assert "theirs(" in written.text
 
 
@@ -128,9 +128,9 @@ def test_a_while_loop_and_a_swap_of_two_numbers_are_refused() -> None:
     functions = {one.__name__: one for one in (endless, swapped)}
     written = Translation(functions, {}, {}, DOUBLE, "mine")
     with pytest.raises(NotImplementedError, match="while"):
-        written.entered("endless", [Block("values", (2,), "values")])
+        written.translate("endless", [Block("values", (2,), "values")])
     with pytest.raises(NotImplementedError, match="none of what is translated"):
-        written.entered("swapped", [Scalar("a"), Scalar("b")])
+        written.translate("swapped", [Scalar("a"), Scalar("b")])
 
 
 def of_other_shape(values: Array, table: Array) -> None:
@@ -227,7 +227,7 @@ def test_code_outside_the_translated_subset_is_refused(function: Callable[..., o
         "scale": Scalar("scale"),
     }
     with pytest.raises(NotImplementedError, match="none of what is translated to C"):
-        written.entered("f", [known[name] for name in inspect.signature(function).parameters])
+        written.translate("f", [known[name] for name in inspect.signature(function).parameters])
 
 
 def scaled(values: Array, scale: float) -> float:
@@ -239,8 +239,8 @@ def scaled(values: Array, scale: float) -> float:
 
 def test_pi_an_array_length_and_a_test_for_nan_are_translated() -> None:
     written = Translation({"scaled": scaled}, {}, {}, DOUBLE, "mine")
-    text = written.entered("scaled", [Block("values", (4,), "values"), Scalar("scale")]).text
+    text = written.translate("scaled", [Block("values", (4,), "values"), Scalar("scale")]).text
     assert "!isnan(scale)" in text
     assert "3.141592653589793" in text
     assert "((double)4)" in text
-    assert written.entered("scaled", [Block("other", (4,), "other"), Scalar("by")]).text == text
+    assert written.translate("scaled", [Block("other", (4,), "other"), Scalar("by")]).text == text

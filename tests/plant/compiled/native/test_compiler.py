@@ -12,12 +12,12 @@ from plant.arrays import Array
 from plant.compiled.native.kinds import KernelError
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature
-from plant.compiled.paste import pasted
+from plant.compiled.paste import functions_text
 
 
 def compiled(takes: str, *functions: Callable[..., Any]) -> Callable[..., Any]:
     name = functions[-1].__name__
-    return getattr(load_native(name, pasted(*functions), {name: signature(takes)}), name)
+    return getattr(load_native(name, functions_text(*functions), {name: signature(takes)}), name)
 
 
 def quotients(a: int, b: int) -> tuple[int, int, float]:

@@ -75,13 +75,13 @@ def test_a_repeated_call_on_the_same_arrays_sees_their_new_values() -> None:
     text = "def double(values, result):\n    for i in range(len(values)):\n        result[i] = 2.0 * values[i]\n"
     entry = load_native("doubling", text, {"double": signature("values, result : ndarray, shape (n,)")}).double
     values, result = np.array([1.0, 2.0]), np.empty(2)
-    call = entry.again(values, result)
+    call = entry.prepared_call(values, result)
     for size in (1.0, 3.0):
         values[:] = size
         call()
         assert result.tolist() == [2.0 * size] * 2
     with pytest.raises(TypeError, match="takes arrays as they are and returns nothing"):
-        entry.again(values[::-1], result)
+        entry.prepared_call(values[::-1], result)
 
 
 def test_python_runs_on_while_a_kernel_runs() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from plant.compiled.native.kinds import KernelError
 from plant.compiled.native.load import load_native
-from plant.compiled.native.operators import _divided
+from plant.compiled.native.operators import _integer_division
 from plant.compiled.native.signature import signature
 
 TAKES = "x : float\nn : int\nflag : bool\nvalues : ndarray, shape (k,)\nwhole : ndarray of int, shape (k,)"
@@ -64,7 +64,7 @@ def test_integer_division_is_guarded_against_zero_unless_the_divisor_is_a_nonzer
 
     for rest in (False, True):
         lines.clear()
-        _divided(SimpleNamespace(op=op), "%n", divisor, rest=rest)  # type: ignore[arg-type]
+        _integer_division(SimpleNamespace(op=op), "%n", divisor, rest=rest)  # type: ignore[arg-type]
         (asked,) = [line for line in lines if line.startswith("sdiv")]
         assert (asked == f"sdiv i64 %n, {divisor}") is not guarded
         assert (f"icmp eq i64 {divisor}, 0" in lines) is guarded

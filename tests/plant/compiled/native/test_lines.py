@@ -10,7 +10,7 @@ import pytest
 from plant.compiled.native.kinds import KernelError
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import functions_text, kernel_text
 from tests.kernels import OPERATIONS, in_python, stepped
 
 exp, fma, log, present, sign, sqrt, tanh, where = (
@@ -33,7 +33,7 @@ def fused(x: Any, y: Any) -> Mapping[str, Any]:
 
 def of(lines: Callable[..., Mapping[str, Any]], width: int) -> dict[str, list[float]]:
     """Return what the lines compute from `X` and `Y`, with ``width`` numbers at a time."""
-    found = stepped(pasted(lines), lines.__name__, {"x": X, "y": Y}, "abcde", width)
+    found = stepped(functions_text(lines), lines.__name__, {"x": X, "y": Y}, "abcde", width)
     return {name: values.tolist() for name, values in found.items()}
 
 
@@ -64,7 +64,9 @@ def both(x: float, y: float, *, of_both: Callable[[tuple[float, float]], tuple[f
 
 
 def test_function_of_returns_the_outputs_of_lines_as_a_tuple() -> None:
-    text = kernel_text("lines of two numbers", pasted(plain), "of_both = function_of(plain, 5)", pasted(both))
+    text = kernel_text(
+        "lines of two numbers", functions_text(plain), "of_both = function_of(plain, 5)", functions_text(both)
+    )
     kernel = load_native("lines_of_two", text, {"both": signature("x, y : float")})
     assert kernel.both(0.7, -0.2) == tuple(in_python(plain)(0.7, -0.2).values())
 
@@ -75,7 +77,7 @@ def wild(x: Any) -> Mapping[str, Any]:
 
 def test_an_operation_that_cannot_be_compiled_is_refused() -> None:
     with pytest.raises(KernelError, match="is none of the operations that are compiled"):
-        stepped(pasted(wild), "wild", {"x": X}, "a", 1)
+        stepped(functions_text(wild), "wild", {"x": X}, "a", 1)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +111,7 @@ def test_lines_read_and_write_numbers_at_several_addresses(width: int) -> None:
     step = f"SLOTS = {slots}\n\nadd = stepping(SLOTS, {width}, lines)"
     lines = "def lines(a, b):\n    return {'c': a - b}"
     takes = {"sums": signature("values, others, found : ndarray, shape (24,)")}
-    kernel = load_native("sums", kernel_text("sums", lines, step, pasted(sums)), takes)
+    kernel = load_native("sums", kernel_text("sums", lines, step, functions_text(sums)), takes)
     values, others, found = np.arange(24.0), np.arange(24.0) ** 2, np.zeros(24)
     kernel.sums(values, others, found)
     wanted = np.zeros(24)
@@ -124,7 +126,7 @@ def whole(values: Any) -> bool:
 @pytest.mark.parametrize("width", [1, 2, 8])
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_complete_detects_a_single_nan_at_any_place(width: int, count: int) -> None:
-    text = kernel_text("whole", f"there = complete({width}, {count}, 80)", pasted(whole))
+    text = kernel_text("whole", f"there = complete({width}, {count}, 80)", functions_text(whole))
     kernel = load_native("whole", text, {"whole": signature("values : ndarray, shape (30,)")})
     values = np.full(30, np.inf)
     assert kernel.whole(values)
@@ -144,5 +146,5 @@ def test_transpose_copies_eight_samples_of_eight_logs_into_rows() -> None:
     places = logs.ctypes.data + logs.strides[0] * np.arange(8)
     rows = np.zeros((8, 8))
     takes = {"turned": signature("places : ndarray of int, shape (8,)\noffset : int\nrows : ndarray, shape (8, 8)")}
-    load_native("turned", kernel_text("turned", pasted(turned)), takes).turned(places, 8 * 8, rows)
+    load_native("turned", kernel_text("turned", functions_text(turned)), takes).turned(places, 8 * 8, rows)
     np.testing.assert_array_equal(rows, logs[:, 8:16].T)

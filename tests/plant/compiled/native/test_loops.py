@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.compiled.native.loops import Loop, natively, needed, text_of
+from plant.compiled.native.loops import Loop, dependencies, natively_compiled, text_of
 
 SHARE = 0.25
 
 
-@natively()
+@natively_compiled()
 def halved(x: float) -> float:
     """Return a share.
 
@@ -23,7 +23,7 @@ def halved(x: float) -> float:
     return SHARE * x
 
 
-@natively()
+@natively_compiled()
 def summed(values: Any) -> float:
     """Return the sum of shares.
 
@@ -47,12 +47,12 @@ def elsewhere(loop: Loop[..., Any], **names: Any) -> Loop[..., Any]:
 def test_a_loop_is_compiled_with_the_loops_it_calls_and_the_constants_it_reads() -> None:
     values = np.array([1.0, 2.0, 5.0])
     assert [summed(values), summed(2.0 * values)] == [2.0, 4.0]
-    loops, constants = needed(summed)
+    loops, constants = dependencies(summed)
     assert ([one.__wrapped__.__name__ for one in loops], constants) == (["halved", "summed"], {"SHARE": 0.25})
     assert "SHARE = 0.25" in text_of(summed)
 
 
-@natively()
+@natively_compiled()
 def both(x: float) -> float:
     """Return a sum; ``other`` is another module's.
 
@@ -69,6 +69,6 @@ other: Any = None
 
 def test_two_loops_or_two_constants_of_one_name_are_refused() -> None:
     with pytest.raises(NameError, match="two loops are named halved"):
-        needed(elsewhere(both, other=elsewhere(halved)))
+        dependencies(elsewhere(both, other=elsewhere(halved)))
     with pytest.raises(NameError, match="two constants are named SHARE"):
-        needed(elsewhere(both, other=halved, SHARE=0.5))
+        dependencies(elsewhere(both, other=halved, SHARE=0.5))

@@ -16,6 +16,6 @@ def roots(values):
 def test_loops_are_not_unrolled(monkeypatch: pytest.MonkeyPatch) -> None:
     module = Module(TEXT)
     module.enter("roots", tuple(one.kind for one in signature("values : ndarray, shape (n,)")))
-    rolled = machine.assembled(module.ir())
-    monkeypatch.setattr(machine, "UNROLLED", True)
-    assert len(rolled) < len(machine.assembled(module.ir()))
+    rolled = machine.assemble(module.ir())
+    monkeypatch.setattr(machine, "UNROLL_LOOPS", True)
+    assert len(rolled) < len(machine.assemble(module.ir()))

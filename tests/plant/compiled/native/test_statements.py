@@ -12,7 +12,7 @@ from plant.arrays import Array
 from plant.compiled.native.kinds import KernelError
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature
-from plant.compiled.paste import pasted
+from plant.compiled.paste import functions_text
 
 TAKES = "x : float\nn : int\nflag : bool\nvalues : ndarray, shape (k,)"
 GIVEN = (0.75, 3, True, np.array([0.5, -2.0, 3.0, 8.0]))
@@ -20,7 +20,7 @@ GIVEN = (0.75, 3, True, np.array([0.5, -2.0, 3.0, 8.0]))
 
 def compiled(takes: str, *functions: Callable[..., Any], above: str = "") -> Callable[..., Any]:
     name = functions[-1].__name__
-    return getattr(load_native(name, above + pasted(*functions), {name: signature(takes)}), name)
+    return getattr(load_native(name, above + functions_text(*functions), {name: signature(takes)}), name)
 
 
 def kernel(body: str, above: str = "", takes: str = TAKES) -> Callable[..., Any]:

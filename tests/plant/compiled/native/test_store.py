@@ -34,13 +34,13 @@ def scale(factor: float = 2.0) -> Callable[[float], float]:
 def compiling(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The names of the kernels that were compiled."""
     names: list[str] = []
-    compile_it = load._compiled
+    compile_it = load._compile
 
     def counted(name: str, *rest: Any) -> Any:
         names.append(name)
         return compile_it(name, *rest)
 
-    monkeypatch.setattr(load, "_compiled", counted)
+    monkeypatch.setattr(load, "_compile", counted)
     return names
 
 
@@ -100,7 +100,7 @@ def test_a_folder_that_others_may_write_to_is_not_used(
     scale()
     folder.chmod(mode)
     before = file_in(folder).read_bytes()
-    store._refused.cache_clear()
+    store._is_refused.cache_clear()
     with caplog.at_level(logging.WARNING, logger="hydrostate"):
         assert scale()(3.0) == scale()(3.0) == 6.0
     assert compiling == ["scale"] * 3
@@ -115,7 +115,7 @@ def test_a_folder_of_another_user_is_not_used(
     compiling: list[str], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scale()
-    store._refused.cache_clear()
+    store._is_refused.cache_clear()
     mine = os.geteuid()
     monkeypatch.setattr(os, "geteuid", lambda: mine + 1)
     with caplog.at_level(logging.WARNING, logger="hydrostate"):
@@ -123,7 +123,7 @@ def test_a_folder_of_another_user_is_not_used(
     assert compiling == ["scale"] * 2
     (message,) = caplog.messages
     assert "belongs to another user" in message
-    store._refused.cache_clear()
+    store._is_refused.cache_clear()
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have owners")
@@ -158,7 +158,7 @@ def test_an_unwritable_folder_disables_the_cache_but_not_the_kernel(
     def full(*_: Any) -> None:
         raise OSError(code, os.strerror(code))
 
-    store._say_once.cache_clear()
+    store._warn_once.cache_clear()
     monkeypatch.setattr(os, "fsync", full)
     with caplog.at_level(logging.WARNING, logger="hydrostate"):
         assert scale(7.0)(2.0) == scale(8.0)(2.0) - 2.0 == 14.0

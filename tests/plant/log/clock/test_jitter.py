@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant.log.clock.jitter import POINTS, grid_of, resampled, rounded_clock
+from plant.log.clock.jitter import SLOPE_SAMPLES, grid_of, resampled, rounded_clock
 
 TICKS = np.arange(40.0)
 OFF = 0.05 * np.random.default_rng(1).uniform(-1.0, 1.0, 40)
@@ -17,7 +17,7 @@ def test_a_channel_with_a_single_value_has_no_value_after_resampling() -> None:
     assert len(resampled(grid, TICKS + OFF, values)) == len(grid.times)
 
 
-@pytest.mark.parametrize("count", [POINTS - 1, POINTS])
+@pytest.mark.parametrize("count", [SLOPE_SAMPLES - 1, SLOPE_SAMPLES])
 def test_resampling_a_straight_line_with_few_samples_is_exact(count: int) -> None:
     time = (TICKS + OFF)[:count]
     grid = grid_of(time)

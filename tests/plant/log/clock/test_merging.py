@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from plant.errors import LogError, LogWarning
-from plant.log.clock.merging import SAME, _same_time
+from plant.log.clock.merging import SAME_TIME_TOLERANCE, _same_time
 from plant.log.files import read_record
 
 T = 1e-3
@@ -68,8 +68,8 @@ def test_merging_a_log_with_dates_and_one_without_is_refused(tmp_path: Path) -> 
 @pytest.mark.parametrize("begin", [0.0, 1000.0])
 def test_clocks_are_compared_with_a_tolerance_relative_to_their_step(begin: float) -> None:
     time = begin + T * np.arange(200)
-    assert _same_time(time, time + 0.5 * SAME * T)
-    assert not _same_time(time, time + 2.0 * SAME * T)
+    assert _same_time(time, time + 0.5 * SAME_TIME_TOLERANCE * T)
+    assert not _same_time(time, time + 2.0 * SAME_TIME_TOLERANCE * T)
 
 
 def test_the_refusal_of_logs_that_do_not_overlap_suggests_an_exchanged_day_and_month(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ import pytest
 
 from plant.arrays import Array
 from plant.log.checks import Clock
-from plant.log.clock.merging import Timed, merged
-from plant.log.clock.uniform import Checked, on_uniform_clock
+from plant.log.clock.merging import LoggerChannels, merge_loggers
+from plant.log.clock.uniform import CheckedLog, on_uniform_clock
 from plant.notes import Note
 from tests.numbers import Numbers, or_refused, told
 from tests.plant.log.clock.made_stamps import TICKS, T, jittering
@@ -28,7 +28,7 @@ def uniform(time: Array, clock: Clock | None = None, **more: Array) -> Any:
     return or_refused(made)
 
 
-def of(found: Checked) -> dict[str, Any]:
+def of(found: CheckedLog) -> dict[str, Any]:
     return {
         "sample time [s]": found.sample_time,
         "begin [s]": found.start_time,
@@ -145,9 +145,9 @@ def channels_with_times_of_their_own() -> dict[str, Any]:
 
 @NUMBERS.case()
 def loggers_on_one_clock() -> dict[str, Any]:
-    def laid(*parts: Timed) -> Any:
+    def laid(*parts: LoggerChannels) -> Any:
         def made() -> Mapping[str, Any]:
-            found = merged(parts, "both")
+            found = merge_loggers(parts, "both")
             time = found.channels["time_s"]
             kind = {"seconds": time[[0, 1, -1]]} if time.dtype.kind == "f" else {"dates": time[[0, -1]].astype(str)}
             channels = {name: values for name, values in found.channels.items() if name != "time_s"}
@@ -163,33 +163,38 @@ def loggers_on_one_clock() -> dict[str, Any]:
 
     def logger(
         name: str, begin: float, step: float, count: int = 30, *, dated: bool = False, source: str = "x"
-    ) -> Timed:
+    ) -> LoggerChannels:
         seconds = begin + step * np.arange(count)
         stamps: Any = np.datetime64("2026-03-01T00:00:00", "ns") + np.rint(1e9 * seconds).astype("timedelta64[ns]")
-        return Timed(source, stamps if dated else seconds, {name: np.cos(70.0 * seconds)}, name)
+        return LoggerChannels(source, stamps if dated else seconds, {name: np.cos(70.0 * seconds)}, name)
 
     fast = logger("a", 0.1, T)
     missing: Any = np.where(np.arange(40) < 30, logger("b", 0.0, T, 40, dated=True).time, np.datetime64("NaT"))
     return {
         "alone": laid(fast),
-        "none": or_refused(lambda: dict(merged([], "both").channels)),
+        "none": or_refused(lambda: dict(merge_loggers([], "both").channels)),
         "of one clock": laid(fast, logger("b", 0.1 + 0.9e-3 * T, T)),
         "of nearly one": laid(fast, logger("b", 0.1 + 1.1e-3 * T, T)),
         "half a step late": laid(fast, logger("b", 0.1 + 3.5 * T, T)),
         "slower": laid(fast, logger("b", 0.1 - 3.3 * T, 3.0 * T)),
         "slower with a gap": laid(
-            fast, Timed("y", np.delete(0.1 + 2.0 * T * np.arange(31.0), 7), {"b": np.delete(np.arange(31.0), 7)})
+            fast,
+            LoggerChannels("y", np.delete(0.1 + 2.0 * T * np.arange(31.0), 7), {"b": np.delete(np.arange(31.0), 7)}),
         ),
         "dated": laid(logger("a", 0.0, T, dated=True), logger("b", 0.3 * T, 2.0 * T, dated=True)),
-        "dated, some not": laid(logger("a", 0.0, T, dated=True), Timed("y", missing, {"b": np.arange(40.0)})),
+        "dated, some not": laid(logger("a", 0.0, T, dated=True), LoggerChannels("y", missing, {"b": np.arange(40.0)})),
         "dated beside seconds": laid(fast, logger("b", 0.1, T, dated=True)),
         "ten together": laid(fast, logger("b", 0.1 + 20.0 * T, T, 31)),
         "nine together": laid(fast, logger("b", 0.1 + 21.0 * T, T, 31)),
         "nine samples": laid(fast, logger("b", 0.1, T, 9)),
-        "names": [Timed(source, np.zeros(2), {}, label).name for source, label in (("a\\b/c.csv", ""), ("c", "group"))],
+        "names": [
+            LoggerChannels(source, np.zeros(2), {}, label).name
+            for source, label in (("a\\b/c.csv", ""), ("c", "group"))
+        ],
         "of two rows": laid(logger("a", 0.0, T, 2), logger("b", 0.5e-3 * T, T, 2)),
         "apart by a share of a step": [
-            list(merged([logger("a", 0.0, T, 11), logger("b", by * T, T, 11)], "both").channels) for by in (0.98e-3,)
+            list(merge_loggers([logger("a", 0.0, T, 11), logger("b", by * T, T, 11)], "both").channels)
+            for by in (0.98e-3,)
         ],
         "of one row": laid(logger("a", 0.0, T, 1), logger("b", 0.0, T, 1)),
     }

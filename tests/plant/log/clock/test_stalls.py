@@ -7,7 +7,7 @@ import pytest
 
 from plant.arrays import Array
 from plant.errors import LogWarning
-from plant.log.clock.stalls import stalled_clock, waited_in_a_queue
+from plant.log.clock.stalls import is_sampled_evenly, stalled_clock
 from plant.log.files import read_record
 from plant.log.frames import frame_table
 from plant.notes import Note
@@ -61,7 +61,7 @@ def test_constant_and_noisy_channels_do_not_contradict_an_even_clock() -> None:
     still = {"held": np.ones(len(time)), "noise": RNG.standard_normal(len(time)), "missing": np.full(len(time), np.nan)}
     found = stalled_clock(time)
     assert found is not None
-    assert waited_in_a_queue(time, still, found.sample_time)
+    assert is_sampled_evenly(time, still, found.sample_time)
 
 
 def test_lost_rows_jitter_and_rounding_are_not_taken_for_a_stalled_clock() -> None:

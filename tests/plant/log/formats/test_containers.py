@@ -13,7 +13,7 @@ from plant.errors import LogError, LogWarning
 from plant.log.columns import Column
 from plant.log.formats import hdf5, json_text, xlsx
 from plant.log.formats.detect import open_tables
-from plant.log.formats.hdf5 import OBJECTS, open_hdf5
+from plant.log.formats.hdf5 import NO_VECTORS, open_hdf5
 from plant.log.formats.mat import tables_of
 from plant.log.formats.xlsx import open_xlsx
 from plant.log.table import Table
@@ -104,7 +104,7 @@ def test_too_many_cells_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     ],
 )
 def test_a_cell_is_converted_to_the_text_of_a_csv_log(cell: Any, said: str) -> None:
-    assert xlsx._said(cell) == said
+    assert xlsx._cell_text(cell) == said
 
 
 def test_hdf5_fields_named_columns_and_units_are_read_and_other_data_sets_are_skipped(tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ def test_a_matlab_hdf5_matrix_is_transposed_and_files_without_numbers_are_refuse
     assert read(table)[names(table)[1]] == pytest.approx(np.arange(5.0, 10.0))
     with h5py.File(path, "w") as file:
         file["text"] = "nothing else"
-    with pytest.raises(LogError, match=re.escape(OBJECTS)):
+    with pytest.raises(LogError, match=re.escape(NO_VECTORS)):
         open_hdf5(path)
     with h5py.File(tmp_path / "none.h5", "w") as file:
         file["text"] = "nothing else"
@@ -256,7 +256,7 @@ def test_what_simulink_calls_a_structure_with_time_is_a_table() -> None:
 def test_nested_structs_give_columns_with_both_names_and_a_file_without_vectors_is_refused() -> None:
     (table,) = tables_of({"log": {"rod": {"way": np.arange(4.0)}, "speed": np.arange(4.0), "who": "me"}}, "a.mat")
     assert names(table) == ["rod.way", "speed"]
-    with pytest.raises(LogError, match=re.escape(f"a.mat: {OBJECTS}")):
+    with pytest.raises(LogError, match=re.escape(f"a.mat: {NO_VECTORS}")):
         tables_of({"gain": np.array(1.0), "who": "me"}, "a.mat")
 
 

@@ -8,14 +8,14 @@ import pytest
 
 from plant.errors import LogError, LogWarning
 from plant.log.files import read_record
-from plant.log.formats.csv_cells import TOGETHER
+from plant.log.formats.csv_cells import BLOCK_ROWS
 from plant.log.formats.detect import open_tables
 from plant.log.notes import LogCode
 from plant.log.record import Record
 from plant.notes import Note
 
 HEADER = "time_s,motor_speed_rad_s,position_m,said"
-ROWS = [f"{0.001 * k:.3f},{k % 7},{0.001 * k:.4f},text" for k in range(TOGETHER + 500)]
+ROWS = [f"{0.001 * k:.3f},{k % 7},{0.001 * k:.4f},text" for k in range(BLOCK_ROWS + 500)]
 
 
 def written(tmp_path: Path, *lines: str, end: str = "\n") -> Path:

@@ -70,7 +70,7 @@ def test_a_line_cut_at_the_end_of_the_examined_bytes_does_not_change_the_layout(
     path = tmp_path / "a.csv"
     path.write_text("t,x\n0.0,1.0\n0.1,2.0\n")
     whole = layout_of(path)
-    monkeypatch.setattr(csv_layout, "LOOKED_AT", 16)  # within the second row
+    monkeypatch.setattr(csv_layout, "INSPECTED_BYTES", 16)  # within the second row
     assert layout_of(path) == whole
 
 

@@ -9,7 +9,7 @@ import scipy.io
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plant.log.formats.mat_reader import DEEPEST, DamagedMatError, Value, read_variables
+from plant.log.formats.mat_reader import MOST_NESTED, DamagedMatError, MatValue, read_variables
 
 RNG = np.random.default_rng(3)
 CONTENT: dict[str, Any] = {
@@ -30,7 +30,7 @@ def written(content: Mapping[str, Any], *, compress: bool) -> bytes:
     return file.getvalue()
 
 
-def agrees(mine: Value, theirs: Any) -> bool:
+def agrees(mine: MatValue, theirs: Any) -> bool:
     if mine is None:
         return True
     if isinstance(mine, Mapping):
@@ -114,9 +114,9 @@ def test_nested_structs_are_read_up_to_the_depth_limit_and_refused_beyond() -> N
             content = {"inner": content}
         return {"outer": content}
 
-    found: Any = read_variables(written(nested(DEEPEST), compress=False))["outer"]
-    for _ in range(DEEPEST):
+    found: Any = read_variables(written(nested(MOST_NESTED), compress=False))["outer"]
+    for _ in range(MOST_NESTED):
         found = found["inner"]
     assert np.array_equal(found, np.arange(3.0))
-    with pytest.raises(DamagedMatError, match=f"over {DEEPEST} deep"):
-        read_variables(written(nested(2 * DEEPEST), compress=False))
+    with pytest.raises(DamagedMatError, match=f"over {MOST_NESTED} deep"):
+        read_variables(written(nested(2 * MOST_NESTED), compress=False))

@@ -7,7 +7,7 @@ import pytest
 
 from plant.errors import LogError
 from plant.log.formats.mat import tables_of
-from plant.log.tables import gathered
+from plant.log.tables import gather_channels
 
 TIME = 0.01 * np.arange(50)
 SPEED, WAY = 10.0 * TIME, 2.0 * TIME
@@ -18,7 +18,7 @@ def names(content: Any) -> dict[str, list[str]]:
 
 
 def read(content: Any) -> Any:
-    return gathered(tables_of(content, "a.mat"), None, (), "a.mat").columns
+    return gather_channels(tables_of(content, "a.mat"), None, (), "a.mat").columns
 
 
 def test_a_nested_struct_with_its_own_time_is_a_table() -> None:

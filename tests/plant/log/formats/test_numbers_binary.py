@@ -11,7 +11,7 @@ import pytest
 import scipy.io
 
 from plant.log.formats import hdf5
-from plant.log.formats.mat import MOST_SPREAD, spread, tables_of
+from plant.log.formats.mat import MOST_COLUMNS, columns_of_array, tables_of
 from plant.log.formats.mat_reader import read_variables
 from plant.log.stream import ring
 from plant.log.stream.ring import RingReader, RingWriter, ring_lines
@@ -132,8 +132,8 @@ def variables_of_mat_files() -> dict[str, Any]:
             )
         ),
         "spread": [
-            {name: np.asarray(one).shape for name, one in spread("a", np.zeros(shape)).items()}
-            for shape in ((1,), (2,), (3, 2), (2, 3), (2, 2), (99, MOST_SPREAD), (99, MOST_SPREAD + 1), (1, 1))
+            {name: np.asarray(one).shape for name, one in columns_of_array("a", np.zeros(shape)).items()}
+            for shape in ((1,), (2,), (3, 2), (2, 3), (2, 2), (99, MOST_COLUMNS), (99, MOST_COLUMNS + 1), (1, 1))
         ],
         "tables": [
             or_refused(
@@ -239,7 +239,7 @@ def rings() -> dict[str, Any]:
             in_a_file(content, lambda path: RingReader(path).header)
             for content in (b"", b"HYDRING1", b"HYDRING1" + b"\0" * 4087, b"HYDRING1" + b"\0" * 4088)
         ],
-        "pause [s] and most": [ring.PAUSE, ring.MOST],
+        "pause [s] and most": [ring.PAUSE, ring.MOST_ROWS],
     }
 
 

@@ -14,9 +14,9 @@ from plant.log.formats.arrow import from_arrow, to_arrow
 from plant.log.formats.cells import number, numbers
 from plant.log.formats.csv_layout import layout_of_lines
 from plant.log.formats.detect import format_of
-from plant.log.formats.packed import inflated, most_unpacked
+from plant.log.formats.packed import inflate, most_unpacked
 from plant.log.table import Table, table_of
-from plant.log.tables import gathered
+from plant.log.tables import gather_channels
 from tests.edges import edge
 from tests.numbers import Numbers
 from tests.plant.log.made_files import in_a_file, or_refused
@@ -29,8 +29,8 @@ def packed_files() -> dict[str, Any]:
     data = zlib.compress(b"a" * 1000)
     return {
         "most unpacked": [most_unpacked(size) for size in (0, 5_368_709, 5_368_710, 10_000_000)],
-        "inflated": [or_refused(lambda most=most: len(inflated(data, most, "a"))) for most in (999, 1000, 5000)],
-        "cut": or_refused(lambda: inflated(data[:-5], 5000, "a")),
+        "inflated": [or_refused(lambda most=most: len(inflate(data, most, "a"))) for most in (999, 1000, 5000)],
+        "cut": or_refused(lambda: inflate(data[:-5], 5000, "a")),
         "packing": [
             in_a_file(content, packed.packing_of)
             for content in (b"\x1f\x8babc", b"\x28\xb5\x2f\xfd", b"\x28\xb5\x2f", b"abcd")
@@ -108,7 +108,7 @@ def cells_of_sheets() -> dict[str, Any]:
         "text": table(("t", "x"), ("0,5", "1"), ("1,5", "2")),
         "spans": table(("t", "x"), (dt.timedelta(seconds=1.5), 2), (dt.timedelta(seconds=2), 3)),
         "said": [
-            xlsx._said(one)
+            xlsx._cell_text(one)
             for one in (
                 None,
                 1.5,
@@ -121,7 +121,7 @@ def cells_of_sheets() -> dict[str, Any]:
                 True,
             )
         ],  # pyright: ignore[reportPrivateUsage]
-        "wide": [xlsx._wide((1, 2, 3), width) for width in (2, 3, 5)],  # pyright: ignore[reportPrivateUsage]
+        "wide": [xlsx._fit_width((1, 2, 3), width) for width in (2, 3, 5)],  # pyright: ignore[reportPrivateUsage]
     }
 
 
@@ -132,7 +132,7 @@ def tables_of_several_kinds() -> dict[str, Any]:
 
     def told(*tables: Table, mapping: Any = None, required: Any = (), sample_time: float | None = None) -> Any:
         def made() -> Any:
-            found = gathered(tables, mapping, required, "a", sample_time)
+            found = gather_channels(tables, mapping, required, "a", sample_time)
             return [
                 found.began,
                 {name: [len(values), values[[0, 1, -1]]] for name, values in found.columns.items()},
@@ -175,7 +175,7 @@ def tables_of_several_kinds() -> dict[str, Any]:
                 np.datetime64("2026-03-01T01:00"),
             )
         ],  # pyright: ignore[reportPrivateUsage]
-        "names of MDF": [mdf._last(name) for name in ("speed\\XCP: 1", "speed")],  # pyright: ignore[reportPrivateUsage]
+        "names of MDF": [mdf._name_without_device(name) for name in ("speed\\XCP: 1", "speed")],  # pyright: ignore[reportPrivateUsage]
         "layout of one": layout_of_lines(["t,x", "0,1", "1,2"], "utf-8", "a").skipped,
     }
 

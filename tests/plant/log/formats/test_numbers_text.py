@@ -146,8 +146,8 @@ def layouts_that_were_seen() -> dict[str, Any]:
     def kept(count: int, header: str = "t,x,v", lines: int = 300, row: str = "{k},1.5,2") -> bool:
         layouts_seen._seen.clear()  # pyright: ignore[reportPrivateUsage]
         start = (header + "\n" + "".join(row.format(k=k) + "\n" for k in range(count))).encode()
-        layouts_seen.remember(start, lines, layout_of_lines(start.decode().split("\n")[:lines], "utf-8", "a"))
-        found = layouts_seen.remembered(start, lines) is not None
+        layouts_seen.remember_layout(start, lines, layout_of_lines(start.decode().split("\n")[:lines], "utf-8", "a"))
+        found = layouts_seen.remembered_layout(start, lines) is not None
         layouts_seen._seen.clear()  # pyright: ignore[reportPrivateUsage]
         return found
 
@@ -155,7 +155,7 @@ def layouts_that_were_seen() -> dict[str, Any]:
         layouts_seen._seen.clear()  # pyright: ignore[reportPrivateUsage]
         for n in range(count):
             start = (f"t,x,v{n}\n" + "".join(f"{k},1.5,2\n" for k in range(120))).encode()
-            layouts_seen.remember(start, 300, layout_of_lines(start.decode().split("\n"), "utf-8", "a"))
+            layouts_seen.remember_layout(start, 300, layout_of_lines(start.decode().split("\n"), "utf-8", "a"))
         size = len(layouts_seen._seen)  # pyright: ignore[reportPrivateUsage]
         layouts_seen._seen.clear()  # pyright: ignore[reportPrivateUsage]
         return size

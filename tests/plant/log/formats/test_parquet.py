@@ -80,7 +80,7 @@ def test_a_column_of_nulls_is_missing_and_booleans_become_numbers(tmp_path: Path
 def test_a_wide_table_read_in_batches_of_columns_keeps_their_values(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(parquet, "MANY", 3)
+    monkeypatch.setattr(parquet, "COLUMNS_AT_A_TIME", 3)
     wide = {f"c{place}": np.arange(4.0) + 10.0 * place for place in range(8)}
     pq.write_table(pa.table(wide), tmp_path / "wide.parquet")
     found = open_parquet(tmp_path / "wide.parquet").numbers()
@@ -105,9 +105,9 @@ def test_a_column_name_with_a_dot_is_not_taken_for_a_struct_field(tmp_path: Path
     path = tmp_path / "log.parquet"
     table = pa.table([inner, np.arange(4.0), np.arange(4.0) + 9.0, np.arange(4.0)], names=["a", "a.b", "c", "c"])
     pq.write_table(table, path)
-    for many in (parquet.MANY, 2):
+    for many in (parquet.COLUMNS_AT_A_TIME, 2):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(parquet, "MANY", many)
+            patch.setattr(parquet, "COLUMNS_AT_A_TIME", many)
             values = open_parquet(path).read([Column(place, "", f"true_{place}") for place in range(4)])
         assert [one[1] for one in values.values()] == [1.0, 10.0, 1.0]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plant.errors import HydrostateError, LogError
-from plant.log.stream.ring import MOST, RingReader, RingWriter
+from plant.log.stream.ring import MOST_ROWS, RingReader, RingWriter
 from plant.log.stream.source import BatchCounts, is_stream, stream_lines
 
 HEADER = "time_s,motor_speed_rad_s,position_m"
@@ -18,7 +18,7 @@ def rows(begin: int, end: int) -> np.ndarray:
 
 
 def test_all_rows_of_a_writer_that_waits_for_the_reader_arrive_unchanged(tmp_path: Path) -> None:
-    path, count, received = tmp_path / "ring", 3 * MOST, BatchCounts()
+    path, count, received = tmp_path / "ring", 3 * MOST_ROWS, BatchCounts()
     writer = RingWriter(path, HEADER, 100)
 
     def write() -> None:
