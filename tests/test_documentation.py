@@ -134,9 +134,7 @@ def pages(texts: dict[str, str]) -> list[Page]:
     floats = FLOATS.union(*(_aliases(tree, FLOATS) for tree in trees.values()))
     arrays = ARRAYS.union(*(_aliases(tree, ARRAYS) for tree in trees.values()))
     public = {path: tree for path, tree in trees.items() if not re.search(r"/_(?!_init__)", path)}
-    pasted = frozenset(
-        name for path, tree in trees.items() if "functions_text(" in texts[path] for name in _pasted(tree)
-    )
+    pasted = frozenset(name for tree in trees.values() for name in _pasted(tree))
     classes = [node for tree in trees.values() for node in tree.body if isinstance(node, ast.ClassDef)]
     methods = frozenset((one.name, item.name) for one in classes for item in one.body if isinstance(item, Function))
     return [Page(path, tree, floats, arrays, pasted, methods) for path, tree in public.items()]

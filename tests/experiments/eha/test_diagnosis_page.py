@@ -42,7 +42,8 @@ def page(diagnosed: tuple[Finding, Record]) -> str:
 
 
 def test_the_page_gives_the_fault_its_severity_and_the_work_to_do(page: str) -> None:
-    assert "<h1>The actuator probably leaks inside more than it should (minor leakage); friction is probably normal.</h1>" in page
+    heading = "The actuator probably leaks inside more than it should (minor leakage); friction is probably normal."
+    assert f"<h1>{heading}</h1>" in page
     assert page.index("What to do") < page.index("How far from the limits") < page.index("Measured and fitted")
     assert "Plan a check of pump and piston seal." in page
     assert "Describe your actuator in a rig file" in page

@@ -155,7 +155,7 @@ def test_a_log_without_drive_and_motion_has_no_class() -> None:
 
 
 def test_nominal_models_of_a_plain_log_are_started_before_the_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
-    order: list[str] = []
+    usual, order = plain(), list[str]()  # the usual diagnosis before anything is replaced
 
     def noted(name: str) -> None:
         run = getattr(diagnose, name)
@@ -168,7 +168,7 @@ def test_nominal_models_of_a_plain_log_are_started_before_the_estimate(monkeypat
     for name in ("checked_estimate", "score_mathematical"):
         noted(name)
     monkeypatch.setattr(diagnose, "start_if_idle", at_once)
-    found, usual = diagnose_log(log(), RIG), plain()
+    found = diagnose_log(log(), RIG)
     assert (found.probabilities, found.severities) == (usual.probabilities, usual.severities)
     assert order == ["score_mathematical", "checked_estimate"]
 
