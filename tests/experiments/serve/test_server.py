@@ -75,7 +75,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 @pytest.fixture(scope="module")
 def paths(served: Server, log: bytes) -> dict[str, str]:
-    both = [served.drop(name, log, "diagnose") for name in ("one.csv", "two.csv")]
+    both = [served.upload_log(name, log, "diagnose") for name in ("one.csv", "two.csv")]
     assert [served.finished(one)["state"] for one in both] == ["done", "done"]
     last_gauges(served, 1)
     return {
