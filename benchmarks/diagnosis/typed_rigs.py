@@ -160,7 +160,7 @@ def plain_setup(healthy: EhaParameters, use: RigUse, condition: str, turn: int, 
     ----------
     healthy : EhaParameters
         Healthy actuator, as the rig's file states it.
-    use : Use
+    use : RigUse
         How the rig is used.
     condition : str
         One of the nine.

@@ -190,7 +190,7 @@ def undetermined_delivery(remarks: Sequence[Note]) -> UndeterminedDelivery | Non
 
     Returns
     -------
-    OpenDelivery or None
+    UndeterminedDelivery or None
         The delivery; None if the log determines it, or a worn pump was found.
     """
     said = _wear_note_data(remarks)

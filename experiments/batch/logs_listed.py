@@ -42,7 +42,7 @@ def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any
 
     Returns
     -------
-    Listed
+    ListedLogs
         The logs. If a file has several names, its own name counts, else the first; names whose folders have different
         rig files all count.
 

@@ -194,7 +194,7 @@ def settled_by_condition(estimates: pd.DataFrame) -> Mapping[str, OurResult]:
 
     Returns
     -------
-    Mapping[str, Ours]
+    Mapping[str, OurResult]
         By condition [Pa]: mean over the first guesses, whether or not the gate passes it.
     """
     rows = dict(by_experiment(estimates))[PUBLISHED_METHOD]
@@ -206,7 +206,7 @@ def printed_by_condition(estimates: pd.DataFrame) -> Mapping[str, OurResult]:
 
     Returns
     -------
-    Mapping[str, Ours]
+    Mapping[str, OurResult]
         By condition: largest error over the first guesses [percent]; no number if none of them stays finite.
     """
     return {str(name): _printed_filter_result(rows) for name, rows in estimates.groupby("condition", sort=False)}

@@ -114,7 +114,7 @@ def spreads_of(
 
     Parameters
     ----------
-    doubts : Mapping[str, Doubt]
+    doubts : Mapping[str, DefaultUncertainty]
         Default uncertainties.
     given : Mapping[str, float]
         Uncertainties in a rig file: relative standard deviation [fraction].

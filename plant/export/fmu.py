@@ -96,7 +96,7 @@ def archive(model: ModelDescription, files: Mapping[str, str], glue: tuple[str, 
 
     Parameters
     ----------
-    model : Described
+    model : ModelDescription
         Its description, with an empty token.
     files : Mapping[str, str]
         The sources, by file name.

@@ -68,9 +68,9 @@ def agreed_answer(straight: LogAnswer, read: LogAnswer) -> LogAnswer:
 
     Parameters
     ----------
-    straight : Answered
+    straight : LogAnswer
         From straight lines.
-    read : Answered
+    read : LogAnswer
         With the volume pumped in each turn read from the samples after it, see `with_turns_read`.
     """
     if read.ended:

@@ -179,7 +179,7 @@ class MotionSearch:
         ----------
         rank : int
             0 for the likeliest start of each way.
-        begun : Begun
+        begun : SharedState
             What was screened so far, and the work; updated here.
         worth : callable
             Whether another start after the very first is approached, called before each.
@@ -264,7 +264,7 @@ class _Tries:
     ----------
     search : MotionSearch
         The search.
-    begun : Begun
+    begun : SharedState
         Its work is counted there.
     """
 

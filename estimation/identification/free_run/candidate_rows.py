@@ -19,7 +19,7 @@ def form_row(structure: str, one: ComparedModel, form: Form, doubt: str = "", **
     ----------
     structure : str
         Name in the command line.
-    one : Compared
+    one : ComparedModel
         The candidate.
     form : Form
         Of its linear part.

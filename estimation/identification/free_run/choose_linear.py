@@ -224,7 +224,7 @@ def smallest_good_candidate(candidates: Sequence[AnyCompared], least: float) -> 
 
     Parameters
     ----------
-    candidates : sequence of Compared
+    candidates : sequence of ComparedModel
         At least one that is.
     least : float
         Held-back error of the best one [dimensionless].

@@ -41,14 +41,14 @@ def with_fitted_accumulator(
 
     Parameters
     ----------
-    found : Loaded
+    found : LoadedDiagnosis
         A diagnosis, and the actuator around which circuits were fitted.
     again : callable
         ``again(parameters)``: the diagnosis around another actuator.
 
     Returns
     -------
-    Loaded
+    LoadedDiagnosis
         Unchanged if a circuit follows the log already, or none does with another accumulator.
     """
     if found.diagnosis.circuit_follows or not found.parameters.single_rod:

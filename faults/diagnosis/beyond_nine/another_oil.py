@@ -30,7 +30,7 @@ def with_stiffer_oil(diagnosed: DiagnoseAround, parameters: EhaParameters) -> Lo
 
     Returns
     -------
-    Loaded
+    LoadedDiagnosis
         The diagnosis, its actuator, and a note if the oil is another.
     """
     found = diagnosed(parameters, 0.0)

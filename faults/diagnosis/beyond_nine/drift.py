@@ -59,7 +59,7 @@ def averaged_over_drift(
 
     Returns
     -------
-    Loaded
+    LoadedDiagnosis
         The diagnosis at the end of the log; with the classes of all places if `LEAKAGE_DRIFTS` is among the notes, or
         if the diagnosis of a log without pressure found a drift, which is then one of its notes.
     """

@@ -74,7 +74,7 @@ def with_rod_load(
 
     Returns
     -------
-    Loaded
+    LoadedDiagnosis
         The diagnosis, and the actuator with its load; those of the rig file where no load explains the log. Where a
         load or friction that changes does, that speaks against all conditions.
     """

@@ -184,7 +184,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
 
     Returns
     -------
-    Outside
+    OutsideFaults
         Empty with pressure, and if the piston sticks.
     """
     if blocks.pressure is not None or is_stuck(blocks, actuator):

@@ -53,7 +53,7 @@ def log_likelihood(blocks: Blocks, tried: Trial) -> float:
     ----------
     blocks : Blocks
         The log in blocks, without pressure.
-    tried : Tried
+    tried : Trial
         The circuit.
 
     Returns
@@ -81,7 +81,7 @@ def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Arr
 
     Returns
     -------
-    Tried
+    Trial
         That circuit: the actuator's, one without a drain from the pump's case, with wider make-up valves, or both.
     """
     tried, healthy = [Trial(actuator, fits)], actuator.circuit

@@ -134,7 +134,7 @@ def chance_by_conditions(
         The evidences of a sound pump.
     actuator : Actuator
         The healthy actuator.
-    left : OpenDelivery
+    left : UndeterminedDelivery
         What the balance leaves open.
     calibration : Calibration
         Weights of the evidences.

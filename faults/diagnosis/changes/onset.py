@@ -185,7 +185,7 @@ def two_parts(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> TwoParts |
 
     Returns
     -------
-    Parted or None
+    TwoParts or None
         Both parts; None if one circuit suffices, or both would be in one condition.
     """
     split = likeliest_split(blocks, fits.best)
@@ -208,7 +208,7 @@ def find_onset(blocks: Blocks, two: TwoParts, actuator: Actuator) -> tuple[Chang
     ----------
     blocks : Blocks
         The log.
-    two : Parted
+    two : TwoParts
         Its parts.
     actuator : Actuator
         The healthy actuator.

@@ -1,7 +1,7 @@
-"""`beginning_of(record, pressure, velocity) -> Beginning`: with what a log begins, and what of it does not count.
+"""`beginning_of(record, pressure, velocity) -> Beginning`: the state in which a log begins, and its settling time.
 
-A circuit starts with both chambers at the accumulator's pressure, but for a differential pressure. A log that begins in
-motion may have oil shut in on both sides.
+A circuit starts with one chamber at the accumulator's pressure, and the other one above it by the differential
+pressure. In a log that begins in motion, both chambers may hold oil at a higher pressure, which fades as it leaks off.
 """
 
 from typing import NamedTuple
@@ -20,8 +20,8 @@ TURNING_SETTLING = 1.0
 piston holds leaks off in about that time, ``V / (beta L)`` of the healthy actuator."""
 
 SLIDING_SETTLING = 3.0
-"""The same if the piston slides as well, three tenths of the log at most [s]: three times that for the oil that its
-motion has shut in."""
+"""The same if the piston slides as well, three tenths of the log at most [s]: the oil that its motion has shut in needs
+three times as long."""
 
 LEAST_MOTION = 0.05
 """First motor speed over the log's root mean square from which the log begins in motion [fraction]: a motor also passes
@@ -32,7 +32,7 @@ LEAST_START_PRESSURE = 0.1
 
 
 class Beginning(NamedTuple):
-    """With what a log begins.
+    """The state in which a log begins.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Beginning(NamedTuple):
 
 
 def beginning_of(record: Record, pressure: Array | None, velocity: Array) -> Beginning:
-    """Return with what a log begins.
+    """Return the state in which a log begins.
 
     Parameters
     ----------
@@ -71,11 +71,9 @@ def beginning_of(record: Record, pressure: Array | None, velocity: Array) -> Beg
     """
     first = float(np.nan_to_num(velocity[0]))
     if pressure is not None:
-        opening = (float(pressure[0]), first) if np.isfinite(pressure[0]) else None
-        pressed = opening is not None and abs(opening[0]) > LEAST_START_PRESSURE * float(
-            np.sqrt(np.nanmean(pressure**2))
-        )
-        return Beginning(opening if pressed else None, opening, 0.0, SETTLING)
+        values = (float(pressure[0]), first) if np.isfinite(pressure[0]) else None
+        least = LEAST_START_PRESSURE * float(np.sqrt(np.nanmean(pressure**2)))
+        return Beginning(values if values is not None and abs(values[0]) > least else None, values, 0.0, SETTLING)
     if not begins_in_motion(record, LEAST_MOTION):
         return Beginning(None, None, 0.0, SETTLING)
     slides = abs(first) > LEAST_MOTION * float(np.sqrt(np.nanmean(velocity**2)))

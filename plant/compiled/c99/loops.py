@@ -69,7 +69,7 @@ class Translation:
         The Python functions, by name.
     constants : Mapping[str, int]
         Integers that the functions read by name.
-    outside : Mapping[str, Outside]
+    outside : Mapping[str, ExternalFunction]
         Functions called that already exist in C.
     prefix : str
         Prefix of the names of their translations.
@@ -98,7 +98,7 @@ class Translation:
 
         Returns
         -------
-        Translated
+        TranslatedFunction
             The function; `text` also has all functions that it calls.
         """
         key = name, tuple(kind_of(one) for one in given)

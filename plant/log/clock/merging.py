@@ -70,7 +70,7 @@ def merge_loggers(parts: Sequence[LoggerChannels], source: str) -> MergedChannel
 
     Returns
     -------
-    Merged
+    MergedChannels
         Channels on one time; those of slower loggers are missing between their samples.
 
     Raises
