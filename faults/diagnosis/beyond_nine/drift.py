@@ -21,10 +21,9 @@ from faults.diagnosis.changes.warming import with_leakage_course
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_fit import LASTING, least_scales, misfit
+from faults.diagnosis.circuits.class_fit import LASTING, misfit
 from faults.diagnosis.circuits.class_regions import fit_classes
-from faults.diagnosis.circuits.model_doubt import NOISE_ALONE
-from faults.diagnosis.circuits.rivals import LOOKS
+from faults.diagnosis.circuits.rivals import blocks_a_look, model_error_share
 from faults.diagnosis.evidence import Scoreboard, models_scores
 from faults.diagnosis.severity import severities
 from faults.notes import AgainstCode
@@ -148,11 +147,10 @@ def _evidence_share(board: Scoreboard) -> float:
     """Return the share of a log's evidence that counts between places of the rig file's oil [fraction].
 
     Places differ by friction of a few percent, and so does a friction law from the real one. Residuals beyond noise are
-    that law's error: however long a log is, they give `LOOKS` looks at it.
+    that law's error, at which a log gives few looks however long it is.
     """
-    blocks = board.blocks
-    error = np.maximum(1.0 - (NOISE_ALONE * least_scales(blocks) / board.fits.best.scales) ** 2, 0.0)
-    return float(np.min(LASTING / (LASTING + error * blocks.counts / LOOKS)))
+    error = model_error_share(board.blocks, board.fits.best.scales)
+    return float(np.min(LASTING / blocks_a_look(board.blocks, error)))
 
 
 def _evidence(board: Scoreboard, calibration: Calibration) -> float:

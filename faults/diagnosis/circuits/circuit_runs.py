@@ -276,9 +276,8 @@ def _initial_states(blocks: Blocks, rows: Array) -> Array:
     p = circuit_values(rows)
     begun = blocks.raw_start_values if blocks.start_values is None and np.any(p.load_force) else blocks.start_values
     if blocks.start_velocity:
-        way, speed = np.sign(blocks.start_velocity), abs(blocks.start_velocity)
-        force = quadratic_friction(speed, 1.0, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
-        begun = (way * force + p.load_force) / p.piston_area, blocks.start_velocity
+        velocity, law = blocks.start_velocity, (p.friction_quadratic, p.friction_linear, p.friction_coulomb)
+        begun = (quadratic_friction(velocity, np.sign(velocity), *law) + p.load_force) / p.piston_area, velocity
     states = at_rest(p) if begun is None else under_pressure(*begun, p)
     found = np.empty((len(rows), len(states)))
     for place, state in enumerate(states):

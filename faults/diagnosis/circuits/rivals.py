@@ -146,18 +146,54 @@ def log_likelihood_behind(fits: Sequence[PointFit], best: PointFit, blocks: Bloc
     ndarray, shape (fits,)
         Log-likelihoods [dimensionless], 0 for the best; infinite if a circuit diverged.
     """
-    scales, noise = scales_of(blocks, best.fitted), NOISE_ALONE * least_scales(blocks)
+    scales = scales_of(blocks, best.fitted)
     found = np.full(len(fits), np.inf)
     for at, fit in enumerate(fits):
         if np.all(np.isfinite(fit.fitted)):
             others = scales_of(blocks, fit.fitted)
-            error = _roughness(blocks, np.minimum(scales, others), noise)
-            looks = blocks.counts / (LASTING + error * blocks.counts / LOOKS)
+            looks = blocks.counts / blocks_a_look(blocks, _roughness(blocks, np.minimum(scales, others)))
             found[at] = float(looks @ np.log(others / scales))
     return found
 
 
-def _roughness(blocks: Blocks, scales: Array, noise: Array) -> Array:
+def blocks_a_look(blocks: Blocks, error: Array) -> Array:
+    """Return how many blocks count as one look at a model.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    error : ndarray, shape (outputs,)
+        Share of each output's residuals that is a wrong model's error [fraction].
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        `LASTING` for noise alone; with a wrong model's error, a long log gives `LOOKS` looks [dimensionless].
+    """
+    return np.asarray(LASTING + error * blocks.counts / LOOKS, dtype=np.float64)
+
+
+def model_error_share(blocks: Blocks, scales: Array) -> Array:
+    """Return the share of a circuit's residuals that is a wrong model's error.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    scales : ndarray, shape (outputs,)
+        Root mean square residuals [m/s, Pa].
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        What is beyond the sensors' noise [fraction].
+    """
+    noise = NOISE_ALONE * least_scales(blocks)
+    return np.asarray(np.maximum(1.0 - (noise / scales) ** 2, 0.0), dtype=np.float64)
+
+
+def _roughness(blocks: Blocks, scales: Array) -> Array:
     """Return the share of each output's residuals that is a wrong model's error, if the piston is followed roughly.
 
     All beyond noise from twice `ROUGH_RESIDUAL` on, nothing up to it [dimensionless].
@@ -166,7 +202,7 @@ def _roughness(blocks: Blocks, scales: Array, noise: Array) -> Array:
         return np.zeros(len(scales))
     tiny = float(np.finfo(float).tiny)
     rough = min(max(float(scales[0]) / max(ROUGH_RESIDUAL * float(blocks.rms[0]), tiny) - 1.0, 0.0), 1.0)
-    return np.asarray(rough * np.maximum(1.0 - (noise / scales) ** 2, 0.0), dtype=np.float64)
+    return np.asarray(rough * model_error_share(blocks, scales), dtype=np.float64)
 
 
 def covariance_between_fits(fits: Sequence[PointFit], best: PointFit, worse: Array) -> Array:
