@@ -18,7 +18,7 @@ from estimation.fits.hypothesis_search.fault_guesses import leakage_guess
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.log_checks.bridging import bridged, within_gaps
 from estimation.log_checks.dropout import LONG_GAP, without_pauses
-from estimation.log_checks.measurement_noise import excited_noise_variance, measurement_variances, position_variance
+from estimation.log_checks.measurement_noise import measurement_variances, noise_behind_motion, position_variance
 from estimation.log_checks.order import median
 from estimation.log_checks.outliers import without_outliers
 from estimation.models.completed_flow import CRACKS
@@ -170,7 +170,7 @@ def flow_log(
     sensed, record = record, without_pauses(record)
     # motor speed keeps its larger variance, with sudden changes, so that intervals cover its course
     pressure = "differential_pressure_pa"
-    quiet = {pressure: min(variances[pressure], excited_noise_variance(sensed[pressure]))}
+    quiet = {pressure: noise_behind_motion(sensed[pressure], variances[pressure])}
     log = greybox_log(
         FLOW_FORM,
         record,
@@ -259,7 +259,7 @@ def with_random_walk(
     """
     (noise,), stiffness = log.noise, min(values["bulk_modulus"], stiffest) / parameters.chamber_volume
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
-    variance = min(log.drive_std[0] ** 2, excited_noise_variance(speed))
+    variance = noise_behind_motion(speed, log.drive_std[0] ** 2)
     walk = (stiffness * parameters.pump_displacement) ** 2 * variance * log.sample_time
     remembered = 0.5 / max(stiffness * values["leakage_coefficient"], 1.0 / (len(log.drives) * log.sample_time))
     felt = walk * remembered > FELT_NOISE**2 * noise.variance

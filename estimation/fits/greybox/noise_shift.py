@@ -13,7 +13,7 @@ from estimation.fits.greybox.deviations import NOISE_DOUBT, Information
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.side_by_side import LANES
 from estimation.fits.greybox.small_pump_ripple import NO_SHIFTS
-from estimation.log_checks.measurement_noise import excited_noise_variance
+from estimation.log_checks.measurement_noise import noise_behind_motion
 from plant.arrays import Array
 
 MOVING = ("bulk_modulus", "leakage_coefficient", "case_leakage", "flow_bias", "pump_displacement")
@@ -52,7 +52,7 @@ def noise_shift(
     if not log.drive_std or not any(noise.walk > 0.0 for noise in log.noise) or log.course is not None:
         return NO_SHIFTS
     names = [problem.model.unknowns[place] for place in known_of.felt]
-    spread = min(log.drive_std[0] ** 2, excited_noise_variance(log.drives[:, 0])) ** 0.5
+    spread = noise_behind_motion(log.drives[:, 0], log.drive_std[0] ** 2) ** 0.5
     asked = problem if len(log.drives) <= LONGEST else problem.on(log.beginning(LONGEST))
     draws = spread * np.random.default_rng(0).standard_normal((len(asked.log.drives), LANES))
     draws[:, 0] = 0.0

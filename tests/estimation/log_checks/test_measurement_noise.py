@@ -9,6 +9,7 @@ from estimation.log_checks.measurement_noise import (
     SMALLEST_VARIANCE,
     excited_noise_variance,
     measurement_variances,
+    noise_behind_motion,
     position_variance,
 )
 from estimation.log_checks.outliers import without_gross_outliers
@@ -156,3 +157,31 @@ def test_a_converter_that_flickers_between_two_levels_has_no_gross_outliers() ->
 @pytest.mark.parametrize("values", [np.zeros(100), np.arange(5.0), np.full(100, np.nan)])
 def test_a_channel_without_noise_has_an_infinite_struck_variance(values: np.ndarray) -> None:
     assert excited_noise_variance(values) == np.inf
+
+
+def test_the_variance_of_white_noise_scatters_little_more_than_that_of_all_differences() -> None:
+    """By the median alone it scattered by 2.9 over the root of the samples, and sound logs of 2 s were refused."""
+    rng, samples = np.random.default_rng(4), 1000
+    found = [variance_of("velocity_m_s", noise) for noise in rng.normal(size=(400, samples))]
+    assert np.mean(found) == pytest.approx(1.0, abs=0.015)
+    assert np.std(found) * samples**0.5 < 2.4
+
+
+@pytest.mark.parametrize(("share", "largest"), [(0.2, 1.8), (0.4, 2.4)])
+def test_differences_that_are_not_normal_leave_the_variance_to_their_median(share: float, largest: float) -> None:
+    """Where the signal is ten times as loud for part of a log, the mean square of differences is far off."""
+    rng = np.random.default_rng(5)
+    loud = np.where(np.arange(4000) < share * 4000, 3.0, 1.0) * rng.normal(size=4000)
+    assert variance_of("velocity_m_s", loud) < largest
+
+
+@pytest.mark.parametrize(("ringing", "lower"), [(0.0, False), (3.0, False), (30.0, True)])
+def test_sixth_differences_tell_the_noise_only_where_they_are_lower_by_more_than_chance(
+    ringing: float, lower: float
+) -> None:
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        values = ringing * np.sin(2.0 * np.pi * 0.05 * np.arange(2000)) + rng.normal(size=2000)
+        variance = variance_of("velocity_m_s", values)
+        found = noise_behind_motion(values, variance)
+        assert found == (excited_noise_variance(values) if lower else variance)

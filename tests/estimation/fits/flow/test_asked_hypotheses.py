@@ -149,7 +149,7 @@ def test_a_short_log_with_residuals_within_chance_has_no_hypothesis_tested() -> 
     """One in eleven plain logs of 2 s was tested for all, which took four times as long and never found anything."""
     short, sound = seen(log(2.0)), made_fit(400.0, 2e8, 1e5)
     with all_promise(PredictedGain(0.0, 0.0, 2.0 * OPEN_DELIVERY)):
-        for chi_square, wanted in ((1.16, ()), (1.18, HYPOTHESES)):
+        for chi_square, wanted in ((1.10, ()), (1.12, HYPOTHESES)):
             fit = replace(sound, chi_square=(chi_square,), seen=2000.0)
             assert hypotheses_asked(short, PAPER, fit, fit, loaded=False, moving=False)[0] == wanted
 

@@ -30,7 +30,7 @@ def known(one: FreedProblem, theta: Array) -> Information:
 
 
 def test_the_noise_shift_equals_the_shift_of_the_solution_by_drawn_noise(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("estimation.fits.greybox.noise_shift.excited_noise_variance", lambda _: SPREAD**2)
+    monkeypatch.setattr("estimation.fits.greybox.noise_shift.noise_behind_motion", lambda *_: SPREAD**2)
     one = loud()
     theta = usual(one)
     told = known(one, theta)
