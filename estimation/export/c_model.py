@@ -35,7 +35,7 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
     HydrostateError
         If the model is not linear or has limits, the name is none of C, or the precision is not known.
     """
-    require_no_limits(model)
+    require_transfer_function(model)
     real, name = precision_of(precision), checked_name(name)
     both = model.transfer_functions()
     order = max(1, *(max(b.size, f.size) - 1 for b, f in both))
@@ -62,14 +62,19 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
     return c_files("estimation", "model", name, real, facts)
 
 
-def require_no_limits(model: FreeRunModel) -> None:
-    """Refuse a model whose output has limits, since a transfer function alone would exceed them.
+def require_transfer_function(model: FreeRunModel) -> None:
+    """Refuse a model that is more than a transfer function: one with limits of its output, or with an error model.
 
     Raises
     ------
     HydrostateError
-        If it has limits; they are named.
+        If it has limits, which are named, or an error model.
     """
+    if model.error_model is not None:
+        raise HydrostateError(
+            f"the model of {model.output!r} has an error model, a polynomial that is not exported: identify with "
+            "--structure output-error for a transfer function alone"
+        )
     if not isinstance(model.dynamics, LimitedDynamics):
         return
     told = model.dynamics.limits.nonlinearity(model.scaling)

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from estimation.export.c_model import require_no_limits
+from estimation.export.c_model import require_transfer_function
 from estimation.identification.free_run.model import FreeRunModel
 from plant.compiled.c99.files import checked_name
 
@@ -23,7 +23,7 @@ def model_in_mat(model: FreeRunModel, *, name: str) -> dict[str, bytes]:
     """
     from scipy.io import savemat
 
-    require_no_limits(model)
+    require_transfer_function(model)
     numerators, denominators = model.padded_transfer_functions()
     held = BytesIO()
     savemat(

@@ -85,6 +85,11 @@ class IdentificationCode(Code):
         "nonlinear one is uncertain by {undetermined:.0%} of the output's deviation in the fitted logs; the linear one "
         "errs by {linear:.0%}. Fit a log with inputs like these, or see the nonlinear run with --structure {structure}"
     )
+    ERROR_MODELLED = (
+        "a polynomial of inputs and free run, now and up to {earlier:.3g} s earlier, predicts part of what the "
+        "{structure} model leaves of {output!r}: {left:.0%} of its error on held-back data is left. Simulations "
+        "include it; transfer function, poles and gain do not"
+    )
     NO_NONLINEARITY = (
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
         "linear model was chosen"

@@ -104,10 +104,12 @@ def column_entries(found: "Identified") -> dict[str, Any]:
     elif isinstance(model.dynamics, StateSpaceDynamics):
         result |= _state_space_entries(model, model.dynamics)
     result["nonlinearity"] = model.nonlinearity
+    result["error_model"] = None if model.error_model is None else model.error_model.facts()
     quality, why = found.quality, sorted(found.notes, key=lambda note: note.code not in UNRELIABLE)
+    named = model.structure + ("" if model.error_model is None else " with an error model")
     result["message"] = clauses(
         [
-            f"{model.structure} with {model.n_values} values: fit {quality.fit_percent:.1f} % running free, "
+            f"{named}, {model.n_values} values: fit {quality.fit_percent:.1f} % running free, "
             f"{found.held_back_percent:.1f} % on blocks held back, rms error {quality.rmse:.4g}",
             *map(str, why[:1] if not found.sound else ()),
         ]

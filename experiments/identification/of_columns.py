@@ -58,8 +58,8 @@ OUTPUT_NONLINEARITIES = ("absolute-value", "cut-off", "stops")
 BLANK: Result = {
     **dict.fromkeys(("inputs", "input", "output", "structure", "order", "n_values", "sample_time_s")),
     **dict.fromkeys(("fit_percent", "rmse", "one_step_percent", "one_step_rmse", "held_back_percent", "offset")),
-    **dict.fromkeys(("numerator", "denominator", "dc_gain", "poles", "delay", "nonlinearity", "test", "model")),
-    "frequency_response": None,
+    **dict.fromkeys(("numerator", "denominator", "dc_gain", "poles", "delay", "nonlinearity", "error_model", "test")),
+    **dict.fromkeys(("model", "frequency_response")),
     "candidates": [],
 }
 """Entries of a log that could not be used."""
@@ -186,7 +186,9 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
         test = result["test"]
         shown.add_row(
             str(result["output"]),
-            result["structure"] if result["order"] is None else f"{result['structure']}, order {result['order']}",
+            result["structure"]
+            + ("" if result["order"] is None else f", order {result['order']}")
+            + ("" if result["error_model"] is None else ", error model"),
             str(result["n_values"]),
             f"{result['fit_percent']:.2f}",
             f"{result['held_back_percent']:.2f}",
@@ -208,7 +210,8 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     for result in results:
         if result["outcome"] == "mismatch":
             yield f"Do not use the model of {result['output']} (outcome mismatch): see the warning above."
-        yield from (note["text"] for note in result["notes"] if note["code"] == IdentificationCode.MORE_THAN_NOISE)
+        told = (IdentificationCode.MORE_THAN_NOISE, IdentificationCode.ERROR_MODELLED)
+        yield from (note["text"] for note in result["notes"] if note["code"] in told)
     yield (
         f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the fitted logs, on blocks held back from "
         f"the fit, and on --validate; gains ± one standard deviation. One-step fits, models and candidates are in "

@@ -74,7 +74,8 @@ def title_of(view: IdentifiedView) -> str:
         return f"Do not use this model of {view.output.name}: {_why_unusable(view)}."
     order = view.result.get("order") or (None if view.linear is None else view.linear.denominator.size - 1)
     kind = "linear with limits" if has_limits(view) else KINDS.get(view.result["structure"], view.result["structure"])
-    said = f"Model of {view.output.name} ({kind}{f', order {order}' if order else ''})"
+    beside = ", with an error model" if view.result.get("error_model") else ""
+    said = f"Model of {view.output.name} ({kind}{f', order {order}' if order else ''}{beside})"
     if has_random_walk(view):
         return f"{said}, fitted to changes: the output also wanders by itself."
     if held is None:

@@ -15,6 +15,10 @@ from estimation.progress import report_progress
 BLOCKS = 4
 """Blocks of every log, each held back once."""
 
+CLEAR_MARGIN = 0.15
+"""Share by which a nonlinear model must reduce the held-back error of the linear one, and an error model that of its
+model [fraction]."""
+
 STUDENT_95 = (6.314, 2.920, 2.353)
 """95 % quantile of a mean of two, three and four over its standard error (Student's distribution)."""
 

@@ -9,6 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.identification.free_run.candidate_rows import hammerstein_row, polynomial_row
+from estimation.identification.free_run.choose_error_model import likelier_with_error_model
 from estimation.identification.free_run.choose_hammerstein import (
     HammersteinCandidate,
     hammerstein_candidates,
@@ -32,7 +33,7 @@ from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.fewer_samples import on_fewer_samples
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import deviations, finished_fit, refitted_hammerstein
-from estimation.identification.free_run.held_back import BLOCKS
+from estimation.identification.free_run.held_back import BLOCKS, CLEAR_MARGIN
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_comparison import (
@@ -73,9 +74,6 @@ model is finally fitted."""
 ROUNDING_ERROR = 1e-9
 """Held-back error of a linear model below which only rounding is left: no nonlinearity is tried [dimensionless]."""
 
-CLEAR_MARGIN = 0.15
-"""Share by which a nonlinear model must reduce the held-back error of the linear one."""
-
 
 def identify_channels(
     data: Channels,
@@ -95,10 +93,10 @@ def identify_channels(
         ``"output-error"``: linear. ``"narx"``: polynomial, with terms chosen by the free run. ``"hammerstein"``, for
         one input: a dead zone, saturation or backlash before a linear model, if one of them is better than none.
         ``"wiener"``: linear, with its output measured without a sign. ``"auto"``: linear, unless one of the others is
-        clearly better on held-back blocks. Further the keys of `other_structures.OTHER_STRUCTURES`, at the order of the
-        output-error model. ``"output-error"`` and ``"auto"`` also recognise an output without its sign, limits at which
-        the output stays, and an output with a random walk, which is fitted to changes from sample to sample
-        (`random_walk`).
+        clearly better on held-back blocks, and with an error model where that surely helps. Further the keys of
+        `other_structures.OTHER_STRUCTURES`, at the order of the output-error model. ``"output-error"`` and ``"auto"``
+        also recognise an output without its sign, limits at which the output stays, and an output with a random walk,
+        which is fitted to changes from sample to sample (`random_walk`).
     order, delay, n_numerator : int, optional
         For every input; if not given, chosen by the free run on held-back blocks.
 
@@ -178,7 +176,10 @@ def _identified(
             held = identified_limited(within, linear)
             if held.sound:
                 return _clearly_better_nonlinear(held, linear, structure)
-    return linear.identified() if structure == "output-error" else _nonlinear_or_linear(structure, linear)
+    if structure == "output-error":
+        return linear.identified()
+    found = _nonlinear_or_linear(structure, linear)
+    return likelier_with_error_model(found, linear) if structure == "auto" else found
 
 
 def _identified_from_changes(task: Task) -> Identified | None:

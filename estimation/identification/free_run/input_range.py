@@ -5,6 +5,7 @@ from itertools import count
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels, in_scale
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.model import FreeRunModel
@@ -15,7 +16,7 @@ from plant.notes import Note
 
 
 def input_range_notes(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return a note on each input that leaves the range in which a polynomial model was fitted.
+    """Return a note on each input that leaves the range in which a polynomial or an error model was fitted.
 
     Parameters
     ----------
@@ -29,20 +30,14 @@ def input_range_notes(model: FreeRunModel, data: Channels) -> list[Note]:
     list of Note
         One per input that leaves its range by a tenth of it or more, with how far and how often.
     """
-    if not isinstance(model.dynamics, PolynomialDynamics):
-        return []
-    variables, by, notes = model.dynamics.variables, model.scaling, list[Note]()
-    together = np.concatenate(data.u)
+    by, notes, together = model.scaling, list[Note](), np.concatenate(data.u)
     for index, name in enumerate(data.inputs):
-        own = variables.limits[variables.source == index + 1]
-        if own.size == 0:
-            continue
+        ends = _ends_of_input(model, index)
         values = (together[:, index] - by.u_mean[index]) / by.u_std[index]
-        outside = (values < own[0, 0]) | (values > own[0, 1])
-        if not outside.any():
+        if ends is None or not (outside := (values < ends[0]) | (values > ends[1])).any():
             continue
-        margin = SIGNAL_MARGIN * (own[0, 1] - own[0, 0]) / (1.0 + 2.0 * SIGNAL_MARGIN)
-        low, high = by.u_mean[index] + by.u_std[index] * (own[0] + margin * np.array([1.0, -1.0]))
+        margin = SIGNAL_MARGIN * (ends[1] - ends[0]) / (1.0 + 2.0 * SIGNAL_MARGIN)
+        low, high = by.u_mean[index] + by.u_std[index] * (ends + margin * np.array([1.0, -1.0]))
         notes.append(
             IdentificationCode.INPUT_BEYOND_RANGE.note(
                 channel=name,
@@ -54,6 +49,16 @@ def input_range_notes(model: FreeRunModel, data: Channels) -> list[Note]:
             )
         )
     return notes
+
+
+def _ends_of_input(model: FreeRunModel, index: int) -> Array | None:
+    """Return the ends, scaled, at which an input counts in a polynomial, shape (2,); None if it is in none."""
+    if isinstance(model.dynamics, PolynomialDynamics):
+        variables = model.dynamics.variables
+        own = variables.limits[variables.source == index + 1]
+        if own.size:
+            return own[0]
+    return None if model.error_model is None else model.error_model.ends[:, index + 1]
 
 
 def linear_fallback_notes(

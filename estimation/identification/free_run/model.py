@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from estimation.arrays import Array
 from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamics
 from estimation.identification.free_run.data import Scaling
-from estimation.identification.free_run.dynamics import Dynamics
+from estimation.identification.free_run.dynamics import Dynamics, OutputErrorDynamics
+from estimation.identification.free_run.error_model import ErrorModel
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.limited_dynamics import LimitedDynamics
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 FORMAT = "hydrostate-model"
 """Name of the format in a saved model."""
 
-VERSION = 1
+VERSION = 2
+"""Latest version of that format: models with an error model. Others are written as version 1."""
 
 KINDS: Mapping[str, Any] = {
     one.kind: one
@@ -77,6 +79,8 @@ class FreeRunModel:
         Scaling of the fitted data, and the dynamics between its scaled channels.
     linear : LinearModel, optional
         The transfer function with its covariance, for one input and a linear model.
+    error_model : ErrorModel, optional
+        What predicts part of the error of the dynamics; runs include it.
     """
 
     inputs: tuple[str, ...]
@@ -86,11 +90,12 @@ class FreeRunModel:
     scaling: Scaling
     dynamics: Dynamics
     linear: "LinearModel | None" = field(default=None)
+    error_model: ErrorModel | None = None
 
     @property
     def n_values(self) -> int:
         """Fitted coefficients."""
-        return self.dynamics.n_values
+        return self.dynamics.n_values + (0 if self.error_model is None else self.error_model.n_values)
 
     @property
     def nonlinearity(self) -> dict[str, Any] | None:
@@ -131,7 +136,7 @@ class FreeRunModel:
         u : array_like, shape (n, m) or (n,)
             Inputs in the model's order, without gaps.
         y : array_like, shape (n,), optional
-            As in `simulate`.
+            See `simulate`.
 
         Returns
         -------
@@ -144,6 +149,8 @@ class FreeRunModel:
             run, errors = self.dynamics.judged_run(inputs, outputs)
         else:
             run = self.dynamics.run(inputs, outputs)
+        if self.error_model is not None and (errors is None or errors[0] < errors[1]):  # no linear model stands in
+            run = self.error_model.corrected(inputs, run)
         return self.scaling.y_mean + self.scaling.y_std * run, errors
 
     def predict(self, u: ArrayLike, y: ArrayLike) -> Array:
@@ -161,6 +168,8 @@ class FreeRunModel:
         ndarray, shape (n,)
             Output [output unit].
         """
+        if self.error_model is not None and isinstance(self.dynamics, OutputErrorDynamics):
+            return self.simulate(u, y)
         inputs, outputs = self._scaled(u, y)
         if self.linear is not None and self.linear.noise_denominator.size > 1:
             return self.linear.predict(self.scaling.u_mean[0] + self.scaling.u_std[0] * inputs[:, 0], np.asarray(y))
@@ -272,7 +281,7 @@ class FreeRunModel:
         return numerators, denominators
 
     def to_control(self) -> "control.TransferFunction":
-        """Return a linear model as a python-control object, one column per input, without offset and limits."""
+        """Return a linear model as a python-control object, without offset, limits and error model."""
         import control
 
         numerators, denominators = self.padded_transfer_functions()
@@ -285,7 +294,7 @@ class FreeRunModel:
         by = self.scaling
         return {
             "format": FORMAT,
-            "version": VERSION,
+            "version": 1 if self.error_model is None else VERSION,
             "inputs": list(self.inputs),
             "output": self.output,
             "sample_time_s": self.sample_time,
@@ -298,6 +307,7 @@ class FreeRunModel:
                 "y_std": by.y_std,
             },
             "body": self.dynamics.to_dict(),
+            **({} if self.error_model is None else {"error_model": self.error_model.to_dict()}),
         }
 
     @classmethod
@@ -319,7 +329,9 @@ class FreeRunModel:
             scaling = Scaling(np.array(by["u_mean"]), np.array(by["u_std"]), float(by["y_mean"]), float(by["y_std"]))
             dynamics = KINDS[values["kind"]].from_dict(values["body"])
             names = (tuple(values["inputs"]), str(values["output"]))
-            return cls(*names, float(values["sample_time_s"]), str(values["structure"]), scaling, dynamics)
+            error_model = ErrorModel.from_dict(values["error_model"]) if "error_model" in values else None
+            sizes = float(values["sample_time_s"]), str(values["structure"])
+            return cls(*names, *sizes, scaling, dynamics, error_model=error_model)
         except (KeyError, TypeError, ValueError) as error:
             raise HydrostateError(f"a saved model is not usable: {type(error).__name__} {error}") from error
 
