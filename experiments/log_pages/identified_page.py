@@ -209,6 +209,8 @@ def control_text(view: IdentifiedView) -> str:
     offset = view.result.get("offset")
     told = f"# The output also has an offset of {offset!r}, which a transfer function leaves out.\n" if offset else ""
     told += "# The output also has limits, which a transfer function leaves out.\n" if has_limits(view) else ""
+    if view.result.get("error_model"):
+        told += "# The model also has an error model, which a transfer function leaves out.\n"
     return (
         f"# Identified by Hydrostate from {view.result['file']!r}.\n{late}{told}"
         "import control\n\n"

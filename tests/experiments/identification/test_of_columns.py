@@ -14,6 +14,7 @@ from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from experiments.cli import app
 from experiments.identification.entries import gains_shown
+from tests.estimation.identification.free_run.test_error_model import signals
 
 
 @pytest.fixture(scope="module")
@@ -258,6 +259,21 @@ def test_a_backlash_is_reported_with_the_interval_of_its_half_width(tmp_path: Pa
     assert "backlash at u, half width 0.3" in run(tmp_path / "play.csv", *arguments).stdout
     model = hs.read(tmp_path / "play.csv").identify(input="u", output="y", structure="hammerstein", order=2, delay=1)
     assert model.nonlinearity["half_width"] == width
+
+
+def test_an_error_model_is_reported_saved_and_simulated(tmp_path: Path) -> None:
+    u, y = signals(3)
+    table = pd.DataFrame({"u": u[:, 0], "y": y}, index=0.01 * np.arange(y.size))
+    table.to_csv(tmp_path / "product.csv", index_label="time_s")
+    saved, columns = tmp_path / "model.json", ("--input", "u", "--output", "y")
+    said = run(tmp_path / "product.csv", *columns, "--structure", "auto", "--out", saved).stdout
+    assert "error model" in said
+    assert "a polynomial of inputs and free run" in " ".join(said.split())
+    (one,) = json.loads(saved.read_text())
+    assert set(one["error_model"]) == {"degree", "lags", "n_values"}
+    assert "with an error model" in one["message"]
+    (again,) = json.loads(run(tmp_path / "product.csv", "--simulate", saved, "--json").stdout)
+    assert again["outputs"][0]["fit_percent"] == pytest.approx(one["fit_percent"], abs=1e-6)
 
 
 def test_an_output_measured_without_its_sign_is_modelled_as_an_absolute_value(tmp_path: Path) -> None:

@@ -109,6 +109,13 @@ def test_a_model_with_limits_is_not_compared_with_the_measured_response(kind: st
     assert "The output also has limits" in control_text(view)
 
 
+def test_a_model_with_an_error_model_is_named_so_and_its_control_file_leaves_that_out() -> None:
+    view = seen(error_model={"degree": 2, "lags": [0, 4, 16], "n_values": 28})
+    assert "(linear, order 2, with an error model)" in title_of(view)
+    assert "The model also has an error model, which a transfer function leaves out" in control_text(view)
+    assert "error model" not in title_of(seen()) + control_text(seen())
+
+
 def test_failed_residual_tests_and_an_uncertain_gain_restrict_the_use_of_the_model() -> None:
     tests = {"whiteness_p": 1e-9, "cross_correlation_p": 1e-9}
     view = seen(validation=tests, dc_gain={"value": 1e-4, "std": 1e-4, "ci95": (-1e-4, 3e-4)})
