@@ -28,6 +28,6 @@ def test_an_identification_reports_progress_of_each_kind_of_model() -> None:
     with reporting_to(heard.append):
         identify_channels(data, structure="auto", order=1, delay=1)
     kinds = list(dict.fromkeys(heard))
-    grown = ["products that grow", "polynomial models"]
+    grown = ["products that grow", "polynomial models", "error models"]
     assert kinds == ["linear models", "outputs with limits", "nonlinear inputs", *grown]
     assert all(heard.count(one) > 1 for one in kinds if one != "linear models")
