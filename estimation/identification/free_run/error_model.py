@@ -78,7 +78,7 @@ class ErrorModel:
 
     def facts(self) -> dict[str, Any]:
         """Return degree and times of the polynomial, under the names of the JSON contract."""
-        return {"degree": self.degree, "lags": list(self.lags), "n_values": self.n_values}
+        return {"degree": self.degree, "lags_samples": list(self.lags), "n_values": self.n_values}
 
     def corrected(self, u: Array, run: Array) -> Array:
         """Return a free run with its predicted error, or as it is if these inputs do not determine that.

@@ -270,7 +270,7 @@ def test_an_error_model_is_reported_saved_and_simulated(tmp_path: Path) -> None:
     assert "error model" in said
     assert "a polynomial of inputs and free run" in " ".join(said.split())
     (one,) = json.loads(saved.read_text())
-    assert set(one["error_model"]) == {"degree", "lags", "n_values"}
+    assert set(one["error_model"]) == {"degree", "lags_samples", "n_values"}
     assert "with an error model" in one["message"]
     (again,) = json.loads(run(tmp_path / "product.csv", "--simulate", saved, "--json").stdout)
     assert again["outputs"][0]["fit_percent"] == pytest.approx(one["fit_percent"], abs=1e-6)

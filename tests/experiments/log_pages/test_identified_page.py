@@ -110,7 +110,7 @@ def test_a_model_with_limits_is_not_compared_with_the_measured_response(kind: st
 
 
 def test_a_model_with_an_error_model_is_named_so_and_its_control_file_leaves_that_out() -> None:
-    view = seen(error_model={"degree": 2, "lags": [0, 4, 16], "n_values": 28})
+    view = seen(error_model={"degree": 2, "lags_samples": [0, 4, 16], "n_values": 28})
     assert "(linear, order 2, with an error model)" in title_of(view)
     assert "The model also has an error model, which a transfer function leaves out" in control_text(view)
     assert "error model" not in title_of(seen()) + control_text(seen())
