@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from estimation.identification.free_run.data import Channels, in_scale, liveliest_sections
 from estimation.identification.free_run.error_model import error_model_of
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
@@ -39,17 +41,22 @@ def likelier_with_error_model(found: Identified, linear: LinearComparison) -> Id
 def _with_error_model(found: Identified, data: Channels) -> Identified:
     """Return a result with a model of its error; as it is if there is none, or it is not to be believed.
 
-    Behind a controller the inputs follow the output's noise, and would predict it.
+    Behind a controller the inputs follow the output's noise, and would predict it. Where a linear model stands in for a
+    nonlinear one, the error is not that model's.
     """
     model = found.model
     fed = any(note.code == IdentificationCode.FEEDBACK for note in found.notes)
     if type(model.dynamics) not in CORRECTED or not found.sound or fed:
         return found
     part, by = liveliest_sections(in_scale(data, model.scaling), MOST_MODELLED), model.scaling
-    runs = [
-        (model.simulate(by.u_mean + by.u_std * u, by.y_mean + by.y_std * y) - by.y_mean) / by.y_std
+    judged = [
+        model.judged_run(by.u_mean + by.u_std * u, by.y_mean + by.y_std * y)
         for u, y in zip(part.u, part.y, strict=True)
     ]
+    stands_in = any(errors is not None and not errors[0] < errors[1] for _, errors in judged)
+    runs = [(run - by.y_mean) / by.y_std for run, _ in judged]
+    if stands_in or not all(np.isfinite(run).all() for run in runs):
+        return found
     error_model = error_model_of(runs, part, [model.dynamics.undetermined_outputs(y.size) for y in part.y])
     if error_model is None:
         return found

@@ -8,12 +8,13 @@ the inputs, now and earlier. Nothing is fed back, so a run is as stable as witho
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
+from math import comb
 from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
-from estimation.arrays import Array, BoolArray
+from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.free_run.data import Channels, blocks
 from estimation.identification.free_run.fallback import jackknife
 from estimation.identification.free_run.held_back import (
@@ -30,13 +31,17 @@ EARLIER = (1, 4)
 """Earlier times of the signals, over the step between times [dimensionless]."""
 
 SHORTEST_SHARE = 50
-"""Samples of a log over the longest step between times [dimensionless]; steps are 0, 1, 2, 4 and so on."""
+"""Samples of a log over the longest step between times [dimensionless]; steps are 1, 2, 4 and so on."""
 
 MOST_CUBED = 6
 """Signals, at all times together, up to which products of three are tried [count]: 83 products."""
 
 PENALTIES = np.logspace(-4.0, 1.0, 11)
 """Penalties of squared coefficients that are tried, per output, for products of unit deviation [dimensionless]."""
+
+
+MOST_ROWS = 10_000
+"""Samples whose products are held in memory at once [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +104,15 @@ class ErrorModel:
         """
         if not np.isfinite(run).all():
             return run
-        columns = self._columns(u, run)
-        found = columns @ self.values
-        apart = jackknife(found, [columns @ part for part in self.parts])
+        signals, fits = _within(self.ends, run, u), np.column_stack([self.values, *self.parts])
+        pieces = np.array_split(np.arange(run.size), -(-run.size // MOST_ROWS))
+        found, *others = np.concatenate([self._columns(signals, rows) @ fits for rows in pieces]).T
+        apart = jackknife(found, others)
         return run + found if np.hypot(self.error, apart) < self.plain_error else run
 
-    def _columns(self, u: Array, run: Array) -> Array:
-        products = (_products(u, run, self.ends, self.lags, self.degree) - self.means) / self.deviations
-        return np.column_stack([np.ones(run.size), products])
+    def _columns(self, signals: Array, rows: IntArray) -> Array:
+        products = (_products(signals, rows, self.lags, self.degree) - self.means) / self.deviations
+        return np.column_stack([np.ones(rows.size), products])
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""
@@ -123,13 +129,34 @@ class ErrorModel:
         }
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> "ErrorModel":
-        """Return the error model that `to_dict` wrote."""
+    def from_dict(cls, values: Mapping[str, Any], inputs: int) -> "ErrorModel":
+        """Return the error model that `to_dict` wrote.
+
+        Parameters
+        ----------
+        inputs : int
+            Of the model whose error it predicts [count].
+
+        Raises
+        ------
+        ValueError
+            If its arrays do not fit together.
+        """
         ends, means, deviations, found, parts = (
             np.array(values[name], dtype=np.float64) for name in ("ends", "means", "deviations", "values", "parts")
         )
         lags, degree = tuple(map(int, values["lags"])), int(values["degree"])
         sizes = float(values["error"]), float(values["plain_error"])
+        if degree not in (2, 3) or min(lags) < 0 or ends.shape != (2, inputs + 1):
+            raise ValueError(
+                f"degree 2 or 3, lags from 0 and ends of {inputs + 1} signals are needed, got {degree}, {lags} and "
+                f"{ends.shape}"
+            )
+        single = ends.shape[1] * len(lags)
+        count = sum(comb(single + one - 1, one) for one in range(1, degree + 1))
+        shapes = [means.shape, deviations.shape, found.shape, parts.shape[1:]]
+        if shapes != [(count,), (count,), (count + 1,), (count + 1,)]:
+            raise ValueError(f"an error model of {count} products is needed, got arrays of {shapes}")
         return cls(lags, degree, ends, means, deviations, found, parts, *sizes)
 
 
@@ -208,7 +235,10 @@ class _Errors:
 
         None if there are fewer than two outputs for each coefficient.
         """
-        each = [_products(u, run, self.ends, lags, degree) for u, run in zip(self.inputs, self.runs, strict=True)]
+        each = [
+            _products(_within(self.ends, run, u), np.arange(run.size), lags, degree)
+            for u, run in zip(self.inputs, self.runs, strict=True)
+        ]
         products, count = np.concatenate(each), int(np.count_nonzero(self.used))
         if count < 2 * (products.shape[1] + 1):
             return None
@@ -236,9 +266,13 @@ def _sums(columns: Array, left: Array, mask: BoolArray) -> tuple[Array, Array]:
     return chosen.T @ chosen, chosen.T @ left[mask]
 
 
-def _products(u: Array, run: Array, ends: Array, lags: Sequence[int], degree: int) -> Array:
-    """Return the signals now and earlier, and their products, shape (n, p); before a log they stand still."""
-    signals, rows = np.clip(np.column_stack([run, u]), *ends), np.arange(run.size)
+def _within(ends: Array, run: Array, u: Array) -> Array:
+    """Return free run and inputs, held at the ends that count, shape (n, m + 1)."""
+    return np.clip(np.column_stack([run, u]), *ends)
+
+
+def _products(signals: Array, rows: IntArray, lags: Sequence[int], degree: int) -> Array:
+    """Return the signals at rows and earlier, and their products, shape (rows, p); before a log they stand still."""
     single = np.column_stack([signals[np.maximum(rows - lag, 0)] for lag in lags])
     found = [single]
     for count in range(2, degree + 1):

@@ -329,8 +329,8 @@ class FreeRunModel:
             scaling = Scaling(np.array(by["u_mean"]), np.array(by["u_std"]), float(by["y_mean"]), float(by["y_std"]))
             dynamics = KINDS[values["kind"]].from_dict(values["body"])
             names = (tuple(values["inputs"]), str(values["output"]))
-            error_model = ErrorModel.from_dict(values["error_model"]) if "error_model" in values else None
-            sizes = float(values["sample_time_s"]), str(values["structure"])
+            told, sizes = values.get("error_model"), (float(values["sample_time_s"]), str(values["structure"]))
+            error_model = None if told is None else ErrorModel.from_dict(told, len(names[0]))
             return cls(*names, *sizes, scaling, dynamics, error_model=error_model)
         except (KeyError, TypeError, ValueError) as error:
             raise HydrostateError(f"a saved model is not usable: {type(error).__name__} {error}") from error

@@ -14,6 +14,7 @@ from estimation.identification.free_run.error_model import MOST_CUBED, ErrorMode
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.input_range import input_range_notes
+from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.saved import load_models, save_models
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
@@ -131,6 +132,31 @@ def test_a_saved_model_keeps_its_error_model(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.simulate(u, y), model.simulate(u, y), rtol=1e-12)
     assert again.n_values == model.n_values
     assert (model.to_dict()["version"], replace(model, error_model=None).to_dict()["version"]) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"degree": 4},
+        {"lags": [0, -1]},
+        {"values": [1.0]},
+        {"parts": [[1.0, 2.0]]},
+        {"ends": [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]},
+        {"means": "none"},
+    ],
+)
+def test_a_saved_error_model_that_does_not_fit_together_is_refused(change: dict[str, object]) -> None:
+    entries = identified().model.to_dict()
+    with pytest.raises(HydrostateError, match="a saved model is not usable"):
+        FreeRunModel.from_dict({**entries, "error_model": {**entries["error_model"], **change}})
+
+
+def test_a_long_log_is_corrected_piece_by_piece_with_the_same_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, (u, _) = error_model(), signals(5)
+    assert found is not None
+    at_once = found.corrected(u, linear_run(u))
+    monkeypatch.setattr("estimation.identification.free_run.error_model.MOST_ROWS", 37)
+    np.testing.assert_allclose(found.corrected(u, linear_run(u)), at_once, rtol=1e-12)
 
 
 def test_a_prediction_one_step_ahead_includes_the_error_model_if_it_is_the_free_run() -> None:
