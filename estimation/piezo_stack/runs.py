@@ -107,8 +107,9 @@ class StackRuns:
         actuators = [self.actuator(theta) for theta in thetas]
         runs = run_stacks(actuators, self.voltage, self.sample_time, longest_step=longest_step)
         found = np.empty((len(actuators), len(self.noise) * len(self.voltage)))
-        for row, p, states in zip(found, actuators, runs, strict=True):
-            row[:] = over_noise(stack_channels(states, p), self.noise)
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that grows beyond bounds is hopeless
+            for row, p, states in zip(found, actuators, runs, strict=True):
+                row[:] = over_noise(stack_channels(states, p), self.noise)
         return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, _HOPELESS)
 
     def linearised_at(
