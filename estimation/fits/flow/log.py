@@ -135,6 +135,10 @@ def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array
     return np.ascontiguousarray(open_gaps[:, open_by > FELT_GAP * noise].T)
 
 
+STIFFEST_OIL = 5e9
+"""Bulk modulus above that of any hydraulic fluid [Pa]; mineral oil without air has 2 GPa, and 3 at 100 MPa."""
+
+
 def flow_log(
     record: Record,
     parameters: EhaParameters,
@@ -257,7 +261,7 @@ def with_random_walk(
     GreyBoxLog
         The same log if the walk does not matter beside the pressure sensor's noise before the oil has leaked off.
     """
-    (noise,), stiffness = log.noise, min(values["bulk_modulus"], stiffest) / parameters.chamber_volume
+    (noise,), stiffness = log.noise, min(values["bulk_modulus"], stiffest, STIFFEST_OIL) / parameters.chamber_volume
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
     variance = noise_behind_motion(speed, log.drive_std[0] ** 2)
     walk = (stiffness * parameters.pump_displacement) ** 2 * variance * log.sample_time
