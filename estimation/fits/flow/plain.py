@@ -7,7 +7,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from estimation.fits.flow.log import flow_log
+from estimation.fits.flow.log import STIFFEST_OIL, flow_log
 from estimation.fits.flow.search import balance_fits, flow_starts, likeliest_swinging, refitted_balances
 from estimation.fits.flow.swept import with_first_fit
 from estimation.fits.flow.turns_read import with_turns_read
@@ -282,7 +282,7 @@ def quieter_start(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
         None if the noise is already that of the oil that explains the log, or does not matter.
     """
     modulus, log = strange.values["bulk_modulus"], plain.log
-    heard = min(plain.swinging.values["bulk_modulus"], plain.start.stiffest)
+    heard = min(plain.swinging.values["bulk_modulus"], plain.start.stiffest, STIFFEST_OIL)
     white, walked = log.noise[0].variance * log.sample_time / log.block, log.noise[0].walk * log.block
     quiet = white + walked * min(modulus / heard, 1.0) ** 2
     return replace(plain.start, stiffest=modulus) if white + walked > MOST_EXCESS_NOISE * quiet else None

@@ -8,10 +8,10 @@ from scipy.signal import lfilter
 
 from estimation.eha.explanation_notes import total_delay
 from estimation.fits.flow.fit import fit_flow
-from estimation.fits.flow.log import _swept_share, flow_log, speed_gaps, with_random_walk, without_strays
+from estimation.fits.flow.log import STIFFEST_OIL, _swept_share, flow_log, speed_gaps, with_random_walk, without_strays
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.problem import Problem
-from estimation.log_checks.measurement_noise import excited_noise_variance
+from estimation.log_checks.measurement_noise import noise_behind_motion
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
@@ -179,17 +179,22 @@ def test_pump_flow_across_a_gap_is_that_of_piston_travel_and_oil_compression() -
 def test_speed_noise_accumulates_in_stiff_oil_that_hardly_leaks() -> None:
     record, true = log("normal", 7)
     seen = flow_log(*_sound(record))
-    found = {"bulk_modulus": 50.0 * true, "leakage_coefficient": HEALTHY.leakage_coefficient}
+    loud = seen.drives.copy()
+    loud[:, 0] += np.random.default_rng(1).normal(0.0, 0.5, len(loud))
+    seen = replace(seen, drives=loud, drive_std=(0.5, 0.0))
+    found = {"bulk_modulus": 10.0 * true, "leakage_coefficient": HEALTHY.leakage_coefficient}
     stiff, stiffer = (
-        with_random_walk(seen, HEALTHY, {**found, "bulk_modulus": times * true}).noise[0] for times in (50.0, 100.0)
+        with_random_walk(seen, HEALTHY, {**found, "bulk_modulus": times * true}).noise[0] for times in (10.0, 20.0)
     )
-    kept = 50.0 * true / HEALTHY.chamber_volume * HEALTHY.pump_displacement
-    noise = min(seen.drive_std[0] ** 2, excited_noise_variance(seen.drives[:, 0]))
+    kept = 10.0 * true / HEALTHY.chamber_volume * HEALTHY.pump_displacement
+    noise = noise_behind_motion(seen.drives[:, 0], seen.drive_std[0] ** 2)
     assert stiff.walk == pytest.approx(kept**2 * noise * seen.sample_time)
     assert stiffer.walk == pytest.approx(4.0 * stiff.walk)
     assert (
-        with_random_walk(seen, HEALTHY, {**found, "bulk_modulus": 1e3 * true}, stiffest=50.0 * true).noise[0] == stiff
+        with_random_walk(seen, HEALTHY, {**found, "bulk_modulus": 1e3 * true}, stiffest=10.0 * true).noise[0] == stiff
     )
+    steel = with_random_walk(seen, HEALTHY, {**found, "bulk_modulus": 1e3 * true}).noise[0]
+    assert steel.walk == pytest.approx((STIFFEST_OIL / (10.0 * true)) ** 2 * stiff.walk)
     assert replace(stiff, walk=0.0) == seen.noise[0]
     assert with_random_walk(seen, HEALTHY, {**found, "leakage_coefficient": 1e4 * HEALTHY.leakage_coefficient}) is seen
 
