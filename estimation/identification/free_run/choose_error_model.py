@@ -6,6 +6,7 @@ import numpy as np
 
 from estimation.identification.free_run.data import Channels, in_scale, liveliest_sections
 from estimation.identification.free_run.error_model import error_model_of
+from estimation.identification.free_run.fallback import linear_stands_in
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.linear_comparison import LinearComparison
@@ -53,9 +54,8 @@ def _with_error_model(found: Identified, data: Channels) -> Identified:
         model.judged_run(by.u_mean + by.u_std * u, by.y_mean + by.y_std * y)
         for u, y in zip(part.u, part.y, strict=True)
     ]
-    stands_in = any(errors is not None and not errors[0] < errors[1] for _, errors in judged)
     runs = [(run - by.y_mean) / by.y_std for run, _ in judged]
-    if stands_in or not all(np.isfinite(run).all() for run in runs):
+    if any(linear_stands_in(errors) or not np.isfinite(run).all() for run, errors in judged):
         return found
     error_model = error_model_of(runs, part, [model.dynamics.undetermined_outputs(y.size) for y in part.y])
     if error_model is None:

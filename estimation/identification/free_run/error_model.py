@@ -104,15 +104,16 @@ class ErrorModel:
         """
         if not np.isfinite(run).all():
             return run
-        signals, fits = _within(self.ends, run, u), np.column_stack([self.values, *self.parts])
-        pieces = np.array_split(np.arange(run.size), -(-run.size // MOST_ROWS))
-        found, *others = np.concatenate([self._columns(signals, rows) @ fits for rows in pieces]).T
+        signals = np.clip(np.column_stack([run, u]), *self.ends)
+        fits, pieces = np.column_stack([self.values, *self.parts]), -(-run.size // MOST_ROWS)
+        found, *others = np.concatenate(
+            [
+                _columns(_products(signals, rows, self.lags, self.degree), self.means, self.deviations) @ fits
+                for rows in np.array_split(np.arange(run.size), pieces)
+            ]
+        ).T
         apart = jackknife(found, others)
         return run + found if np.hypot(self.error, apart) < self.plain_error else run
-
-    def _columns(self, signals: Array, rows: IntArray) -> Array:
-        products = (_products(signals, rows, self.lags, self.degree) - self.means) / self.deviations
-        return np.column_stack([np.ones(rows.size), products])
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""
@@ -201,7 +202,7 @@ class _Errors:
 
     Parameters
     ----------
-    runs, inputs : sequence of ndarray, shape (n,) and (n, m)
+    signals : sequence of ndarray, shape (n, m + 1)
         Free run and inputs of each log, scaled.
     ends : ndarray, shape (2, m + 1)
         As in `ErrorModel`.
@@ -213,8 +214,7 @@ class _Errors:
         Those of each held-back block.
     """
 
-    runs: Sequence[Array]
-    inputs: Sequence[Array]
+    signals: Sequence[Array]
     ends: Array
     left: Array
     used: BoolArray
@@ -222,29 +222,27 @@ class _Errors:
 
     @classmethod
     def of(cls, runs: Sequence[Array], data: Channels, undetermined: Sequence[int]) -> "_Errors":
-        signals = np.column_stack([np.concatenate(runs), np.concatenate(data.u)])
-        low, high = signals.min(axis=0), signals.max(axis=0)
+        signals = [np.column_stack([run, u]) for run, u in zip(runs, data.u, strict=True)]
+        together = np.concatenate(signals)
+        low, high = together.min(axis=0), together.max(axis=0)
         ends = np.array([low - SIGNAL_MARGIN * (high - low), high + SIGNAL_MARGIN * (high - low)])
         left = np.concatenate([y - run for y, run in zip(data.y, runs, strict=True)])
         begun = np.concatenate([np.arange(y.size) >= first for y, first in zip(data.y, undetermined, strict=True)])
         used = np.isfinite(left) & begun
-        return cls(runs, data.u, ends, left, used, [np.concatenate(mask) & used for mask in blocks(data, BLOCKS)])
+        return cls(signals, ends, left, used, [np.concatenate(mask) & used for mask in blocks(data, BLOCKS)])
 
     def fitted(self, lags: tuple[int, ...], degree: int, plain_error: float) -> tuple[ErrorModel, list[float]] | None:
         """Return the fit with the penalty that held-back blocks prefer, and its error on each of them.
 
         None if there are fewer than two outputs for each coefficient.
         """
-        each = [
-            _products(_within(self.ends, run, u), np.arange(run.size), lags, degree)
-            for u, run in zip(self.inputs, self.runs, strict=True)
-        ]
-        products, count = np.concatenate(each), int(np.count_nonzero(self.used))
+        products = np.concatenate([_products(one, np.arange(len(one)), lags, degree) for one in self.signals])
+        count = int(np.count_nonzero(self.used))
         if count < 2 * (products.shape[1] + 1):
             return None
         means, deviations = products[self.used].mean(axis=0), products[self.used].std(axis=0)
         deviations = np.where(deviations > 0.0, deviations, 1.0)
-        columns = np.column_stack([np.ones(self.left.size), (products - means) / deviations])
+        columns = _columns(products, means, deviations)
         gram, side = _sums(columns, self.left, self.used)
         held = [_sums(columns, self.left, mask) for mask in self.masks]
         free = np.diag(np.arange(columns.shape[1]) > 0).astype(np.float64)  # the constant is not penalised
@@ -266,9 +264,9 @@ def _sums(columns: Array, left: Array, mask: BoolArray) -> tuple[Array, Array]:
     return chosen.T @ chosen, chosen.T @ left[mask]
 
 
-def _within(ends: Array, run: Array, u: Array) -> Array:
-    """Return free run and inputs, held at the ends that count, shape (n, m + 1)."""
-    return np.clip(np.column_stack([run, u]), *ends)
+def _columns(products: Array, means: Array, deviations: Array) -> Array:
+    """Return a column of ones, and products less their means over their deviations, shape (n, p + 1)."""
+    return np.column_stack([np.ones(len(products)), (products - means) / deviations])
 
 
 def _products(signals: Array, rows: IntArray, lags: Sequence[int], degree: int) -> Array:

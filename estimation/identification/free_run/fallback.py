@@ -95,8 +95,8 @@ class Fallback:
             beyond = float(np.sqrt(np.mean((linear - np.clip(linear, *ends)) ** 2)))
         apart = known * jackknife(own, [one.run(u, y) for one in self.parts])
         undetermined = float(np.linalg.norm([self.own_error, apart, beyond]))
-        left = float(np.hypot(self.error, straight))
-        return own if undetermined < left else linear, (undetermined, left)
+        errors = undetermined, float(np.hypot(self.error, straight))
+        return linear if linear_stands_in(errors) else own, errors
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""
@@ -121,6 +121,17 @@ class Fallback:
         straight = tuple(LinearDynamics.from_dict(one) for one in values["linear_parts"])
         sizes = float(values["error"]), float(values.get("share", 1.0)), float(values.get("own_error", 0.0))
         return cls(LinearDynamics.from_dict(values["linear"]), straight, tuple(map(part, values["parts"])), *sizes)
+
+
+def linear_stands_in(errors: tuple[float, float] | None) -> bool:
+    """Return whether the linear model is run in place of the nonlinear one.
+
+    Parameters
+    ----------
+    errors : tuple of float or None
+        Result of `Fallback.errors`; None without a fallback [dimensionless].
+    """
+    return errors is not None and not errors[0] < errors[1]
 
 
 def jackknife(whole: Array, parts: Sequence[Array]) -> float:

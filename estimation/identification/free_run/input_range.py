@@ -7,6 +7,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels, in_scale
+from estimation.identification.free_run.fallback import linear_stands_in
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
@@ -88,7 +89,7 @@ def linear_fallback_notes(
         told = (dynamics.judged_run(u, y)[1] for u, y in zip(one.u, one.y, strict=True))
         judged = [errors for errors in told if errors is not None]
     undetermined, linear = max([(0.0, 1.0), *judged], key=lambda pair: pair[0] / pair[1])
-    if undetermined < linear:
+    if not linear_stands_in((undetermined, linear)):
         return []
     return [
         IdentificationCode.LINEAR_STANDS_IN.note(

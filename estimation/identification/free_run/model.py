@@ -12,6 +12,7 @@ from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamic
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.dynamics import Dynamics, OutputErrorDynamics
 from estimation.identification.free_run.error_model import ErrorModel
+from estimation.identification.free_run.fallback import linear_stands_in
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.limited_dynamics import LimitedDynamics
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
@@ -25,11 +26,8 @@ if TYPE_CHECKING:
 
     from estimation.identification.model.linear_model import LinearModel
 
-FORMAT = "hydrostate-model"
-"""Name of the format in a saved model."""
-
-VERSION = 2
-"""Latest version of that format: models with an error model. Others are written as version 1."""
+FORMAT, VERSION = "hydrostate-model", 2
+"""Format of a saved model, and its latest version: models with an error model. Others are written as version 1."""
 
 KINDS: Mapping[str, Any] = {
     one.kind: one
@@ -149,7 +147,7 @@ class FreeRunModel:
             run, errors = self.dynamics.judged_run(inputs, outputs)
         else:
             run = self.dynamics.run(inputs, outputs)
-        if self.error_model is not None and (errors is None or errors[0] < errors[1]):  # no linear model stands in
+        if self.error_model is not None and not linear_stands_in(errors):
             run = self.error_model.corrected(inputs, run)
         return self.scaling.y_mean + self.scaling.y_std * run, errors
 
