@@ -148,9 +148,9 @@ def read(
 ) -> "Log":
     """Read a log, of an actuator or of anything else.
 
-    If no rig, columns or kind is given, a log without the actuator's channels is read unchanged: every numeric column
-    under its own name, for `Log.identify`. Up to half of the samples may be missing for `Log.identify`; at most 5 % for
-    everything else.
+    If no rig or kind is given, and no column but the time's is named, a log without the actuator's channels is read
+    unchanged: every numeric column under its own name, for `Log.identify`. Up to half of the samples may be missing for
+    `Log.identify`; at most 5 % for everything else.
 
     Parameters
     ----------
@@ -231,12 +231,13 @@ def read(
             )
         name = kind.name
     except NoChannelError as error:
-        if rig is not None or columns is not None or plant is not None or others:
+        time = columns["time_s"] if columns is not None and set(columns) == {"time_s"} else None
+        if rig is not None or (columns is not None and time is None) or plant is not None or others:
             raise
         kinds = kinds_by_columns(error.columns)
         if len(kinds) == 1:
-            return read(path, plant=kinds[0], sample_time=sample_time)
-        found, name = read_whole_or_sparse(partial(read_any, file, sample_time=sample_time)), ANY
+            return read(path, plant=kinds[0], columns=columns, sample_time=sample_time)
+        found, name = read_whole_or_sparse(partial(read_any, file, time=time, sample_time=sample_time)), ANY
     kept: dict[str, Any] = {"sparse": found.sparse, "refusal": found.refusal}
     kept |= {"name": file.name} if isinstance(file, Path) else {}
     return Log(found.record, bench, name, found.said, **kept)

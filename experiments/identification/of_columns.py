@@ -34,6 +34,8 @@ class ColumnFit:
         Values for every input; None lets the data choose.
     sample_time, resampled : float or None
         Sample time of logs without a column of time, and of the model [s].
+    time : str or None
+        The column of time under another name, with its unit: ``"T_MS:ms"``.
     """
 
     inputs: tuple[str, ...]
@@ -45,6 +47,7 @@ class ColumnFit:
     numerator: int | None = None
     sample_time: float | None = None
     resampled: float | None = None
+    time: str | None = None
     validate: tuple[Path, ...] = ()
     figure: Path | None = None
     report: Path | None = None
@@ -95,8 +98,8 @@ def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out
         output = columns[name]
         if not read:
             wanted, references = (*fit.inputs, *fit.outputs), fit.references
-            read.append([record_of(log, (*wanted, *references), fit.sample_time) for log in logs])
-            read.append([record_of(log, wanted, fit.sample_time) for log in fit.validate])
+            read.append([record_of(log, (*wanted, *references), fit) for log in logs])
+            read.append([record_of(log, wanted, fit) for log in fit.validate])
         together = fit.structure == STATE_SPACE or (fit.structure == "auto" and len(fit.outputs) > 1)
         if together and not shared:
             shared.update(_identify_outputs(read[0], fit, fit.outputs))

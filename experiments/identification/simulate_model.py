@@ -49,7 +49,7 @@ def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_jso
                     f"the model goes from {len(model.inputs)} inputs to {len(models)} outputs, got columns for "
                     f"{len(inputs)} and {len(outputs)}"
                 )
-            record = record_of(log, (*inputs, outputs[index]), fit.sample_time, assumed=model.sample_time)
+            record = record_of(log, (*inputs, outputs[index]), fit, assumed=model.sample_time)
             data = channels_of([record], inputs, outputs[index], model.sample_time)
             quality = quality_of(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))
             results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
@@ -89,15 +89,15 @@ def write_simulated(model: "FreeRunModel", data: "Channels", path: Path) -> None
     write_whole(path, pd.DataFrame(columns).to_csv(index=False), "--simulated")
 
 
-def record_of(log: Path, wanted: Sequence[str], sample_time: float | None, *, assumed: float = 1.0) -> "Record":
+def record_of(log: Path, wanted: Sequence[str], fit: "ColumnFit", *, assumed: float = 1.0) -> "Record":
     """Read columns of any log; as many samples may be missing as a model can tolerate.
 
     Parameters
     ----------
-    sample_time : float or None
-        Sample time of a log without a column of time [s].
+    fit : ColumnFit
+        Which column holds the time, or the sample time of a log without one.
     assumed : float
-        The same, if none is given [s].
+        Sample time, if neither is given [s].
 
     Raises
     ------
@@ -113,7 +113,14 @@ def record_of(log: Path, wanted: Sequence[str], sample_time: float | None, *, as
     from plant.log.any_columns import read_any
     from plant.log.clock.uniform import MOST_MISSING_TO_RELATE
 
-    record = read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE, assumed=assumed)
+    record = read_any(
+        log,
+        wanted,
+        time=fit.time,
+        sample_time=fit.sample_time,
+        most_missing=MOST_MISSING_TO_RELATE,
+        assumed=assumed,
+    )
     return without_repeated_rows(record, wanted)
 
 

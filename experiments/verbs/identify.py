@@ -43,6 +43,7 @@ from experiments.identification.options import (
 )
 from experiments.identification.simulate_model import simulate_model
 from plant.errors import HydrostateError
+from plant.log.columns import TIME
 
 commands = typer.Typer()
 
@@ -76,7 +77,8 @@ def identify(
 
     With --input and --output, the model relates any columns, in any unit. Several logs are then experiments on the same
     plant, each with its own initial state, and its own offset where these differ. Free runs on held-back blocks choose
-    order, dead time and structure. Fit and rms error are always those of the free run.
+    order, dead time and structure. Fit and rms error are always those of the free run. `--columns time_s=T:ms` names
+    the column of time, if it is called otherwise.
 
     Without them, the command makes an output-error fit with covariance; the defaults are the form of Table 6.
     Differential pressure is not used, so its absence costs nothing. Nothing is random, so the seed changes nothing.
@@ -93,10 +95,14 @@ def identify(
         "report": report,
     }
     related = any(one is not None for one in (inputs, outputs, references, simulate))
-    if (related and rig is None and not columns) or structure in ONLY_BETWEEN_COLUMNS:
-        of_channels = {"--rig": rig, "--columns": columns, "--filter-hz": filter_hz}
+    mapping = load_columns(columns)
+    time = mapping[TIME] if set(mapping) == {TIME} else None
+    if (related and rig is None and (not mapping or time)) or structure in ONLY_BETWEEN_COLUMNS:
+        of_channels = {"--rig": rig, "--columns": None if time else columns, "--filter-hz": filter_hz}
         refuse_ineffective_options(
-            of_channels, "does not go with --input and --output, which take columns as they stand in the log"
+            of_channels,
+            "does not go with --input and --output, which take columns as they stand in the log; only the time may be "
+            "named, --columns time_s=NAME:UNIT",
         )
         between = ColumnFit(
             split_names(*(inputs or ())),
@@ -105,6 +111,7 @@ def identify(
             order=whole_or_auto("--order", order or "auto", 1),
             delay=whole_or_auto("--delay", delay or "auto", 0),
             resampled=resample,
+            time=time,
             validate=tuple(validate or ()),
             simulated=simulated,
             response=response,
@@ -127,7 +134,7 @@ def identify(
         seed=seed,
         **asked,
     )
-    identify_channels(logs, fit, load_rig(rig), load_columns(columns), as_json=as_json, out=out)
+    identify_channels(logs, fit, load_rig(rig), mapping, as_json=as_json, out=out)
 
 
 def _relate_columns(

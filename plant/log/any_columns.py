@@ -14,7 +14,7 @@ from plant.errors import LogError, LogWarning
 from plant.log.checks import Clock, checked_log
 from plant.log.clock.stamps import seconds_from_first
 from plant.log.clock.uniform import MOST_MISSING
-from plant.log.columns import TIME, UNITS, Column, list_in_words, resolve_columns
+from plant.log.columns import TIME, UNITS, Column, list_in_words, named_column, resolve_columns
 from plant.log.formats.detect import open_tables
 from plant.log.headings import Heading, headings_of
 from plant.log.lost_values import without_lost
@@ -22,6 +22,7 @@ from plant.log.notes import LogCode
 from plant.log.plausibility import implausibility_notes
 from plant.log.record import Record
 from plant.log.table import Table
+from plant.notes import Note
 
 SECONDS: Mapping[str, float] = {
     **dict.fromkeys(("", "s", "sec", "second", "seconds"), 1.0),
@@ -37,11 +38,15 @@ SECONDS: Mapping[str, float] = {
 TIME_STEM = re.compile(rf"(?:t|time|timestamp|zeit)(?:_({'|'.join(one for one in SECONDS if one)}))?")
 """What a column of time is called, in lower case and without brackets: ``t``, ``time_ms``."""
 
+FEWEST_STEPS, MOST_ALIKE = 10, 0.9
+"""Fewest steps of a column that may be the time [count], and the share of them near the median [fraction]; judged."""
+
 
 def read_any(
     path: str | Path | Table,
     names: Sequence[str] | None = None,
     *,
+    time: str | None = None,
     sample_time: float | None = None,
     most_missing: float = MOST_MISSING,
     assumed: float = 1.0,
@@ -55,6 +60,8 @@ def read_any(
     names : sequence of str, optional
         Columns wanted; a name that is a known channel may stand in another unit, ``motor_speed_rpm`` for
         ``motor_speed_rad_s``. Every column that holds numbers unless told.
+    time : str, optional
+        The column of time under another name, with its unit where that is not s: ``"T_MS:ms"``.
     sample_time : float, optional
         Time between samples [s]; a column of time is then not read.
     most_missing : float
@@ -70,7 +77,8 @@ def read_any(
     Raises
     ------
     LogError
-        If the file cannot be read, a column is missing or holds no numbers, or time is no clock's.
+        If the file cannot be read, a column is missing or holds no numbers, or time is no clock's; if both a column of
+        time and a sample time are given.
 
     Warns
     -----
@@ -80,9 +88,17 @@ def read_any(
     source, opened = (path.source, (path,)) if isinstance(path, Table) else (str(path), open_tables(Path(path)))
     table = _table(opened, names)
     headings = headings_of(table.headings)
-    time = None if sample_time is not None else _time_column(headings)
+    if time is not None and sample_time is not None:
+        wanted = f"a column of time or a sample time is wanted, got both: {time[:80]!r} and {sample_time:g} s"
+        raise LogError(wanted, source)
+    if time is None:
+        clock_column = None if sample_time is not None else _time_column(headings)
+    else:
+        clock_column = named_column(headings, TIME, time, source)
     columns = (
-        _all_columns(table, headings, time) if names is None else _wanted_columns(table, headings, time, names, source)
+        _all_columns(table, headings, clock_column)
+        if names is None
+        else _wanted_columns(table, headings, clock_column, names, source)
     )
     if not set(columns) - {TIME}:
         raise LogError("a column of numbers is needed; the log has none", source)
@@ -91,10 +107,11 @@ def read_any(
         for note in said:
             warnings.warn(LogWarning(note, source), stacklevel=2)
     clock = None
-    if time is None:
+    if clock_column is None:
         step = sample_time if sample_time is not None else table.step
         if step is None:
-            warnings.warn(LogWarning(LogCode.CLOCK_ASSUMED.note(sample_time_s=assumed), source), stacklevel=2)
+            for note in _notes_on_assumed_clock(table, names or (), assumed):
+                warnings.warn(LogWarning(note, source), stacklevel=2)
         clock = Clock(assumed if step is None else step, 0.0)
         columns[TIME] = clock.sample_time * np.arange(len(next(iter(columns.values()))), dtype=np.float64)
     checked = checked_log(columns, source=source, required=tuple(names or ()), clock=clock, most_missing=most_missing)
@@ -122,6 +139,8 @@ def _all_columns(table: Table, headings: Sequence[Heading], time: Column | None)
     found: dict[str, Array] = {} if time is None else {TIME: _seconds(numbers[time.position], time)}
     for place, values in numbers.items():
         name = headings[place].name
+        if time is not None and place == time.position:
+            continue
         if name and values.dtype.kind != "M" and not _is_time(headings[place]) and name not in found:
             found[name] = values
     return found
@@ -131,26 +150,49 @@ def _wanted_columns(
     table: Table, headings: Sequence[Heading], time: Column | None, names: Sequence[str], source: str
 ) -> dict[str, Array]:
     """Return the wanted columns and the time [s], read together: a row that is skipped in one is skipped in all."""
-    chosen = [_column_named(headings, name, source) for name in dict.fromkeys(names)]
+    chosen = [_column_named(table, headings, name, source) for name in dict.fromkeys(names)]
     raw = table.read(chosen if time is None else [time, *chosen])
     found: dict[str, Array] = {} if time is None else {TIME: _seconds(raw[time], time)}
     for column in chosen:
         if column not in raw or raw[column].dtype.kind == "M":
             raise LogError(f"column {column.name!r} must hold numbers", source)
-        plain = (column.factor, column.offset) == (1.0, 0.0)
-        found[column.channel] = raw[column] if plain else raw[column] * column.factor + column.offset
+        found[column.channel] = column.in_si(raw[column])
     return found
 
 
-def _column_named(headings: Sequence[Heading], name: str, source: str) -> Column:
+def _notes_on_assumed_clock(table: Table, names: Sequence[str], assumed: float) -> list[Note]:
+    """Return that a sample time is assumed, and which column, if one, rises as a time does."""
+    found = [LogCode.CLOCK_ASSUMED.note(sample_time_s=assumed)]
+    headings = headings_of(table.headings)
+    for place, values in table.numbers().items():
+        heading = headings[place]
+        if not {heading.name, heading.bare}.isdisjoint(names) or values.dtype.kind == "M" or not _rises_evenly(values):
+            continue
+        found.append(LogCode.TIME_UNNAMED.note(column=heading.name, step=float(np.median(np.diff(values)))))
+        break
+    return found
+
+
+def _rises_evenly(values: Array) -> bool:
+    """Return whether values rise from row to row, nearly all by about the same step."""
+    steps = np.diff(values)
+    if steps.size < FEWEST_STEPS or not np.all(steps > 0.0):
+        return False
+    return bool(np.mean(np.abs(steps - np.median(steps)) < 0.5 * np.median(steps)) > MOST_ALIKE)
+
+
+def _column_named(table: Table, headings: Sequence[Heading], name: str, source: str) -> Column:
     known = [one.name for one in headings]
     positions = [k for k, other in enumerate(known) if other == name]
     positions = positions or [k for k, other in enumerate(known) if other.lower() == name.lower()]
     positions = positions or [k for k, other in enumerate(headings) if other.bare.lower() == name.lower()]
-    if len(positions) == 1:
-        return Column(positions[0], known[positions[0]], name)
     if positions:
-        raise LogError(f"column {name!r} is needed once, the log has it {len(positions)} times", source)
+        columns = [Column(position, known[position], name) for position in positions]
+        if len(columns) > 1 and not _all_alike(table, columns):
+            raise LogError(
+                f"column {name!r} is needed once, the log has it {len(positions)} times with other values", source
+            )
+        return columns[0]
     if name in UNITS:
         for column in resolve_columns(headings, None, source):
             if column.channel == name:
@@ -158,6 +200,12 @@ def _column_named(headings: Sequence[Heading], name: str, source: str) -> Column
     near = get_close_matches(name, known, n=1) or [one for one in known if name.lower() in one.lower()][:1]
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise LogError(f"column {name!r} is needed; the log has {list_in_words(known)}{hint}", source)
+
+
+def _all_alike(table: Table, columns: Sequence[Column]) -> bool:
+    """Return whether a log has the same column several times."""
+    first, *others = table.read(columns).values()
+    return all(np.array_equal(first, other, equal_nan=first.dtype.kind == "f") for other in others)
 
 
 def _is_time(heading: Heading) -> bool:

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import NDArray
-
+from plant.arrays import Array
 from plant.errors import HydrostateError, LogError, MissingColumnError, RigError
 from plant.log.headings import Heading, headings_of
 from plant.log.scale import conversion_of
@@ -104,6 +102,21 @@ class Column:
     factor: float = 1.0
     offset: float = 0.0
 
+    def in_si(self, values: Array) -> Array:
+        """Return values in SI.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n,)
+            Values in the unit of the log.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            The same array if the unit is SI.
+        """
+        return values if (self.factor, self.offset) == (1.0, 0.0) else values * self.factor + self.offset
+
 
 def resolve_columns(
     names: "Sequence[str | Heading]", mapping: Mapping[str, str] | None, source: str
@@ -131,7 +144,7 @@ def resolve_columns(
     """
     clean = headings_of(names)
     dated = _date_column(clean)
-    found = {channel: _foreign_column(clean, channel, spec, source) for channel, spec in (mapping or {}).items()}
+    found = {channel: named_column(clean, channel, spec, source) for channel, spec in (mapping or {}).items()}
     taken = {column.position for column in found.values()}
     strange: list[tuple[str, LogError]] = []
     for position, heading in enumerate(clean):
@@ -205,7 +218,14 @@ def _own_column(position: int, heading: Heading, channel: str, source: str) -> C
     return Column(position, name, channel, factor, offset)
 
 
-def _foreign_column(headings: Sequence[Heading], channel: str, spec: str, source: str) -> Column:
+def named_column(headings: Sequence[Heading], channel: str, spec: str, source: str) -> Column:
+    """Return the column that a user names for a channel, such as ``"POS_MM:mm"``.
+
+    Raises
+    ------
+    LogError
+        If the log lacks it or has it twice, or its unit does not convert.
+    """
     for one in (channel, spec):
         if not isinstance(one, str):  # pyright: ignore[reportUnnecessaryIsInstance] -- Python's users give what they like
             raise LogError(f"columns must be names by channel, such as 'POS_MM:mm', got {one!r:.80}", source)
@@ -327,22 +347,3 @@ def parse_columns(texts: Sequence[str]) -> dict[str, str]:
             raise RigError(f"channel {channel!r} is needed once, got {mapping[channel]!r:.80} and {spec!r:.80}")
         mapping[channel] = spec
     return check_columns(mapping)
-
-
-def converted(raw: Mapping[Column, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-    """Return columns as channels in SI.
-
-    Parameters
-    ----------
-    raw : Mapping[Column, ndarray, shape (n,)]
-        Values in the units of the log.
-
-    Returns
-    -------
-    dict[str, ndarray, shape (n,)]
-        Values in SI by channel.
-    """
-    return {
-        of.channel: values if (of.factor, of.offset) == (1.0, 0.0) else values * of.factor + of.offset
-        for of, values in raw.items()
-    }

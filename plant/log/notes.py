@@ -100,3 +100,7 @@ class LogCode(Code):
     CLOCK_ASSUMED = (
         "the log has no time column: a sample time of {sample_time_s:g} s was assumed; --sample-time gives another"
     )
+    TIME_UNNAMED = (
+        "column {column!r} rises by about {step:g} from row to row, as a time does: if it is the time, name it and its "
+        "unit, --columns 'time_s={column}:s'"
+    )

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from plant.errors import LogError, LogWarning
 from plant.log.checks import REQUIRED, all_missing, checked_log
 from plant.log.columns import CHANNELS as CHANNELS
-from plant.log.columns import converted, resolve_columns
+from plant.log.columns import resolve_columns
 from plant.log.formats.cells import numbers, values_of
 
 if TYPE_CHECKING:
@@ -226,7 +226,9 @@ class Record:
             raise LogError(f"a pandas.DataFrame is needed, got {type(frame).__name__}", source)
         chosen = resolve_columns([str(name) for name in frame.columns], columns, source)
         raw = {c: numbers(_values(frame.iloc[:, c.position]), c.name, source) for c in chosen}
-        checked = checked_log(converted(raw), source=source, required=required)
+        checked = checked_log(
+            {of.channel: of.in_si(values) for of, values in raw.items()}, source=source, required=required
+        )
         for note in checked.notes:
             warnings.warn(LogWarning(note, source), stacklevel=2)
         return Record(checked.sample_time, checked.channels, start_time=checked.start_time)

@@ -13,7 +13,7 @@ from plant.log.checks import alternatives, missing_required
 from plant.log.clock.merging import LoggerChannels, merge_loggers
 from plant.log.clock.stamps import seconds_from_first
 from plant.log.clock.time_unit import likely_unit, unit_of_dates
-from plant.log.columns import TIME, TRUTH_PREFIX, Column, converted, list_in_words, resolve_columns
+from plant.log.columns import TIME, TRUTH_PREFIX, Column, list_in_words, resolve_columns
 from plant.log.guess import SHOWN_PROBABILITY, guess_by_name, hint_of, missing_channels, unused_column_notes
 from plant.log.headings import Heading, headings_of
 from plant.log.lost_values import without_lost
@@ -255,7 +255,8 @@ def _read(table: Table, columns: Sequence[Column], notes: list[Note]) -> dict[st
     for column, values in ((one, values) for one, values in raw.items() if one not in stamps):
         numbers[column], said = (values, []) if column.channel == TIME else without_lost(values, column.channel)
         notes += said
-    return converted(numbers) | {column.channel: values for column, values in stamps.items()}
+    in_si = {column.channel: column.in_si(values) for column, values in numbers.items()}
+    return in_si | {column.channel: values for column, values in stamps.items()}
 
 
 def _with_time(

@@ -1,8 +1,9 @@
-"""25 ways to write one log, each with the library that benches and scripts use for it."""
+"""27 ways to write one log, each with the library that benches and scripts use for it."""
 
 import gzip
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +149,33 @@ def mat5(log: pd.DataFrame, folder: Path) -> Path:
     return folder / "log.mat"
 
 
+def mat4(log: pd.DataFrame, folder: Path) -> Path:
+    from scipy.io import savemat
+
+    savemat(folder / "log4.mat", {name: log[[name]].to_numpy() for name in SI}, format="4")
+    return folder / "log4.mat"
+
+
+def modelica(log: pd.DataFrame, folder: Path) -> Path:
+    """Write a log as OpenModelica does, with one signal as an alias of the opposite sign."""
+    from scipy.io import savemat
+
+    def turned(texts: list[str]) -> np.ndarray:
+        return np.array(["".join(row) for row in zip_longest(*texts, fillvalue=" ")])
+
+    signals = {name: log[name].to_numpy() for name in SI}
+    names, said = ["rod.m", *signals], ["Mass of the rod [kg]", *("said of it" for _ in signals)]
+    info = np.array([[1, 2, 0, -1], *([0 if name == "time_s" else 2, k, 0, -1] for k, name in enumerate(signals, 1))])
+    courses = np.vstack(list(signals.values()))
+    info[-1, 1] *= -1
+    courses[-1] *= -1.0
+    content = {"Aclass": np.array(["Atrajectory", "1.1        ", " " * 11, "binTrans   "])}
+    content |= {"name": turned(names), "description": turned(said), "dataInfo": info.T.astype(np.int32)}
+    content |= {"data_1": np.array([[0.0, log["time_s"].iloc[-1]], [7.4, 7.4]]), "data_2": courses}
+    savemat(folder / "rod_res.mat", content, format="4")
+    return folder / "rod_res.mat"
+
+
 def mat73(log: pd.DataFrame, folder: Path) -> Path:
     import h5py
 
@@ -246,6 +274,8 @@ WAYS: Mapping[str, Way] = {
     "TDMS with a step": Way(tdms),
     "MDF 4": Way(mdf4),
     "MAT 5, a struct": Way(mat5),
+    "MAT 4": Way(mat4),
+    "a simulation in Modelica": Way(modelica),
     "MAT 7.3": Way(mat73),
     "Simulink's structure with time": Way(simulink),
     "HDF5 with units as attributes": Way(hdf5),
@@ -256,4 +286,4 @@ WAYS: Mapping[str, Way] = {
     "a timetable of MATLAB's": Way(timetable, refused="can only be read by MATLAB: save its columns as"),
     "a zip archive": Way(zipped, refused="a zip archive is no log: unpack it first"),
 }
-"""Each way, by its description; 23 can be read, 2 are refused."""
+"""Each way, by its description; 25 can be read, 2 are refused."""

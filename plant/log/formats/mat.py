@@ -1,4 +1,4 @@
-"""MAT logs: structs whose fields are columns, or plain variables. Versions 5 to 7 are read here, 7.3 as HDF5."""
+"""MAT logs: structs whose fields are columns, or plain variables. Versions 4 to 7 are read here, 7.3 as HDF5."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -9,8 +9,10 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError
+from plant.log.formats.mat4_reader import is_version_4, read_variables_of_version_4
 from plant.log.formats.mat_reader import DamagedMatError, MatValue, read_variables
 from plant.log.formats.mat_structs import each_struct, structs_of
+from plant.log.formats.modelica import modelica_columns
 from plant.log.table import Table, table_of
 
 STRUCT = "record"
@@ -26,23 +28,27 @@ NO_VECTORS = (
 
 
 def open_mat(path: Path) -> tuple[Table, ...]:
-    """Open a MAT file of version 5 to 7.
+    """Open a MAT file of version 4 to 7.
 
     Returns
     -------
     tuple of Table
-        One a struct, and one of the plain variables.
+        One a struct, and one of the plain variables; or the one of a simulation in Modelica.
 
     Raises
     ------
     LogError
         If it is of another version or damaged, or holds no numbers.
     """
+    stored = path.read_bytes()
     try:
-        content = read_variables(path.read_bytes(), str(path))
+        if not is_version_4(stored):
+            return tables_of(read_variables(stored, str(path)), str(path))
+        content = read_variables_of_version_4(stored)
     except DamagedMatError as error:
         raise LogError(f"cannot be read as mat: {error}", str(path)) from error
-    return tables_of(content, str(path))
+    columns, units = modelica_columns(content)
+    return (table_of(str(path), columns, units=units),) if columns else tables_of(content, str(path))
 
 
 def tables_of(content: Mapping[str, MatValue], source: str) -> tuple[Table, ...]:

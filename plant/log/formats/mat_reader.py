@@ -94,7 +94,7 @@ def read_variables(content: bytes, source: str = "the file") -> dict[str, MatVal
         raise DamagedMatError("a MAT file of version 7.3 that holds no HDF5")
     mark = content[HEADER - 2 : HEADER]
     if mark not in (b"IM", b"MI"):
-        raise DamagedMatError("no mark of a MAT file of version 5 to 7")
+        raise DamagedMatError("no mark of a MAT file of version 4 to 7")
     order: Literal["little", "big"] = "little" if mark == b"IM" else "big"
     variables = _variables(_Reader(memoryview(content), order, HEADER), most_unpacked(len(content)), source)
     return {name: value for name, value in variables if name}

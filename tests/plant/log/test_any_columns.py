@@ -32,10 +32,38 @@ def test_every_column_of_numbers_is_read_if_none_is_requested(tmp_path: Path) ->
 
 
 def test_a_log_without_time_takes_the_given_sample_time_or_assumes_one_second_with_a_warning(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.csv", "u,y", RAMP, RAMP)
+    path = written(tmp_path / "a.csv", "u,y", RAMP % 3, RAMP % 4)
     assert read_any(path, sample_time=4.0).sample_time == 4.0
     with pytest.warns(LogWarning, match="no time column"):
         assert read_any(path).sample_time == 1.0
+
+
+def test_a_column_that_may_be_the_time_is_pointed_out_unless_it_is_asked_for(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", "u,n,y", RAMP % 3, 0.1 * RAMP, RAMP**2)
+    with pytest.warns(LogWarning) as said:
+        read_any(path, ["u", "y"])
+    hint = "column 'n' rises by about 0.1 from row to row, as a time does: if it is the time, name it and its unit, "
+    assert [str(one.message).removeprefix(f"{path}: ") for one in said][1:] == [hint + "--columns 'time_s=n:s'"]
+    with pytest.warns(LogWarning) as said:
+        read_any(path, ["u", "n"])
+    assert len(said) == 1
+
+
+def test_the_column_of_time_may_be_named_with_its_unit(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    path = written(tmp_path / "a.csv", "n,y", 5.0 * RAMP, RAMP)
+    record = read_any(path, ["y"], time="n:ms")
+    assert record.sample_time == pytest.approx(5e-3)
+    assert len(recwarn) == 0
+    for time, said in (("m:ms", "'m'"), ("n:bar", "'n' cannot become time_s")):
+        with pytest.raises(LogError, match=said):
+            read_any(path, ["y"], time=time)
+    with pytest.raises(LogError, match="a column of time or a sample time is wanted, got both: 'n:ms' and 2 s"):
+        read_any(path, ["y"], time="n:ms", sample_time=2.0)
+
+
+def test_a_column_that_a_log_has_twice_with_the_same_values_is_one_column(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", "t,x,u,x", RAMP, RAMP**2, RAMP, RAMP**2)
+    assert read_any(path, ["x"])["x"][-1] == 361.0
 
 
 def test_a_slow_clock_is_no_slip_of_units(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
@@ -53,7 +81,7 @@ def test_a_known_channel_in_another_unit_is_found_by_its_name(tmp_path: Path) ->
     [("valv", "column 'valv' is needed; the log has 't', 'valve', 'x', 'x'; did you mean 'valve'"), ("x", "2 times")],
 )
 def test_a_requested_column_that_is_absent_or_ambiguous_is_refused(name: str, said: str, tmp_path: Path) -> None:
-    path = written(tmp_path / "a.csv", "t,valve,x,x", RAMP, RAMP, RAMP, RAMP)
+    path = written(tmp_path / "a.csv", "t,valve,x,x", RAMP, RAMP, RAMP, RAMP**2)
     with pytest.raises(LogError, match=said):
         read_any(path, [name])
 
@@ -141,4 +169,4 @@ def test_a_row_of_garbage_is_one_missing_sample_and_shifts_no_column(
 
 def test_rows_without_a_time_are_spaced_by_the_assumed_sample_time(tmp_path: Path) -> None:
     with pytest.warns(LogWarning, match="sample time of 4 s"):
-        assert read_any(written(tmp_path / "a.csv", "u,y", RAMP, RAMP), assumed=4.0).sample_time == 4.0
+        assert read_any(written(tmp_path / "a.csv", "u,y", RAMP % 3, RAMP % 4), assumed=4.0).sample_time == 4.0

@@ -216,8 +216,8 @@ def columns_of_anything() -> dict[str, Any]:
     def named(name: str) -> Any:
         return or_refused(
             lambda: {
-                "at": any_columns._column_named(headings, name, "a").position,
-                "factor": any_columns._column_named(headings, name, "a").factor,
+                "at": any_columns._column_named(table, headings, name, "a").position,
+                "factor": any_columns._column_named(table, headings, name, "a").factor,
             }
         )  # pyright: ignore[reportPrivateUsage]
 
