@@ -30,12 +30,7 @@ SPELLINGS: Mapping[str, str] = {
     "°/s": "degree/s",
     "°C": "degC",
     "deg": "degree",
-    "sec": "s",
-    "secs": "s",
-    "seconds": "s",
     "Sekunden": "s",
-    "msec": "ms",
-    "usec": "us",
     "Volt": "V",
     "Volts": "V",
     **dict.fromkeys(GAUGE, "bar"),
@@ -47,6 +42,8 @@ _TURNS = {"1/min", "min^-1", "u/min", "umdr/min", "tr/min", "r/min", "rev/min", 
 
 _CASELESS = {
     **{one.lower(): one for one in ("kPa", "MPa", "GPa", "Pa", "hPa", "V", "mV", "kV", "Hz", "kHz", "N", "kN")},
+    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+    **{f"{one}sec": f"{one}s" for one in ("m", "u", "mm/", "cm/", "m/")},
     **{one: one for one in ("bar", "mbar", "psi", "mm", "cm", "um", "µm", "ms", "us", "mm/s", "cm/s", "m/s", "rad/s")},
 }
 """Units that are recognised in any case, by their lower-case spelling."""

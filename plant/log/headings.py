@@ -9,7 +9,13 @@ from plant.unit_text import plain_unit
 
 _BRACKETED = re.compile(r"^(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]{0,40})\]|\((?P<round>[^()]{0,40})\))$")
 _UNIT_AFTER_NAME = re.compile(r"^(?P<name>.*\S)(?:\s+/\s*|\s*,\s+|\s+in\s+)(?P<unit>\S{1,20})$")
-_UNITS_FOLLOW = ("unit", "units", "unit:", "units:", "einheit", "einheiten")
+_INDEX = re.compile(r"0|[2-9]|[1-9]\d+")
+"""The number of an element; 1 is the unit of a ratio."""
+
+_UNITS_FOLLOW = re.compile(r"(?:\w+[ _])?(?:units?|einheit(?:en)?) ?:?", re.IGNORECASE)
+_UNIT_LABEL = re.compile(r"^units?:\s*", re.IGNORECASE)
+"""What Simulink writes in front of each unit."""
+
 _NO_UNIT = ("", "-", "--", "[-]", "[]", "1", "n/a", "none")
 
 
@@ -49,7 +55,7 @@ class Heading:
 
 
 def _split_unit(name: str) -> tuple[str, str | None]:
-    if found := _BRACKETED.match(name):
+    if (found := _BRACKETED.match(name)) and not _INDEX.fullmatch(found["square"] or ""):
         inside = found["square"] if found["square"] is not None else found["round"]
         if found["square"] is not None or is_unit(inside):
             return found["name"].strip(), unit_or_none(inside)
@@ -109,10 +115,10 @@ def is_unit_row(row: Sequence[str]) -> bool:
 
     Examples
     --------
-    >>> is_unit_row(["Unit", "rpm", "-"]), is_unit_row(["s", "rpm", "ten"])
-    (True, False)
+    >>> is_unit_row(["Unit", "rpm", "-"]), is_unit_row(["s", "rpm", "ten"]), is_unit_row(["", "Unit: rpm"])
+    (True, False, True)
     """
-    cells = row[1:] if row and row[0].strip().lower() in _UNITS_FOLLOW else row
+    cells = [_UNIT_LABEL.sub("", cell) for cell in (row[1:] if _UNITS_FOLLOW.fullmatch("".join(row[:1])) else row)]
     return any(map(is_unit, cells)) and all(unit_or_none(cell) is None or is_unit(cell) for cell in cells)
 
 
@@ -130,8 +136,14 @@ def names_and_units(above: Sequence[list[str]], width: int) -> tuple[list[str], 
     names = above
     for row in above[1:]:
         if is_unit_row(row):
-            units = [unit_or_none(cell.strip("[]()")) if is_unit(cell) else None for cell in row]
+            said = [_UNIT_LABEL.sub("", cell) for cell in row]
+            units = [unit_or_none(cell.strip("[]()")) if is_unit(cell) else None for cell in said]
             names = [other for other in above if other is not row]
             break
-    best = max(names, key=lambda row: len(set(row) - {""}), default=[""] * width)
+    best = max(names, key=_worth_as_names, default=[""] * width)
     return [name or f"column {place + 1}" for place, name in enumerate(best)], units
+
+
+def _worth_as_names(row: Sequence[str]) -> tuple[int, int]:
+    """Return how many names a row has, and how many of them state a unit."""
+    return len(set(row) - {""}), sum(_split_unit(cell)[1] is not None for cell in row)

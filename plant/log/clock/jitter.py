@@ -215,7 +215,8 @@ def rounded_clock(time: Array, slots: Array) -> tuple[float, float, float] | Non
     if np.max(np.abs(step / quantum - quanta)) > 0.01 or np.count_nonzero(quanta) < FEWEST_QUANTA:
         return None
     centred = slots - slots.mean()
-    sample_time = float(centred @ time) / float(centred @ centred)
+    spread = float(centred @ centred)  # zero for steps so small that their squares vanish
+    sample_time = float(centred @ time) / spread if spread else 0.0
     if not sample_time > 0.0:
         return None
     turns = slots[1:][quanta > 0]  # slots at which the stamp changes; few of them give a poor slope

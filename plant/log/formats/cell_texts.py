@@ -1,6 +1,7 @@
 """Contents of a text cell: a number, a number with its unit, a stamp, or a word for a missing value."""
 
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 
 from plant.log.clock.stamps import is_stamp
@@ -74,3 +75,44 @@ def without_that_unit(cell: str, unit: str) -> str:
     """
     text = cell.strip()
     return text if text in MISSING else text.removesuffix(unit).rstrip()
+
+
+def mostly_stamps(cells: Sequence[str]) -> bool:
+    """Return whether most cells are dates or times of the day.
+
+    Examples
+    --------
+    >>> mostly_stamps(["12:00:00", "12:00:01", ""]), mostly_stamps(["20260301", "20260302"])
+    (True, False)
+    """
+    return 2 * sum(is_stamp(cell) and not NUMBER.fullmatch(cell) for cell in cells) > len(cells)
+
+
+def is_data_row(cells: Sequence[str], width: int) -> bool:
+    """Return whether a line is a row of data, though a broken one: not names, of which some may be numbers.
+
+    Examples
+    --------
+    >>> is_data_row(["0.0", "oops", "oops"], 3), is_data_row(["time", "speed", "3"], 3), is_data_row(["0.0"], 3)
+    (True, False, False)
+    """
+    texts = {cell.strip() for cell in cells if not NUMBER.fullmatch(cell.strip()) and not is_stamp(cell)} - {""}
+    return len(cells) == width and sum(cell.strip() not in {*texts, ""} for cell in cells) >= max(len(texts), 1)
+
+
+def is_label_row(row: Sequence[str], numeric: Sequence[bool]) -> bool:
+    """Return whether a cell in a column of numbers is text, as in ``Rate, 1000``.
+
+    Parameters
+    ----------
+    row : sequence of str
+        Cells.
+    numeric : sequence of bool
+        Whether their column holds numbers.
+
+    Examples
+    --------
+    >>> is_label_row(["Rate", "1000"], [True, True]), is_label_row(["ok", "1000"], [False, True])
+    (True, False)
+    """
+    return any(one and cell and not is_value(cell) for one, cell in zip(numeric, row, strict=True))

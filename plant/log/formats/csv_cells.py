@@ -24,6 +24,7 @@ from plant.log.formats.cells import (
 )
 from plant.log.formats.csv_column import Cells
 from plant.log.formats.csv_layout import COMMENT, Layout
+from plant.log.formats.csv_loggers import HEADER_ENDS
 from plant.log.formats.thousands import without_thousands
 from plant.log.headings import unit_or_none
 from plant.log.notes import LogCode
@@ -135,8 +136,9 @@ class _Body:
     def note_width(self, row: _Row, waiting: int) -> None:
         """Remember a row of another width; refuse the log if most of its rows have one."""
         wanted, got = len(self.layout.headings), len(row.cells)
-        error = wrong_width(self.source, wanted, got, row.row)
-        self.strange.append(_StrangeRow(row.line, row.said, error, got == wanted - 1 and _is_header(row.cells)))
+        is_header = row.cells[0].startswith(HEADER_ENDS) or (got == wanted - 1 and _is_header(row.cells))
+        error = self._header_error(row) if is_header else wrong_width(self.source, wanted, got, row.row)
+        self.strange.append(_StrangeRow(row.line, row.said, error, is_header))
         if len(self.strange) > BLOCK_ROWS + len(self.rows) + waiting:
             raise self.strange[0].error
 
@@ -148,12 +150,7 @@ class _Body:
             if self._repeats_units(row.cells):
                 self.skipped += 1
                 continue
-            error = LogError(
-                f"every row must hold numbers, got another header in row {row.row + 1} ({row.said!r}), counted below "
-                "the first; save what stands below it as a log of its own",
-                self.source,
-            )
-            self.strange.append(_StrangeRow(row.line, row.said, error, is_header=True))
+            self.strange.append(_StrangeRow(row.line, row.said, self._header_error(row), is_header=True))
         kept = [row for place, row in enumerate(block) if place not in headers]
         for column, cells in self.columns.items():
             texts = self._cells(column, kept)
@@ -166,6 +163,13 @@ class _Body:
             if column.position not in self.layout.stamped:
                 cells.note_parted(texts, len(self.rows), self.layout.decimal_point)
         self.rows.extend((row.line, row.row) for row in kept)
+
+    def _header_error(self, row: _Row) -> LogError:
+        return LogError(
+            f"every row must hold numbers, got another header in row {row.row + 1} ({row.said!r}), counted below "
+            "the first; save what stands below it as a log of its own",
+            self.source,
+        )
 
     def _repeats_units(self, cells: Sequence[str]) -> bool:
         units = [unit_or_none(cell.strip().strip("[]()")) for cell in cells]

@@ -7,11 +7,19 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from operator import and_
 from pathlib import Path
 
 from plant.errors import LogError
-from plant.log.clock.stamps import is_stamp
-from plant.log.formats.cell_texts import NUMBER, is_value, unit_behind, without_unit
+from plant.log.formats.cell_texts import (
+    NUMBER,
+    is_data_row,
+    is_label_row,
+    is_value,
+    mostly_stamps,
+    unit_behind,
+    without_unit,
+)
 from plant.log.formats.csv_loggers import (
     HEADER_ENDS,
     LABVIEW,
@@ -253,7 +261,7 @@ class _Block:
             beneath = cells_of(lines[place - 1], self.delimiter)
             if place == 2 and not first and is_unit_row(beneath):
                 first = place  # the row above the units holds channel numbers
-        while first and _has_number(cells_of(lines[first - 1], self.delimiter), width):
+        while first and is_data_row(cells_of(lines[first - 1], self.delimiter), width):
             first -= 1
         closed = all(not row[-1] for _, row in self.rows)
         names, units = names_and_units(_lines_above(lines[:first], self.delimiter, width, closed=closed), width)
@@ -261,7 +269,7 @@ class _Block:
         stamped = frozenset(
             place
             for place, one in enumerate(self.numeric)
-            if one and _mostly_stamps([row[place] for _, row in self.rows[:9]])
+            if one and mostly_stamps([row[place] for _, row in self.rows[:9]])
         )
         clocks = {place for place in stamped if any(":" in row[place] for _, row in self.rows[:9])}
         stamped = frozenset(clocks) or stamped  # beside a column of times, a column of days is not needed
@@ -287,15 +295,6 @@ class _Block:
         return found
 
 
-def _mostly_stamps(cells: Sequence[str]) -> bool:
-    return 2 * sum(is_stamp(cell) and not NUMBER.fullmatch(cell) for cell in cells) > len(cells)
-
-
-def _has_number(cells: Sequence[str], width: int) -> bool:
-    """Return whether a line is a row of data, though a broken one."""
-    return len(cells) == width and any(NUMBER.fullmatch(cell.strip()) or is_stamp(cell) for cell in cells)
-
-
 def _block(lines: Sequence[str], delimiter: str) -> _Block:
     """Return the rows of data if cells are apart by a delimiter: most columns of most rows are numbers."""
     split = [
@@ -319,6 +318,9 @@ def _block(lines: Sequence[str], delimiter: str) -> _Block:
         for place, row, values in judged
         if 2 * sum(one and (value or not cell) for one, value, cell in zip(numeric, values, row, strict=True)) > count
     ]
+    full = {place for place, _, values in judged if 2 * sum(map(and_, numeric, values)) > count}
+    while whole and is_label_row(whole[0][1], numeric) and not {whole[0][0], whole[0][0] + 1} <= full:
+        del whole[0]  # above the names, such as a rate or a range
     return _Block(delimiter, tuple(whole), numeric) if whole else _Block(delimiter)
 
 

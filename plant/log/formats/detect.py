@@ -13,6 +13,7 @@ from plant.errors import HydrostateError, LogError, NoMemoryError
 from plant.log.columns import Column
 from plant.log.formats.csv import open_csv
 from plant.log.formats.packed import require_regular
+from plant.log.formats.repeated_clocks import without_repeated_clocks
 from plant.log.table import Table
 
 SIGNS: Mapping[bytes, str] = {
@@ -149,11 +150,12 @@ def open_tables(path: Path, metadata: str | None = None) -> tuple[Table, ...]:
         if kind in REFUSED:
             raise LogError(REFUSED[kind], str(path))
         if kind == "csv":
-            return (_with_clear_errors(open_csv(path, metadata), kind, path),)
+            return (without_repeated_clocks(_with_clear_errors(open_csv(path, metadata), kind, path)),)
         module, _, name = READERS[kind].partition(":")
         reader: Callable[[Path], Table | tuple[Table, ...]] = getattr(import_module(module), name)
         made = reader(path)
-        return tuple(_with_clear_errors(one, kind, path) for one in (made if isinstance(made, tuple) else (made,)))
+        opened = made if isinstance(made, tuple) else (made,)
+        return tuple(without_repeated_clocks(_with_clear_errors(one, kind, path)) for one in opened)
     except BaseException as error:
         raise refusal(error, kind, path) from error
 

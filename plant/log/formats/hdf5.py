@@ -20,6 +20,11 @@ NAME_ATTRIBUTES = ("columns", "names", "column_names", "channels")
 PACKING_ATTRIBUTES = ("_FillValue", "missing_value", "scale_factor", "add_offset")
 """How netCDF says that numbers are packed: what stands for none, and what they are multiplied by and added to."""
 
+IN_OTHER_FILES = (
+    "its numbers are stored in other files (as virtual or external data sets), which are not read; copy them into it"
+)
+"""A file may name any other one, also one that its sender may not read, or itself, which crashes the library."""
+
 MOST_OBJECTS = 10_000
 """Groups and vectors of the largest file that is read."""
 
@@ -42,6 +47,7 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
     groups: dict[str, dict[str, Any]] = defaultdict(dict)
     units: dict[str, dict[str, str | None]] = defaultdict(dict)
     texts: dict[str, str] = {}
+    elsewhere = False
     with h5py.File(path, "r") as file:
         for name, one in _data_sets(h5py, file):
             group, _, leaf = name.rpartition("/")
@@ -50,6 +56,9 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
                     texts[group] = _text(one, most, str(path))
                 continue
             if not _holds_numbers(one):
+                continue
+            if one.is_virtual or one.external:
+                elsewhere = True
                 continue
             left -= one.size * one.dtype.itemsize
             if left < 0:
@@ -61,6 +70,8 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
     if STRUCT in groups and STRUCT in texts:
         groups = defaultdict(dict, {STRUCT: groups[STRUCT]})
     if not any(groups.values()):
+        if elsewhere:
+            raise LogError(IN_OTHER_FILES, str(path))
         raise LogError(NO_VECTORS if path.suffix.lower() == ".mat" else "it holds no vector of numbers", str(path))
     return tuple(
         table_of(str(path), columns, units=units[group], metadata=texts.get(group), label=group)

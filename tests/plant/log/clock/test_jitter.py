@@ -53,3 +53,8 @@ def test_the_sample_time_is_found_from_the_rows_at_which_coarse_stamps_change(co
     found = rounded_clock(0.1 * np.floor(ticks / 100.0), ticks)
     assert found is not None
     assert found[1] == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_stamps_so_small_that_their_squares_vanish_are_no_rounded_clock() -> None:
+    time = np.repeat(1e-300 * np.arange(50.0), 2)
+    assert rounded_clock(time, np.concatenate(([0.0], np.cumsum(np.diff(time))))) is None

@@ -155,6 +155,7 @@ def test_a_quote_that_is_never_closed_swallows_no_rows(tmp_path: Path) -> None:
         ([*ROWS[:40], *["1,2"] * 16, *ROWS[40:]], "got 2 in row 41, .* 16 of 1516 rows cannot be read, at most 1 %"),
         ([*ROWS[:60], *["0.060,x,0.06,text"] * 2], "column 'motor_speed_rad_s' must hold numbers, got 'x' in row 61"),
         ([*ROWS[:9], "time_s,position_m,motor_speed_rad_s,said", *ROWS[9:]], "got another header in row 10"),
+        ([*ROWS[:9], "Channels,4", "***End_of_Header***,,", *ROWS[9:]], "got another header in row 11"),
     ],
 )
 def test_many_rows_of_garbage_or_another_header_are_refused_with_their_row(

@@ -164,3 +164,27 @@ def test_twincat_channels_with_one_shared_time_column_have_a_clock_in_millisecon
 def test_a_first_line_with_more_than_10000_cells_is_refused() -> None:
     with pytest.raises(LogError, match=r"at most 10,000 columns are read, the first line has 20,001 cells"):
         layout_of_lines(["0," * 20_000], "utf-8", "a.csv")
+
+
+def test_a_preamble_that_excel_pads_with_delimiters_is_not_taken_for_data() -> None:
+    above = ["Operator,bench 2,,", "Rate,1000,,", "Range,200 mm,400 bar,9 rpm", "", "t [s],x [mm],p [bar],n [rpm]"]
+    made = layout(*above, *(f"{0.1 * k:.1f},1.5,2.5,3.5" for k in range(9)))
+    assert made.skipped == 5
+    assert [one.bare for one in made.headings] == ["t", "x", "p", "n"]
+
+
+def test_a_name_that_is_a_number_does_not_turn_the_header_into_data() -> None:
+    made = layout("t [s],x [mm],3", "0.0,1.5,2.5", "0.1,1.5,2.5", "0.2,1.5,2.5")
+    assert made.skipped == 1
+    assert made.headings[1].unit == "mm"
+
+
+def test_of_two_rows_of_names_the_one_with_units_counts() -> None:
+    made = layout("CH,U1,U2", "Time,U1[rpm],U2[mm]", "0.0,1.5,2.5", "0.1,1.5,2.5", "0.2,1.5,2.5")
+    assert [one.unit for one in made.headings] == [None, "rpm", "mm"]
+
+
+def test_units_that_simulink_writes_below_the_names_are_read() -> None:
+    above = ["time,n,x", ",Type: double,Type: double", ",Unit: rpm,Unit: mm", ",Interp: linear,Interp: zoh"]
+    made = layout(*above, "0.0,1.5,2.5", "0.1,1.5,2.5", "0.2,1.5,2.5")
+    assert [(one.name, one.unit) for one in made.headings] == [("time", None), ("n", "rpm"), ("x", "mm")]
