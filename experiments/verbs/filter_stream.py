@@ -27,6 +27,7 @@ from experiments.streams.broker import broker_publisher
 from experiments.streams.endings import report_end, say_line, stop_at_signals
 from experiments.streams.filtering import Filtering
 from experiments.streams.rows import STANDARD_INPUT, stream_input, warn_of_lost_batches
+from plant.errors import LogError
 from plant.log.stream.source import BatchCounts, bounded_lines, is_stream, stream_lines
 
 commands = typer.Typer()
@@ -114,8 +115,18 @@ def _lines(stream: str, received: BatchCounts) -> Iterator[str]:
     elif stream == "-":
         yield from stream_input(sys.stdin)
     else:
+        _require_text(Path(stream))
         with (
             os_errors_as(f"{stream}: it cannot be read"),
             Path(stream).open(encoding="utf-8", errors="replace", newline="\n") as file,
         ):
             yield from bounded_lines(file, stream)
+
+
+def _require_text(path: Path) -> None:
+    """Refuse a file of another format, whose bytes would be taken for a header."""
+    from plant.log.formats.detect import format_of
+    from plant.log.formats.packed import packing_of
+
+    if path.is_file() and path.stat().st_size and (format_of(path) != "csv" or packing_of(path) is not None):
+        raise LogError("rows are filtered from text; `hydrostate estimate LOG --method ekf` filters a log", str(path))

@@ -71,7 +71,8 @@ def merge_loggers(parts: Sequence[LoggerChannels], source: str) -> MergedChannel
     Returns
     -------
     MergedChannels
-        Channels on one time; those of slower loggers are missing between their samples.
+        Channels on one time; those of slower loggers are missing between their samples, and those of a logger that took
+        no sample everywhere.
 
     Raises
     ------
@@ -79,6 +80,11 @@ def merge_loggers(parts: Sequence[LoggerChannels], source: str) -> MergedChannel
         If some have dates and others have not, they do not overlap, or the stamps of one are no clock's.
     """
     parts = [one for one in parts if one.channels]
+    if len(kept := [one for one in parts if _has_samples(one)]) < len(parts) and kept:
+        merged = merge_loggers(kept, source)
+        nothing = np.full(len(merged.channels[TIME]), np.nan)
+        empty = {name: nothing for one in parts if not _has_samples(one) for name in one.channels}
+        return MergedChannels({**merged.channels, **empty}, merged.notes)
     if len(parts) == 1 or all(_same_time(parts[0].time, one.time) for one in parts[1:]):
         together = {name: values for one in parts for name, values in one.channels.items()}
         return MergedChannels({TIME: parts[0].time, **together} if parts else {})
@@ -111,6 +117,11 @@ def merge_loggers(parts: Sequence[LoggerChannels], source: str) -> MergedChannel
     notes.append(LogCode.LOGGERS_MERGED.note(loggers=names, duration_s=T * (count - 1), sample_time_s=T))
     time: Any = even if epoch is None else epoch + np.rint(1e9 * even).astype("timedelta64[ns]")
     return MergedChannels({TIME: time, **channels}, tuple(notes))
+
+
+def _has_samples(one: LoggerChannels) -> bool:
+    """Return whether a logger took any sample: a bus may never have sent a message."""
+    return bool(np.any(~np.isnat(one.time) if one.time.dtype.kind == "M" else np.isfinite(one.time)))
 
 
 def _same_time(one: Any, other: Any) -> bool:

@@ -185,7 +185,8 @@ def refusal(error: BaseException, kind: str, path: Path) -> BaseException:
         return LogError(f"cannot be read as {kind}", str(path)) if panicked else error
     if isinstance(error, PermissionError):
         return LogError("there is no permission to read it", str(path))
-    said = " ".join(re.sub(r" at 0x[0-9a-f]+", "", str(error)).split())[:200] or type(error).__name__
+    lacking = "it lacks " if isinstance(error, LookupError) else ""
+    said = lacking + (" ".join(re.sub(r" at 0x[0-9a-f]+", "", str(error)).split())[:200] or type(error).__name__)
     if isinstance(error, MemoryError):
         return NoMemoryError(f"reading it as {kind} needs more memory than there is ({said})", str(path))
     return LogError(f"cannot be read as {kind}: {said}", str(path))

@@ -53,9 +53,9 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
 
     made: list[Table] = []
     units: dict[str, str] = {}
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), path.open("rb") as file:  # of a path, openpyxl would judge the suffix
         warnings.simplefilter("ignore")
-        reader = openpyxl.reader.excel.ExcelReader(path, read_only=True, data_only=True, keep_links=False)
+        reader = openpyxl.reader.excel.ExcelReader(file, read_only=True, data_only=True, keep_links=False)
         reader.read_chartsheet = _skip_charts
         reader.read()
         book = reader.wb

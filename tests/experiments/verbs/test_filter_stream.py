@@ -124,3 +124,11 @@ def test_a_stream_without_a_needed_channel_and_a_missing_file_are_refused(tmp_pa
     assert told[-1]["outcome"] == "failed"
     assert "standard input" in error
     assert "it cannot be read" in run(tmp_path / "nowhere.csv")[2]
+
+
+@pytest.mark.parametrize("name", ["run.parquet", "run.csv.gz"])
+def test_a_log_that_is_no_text_is_refused_with_the_command_that_filters_it(tmp_path: Path, name: str) -> None:
+    write_record(bench(), tmp_path / name)
+    code, told, said = run(tmp_path / name)
+    assert (code, told[-1]["outcome"]) == (2, "failed")
+    assert "estimate LOG --method ekf" in said

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from plant.errors import LogError, LogWarning
-from plant.log.clock.merging import SAME_TIME_TOLERANCE, _same_time
+from plant.log.clock.merging import SAME_TIME_TOLERANCE, LoggerChannels, _same_time, merge_loggers
 from plant.log.files import read_record
 
 T = 1e-3
@@ -80,3 +80,14 @@ def test_the_refusal_of_logs_that_do_not_overlap_suggests_an_exchanged_day_and_m
     other = logger(tmp_path / "b.csv", "position_m", steps, iso)
     with pytest.raises(LogError, match=r"2026-01-03 12:00:00 to .*2026-03-01 12:00:00 to .*may be exchanged"):
         read_record(motor, beside=[other])
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_channels_of_a_logger_that_took_no_sample_are_missing_and_the_others_are_read(count: int) -> None:
+    time = 0.001 * np.arange(50.0)
+    full = [LoggerChannels("a", time, {"position_m": time}), LoggerChannels("b", time, {"velocity_m_s": time})][:count]
+    empty = LoggerChannels("c", time[:0], {"differential_pressure_pa": time[:0]})
+    merged = merge_loggers([empty, *full], "log").channels
+    assert np.isnan(merged["differential_pressure_pa"]).all()
+    assert all(len(values) == 50 for values in merged.values())
+    assert len(merged) == count + 2

@@ -163,6 +163,12 @@ def test_numbers_that_an_hdf5_file_takes_from_other_files_or_from_itself_are_not
     assert names(table) == ["time"]
 
 
+def test_a_workbook_is_known_by_its_content_whatever_its_suffix(tmp_path: Path) -> None:
+    path = workbook(tmp_path / "log.xlsx", [["time_s", "position_mm"], *([0.1 * k, k] for k in range(9))])
+    (table,) = open_tables(path.rename(tmp_path / "log.csv"))
+    assert names(table) == ["time_s", "position_mm"]
+
+
 def test_an_archive_without_a_workbook_is_no_log(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "logs.xlsx", "w") as archive:
         archive.writestr("log.csv", "time_s,position_m\n0,0\n")
