@@ -22,8 +22,8 @@ _SIGNS = str.maketrans(
     {"²": "^2", "³": "^3", "⁻": "-", "¹": "1", "μ": "µ", "·": "*", "⋅": "*", "\u2212": "-", "\u00d7": "*"}
 )
 
-GAUGE = ("barg", "bar(g)")
-"""Gauge pressure in bar: for a pressure difference, which a log has, it equals bar."""
+GAUGE = {"barg": "bar", "bar(g)": "bar", "psig": "psi", "psi(g)": "psi"}
+"""Gauge pressure: for a pressure difference, which a log has, it equals the plain unit."""
 
 SPELLINGS: Mapping[str, str] = {
     "°": "degree",
@@ -33,7 +33,9 @@ SPELLINGS: Mapping[str, str] = {
     "Sekunden": "s",
     "Volt": "V",
     "Volts": "V",
-    **dict.fromkeys(GAUGE, "bar"),
+    **GAUGE,
+    "psid": "psi",
+    **dict.fromkeys(("kg/cm2", "kg/cm^2"), "kgf/cm^2"),
 }
 """Spellings used on benches, and their meaning."""
 

@@ -76,6 +76,9 @@ LEARNING = 120.0
 LEAST_LEARNING = 60.0
 """Shortest healthy running that can be set before alarms [s]."""
 
+MOST_LEARNING = 1e7
+"""Longest such running: four months; judged [s]."""
+
 AFTER = 2.0
 """Running time after an alarm from which the change of the gains is determined [s]."""
 
@@ -125,8 +128,9 @@ class Watch:
             raise HydrostateError(f"a watch needs a sample at least every {SLOWEST:g} s, got one in {sample_time:g} s")
         if not (isfinite(false_alarms) and 0.0 < false_alarms <= 60.0):
             raise HydrostateError(f"false alarms must be over 0 and at most 60 an hour, got {false_alarms:g}")
-        if not (isfinite(learning) and learning >= LEAST_LEARNING):
-            raise HydrostateError(f"learning must take at least {LEAST_LEARNING:g} s, got {learning:g} s")
+        if not LEAST_LEARNING <= learning <= MOST_LEARNING:
+            allowed = f"at least {LEAST_LEARNING:g} s and at most {MOST_LEARNING:g} s"
+            raise HydrostateError(f"learning must take {allowed}, got {learning:g} s")
         balances = BALANCES if pressure else ("motion",)
         self.pressure, self.balances = pressure, (*balances, LOSS_BALANCE)
         self.sample_time, self.start = sample_time, start

@@ -56,7 +56,7 @@ NAMES: Mapping[str, tuple[tuple[str, float], ...]] = {
 
 OTHER_QUANTITIES = re.compile(
     r"(^|_)(soll\w*|set\w*|sp|ref\w*|cmd|command\w*|demand|target|desired|err\w*|max|min|limit|std|temp\w*|status|flag|"
-    r"count\w*|index|filter\w*)(_|$)"
+    r"count\w*|index|filter\w*|time_of(?!_day))(_|$)"
 )
 """Words of columns that are not the measured channel: set points, errors, temperatures."""
 
