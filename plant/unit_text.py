@@ -30,6 +30,8 @@ SPELLINGS: Mapping[str, str] = {
     "°/s": "degree/s",
     "°C": "degC",
     "deg": "degree",
+    "Grad": "degree",
+    "Grad/s": "degree/s",
     "Sekunden": "s",
     "Volt": "V",
     "Volts": "V",

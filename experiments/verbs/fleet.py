@@ -1,5 +1,6 @@
 """`hydrostate fleet FOLDER_OR_STORE`: one page with one row per actuator, the sick ones at the top."""
 
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -161,7 +162,7 @@ def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
     Raises
     ------
     HydrostateError
-        If a severity is not known, or a value is not a number.
+        If a severity is not known, or a value is no finite number.
     """
     if not texts:
         return {}
@@ -173,8 +174,10 @@ def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
         require_known("--limit", name, list(UNITS))
         try:
             found[name] = float(value)
-        except ValueError as error:
-            raise HydrostateError(f"--limit {name} must be a number in {UNITS[name]}, got {value!r}") from error
+        except ValueError:
+            found[name] = math.nan
+        if not math.isfinite(found[name]):
+            raise HydrostateError(f"--limit {name} must be a number in {UNITS[name]}, got {value!r:.80}")
     return found
 
 

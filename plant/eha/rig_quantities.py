@@ -64,7 +64,7 @@ def _in_si(name: str, value: Any, unit: str) -> Any:
         raise RigError(f"{wrong}: {error}") from error
     if given in GAUGE:  # some parameters are absolute pressures
         raise RigError(
-            f"parameters.{name} must be in {GAUGE[given]} or {unit}, got {entry_text(value)}, a pressure above the atmosphere: "
-            "add 1.013 bar if the parameter is absolute"
+            f"parameters.{name} must be in {GAUGE[given]} or {unit}, got {entry_text(value)}, a pressure above the "
+            "atmosphere: add 1.013 bar if the parameter is absolute"
         )
     return amount * factor + offset

@@ -188,7 +188,7 @@ def _channel_of(heading: Heading) -> str | None:
         return known
     if heading.stem in TIME_NAMES and heading.unit is not None and converts(heading.unit, "s"):
         return TIME
-    stems = [stem for stem in STEMS if name.startswith(stem) and not _PART.search(name)]
+    stems = [stem for stem in STEMS if name.startswith(stem) and name != stem and not _PART.search(name)]
     return STEMS[max(stems, key=len)] if stems and heading.name == heading.bare else None
 
 

@@ -48,3 +48,18 @@ def test_every_spelling_of_revolutions_per_minute_is_read(unit: str) -> None:
 @pytest.mark.parametrize(("unit", "spelt"), [("m/s²", "m/s^2"), ("kgf/cm2", "kgf/cm^2"), ("BAR", "bar"), ("Mm", "Mm")])
 def test_units_of_benches_are_converted_to_the_spelling_of_the_library(unit: str, spelt: str) -> None:
     assert plain_unit(unit) == spelt
+
+
+@pytest.mark.parametrize(
+    ("spelling", "unit"),
+    [
+        ("mm/Sec", "mm/s"),
+        ("Sec", "s"),
+        ("psid", "psi"),
+        ("psig", "psi"),
+        ("kg/cm2", "kgf/cm^2"),
+        ("Grad/s", "degree/s"),
+    ],
+)
+def test_spellings_of_benches_mean_a_unit(spelling: str, unit: str) -> None:
+    assert plain_unit(spelling) == unit

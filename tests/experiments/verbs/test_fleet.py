@@ -42,7 +42,11 @@ def test_a_folder_may_hold_logs_of_another_kind_of_actuator(tmp_path: Path) -> N
 
 @pytest.mark.parametrize(
     ("option", "words"),
-    [("leak=2", "--limit must be one of"), ("leakage_flow=much", "--limit leakage_flow must be a number in L/min")],
+    [
+        ("leak=2", "--limit must be one of"),
+        ("leakage_flow=much", "--limit leakage_flow must be a number in L/min"),
+        ("leakage_flow=nan", "must be a number in L/min, got 'nan'"),
+    ],
 )
 def test_a_limit_that_cannot_be_used_is_refused(tmp_path: Path, option: str, words: str) -> None:
     code, _, said = invoke("fleet", tmp_path, "--limit", option)

@@ -57,6 +57,10 @@ def test_a_field_name_or_matrix_index_after_a_channel_is_not_read_as_a_unit() ->
     assert channels("position_m.Data", "velocity_m_s 1", "time_s.Time") == {}
 
 
+def test_a_name_that_ends_where_its_unit_should_stand_is_not_taken_to_be_in_si() -> None:
+    assert resolve_columns(["position_", "motor_speed_", "time_"], None, "a.csv") == ()
+
+
 def test_an_unknown_unit_is_refused_with_file_column_channel_and_unit() -> None:
     with pytest.raises(LogError, match=r"a\.csv: column 'position_xyz' cannot become position_m: unit 'xyz'"):
         channels("time_s", "position_xyz")
