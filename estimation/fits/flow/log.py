@@ -62,6 +62,9 @@ FELT_GAP = 0.1
 FELT_NOISE = 0.1
 """Position noise matters to the slopes if it moves pressure by this share of the sensor's noise [fraction]."""
 
+STIFFEST_OIL = 5e9
+"""Bulk modulus above that of any hydraulic fluid [Pa]; mineral oil without air has 2 GPa, and 3 at 100 MPa."""
+
 BESIDE_STOP = 0.02
 """Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft. Also the largest
 first reading of a log that begins in mid-stroke, where the reading should be zero [fraction]."""
@@ -133,10 +136,6 @@ def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array
     open_by = 0.5 * stiffness * sudden * length * record.sample_time
     open_gaps = np.array([first, behind, open_by**2 / (length + 1)], dtype=np.float64)
     return np.ascontiguousarray(open_gaps[:, open_by > FELT_GAP * noise].T)
-
-
-STIFFEST_OIL = 5e9
-"""Bulk modulus above that of any hydraulic fluid [Pa]; mineral oil without air has 2 GPa, and 3 at 100 MPa."""
 
 
 def flow_log(
@@ -238,7 +237,7 @@ def _with_leaking_noise(log: GreyBoxLog, p: EhaParameters, record: Record) -> Gr
 
 
 def with_random_walk(
-    log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float], stiffest: float = np.inf
+    log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float], stiffest: float = STIFFEST_OIL
 ) -> GreyBoxLog:
     """Return a log in which noise of motor speed adds a random walk to the pressure.
 
@@ -261,7 +260,7 @@ def with_random_walk(
     GreyBoxLog
         The same log if the walk does not matter beside the pressure sensor's noise before the oil has leaked off.
     """
-    (noise,), stiffness = log.noise, min(values["bulk_modulus"], stiffest, STIFFEST_OIL) / parameters.chamber_volume
+    (noise,), stiffness = log.noise, min(values["bulk_modulus"], stiffest) / parameters.chamber_volume
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
     variance = noise_behind_motion(speed, log.drive_std[0] ** 2)
     walk = (stiffness * parameters.pump_displacement) ** 2 * variance * log.sample_time

@@ -93,7 +93,7 @@ class FitStart:
     bulk_modulus: float
     speed_offset: float = 0.0
     valley: Mapping[str, float] | None = None
-    stiffest: float = np.inf
+    stiffest: float = STIFFEST_OIL
     turns_read: bool = False
     implicit: bool = False
     held: bool = False
@@ -282,7 +282,7 @@ def quieter_start(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
         None if the noise is already that of the oil that explains the log, or does not matter.
     """
     modulus, log = strange.values["bulk_modulus"], plain.log
-    heard = min(plain.swinging.values["bulk_modulus"], plain.start.stiffest, STIFFEST_OIL)
+    heard = min(plain.swinging.values["bulk_modulus"], plain.start.stiffest)
     white, walked = log.noise[0].variance * log.sample_time / log.block, log.noise[0].walk * log.block
     quiet = white + walked * min(modulus / heard, 1.0) ** 2
     return replace(plain.start, stiffest=modulus) if white + walked > MOST_EXCESS_NOISE * quiet else None

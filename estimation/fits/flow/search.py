@@ -7,7 +7,7 @@ import numpy as np
 
 from estimation.arrays import IntArray
 from estimation.fits.flow.accumulator import first_stiffness
-from estimation.fits.flow.log import DRAIN_START, OPENING_START
+from estimation.fits.flow.log import DRAIN_START, OPENING_START, STIFFEST_OIL
 from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, lower_end
 from estimation.fits.flow.rough_search import RIVAL_COST, UNLIKELY, RoughOptimum, rough_optima
 from estimation.fits.flow.swept import with_first_fit
@@ -121,7 +121,7 @@ def balance_fits(
     parameters: EhaParameters,
     starts: Sequence[Mapping[str, float]],
     valley: Mapping[str, float] | None = None,
-    stiffest: float = np.inf,
+    stiffest: float = STIFFEST_OIL,
 ) -> Sequence[GreyBoxFit]:
     """Return the fits of the balances that count.
 
@@ -175,7 +175,7 @@ def balance_fits(
 
 
 def refitted_balances(
-    log: GreyBoxLog, parameters: EhaParameters, fits: Sequence[GreyBoxFit], stiffest: float = np.inf
+    log: GreyBoxLog, parameters: EhaParameters, fits: Sequence[GreyBoxFit], stiffest: float = STIFFEST_OIL
 ) -> Sequence[GreyBoxFit]:
     """Return the fits of a log that differs little from one already fitted, started from those fits.
 

@@ -14,7 +14,7 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
 from estimation.fits.flow.accumulator import first_stiffness
-from estimation.fits.flow.log import flow_log, without_strays
+from estimation.fits.flow.log import STIFFEST_OIL, flow_log, without_strays
 from estimation.fits.flow.other_minimum import lower_end, lower_minimum
 from estimation.fits.flow.search import balance_fits, flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
@@ -147,9 +147,9 @@ def test_a_hypothesis_is_accepted_only_if_it_gains_over_the_plain_form_in_its_mi
         parameters: EhaParameters,
         starts: object,
         valley: Mapping[str, float] | None = None,
-        stiffest: float = np.inf,
+        stiffest: float = STIFFEST_OIL,
     ) -> Sequence[GreyBoxFit]:
-        assert stiffest == np.inf  # no limit: position noise is that for the oil that was found
+        assert stiffest == STIFFEST_OIL  # noise of motor speed is that for the oil found, up to this
         assert parameters is PAPER
         assert starts
         told.append(valley)
