@@ -21,7 +21,7 @@ from estimation.fits.hypothesis_search.fault_guesses import (
 )
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP, FormFit, likelihood_mean, with_structure
 from estimation.fits.motion.chatter import without_chatter
-from estimation.fits.motion.force_scale import Way, bulk_modulus, disagree, optimum_on_other_scales
+from estimation.fits.motion.force_scale import Way, bulk_modulus, disagree, is_short, optimum_on_other_scales
 from estimation.fits.motion.noise_annealing import RETURNING
 from estimation.fits.motion.search import (
     ENOUGH,
@@ -30,7 +30,6 @@ from estimation.fits.motion.search import (
     HOPELESS,
     NEAR_ENOUGH,
     NEARING,
-    SCREENED,
     SLIGHT_SHARE,
     WAYS,
     MotionSearch,
@@ -308,7 +307,7 @@ def _wanted_cost(problem: FreedProblem, begun: Point, share: float = 1.0) -> flo
     samples = len(problem.log.measured)
     chi_square = 2.0 * problem.at(begun.theta).cost / samples  # the search begins here and reuses this run
     spared = chi_square < share * SPARED_NIS or share_of_motion(chi_square, problem.log) < share * SPARED_SHARE
-    return explained_cost(problem) if spared and samples * problem.log.sample_time > SCREENED else np.inf
+    return explained_cost(problem) if spared and not is_short(problem.log) else np.inf
 
 
 def _rival_fits(second: SearchResult, whole: FreedProblem, best: Point, *, told: bool) -> list[GreyBoxFit]:

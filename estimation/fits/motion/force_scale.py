@@ -7,6 +7,7 @@ import numpy as np
 
 from estimation.fits.greybox.descent import Point, descend_together
 from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
 from plant.arrays import Array
 
 SCALES = (0.8, 1.25)
@@ -24,9 +25,12 @@ MOST_RESCALINGS = 3
 LEAST_FALL = 5.0
 """Fall of the cost from which a better optimum is left in its turn [dimensionless]."""
 
-ELSEWHERE, SHORT = 0.005, 4.0
-"""Relative difference in bulk modulus from which the same [fraction], in logs up to this length [s]. In longer logs the
-two optima must disagree: if they are nearer, the same places are searched again, which takes 1 s and changes little."""
+ELSEWHERE = 0.005
+"""Relative difference in bulk modulus from which the same, in a short log [fraction]. In longer logs the two optima
+must disagree: if they are nearer, the same places are searched again, which takes 1 s and changes little."""
+
+SHORT = 4.0
+"""Length up to which a log is short [s]: any improvement of its fit counts, since searches take little time."""
 
 ALMOST, NEARBY = 1e-3, 0.3
 """Relative difference in bulk modulus, and the same over its deviation, up to which a nearby optimum counts as the
@@ -101,8 +105,7 @@ def optimum_on_other_scales(problem: FreedProblem, best: Point, way: Way) -> tup
         The best optimum, and the bulk moduli of all others that explain the log [Pa].
     """
     found, moduli = [best], list[float]()
-    short = len(problem.log.measured) * problem.log.sample_time <= SHORT
-    far = ELSEWHERE if short else np.log(1.0 + LARGEST_DISAGREEMENT)
+    far = ELSEWHERE if is_short(problem.log) else np.log(1.0 + LARGEST_DISAGREEMENT)
     for _ in range(MOST_RESCALINGS):
         for moved in _rescaled_starts(problem.model.values(best.theta)):
             found += _downhill_optima(problem, best, moved, way)
@@ -115,6 +118,11 @@ def optimum_on_other_scales(problem: FreedProblem, best: Point, way: Way) -> tup
         if over or moved < far or disagree([bulk_modulus(problem, best), *moduli]):
             break
     return best, moduli
+
+
+def is_short(log: GreyBoxLog) -> bool:
+    """Return whether a log lasts no longer than `SHORT`."""
+    return len(log.measured) * log.sample_time <= SHORT
 
 
 def disagree(moduli: Sequence[float]) -> bool:

@@ -9,9 +9,10 @@ import pytest
 from estimation.fits.greybox.descent import Point
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion.fit import BEGINNING_SHARE, SPARED_NIS, SPARED_SHARE
-from estimation.fits.motion.search import EXPLAINED, SCREENED, SearchResult
+from estimation.fits.motion.force_scale import SHORT
+from estimation.fits.motion.search import EXPLAINED, SearchResult
 
-LONG = round(1e3 * SCREENED) + 1
+LONG = round(1e3 * SHORT) + 1
 
 BEGUN = Point(np.ones(1), 1.0, np.zeros(1), np.zeros((1, 1)))
 
